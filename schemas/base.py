@@ -1,0 +1,68 @@
+"""The base of every JSON payload: strict, frozen, written canonically."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
+
+from schemas.errors import BadInput
+
+
+def canonical_json(value: Any) -> str:
+    """Return `value` as JSON with sorted keys and no white space; NaN and infinities raise ValueError."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+
+
+def _check_rows(rows: int, columns: int):
+    def check(value: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+        if len(value) != rows or any(len(row) != columns for row in value):
+            raise ValueError(f"expected {rows}x{columns} numbers")
+        return value
+
+    return check
+
+
+Vector3 = tuple[float, float, float]
+QuaternionXYZW = tuple[float, float, float, float]
+Transform = Annotated[tuple[tuple[float, ...], ...], AfterValidator(_check_rows(4, 4))]
+"""A 4x4 homogeneous `target_from_source` matrix, row major, metres."""
+
+
+def as_transform(matrix: np.ndarray) -> tuple[tuple[float, ...], ...]:
+    """Convert a (4, 4) array into the JSON form of a `Transform`."""
+    return tuple(tuple(float(x) for x in row) for row in np.asarray(matrix, dtype=float).reshape(4, 4))
+
+
+def as_vector(values: np.ndarray) -> Vector3:
+    """Convert a (3,) array into the JSON form of a `Vector3`."""
+    x, y, z = (float(v) for v in np.asarray(values, dtype=float).reshape(3))
+    return (x, y, z)
+
+
+class Model(BaseModel):
+    """A payload model. Unknown keys are errors, values are immutable, NaN is refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, protected_namespaces=())
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read and validate a JSON file. Raises BadInput naming the file and the first wrong field."""
+        try:
+            return cls.model_validate_json(Path(path).read_bytes())
+        except FileNotFoundError:
+            raise BadInput(f"{path}: file is missing", hint="make the artifact again") from None
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(str(part) for part in first["loc"]) or "document"
+            raise BadInput(f"{path}: {where}: {first['msg']}", hint="make the artifact again") from None
+
+    def write(self, path: Path) -> None:
+        """Write the model as indented JSON with sorted keys and a final newline."""
+        text = json.dumps(
+            self.model_dump(mode="json"), sort_keys=True, indent=1, allow_nan=False, ensure_ascii=False
+        )
+        Path(path).write_text(text + "\n", encoding="utf-8")

@@ -1,0 +1,64 @@
+"""Kind `cad_library`: parametric and imported furniture, ready for matching and for simulation."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from schemas.artifact import Artifact
+from schemas.base import Model, Vector3
+from schemas.scene_parts import Joint, SurfacePlane
+
+
+class ModelState(Model):
+    """The shape of a model at one set of joint values. Matching tries every state."""
+
+    joints: dict[str, float]
+    """Joint name -> value; empty for rigid models."""
+    box_minimum: Vector3
+    box_maximum: Vector3
+    planes: tuple[SurfacePlane, ...]
+    """Surface planes in the model frame; the `horizontal` ones are support surfaces."""
+
+
+class CadModel(Model):
+    """One CAD model. Model frame: metres, z up, front along -y, origin at the centre of the bottom
+    of the closed (all joints 0) bounding box."""
+
+    id: str
+    class_name: str
+    articulated: bool
+    mass: float
+    """Total mass [kg] at scale 1."""
+    states: tuple[ModelState, ...]
+    """First the closed one."""
+    joints: tuple[Joint, ...] = ()
+    movable: bool
+    contains: bool = False
+    """Whether things can be put inside."""
+    grasp_width: float | None = None
+    """Horizontal extent that a two-finger gripper can close on [m], for movable models."""
+    parts: tuple[str, ...]
+    """Link names; the first is the body."""
+    recipe: dict[str, float | int | str] = {}
+    """Generator and its parameters, or the source file of an import."""
+
+
+class LibraryFile(Model):
+    """library.json."""
+
+    seed: int
+    models: tuple[CadModel, ...]
+
+
+class CadLibrary(Artifact):
+    """Folder `models/<id>/`: `model.urdf` (self-contained, meshes by relative path), `visual/<part>.glb`,
+    `collision/<part>_<k>.obj` (convex)."""
+
+    kind: ClassVar[str] = "cad_library"
+    description: ClassVar[str] = "CAD models: URDF, visual and convex collision meshes, planes, joints, affordances"
+    json_files: ClassVar[dict[str, type[Model]]] = {"library.json": LibraryFile}
+
+    @property
+    def library(self) -> LibraryFile:
+        """The parsed library.json."""
+        return LibraryFile.read(self.path("library.json"))

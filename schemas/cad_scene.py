@@ -1,0 +1,68 @@
+"""Kind `cad_scene`: the functionally equivalent scene cg' (Han 2024, section 2.4)."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from schemas.artifact import Artifact
+from schemas.base import Model, Transform
+from schemas.contact_graph import ContactGraphFile
+
+
+class CadCandidate(Model):
+    """One aligned candidate: CAD model, state and pose."""
+
+    model_id: str
+    joints: dict[str, float] = {}
+    scale: float
+    world_from_model: Transform
+    """Rigid part, without the scale: p_world = world_from_model * (scale * p_model)."""
+    matching_error: float
+    """Equation 2.7."""
+    alignment_error: float
+    """Root mean square distance from object vertices to the CAD surface [m]."""
+
+
+class Replacement(Model):
+    """What stands for one graph node."""
+
+    node: str
+    decision: Literal["cad", "mesh", "layout"]
+    """`mesh`: no valid candidate, the reconstructed mesh stays; `layout`: never replaced."""
+    reason: str = ""
+    """Why not `cad`, with numbers."""
+    chosen: CadCandidate | None = None
+    alternatives: tuple[CadCandidate, ...] = ()
+    rejected: dict[str, int] = {}
+    """Reason -> number of candidates discarded."""
+
+
+class CadSceneFile(Model):
+    """scene.json."""
+
+    replacements: tuple[Replacement, ...]
+    conflicts_before: int
+    """Colliding pairs with the best candidate of each object."""
+    conflicts_after: int
+    iterations: int
+    """Steps of min-conflicts."""
+
+
+class CadScene(Artifact):
+    """`scene.json`, `graph.json` (cg': the contact graph with model, pose, scale, joints per node, boxes and
+    planes of the CAD models), `models/<id>/` (copies of the chosen library models), `meshes/<node>.ply` (nodes
+    that keep their mesh), `layout/<node>.ply`."""
+
+    kind: ClassVar[str] = "cad_scene"
+    description: ClassVar[str] = "CAD replacement: model, pose, scale, errors and alternatives per node"
+    json_files: ClassVar[dict[str, type[Model]]] = {"scene.json": CadSceneFile, "graph.json": ContactGraphFile}
+
+    @property
+    def scene(self) -> CadSceneFile:
+        """The parsed scene.json."""
+        return CadSceneFile.read(self.path("scene.json"))
+
+    @property
+    def graph(self) -> ContactGraphFile:
+        """The parsed graph.json of cg'."""
+        return ContactGraphFile.read(self.path("graph.json"))

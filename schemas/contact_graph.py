@@ -1,0 +1,77 @@
+"""Kind `contact_graph`: the parse tree of supports and the proximal relations (Han 2024, section 2.2)."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from schemas.artifact import Artifact
+from schemas.base import Model, Transform
+from schemas.scene_parts import Box, Relation, SurfacePlane
+
+SCENE_NODE = "scene"
+
+
+class GraphNode(Model):
+    """A node <o, c, M, B, Pi>. The scene root has neither mesh nor box."""
+
+    id: str
+    """`<class>_<instance>`, unique; `scene` for the root."""
+    instance: int
+    """Instance label o in the panoptic map or ground truth; 0 for the scene root."""
+    class_name: str
+    node_type: Literal["scene", "layout", "rigid", "articulated"]
+    mesh: str | None = None
+    """M: path inside the panoptic map artifact (`entities/<instance>.ply`), or None."""
+    box: Box | None = None
+    """B, gravity-aligned, world frame, after refinement."""
+    box_observed: Box | None = None
+    """B before refinement onto the supporting plane."""
+    planes: tuple[SurfacePlane, ...] = ()
+    """Pi, world frame."""
+    confidence: float = 1.0
+    # What cg' adds (kind cad_scene): which model stands for the node.
+    model_id: str | None = None
+    world_from_model: Transform | None = None
+    scale: float | None = None
+    joints: dict[str, float] = {}
+
+
+class ContactGraphFile(Model):
+    """graph.json: node-link form (networkx.node_link_graph(edges="links") reads it)."""
+
+    directed: bool = True
+    multigraph: bool = True
+    graph: dict[str, str] = {}
+    nodes: tuple[GraphNode, ...]
+    links: tuple[Relation, ...]
+
+    def node(self, node_id: str) -> GraphNode:
+        """Return the node with this id. Raises KeyError."""
+        for entry in self.nodes:
+            if entry.id == node_id:
+                return entry
+        raise KeyError(node_id)
+
+    def parent_link(self, node_id: str) -> Relation | None:
+        """Return the directed relation whose target is `node_id` (every node but the root has one)."""
+        for link in self.links:
+            if link.target == node_id and link.relation != "proximal":
+                return link
+        return None
+
+    def children(self, node_id: str) -> tuple[str, ...]:
+        """Return the ids of the nodes that `node_id` carries or contains."""
+        return tuple(link.target for link in self.links if link.source == node_id and link.relation != "proximal")
+
+
+class ContactGraph(Artifact):
+    """`graph.json`."""
+
+    kind: ClassVar[str] = "contact_graph"
+    description: ClassVar[str] = "contact graph: support tree and proximal relations, node-link JSON"
+    json_files: ClassVar[dict[str, type[Model]]] = {"graph.json": ContactGraphFile}
+
+    @property
+    def graph(self) -> ContactGraphFile:
+        """The parsed graph.json."""
+        return ContactGraphFile.read(self.path("graph.json"))

@@ -1,0 +1,48 @@
+"""Kinds `evaluation` and `report`."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from schemas.artifact import Artifact
+from schemas.base import Model
+
+
+class MetricsFile(Model):
+    """metrics.json: flat, `<part>/<measure>` -> number (`map/pq`, `graph/edit_distance`)."""
+
+    label: str
+    """Which masks and which room the figures are about; printed beside every figure."""
+    metrics: dict[str, float | None]
+    """None where a measure is undefined (no instance of the class, say)."""
+    notes: tuple[str, ...] = ()
+
+
+class Evaluation(Artifact):
+    """`metrics.json`, `tables/*.csv` and `*.md`, `plots/*.png`."""
+
+    kind: ClassVar[str] = "evaluation"
+    description: ClassVar[str] = "figures against ground truth, with tables and plots"
+    json_files: ClassVar[dict[str, type[Model]]] = {"metrics.json": MetricsFile}
+
+    @property
+    def metrics(self) -> MetricsFile:
+        """The parsed metrics.json."""
+        return MetricsFile.read(self.path("metrics.json"))
+
+
+class ReportFile(Model):
+    """report.json: which sections the page has, and from which artifacts (content digests)."""
+
+    title: str
+    sections: tuple[str, ...]
+    sources: dict[str, str]
+
+
+class Report(Artifact):
+    """`report.html`: one file, no network. It prints wall-clock times, therefore no digest covers it."""
+
+    kind: ClassVar[str] = "report"
+    description: ClassVar[str] = "one self-contained HTML page about a run"
+    json_files: ClassVar[dict[str, type[Model]]] = {"report.json": ReportFile}
+    undigested: ClassVar[tuple[str, ...]] = ("timings.json", "report.html")

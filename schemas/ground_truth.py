@@ -1,0 +1,67 @@
+"""Kind `ground_truth`: a generated log and everything that is true of the room it shows."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from schemas.artifact import Artifact
+from schemas.base import Model, Transform, Vector3
+from schemas.contact_graph import ContactGraphFile
+from schemas.scene_parts import Box, Camera
+
+
+class TrueObject(Model):
+    """One object or layout entity of the room."""
+
+    instance: int
+    """Label in the log's `labels` stream."""
+    name: str
+    """`<class>_<instance>`; the node id in graph.json and the body name in room/."""
+    class_name: str
+    model_id: str | None = None
+    """Model in the CAD library; None for layout entities."""
+    scale: float = 1.0
+    world_from_model: Transform
+    joints: dict[str, float] = {}
+    """Joint name -> value while the room was scanned."""
+    box: Box
+    """Gravity-aligned box of the whole object as it stands (open doors included)."""
+    visible_pixels: int = 0
+    """Pixels over all frames; 0 for what the camera never saw."""
+
+
+class GroundTruthFile(Model):
+    """ground_truth.json."""
+
+    seed: int
+    recipe: str
+    room_size: Vector3
+    camera: Camera
+    frame_count: int
+    depth_noise: bool
+    objects: tuple[TrueObject, ...]
+
+
+class GroundTruth(Artifact):
+    """`log.mcap` (what the sensor recorded: noisy depth, colour, poses, gravity unknown to the reader is
+    given as `world` z up; label stream), `trajectory.tum`, `graph.json` (true contact graph), `visible.npz`
+    (`points` (N, 3) float32 on a 1 cm grid of true surface that was seen, `instance` (N,) int32), `mesh.ply`
+    (the whole true surface), `room/` (interactive scene of the true room, laid out like kind
+    interactive_scene)."""
+
+    kind: ClassVar[str] = "ground_truth"
+    description: ClassVar[str] = "generated log with the true poses, boxes, contact graph, CAD poses and joints"
+    json_files: ClassVar[dict[str, type[Model]]] = {
+        "ground_truth.json": GroundTruthFile,
+        "graph.json": ContactGraphFile,
+    }
+
+    @property
+    def truth(self) -> GroundTruthFile:
+        """The parsed ground_truth.json."""
+        return GroundTruthFile.read(self.path("ground_truth.json"))
+
+    @property
+    def graph(self) -> ContactGraphFile:
+        """The parsed true contact graph."""
+        return ContactGraphFile.read(self.path("graph.json"))

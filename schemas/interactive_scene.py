@@ -1,0 +1,66 @@
+"""Kind `interactive_scene`: what simulators and robots load (Han 2024, section 2.4.5)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from schemas.artifact import Artifact
+from schemas.base import Model, Transform
+from schemas.contact_graph import ContactGraphFile
+from schemas.scene_parts import Box, Joint
+
+
+class SceneBody(Model):
+    """One node of the scene as links: in scene.urdf and static.urdf all links are prefixed `<name>__<part>`,
+    the body link is `<name>`."""
+
+    name: str
+    """Node id of the contact graph."""
+    class_name: str
+    movable: bool
+    """Movable bodies hang on floating joints in scene.urdf and have a file of their own."""
+    file: str | None = None
+    """`bodies/<name>.urdf` for movable bodies, None for those in static.urdf."""
+    parent: str | None = None
+    relation: str = "supports"
+    world_from_body: Transform
+    joints: tuple[Joint, ...] = ()
+    """Scaled; `name` and `part` carry the `<name>__` prefix of the URDF; origin, axis, handle in the body frame."""
+    joint_values: dict[str, float] = {}
+    """Prefixed joint name -> value in which the scene was reconstructed."""
+    box: Box
+    """World frame."""
+    mass: float
+    contains: bool = False
+    grasp_width: float | None = None
+
+
+class InteractiveSceneFile(Model):
+    """scene.json: how to load the scene. Physics engines that know no floating joints load `static_file` with a
+    fixed base and then each movable body at world_from_body."""
+
+    combined_file: str = "scene.urdf"
+    static_file: str = "static.urdf"
+    bodies: tuple[SceneBody, ...]
+
+
+class InteractiveScene(Artifact):
+    """`scene.urdf` (whole kinematic tree, root link `world`), `static.urdf`, `bodies/<name>.urdf`, `scene.json`,
+    `graph.json` (cg'), `scene.mjcf.xml`, `meshes/`."""
+
+    kind: ClassVar[str] = "interactive_scene"
+    description: ClassVar[str] = "URDF scene: whole kinematic tree, static tree, one file per movable body"
+    json_files: ClassVar[dict[str, type[Model]]] = {
+        "scene.json": InteractiveSceneFile,
+        "graph.json": ContactGraphFile,
+    }
+
+    @property
+    def scene(self) -> InteractiveSceneFile:
+        """The parsed scene.json."""
+        return InteractiveSceneFile.read(self.path("scene.json"))
+
+    @property
+    def graph(self) -> ContactGraphFile:
+        """The parsed graph.json."""
+        return ContactGraphFile.read(self.path("graph.json"))

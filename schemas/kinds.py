@@ -1,0 +1,32 @@
+"""The table of artifact kinds. Importing this registers every kind in `schemas.artifact.KINDS`."""
+
+from schemas.artifact import KINDS, Artifact
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import CadScene
+from schemas.contact_graph import ContactGraph
+from schemas.evaluation import Evaluation, Report
+from schemas.ground_truth import GroundTruth
+from schemas.interactive_scene import InteractiveScene
+from schemas.panoptic_map import PanopticMap
+from schemas.plan import Plan
+from schemas.segments import Segments
+from schemas.sequence import Sequence
+from schemas.trajectory import Depth, Trajectory
+
+__all__ = [
+    "KINDS",
+    "Artifact",
+    "CadLibrary",
+    "CadScene",
+    "ContactGraph",
+    "Depth",
+    "Evaluation",
+    "GroundTruth",
+    "InteractiveScene",
+    "PanopticMap",
+    "Plan",
+    "Report",
+    "Segments",
+    "Sequence",
+    "Trajectory",
+]

@@ -1,0 +1,77 @@
+"""The manifest: the record of how an artifact was made. A folder without a valid one does not exist."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from schemas.base import Model
+
+MANIFEST_NAME = "manifest.json"
+FORMAT_VERSION = 1
+
+CONVENTIONS: dict[str, str] = {
+    "length": "metre",
+    "angle": "radian",
+    "time": "second",
+    "camera_frame": "OpenCV: x right, y down, z forward",
+    "depth": "z-depth",
+    "world_frame": "right-handed, z up (REP-103), gravity along -z",
+    "transforms": "target_from_source",
+    "quaternions": "x, y, z, w",
+}
+
+
+class FileRecord(Model):
+    """One payload file. `digested` is false for files that hold wall-clock figures."""
+
+    path: str
+    bytes: int
+    sha256: str
+    digested: bool = True
+
+
+class InputRecord(Model):
+    """One input: its role, kind, content digest and path relative to the artifact folder."""
+
+    role: str
+    kind: str
+    digest: str
+    path: str
+
+
+class Provenance(Model):
+    """Who made it, where, and what it cost. Never part of a digest."""
+
+    command: tuple[str, ...] = ()
+    package_version: str = ""
+    git_commit: str = ""
+    git_dirty: bool = False
+    lock_digest: str = ""
+    platform: str = ""
+    python: str = ""
+    device: str = "cpu"
+    started: str = ""
+    seconds: float = 0.0
+    peak_memory_bytes: int = 0
+
+
+class Manifest(Model):
+    """docs/FORMATS.md, manifest."""
+
+    format_version: int = FORMAT_VERSION
+    kind: str
+    schema_version: int
+    stage: str
+    stage_version: int
+    key: str
+    content_digest: str
+    files: tuple[FileRecord, ...]
+    inputs: tuple[InputRecord, ...] = ()
+    parameters: dict[str, Any] = {}
+    seed: int = 0
+    libraries: dict[str, str] = {}
+    device_kind: str = "cpu"
+    conventions: dict[str, str] = CONVENTIONS
+    outcome: str = "ok"
+    summary: dict[str, Any] = {}
+    provenance: Provenance = Provenance()

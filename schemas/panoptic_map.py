@@ -1,0 +1,56 @@
+"""Kind `panoptic_map`: a labelled TSDF map and a mesh per entity (Han 2024, sections 2.3.2 to 2.3.4)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from schemas.artifact import Artifact
+from schemas.base import Model, Vector3
+
+
+class Entity(Model):
+    """One panoptic entity: an object or a layout surface."""
+
+    instance: int
+    """Global instance label p, >= 1."""
+    class_name: str
+    mesh: str
+    """`entities/<instance>.ply`."""
+    vertices: int
+    triangles: int
+    box_minimum: Vector3
+    box_maximum: Vector3
+    """Axis-aligned bounds in the world frame."""
+    confidence: float
+    """Share of the triple-wise count that agrees with (class, instance)."""
+    observations: int
+    """Frames that voted for it."""
+    segments: tuple[int, ...]
+    """Global segment labels l in it."""
+
+
+class EntitiesFile(Model):
+    """entities.json."""
+
+    voxel_size: float
+    truncation_distance: float
+    frames_integrated: int
+    segmentation: str
+    """`label` of the segments artifact: which masks these entities come from."""
+    entities: tuple[Entity, ...]
+
+
+class PanopticMap(Artifact):
+    """`mesh.ply` (whole map, colour), `mesh_labels.npz` (`instance`, `segment`, `class_id`: (V,) int32 per vertex
+    of mesh.ply, 0 = unlabelled), `entities/<instance>.ply`, `entities.json`, `counts.npz` (the triple-wise
+    count: `segment`, `class_id`, `instance`, `count`, each (K,)), `volume.npz` (`block_coordinates` (B, 3) int32,
+    `tsdf`, `weight`, `segment`, `color` over 8^3 voxels a block)."""
+
+    kind: ClassVar[str] = "panoptic_map"
+    description: ClassVar[str] = "labelled TSDF map: whole mesh, a mesh per entity, counts"
+    json_files: ClassVar[dict[str, type[Model]]] = {"entities.json": EntitiesFile}
+
+    @property
+    def info(self) -> EntitiesFile:
+        """The parsed entities.json."""
+        return EntitiesFile.read(self.path("entities.json"))

@@ -1,0 +1,73 @@
+"""Kind `plan`: symbolic plan, motions, what happened when it was executed, or why there is none."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from schemas.artifact import Artifact
+from schemas.base import Model, Transform
+from schemas.contact_graph import ContactGraphFile
+
+
+class Failure(Model):
+    """Why something failed, with names and numbers; the same record goes to people and to language models."""
+
+    kind: str
+    """`goal_unsatisfiable`, `no_inverse_kinematics`, `goal_in_collision`, `start_in_collision`, `no_path`,
+    `joint_limit`, `no_grasp`, `no_placement`, `grasp_lost`, `condition_not_met`, ..."""
+    message: str
+    action: str | None = None
+    objects: tuple[str, ...] = ()
+    numbers: dict[str, float] = {}
+
+
+class PlannedAction(Model):
+    """One step of the plan with its motion."""
+
+    name: str
+    """`drive`, `pick`, `place`, `open`, `close`."""
+    arguments: tuple[str, ...]
+    start: int
+    end: int
+    """Half-open range of rows in trajectory.npz."""
+    base_pose: Transform
+    """world_from_base during the action (at its end, for `drive`)."""
+
+
+class Check(Model):
+    """One condition of the goal, checked after execution."""
+
+    condition: str
+    holds: bool
+    detail: str
+    numbers: dict[str, float] = {}
+
+
+class PlanFile(Model):
+    """plan.json."""
+
+    goal: tuple[str, ...]
+    """Ground goal literals, e.g. `on(bottle_7, table_3)`, `closed(fridge_2)`."""
+    planned_in: str
+    executed_in: str | None
+    """`reconstructed` or `ground_truth` room."""
+    actions: tuple[PlannedAction, ...]
+    failures: tuple[Failure, ...] = ()
+    """Every failure met on the way, the last is the one that ended the search when there is no plan."""
+    checks: tuple[Check, ...] = ()
+    status: Literal["executed", "planned", "infeasible", "execution_failed"]
+
+
+class Plan(Artifact):
+    """`plan.json`, `domain.pddl`, `problem.pddl`, `plan.txt`, `trajectory.npz` (`time` (N,), `joints` (N, 9),
+    `world_from_base` (N, 4, 4), `action` (N,)), `keyframes/<k>_<action>.png`, `execution.mcap` (FrameTransforms
+    of every body and link, a CompressedImage stream), `graph.json` (the updated contact graph)."""
+
+    kind: ClassVar[str] = "plan"
+    description: ClassVar[str] = "task and motion plan, its execution and the updated contact graph"
+    json_files: ClassVar[dict[str, type[Model]]] = {"plan.json": PlanFile, "graph.json": ContactGraphFile}
+
+    @property
+    def plan(self) -> PlanFile:
+        """The parsed plan.json."""
+        return PlanFile.read(self.path("plan.json"))

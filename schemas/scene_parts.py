@@ -1,0 +1,80 @@
+"""Small records that several kinds share: cameras, boxes, planes, joints."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from schemas.base import Model, QuaternionXYZW, Transform, Vector3
+
+
+class Camera(Model):
+    """A pinhole camera without distortion. Pixels; pixel centres at integer coordinates (OpenCV)."""
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+
+class Box(Model):
+    """An oriented box: world_from_box has `center` and `orientation`; `size` is the full edge lengths [m].
+
+    Gravity-aligned boxes have an orientation about world z alone.
+    """
+
+    center: Vector3
+    orientation: QuaternionXYZW = (0.0, 0.0, 0.0, 1.0)
+    size: Vector3
+
+
+class SurfacePlane(Model):
+    """A plane n.v + d = 0 in the frame its owner names, with the rectangle of its inliers."""
+
+    normal: Vector3
+    offset: float
+    area: float
+    """Area of the inlier region [m^2]."""
+    center: Vector3
+    """Centre of the inliers (their mean)."""
+    corners: tuple[Vector3, ...] = ()
+    """Corners of the inliers' minimum rectangle (0 or 4)."""
+    horizontal: bool = False
+    """Whether the normal points up within the tolerance a_th (a possible supporting plane)."""
+    hidden: bool = False
+    """Whether it was registered from a supported object instead of seen."""
+
+
+class Joint(Model):
+    """A joint of an articulated model, in the model frame at scale 1."""
+
+    name: str
+    type: Literal["revolute", "prismatic"]
+    part: str
+    """Name of the moving link."""
+    origin: Vector3
+    axis: Vector3
+    lower: float
+    upper: float
+    """Limits [rad] or [m]; 0 is closed."""
+    handle: Vector3 | None = None
+    """Where the moving part is grasped, at joint value 0, model frame."""
+    handle_axis: Vector3 | None = None
+    """Direction of the handle bar, model frame."""
+
+
+class Relation(Model):
+    """An edge of a contact graph (node-link `links` entry)."""
+
+    source: str
+    """Parent for directed relations; either end for `proximal`."""
+    target: str
+    relation: Literal["supports", "contains", "carries_on_wall", "proximal"]
+    confidence: float
+    plane: int | None = None
+    """Index of the supporting plane in the parent's `planes`."""
+    gap: float | None = None
+    """Signed height of the child's bottom over the plane before refinement [m] (equation 2.1)."""
+    overlap: float | None = None
+    """Share of the child's footprint over the plane (equation 2.2)."""

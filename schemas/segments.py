@@ -1,0 +1,58 @@
+"""Kind `segments`: per-frame panoptic and geometric segments, fused (Han 2024, section 2.3.1)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from schemas.artifact import Artifact
+from schemas.base import Model
+
+
+class FrameSegment(Model):
+    """One fused segment (P_k, c_k, o_k) of a frame: geometrically connected pixels with one panoptic label."""
+
+    id: int
+    """Value in the frame's panoptic PNG (COCO: R + 256 G + 65536 B); 0 is void."""
+    category_id: int
+    """Class id of data/vocabulary.toml; 0 = background (geometric segment without a label)."""
+    instance: int
+    """Instance o_k within the frame (the same number on all segments of one instance); 0 = background."""
+    is_thing: bool
+    score: float
+    area: int
+    """Pixels."""
+
+
+class FrameSegments(Model):
+    """The segments of one frame."""
+
+    frame: int
+    """Frame index in the sequence."""
+    segments: tuple[FrameSegment, ...]
+
+
+class SegmentsFile(Model):
+    """segments.json: COCO-panoptic-like annotations for every frame, and the label source."""
+
+    backend: str
+    """`ground-truth`, `geometric` or `detector`."""
+    label: str
+    """Name to print beside every figure, e.g. `ground-truth masks, corruption 0.2`."""
+    corruption: float = 0.0
+    width: int
+    height: int
+    frames: tuple[FrameSegments, ...]
+
+
+class Segments(Artifact):
+    """`segments.json`, `panoptic.zip` (stored, not deflated; `<frame:06d>.png` COCO panoptic PNGs of fused
+    segment ids; stages/kit/formats/masks.py reads and writes it)."""
+
+    kind: ClassVar[str] = "segments"
+    description: ClassVar[str] = "per-frame fused panoptic and geometric segments"
+    json_files: ClassVar[dict[str, type[Model]]] = {"segments.json": SegmentsFile}
+
+    @property
+    def info(self) -> SegmentsFile:
+        """The parsed segments.json."""
+        return SegmentsFile.read(self.path("segments.json"))

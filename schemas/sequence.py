@@ -1,0 +1,61 @@
+"""Kind `sequence`: one RGB-D sequence in our conventions, whatever the log was."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from schemas.artifact import Artifact
+from schemas.base import Model, Transform
+from schemas.scene_parts import Camera
+
+
+class Gravity(Model):
+    """How the world frame was made upright."""
+
+    method: Literal["given", "floor_plane", "mean_camera_up", "none"]
+    world_from_log: Transform
+    """What ingest applied to the log's world frame."""
+    inlier_count: int = 0
+    """Points that support the floor plane, when `floor_plane`."""
+    detail: str = ""
+
+
+class LabelEntry(Model):
+    """Meaning of one value of the `labels` stream."""
+
+    instance: int
+    class_name: str
+
+
+class SequenceFile(Model):
+    """sequence.json."""
+
+    source_format: str
+    """The format that was detected."""
+    rule: str
+    """The rule that matched, for people."""
+    camera: Camera
+    streams: tuple[Literal["color", "depth", "right", "labels", "pose"], ...]
+    frame_count: int
+    frames_in_log: int
+    drops: dict[str, int] = {}
+    """Reason -> number of frames left out."""
+    gravity: Gravity
+    depth_unit: str = "millimetre, 16UC1, 0 invalid"
+    label_table: tuple[LabelEntry, ...] = ()
+    color_depth_registered: bool = True
+    start_time: float = 0.0
+    end_time: float = 0.0
+
+
+class Sequence(Artifact):
+    """`frames.mcap` (stages/kit/formats/frames.py reads and writes it), `sequence.json`, `trajectory.tum`."""
+
+    kind: ClassVar[str] = "sequence"
+    description: ClassVar[str] = "RGB-D frames with calibration and poses, gravity aligned"
+    json_files: ClassVar[dict[str, type[Model]]] = {"sequence.json": SequenceFile}
+
+    @property
+    def info(self) -> SequenceFile:
+        """The parsed sequence.json."""
+        return SequenceFile.read(self.path("sequence.json"))

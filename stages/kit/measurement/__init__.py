@@ -1,0 +1,1 @@
+"""Measures: panoptic quality, average precision, edit distance, intervals, tables."""

@@ -1,0 +1,1 @@
+"""Kinematics, collision and path planning."""

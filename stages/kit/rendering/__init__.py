@@ -1,0 +1,1 @@
+"""Colour, depth and instance images by ray casting."""

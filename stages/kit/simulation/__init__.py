@@ -1,0 +1,1 @@
+"""pybullet worlds, robots and loaders."""

@@ -1,0 +1,110 @@
+"""How a step declares itself: options, what it reads, what it writes. Cheap to import; the running is in runner.py."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from schemas.artifact import Artifact
+
+Item = TypeVar("Item")
+
+
+class Parameters(BaseModel):
+    """Options of a step. The command line, its help, its ranges and the config file come from these fields.
+
+    Every field has a default and a description. Allowed field types: bool, int, float, str, Literal of str,
+    Enum, Path-free tuples of str/int/float, and `X | None`.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+@dataclass(frozen=True)
+class External:
+    """An input that is no artifact: a raw file or folder of the user (a log, a weight file).
+
+    Its digest is the sha256 over its sorted files.
+    """
+
+    description: str = "file or folder"
+    weights: bool = False
+    """A missing weight file is a missing dependency (exit 5) instead of bad input (exit 3)."""
+
+
+@dataclass(frozen=True)
+class Optionally:
+    """Marks an input that may be left out; `run` then gets None."""
+
+    what: type[Artifact] | External
+
+
+Reads = Mapping[str, type[Artifact] | External | Optionally]
+
+
+class Progress(Protocol):
+    """What a step says about its progress."""
+
+    def track(self, items: Iterable[Item], *, total: int | None = None, description: str = "") -> Iterator[Item]:
+        """Yield the items while a bar (terminal) or plain lines (elsewhere) tell how far it is."""
+        ...
+
+    def step(self, description: str) -> AbstractContextManager[None]:
+        """Name and time one part of the work; the time lands in the artifact's timings."""
+        ...
+
+
+@dataclass(frozen=True)
+class Context:
+    """What the runner gives a step: where to write, the seed, the device, progress and a logger."""
+
+    output: Path
+    """The partial folder; the step writes its payload files here and nowhere else."""
+    seed: int
+    device: str
+    """`cpu` or `cuda`."""
+    progress: Progress
+    logger: logging.Logger = field(default_factory=lambda: logging.getLogger("scenewright"))
+
+    def random(self, *stream: int) -> np.random.Generator:
+        """Return a generator seeded by the run's seed and the given stream numbers."""
+        return np.random.default_rng([self.seed, *stream])
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step: `stages/<folder>/parameters.py` holds it as STAGE (or several as STAGES), the function
+    `run(**inputs, parameters=..., context=...) -> Artifact` stands in `stages/<folder>/<module>.py`.
+
+    `name` is the command (`fuse`, or `library build` for a command within a group). `version` is raised by
+    hand when the meaning of the output changes. `libraries` are the distributions whose versions decide the bytes of
+    the output. `summary` is one line for the help.
+    """
+
+    name: str
+    version: int
+    summary: str
+    parameters: type[Parameters]
+    reads: Reads
+    writes: type[Artifact]
+    libraries: tuple[str, ...] = ("numpy",)
+    module: str = "stage"
+    example: str = ""
+    check: Callable[[Any, Mapping[str, Any]], None] | None = None
+    """Optional check of parameters against the inputs given (role -> path), raising UsageError before work starts."""
+
+    @property
+    def folder(self) -> str:
+        """The folder under stages/ (the first word of the name)."""
+        return self.name.split()[0]
+
+    def required(self) -> tuple[str, ...]:
+        """Roles that must be given."""
+        return tuple(role for role, what in self.reads.items() if not isinstance(what, Optionally))
