@@ -1,0 +1,113 @@
+"""COCO panoptic PNGs, packed into one zip: the colour of a pixel is its segment id, id = R + 256 G + 65536 B."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+
+import cv2
+import numpy as np
+
+from schemas.errors import BadInput
+
+LARGEST_ID = (1 << 24) - 1
+REMAKE = "run `scenewright segment` again"
+FIXED_TIMESTAMP = (1980, 1, 1, 0, 0, 0)
+"""Every zip entry bears the earliest date the format knows, so that the same images give the same bytes."""
+
+
+def encode_panoptic_png(ids: np.ndarray) -> bytes:
+    """Return the PNG of an id image (H, W) of integers in 0 .. 2^24 - 1, as COCO panoptic writes it (R first).
+
+    Raises ValueError for another shape or for ids that do not fit.
+    """
+    if ids.ndim != 2 or ids.size == 0:
+        raise ValueError(f"an id image has shape (H, W), not {ids.shape}")
+    if int(ids.min()) < 0 or int(ids.max()) > LARGEST_ID:
+        raise ValueError(f"panoptic ids lie in 0..{LARGEST_ID}, not {ids.min()}..{ids.max()}")
+    ids = ids.astype(np.uint32)
+    blue_green_red = np.empty((*ids.shape, 3), dtype=np.uint8)
+    blue_green_red[..., 2] = ids & 255
+    blue_green_red[..., 1] = (ids >> 8) & 255
+    blue_green_red[..., 0] = (ids >> 16) & 255
+    done, data = cv2.imencode(".png", blue_green_red, [cv2.IMWRITE_PNG_COMPRESSION, 3])
+    if not done:
+        raise ValueError("the PNG encoder refused the image")
+    return data.tobytes()
+
+
+def decode_panoptic_png(data: bytes) -> np.ndarray:
+    """Return the id image (H, W) int32 of a COCO panoptic PNG. Raises BadInput when it is no 8-bit colour PNG."""
+    image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+    if image is None or image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
+        raise BadInput("not a COCO panoptic PNG (8 bits, three channels)", hint="ids are R + 256 G + 65536 B")
+    # Widen before multiplying: 256 * uint8 overflows.
+    wide = image.astype(np.int32)
+    return wide[..., 2] + 256 * wide[..., 1] + 65536 * wide[..., 0]
+
+
+def panoptic_name(frame_index: int) -> str:
+    """Return the name of a frame's image within the zip."""
+    return f"{frame_index:06d}.png"
+
+
+def write_panoptic_zip(path: Path, images: Iterable[tuple[int, np.ndarray]]) -> None:
+    """Write pairs (frame index, id image (H, W)) as PNGs into a stored (not deflated) zip with fixed timestamps.
+
+    The same images in the same order give the same bytes. Raises ValueError when a frame comes twice.
+    """
+    seen: set[int] = set()
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        for frame_index, ids in images:
+            if frame_index in seen:
+                raise ValueError(f"frame {frame_index} comes twice")
+            seen.add(frame_index)
+            entry = zipfile.ZipInfo(panoptic_name(frame_index), date_time=FIXED_TIMESTAMP)
+            entry.external_attr = 0o644 << 16
+            entry.create_system = 3
+            archive.writestr(entry, encode_panoptic_png(ids))
+
+
+class PanopticReader:
+    """Random access to the images of a panoptic zip. Opening a missing or broken file raises BadInput."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = Path(path)
+        try:
+            self._archive = zipfile.ZipFile(self.path)
+        except FileNotFoundError as error:
+            raise BadInput(f"{self.path.name} is missing", hint=REMAKE) from error
+        except (zipfile.BadZipFile, OSError) as error:
+            raise BadInput(f"{self.path.name} is no zip file: {error}", hint=REMAKE) from error
+
+    def __enter__(self) -> PanopticReader:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._archive.close()
+
+    def frame_indices(self) -> list[int]:
+        """Return the indices of the frames that have an image, ascending."""
+        stems = (name.removesuffix(".png") for name in self._archive.namelist() if name.endswith(".png"))
+        return sorted(int(stem) for stem in stems if stem.isdigit())
+
+    def read(self, frame_index: int) -> np.ndarray:
+        """Return the ids (H, W) int32 of a frame; 0 is void.
+
+        Raises BadInput when the frame has no image, its checksum is wrong, or it is no panoptic PNG.
+        """
+        try:
+            data = self._archive.read(panoptic_name(frame_index))
+        except KeyError as error:
+            raise BadInput(f"{self.path.name} has no image for frame {frame_index}", hint=REMAKE) from error
+        except zipfile.BadZipFile as error:
+            raise BadInput(f"{self.path.name}: frame {frame_index} is damaged: {error}") from error
+        return decode_panoptic_png(data)
