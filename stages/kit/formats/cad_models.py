@@ -1,0 +1,116 @@
+"""Models of the CAD library on disk: find, load and pose their parts.
+
+A part frame has its origin at the joint's origin and axes parallel to the model frame at joint value 0; the body's part
+frame is the model frame (docs/FORMATS.md, cad_library).
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from schemas.cad_library import CadLibrary, CadModel
+from schemas.errors import BadInput
+from stages.kit.geometry.transforms import transform_from
+
+MODEL_FILE = "model.json"
+URDF_FILE = "model.urdf"
+
+
+def model_folder(library: CadLibrary, model_id: str) -> Path:
+    """Return the folder of a model of the library. Raises BadInput when it is not there."""
+    folder = library.path("models") / model_id
+    if not folder.is_dir():
+        raise BadInput(f"{library.root}: no model {model_id!r}", hint="build the CAD library again")
+    return folder
+
+
+def read_model(folder: Path) -> CadModel:
+    """Return the description that lies inside a model folder (`model.json`). Raises BadInput."""
+    return CadModel.read(Path(folder) / MODEL_FILE)
+
+
+def part_transforms(model: CadModel, joints: dict[str, float]) -> dict[str, np.ndarray]:
+    """Return part -> (4, 4) model_from_part at the given joint values [rad, m at scale 1]; missing ones are 0.
+
+    Raises BadInput for a joint that the model does not have.
+    """
+    unknown = set(joints) - {joint.name for joint in model.joints}
+    if unknown:
+        raise BadInput(f"model {model.id}: no joint {sorted(unknown)[0]!r}")
+    transforms = {part: np.eye(4) for part in model.parts}
+    for joint in model.joints:
+        value = joints.get(joint.name, 0.0)
+        axis, origin = np.asarray(joint.axis), np.asarray(joint.origin)
+        if joint.type == "revolute":
+            transforms[joint.part] = transform_from(Rotation.from_rotvec(value * axis).as_matrix(), origin)
+        else:
+            transforms[joint.part] = transform_from(np.eye(3), origin + value * axis)
+    return transforms
+
+
+def load_visual_parts(folder: Path) -> dict[str, trimesh.Trimesh]:
+    """Return part -> visual mesh in the part frame [m], with the vertex colours of the file. Raises BadInput."""
+    files = sorted((Path(folder) / "visual").glob("*.glb"))
+    if not files:
+        raise BadInput(f"{folder}: no visual/<part>.glb", hint="build the CAD library again")
+    return {file.stem: _load_mesh(file) for file in files}
+
+
+def load_collision_parts(folder: Path) -> dict[str, list[trimesh.Trimesh]]:
+    """Return part -> convex collision pieces in the part frame [m], in the order of their numbers. Raises BadInput."""
+    numbered: dict[str, list[tuple[int, Path]]] = {}
+    for file in (Path(folder) / "collision").glob("*.obj"):
+        match = re.fullmatch(r"(.+)_(\d+)", file.stem)
+        if match is None:
+            raise BadInput(f"{file}: not named <part>_<number>.obj")
+        numbered.setdefault(match[1], []).append((int(match[2]), file))
+    if not numbered:
+        raise BadInput(f"{folder}: no collision/<part>_<number>.obj", hint="build the CAD library again")
+    return {part: [_load_mesh(file) for _, file in sorted(numbered[part])] for part in sorted(numbered)}
+
+
+def posed_mesh(folder: Path, model: CadModel, joints: dict[str, float], scale: float = 1.0) -> trimesh.Trimesh:
+    """Return the whole visual mesh in the model frame at the joint values, times `scale`, colours kept.
+
+    Prismatic values are those of scale 1: the scale multiplies the posed geometry.
+    """
+    transforms = part_transforms(model, joints)
+    parts = load_visual_parts(folder)
+    placed = []
+    for part in model.parts:
+        mesh = parts[part]
+        mesh.apply_transform(transforms[part])
+        placed.append(mesh)
+    whole = placed[0] if len(placed) == 1 else trimesh.util.concatenate(placed)
+    whole.apply_scale(scale)
+    return whole
+
+
+def posed_collision(
+    folder: Path, model: CadModel, joints: dict[str, float], scale: float = 1.0
+) -> list[trimesh.Trimesh]:
+    """Return the convex collision pieces of all parts in the model frame at the joint values, times `scale`."""
+    transforms = part_transforms(model, joints)
+    parts = load_collision_parts(folder)
+    placed = []
+    for part in model.parts:
+        for piece in parts.get(part, []):
+            piece.apply_transform(transforms[part])
+            piece.apply_scale(scale)
+            placed.append(piece)
+    return placed
+
+
+def _load_mesh(file: Path) -> trimesh.Trimesh:
+    try:
+        mesh = trimesh.load(file, force="mesh", process=False)
+    except Exception as error:  # trimesh raises whatever its parsers raise
+        raise BadInput(f"{file}: cannot be read as a mesh: {error}") from None
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
+        raise BadInput(f"{file}: holds no triangles")
+    return mesh
