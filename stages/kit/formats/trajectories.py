@@ -1,0 +1,146 @@
+"""Readers and writers of camera trajectories: TUM lines, Open3D logs, 4x4 matrices. Garbage raises BadInput."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from schemas.errors import BadInput
+from stages.kit.geometry.transforms import is_rigid
+
+QUATERNION_TOLERANCE = 0.02
+"""How far the norm of a quaternion may be from 1: files that print four decimals stay well within."""
+
+
+def write_tum(path: Path, times: np.ndarray, world_from_camera: np.ndarray) -> None:
+    """Write `t tx ty tz qx qy qz qw` lines (TUM RGB-D format; seconds, metres, w >= 0).
+
+    `times` is (N,) and strictly increasing, `world_from_camera` is (N, 4, 4) and rigid. Raises ValueError otherwise.
+    """
+    times = np.asarray(times, dtype=float).reshape(-1)
+    poses = np.asarray(world_from_camera, dtype=float).reshape(-1, 4, 4)
+    if len(times) != len(poses):
+        raise ValueError(f"{len(times)} times for {len(poses)} poses")
+    if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise ValueError("times are not finite and strictly increasing")
+    lines = ["# timestamp tx ty tz qx qy qz qw (world_from_camera, seconds, metres)"]
+    for time, pose in zip(times, poses, strict=True):
+        if not is_rigid(pose):
+            raise ValueError(f"pose at {time} s is not rigid")
+        quaternion = Rotation.from_matrix(pose[:3, :3]).as_quat(canonical=True)
+        numbers = [f"{value:.9f}" for value in pose[:3, 3]] + [f"{value:.12f}" for value in quaternion]
+        lines.append(" ".join([f"{time:.9f}", *numbers]))
+    Path(path).write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def read_tum(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Read a TUM trajectory: times (N,) [s], strictly increasing, and world_from_camera (N, 4, 4) [m].
+
+    Raises BadInput naming the line for anything but eight finite numbers with a unit quaternion.
+    """
+    rows = number_rows(path, 8)
+    times = np.array([row[0] for _, row in rows])
+    poses = [transform_from_numbers(row[1:], f"{path}: line {line}") for line, row in rows]
+    backward = np.flatnonzero(np.diff(times) <= 0)
+    if len(backward):
+        line = rows[int(backward[0]) + 1][0]
+        raise BadInput(
+            f"{path}: line {line}: time {times[backward[0] + 1]} s is not after the one before",
+            hint="sort the trajectory by time and remove duplicates",
+        )
+    return times, np.array(poses).reshape(-1, 4, 4)
+
+
+def transform_from_numbers(numbers: np.ndarray, where: str) -> np.ndarray:
+    """Return the (4, 4) transform of `tx ty tz qx qy qz qw` [m]. Raises BadInput, beginning with `where`."""
+    quaternion = np.asarray(numbers[3:7], dtype=float)
+    norm = float(np.linalg.norm(quaternion))
+    if not np.isfinite(numbers).all():
+        raise BadInput(f"{where}: pose is not finite")
+    if abs(norm - 1) > QUATERNION_TOLERANCE:
+        raise BadInput(f"{where}: quaternion has norm {norm:.4g}, expected 1", hint="the order is x y z w")
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.from_quat(quaternion / norm).as_matrix()
+    matrix[:3, 3] = numbers[:3]
+    return matrix
+
+
+def number_rows(path: Path, columns: int) -> list[tuple[int, np.ndarray]]:
+    """Return (line number, (columns,) numbers) of every line of a text table; blank lines and # comments are skipped.
+
+    NaN and infinities are read as such. Raises BadInput for a wrong number of columns or what is no number.
+    """
+    rows = []
+    for line, text in enumerate(read_text(path).splitlines(), start=1):
+        fields = text.split("#", 1)[0].split()
+        if not fields:
+            continue
+        if len(fields) != columns:
+            raise BadInput(f"{path}: line {line}: {len(fields)} columns, expected {columns}")
+        rows.append((line, _numbers(fields, f"{path}: line {line}")))
+    return rows
+
+
+def read_matrix(path: Path, rows: int = 4, columns: int = 4) -> np.ndarray:
+    """Return the (rows, columns) matrix in a text file, whatever the line breaks. Raises BadInput."""
+    fields = read_text(path).split()
+    if len(fields) != rows * columns:
+        raise BadInput(f"{path}: {len(fields)} numbers, expected {rows}x{columns}")
+    return _numbers(fields, str(path)).reshape(rows, columns)
+
+
+def read_open3d_log(path: Path) -> list[np.ndarray]:
+    """Return the (4, 4) world_from_camera matrices of an Open3D / Redwood `trajectory.log`, in file order.
+
+    Each entry is a line of three integers followed by four lines of four numbers
+    (open3d.io.write_pinhole_camera_trajectory). Raises BadInput naming the line.
+    """
+    lines = [line for line in read_text(path).splitlines() if line.strip()]
+    if len(lines) % 5:
+        raise BadInput(f"{path}: {len(lines)} lines, expected a multiple of 5 (header and 4 matrix rows)")
+    poses = []
+    for start in range(0, len(lines), 5):
+        if len(lines[start].split()) != 3:
+            raise BadInput(f"{path}: entry {start // 5}: header {lines[start]!r:.60} is not three integers")
+        rows = [line.split() for line in lines[start + 1 : start + 5]]
+        if any(len(row) != 4 for row in rows):
+            raise BadInput(f"{path}: entry {start // 5}: matrix is not 4x4")
+        poses.append(_numbers([field for row in rows for field in row], f"{path}: entry {start // 5}").reshape(4, 4))
+    return poses
+
+
+def write_open3d_log(path: Path, world_from_camera: np.ndarray) -> None:
+    """Write (N, 4, 4) poses as an Open3D `trajectory.log`."""
+    lines = []
+    for index, pose in enumerate(np.asarray(world_from_camera, dtype=float).reshape(-1, 4, 4)):
+        lines.append(f"{index} {index} {index + 1}")
+        lines.extend(" ".join(repr(float(value)) for value in row) for row in pose)
+    Path(path).write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file. Raises BadInput when it is missing or no text."""
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise BadInput(f"{path}: file is missing") from None
+    except (UnicodeDecodeError, IsADirectoryError):
+        raise BadInput(f"{path}: not a text file") from None
+
+
+def _numbers(fields: list[str], where: str) -> np.ndarray:
+    try:
+        return np.array([float(field) for field in fields])
+    except ValueError:
+        bad = next(field for field in fields if not _is_number(field))
+        raise BadInput(f"{where}: {bad!r:.40} is not a number") from None
+
+
+def _is_number(field: str) -> bool:
+    try:
+        float(field)
+    except ValueError:
+        return False
+    return True
