@@ -1,1 +1,1 @@
-"""Measures: panoptic quality, average precision, edit distance, intervals, tables."""
+"""Measures against ground truth: panoptic quality, average precision, graph edit distance, meshes, poses, plots."""

@@ -1,0 +1,129 @@
+"""Average precision at one IoU threshold, in the standard forms and in the form of the thesis's code."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+RECALL_POINTS = np.linspace(0.0, 1.0, 11)
+
+
+@dataclass(frozen=True)
+class PrecisionRecall:
+    """The precision-recall curve of one class, predictions in falling confidence."""
+
+    precision: np.ndarray
+    """(P,) precision after each prediction."""
+    recall: np.ndarray
+    """(P,) recall after each prediction; all 0 when nothing is true."""
+    true_count: int
+    matches: tuple[tuple[int, int], ...] = ()
+    """(prediction row, truth column) of the true positives."""
+
+
+def match_greedily(iou: np.ndarray, confidence: np.ndarray, match_iou: float = 0.5) -> list[tuple[int, int | None]]:
+    """Match predictions of one class to truths in falling confidence (ties: lower row first).
+
+    `iou` (P, T), `confidence` (P,). Each prediction takes the free truth of highest IoU if that is > `match_iou`.
+    Returns (prediction row, truth column or None) in the order of processing.
+    """
+    iou = np.asarray(iou, dtype=float).reshape(len(confidence), -1)
+    order = np.argsort(-np.asarray(confidence, dtype=float), kind="stable")
+    free = np.ones(iou.shape[1], dtype=bool)
+    result: list[tuple[int, int | None]] = []
+    for row in order:
+        candidates = np.where(free, iou[row], -1.0)
+        best = int(np.argmax(candidates)) if len(candidates) else -1
+        if best >= 0 and candidates[best] > match_iou:
+            free[best] = False
+            result.append((int(row), best))
+        else:
+            result.append((int(row), None))
+    return result
+
+
+def precision_recall(
+    iou: np.ndarray, confidence: np.ndarray, true_count: int, match_iou: float = 0.5
+) -> PrecisionRecall:
+    """Return the precision-recall curve of one class. `iou` (P, T), `confidence` (P,)."""
+    matched = match_greedily(np.asarray(iou, dtype=float).reshape(len(confidence), true_count), confidence, match_iou)
+    hits = np.array([truth is not None for _, truth in matched], dtype=float)
+    found = np.cumsum(hits)
+    seen = np.arange(1, len(hits) + 1)
+    recall = found / true_count if true_count else np.zeros(len(hits))
+    pairs = tuple((row, truth) for row, truth in matched if truth is not None)
+    return PrecisionRecall(found / seen if len(hits) else found, recall, true_count, pairs)
+
+
+def average_precision(curve: PrecisionRecall) -> float | None:
+    """Area under the interpolated curve over all recall points (Pascal VOC from 2010, COCO in the limit).
+
+    Recall that is never reached counts with precision 0. None where nothing is true.
+    """
+    if curve.true_count == 0:
+        return None
+    if not len(curve.precision):
+        return 0.0
+    envelope = np.maximum.accumulate(curve.precision[::-1])[::-1]
+    steps = np.diff(np.concatenate([[0.0], curve.recall]))
+    return float(np.sum(steps * envelope))
+
+
+def average_precision_eleven_point(curve: PrecisionRecall) -> float | None:
+    """Mean interpolated precision at recall 0, 0.1, ... 1 (Pascal VOC 2007); 0 beyond the last recall reached."""
+    return _eleven_point(curve, beyond_last=False)
+
+
+def average_precision_thesis_code(curve: PrecisionRecall) -> float | None:
+    """Eleven points as the thesis's code has it: recall points beyond the last one reached get the LAST precision.
+
+    This inflates: one correct prediction among ten objects gives 1.0 (PROTOCOLS section 3). Kept under its own
+    name, for comparison with the thesis's tables only.
+    """
+    return _eleven_point(curve, beyond_last=True)
+
+
+def _eleven_point(curve: PrecisionRecall, beyond_last: bool) -> float | None:
+    if curve.true_count == 0:
+        return None
+    if not len(curve.precision):
+        return 0.0
+    values = []
+    for level in RECALL_POINTS:
+        reached = curve.recall >= level - 1e-12
+        if reached.any():
+            values.append(float(curve.precision[reached].max()))
+        else:
+            values.append(float(curve.precision[-1]) if beyond_last else 0.0)
+    return float(np.mean(values))
+
+
+@dataclass(frozen=True)
+class ClassPrecision:
+    """Average precision of one class in the three forms; None where nothing is true."""
+
+    all_point: float | None
+    eleven_point: float | None
+    thesis_code: float | None
+    true_count: int
+    predicted_count: int
+    found: int
+
+
+def class_precision(curve: PrecisionRecall) -> ClassPrecision:
+    """Evaluate one class's curve in every form."""
+    return ClassPrecision(
+        average_precision(curve),
+        average_precision_eleven_point(curve),
+        average_precision_thesis_code(curve),
+        curve.true_count,
+        len(curve.precision),
+        len(curve.matches),
+    )
+
+
+def mean_precision(values: list[float | None]) -> float | None:
+    """Mean over the classes that have truth; None without any."""
+    defined = [value for value in values if value is not None]
+    return float(np.mean(defined)) if defined else None

@@ -1,0 +1,87 @@
+"""Precision, recall and F1 of the directed edges of a contact graph, by relation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from schemas.contact_graph import ContactGraphFile
+
+DIRECTED = ("supports", "contains", "carries_on_wall")
+
+
+@dataclass(frozen=True)
+class EdgeAgreement:
+    """Counts of one relation."""
+
+    true_count: int
+    predicted_count: int
+    agreed: int
+
+    @property
+    def precision(self) -> float | None:
+        """Share of the predicted edges that are true; None without any."""
+        return self.agreed / self.predicted_count if self.predicted_count else None
+
+    @property
+    def recall(self) -> float | None:
+        """Share of the true edges that were predicted; None without any."""
+        return self.agreed / self.true_count if self.true_count else None
+
+    @property
+    def f1(self) -> float | None:
+        """Harmonic mean; None when there is neither a true nor a predicted edge."""
+        both = self.true_count + self.predicted_count
+        return 2.0 * self.agreed / both if both else None
+
+
+def edge_agreement(
+    true: ContactGraphFile,
+    predicted: ContactGraphFile,
+    partner: Mapping[str, str],
+    *,
+    ignored: frozenset[str] = frozenset(),
+    relations: tuple[str, ...] = (*DIRECTED, "proximal"),
+) -> dict[str, EdgeAgreement]:
+    """Compare edges under a pairing of nodes.
+
+    `partner`: true node id -> predicted node id (the scene roots pair by themselves). An edge agrees when both ends
+    are partners and the relation is the same (proximal edges have no direction). True edges that touch an
+    `ignored` true node (never seen by the camera), and predicted edges that touch its partner, do not count. Returns
+    each relation's counts and, as `any_support`, those of all directed edges whatever their relation is called.
+    """
+    names = dict(partner)
+    for node in true.nodes:
+        if node.node_type == "scene":
+            names[node.id] = next((n.id for n in predicted.nodes if n.node_type == "scene"), node.id)
+    skipped = {names[name] for name in ignored if name in names}
+    result: dict[str, EdgeAgreement] = {}
+    for relation in relations:
+        result[relation] = _agreement(true, predicted, names, ignored, skipped, (relation,))
+    result["any_support"] = _agreement(true, predicted, names, ignored, skipped, DIRECTED)
+    return result
+
+
+def _agreement(
+    true: ContactGraphFile,
+    predicted: ContactGraphFile,
+    names: Mapping[str, str],
+    ignored: frozenset[str],
+    skipped: set[str],
+    relations: tuple[str, ...],
+) -> EdgeAgreement:
+    def key(source: str, target: str) -> tuple[str, str]:
+        return (source, target) if relations != ("proximal",) else (min(source, target), max(source, target))
+
+    wanted = [
+        (link.source, link.target)
+        for link in true.links
+        if link.relation in relations and not {link.source, link.target} & ignored
+    ]
+    got = {
+        key(link.source, link.target)
+        for link in predicted.links
+        if link.relation in relations and not {link.source, link.target} & skipped
+    }
+    agreed = {key(names[s], names[t]) for s, t in wanted if s in names and t in names} & got
+    return EdgeAgreement(len(set(wanted)), len(got), len(agreed))
