@@ -1,0 +1,175 @@
+"""From ray hits to linear light: colour, pattern, light map or direct lights, highlight. One loop over pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+from stages.kit.rendering.light_map import lookup
+from stages.kit.rendering.patterns import pattern_factor
+
+MISS = np.uint32(0xFFFFFFFF)
+
+
+@njit(cache=True, parallel=True)
+def camera_rays(
+    pixels: np.ndarray, fx: float, fy: float, cx: float, cy: float, world_from_camera: np.ndarray
+) -> np.ndarray:
+    """Return rays (N, 6) float32 through pixels (N, 2) [px]; directions have unit z in the camera frame, so the hit
+    parameter t is the z-depth."""
+    rays = np.empty((len(pixels), 6), dtype=np.float32)
+    for k in prange(len(pixels)):
+        x = (pixels[k, 0] - cx) / fx
+        y = (pixels[k, 1] - cy) / fy
+        for axis in range(3):
+            rays[k, axis] = world_from_camera[axis, 3]
+            rays[k, 3 + axis] = (
+                world_from_camera[axis, 0] * x + world_from_camera[axis, 1] * y + world_from_camera[axis, 2]
+            )
+    return rays
+
+
+@njit(cache=True, parallel=True)
+def surface_at(
+    rays: np.ndarray,
+    primitive: np.ndarray,
+    uvs: np.ndarray,
+    corner_normals: np.ndarray,
+    face_normals: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return (shading normals (N, 3) turned towards the camera, cosine of incidence (N,) of the true face)."""
+    normals = np.zeros((len(rays), 3), dtype=np.float32)
+    cosine = np.zeros(len(rays), dtype=np.float32)
+    for k in prange(len(rays)):
+        if primitive[k] == MISS:
+            continue
+        t = np.int64(primitive[k])
+        u, v = uvs[k, 0], uvs[k, 1]
+        w = 1.0 - u - v
+        length, along, ray = 0.0, 0.0, 0.0
+        for axis in range(3):
+            value = w * corner_normals[t, 0, axis] + u * corner_normals[t, 1, axis] + v * corner_normals[t, 2, axis]
+            normals[k, axis] = value
+            length += value * value
+            ray += rays[k, 3 + axis] * rays[k, 3 + axis]
+            along += rays[k, 3 + axis] * face_normals[t, axis]
+        side = -1.0 if along > 0.0 else 1.0
+        length = np.sqrt(length)
+        for axis in range(3):
+            normals[k, axis] = side * (normals[k, axis] / length if length > 1e-9 else face_normals[t, axis])
+        cosine[k] = abs(along) / np.sqrt(ray)
+    return normals, cosine
+
+
+@njit(cache=True, parallel=True)
+def surface_color(
+    rays: np.ndarray,
+    primitive: np.ndarray,
+    uvs: np.ndarray,
+    t_hit: np.ndarray,
+    cosine: np.ndarray,
+    corner_colors: np.ndarray,
+    material: np.ndarray,
+    table: np.ndarray,
+    pixel_angle: float,
+) -> np.ndarray:
+    """Return the diffuse albedo (N, 3), linear, with patterns. `pixel_angle` is the width of a pixel at depth 1."""
+    albedo = np.zeros((len(rays), 3), dtype=np.float32)
+    for k in prange(len(rays)):
+        if primitive[k] == MISS:
+            continue
+        t = np.int64(primitive[k])
+        u, v = uvs[k, 0], uvs[k, 1]
+        w = 1.0 - u - v
+        row = table[material[t]]
+        factor, warmth = 1.0, 0.0
+        x = rays[k, 0] + t_hit[k] * rays[k, 3]
+        y = rays[k, 1] + t_hit[k] * rays[k, 4]
+        z = rays[k, 2] + t_hit[k] * rays[k, 5]
+        if row[0] > 0.5:
+            # The geometric mean of a pixel's two extents on the slanted surface.
+            footprint = t_hit[k] * pixel_angle / np.sqrt(max(float(cosine[k]), 0.05))
+            factor, warmth = pattern_factor(row, x, y, z, footprint)
+        for channel in range(3):
+            value = (
+                w * corner_colors[t, 0, channel] + u * corner_colors[t, 1, channel] + v * corner_colors[t, 2, channel]
+            )
+            albedo[k, channel] = min(1.0, value * factor * (1.0 + 0.3 * warmth * (1.0 - channel)))
+        if row[18] > 0.0 and z < row[18]:
+            edge = 0.55 if z > row[18] - 0.006 else 1.0
+            for channel in range(3):
+                albedo[k, channel] = 0.72 * edge
+    return albedo
+
+
+@njit(cache=True, parallel=True)
+def light_from_map(
+    primitive: np.ndarray, uvs: np.ndarray, light: np.ndarray, offset: np.ndarray, subdivisions: np.ndarray
+) -> np.ndarray:
+    """Return the light (N, 3) on matt white at the hits, from the light map."""
+    result = np.zeros((len(primitive), 3), dtype=np.float32)
+    for k in prange(len(primitive)):
+        if primitive[k] == MISS:
+            continue
+        t = np.int64(primitive[k])
+        for channel in range(3):
+            result[k, channel] = lookup(light, offset[t], subdivisions[t], uvs[k, 0], uvs[k, 1], channel)
+    return result
+
+
+@njit(cache=True, parallel=True)
+def add_light(
+    total: np.ndarray,
+    highlight: np.ndarray,
+    rays: np.ndarray,
+    t_hit: np.ndarray,
+    normals: np.ndarray,
+    primitive: np.ndarray,
+    material: np.ndarray,
+    table: np.ndarray,
+    blocked: np.ndarray,
+    point: np.ndarray,
+    color: np.ndarray,
+    diffuse: bool,
+) -> None:
+    """Add one point-like light in place: its diffuse part to `total` (N, 3) when `diffuse`, and its highlight
+    (Blinn 1977) to `highlight` (N, 3), where it is not blocked. `color` is the intensity at any distance."""
+    for k in prange(len(primitive)):
+        if primitive[k] == MISS or blocked[k]:
+            continue
+        t = np.int64(primitive[k])
+        length, view, cosine = 0.0, 0.0, 0.0
+        for axis in range(3):
+            d = point[axis] - (rays[k, axis] + t_hit[k] * rays[k, 3 + axis])
+            length += d * d
+            view += rays[k, 3 + axis] * rays[k, 3 + axis]
+        length, view = np.sqrt(length), np.sqrt(view)
+        half, square = 0.0, 0.0
+        for axis in range(3):
+            d = (point[axis] - (rays[k, axis] + t_hit[k] * rays[k, 3 + axis])) / length
+            h = d - rays[k, 3 + axis] / view
+            cosine += d * normals[k, axis]
+            half += h * normals[k, axis]
+            square += h * h
+        if cosine <= 0.0:
+            continue
+        row = table[material[t]]
+        shine = row[3] * max(0.0, half / np.sqrt(square)) ** row[4] if row[3] > 0.0 else 0.0
+        for channel in range(3):
+            if diffuse:
+                total[k, channel] += cosine * color[channel]
+            highlight[k, channel] += shine * min(1.0, 4.0 * cosine) * color[channel]
+
+
+@njit(cache=True, parallel=True)
+def tone_map(linear: np.ndarray, exposure: float, table: np.ndarray) -> np.ndarray:
+    """Return (N, 3) uint8 sRGB of linear light (N, 3): exposure, a soft shoulder over 0.6 that reaches white at
+    infinity, then the sRGB curve from `table` (4096,) uint8."""
+    result = np.empty(linear.shape, dtype=np.uint8)
+    for k in prange(len(linear)):
+        for channel in range(3):
+            value = linear[k, channel] * exposure
+            if value > 0.6:
+                value = 0.6 + 0.4 * (1.0 - np.exp(-(value - 0.6) / 0.4))
+            result[k, channel] = table[min(4095, max(0, int(value * 4095.0 + 0.5)))]
+    return result
