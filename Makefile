@@ -1,0 +1,68 @@
+SHELL := bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+# No .DELETE_ON_ERROR: an artifact whose outcome is not ok is complete and stays.
+
+VENV := .venv
+PYTHON := $(VENV)/bin/python
+STAMP := $(VENV)/.installed
+OUTPUTS ?= outputs
+# Where pip finds torch, for machines on which it would bring a CUDA build (for example https://.../whl/cpu).
+TORCH_INDEX ?=
+PIPELINES := $(sort $(patsubst data/pipelines/%.toml,%,$(wildcard data/pipelines/*.toml)))
+
+.PHONY: help
+help: ## List the targets
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -t -s $$'\t'
+	@echo; echo "Pipelines (make NAME RUN=folder VARIABLE=value ...):"
+	@for name in $(PIPELINES); do printf '  %-14s %s\n' $$name "$$(sed -n 's/^summary = "\(.*\)"/\1/p' data/pipelines/$$name.toml)"; done
+
+# ---- installation -------------------------------------------------------------------------------------------------
+
+.PHONY: setup
+setup: $(STAMP) ## Create .venv from requirements.lock when it is missing or stale
+
+$(STAMP): requirements.lock pyproject.toml data/setup.sh
+	TORCH_INDEX="$(TORCH_INDEX)" bash data/setup.sh $(VENV)
+	touch $@
+
+.PHONY: lock
+lock: ## Write requirements.lock from what is installed
+	$(PYTHON) -m pip freeze --exclude-editable --exclude scenewright --exclude rerun-sdk | sed 's/+cpu$$//' > requirements.lock
+
+# ---- checks -------------------------------------------------------------------------------------------------------
+
+.PHONY: test test-all lint format rules
+test: setup ## Run the tests (under 12 minutes on 2 cores)
+	$(PYTHON) -m pytest
+
+test-all: setup ## Run the slow tests too
+	$(PYTHON) -m pytest -m ''
+
+lint: setup ## Format and lint check, types, import contracts
+	$(PYTHON) -m ruff format --check .
+	$(PYTHON) -m ruff check .
+	$(PYTHON) -m mypy
+	$(VENV)/bin/lint-imports
+
+format: setup ## Format the code
+	$(PYTHON) -m ruff format .
+	$(PYTHON) -m ruff check --fix .
+
+rules: setup ## Generate data/pipelines/*.mk and schemas/json from their declarations
+	for name in $(PIPELINES); do $(PYTHON) -m cli makefile $$name > data/pipelines/$$name.mk.new; mv data/pipelines/$$name.mk.new data/pipelines/$$name.mk; done
+	$(PYTHON) -m cli schemas
+
+# ---- pipelines ----------------------------------------------------------------------------------------------------
+
+.PHONY: $(PIPELINES)
+$(PIPELINES): setup
+	@$(MAKE) --no-print-directory -f data/pipelines/$@.mk PYTHON=$(PYTHON) OUTPUTS=$(OUTPUTS) $(if $(RUN),RUN=$(RUN))
+
+.PHONY: batch
+batch: setup ## Run a pipeline over a data set: make batch SPEC=batch.toml RUN=folder
+	$(PYTHON) -m cli batch $(SPEC) --out $(OUTPUTS)/$(or $(RUN),batch)
+
+.PHONY: clean
+clean: ## Remove everything that runs made (outputs/*)
+	find outputs -mindepth 1 -not -name README.md -delete

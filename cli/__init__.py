@@ -1,0 +1,1 @@
+"""The front door: a table of commands, console output, exit codes; no logic."""

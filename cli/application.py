@@ -1,0 +1,39 @@
+"""The command table: one command per declared step, found by folder, and the housekeeping commands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import typer
+
+from cli import housekeeping
+from cli.step_command import make_command
+from stages.kit.running.discovery import all_stages
+
+HELP = """Turn robot logs into scenes a robot can act in, and act in them.
+
+Each step reads artifact folders and writes one; `scenewright run reconstruct` chains them.
+Standard output carries data only; exit codes: 0 done, 2 usage, 3 bad input, 4 outcome not ok,
+5 something is missing, 6 the machine failed, 130 interrupted."""
+
+
+def build_application() -> Callable[..., Any]:
+    """Build the command line from the declarations of the steps; no step's code is loaded."""
+    application = typer.Typer(
+        help=HELP, no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
+    )
+    groups: dict[str, typer.Typer] = {}
+    for name, stage in all_stages().items():
+        group, _, command = name.rpartition(" ")
+        parent = application
+        if group:
+            if group not in groups:
+                groups[group] = typer.Typer(help=f"Commands of {group}.", no_args_is_help=True, rich_markup_mode=None)
+                application.add_typer(groups[group], name=group)
+            parent = groups[group]
+        parent.command(name=command, help=stage.summary, rich_help_panel="Steps")(make_command(stage))
+    for function, help_panel in housekeeping.COMMANDS:
+        application.command(rich_help_panel=help_panel)(function)
+    application.callback()(housekeeping.root)
+    return typer.main.get_command(application)

@@ -1,0 +1,273 @@
+"""Commands that are no steps: run, batch, verify, inspect, migrate, view, models, doctor, schemas, makefile."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from schemas.errors import BadInput, UsageError
+
+Paths = Annotated[list[Path], typer.Argument(help="Artifact folders.")]
+Json = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Warnings only.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+Settings = Annotated[list[str] | None, typer.Option("--set", help="variable=value; may be repeated.")]
+
+
+def _out(text: str) -> None:
+    sys.stdout.write(text + "\n")
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(text + "\n")
+
+
+def _settings(pairs: list[str] | None) -> dict[str, str]:
+    values = {}
+    for pair in pairs or []:
+        name, separator, value = pair.partition("=")
+        if not separator:
+            raise UsageError(f"--set {pair!r}: not variable=value", hint="for example --set log=room.mcap")
+        values[name] = value
+    return values
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from stages.kit.running.keys import library_version
+
+        _out(library_version("scenewright"))
+        raise typer.Exit
+
+
+def root(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and stop.", is_eager=True, callback=_print_version)
+    ] = False,
+) -> None:
+    """Toolkit from robot logs to scenes a robot can act in."""
+
+
+def run(
+    pipeline: Annotated[str, typer.Argument(help="Pipeline: a name in data/pipelines or a TOML file.")],
+    out: Annotated[Path, typer.Option("--out", help="Run folder; one artifact folder per step in it.")],
+    settings: Settings = None,
+    only: Annotated[list[str] | None, typer.Option("--only", help="Only this step; may be repeated.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Make every artifact again.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would run and why.")] = False,
+    json_output: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> int:
+    """Run a pipeline: the same commands that the Makefile chains."""
+    from stages.kit.running.chain import run_pipeline
+    from stages.kit.running.pipelines import pipeline_path, read_pipeline
+
+    flags = {"--force": force, "--dry-run": dry_run, "--quiet": quiet, "--debug": debug}
+    extra = tuple(flag for flag, given in flags.items() if given)
+    reports = run_pipeline(
+        read_pipeline(pipeline_path(pipeline)),
+        out,
+        _settings(settings),
+        extra=extra,
+        only=tuple(only or ()),
+        announce=(lambda text: None) if quiet else _say,
+    )
+    for report in reports:
+        facts = report.facts
+        _say(f"{report.name:24} {facts.get('status', f'exit {report.exit_code}'):11} {facts.get('outcome', '')}")
+        if dry_run and facts.get("reason"):
+            _say(f"{'':24} {facts['reason']}")
+    if json_output:
+        _out(json.dumps({"run": str(out), "steps": [r.facts for r in reports]}, sort_keys=True))
+    else:
+        _out(str(out))
+    return reports[-1].exit_code if reports else 0
+
+
+def batch(
+    spec: Annotated[Path, typer.Argument(help="Batch file (TOML): pipeline, set, scene.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder; one run folder per scene in it.")],
+    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Scenes at once.")] = 1,
+    force: Annotated[bool, typer.Option("--force", help="Make every artifact again.")] = False,
+    json_output: Json = False,
+    debug: Debug = False,
+) -> int:
+    """Run a pipeline over a data set; exits with the gravest code of its scenes."""
+    from stages.kit.running.batch import read_batch, run_batch, worst_exit_code
+
+    parsed, pipeline = read_batch(spec)
+    reports = run_batch(
+        parsed, pipeline, out, jobs=jobs, extra=("--quiet", *(("--force",) if force else ())), announce=_say
+    )
+    codes = {}
+    for name, steps in reports.items():
+        codes[name] = steps[-1].exit_code if steps else 0
+        _say(f"{name:24} exit {codes[name]}  {len(steps)}/{len(pipeline.step)} steps, last: {steps[-1].name}")
+    if json_output:
+        table = {name: [{"step": s.name, "exit_code": s.exit_code, **s.facts} for s in r] for name, r in reports.items()}
+        _out(json.dumps(table, sort_keys=True))
+    else:
+        _out(str(out))
+    return worst_exit_code(list(codes.values()))
+
+
+def verify(paths: Paths, json_output: Json = False, debug: Debug = False) -> int:
+    """Re-hash artifacts and follow their inputs back to the log."""
+    from stages.kit.running.verification import Finding
+    from stages.kit.running.verification import verify as verify_artifact
+
+    seen: dict[Path, Finding] = {}
+    for path in paths:
+        verify_artifact(path, seen)
+    for finding in seen.values():
+        _say(f"{'damaged' if finding.problems else 'sound':8} {finding.kind:18} {finding.path}")
+        for line in (*finding.problems, *finding.notes):
+            _say(f"{'':8} {line}")
+    damaged = [finding for finding in seen.values() if finding.problems]
+    if json_output:
+        rows = [
+            {"path": str(f.path), "kind": f.kind, "problems": list(f.problems), "notes": list(f.notes)}
+            for f in seen.values()
+        ]
+        _out(json.dumps({"sound": not damaged, "artifacts": rows}, sort_keys=True))
+    if damaged:
+        raise BadInput(f"{len(damaged)} of {len(seen)} artifacts are damaged", hint="make them again with --force")
+    return 0
+
+
+def inspect(
+    path: Annotated[Path, typer.Argument(help="Artifact folder.")],
+    expect: Annotated[str | None, typer.Option("--expect", help="Exit with 4 unless this is its outcome.")] = None,
+    json_output: Json = False,
+    debug: Debug = False,
+) -> int:
+    """Say what an artifact is and how it was made."""
+    from stages.kit.running.reading import open_artifact
+
+    manifest = open_artifact(path).manifest
+    assert manifest is not None
+    if json_output:
+        _out(manifest.model_dump_json())
+    else:
+        made = manifest.provenance
+        lines: list[tuple[str, Any]] = [
+            ("kind", f"{manifest.kind} version {manifest.schema_version}"),
+            ("outcome", manifest.outcome),
+            *(("summary", f"{name} = {value}") for name, value in manifest.summary.items()),
+            ("made by", f"{manifest.stage} version {manifest.stage_version}, seed {manifest.seed}"),
+            *(("input", f"{i.role}: {i.kind} {i.digest[:12]} {i.path}") for i in manifest.inputs),
+            *(("parameter", f"{name} = {value}") for name, value in manifest.parameters.items()),
+            ("content", manifest.content_digest),
+            ("files", f"{len(manifest.files)}, {sum(f.bytes for f in manifest.files) / 1e6:.1f} MB"),
+            ("took", f"{made.seconds:.1f} s, {made.peak_memory_bytes / 2**20:.0f} MiB, {made.started}"),
+            ("command", " ".join(made.command)),
+        ]
+        for label, value in lines:
+            _out(f"{label:10} {value}")
+    return 4 if expect is not None and manifest.outcome != expect else 0
+
+
+def migrate(
+    path: Annotated[Path, typer.Argument(help="Artifact of an older schema version.")],
+    out: Annotated[Path, typer.Option("--out", help="New folder.")],
+    debug: Debug = False,
+) -> int:
+    """Bring an artifact to the current schema version, into a new folder."""
+    from stages.kit.running.migration import migrate as migrate_artifact
+
+    migrate_artifact(path, out)
+    _out(str(out))
+    return 0
+
+
+def view(
+    path: Annotated[Path, typer.Argument(help="Artifact folder of any kind.")],
+    save: Annotated[Path | None, typer.Option("--save", help="Write a .rrd file instead of opening a window.")] = None,
+    debug: Debug = False,
+) -> int:
+    """Open an artifact in Rerun (an extra: pip install rerun-sdk), or write an .rrd file."""
+    from stages.kit.viewing.view import view_artifact
+
+    view_artifact(path, save)
+    if save is not None:
+        _out(str(save))
+    return 0
+
+
+def models(
+    check: Annotated[Path | None, typer.Option("--check", help="Tell which known network this file is.")] = None,
+    json_output: Json = False,
+    debug: Debug = False,
+) -> int:
+    """List the networks that steps can use: source, licence, checksum."""
+    from stages.kit.running.known_models import identify, known_models
+
+    if check is not None:
+        _out(identify(check).name)
+        return 0
+    for model in known_models():
+        if json_output:
+            _out(model.model_dump_json())
+        else:
+            _out(f"{model.name}: {model.purpose}\n  {model.file}, {model.licence}, {model.source}\n  sha256 {model.sha256}")
+    return 0
+
+
+def doctor(json_output: Json = False, debug: Debug = False) -> int:
+    """Say what is there, what is missing and how to get it."""
+    from stages.kit.running.diagnosis import diagnose
+
+    checks = diagnose()
+    if json_output:
+        rows = [{"name": c.name, "found": c.found, "remedy": c.remedy, "required": c.required} for c in checks]
+        _out(json.dumps(rows, sort_keys=True))
+    else:
+        for check in checks:
+            mark = "ok" if check.sound else "MISSING" if check.required else "extra"
+            _out(f"{mark:8} {check.name:24} {check.found}{'  -> ' + check.remedy if check.remedy else ''}")
+    return 5 if any(check.required and not check.sound for check in checks) else 0
+
+
+def schemas(
+    out: Annotated[Path, typer.Option("--out", help="Folder.")] = Path("schemas/json"), debug: Debug = False
+) -> int:
+    """Export the JSON Schemas of the manifest and every payload file."""
+    from stages.kit.running.json_schemas import json_schemas
+
+    out.mkdir(parents=True, exist_ok=True)
+    for name, text in json_schemas().items():
+        (out / name).write_text(text)
+    _out(str(out))
+    return 0
+
+
+def makefile(
+    pipeline: Annotated[str, typer.Argument(help="Pipeline: a name in data/pipelines or a TOML file.")],
+    debug: Debug = False,
+) -> int:
+    """Print the makefile of a pipeline."""
+    from stages.kit.running.make_rules import makefile_for
+    from stages.kit.running.pipelines import pipeline_path, read_pipeline
+
+    sys.stdout.write(makefile_for(read_pipeline(pipeline_path(pipeline))))
+    return 0
+
+
+COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
+    (run, "Pipelines"),
+    (batch, "Pipelines"),
+    (view, "Artifacts"),
+    (inspect, "Artifacts"),
+    (verify, "Artifacts"),
+    (migrate, "Artifacts"),
+    (models, "Installation"),
+    (doctor, "Installation"),
+    (schemas, "Installation"),
+    (makefile, "Installation"),
+)

@@ -1,0 +1,107 @@
+"""Entry point: builds the command table and turns every error into one line and an exit code."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import sys
+from pathlib import Path
+from types import FrameType
+
+import typer
+from typer.exceptions import TyperException
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+def _refuse_foreign_packages() -> None:
+    """`stages` and `schemas` are common names: refuse to run when they come from somewhere else."""
+    import schemas
+    import stages
+
+    for package in (schemas, stages):
+        found = Path(package.__file__ or "").resolve().parent.parent
+        if found != REPOSITORY:
+            sys.stderr.write(
+                f"error: package {package.__name__!r} comes from {found}, not from {REPOSITORY} "
+                "(run from another folder, or clear PYTHONPATH)\n"
+            )
+            raise SystemExit(5)
+
+
+def _interrupt(signum: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def _set_up_logging(level: int) -> None:
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(logging.Formatter("%(message)s"))
+    logger = logging.getLogger("scenewright")
+    logger.handlers[:] = [handler]
+    logger.setLevel(level)
+    logger.propagate = False
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command line and return its exit code."""
+    from schemas.errors import ScenewrightError
+
+    debug = "--debug" in arguments
+    _set_up_logging(logging.WARNING if "--quiet" in arguments else logging.DEBUG if debug else logging.INFO)
+    try:
+        from cli.application import build_application
+
+        result = build_application()(args=arguments, prog_name="scenewright", standalone_mode=False)
+        return result if isinstance(result, int) else 0
+    except ScenewrightError as error:
+        if debug:
+            raise
+        _say_error(str(error))
+        return error.exit_code
+    except typer.Exit as error:
+        return error.exit_code
+    except (KeyboardInterrupt, typer.Abort):
+        _say_error("interrupted; every finished artifact is as it was")
+        return 130
+    except TyperException as error:
+        context = getattr(error, "ctx", None)
+        where = f"{context.command_path}: " if context is not None else ""
+        message = error.format_message() if hasattr(error, "format_message") else str(error)
+        _say_error(f"{where}{message} (see --help)")
+        return 2
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except ImportError as error:
+        if debug:
+            raise
+        _say_error(f"{error} (run: scenewright doctor)")
+        return 5
+    except Exception as error:
+        if debug:
+            raise
+        _say_error(f"internal error: {type(error).__name__}: {error} (a bug of ours; --debug shows where)")
+        return 1
+
+
+def _say_error(text: str) -> None:
+    sys.stderr.write("error: " + " ".join(text.split()) + "\n")
+
+
+def _keep_standard_output_for_data() -> None:
+    """Send what native libraries print to file descriptor 1 (pybullet greets there) to standard error instead."""
+    sys.stdout.flush()
+    data = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    sys.stdout = data
+
+
+def main() -> None:
+    """Run the command line of this process."""
+    _keep_standard_output_for_data()
+    _refuse_foreign_packages()
+    signal.signal(signal.SIGTERM, _interrupt)
+    code = run(sys.argv[1:])
+    sys.stdout.flush()
+    sys.exit(code)

@@ -1,0 +1,194 @@
+"""The command of a step, generated from its declaration: options, help, ranges and errors are said once, there."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import sys
+from collections.abc import Callable
+from enum import Enum
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Literal, Optional, Union, get_args, get_origin
+
+import typer
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from schemas.artifact import Artifact
+from stages.kit.progress import progress_for
+from stages.kit.running.configuration import parameters_for, read_config
+from stages.kit.running.runner import RunResult, run_stage
+from stages.kit.stage import External, Optionally, Stage
+
+OUTCOME_EXIT_CODE = 4
+
+_BOUNDS = (("ge", "at least"), ("gt", "above"), ("le", "at most"), ("lt", "below"))
+
+
+def _bare_type(annotation: Any) -> Any:
+    """Strip None from a union."""
+    if get_origin(annotation) in (Union, UnionType):
+        rest = [item for item in get_args(annotation) if item is not NoneType]
+        return rest[0] if len(rest) == 1 else str
+    return annotation
+
+
+def _option_type(annotation: Any) -> tuple[Any, str]:
+    """Return the typer type of a parameter and what to add to its help."""
+    bare = _bare_type(annotation)
+    if get_origin(bare) is Literal:
+        return Optional[str], "one of " + ", ".join(map(str, get_args(bare)))  # noqa: UP045
+    if get_origin(bare) is tuple:
+        return Optional[list[get_args(bare)[0]]], "may be repeated"  # type: ignore[misc]  # noqa: UP045
+    if inspect.isclass(bare) and issubclass(bare, Enum):
+        return Optional[str], "one of " + ", ".join(str(item.value) for item in bare)  # noqa: UP045
+    return Optional[bare], ""  # noqa: UP045
+
+
+def _default_text(field: FieldInfo) -> str:
+    default = field.get_default(call_default_factory=True)
+    if default is PydanticUndefined:
+        return "required"
+    if default is None:
+        return "none"
+    if isinstance(default, Enum):
+        return str(default.value)
+    if isinstance(default, tuple):
+        return " ".join(map(str, default)) or "none"
+    return str(default).lower() if isinstance(default, bool) else str(default)
+
+
+def _help_of(field: FieldInfo, extra: str) -> str:
+    bounds = [
+        f"{word} {getattr(item, name)}"
+        for item in field.metadata
+        for name, word in _BOUNDS
+        if getattr(item, name, None) is not None
+    ]
+    notes = [text for text in (extra, " and ".join(bounds), f"default: {_default_text(field)}") if text]
+    return f"{field.description} [{'; '.join(notes)}]"
+
+
+def _parameter(name: str, annotation: Any, option: Any) -> inspect.Parameter:
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=option, annotation=annotation)
+
+
+def _input_options(stage: Stage) -> list[inspect.Parameter]:
+    options = []
+    for role, declared in stage.reads.items():
+        optional = isinstance(declared, Optionally)
+        what = declared.what if isinstance(declared, Optionally) else declared
+        text = what.description if isinstance(what, External) else f"Artifact: {what.kind}"
+        flag = "--" + role.replace("_", "-")
+        annotation = Optional[Path] if optional else Path  # noqa: UP045
+        default = None if optional else ...
+        options.append(
+            _parameter(f"input_{role}", annotation, typer.Option(default, flag, help=text, rich_help_panel="Inputs"))
+        )
+    return options
+
+
+def _parameter_options(stage: Stage) -> list[inspect.Parameter]:
+    options = []
+    for name, field in stage.parameters.model_fields.items():
+        annotation, extra = _option_type(field.annotation)
+        flag = "--" + name.replace("_", "-")
+        flags = [f"{flag}/--no-{flag[2:]}"] if _bare_type(field.annotation) is bool else [flag]
+        option = typer.Option(None, *flags, help=_help_of(field, extra), show_default=False)
+        options.append(_parameter(f"parameter_{name}", annotation, option))
+    return options
+
+
+def _common_options(stage: Stage) -> list[inspect.Parameter]:
+    panel = {"rich_help_panel": "Running", "show_default": False}
+
+    def flag(name: str, text: str) -> inspect.Parameter:
+        return _parameter(name, bool, typer.Option(False, f"--{name.replace('_', '-')}", help=text, **panel))
+
+    out = f"Folder of the {stage.writes.kind} artifact to write."
+    return [
+        _parameter("out", Path, typer.Option(..., "--out", help=out, **panel)),
+        _parameter("seed", int, typer.Option(0, "--seed", min=0, help="Seed of all randomness [default: 0].", **panel)),
+        _parameter("device", str, typer.Option("cpu", "--device", help="auto, cpu or cuda [default: cpu].", **panel)),
+        _parameter(
+            "config",
+            Optional[Path],  # noqa: UP045
+            typer.Option(None, "--config", help="TOML file of parameters; flags win.", **panel),
+        ),
+        flag("force", "Make it again even when it is up to date."),
+        flag("dry_run", "Say what would run and why; write nothing."),
+        _parameter(
+            "accept",
+            Optional[list[str]],  # noqa: UP045
+            typer.Option(None, "--accept", help="Outcome besides ok that exits with 0; may be repeated.", **panel),
+        ),
+        _parameter("json_output", bool, typer.Option(False, "--json", help="One JSON object on standard output.", **panel)),
+        flag("quiet", "No progress, warnings only."),
+        flag("debug", "Show the traceback of an error."),
+    ]
+
+
+def report_result(result: RunResult, stage: Stage, accept: tuple[str, ...], json_output: bool) -> int:
+    """Print what came of a run (standard output: the path, or JSON) and return the exit code."""
+    manifest = result.manifest
+    if json_output:
+        facts = {
+            "stage": stage.name,
+            "kind": stage.writes.kind,
+            "status": result.status,
+            "reason": result.reason,
+            "path": str(result.path),
+            "key": result.key,
+            "content_digest": manifest.content_digest if manifest else None,
+            "outcome": result.outcome,
+            "summary": manifest.summary if manifest else {},
+            "nondeterministic": result.nondeterministic,
+        }
+        sys.stdout.write(json.dumps(facts, sort_keys=True) + "\n")
+    else:
+        if manifest is not None:
+            summary = ", ".join(f"{name} {value}" for name, value in manifest.summary.items())
+            seconds = f" in {manifest.provenance.seconds:.1f} s" if result.status == "made" else ""
+            sys.stderr.write(f"{stage.name}: {result.status}{seconds}: {result.outcome}. {summary}\n")
+        else:
+            sys.stderr.write(f"{stage.name}: {result.status}: {result.reason}\n")
+        sys.stdout.write(f"{result.path}\n")
+    if manifest is not None and manifest.outcome != "ok" and manifest.outcome not in accept:
+        sys.stderr.write(
+            f"error: {stage.name}: outcome is {manifest.outcome!r}: "
+            f"{manifest.summary.get('reason', 'see the summary')} (--accept {manifest.outcome} goes on)\n"
+        )
+        return OUTCOME_EXIT_CODE
+    return 0
+
+
+def make_command(stage: Stage) -> Callable[..., int]:
+    """Return a function with the signature that typer reads for this step."""
+
+    def command(**options: Any) -> int:
+        config = read_config(options["config"]) if options["config"] else {}
+        flags = {name: options[f"parameter_{name}"] for name in stage.parameters.model_fields}
+        flags = {name: value for name, value in flags.items() if value not in (None, [])}
+        parameters = parameters_for(stage, flags, config, str(options["config"]))
+        inputs = {role: path for role in stage.reads if (path := options[f"input_{role}"]) is not None}
+        result = run_stage(
+            stage,
+            inputs,
+            options["out"],
+            parameters,
+            seed=options["seed"],
+            device=options["device"],
+            force=options["force"],
+            dry_run=options["dry_run"],
+            progress=progress_for(sys.stderr.isatty(), quiet=options["quiet"] or options["json_output"]),
+            command=("scenewright", *sys.argv[1:]),
+        )
+        return report_result(result, stage, tuple(options["accept"] or ()), options["json_output"])
+
+    parameters = [*_input_options(stage), *_parameter_options(stage), *_common_options(stage)]
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    command.__name__ = stage.name.replace(" ", "_")
+    command.__doc__ = f"{stage.summary}\n\nExample: {stage.example}" if stage.example else stage.summary
+    return command

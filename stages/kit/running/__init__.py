@@ -1,0 +1,1 @@
+"""Running steps: keys, digests, whole-or-not-at-all folders, resume, pipelines."""

@@ -1,0 +1,66 @@
+"""`scenewright doctor`: what is there, what is missing, how to get it."""
+
+from __future__ import annotations
+
+import ctypes.util
+import importlib
+import os
+import shutil
+import sys
+from dataclasses import dataclass
+
+from stages.kit.running.keys import library_version
+
+CORE = {
+    "typer": "typer", "open3d": "open3d", "trimesh": "trimesh", "pycolmap": "pycolmap",
+    "opencv-python-headless": "cv2", "numpy": "numpy", "scipy": "scipy", "torch": "torch", "mcap": "mcap",
+    "pybullet": "pybullet", "pydantic": "pydantic", "numba": "numba", "python-fcl": "fcl", "embreex": "embreex",
+    "shapely": "shapely", "networkx": "networkx", "yourdfpy": "yourdfpy", "matplotlib": "matplotlib",
+}  # fmt: skip
+EXTRAS = {"rerun-sdk": ("rerun", "viewing artifacts: pip install rerun-sdk")}
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of the diagnosis."""
+
+    name: str
+    found: str
+    remedy: str = ""
+    required: bool = True
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing has to be done."""
+        return not self.remedy
+
+
+def _import_check(distribution: str, module: str, remedy: str, required: bool) -> Check:
+    version = library_version(distribution)
+    if version == "absent":
+        return Check(distribution, "absent", remedy, required)
+    try:
+        importlib.import_module(module)
+    except Exception as error:
+        return Check(distribution, f"{version}, does not import: {error}", remedy, required)
+    return Check(distribution, version, required=required)
+
+
+def diagnose() -> list[Check]:
+    """Check Python, system libraries, core and extra packages, memory and disk."""
+    checks = []
+    python = ".".join(map(str, sys.version_info[:3]))
+    supported = sys.version_info[:2] == (3, 11)
+    checks.append(Check("python", python, "" if supported else "use Python 3.11 and run: make setup"))
+    usb = ctypes.util.find_library("usb-1.0")
+    checks.append(Check("libusb-1.0-0", usb or "absent", "" if usb else "apt-get install libusb-1.0-0"))
+    checks += [_import_check(name, module, "run: make setup", True) for name, module in CORE.items()]
+    torchvision = library_version("torchvision")
+    if torchvision != "absent":
+        checks.append(Check("torchvision", torchvision, "pip uninstall torchvision (it breaks transformers)", False))
+    checks += [_import_check(name, module, hint, False) for name, (module, hint) in EXTRAS.items()]
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
+    checks.append(Check("memory", f"{memory:.0f} GiB", "" if memory >= 4 else "4 GiB are needed", False))
+    free = shutil.disk_usage(".").free / 2**30
+    checks.append(Check("free disk here", f"{free:.0f} GiB", "" if free >= 2 else "free 2 GiB", False))
+    return checks

@@ -1,0 +1,60 @@
+"""The key of an artifact: what decides its bytes. Same key on disk means nothing to do."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from importlib import metadata
+from typing import Any
+
+from schemas.base import canonical_json
+from stages.kit.running.digests import sha256_of_text
+from stages.kit.stage import Parameters, Stage
+
+KEY_FORMAT = 1
+"""Raised whenever what goes into the key changes."""
+
+
+@cache
+def library_version(distribution: str) -> str:
+    """Return the installed version of a distribution, without its local build tag (`2.13.0+cpu` -> `2.13.0`)."""
+    try:
+        return metadata.version(distribution).split("+")[0]
+    except metadata.PackageNotFoundError:
+        return "absent"
+
+
+def library_versions(stage: Stage) -> dict[str, str]:
+    """Return the versions of the libraries that decide the step's output."""
+    return {name: library_version(name) for name in sorted(stage.libraries)}
+
+
+def parameters_as_json(parameters: Parameters) -> dict[str, Any]:
+    """Return all parameters, defaults included, as plain JSON values."""
+    return json.loads(parameters.model_dump_json())
+
+
+def artifact_key(
+    stage: Stage, parameters: Parameters, inputs: Mapping[str, str], seed: int, device_kind: str
+) -> str:
+    """Return the key: sha256 of canonical JSON of all that decides the output.
+
+    `inputs` maps role to content digest (artifacts) or file digest (raw inputs, weights).
+    """
+    return sha256_of_text(
+        canonical_json(
+            {
+                "key_format": KEY_FORMAT,
+                "kind": stage.writes.kind,
+                "schema_version": stage.writes.schema_version,
+                "stage": stage.name,
+                "stage_version": stage.version,
+                "parameters": parameters_as_json(parameters),
+                "inputs": dict(inputs),
+                "seed": seed,
+                "libraries": library_versions(stage),
+                "device_kind": device_kind,
+            }
+        )
+    )

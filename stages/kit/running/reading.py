@@ -1,0 +1,74 @@
+"""Opening artifacts as inputs: kind, version and sizes are checked before any step sees them."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from schemas.artifact import KINDS, Artifact
+from schemas.errors import BadInput
+from schemas.manifest import FORMAT_VERSION, MANIFEST_NAME, Manifest
+from stages.kit.running.store import complete_interrupted
+
+
+def read_manifest(root: Path) -> Manifest:
+    """Read the manifest of an artifact folder. Raises BadInput when there is none that this version can read."""
+    root = Path(root)
+    complete_interrupted(root)
+    if not root.exists():
+        raise BadInput(f"{root}: no such artifact", hint="run the step that makes it")
+    path = root / MANIFEST_NAME
+    if not path.exists():
+        raise BadInput(f"{root}: not an artifact (no {MANIFEST_NAME})", hint="give the folder that a step wrote")
+    manifest = Manifest.read(path)
+    if manifest.format_version > FORMAT_VERSION:
+        raise BadInput(f"{root}: written by a newer scenewright", hint="upgrade scenewright")
+    return manifest
+
+
+def check_version(root: Path, manifest: Manifest) -> type[Artifact]:
+    """Return the class of the artifact's kind. Raises BadInput for an unknown kind or another schema version."""
+    kind = KINDS.get(manifest.kind)
+    if kind is None:
+        raise BadInput(f"{root}: unknown kind {manifest.kind!r}", hint="upgrade scenewright")
+    if manifest.schema_version > kind.schema_version:
+        raise BadInput(
+            f"{root}: {manifest.kind} version {manifest.schema_version} is newer than this scenewright reads "
+            f"({kind.schema_version})",
+            hint="upgrade scenewright",
+        )
+    if manifest.schema_version < kind.schema_version:
+        raise BadInput(
+            f"{root}: {manifest.kind} version {manifest.schema_version} is older than {kind.schema_version}",
+            hint=f"run: scenewright migrate {root} --out {root}-v{kind.schema_version}",
+        )
+    return kind
+
+
+def check_sizes(root: Path, manifest: Manifest) -> None:
+    """Check that every payload file is there with its size. Raises BadInput naming the first that is not."""
+    real_root = os.path.realpath(root)
+    for record in manifest.files:
+        path = root / record.path
+        if not os.path.realpath(path).startswith(real_root + os.sep):
+            raise BadInput(f"{root}: {record.path} points outside the artifact", hint="make the artifact again")
+        if not path.is_file():
+            raise BadInput(f"{path}: missing", hint="make the artifact again with --force")
+        if path.stat().st_size != record.bytes:
+            raise BadInput(
+                f"{path}: {path.stat().st_size} bytes, the manifest says {record.bytes}",
+                hint="make the artifact again with --force",
+            )
+
+
+def open_artifact(root: Path, expected: type[Artifact] | None = None) -> Artifact:
+    """Open an artifact folder as its typed handle. Raises BadInput for a wrong kind, version or missing payload."""
+    root = Path(root)
+    manifest = read_manifest(root)
+    kind = check_version(root, manifest)
+    if expected is not None and kind is not expected:
+        raise BadInput(
+            f"{root}: holds a {manifest.kind!r} artifact, {expected.kind!r} is needed", hint="give another folder"
+        )
+    check_sizes(root, manifest)
+    return kind(root=root, outcome=manifest.outcome, summary=dict(manifest.summary), manifest=manifest)

@@ -1,0 +1,242 @@
+"""Running one step: check inputs, compare keys, work in a partial folder, record, take the target's place."""
+
+from __future__ import annotations
+
+import errno
+import importlib
+import json
+import logging
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+from schemas.artifact import Artifact
+from schemas.errors import BadInput, MachineFailure, MissingDependency, UsageError
+from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
+from stages.kit.progress import SilentProgress
+from stages.kit.running import store
+from stages.kit.running.digests import content_digest, external_digest, record_files
+from stages.kit.running.keys import artifact_key, library_versions, parameters_as_json
+from stages.kit.running.provenance import provenance_now
+from stages.kit.running.reading import check_sizes, open_artifact, read_manifest
+from stages.kit.stage import Context, External, Optionally, Parameters, Stage
+
+logger = logging.getLogger("scenewright")
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What came of a run."""
+
+    status: Literal["made", "up to date", "would run"]
+    reason: str
+    """Why it ran, or would."""
+    path: Path
+    key: str
+    manifest: Manifest | None
+    nondeterministic: bool = False
+    """The same key gave another content digest than before."""
+
+    @property
+    def outcome(self) -> str:
+        """Outcome of the artifact; `unknown` for one that a dry run would make."""
+        return self.manifest.outcome if self.manifest else "unknown"
+
+
+@dataclass(frozen=True)
+class _OpenInput:
+    role: str
+    kind: str
+    digest: str
+    path: Path
+    value: Artifact | Path
+
+
+def choose_device(wanted: str) -> str:
+    """Turn `auto`, `cpu` or `cuda` into the device to use. Raises MissingDependency when cuda is asked for and absent."""
+    if wanted == "cpu":
+        return "cpu"
+    import torch
+
+    if torch.cuda.is_available():
+        return "cuda"
+    if wanted == "cuda":
+        raise MissingDependency("no CUDA device is available", hint="use --device cpu")
+    return "cpu"
+
+
+def _open_inputs(stage: Stage, paths: Mapping[str, Path]) -> list[_OpenInput]:
+    unknown = set(paths) - set(stage.reads)
+    if unknown:
+        raise UsageError(f"{stage.name}: no input {sorted(unknown)[0]!r}", hint=f"inputs: {', '.join(stage.reads)}")
+    missing = [role for role in stage.required() if role not in paths]
+    if missing:
+        raise UsageError(f"{stage.name}: --{missing[0].replace('_', '-')} is missing", hint="see --help")
+    opened = []
+    for role, path in paths.items():
+        declared = stage.reads[role]
+        what = declared.what if isinstance(declared, Optionally) else declared
+        if isinstance(what, External):
+            if what.weights and not Path(path).is_file():
+                raise MissingDependency(f"{path}: no such weight file", hint="see: scenewright models")
+            opened.append(_OpenInput(role, "external", external_digest(path), Path(path), Path(path)))
+        else:
+            artifact = open_artifact(path, what)
+            assert artifact.manifest is not None
+            opened.append(_OpenInput(role, what.kind, artifact.manifest.content_digest, Path(path), artifact))
+    return opened
+
+
+def _reason_to_run(out: Path, key: str, manifest: Manifest | None, force: bool, changed: list[str]) -> str | None:
+    """Why the step has to run, or None when the artifact on disk is what it would make."""
+    if manifest is None:
+        return f"{out} does not exist"
+    if manifest.key != key:
+        return f"changed: {', '.join(changed) or 'key format'}"
+    if force:
+        return "--force"
+    try:
+        check_sizes(out, manifest)
+    except BadInput as error:
+        return error.message
+    return None
+
+
+def _what_changed(old: Manifest, new: dict[str, Any]) -> list[str]:
+    changed = []
+    for name in ("stage_version", "schema_version", "seed", "device_kind"):
+        if getattr(old, name) != new[name]:
+            changed.append(f"{name} {getattr(old, name)} -> {new[name]}")
+    for group, before, after in (
+        ("parameter", old.parameters, new["parameters"]),
+        ("library", old.libraries, new["libraries"]),
+        ("input", {record.role: record.digest for record in old.inputs}, new["inputs"]),
+    ):
+        for name in sorted(set(before) | set(after)):
+            if before.get(name) != after.get(name):
+                detail = "" if group == "input" else f" {before.get(name)!r} -> {after.get(name)!r}"
+                changed.append(f"{group} {name}{detail}")
+    return changed
+
+
+@contextmanager
+def _machine_errors(out: Path) -> Iterator[None]:
+    """Turn a full or read-only disk and exhausted memory into MachineFailure."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO):
+            raise MachineFailure(f"{out}: {error.strerror}", hint="free space or choose another --out") from error
+        raise
+    except MemoryError as error:
+        raise MachineFailure(f"{out}: out of memory", hint="use fewer frames or larger voxels") from error
+
+
+def run_stage(
+    stage: Stage,
+    inputs: Mapping[str, Path],
+    out: Path,
+    parameters: Parameters,
+    *,
+    seed: int = 0,
+    device: str = "cpu",
+    force: bool = False,
+    dry_run: bool = False,
+    progress: SilentProgress | None = None,
+    command: tuple[str, ...] = (),
+) -> RunResult:
+    """Make the artifact at `out`, unless it is there already (docs/ARCHITECTURE.md, the stage contract).
+
+    Raises BadInput, UsageError, MissingDependency or MachineFailure; whatever stood at `out` is then untouched.
+    """
+    out = Path(os.path.abspath(out))
+    if stage.check is not None:
+        stage.check(parameters, inputs)
+    opened = _open_inputs(stage, inputs)
+    device = choose_device(device) if device != "cpu" else device
+    digests = {item.role: item.digest for item in opened}
+    key = artifact_key(stage, parameters, digests, seed, device)
+    store.check_target(out, stage.writes.kind)
+    facts = {
+        "stage_version": stage.version,
+        "schema_version": stage.writes.schema_version,
+        "seed": seed,
+        "device_kind": device,
+        "parameters": parameters_as_json(parameters),
+        "libraries": library_versions(stage),
+        "inputs": digests,
+    }
+
+    if dry_run:
+        previous = _previous_manifest(out)
+        reason = _reason_to_run(out, key, previous, force, _what_changed(previous, facts) if previous else [])
+        status: Literal["up to date", "would run"] = "up to date" if reason is None else "would run"
+        return RunResult(status, reason or "", out, key, previous if reason is None else None)
+
+    with _machine_errors(out), store.locked(out):
+        previous = _previous_manifest(out)
+        reason = _reason_to_run(out, key, previous, force, _what_changed(previous, facts) if previous else [])
+        if reason is None:
+            return RunResult("up to date", "", out, key, previous)
+        logger.info("%s: %s", stage.name, reason)
+        started = datetime.now(UTC)
+        progress = progress or SilentProgress()
+        with store.partial_folder(out) as partial:
+            context = Context(output=partial, seed=seed, device=device, progress=progress)
+            run = importlib.import_module(f"stages.{stage.folder}.{stage.module}").run
+            values: dict[str, Artifact | Path | None] = dict.fromkeys(stage.reads)
+            values.update({item.role: item.value for item in opened})
+            made = run(**values, parameters=parameters, context=context)
+            _check_payload(stage, made, partial)
+            (partial / "timings.json").write_text(
+                json.dumps({name: round(value, 3) for name, value in sorted(progress.seconds.items())}, indent=1)
+            )
+            records = record_files(partial, stage.writes.undigested)
+            manifest = Manifest(
+                kind=stage.writes.kind,
+                schema_version=stage.writes.schema_version,
+                stage=stage.name,
+                stage_version=stage.version,
+                key=key,
+                content_digest=content_digest(records),
+                files=records,
+                inputs=tuple(
+                    InputRecord(role=i.role, kind=i.kind, digest=i.digest, path=os.path.relpath(i.path, out))
+                    for i in opened
+                ),
+                parameters=facts["parameters"],
+                seed=seed,
+                libraries=facts["libraries"],
+                device_kind=device,
+                outcome=made.outcome,
+                summary=made.summary,
+                provenance=provenance_now(command, device, started),
+            )
+            manifest.write(partial / MANIFEST_NAME)
+            store.take_place(partial, out)
+    nondeterministic = (
+        previous is not None and previous.key == key and previous.content_digest != manifest.content_digest
+    )
+    if nondeterministic:
+        logger.warning("%s: the same key gave other bytes than before: this step is not deterministic", stage.name)
+    return RunResult("made", reason, out, key, manifest, nondeterministic)
+
+
+def _previous_manifest(out: Path) -> Manifest | None:
+    try:
+        return read_manifest(out)
+    except BadInput:
+        return None
+
+
+def _check_payload(stage: Stage, made: Artifact, partial: Path) -> None:
+    """What a step says it wrote has to be there and readable, before anybody else sees it."""
+    if type(made) is not stage.writes or made.root != partial:
+        raise TypeError(f"step {stage.name} returned {made!r}, not {stage.writes.__name__} in its output folder")
+    if made.outcome == "ok":
+        for name, model in stage.writes.json_files.items():
+            model.read(partial / name)

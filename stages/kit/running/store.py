@@ -1,0 +1,176 @@
+"""Artifact folders that appear whole or not at all.
+
+A run holds an exclusive lock beside its target, writes into a partial folder beside it, and takes the target's place
+in one step: renameat2(RENAME_EXCHANGE) where the file system has it, otherwise a journalled pair of renames that the
+next run (or reader) completes. Leftovers of killed runs are swept by the next run, as only the holder of the lock may
+own a partial folder.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import errno
+import fcntl
+import json
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+from schemas.errors import MachineFailure, UsageError
+from schemas.manifest import MANIFEST_NAME
+
+AT_FDCWD = -100
+RENAME_EXCHANGE = 2
+
+
+def _beside(target: Path, suffix: str) -> Path:
+    return target.with_name(f".{target.name}.{suffix}")
+
+
+def sync_folder(path: Path) -> None:
+    """Flush a folder's entries to the disk."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def sync_tree(root: Path) -> None:
+    """Flush every file and folder under `root` to the disk."""
+    for folder, _, names in os.walk(root):
+        for name in names:
+            descriptor = os.open(os.path.join(folder, name), os.O_RDONLY)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
+        sync_folder(Path(folder))
+
+
+def exchange(first: Path, second: Path) -> bool:
+    """Swap two paths atomically. Returns False where the kernel or the file system cannot."""
+    try:
+        renameat2 = ctypes.CDLL(None, use_errno=True).renameat2
+    except (OSError, AttributeError):
+        return False
+    result = renameat2(AT_FDCWD, os.fsencode(first), AT_FDCWD, os.fsencode(second), RENAME_EXCHANGE)
+    if result == 0:
+        return True
+    code = ctypes.get_errno()
+    if code in (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP):
+        return False
+    raise OSError(code, os.strerror(code), str(second))
+
+
+def _journalled_replace(partial: Path, target: Path) -> None:
+    journal, old = _beside(target, "journal"), _beside(target, f"old-{secrets.token_hex(4)}")
+    text = json.dumps({"partial": partial.name, "old": old.name})
+    with journal.open("w") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    sync_folder(target.parent)
+    os.rename(target, old)
+    os.rename(partial, target)
+    sync_folder(target.parent)
+    journal.unlink()
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def recover(target: Path) -> None:
+    """Complete or undo a replacement that a kill interrupted. Call with the lock held."""
+    journal = _beside(target, "journal")
+    try:
+        plan = json.loads(journal.read_text())
+    except FileNotFoundError:
+        return
+    except json.JSONDecodeError:
+        journal.unlink()  # killed while writing it: nothing had been renamed yet
+        return
+    partial, old = target.with_name(plan["partial"]), target.with_name(plan["old"])
+    if not target.exists():
+        if (partial / MANIFEST_NAME).exists():
+            os.rename(partial, target)
+        elif old.exists():
+            os.rename(old, target)
+    sync_folder(target.parent)
+    journal.unlink()
+
+
+def _sweep(target: Path) -> None:
+    for leftover in target.parent.glob(f".{target.name}.partial-*"):
+        shutil.rmtree(leftover, ignore_errors=True)
+    for leftover in target.parent.glob(f".{target.name}.old-*"):
+        shutil.rmtree(leftover, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def locked(target: Path) -> Iterator[None]:
+    """Hold the lock of `target`. Raises MachineFailure when another run holds it."""
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(_beside(target, "lock"), os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise MachineFailure(f"{target}: {error.strerror}", hint="choose a writable --out") from None
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise MachineFailure(
+                f"{target}: another run is writing it", hint="wait for it to end, or choose another --out"
+            ) from None
+        recover(target)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def complete_interrupted(target: Path) -> None:
+    """For readers: complete an interrupted replacement, if there is one and nobody is at it."""
+    if _beside(target, "journal").exists():
+        with contextlib.suppress(MachineFailure), locked(target):
+            pass
+
+
+def check_target(target: Path, kind: str) -> None:
+    """Refuse to replace what is no artifact, or one of another kind. Raises UsageError."""
+    if not target.exists():
+        return
+    if not target.is_dir():
+        raise UsageError(f"{target}: a file stands there", hint="choose another --out")
+    manifest = target / MANIFEST_NAME
+    if manifest.exists():
+        try:
+            found = json.loads(manifest.read_text()).get("kind")
+        except (ValueError, AttributeError):
+            found = kind  # a torn manifest: not an artifact any more, ours to replace
+        if found != kind:
+            raise UsageError(f"{target}: holds a {found!r} artifact, not {kind!r}", hint="choose another --out")
+    elif any(target.iterdir()):
+        raise UsageError(f"{target}: holds files that no step wrote", hint="choose another --out; nothing was changed")
+
+
+@contextlib.contextmanager
+def partial_folder(target: Path) -> Iterator[Path]:
+    """Yield a new partial folder beside `target` (lock held by the caller); whatever is left of it is removed."""
+    _sweep(target)
+    partial = _beside(target, f"partial-{os.getpid()}-{secrets.token_hex(4)}")
+    partial.mkdir()
+    try:
+        yield partial
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def take_place(partial: Path, target: Path) -> None:
+    """Make the finished partial folder stand at `target`, in one step."""
+    sync_tree(partial)
+    if not target.exists():
+        os.rename(partial, target)
+    elif not exchange(partial, target):
+        _journalled_replace(partial, target)
+    sync_folder(target.parent)
