@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
@@ -14,7 +15,7 @@ TILT_TOLERANCE = 1e-6
 """How far (as 1 - cosine) a box's z axis may lean before it no longer counts as gravity-aligned."""
 
 
-def box_from_bounds(minimum: np.ndarray, maximum: np.ndarray) -> Box:
+def box_from_bounds(minimum: ArrayLike, maximum: ArrayLike) -> Box:
     """Return the axis-aligned box between two corners (3,) [m]. Raises ValueError when minimum > maximum."""
     low, high = np.asarray(minimum, dtype=float).reshape(3), np.asarray(maximum, dtype=float).reshape(3)
     if np.any(low > high):
@@ -22,10 +23,10 @@ def box_from_bounds(minimum: np.ndarray, maximum: np.ndarray) -> Box:
     return gravity_aligned_box((low + high) / 2.0, high - low, 0.0)
 
 
-def gravity_aligned_box(center: np.ndarray, size: np.ndarray, yaw: float) -> Box:
+def gravity_aligned_box(center: ArrayLike, size: ArrayLike, yaw: float) -> Box:
     """Return the box with `center` (3,) [m], full edge lengths `size` (3,) [m], turned by `yaw` [rad] about z."""
-    cx, cy, cz = (float(v) for v in center)
-    sx, sy, sz = (float(v) for v in size)
+    cx, cy, cz = (float(v) for v in np.asarray(center, dtype=float))
+    sx, sy, sz = (float(v) for v in np.asarray(size, dtype=float))
     half = 0.5 * float(yaw)
     return Box(center=(cx, cy, cz), orientation=(0.0, 0.0, math.sin(half), math.cos(half)), size=(sx, sy, sz))
 
