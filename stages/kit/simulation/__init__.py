@@ -1,1 +1,1 @@
-"""pybullet worlds, robots and loaders."""
+"""Physics worlds in pybullet: interactive scenes, robots, grasps."""

@@ -1,0 +1,142 @@
+"""Collision checks of a mobile arm, and of what it carries, with the bodies of a pybullet world."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.kit.geometry.transforms import inverse
+from stages.kit.simulation.engine import engine
+from stages.kit.simulation.robot import Robot
+from stages.kit.simulation.robot_description import PEDESTAL_LINK
+from stages.kit.simulation.world import Contact, PhysicsWorld
+
+_SCENE, _ROBOT, _CARRIED = 1, 2, 4
+RESTING_DEPTH = 0.008
+"""A carried item may sink this far into what it stands on: reconstructed surfaces are that uncertain."""
+
+
+@dataclass(frozen=True)
+class Collision:
+    """The deepest of the contacts that are not allowed."""
+
+    part: str
+    """Link of the robot, or name of the carried body."""
+    other: str
+    """Link of a scene body (`fridge_2__door`), or of the robot itself."""
+    depth: float
+    """Penetration [m]; negative when only the clearance is missed."""
+
+
+class CollisionChecker:
+    """Asks whether configurations (10,) of base and arm are free.
+
+    `clearance` [m] is kept to everything, itself excepted. What may be touched is said by `allow`.
+    """
+
+    def __init__(self, world: PhysicsWorld, robot: Robot, clearance: float = 0.004) -> None:
+        self.world = world
+        self.robot = robot
+        self.clearance = clearance
+        self.checks = 0
+        self.carried: str | None = None
+        self._tool_from_carried = np.eye(4)
+        self._touchable: frozenset[str] = frozenset()
+        self._rest_on: frozenset[str] = frozenset()
+        self._touching = frozenset({robot.hand, *robot.fingers})
+        for name in world.bodies:
+            self.add_body(name)
+        for index in (-1, *robot.links.values()):
+            self._group(robot.body_id, index, _ROBOT, _SCENE | _ROBOT | _CARRIED)
+
+    def _group(self, body_id: int, link: int, group: int, mask: int) -> None:
+        engine.setCollisionFilterGroupMask(body_id, link, group, mask, physicsClientId=self.world.client)
+
+    def add_body(self, name: str) -> None:
+        """Make a scene body an obstacle (those in the world at construction are). Floors do not stop the pedestal."""
+        body = self.world.bodies[name]
+        for index in body.links.values():
+            self._group(body.body_id, index, _SCENE, _ROBOT | _CARRIED)
+            if body.record.class_name == "floor":
+                engine.setCollisionFilterPair(
+                    self.robot.body_id, body.body_id, self.robot.links[PEDESTAL_LINK], index, 0,
+                    physicsClientId=self.world.client,
+                )  # fmt: skip
+
+    # --- what is carried, what may be touched -----------------------------------------------------------------
+
+    def carry(self, name: str, tool_from_body: np.ndarray) -> None:
+        """From now on the body moves with the tool: world_from_body = world_from_tool @ tool_from_body (4, 4)."""
+        self.put_down()
+        self.carried, self._tool_from_carried = name, tool_from_body
+        body = self.world.bodies[name]
+        for index in body.links.values():
+            self._group(body.body_id, index, _CARRIED, _SCENE | _ROBOT)
+
+    def put_down(self, world_from_body: np.ndarray | None = None) -> None:
+        """The carried body (if any) becomes an obstacle again, at a pose (4, 4) or where it is."""
+        if self.carried is None:
+            return
+        if world_from_body is not None:
+            self.world.set_pose(self.carried, world_from_body)
+        body = self.world.bodies[self.carried]
+        for index in body.links.values():
+            self._group(body.body_id, index, _SCENE, _ROBOT | _CARRIED)
+        self.carried = None
+
+    def allow(self, touch: Iterable[str] = (), rest_on: Iterable[str] = ()) -> None:
+        """Say which links hand and fingers may touch, and which links the carried body may rest on (link names)."""
+        self._touchable, self._rest_on = frozenset(touch), frozenset(rest_on)
+
+    # --- queries ----------------------------------------------------------------------------------------------
+
+    def check(self, body: np.ndarray) -> Collision | None:
+        """Return the worst collision of a configuration (10,), or None when it is free."""
+        self.checks += 1
+        self.robot.set_body(body)
+        if self.carried is not None:
+            self.world.set_pose(self.carried, self.robot.tool_pose() @ self._tool_from_carried)
+        engine.performCollisionDetection(physicsClientId=self.world.client)
+        worst: Collision | None = None
+        for contact in self.world.contacts(self.robot.body_id):
+            collision = self._of_robot(contact)
+            if collision is not None and (worst is None or collision.depth > worst.depth):
+                worst = collision
+        if self.carried is not None:
+            for contact in self.world.contacts(self.world.bodies[self.carried].body_id):
+                collision = self._of_carried(contact)
+                if collision is not None and (worst is None or collision.depth > worst.depth):
+                    worst = collision
+        return worst
+
+    def _of_robot(self, contact: Contact) -> Collision | None:
+        own = self.robot.link_names.get(contact.own_link, "anchor")
+        if contact.other_body == self.robot.body_id:
+            if contact.depth <= 0:
+                return None
+            return Collision(own, self.robot.link_names.get(contact.other_link, "anchor"), contact.depth)
+        if contact.depth <= -self.clearance:
+            return None
+        other = self.world.link_name(contact.other_body, contact.other_link)
+        if contact.own_link in self._touching:
+            carried = self.carried is not None and contact.other_body == self.world.bodies[self.carried].body_id
+            if carried or other in self._touchable:
+                return None
+        return Collision(own, other, contact.depth)
+
+    def _of_carried(self, contact: Contact) -> Collision | None:
+        if contact.other_body == self.robot.body_id:
+            return None  # seen from the robot's side
+        if contact.depth <= -self.clearance:
+            return None
+        other = self.world.link_name(contact.other_body, contact.other_link)
+        if other in self._rest_on and contact.depth < RESTING_DEPTH:
+            return None
+        return Collision(self.carried or "", other, contact.depth)
+
+
+def tool_from_body(world_from_tool: np.ndarray, world_from_body: np.ndarray) -> np.ndarray:
+    """Return tool_from_body (4, 4) of a grasp."""
+    return inverse(world_from_tool) @ world_from_body

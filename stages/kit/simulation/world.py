@@ -1,0 +1,258 @@
+"""An interactive scene in pybullet: static bodies fixed, movable bodies free, joints at their values.
+
+pybullet turns floating joints into fixed ones, so that scene.urdf would hang every cup in the air. Every body is
+therefore loaded on its own: those of static.urdf with a fixed base, the movable ones from their own files.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.interactive_scene import InteractiveSceneFile, SceneBody
+from stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion
+from stages.kit.simulation.engine import engine, native_output_to_stderr
+from stages.kit.simulation.urdf_split import read_urdf, split_body, with_absolute_meshes, without_visuals
+
+TIME_STEP = 1.0 / 240.0
+GRAVITY = 9.81
+FRICTION = 0.6
+JOINT_FRICTION = 0.4
+"""Torque [N m] or force [N] that holds an unpowered door or drawer where it was left."""
+
+
+@dataclass(frozen=True)
+class LoadedBody:
+    """A scene body in a physics world."""
+
+    record: SceneBody
+    body_id: int
+    links: dict[str, int]
+    """Link name -> pybullet link index; -1 is the base link."""
+    joints: dict[str, int]
+    """Names of moving joints -> pybullet joint index."""
+
+    @property
+    def name(self) -> str:
+        """Node id in the contact graph."""
+        return self.record.name
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A contact between two links. `depth` [m] is positive for penetration; `normal` (3,) points from other to own."""
+
+    own_link: int
+    other_body: int
+    other_link: int
+    depth: float
+    point: np.ndarray
+    normal: np.ndarray
+    force: float
+
+
+class PhysicsWorld:
+    """A pybullet client without graphics. Close it, or use it in a `with` statement."""
+
+    def __init__(self, time_step: float = TIME_STEP) -> None:
+        self.client = engine.connect(engine.DIRECT)
+        self.time_step = time_step
+        self.bodies: dict[str, LoadedBody] = {}
+        self._base_from_inertial: dict[int, np.ndarray] = {}
+        self.time = 0.0
+        engine.setGravity(0, 0, -GRAVITY, physicsClientId=self.client)
+        engine.setPhysicsEngineParameter(
+            fixedTimeStep=time_step, numSolverIterations=100, deterministicOverlappingPairs=1,
+            physicsClientId=self.client,
+        )  # fmt: skip
+
+    def __enter__(self) -> PhysicsWorld:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Disconnect; the world cannot be used afterwards."""
+        if self.client >= 0:
+            engine.disconnect(physicsClientId=self.client)
+            self.client = -1
+
+    def load_urdf_text(self, text: str, *, fixed: bool, flags: int = 0) -> int:
+        """Load URDF text (absolute mesh paths) at the origin and return the body id. Raises BadInput."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "body.urdf")
+            Path(path).write_text(text, encoding="utf-8")
+            try:
+                with native_output_to_stderr():
+                    return engine.loadURDF(
+                        path, useFixedBase=fixed, flags=flags | engine.URDF_USE_INERTIA_FROM_FILE,
+                        physicsClientId=self.client,
+                    )  # fmt: skip
+            except engine.error as error:
+                raise BadInput(f"pybullet cannot load a URDF: {error}", hint="run `scenewright verify`") from None
+
+    def add_body(self, record: SceneBody, text: str) -> LoadedBody:
+        """Load one scene body from URDF text at its pose and joint values."""
+        body_id = self.load_urdf_text(without_visuals(text), fixed=not record.movable)
+        info = engine.getDynamicsInfo(body_id, -1, physicsClientId=self.client)
+        self._base_from_inertial[body_id] = transform_from_quaternion(np.array(info[4]), np.array(info[3]))
+        links, joints = self._names(body_id)
+        body = LoadedBody(record, body_id, links, joints)
+        self.bodies[record.name] = body
+        self.set_pose(record.name, np.array(record.world_from_body))
+        for joint, index in joints.items():
+            self.set_joint(record.name, joint, record.joint_values.get(joint, 0.0))
+            engine.setJointMotorControl2(
+                body_id, index, engine.VELOCITY_CONTROL, targetVelocity=0.0, force=JOINT_FRICTION,
+                physicsClientId=self.client,
+            )  # fmt: skip
+        for index in links.values():
+            engine.changeDynamics(
+                body_id, index, lateralFriction=FRICTION, spinningFriction=0.005, rollingFriction=0.0005,
+                physicsClientId=self.client,
+            )  # fmt: skip
+        return body
+
+    def remove_body(self, name: str) -> None:
+        """Take a scene body out of the world."""
+        engine.removeBody(self.bodies.pop(name).body_id, physicsClientId=self.client)
+
+    def _names(self, body_id: int) -> tuple[dict[str, int], dict[str, int]]:
+        links = {engine.getBodyInfo(body_id, physicsClientId=self.client)[0].decode(): -1}
+        joints = {}
+        for index in range(engine.getNumJoints(body_id, physicsClientId=self.client)):
+            info = engine.getJointInfo(body_id, index, physicsClientId=self.client)
+            links[info[12].decode()] = index
+            if info[2] in (engine.JOINT_REVOLUTE, engine.JOINT_PRISMATIC):
+                joints[info[1].decode()] = index
+        return links, joints
+
+    # --- state ------------------------------------------------------------------------------------------------
+
+    def set_pose(self, name: str, world_from_body: np.ndarray) -> None:
+        """Put a body at a pose (4, 4) of its base link frame, at rest."""
+        body_id = self.bodies[name].body_id
+        # pybullet's base pose is that of the centre of mass, not of the link frame.
+        pose = world_from_body @ self._base_from_inertial[body_id]
+        engine.resetBasePositionAndOrientation(
+            body_id, pose[:3, 3].tolist(), quaternion_of(pose).tolist(), physicsClientId=self.client
+        )
+
+    def pose(self, name: str) -> np.ndarray:
+        """Return world_from_body (4, 4) of the base link frame."""
+        body_id = self.bodies[name].body_id
+        position, quaternion = engine.getBasePositionAndOrientation(body_id, physicsClientId=self.client)
+        pose = transform_from_quaternion(np.array(quaternion), np.array(position))
+        return pose @ inverse(self._base_from_inertial[body_id])
+
+    def link_pose(self, name: str, link: str) -> np.ndarray:
+        """Return world_from_link (4, 4) of a link of a body."""
+        index = self.bodies[name].links[link]
+        if index < 0:
+            return self.pose(name)
+        state = engine.getLinkState(
+            self.bodies[name].body_id, index, computeForwardKinematics=1, physicsClientId=self.client
+        )
+        return transform_from_quaternion(np.array(state[5]), np.array(state[4]))
+
+    def velocity(self, name: str) -> tuple[float, float]:
+        """Return linear [m/s] and angular [rad/s] speed of a body."""
+        linear, angular = engine.getBaseVelocity(self.bodies[name].body_id, physicsClientId=self.client)
+        return float(np.linalg.norm(linear)), float(np.linalg.norm(angular))
+
+    def set_joint(self, name: str, joint: str, value: float) -> None:
+        """Put a joint at a value [rad] or [m], at rest."""
+        body = self.bodies[name]
+        engine.resetJointState(body.body_id, body.joints[joint], value, physicsClientId=self.client)
+
+    def joint_value(self, name: str, joint: str) -> float:
+        """Return the value of a joint [rad] or [m]."""
+        body = self.bodies[name]
+        return float(engine.getJointState(body.body_id, body.joints[joint], physicsClientId=self.client)[0])
+
+    def bounds(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the axis-aligned bounds (3,), (3,) of all links of a body, world frame."""
+        body = self.bodies[name]
+        boxes = np.array(
+            [engine.getAABB(body.body_id, index, physicsClientId=self.client) for index in body.links.values()]
+        )
+        return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+
+    # --- time -------------------------------------------------------------------------------------------------
+
+    def step(self, count: int = 1) -> None:
+        """Advance the physics by `count` time steps."""
+        for _ in range(count):
+            engine.stepSimulation(physicsClientId=self.client)
+        self.time += count * self.time_step
+
+    def settle(self, seconds: float = 1.0) -> dict[str, float]:
+        """Let the world fall for some simulated seconds; return how far each movable body moved [m]."""
+        movable = [name for name, body in self.bodies.items() if body.record.movable]
+        before = {name: self.pose(name)[:3, 3] for name in movable}
+        self.step(round(seconds / self.time_step))
+        return {name: float(np.linalg.norm(self.pose(name)[:3, 3] - before[name])) for name in movable}
+
+    # --- contact ----------------------------------------------------------------------------------------------
+
+    def contacts(self, body_id: int, other_id: int | None = None) -> list[Contact]:
+        """Return the contacts of a body found by the last step or collision detection."""
+        arguments = {"bodyA": body_id} if other_id is None else {"bodyA": body_id, "bodyB": other_id}
+        found = engine.getContactPoints(physicsClientId=self.client, **arguments) or ()
+        return [
+            Contact(entry[3], entry[2], entry[4], -entry[8], np.array(entry[6]), np.array(entry[7]), entry[9])
+            for entry in found
+        ]
+
+    def name_of(self, body_id: int) -> str | None:
+        """Return the scene body with this pybullet id, None for others (a robot)."""
+        for name, body in self.bodies.items():
+            if body.body_id == body_id:
+                return name
+        return None
+
+    def link_name(self, body_id: int, index: int) -> str:
+        """Return the name of a link of any body."""
+        if index < 0:
+            return engine.getBodyInfo(body_id, physicsClientId=self.client)[0].decode()
+        return engine.getJointInfo(body_id, index, physicsClientId=self.client)[12].decode()
+
+
+def read_scene_bodies(root: Path) -> dict[str, tuple[SceneBody, str]]:
+    """Return the bodies of an interactive scene folder: name -> (record, URDF text with absolute mesh paths).
+
+    Raises BadInput when a file is missing or a body has no links.
+    """
+    scene = InteractiveSceneFile.read(root / "scene.json")
+    static = read_urdf(root / scene.static_file)
+    names = {body.name for body in scene.bodies}
+    bodies = {}
+    for record in scene.bodies:
+        if record.file is not None:
+            path = root / record.file
+            text = with_absolute_meshes(read_urdf(path), path.parent)
+        else:
+            text = split_body(static, record.name, names, (root / scene.static_file).parent)
+        bodies[record.name] = (record, text)
+    return bodies
+
+
+def load_scene(root: Path, *, time_step: float = TIME_STEP) -> PhysicsWorld:
+    """Load an interactive scene folder (or `room/` of a ground truth) into a new physics world.
+
+    Static bodies are fixed, movable ones free; joints stand at the values of scene.json. Raises BadInput.
+    """
+    world = PhysicsWorld(time_step)
+    try:
+        for record, text in read_scene_bodies(root).values():
+            world.add_body(record, text)
+    except BaseException:
+        world.close()
+        raise
+    return world
