@@ -110,7 +110,9 @@ def batch(
         codes[name] = steps[-1].exit_code if steps else 0
         _say(f"{name:24} exit {codes[name]}  {len(steps)}/{len(pipeline.step)} steps, last: {steps[-1].name}")
     if json_output:
-        table = {name: [{"step": s.name, "exit_code": s.exit_code, **s.facts} for s in r] for name, r in reports.items()}
+        table = {
+            name: [{"step": s.name, "exit_code": s.exit_code, **s.facts} for s in r] for name, r in reports.items()
+        }
         _out(json.dumps(table, sort_keys=True))
     else:
         _out(str(out))
@@ -215,7 +217,7 @@ def models(
         if json_output:
             _out(model.model_dump_json())
         else:
-            _out(f"{model.name}: {model.purpose}\n  {model.file}, {model.licence}, {model.source}\n  sha256 {model.sha256}")
+            _out(f"{model.name}: {model.purpose}\n  {model.file}, {model.licence}, {model.source}\n  {model.sha256}")
     return 0
 
 

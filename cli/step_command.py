@@ -15,7 +15,6 @@ import typer
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from schemas.artifact import Artifact
 from stages.kit.progress import progress_for
 from stages.kit.running.configuration import parameters_for, read_config
 from stages.kit.running.runner import RunResult, run_stage
@@ -101,7 +100,7 @@ def _parameter_options(stage: Stage) -> list[inspect.Parameter]:
 
 
 def _common_options(stage: Stage) -> list[inspect.Parameter]:
-    panel = {"rich_help_panel": "Running", "show_default": False}
+    panel: dict[str, Any] = {"rich_help_panel": "Running", "show_default": False}
 
     def flag(name: str, text: str) -> inspect.Parameter:
         return _parameter(name, bool, typer.Option(False, f"--{name.replace('_', '-')}", help=text, **panel))
@@ -123,7 +122,9 @@ def _common_options(stage: Stage) -> list[inspect.Parameter]:
             Optional[list[str]],  # noqa: UP045
             typer.Option(None, "--accept", help="Outcome besides ok that exits with 0; may be repeated.", **panel),
         ),
-        _parameter("json_output", bool, typer.Option(False, "--json", help="One JSON object on standard output.", **panel)),
+        _parameter(
+            "json_output", bool, typer.Option(False, "--json", help="One JSON object on standard output.", **panel)
+        ),
         flag("quiet", "No progress, warnings only."),
         flag("debug", "Show the traceback of an error."),
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -17,7 +18,7 @@ def canonical_json(value: Any) -> str:
     return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
 
 
-def _check_rows(rows: int, columns: int):
+def _check_rows(rows: int, columns: int) -> Callable[[Any], Any]:
     def check(value: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
         if len(value) != rows or any(len(row) != columns for row in value):
             raise ValueError(f"expected {rows}x{columns} numbers")
@@ -62,7 +63,5 @@ class Model(BaseModel):
 
     def write(self, path: Path) -> None:
         """Write the model as indented JSON with sorted keys and a final newline."""
-        text = json.dumps(
-            self.model_dump(mode="json"), sort_keys=True, indent=1, allow_nan=False, ensure_ascii=False
-        )
+        text = json.dumps(self.model_dump(mode="json"), sort_keys=True, indent=1, allow_nan=False, ensure_ascii=False)
         Path(path).write_text(text + "\n", encoding="utf-8")

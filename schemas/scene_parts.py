@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from schemas.base import Model, QuaternionXYZW, Transform, Vector3
+from schemas.base import Model, QuaternionXYZW, Vector3
 
 
 class Camera(Model):

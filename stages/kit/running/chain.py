@@ -33,9 +33,7 @@ def command_prefix() -> list[str]:
 def run_command(arguments: list[str]) -> tuple[int, str]:
     """Run one scenewright command; progress and messages pass through, standard output is returned."""
     environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
-    process = subprocess.Popen(
-        [*command_prefix(), *arguments], stdout=subprocess.PIPE, text=True, env=environment
-    )
+    process = subprocess.Popen([*command_prefix(), *arguments], stdout=subprocess.PIPE, text=True, env=environment)
     try:
         output, _ = process.communicate()
     except KeyboardInterrupt:

@@ -35,9 +35,7 @@ def parameters_as_json(parameters: Parameters) -> dict[str, Any]:
     return json.loads(parameters.model_dump_json())
 
 
-def artifact_key(
-    stage: Stage, parameters: Parameters, inputs: Mapping[str, str], seed: int, device_kind: str
-) -> str:
+def artifact_key(stage: Stage, parameters: Parameters, inputs: Mapping[str, str], seed: int, device_kind: str) -> str:
     """Return the key: sha256 of canonical JSON of all that decides the output.
 
     `inputs` maps role to content digest (artifacts) or file digest (raw inputs, weights).

@@ -39,7 +39,9 @@ def migrate(source: Path, out: Path) -> Manifest:
         for version in range(manifest.schema_version, kind.schema_version):
             step = MIGRATIONS.get((manifest.kind, version))
             if step is None:
-                raise BadInput(f"{source}: no migration of {manifest.kind} from version {version}", hint="make it again")
+                raise BadInput(
+                    f"{source}: no migration of {manifest.kind} from version {version}", hint="make it again"
+                )
             following = Path(scratch) / str(version + 1)
             following.mkdir()
             step(current, following)

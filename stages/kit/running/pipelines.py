@@ -1,4 +1,4 @@
-"""Pipelines, declared once in data/pipelines/<name>.toml: `scenewright run` and the Makefile execute the same commands."""
+"""Pipelines, declared once in data/pipelines/<name>.toml; `scenewright run` and make execute the same commands."""
 
 from __future__ import annotations
 
@@ -115,7 +115,9 @@ def resolve_variables(pipeline: Pipeline, given: Mapping[str, str]) -> dict[str,
     for name, variable in pipeline.variables.items():
         value = given.get(name) or variable.default
         if value is None and not variable.optional:
-            raise UsageError(f"pipeline {pipeline.name} needs {name} ({variable.description})", hint=f"--set {name}=...")
+            raise UsageError(
+                f"pipeline {pipeline.name} needs {name} ({variable.description})", hint=f"--set {name}=..."
+            )
         values[name] = value
     return values
 

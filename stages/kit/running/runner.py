@@ -57,7 +57,7 @@ class _OpenInput:
 
 
 def choose_device(wanted: str) -> str:
-    """Turn `auto`, `cpu` or `cuda` into the device to use. Raises MissingDependency when cuda is asked for and absent."""
+    """Turn `auto`, `cpu` or `cuda` into the device to use. Raises MissingDependency when cuda is absent."""
     if wanted == "cpu":
         return "cpu"
     import torch
@@ -161,7 +161,7 @@ def run_stage(
     digests = {item.role: item.digest for item in opened}
     key = artifact_key(stage, parameters, digests, seed, device)
     store.check_target(out, stage.writes.kind)
-    facts = {
+    facts: dict[str, Any] = {
         "stage_version": stage.version,
         "schema_version": stage.writes.schema_version,
         "seed": seed,

@@ -74,6 +74,8 @@ def verify(root: Path, seen: dict[Path, Finding] | None = None) -> list[Finding]
         elif record.kind == "external":
             if external_digest(source) != record.digest:
                 problems.append(f"input {record.role} ({source}) is not what the artifact was made from")
+            elif (source.parent / MANIFEST_NAME).exists():  # a payload file of an artifact, such as a generated log
+                findings += verify(source.parent, seen)
         else:
             try:
                 digest = read_manifest(source).content_digest
