@@ -34,6 +34,8 @@ class SequenceFile(Model):
     """The format that was detected."""
     rule: str
     """The rule that matched, for people."""
+    notes: tuple[str, ...] = ()
+    """What was assumed (intrinsics, depth unit, times, pose convention) and what looked odd."""
     camera: Camera
     streams: tuple[Literal["color", "depth", "right", "labels", "pose"], ...]
     frame_count: int

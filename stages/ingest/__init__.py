@@ -1,0 +1,1 @@
+"""Step `ingest`: a robot's RGB-D log becomes a sequence in our conventions."""

@@ -1,0 +1,84 @@
+"""Choosing how the world is made upright, and saying how it was done."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from schemas.base import as_transform
+from schemas.errors import BadInput
+from schemas.sequence import Gravity
+from stages.ingest.gravity import (
+    AXES,
+    find_floor,
+    grid_samples,
+    mean_camera_up,
+    upright_from_direction,
+    upright_from_floor,
+    wall_yaw,
+)
+from stages.kit.geometry.transforms import transform_from_yaw
+
+GRID = 0.05
+CLOUD = Callable[[], tuple[np.ndarray, np.ndarray]]
+
+
+def align(
+    method: str,
+    up_axis: str,
+    stated: str | None,
+    poses: np.ndarray,
+    cloud: CLOUD,
+    random: np.random.Generator,
+) -> Gravity:
+    """Return what makes the world upright.
+
+    `method` and `up_axis` are the options `gravity` and `up`; `stated` says where the log states that its z is up
+    (None: it does not); `poses` (N, 4, 4) are log_from_camera; `cloud` returns surface points and normals in the
+    log's world, and is called only when the floor is looked for. Raises BadInput when the floor was demanded and
+    there is none.
+    """
+    if method == "none":
+        return _gravity("none", np.eye(4), "not asked for")
+    if method == "given":
+        return _gravity("given", upright_from_direction(np.array(AXES[up_axis])), f"option: {up_axis} of the log is up")
+    if method == "auto" and stated is not None:
+        return _gravity("given", np.eye(4), stated)
+    if len(poses) == 0:
+        return _gravity("none", np.eye(4), "the log has no poses")
+    up = mean_camera_up(poses)
+    if up is None:
+        return _gravity("none", np.eye(4), "the cameras' up directions cancel out")
+    points, normals = grid_samples(*cloud(), GRID)
+    floor = find_floor(points, normals, up, random) if method in ("auto", "floor") else None
+    if floor is not None:
+        upright = upright_from_floor(floor)
+        tilt = math.degrees(math.acos(np.clip(floor.normal @ up, -1, 1)))
+        upright, turned = _turned_to_walls(upright, normals)
+        detail = (
+            f"lowest supported plane: {floor.inlier_count} of {len(points)} grid points within 3 cm, rms "
+            f"{floor.residual * 1000:.1f} mm, {100 * floor.below_share:.1f} % of the points below, "
+            f"{tilt:.1f} deg from the cameras' mean up; {turned}"
+        )
+        return _gravity("floor_plane", upright, detail, floor.inlier_count)
+    if method == "floor":
+        raise BadInput("no floor was seen: no supported plane near the cameras' mean up", hint="--gravity camera-up")
+    upright, turned = _turned_to_walls(upright_from_direction(up, points), normals)
+    why = "asked for" if method == "camera-up" else "no floor was seen"
+    detail = f"mean of the cameras' up ({why}), lowest percentile of the points at z = 0; {turned}"
+    return _gravity("mean_camera_up", upright, detail)
+
+
+def _turned_to_walls(upright: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, str]:
+    yaw = wall_yaw(normals @ upright[:3, :3].T)
+    if yaw is None:
+        return upright, "yaw kept (no dominant wall direction)"
+    return transform_from_yaw(-yaw, np.zeros(3)) @ upright, f"turned {-math.degrees(yaw):.1f} deg to the walls"
+
+
+def _gravity(method: str, world_from_log: np.ndarray, detail: str, inlier_count: int = 0) -> Gravity:
+    return Gravity(
+        method=method, world_from_log=as_transform(world_from_log), inlier_count=inlier_count, detail=detail
+    )

@@ -1,0 +1,79 @@
+"""Checks and decoding of the colour and depth images of a log."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from schemas.scene_parts import Camera
+from stages.ingest.source import Unusable
+from stages.kit.formats.foxglove import JPEG_START, decode_color, depth_to_millimetres
+
+INVALID_DEPTH = 65535
+
+
+def usable_color(data: bytes, camera: Camera) -> np.ndarray | bytes:
+    """Return colour of the camera's size: JPEG bytes as they are, anything else as (H, W, 3) uint8 RGB.
+
+    A picture of another size and the same aspect ratio is resized. Raises Unusable.
+    """
+    image = decode_color(data)
+    if image is None:
+        raise Unusable("undecodable_color", f"{len(data)} bytes")
+    if data.startswith(JPEG_START) and image.shape[:2] == (camera.height, camera.width):
+        return data
+    return fitted_color(image, camera)
+
+
+def fitted_color(image: np.ndarray, camera: Camera) -> np.ndarray:
+    """Return an RGB image (H, W, 3) at the camera's size. Raises Unusable when the aspect ratio differs."""
+    height, width = image.shape[:2]
+    if (height, width) == (camera.height, camera.width):
+        return np.ascontiguousarray(image)
+    if abs(width * camera.height - height * camera.width) > max(camera.height, camera.width):
+        raise Unusable("size_mismatch", f"colour {width}x{height}, depth {camera.width}x{camera.height}")
+    shrinks = width > camera.width
+    size = (camera.width, camera.height)
+    return cv2.resize(image, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
+
+
+def decode_image(data: bytes) -> np.ndarray | None:
+    """Decode image bytes without any conversion; None when that is impossible."""
+    if not data:
+        return None
+    try:
+        return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        return None
+
+
+def usable_depth(data: bytes, camera: Camera, units_per_metre: float) -> np.ndarray:
+    """Decode a 16-bit depth image (PNG, PGM, TIFF) to (H, W) uint16 [mm]. Raises Unusable."""
+    image = decode_image(data)
+    if image is None:
+        raise Unusable("undecodable_depth", f"{len(data)} bytes")
+    if image.dtype == np.uint8:
+        raise Unusable("depth_not_16_bit", "8-bit image, probably a picture of depth made for people")
+    return depth_millimetres(image, camera, units_per_metre)
+
+
+def depth_millimetres(image: np.ndarray, camera: Camera, units_per_metre: float) -> np.ndarray:
+    """Return (H, W) uint16 [mm] of a depth image, (H, W) uint16 or float, in `units_per_metre`.
+
+    0, 65535 (of 16-bit images), NaN, infinite and negative depth become 0. Raises Unusable for another size, for
+    several channels, and when no pixel is valid.
+    """
+    if image.ndim != 2 or image.dtype not in (np.uint16, np.float32, np.float64):
+        raise Unusable("depth_not_16_bit", f"depth image of shape {image.shape}, {image.dtype}")
+    if image.shape != (camera.height, camera.width):
+        raise Unusable(
+            "size_mismatch", f"depth {image.shape[1]}x{image.shape[0]}, camera {camera.width}x{camera.height}"
+        )
+    if image.dtype == np.uint16:
+        image = np.where(image == INVALID_DEPTH, np.uint16(0), image)
+        millimetres = image if units_per_metre == 1000 else depth_to_millimetres(image / np.float32(units_per_metre))
+    else:
+        millimetres = depth_to_millimetres(image / np.float32(units_per_metre))
+    if not millimetres.any():
+        raise Unusable("no_valid_depth", "all pixels are invalid")
+    return millimetres

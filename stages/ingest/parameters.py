@@ -1,0 +1,66 @@
+"""Declaration of the step `ingest`."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from schemas.errors import UsageError
+from schemas.sequence import Sequence
+from stages.kit.stage import External, Parameters, Stage
+
+
+class IngestParameters(Parameters):
+    """Options of `ingest`."""
+
+    format: Literal["auto", "foxglove-mcap", "7scenes", "redwood", "posed-images"] = Field(
+        "auto", description="Layout of the log; auto tries each and records the rule that matched"
+    )
+    fx: float | None = Field(None, gt=0, description="Focal length along x [pixel], overrides the log")
+    fy: float | None = Field(None, gt=0, description="Focal length along y [pixel], overrides the log")
+    cx: float | None = Field(None, description="Principal point x [pixel], overrides the log")
+    cy: float | None = Field(None, description="Principal point y [pixel], overrides the log")
+    depth_scale: float | None = Field(
+        None, gt=0, description="Depth units per metre, overrides the format's (1000 is millimetres, TUM has 5000)"
+    )
+    frame_rate: float = Field(30.0, gt=0, description="Rate assumed for folders whose images carry no time [1/s]")
+    every: int = Field(1, ge=1, description="Use every n-th frame of the log")
+    start: int = Field(0, ge=0, description="First frame of the log to use")
+    stop: int | None = Field(None, ge=0, description="Frame of the log to stop before")
+    max_frames: int | None = Field(None, ge=1, description="Stop after this many usable frames")
+    maximum_time_difference: float = Field(
+        0.02, ge=0, description="Largest difference between the stamps of colour and depth of one frame [s]"
+    )
+    maximum_transform_gap: float = Field(
+        0.5, gt=0, description="Largest gap between transforms that a pose is interpolated over [s]"
+    )
+    maximum_depth: float | None = Field(None, gt=0, description="Depth beyond this becomes invalid [m]")
+    gravity: Literal["auto", "given", "floor", "camera-up", "none"] = Field(
+        "auto",
+        description="How the world is made upright: auto takes what the log says, else the floor, else the mean "
+        "camera up; given takes the axis named by up",
+    )
+    up: Literal["x", "-x", "y", "-y", "z", "-z"] = Field("z", description="Up axis of the log's world, with given")
+    color_topic: str | None = Field(None, description="Topic of the colour images, for logs with several")
+    depth_topic: str | None = Field(None, description="Topic of the depth images, for logs with several")
+    world_frame: str | None = Field(None, description="Frame that poses are wanted in; default: root of the tree")
+
+
+def check(parameters: IngestParameters, inputs: Any) -> None:
+    """Refuse combinations that cannot work. Raises UsageError."""
+    if parameters.stop is not None and parameters.stop <= parameters.start:
+        raise UsageError(f"stop {parameters.stop} is not after start {parameters.start}")
+
+
+STAGE = Stage(
+    name="ingest",
+    version=1,
+    summary="Turn an RGB-D log into a sequence: calibrated, posed, gravity-aligned frames",
+    parameters=IngestParameters,
+    reads={"log": External("log file or folder")},
+    writes=Sequence,
+    libraries=("numpy", "scipy", "opencv-python-headless", "mcap", "protobuf", "foxglove-schemas-protobuf", "zstandard"),
+    example="scenewright ingest --log recording.mcap --out outputs/kitchen/sequence",
+    check=check,
+)

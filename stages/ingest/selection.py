@@ -1,0 +1,65 @@
+"""Which frames of a log are used, and why the others are not."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from stages.ingest.parameters import IngestParameters
+from stages.ingest.source import Entry
+from stages.kit.geometry.transforms import is_rigid
+
+POSE_TOLERANCE = 1e-2
+"""Deviation from a rotation that rounding in a text file explains; more is no pose."""
+NOT_SELECTED = "not_selected"
+
+
+def select(
+    entries: tuple[Entry, ...], parameters: IngestParameters, has_poses: bool
+) -> tuple[list[Entry], Counter[str]]:
+    """Return the frames worth loading, with checked poses, and the others counted by reason.
+
+    A frame without a pose is left out only when other frames of the log have one.
+    """
+    kept: list[Entry] = []
+    drops: Counter[str] = Counter()
+    last_time = -1.0
+    for index, entry in enumerate(entries):
+        stop = len(entries) if parameters.stop is None else parameters.stop
+        if not parameters.start <= index < stop or (index - parameters.start) % parameters.every:
+            drops[NOT_SELECTED] += 1
+            continue
+        pose, problem = checked_pose(entry.world_from_camera, has_poses)
+        problem = entry.problem or problem
+        if problem is None and not (entry.time >= 0 and round(entry.time * 1e9) > round(last_time * 1e9)):
+            problem = "duplicate_stamp" if entry.time == last_time else "time_not_ascending"
+        if problem is not None:
+            drops[problem] += 1
+            continue
+        last_time = entry.time
+        kept.append(Entry(entry.name, entry.time, pose, entry.load))
+    return kept, drops
+
+
+def checked_pose(matrix: np.ndarray | None, needed: bool) -> tuple[np.ndarray | None, str | None]:
+    """Return the rigid (4, 4) pose nearest to `matrix`, or the reason why there is none."""
+    if matrix is None:
+        return None, "missing_pose" if needed else None
+    if not np.isfinite(matrix).all():
+        return None, "non_finite_pose"
+    if not is_rigid(matrix, POSE_TOLERANCE):
+        return None, "non_rigid_pose"
+    if is_rigid(matrix, 1e-9):
+        return matrix, None
+    left, _, right = np.linalg.svd(matrix[:3, :3])
+    pose = matrix.copy()
+    pose[:3, :3] = left @ right
+    return pose, None
+
+
+def largest_step(poses: np.ndarray) -> float:
+    """Return the largest distance [m] between the camera centres of consecutive poses (N, 4, 4)."""
+    if len(poses) < 2:
+        return 0.0
+    return float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).max())

@@ -1,0 +1,93 @@
+"""7-Scenes folders: frame-000000.color.jpg|png, frame-000000.depth.png, frame-000000.pose.txt (world_from_camera)."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.scene_parts import Camera
+from stages.ingest.folders import depth_image_size, depth_units, image_loader, overridden
+from stages.ingest.parameters import IngestParameters
+from stages.ingest.source import Entry, LogSource
+from stages.kit.formats.trajectories import read_matrix
+
+FILE = re.compile(r"frame-(\d+)\.(color|depth|pose)\.(jpg|jpeg|png|txt)$")
+DEFAULT_FOCAL_LENGTH, DEFAULT_CENTER = 585.0, (320.0, 240.0)
+"""What the data set's page states for its Kinect at 640x480."""
+
+
+def matches(root: Path) -> str | None:
+    """Return the rule that matched, or None."""
+    if root.is_dir() and any(FILE.match(path.name) and ".depth." in path.name for path in root.iterdir()):
+        return "folder with frame-<number>.depth.png files: 7-Scenes"
+    return None
+
+
+def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
+    """List the frames of a 7-Scenes folder. Raises BadInput for damaged intrinsics."""
+    files: dict[int, dict[str, Path]] = {}
+    for path in sorted(root.iterdir()):
+        match = FILE.match(path.name)
+        if match:
+            files.setdefault(int(match[1]), {})[match[2]] = path
+    size = depth_image_size([found["depth"] for _, found in sorted(files.items()) if "depth" in found])
+    camera, notes = _camera(root, size)
+    camera, given = overridden(camera, parameters)
+    units, unit_note = depth_units(parameters, 1000.0)
+    entries = []
+    for number in sorted(files):
+        found = files[number]
+        pose, problem = _pose(found.get("pose"))
+        entries.append(
+            Entry(
+                name=f"frame-{number:06d}",
+                time=number / parameters.frame_rate,
+                world_from_camera=pose,
+                load=image_loader(found.get("color"), found.get("depth"), camera, units),
+                problem=problem,
+            )
+        )
+    notes = (
+        *notes,
+        *given,
+        unit_note,
+        f"times assumed: frame number / {parameters.frame_rate:g} per second",
+        "colour and depth of 7-Scenes are not registered (small parallax)",
+    )
+    return LogSource("7scenes", rule, camera, tuple(entries), notes, registered=False)
+
+
+def _camera(root: Path, size: tuple[int, int] | None) -> tuple[Camera, tuple[str, ...]]:
+    width, height = size or (0, 0)
+    path = root / "camera-intrinsics.txt"
+    if path.exists():
+        matrix = read_matrix(path, 3, 3)
+        if not np.isfinite(matrix).all() or matrix[0, 0] <= 0 or matrix[1, 1] <= 0:
+            raise BadInput(f"{path}: focal lengths {matrix[0, 0]:g}, {matrix[1, 1]:g} are not positive")
+        camera = Camera(
+            width=width, height=height, fx=matrix[0, 0], fy=matrix[1, 1], cx=matrix[0, 2], cy=matrix[1, 2]
+        )
+        return camera, (f"intrinsics read from {path.name}",)
+    if size is not None and size != (640, 480):
+        raise BadInput(f"{root}: images are {width}x{height} and there is no {path.name}", hint="give --fx --fy --cx --cy")
+    camera = Camera(
+        width=width,
+        height=height,
+        fx=DEFAULT_FOCAL_LENGTH,
+        fy=DEFAULT_FOCAL_LENGTH,
+        cx=DEFAULT_CENTER[0],
+        cy=DEFAULT_CENTER[1],
+    )
+    return camera, ("intrinsics assumed: 7-Scenes default, fx = fy = 585, cx = 320, cy = 240",)
+
+
+def _pose(path: Path | None) -> tuple[np.ndarray | None, str | None]:
+    if path is None:
+        return None, None
+    try:
+        return read_matrix(path), None
+    except BadInput:
+        return None, "unreadable_pose"
