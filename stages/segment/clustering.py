@@ -1,0 +1,49 @@
+"""Euclidean clusters of point clouds: which of several clouds hang together."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+
+def clouds_touch(first: np.ndarray, second: np.ndarray, distance: float) -> bool:
+    """Whether any point of `first` (N, 3) comes within `distance` [m] of any point of `second` (M, 3)."""
+    if not len(first) or not len(second):
+        return False
+    low = np.maximum(first.min(axis=0), second.min(axis=0)) - distance
+    high = np.minimum(first.max(axis=0), second.max(axis=0)) + distance
+    # Only points within reach of the other's bounds can be neighbours.
+    first = first[((first >= low) & (first <= high)).all(axis=1)]
+    second = second[((second >= low) & (second <= high)).all(axis=1)]
+    if not len(first) or not len(second):
+        return False
+    if len(first) < len(second):
+        first, second = second, first
+    nearest, _ = cKDTree(first).query(second, distance_upper_bound=np.nextafter(distance, np.inf))
+    return bool(np.isfinite(nearest).any())
+
+
+def largest_cluster(clouds: list[np.ndarray], sizes: list[int], *, distance: float) -> set[int]:
+    """Return the indices of the clouds (N_i, 3) [m] in the cluster with the largest sum of `sizes`.
+
+    Clouds within `distance` of each other belong together, and so do chains of them. Of equal clusters the one with
+    the smallest index wins.
+    """
+    unvisited = set(range(len(clouds)))
+    best: set[int] = set()
+    best_size = -1
+    for seed in range(len(clouds)):
+        if seed not in unvisited:
+            continue
+        unvisited.discard(seed)
+        cluster, front = {seed}, [seed]
+        while front:
+            current = front.pop()
+            reached = [other for other in sorted(unvisited) if clouds_touch(clouds[current], clouds[other], distance)]
+            cluster.update(reached)
+            front.extend(reached)
+            unvisited.difference_update(reached)
+        size = sum(sizes[index] for index in cluster)
+        if size > best_size:
+            best, best_size = cluster, size
+    return best

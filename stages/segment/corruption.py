@@ -1,0 +1,131 @@
+"""A seeded model of what a segmentation network gets wrong, applied to true masks.
+
+One level 0..1 stands for all rates: at level 1 a mask has a wrong class with probability 0.5, is missed with 0.3, is
+merged with a neighbour with 0.3, is cut in two with 0.3, and boundaries wander by 8 pixels (standard deviation, at
+640 pixels width); rates grow linearly with the level. Every frame is drawn on its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from stages.segment.panoptic import PanopticFrame, PanopticMask
+
+FLIP_AT_ONE = 0.5
+MISS_AT_ONE = 0.3
+MERGE_AT_ONE = 0.3
+SPLIT_AT_ONE = 0.3
+BOUNDARY_AT_ONE = 8.0
+"""Pixels at a width of 640."""
+BOUNDARY_WAVELENGTH = 24
+"""Pixels at a width of 640 between the points at which boundary displacement is drawn."""
+
+
+@dataclass(frozen=True)
+class CorruptionRates:
+    """Probabilities per mask and frame, and the boundary displacement [pixels at 640 width]."""
+
+    flip: float = 0.0
+    miss: float = 0.0
+    merge: float = 0.0
+    split: float = 0.0
+    boundary: float = 0.0
+
+
+def rates_of_level(level: float) -> CorruptionRates:
+    """Return the rates of a corruption level in 0..1; level 0 changes nothing."""
+    return CorruptionRates(
+        flip=FLIP_AT_ONE * level,
+        miss=MISS_AT_ONE * level,
+        merge=MERGE_AT_ONE * level,
+        split=SPLIT_AT_ONE * level,
+        boundary=BOUNDARY_AT_ONE * level,
+    )
+
+
+def corrupt(
+    frame: PanopticFrame,
+    rates: CorruptionRates,
+    classes: dict[bool, tuple[int, ...]],
+    random: np.random.Generator,
+) -> PanopticFrame:
+    """Return the frame with masks missed, merged, split, with flipped classes and noisy boundaries, in this order.
+
+    `classes` maps is_thing to the class ids a flip may choose from; stuff is never merged or split. Masks keep their
+    ids; the second half of a split mask gets a new one. The same generator state gives the same frame.
+    """
+    ids = frame.ids.copy()
+    masks = dict(frame.masks)
+    for mask_id in sorted(frame.masks):
+        if random.random() < rates.miss:
+            ids[ids == mask_id] = 0
+            del masks[mask_id]
+    for mask_id in _things(masks):
+        if random.random() < rates.merge and mask_id in masks:
+            _merge(ids, masks, mask_id, random)
+    for mask_id in _things(masks):
+        if random.random() < rates.split:
+            _split(ids, masks, mask_id, random)
+    for mask_id in sorted(masks):
+        if random.random() < rates.flip:
+            masks[mask_id] = _flipped(masks[mask_id], classes, random)
+    if rates.boundary > 0:
+        ids = displace_boundaries(ids, rates.boundary * ids.shape[1] / 640, random)
+    present = set(np.unique(ids).tolist())
+    return PanopticFrame(ids=ids, masks={key: mask for key, mask in masks.items() if key in present})
+
+
+def _things(masks: dict[int, PanopticMask]) -> list[int]:
+    return sorted(mask_id for mask_id, mask in masks.items() if mask.is_thing)
+
+
+def _merge(ids: np.ndarray, masks: dict[int, PanopticMask], mask_id: int, random: np.random.Generator) -> None:
+    """Give the mask's pixels to a thing that touches it (within two pixels); nothing happens without one."""
+    own = (ids == mask_id).astype(np.uint8)
+    around = cv2.dilate(own, np.ones((5, 5), np.uint8)) != 0
+    neighbours = [i for i in np.unique(ids[around]).tolist() if i != mask_id and i in masks and masks[i].is_thing]
+    if neighbours:
+        ids[ids == mask_id] = neighbours[int(random.integers(len(neighbours)))]
+        del masks[mask_id]
+
+
+def _split(ids: np.ndarray, masks: dict[int, PanopticMask], mask_id: int, random: np.random.Generator) -> None:
+    """Cut the mask by a line of random direction through its middle; the far half becomes an instance of its own."""
+    rows, columns = np.nonzero(ids == mask_id)
+    if rows.size < 2:
+        return
+    angle = random.uniform(0, np.pi)
+    side = (columns - columns.mean()) * np.cos(angle) + (rows - rows.mean()) * np.sin(angle) > 0
+    if not side.any() or side.all():
+        return
+    new_id = max(masks) + 1
+    ids[rows[side], columns[side]] = new_id
+    masks[new_id] = masks[mask_id]
+
+
+def _flipped(mask: PanopticMask, classes: dict[bool, tuple[int, ...]], random: np.random.Generator) -> PanopticMask:
+    """Return the mask with another class of its own kind (thing or stuff), uniformly drawn."""
+    others = [class_id for class_id in classes[mask.is_thing] if class_id != mask.category_id]
+    if not others:
+        return mask
+    return replace(mask, category_id=others[int(random.integers(len(others)))])
+
+
+def displace_boundaries(ids: np.ndarray, deviation: float, random: np.random.Generator) -> np.ndarray:
+    """Return ids (H, W) resampled through a smooth random displacement of standard deviation `deviation` [pixels]
+    per axis: boundaries wander, labels stay whole."""
+    height, width = ids.shape
+    spacing = max(2.0, BOUNDARY_WAVELENGTH * width / 640)
+    coarse = (int(np.ceil(height / spacing)) + 3, int(np.ceil(width / spacing)) + 3)
+    v, u = np.mgrid[0:height, 0:width].astype(np.float32)
+    shift = []
+    for _ in range(2):
+        drawn = random.standard_normal(coarse).astype(np.float32)
+        smooth = cv2.remap(drawn, u / spacing + 1, v / spacing + 1, cv2.INTER_CUBIC)
+        shift.append(smooth / max(float(smooth.std()), 1e-6) * deviation)
+    source_u = np.clip(np.rint(u + shift[0]), 0, width - 1).astype(np.intp)
+    source_v = np.clip(np.rint(v + shift[1]), 0, height - 1).astype(np.intp)
+    return ids[source_v, source_u]

@@ -1,0 +1,254 @@
+"""Geometric segments of a depth image: regions bounded by concave creases and depth jumps.
+
+Furrer et al. 2018 ("Incremental Object Database", the segmentation that Voxblox++ and Han 2024, section 2.3.1 use):
+normals, per-pixel minimum convexity over a window, depth discontinuities, both made into one edge map, connected
+components of what is left. Constants: those Han's system was run with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numba import njit, prange
+
+from schemas.scene_parts import Camera
+from stages.kit.geometry.cameras import back_project
+from stages.segment.normals import surface_normals
+
+REFERENCE_AREA = 640 * 480
+"""Pixel counts among the parameters hold for images of this many pixels."""
+
+
+@dataclass(frozen=True)
+class GeometricSettings:
+    """Constants of the convexity segmentation; see stages/segment/parameters.py for their meaning."""
+
+    normal_window: int = 13
+    normal_step: int = 2
+    normal_distance_factor: float = 0.05
+    convexity_window: int = 5
+    convexity_threshold: float = 0.97
+    convexity_mask_threshold: float = -0.0005
+    mutual_convexity: bool = True
+    discontinuity_ratio: float = 0.01
+    discontinuity_window: int = 3
+    opening: int = 1
+    closing: int = 1
+    minimum_pixels: int = 200
+
+
+@dataclass(frozen=True)
+class GeometricFrame:
+    """Geometric segments of one frame, with what was computed on the way."""
+
+    labels: np.ndarray
+    """(H, W) int32, 0 = none, else 1..n."""
+    points: np.ndarray
+    """(H, W, 3) float32 [m], camera frame, zero where depth is invalid."""
+    normals: np.ndarray
+    """(H, W, 3) float32 unit vectors that face the camera, zero where there is none."""
+
+
+@njit(cache=True, parallel=True)
+def _minimum_convexity(
+    points: np.ndarray, normals: np.ndarray, window: int, mask_threshold: float, mutual: bool
+) -> np.ndarray:
+    height, width = points.shape[0], points.shape[1]
+    result = np.ones((height, width), dtype=np.float32)
+    half = window // 2
+    for v in prange(height):
+        for u in range(width):
+            if points[v, u, 2] <= 0.0:
+                continue
+            px, py, pz = points[v, u, 0], points[v, u, 1], points[v, u, 2]
+            nx, ny, nz = normals[v, u, 0], normals[v, u, 1], normals[v, u, 2]
+            smallest = np.float32(1.0)
+            for row in range(max(0, v - half), min(height, v + half + 1)):
+                for column in range(max(0, u - half), min(width, u + half + 1)):
+                    if points[row, column, 2] <= 0.0:
+                        continue
+                    dx = points[row, column, 0] - px
+                    dy = points[row, column, 1] - py
+                    dz = points[row, column, 2] - pz
+                    mx, my, mz = normals[row, column, 0], normals[row, column, 1], normals[row, column, 2]
+                    over = dx * nx + dy * ny + dz * nz
+                    if mutual:
+                        over -= dx * mx + dy * my + dz * mz
+                    # A neighbour on or below the tangent plane is convex (1); one above it counts by its normal.
+                    if -over > mask_threshold:
+                        continue
+                    cosine = mx * nx + my * ny + mz * nz
+                    if cosine < smallest:
+                        smallest = cosine
+            result[v, u] = smallest
+    return result
+
+
+def minimum_convexity(
+    points: np.ndarray,
+    normals: np.ndarray,
+    *,
+    window: int = 5,
+    mask_threshold: float = -0.0005,
+    mutual: bool = True,
+) -> np.ndarray:
+    """Return the smallest convexity of every pixel to its neighbours, (H, W) float32 in -1..1.
+
+    `points` and `normals` (H, W, 3) float32, normals facing the camera. The convexity to a neighbour q of p is 1 where
+    -(q - p).n_p > mask_threshold [m] (q lies not above the tangent plane of p), else n_p.n_q (Furrer et al. 2018).
+    With `mutual` the height counts from both sides, (q - p).(n_p - n_q) (Stein et al. 2014, "LCCP"): a window that
+    reaches over a ridge tilts the normals before it, and the flat beside it then seems to rise, which the one-sided
+    test takes for a crease; it also takes depth noise for one.
+    """
+    return _minimum_convexity(points, normals, window, mask_threshold, mutual)
+
+
+def depth_discontinuity(depth: np.ndarray, *, ratio: float = 0.01, window: int = 3) -> np.ndarray:
+    """Return (H, W) bool: the depth within `window` differs from the pixel's own by more than `ratio` of it.
+
+    `depth` (H, W) float32 [m], 0 invalid; invalid neighbours count for nothing, invalid pixels are False.
+    """
+    kernel = np.ones((window, window), dtype=np.uint8)
+    valid = depth > 0
+    farthest = cv2.dilate(depth, kernel, borderType=cv2.BORDER_REPLICATE)
+    nearest = cv2.erode(np.where(valid, depth, np.float32(1e6)), kernel, borderType=cv2.BORDER_REPLICATE)
+    return valid & (np.maximum(farthest - depth, depth - nearest) > ratio * depth)
+
+
+def edge_map(depth: np.ndarray, points: np.ndarray, normals: np.ndarray, settings: GeometricSettings) -> np.ndarray:
+    """Return (H, W) bool: pixels on a concave crease, on a depth jump, or without depth.
+
+    The convex map is opened and the jumps are closed by squares of 2k+1 pixels, as the original does.
+    """
+    convexity = minimum_convexity(
+        points,
+        normals,
+        window=settings.convexity_window,
+        mask_threshold=settings.convexity_mask_threshold,
+        mutual=settings.mutual_convexity,
+    )
+    convex = (convexity > settings.convexity_threshold).astype(np.uint8)
+    jumps = depth_discontinuity(depth, ratio=settings.discontinuity_ratio, window=settings.discontinuity_window)
+    jump_mask = jumps.astype(np.uint8)
+    if settings.opening:
+        convex = cv2.morphologyEx(convex, cv2.MORPH_OPEN, np.ones((2 * settings.opening + 1,) * 2, np.uint8))
+    if settings.closing:
+        jump_mask = cv2.morphologyEx(jump_mask, cv2.MORPH_CLOSE, np.ones((2 * settings.closing + 1,) * 2, np.uint8))
+    return (convex == 0) | (jump_mask != 0) | (depth <= 0) | ~normals.any(axis=2)
+
+
+@njit(cache=True)
+def _fill_edges(labels: np.ndarray, points: np.ndarray, normals: np.ndarray, ratio: float) -> None:
+    """Breadth-first growth of the labels over unlabelled pixels with depth, never across a depth jump.
+
+    A step from p to q is no jump when the depth changes by less than `ratio`, or when q lies that close to the
+    tangent plane of p: surfaces seen at a grazing angle change their depth fast without ending.
+    """
+    height, width = labels.shape
+    queue = np.empty(height * width, dtype=np.int64)
+    head = 0
+    tail = 0
+    for v in range(height):
+        for u in range(width):
+            if labels[v, u] > 0:
+                queue[tail] = v * width + u
+                tail += 1
+    while head < tail:
+        v, u = queue[head] // width, queue[head] % width
+        head += 1
+        label = labels[v, u]
+        z = points[v, u, 2]
+        for side in range(4):
+            row = v + (1 if side == 0 else -1 if side == 1 else 0)
+            column = u + (1 if side == 2 else -1 if side == 3 else 0)
+            if row < 0 or row >= height or column < 0 or column >= width:
+                continue
+            if labels[row, column] != 0 or points[row, column, 2] <= 0.0:
+                continue
+            height_over_plane = (
+                (points[row, column, 0] - points[v, u, 0]) * normals[v, u, 0]
+                + (points[row, column, 1] - points[v, u, 1]) * normals[v, u, 1]
+                + (points[row, column, 2] - z) * normals[v, u, 2]
+            )
+            has_normal = normals[v, u, 2] != 0.0 or normals[v, u, 0] != 0.0 or normals[v, u, 1] != 0.0
+            if abs(points[row, column, 2] - z) <= ratio * z or (has_normal and abs(height_over_plane) <= ratio * z):
+                labels[row, column] = label
+                queue[tail] = row * width + column
+                tail += 1
+
+
+@njit(cache=True)
+def _sole_neighbours(labels: np.ndarray, small: np.ndarray) -> np.ndarray:
+    """For every small label the one large label it touches: 0 when it touches none, -1 when several."""
+    height, width = labels.shape
+    sole = np.zeros(small.size, dtype=np.int32)
+    for v in range(height):
+        for u in range(width):
+            for side in range(2):
+                row, column = v + side, u + 1 - side
+                if row >= height or column >= width:
+                    continue
+                a, b = labels[v, u], labels[row, column]
+                if a == b or a == 0 or b == 0 or small[a] == small[b]:
+                    continue
+                inner, outer = (a, b) if small[a] else (b, a)
+                if sole[inner] == 0:
+                    sole[inner] = outer
+                elif sole[inner] != outer:
+                    sole[inner] = -1
+    return sole
+
+
+def relabel(labels: np.ndarray) -> np.ndarray:
+    """Return the labels (H, W) renumbered 1..n in the order in which they first appear row by row; 0 stays."""
+    values, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    order = np.argsort(np.where(values == 0, -1, first), kind="stable")
+    rank = np.empty(values.size, dtype=np.int32)
+    rank[order] = np.arange(values.size, dtype=np.int32) + (0 if values.size and (values == 0).any() else 1)
+    return rank[inverse].reshape(labels.shape)
+
+
+def label_regions(
+    edges: np.ndarray, points: np.ndarray, normals: np.ndarray, *, minimum_pixels: int, ratio: float
+) -> np.ndarray:
+    """Return geometric segment labels (H, W) int32, 0 = none, from an edge map (H, W) bool.
+
+    `points` (H, W, 3) [m], z = 0 without depth; `normals` (H, W, 3), zero where there is none. Connected (4-neighbour) regions without edges are segments; edge pixels join the nearest segment on their side of
+    a depth jump of `ratio`; a region under `minimum_pixels` joins the one large segment that surrounds it, or is none.
+    """
+    _, labels = cv2.connectedComponents((~edges).astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
+    small = np.bincount(labels.ravel()) < minimum_pixels
+    small[0] = False
+    _fill_edges(labels, points, normals, ratio)
+    sole = _sole_neighbours(labels, small)
+    lookup = np.where(small, np.maximum(sole, 0), np.arange(small.size)).astype(np.int32)
+    return relabel(lookup[labels])
+
+
+def pixels_at(count: int, shape: tuple[int, ...]) -> int:
+    """Return a pixel count given for 640x480 rescaled to the area of an image of `shape` (H, W), at least 1."""
+    return max(1, round(count * shape[0] * shape[1] / REFERENCE_AREA))
+
+
+def segment_depth(depth: np.ndarray, camera: Camera, settings: GeometricSettings | None = None) -> GeometricFrame:
+    """Return the geometric segments of a z-depth image (H, W) [m], 0 invalid (Han 2024, section 2.3.1)."""
+    settings = settings or GeometricSettings()
+    depth = np.ascontiguousarray(depth, dtype=np.float32)
+    points = back_project(depth, camera)
+    normals = surface_normals(
+        points,
+        window=settings.normal_window,
+        step=settings.normal_step,
+        distance_factor=settings.normal_distance_factor,
+    )
+    edges = edge_map(depth, points, normals, settings)
+    labels = label_regions(
+        edges,
+        points,
+        normals,
+        minimum_pixels=pixels_at(settings.minimum_pixels, depth.shape),
+        ratio=settings.discontinuity_ratio,
+    )
+    return GeometricFrame(labels=labels, points=points, normals=normals)

@@ -1,0 +1,24 @@
+"""What a panoptic backend says about one frame: masks M_i with class c_i and instance o_i (Han 2024, section 2.3.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class PanopticMask:
+    """Class and score of one mask; its number is its value in PanopticFrame.ids."""
+
+    category_id: int
+    is_thing: bool
+    score: float = 1.0
+
+
+@dataclass(frozen=True)
+class PanopticFrame:
+    """Masks that do not overlap. `ids` (H, W) int32, 0 = no mask; `masks` maps every value to what it is."""
+
+    ids: np.ndarray
+    masks: dict[int, PanopticMask] = field(default_factory=dict)

@@ -1,0 +1,89 @@
+"""Declaration of `scenewright segment`. Pixel counts hold for 640x480 and are rescaled by the area of the image."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from schemas.segments import Segments
+from schemas.sequence import Sequence
+from stages.kit.stage import External, Optionally, Parameters, Stage
+
+
+class SegmentParameters(Parameters):
+    """Options of `segment`. Defaults of the geometric part and of the fusion are those of the published system."""
+
+    backend: Literal["ground-truth", "geometric", "detector"] = Field(
+        "ground-truth",
+        description="Where panoptic masks come from: the log's labels, every geometric segment as an `object`, "
+        "or an ONNX object detector",
+    )
+    corruption: float = Field(
+        0.0, ge=0, le=1, description="Level of the errors put into ground-truth masks (0 none; part of every name)"
+    )
+    fusion: Literal["ours", "thesis"] = Field(
+        "ours",
+        description="`thesis` follows the text; `ours` also keeps small segments that a mask claims and cuts a "
+        "segment that several masks share",
+    )
+
+    normal_window: int = Field(13, ge=3, le=31, description="Window of the normals [pixels, odd]")
+    normal_step: int = Field(2, ge=1, le=6, description="Every how many-th row and column of that window is used")
+    normal_distance_factor: float = Field(
+        0.05, gt=0, description="Points farther than this times the depth take no part in a normal"
+    )
+    convexity_window: int = Field(5, ge=3, le=31, description="Window of the minimum convexity [pixels, odd]")
+    convexity_threshold: float = Field(0.97, gt=0, le=1, description="Less convex pixels are edges [cosine]")
+    convexity_mask_threshold: float = Field(
+        -0.0005, le=0, description="Neighbours less high over the tangent plane than this (negated) are convex [m]"
+    )
+    mutual_convexity: bool = Field(
+        True, description="Judge convexity from both pixels of a pair (no: from the middle one alone, as published)"
+    )
+    discontinuity_ratio: float = Field(0.01, gt=0, lt=1, description="Depth jumps over this share of depth are edges")
+    discontinuity_window: int = Field(3, ge=3, le=15, description="Window in which depth jumps are sought [pixels]")
+    opening: int = Field(1, ge=0, le=5, description="Radius of the opening of the convex map [pixels]")
+    closing: int = Field(1, ge=0, le=5, description="Radius of the closing of the depth jumps [pixels]")
+    geometric_minimum: int = Field(200, ge=1, description="Smallest geometric region [pixels at 640x480]")
+
+    fusion_minimum: int = Field(
+        800, ge=1, description="Geometric segments under this are discarded before fusion [pixels at 640x480]"
+    )
+    contained_share: float = Field(
+        0.9, gt=0, lt=1, description="A mask of which more than this lies in one segment may be split out of it"
+    )
+    largest_part: float = Field(0.5, gt=0, le=1, description="... if it is less than this share of the segment")
+    majority_share: float = Field(
+        0.2, gt=0, le=1, description="A segment takes the label of a mask that covers at least this share of it"
+    )
+    cluster_distance: float = Field(
+        0.05, gt=0, description="Segments of an instance within this distance belong together [m]"
+    )
+    cluster_step: int = Field(5, ge=1, description="Every how many-th point is looked at in that clustering")
+    small_object_pixels: int = Field(
+        60, ge=1, description="Smallest segment that `ours` keeps for a mask [pixels at 640x480]"
+    )
+
+    score_threshold: float = Field(0.3, gt=0, lt=1, description="Detections under this score are dropped")
+    suppression_overlap: float = Field(
+        0.5, gt=0, lt=1, description="Detections of one class that overlap more than this are one (IoU)"
+    )
+    tiles: bool = Field(
+        True, description="Detect on overlapping tiles at full resolution too (finds small things, five times slower)"
+    )
+
+
+STAGE = Stage(
+    name="segment",
+    version=1,
+    summary="Segment every frame: panoptic masks of a backend fused with geometric segments of the depth",
+    parameters=SegmentParameters,
+    reads={
+        "sequence": Sequence,
+        "weights": Optionally(External("ONNX detector (YOLOX layout, COCO-80), for --backend detector", weights=True)),
+    },
+    writes=Segments,
+    libraries=("numpy", "opencv-python-headless", "numba", "scipy"),
+    example="scenewright segment --sequence outputs/demo/sequence --out outputs/demo/segments --corruption 0.2",
+)
