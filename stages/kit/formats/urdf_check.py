@@ -1,0 +1,154 @@
+"""What is wrong with a URDF that loads fine: the checks that parsers leave out."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from schemas.errors import BadInput
+from stages.kit.formats.urdf_file import JOINT_TYPES, Link, Shape, Urdf, UrdfJoint, parse_urdf
+
+NAME = re.compile(r"[A-Za-z0-9_.\-]+")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong: a kind for programs, the element, a sentence for people."""
+
+    kind: str
+    element: str
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.element}: {self.message}"
+
+
+def check_urdf(path: Path) -> list[Problem]:
+    """Return what is wrong with a URDF; an empty list when nothing is.
+
+    Kinds: `unreadable`, `name`, `duplicate`, `dangling`, `cycle`, `roots`, `not_finite`, `axis`, `limits`,
+    `joint_type`, `mass`, `inertia`, `no_inertia`, `mesh_missing`, `mesh_outside`, `geometry`.
+    """
+    path = Path(path)
+    try:
+        urdf = parse_urdf(path)
+    except BadInput as error:
+        return [Problem("unreadable", path.name, error.message)]
+    problems = _check_names(urdf) + _check_tree(urdf)
+    moving = {joint.child for joint in urdf.joints if joint.type != "fixed"}
+    if not urdf.joints:
+        moving |= {link.name for link in urdf.links}
+    for link in urdf.links:
+        problems += _check_inertia(link, must_have=link.name in moving)
+        for shape in (*link.visuals, *link.collisions):
+            problems += _check_shape(link.name, shape, path.parent)
+    for joint in urdf.joints:
+        problems += _check_joint(joint)
+    return problems
+
+
+def require_sound(path: Path) -> None:
+    """Raise BadInput with the first problem of a URDF, and how many there are."""
+    problems = check_urdf(path)
+    if problems:
+        more = f", and {len(problems) - 1} more" if len(problems) > 1 else ""
+        raise BadInput(f"{path}: {problems[0]}{more}", hint="the model or scene behind it is broken")
+
+
+def _check_names(urdf: Urdf) -> list[Problem]:
+    problems = []
+    for what, names in (("link", [link.name for link in urdf.links]), ("joint", [joint.name for joint in urdf.joints])):
+        problems += [Problem("name", f"{what} {n!r}", "name is empty or not ASCII letters, digits, _ . -") for n in names if not NAME.fullmatch(n)]
+        problems += [Problem("duplicate", f"{what} {n!r}", f"stands {count} times") for n, count in Counter(names).items() if count > 1]
+    return problems
+
+
+def _check_tree(urdf: Urdf) -> list[Problem]:
+    names = {link.name for link in urdf.links}
+    problems = []
+    parents: dict[str, str] = {}
+    for joint in urdf.joints:
+        for role, end in (("parent", joint.parent), ("child", joint.child)):
+            if end not in names:
+                problems.append(Problem("dangling", f"joint {joint.name!r}", f"{role} link {end!r} does not exist"))
+        if joint.child in parents:
+            problems.append(Problem("cycle", f"link {joint.child!r}", "has more than one parent joint"))
+        parents[joint.child] = joint.parent
+    for start in sorted(parents):
+        seen, link = {start}, parents[start]
+        while link in parents and link not in seen:
+            seen.add(link)
+            link = parents[link]
+        if link == start:
+            problems.append(Problem("cycle", f"link {start!r}", "is its own ancestor"))
+    if not names:
+        problems.append(Problem("roots", "robot", "has no links"))
+    elif len(urdf.roots()) != 1:
+        problems.append(Problem("roots", "robot", f"has {len(urdf.roots())} root links, expected 1: {urdf.roots()[:4]}"))
+    return problems
+
+
+def _check_inertia(link: Link, must_have: bool) -> list[Problem]:
+    element = f"link {link.name!r}"
+    if link.inertial is None:
+        return [Problem("no_inertia", element, "moves but has no inertial (engines then assume 1 kg)")] if must_have else []
+    mass, tensor = link.inertial.mass, link.inertial.inertia
+    if not (np.isfinite(mass) and np.isfinite(tensor).all() and np.isfinite(link.inertial.center).all()):
+        return [Problem("not_finite", element, "inertial holds NaN or infinity")]
+    problems = []
+    if mass <= 0:
+        problems.append(Problem("mass", element, f"mass is {mass:g} kg"))
+    moments = np.linalg.eigvalsh(tensor)
+    if moments[0] <= 0:
+        problems.append(Problem("inertia", element, f"inertia is not positive definite, smallest moment {moments[0]:g} kg m^2"))
+    elif moments[0] + moments[1] < moments[2] * (1 - 1e-6):
+        problems.append(
+            Problem("inertia", element, f"moments {moments[0]:g}, {moments[1]:g}, {moments[2]:g} break the triangle inequality")
+        )
+    return problems
+
+
+def _check_shape(link: str, shape: Shape, folder: Path) -> list[Problem]:
+    element = f"link {link!r}"
+    if not np.isfinite(shape.link_from_shape).all() or not np.isfinite(shape.scale):
+        return [Problem("not_finite", element, "geometry origin or scale holds NaN or infinity")]
+    if shape.box_size is not None:
+        if not (np.isfinite(shape.box_size).all() and min(shape.box_size) > 0):
+            return [Problem("geometry", element, f"box size {shape.box_size}")]
+        return []
+    name = shape.mesh or ""
+    if shape.scale <= 0:
+        return [Problem("geometry", element, f"mesh {name!r} has scale {shape.scale:g}")]
+    root = folder.resolve()
+    target = (folder / name).resolve()
+    if "://" in name or PurePosixPath(name).is_absolute() or not target.is_relative_to(root) or target == root:
+        return [Problem("mesh_outside", element, f"mesh {name!r} is not a path inside the folder of the URDF")]
+    if not target.is_file():
+        return [Problem("mesh_missing", element, f"mesh {name!r} does not exist")]
+    return []
+
+
+def _check_joint(joint: UrdfJoint) -> list[Problem]:
+    element = f"joint {joint.name!r}"
+    if joint.type not in JOINT_TYPES:
+        return [Problem("joint_type", element, f"type {joint.type!r} is not one of {', '.join(JOINT_TYPES)}")]
+    if not np.isfinite(joint.parent_from_child).all():
+        return [Problem("not_finite", element, "origin holds NaN or infinity")]
+    if joint.type in ("fixed", "floating"):
+        return []
+    values = (*joint.axis, joint.lower, joint.upper, joint.effort, joint.velocity)
+    if not np.isfinite(values).all():
+        return [Problem("not_finite", element, "axis or limit holds NaN or infinity")]
+    problems = []
+    if np.linalg.norm(joint.axis) < 1e-6:
+        problems.append(Problem("axis", element, "axis has no length"))
+    if joint.type != "continuous":
+        if joint.lower > joint.upper:
+            problems.append(Problem("limits", element, f"lower {joint.lower:g} > upper {joint.upper:g}"))
+        if joint.effort <= 0 or joint.velocity <= 0:
+            problems.append(Problem("limits", element, f"effort {joint.effort:g} or velocity {joint.velocity:g} is not positive"))
+    return problems

@@ -1,0 +1,1 @@
+"""Step `library build`: a CAD library of parametric furniture."""

@@ -1,0 +1,83 @@
+"""From a design to the record of a CAD model: states with boxes and planes, masses, parts in their own frames."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from schemas.base import as_vector
+from schemas.cad_library import CadModel, ModelState
+from schemas.scene_parts import Joint
+from stages.kit.formats.model_writer import PartGeometry
+from stages.kit.geometry.solids import Solid
+from stages.kit.geometry.transforms import transform_from
+from stages.library.design import Design, mass_of
+from stages.library.surfaces import surface_planes
+
+BODY = "body"
+
+
+def describe(design: Design, model_id: str, movable: bool) -> CadModel:
+    """Return the library's record of a centred design."""
+    joints = tuple(link.joint for link in design.moving)
+    return CadModel(
+        id=model_id,
+        class_name=design.class_name,
+        articulated=bool(joints),
+        mass=round(sum(part.properties.mass for part in part_geometries(design)), 6),
+        states=tuple(_state(design, values) for values in _joint_values(joints)),
+        joints=joints,
+        movable=movable,
+        contains=design.contains,
+        grasp_width=design.grasp_width if movable else None,
+        parts=(BODY, *(joint.part for joint in joints)),
+        recipe=design.recipe,
+    )
+
+
+def part_geometries(design: Design) -> list[PartGeometry]:
+    """Return the body and the moving links, each in its part frame (origin at its joint)."""
+    parts = []
+    for name, pieces, origin in [
+        (BODY, design.body, np.zeros(3)),
+        *((link.joint.part, link.pieces, np.asarray(link.joint.origin)) for link in design.moving),
+    ]:
+        local = [piece.solid.shifted(*(-origin)) for piece in pieces]
+        whole = mass_of(pieces)
+        properties = type(whole)(whole.mass, whole.center - origin, whole.inertia)
+        parts.append(PartGeometry(name, local, [piece.paint.color for piece in pieces], properties))
+    return parts
+
+
+def _joint_values(joints: tuple[Joint, ...]) -> list[dict[str, float]]:
+    """Return closed; every joint alone half and fully open; all fully open."""
+    closed = {joint.name: 0.0 for joint in joints}
+    values = [closed]
+    for joint in joints:
+        values += [{**closed, joint.name: round(share * joint.upper, 6)} for share in (0.5, 1.0)]
+    if len(joints) > 1:
+        values.append({joint.name: joint.upper for joint in joints})
+    return values
+
+
+def _state(design: Design, values: dict[str, float]) -> ModelState:
+    solids: list[Solid] = [piece.solid for piece in design.body]
+    for link in design.moving:
+        moved = motion(link.joint, values[link.joint.name])
+        solids += [piece.solid.moved(moved) for piece in link.pieces]
+    points = np.concatenate([solid.vertices for solid in solids])
+    return ModelState(
+        joints=values,
+        box_minimum=as_vector(np.round(points.min(axis=0), 9) + 0.0),
+        box_maximum=as_vector(np.round(points.max(axis=0), 9) + 0.0),
+        planes=surface_planes(solids),
+    )
+
+
+def motion(joint: Joint, value: float) -> np.ndarray:
+    """Return the (4, 4) rigid motion in the model frame that the joint value makes of the closed link."""
+    axis, origin = np.asarray(joint.axis), np.asarray(joint.origin)
+    if joint.type == "prismatic":
+        return transform_from(np.eye(3), value * axis)
+    rotation = Rotation.from_rotvec(value * axis).as_matrix()
+    return transform_from(rotation, origin - rotation @ origin)

@@ -1,0 +1,151 @@
+"""Surface planes of a set of convex solids: coplanar facets merged, what another solid covers taken away.
+
+Exact polygon arithmetic in each plane: the union of the facets less the cross-section of every solid that stands on
+them, so that a leg's top under a table's top is no surface, and a shelf is one between its uprights alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiPoint, Polygon
+
+from schemas.base import as_vector
+from schemas.scene_parts import SurfacePlane
+from stages.kit.geometry.solids import Solid
+
+COVER_GAP = 0.003
+"""What stands within this of a surface covers it [m] (a closed door before the edges of a carcass)."""
+JOIN_GAP = 0.004
+"""Regions of one horizontal plane closer than this are one support surface [m]."""
+UPRIGHT = 0.9
+"""-a_th of equation 2.1: a plane supports when its normal's z exceeds this."""
+
+
+def surface_planes(
+    solids: Sequence[Solid], *, minimum_share: float = 0.02, support_share: float = 0.004, support_width: float = 0.05
+) -> tuple[SurfacePlane, ...]:
+    """Return the planes of flat facets, largest first.
+
+    A plane is kept when its exposed area is at least `minimum_share` of the surface of the bounding box; a horizontal
+    region that looks up needs `support_share`, and a rectangle at least `support_width` wide [m] (0.35 of the smaller
+    horizontal extent on small things). Horizontal planes are split into connected regions, others are not.
+    """
+    points = np.concatenate([solid.vertices for solid in solids])
+    size = points.max(axis=0) - points.min(axis=0)
+    surface = 2 * float(size[0] * size[1] + size[1] * size[2] + size[0] * size[2])
+    width = min(support_width, 0.35 * float(size[:2].min()))
+    bounds = np.array([[solid.vertices.min(axis=0), solid.vertices.max(axis=0)] for solid in solids])
+    edges = [np.unique(np.sort(solid.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0) for solid in solids]
+    planes = []
+    for normal, offset, facets in _coplanar_facets(solids):
+        up = normal[2] > UPRIGHT
+        least = (support_share if up else minimum_share) * surface
+        basis = _basis(normal)
+        union = shapely.union_all([_outline(corners @ basis.T) for corners in facets])
+        if union.area < least:
+            continue
+        height = offset - COVER_GAP
+        near = _bounds_reach(bounds, normal, height)
+        cover = [_section(solids[k].vertices, edges[k], normal, height, basis) for k in np.flatnonzero(near)]
+        exposed = union.difference(shapely.union_all([c for c in cover if c is not None]))
+        regions = _regions(exposed) if up else [exposed]
+        for region in regions:
+            if region.area < least:
+                continue
+            corners, narrow = _rectangle(region)
+            if up and narrow < width:
+                continue
+            anchor = -offset * normal
+            middle = np.asarray(region.centroid.coords[0])
+            planes.append(
+                SurfacePlane(
+                    normal=as_vector(np.round(normal, 9) + 0.0), offset=round(float(offset), 9) + 0.0, area=round(region.area, 9),
+                    center=as_vector(np.round(anchor + middle @ basis, 9) + 0.0),
+                    corners=tuple(as_vector(np.round(anchor + corner @ basis, 9) + 0.0) for corner in corners),
+                    horizontal=bool(up),
+                )
+            )  # fmt: skip
+    planes.sort(key=lambda plane: (-round(plane.area, 6), plane.center, plane.normal))
+    return tuple(planes)
+
+
+def _coplanar_facets(solids: Sequence[Solid]) -> list[tuple[np.ndarray, float, list[np.ndarray]]]:
+    """Return (unit normal, offset d of n.v + d = 0, facet corner points per solid) of every plane of flat facets."""
+    groups: dict[tuple[int, ...], tuple[list[np.ndarray], list[float], list[float], dict[int, list[np.ndarray]]]] = {}
+    for number, solid in enumerate(solids):
+        corners = solid.vertices[solid.faces]
+        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        doubled = np.linalg.norm(cross, axis=1)
+        for k in np.flatnonzero(~solid.curved & (doubled > 1e-10)):
+            normal = cross[k] / doubled[k]
+            offset = -float(normal @ corners[k].mean(axis=0))
+            key = (*(int(v) for v in np.round(normal * 200)), round(offset * 1000))
+            entry = groups.setdefault(key, ([], [], [], {}))
+            entry[0].append(normal * doubled[k])
+            entry[1].append(offset * doubled[k])
+            entry[2].append(float(doubled[k]))
+            entry[3].setdefault(number, []).append(corners[k])
+    planes = []
+    for key in sorted(groups):
+        normals, offsets, weights, facets = groups[key]
+        normal = np.sum(normals, axis=0)
+        normal = normal / np.linalg.norm(normal)
+        planes.append((normal, sum(offsets) / sum(weights), [np.concatenate(corners) for corners in facets.values()]))
+    return planes
+
+
+def _basis(normal: np.ndarray) -> np.ndarray:
+    """Return two orthonormal directions (2, 3) in the plane, axis-parallel where the normal is, right-handed with it."""
+    helper = np.array([1.0, 0, 0]) if abs(normal[0]) < 0.9 else np.array([0, 1.0, 0])
+    first = helper - (helper @ normal) * normal
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)])
+
+
+def _outline(points: np.ndarray) -> Polygon:
+    return MultiPoint(points).convex_hull
+
+
+def _bounds_reach(bounds: np.ndarray, normal: np.ndarray, height: float) -> np.ndarray:
+    """Return (S,) bool: which bounding boxes (S, 2, 3) cross the plane n.v + height = 0."""
+    center, half = bounds.mean(axis=1), 0.5 * (bounds[:, 1] - bounds[:, 0])
+    return np.abs(center @ normal + height) < half @ np.abs(normal)
+
+
+def _section(vertices: np.ndarray, edges: np.ndarray, normal: np.ndarray, height: float, basis: np.ndarray) -> Polygon | None:
+    """Return the cross-section of a convex solid with the plane n.v + height = 0, in the plane's basis, or None."""
+    signed = vertices @ normal + height
+    start, end = signed[edges[:, 0]], signed[edges[:, 1]]
+    crossing = (start < 0) != (end < 0)
+    if not crossing.any():
+        return None
+    weight = (start[crossing] / (start[crossing] - end[crossing]))[:, None]
+    points = vertices[edges[crossing, 0]] * (1 - weight) + vertices[edges[crossing, 1]] * weight
+    outline = _outline(points @ basis.T)
+    return outline if outline.area > 0 else None
+
+
+def _regions(exposed: shapely.Geometry) -> list[shapely.Geometry]:
+    """Return the connected regions, joined over gaps up to JOIN_GAP, slivers left out."""
+    half = 0.5 * JOIN_GAP
+    closed = exposed.buffer(half, join_style="mitre").buffer(-half, join_style="mitre")
+    parts = list(getattr(closed, "geoms", [closed]))
+    return [part for part in parts if isinstance(part, Polygon) and not part.is_empty]
+
+
+def _rectangle(region: shapely.Geometry) -> tuple[np.ndarray, float]:
+    """Return the corners (4, 2), counter-clockwise, of the minimum-area rectangle, and its smaller edge [m].
+
+    The axis-parallel one is taken when it is at most 1 % larger.
+    """
+    x0, y0, x1, y1 = region.bounds
+    upright = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+    turned = shapely.minimum_rotated_rectangle(region)
+    corners = upright
+    if isinstance(turned, Polygon) and turned.area * 1.01 < (x1 - x0) * (y1 - y0):
+        corners = np.asarray(shapely.geometry.polygon.orient(turned).exterior.coords)[:4]
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+    return corners, float(lengths.min())

@@ -1,0 +1,1 @@
+"""Step `urdf`: the functionally equivalent scene as a kinematic tree for simulators and robots."""
