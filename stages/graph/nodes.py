@@ -1,0 +1,229 @@
+"""Scene entity nodes <o, c, M, B, Pi> while the graph is built (Han 2024, section 2.2.2, initialisation)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from schemas.base import as_vector
+from schemas.scene_parts import Box, SurfacePlane
+from stages.kit.geometry.boxes import bottom, convex_hull, minimum_box, polygon_area, top
+from stages.kit.geometry.planes import PlaneFit, plane_rectangle, ransac_plane, ransac_planes
+from stages.kit.geometry.point_clouds import without_strays
+
+GRAVITY = np.array([0.0, 0.0, -1.0])
+CONTAINER_CLASSES = frozenset(
+    {"shelf", "bin", "bowl", "box", "sink", "vase", "cup", "backpack", "cabinet", "wall_cabinet"}
+)
+"""Rigid things that things are put into; articulated classes contain as well."""
+THINNEST_DISTANCE = 0.005
+"""RANSAC distance never falls below half a centimetre: surfaces of a fused map are not more exact than that."""
+SAME_HEIGHT = 0.02
+"""Horizontal patches of one entity nearer than this in height are one plane."""
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A surface plane, the points on it, and (where horizontal) the hull of their ground projection."""
+
+    plane: SurfacePlane
+    points: np.ndarray
+    """(K, 3) [m]."""
+    hull: np.ndarray
+    """(M, 2) convex, counter-clockwise; empty when the plane is not horizontal."""
+
+
+@dataclass(frozen=True)
+class Entity:
+    """A node of the parse tree in the making."""
+
+    name: str
+    instance: int
+    class_name: str
+    node_type: Literal["layout", "rigid", "articulated"]
+    movable: bool
+    mesh: str | None
+    confidence: float
+    points: np.ndarray
+    """(N, 3) on the thinning grid, strays removed [m]."""
+    box: Box
+    patches: tuple[Patch, ...]
+
+    @property
+    def bottom(self) -> float:
+        """Height of the box's bottom face [m]."""
+        return bottom(self.box)
+
+    @property
+    def top(self) -> float:
+        """Height of the box's top face [m]."""
+        return top(self.box)
+
+    @property
+    def is_container(self) -> bool:
+        """Whether things stand in it rather than on it."""
+        return self.node_type == "articulated" or self.class_name in CONTAINER_CLASSES
+
+    @property
+    def supporting(self) -> tuple[int, ...]:
+        """Indices of the horizontal patches."""
+        return tuple(k for k, patch in enumerate(self.patches) if patch.plane.horizontal)
+
+    def with_patch(self, patch: Patch) -> Entity:
+        """Return the entity with one more plane (a hidden one that was registered)."""
+        return replace(self, patches=(*self.patches, patch))
+
+
+def is_horizontal(normal: np.ndarray, threshold: float) -> bool:
+    """Equation 2.1, first line: n . g <= a_th, for a unit normal (3,)."""
+    return float(np.asarray(normal) @ GRAVITY) <= threshold
+
+
+def plane_height(plane: SurfacePlane, at: np.ndarray) -> float:
+    """Return the height z [m] of a plane that is not vertical, above the ground point `at` (2,).
+
+    For a horizontal plane this is -d (equation 2.1); a_th admits slopes up to 26 degrees, for which -d would be the
+    height at the world's origin instead of under the object.
+    """
+    nx, ny, nz = plane.normal
+    return -(plane.offset + nx * float(at[0]) + ny * float(at[1])) / nz
+
+
+def observed_box(points: np.ndarray, *, stray_share: float, stray_distance: float) -> tuple[Box, np.ndarray]:
+    """Return the gravity-aligned minimum box of points (N, 3), and which points (N,) it was put around.
+
+    Labels leak at object borders, onto what stands behind them; one stray vertex would stretch the minimum box. So
+    small clusters that are cut off from the rest are left out (point_clouds.without_strays).
+    """
+    kept = without_strays(points, stray_share, stray_distance)
+    return minimum_box(points[kept]), kept
+
+
+def surface_planes(
+    points: np.ndarray,
+    normals: np.ndarray,
+    *,
+    distance: float,
+    iterations: int,
+    normal_weight: float,
+    plane_share: float,
+    horizontal_threshold: float,
+    minimum_support_area: float | None,
+    spacing: float,
+    random: np.random.Generator,
+) -> tuple[Patch, ...]:
+    """Return the surface planes Pi of points (N, 3) with outward unit normals (N, 3) (Han 2024, section 2.2.2).
+
+    `minimum_support_area` [m^2]: see `small_support_planes`; None leaves the thesis's planes alone.
+    """
+    fits = ransac_planes(
+        points,
+        normals,
+        distance_threshold=distance,
+        iterations=iterations,
+        random=random,
+        normal_weight=normal_weight,
+        minimum_share=plane_share,
+    )
+    if minimum_support_area is not None:
+        free = np.ones(len(points), dtype=bool)
+        for fit in fits:
+            free[fit.inliers] = False
+        rest = np.flatnonzero(free)
+        least = max(5, math.ceil(minimum_support_area / spacing**2))
+        found = small_support_planes(points[rest], normals[rest], distance, horizontal_threshold, least, random)
+        fits += [PlaneFit(fit.normal, fit.offset, rest[fit.inliers]) for fit in found]
+        fits = merge_levels(points, fits, horizontal_threshold)
+    return tuple(patch_from_fit(points, fit, horizontal_threshold) for fit in fits)
+
+
+def small_support_planes(
+    points: np.ndarray,
+    normals: np.ndarray,
+    distance: float,
+    horizontal_threshold: float,
+    minimum_count: int,
+    random: np.random.Generator,
+) -> list[PlaneFit]:
+    """Return horizontal planes among the points (N, 3) that the share rule left over.
+
+    The thesis keeps planes with more than a tenth of an entity's points. The boards of a shelf or of an open fridge
+    have fewer, and yet they are what things stand on. Only points whose own normal points up are searched.
+    """
+    upward = np.flatnonzero(normals @ GRAVITY <= horizontal_threshold)
+    found: list[PlaneFit] = []
+    while len(upward) >= minimum_count:
+        fit = ransac_plane(
+            points[upward],
+            distance_threshold=min(distance, SAME_HEIGHT),
+            iterations=100,
+            random=random,
+            normals=normals[upward],
+            normal_weight=0.0,
+            direction=-GRAVITY,
+            maximum_angle=math.acos(-horizontal_threshold),
+        )
+        if fit is None or len(fit.inliers) < minimum_count:
+            break
+        found.append(PlaneFit(fit.normal, fit.offset, upward[fit.inliers]))
+        upward = np.delete(upward, fit.inliers)
+    return found
+
+
+def merge_levels(points: np.ndarray, fits: list[PlaneFit], horizontal_threshold: float) -> list[PlaneFit]:
+    """Merge horizontal planes at the same height (within 2 cm) into the largest of them.
+
+    One table top that noise bent falls into two planes; the released code merges such planes too.
+    """
+    result: list[PlaneFit] = []
+    for fit in fits:
+        height = float(points[fit.inliers, 2].mean())
+        if is_horizontal(fit.normal, horizontal_threshold):
+            for k, other in enumerate(result):
+                level = abs(float(points[other.inliers, 2].mean()) - height) < SAME_HEIGHT
+                if level and is_horizontal(other.normal, horizontal_threshold):
+                    inliers = np.sort(np.concatenate([other.inliers, fit.inliers]))
+                    result[k] = PlaneFit(other.normal, other.offset, inliers)
+                    break
+            else:
+                result.append(fit)
+        else:
+            result.append(fit)
+    return result
+
+
+def patch_from_fit(points: np.ndarray, fit: PlaneFit, horizontal_threshold: float) -> Patch:
+    """Return the patch of a fitted plane: centre, rectangle and hull of its inliers."""
+    inliers = points[fit.inliers]
+    normal = fit.normal / np.linalg.norm(fit.normal)
+    center = inliers.mean(axis=0)
+    corners, area = plane_rectangle(inliers, normal)
+    horizontal = is_horizontal(normal, horizontal_threshold)
+    hull = convex_hull(inliers[:, :2]) if horizontal else np.zeros((0, 2))
+    plane = SurfacePlane(
+        normal=as_vector(normal),
+        offset=float(fit.offset),
+        area=polygon_area(hull) if horizontal else area,
+        center=as_vector(center),
+        corners=tuple(as_vector(corner) for corner in corners),
+        horizontal=horizontal,
+    )
+    return Patch(plane, inliers, hull)
+
+
+def level_patch(outline: np.ndarray, height: float, *, hidden: bool) -> Patch:
+    """Return a horizontal plane at `height` [m] over a convex ground polygon (K, 2), K >= 3."""
+    corners = np.column_stack([outline, np.full(len(outline), height)])
+    plane = SurfacePlane(
+        normal=(0.0, 0.0, 1.0),
+        offset=-float(height),
+        area=polygon_area(outline),
+        center=as_vector(corners.mean(axis=0)),
+        corners=tuple(as_vector(corner) for corner in corners) if len(corners) == 4 else (),
+        horizontal=True,
+        hidden=hidden,
+    )
+    return Patch(plane, corners, outline)

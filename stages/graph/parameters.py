@@ -1,0 +1,80 @@
+"""Declaration of `graph`: contact graph from a panoptic map."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from schemas.contact_graph import ContactGraph
+from schemas.panoptic_map import PanopticMap
+from stages.kit.stage import Parameters, Stage
+
+
+class GraphParameters(Parameters):
+    """Defaults are the thesis's constants where it states them (PROTOCOLS section 3), and said to be ours elsewhere."""
+
+    method: Literal["ours", "thesis"] = Field(
+        "ours",
+        description="`thesis`: equations 2.1 to 2.3 and nothing else; `ours`: with the corrections of stages/graph",
+    )
+    horizontal_threshold: float = Field(
+        -0.9, ge=-1.0, le=0.0, description="a_th: a plane supports when its normal times gravity is at most this"
+    )
+    area_threshold: float = Field(
+        0.5, ge=0.0, le=1.0, description="b_th: least share of the child's footprint over the supporting plane"
+    )
+    minimum_score: float = Field(0.2, ge=0.0, le=1.0, description="Least score (2.3) of a supporting relation")
+    point_spacing: float = Field(0.01, gt=0.0, description="Grid to which meshes are thinned for plane search [m]")
+    plane_distance: float = Field(
+        0.03, gt=0.0, description="RANSAC inlier distance, at most a quarter of the box's smallest edge [m]"
+    )
+    plane_iterations: int = Field(200, ge=1, description="RANSAC hypotheses per plane")
+    normal_weight: float = Field(0.1, ge=0.0, le=1.0, description="Weight of normals in the RANSAC inlier rule")
+    plane_share: float = Field(
+        0.1, gt=0.0, le=1.0, description="Planes with a smaller share of an entity's points are dropped"
+    )
+    minimum_support_area: float = Field(
+        0.004, gt=0.0, description="ours: smaller horizontal patches than this are no supporting planes [m^2]"
+    )
+    stray_share: float = Field(
+        0.05, ge=0.0, lt=1.0, description="Clusters with a smaller share of an entity's points are left out of its box"
+    )
+    stray_distance: float = Field(0.1, gt=0.0, description="Gap that separates clusters [m]")
+    maximum_sinking: float = Field(
+        0.05, ge=0.0, description="ours: planes farther above the child's bottom than this do not support it [m]"
+    )
+    tie_margin: float = Field(
+        0.1, ge=0.0, le=1.0, description="ours: among scores this close to the best the highest plane wins"
+    )
+    maximum_extension: float = Field(
+        1.0, ge=0.0, description="Boxes are extended down to the supporting plane by at most this [m]"
+    )
+    wall_distance: float = Field(
+        0.12, ge=0.0, description="Objects without support hang on a wall that is at most this far from their mesh [m]"
+    )
+    wall_classes: tuple[str, ...] = Field(
+        ("wall_cabinet", "clock", "monitor", "shelf", "lamp"),
+        description="ours: classes that rather hang on a near wall than float above a plane",
+    )
+    floating_gap: float = Field(0.15, ge=0.0, description="ours: gap above which `wall_classes` count as floating [m]")
+    minimum_points: int = Field(
+        30, ge=1, description="Entities with fewer points on the thinning grid are dropped (small-entity filter)"
+    )
+    minimum_diagonal: float = Field(0.03, ge=0.0, description="Entities with a smaller box diagonal are dropped [m]")
+    dropped_classes: tuple[str, ...] = Field(("person",), description="Classes that are no part of a static scene")
+    minimum_floor_area: float = Field(
+        0.5, gt=0.0, description="Unlabelled surface at z = 0 from which a missing floor is supposed [m^2]"
+    )
+
+
+STAGE = Stage(
+    name="graph",
+    version=1,
+    summary="contact graph (who supports, contains, carries whom) from a panoptic map",
+    parameters=GraphParameters,
+    reads={"panoptic_map": PanopticMap},
+    writes=ContactGraph,
+    libraries=("numpy", "scipy", "trimesh"),
+    example="scenewright graph --panoptic-map outputs/demo/panoptic_map --out outputs/demo/contact_graph",
+)

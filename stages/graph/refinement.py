@@ -1,0 +1,102 @@
+"""Register hidden planes, extend boxes down to what supports them, find proximal pairs (Han 2024, section 2.2.2)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from schemas.scene_parts import Box, Relation
+from stages.graph.nodes import SAME_HEIGHT, Entity
+from stages.graph.support import Candidate
+from stages.kit.geometry.boxes import box_volume, boxes_overlap_volume, minimum_box, top, with_extent
+
+LEAST_SHARED_VOLUME = 1e-6
+"""Boxes that merely touch share less than this by rounding [m^3]."""
+SLAB_THICKNESS = 0.04
+"""Thickness that a wall's plane gets for the intersection test [m]."""
+
+
+def register_hidden_planes(
+    entities: dict[str, Entity], chosen: dict[str, Candidate]
+) -> tuple[dict[str, Entity], dict[str, Candidate]]:
+    """Add hidden supporting planes to their parents, and point the relations at them.
+
+    Children at the same height (2 cm) share one hidden plane.
+    """
+    entities = dict(entities)
+    linked: dict[str, Candidate] = {}
+    for name in sorted(chosen):
+        candidate = chosen[name]
+        if candidate.hidden is not None:
+            parent = entities[candidate.parent]
+            index = next(
+                (
+                    k
+                    for k in parent.supporting
+                    if parent.patches[k].plane.hidden
+                    and abs(parent.patches[k].plane.center[2] - candidate.height) < SAME_HEIGHT
+                ),
+                None,
+            )
+            if index is None:
+                index = len(parent.patches)
+                entities[candidate.parent] = parent.with_patch(candidate.hidden)
+            height = entities[candidate.parent].patches[index].plane.center[2]
+            gap = entities[name].bottom - height
+            candidate = replace(candidate, patch=index, hidden=None, height=height, gap=gap)
+        linked[name] = candidate
+    return entities, linked
+
+
+def refined_box(box: Box, height: float, maximum_extension: float) -> Box:
+    """Return the box with its bottom on the plane at `height` [m], top and footprint kept (equation 2.1 holds).
+
+    Boxes grow downwards by at most `maximum_extension` [m] (beyond that the box stays as observed, it is no missing
+    leg any more). A bottom below the plane is raised to it: points below a supporting surface are noise. A box that
+    lies wholly below the plane stays.
+    """
+    low, high = box.center[2] - box.size[2] / 2, top(box)
+    if height >= high or low - height > maximum_extension:
+        return box
+    return with_extent(box, height, high)
+
+
+def wall_slabs(entity: Entity) -> list[Box]:
+    """Return thin boxes around the planes of a layout entity.
+
+    One wall entity may hold all four walls of a room, whose common box would meet everything in it.
+    """
+    slabs = []
+    for patch in entity.patches:
+        corners = np.asarray(patch.plane.corners)
+        if len(corners) == 4:
+            normal = np.asarray(patch.plane.normal)
+            slabs.append(minimum_box(np.concatenate([corners, corners - SLAB_THICKNESS * normal])))
+    return slabs or [entity.box]
+
+
+def proximal_relations(entities: list[Entity], boxes: dict[str, Box], linked: set[tuple[str, str]]) -> list[Relation]:
+    """Return undirected proximal relations: Vol(B_1 n B_2) > 0 and neither carries the other (section 2.2.1).
+
+    `boxes`: refined boxes by name; `linked`: (parent, child) pairs. Layout nodes take part with the slabs of their
+    planes; two layout nodes do not. The confidence is the share of the smaller box.
+    """
+    solids = {e.name: (wall_slabs(e) if e.node_type == "layout" else [boxes[e.name]]) for e in entities}
+    relations = []
+    for k, a in enumerate(entities):
+        for b in entities[k + 1 :]:
+            if a.node_type == "layout" and b.node_type == "layout":
+                continue
+            if (a.name, b.name) in linked or (b.name, a.name) in linked:
+                continue
+            shared, smaller = 0.0, 1.0
+            for first in solids[a.name]:
+                for second in solids[b.name]:
+                    volume = boxes_overlap_volume(first, second)
+                    if volume > shared:
+                        shared, smaller = volume, min(box_volume(first), box_volume(second))
+            if shared > LEAST_SHARED_VOLUME:
+                confidence = float(min(1.0, shared / smaller)) if smaller > 0 else 1.0
+                relations.append(Relation(source=a.name, target=b.name, relation="proximal", confidence=confidence))
+    return relations

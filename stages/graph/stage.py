@@ -1,0 +1,104 @@
+"""Wiring of `graph`: panoptic map in, contact graph out (Han 2024, section 2.2)."""
+
+from __future__ import annotations
+
+from schemas.contact_graph import SCENE_NODE, ContactGraph, ContactGraphFile, GraphNode
+from schemas.panoptic_map import PanopticMap
+from schemas.scene_parts import Relation
+from stages.graph.entities import load_entities, suppose_floor
+from stages.graph.nodes import Entity
+from stages.graph.parameters import GraphParameters
+from stages.graph.refinement import proximal_relations, refined_box, register_hidden_planes
+from stages.graph.support import Candidate
+from stages.graph.tree import choose_parents, ranked_candidates
+from stages.kit.stage import Context
+
+
+def run(panoptic_map: PanopticMap, *, parameters: GraphParameters, context: Context) -> ContactGraph:
+    """Build the contact graph of a panoptic map: nodes, support tree, hidden planes, refined boxes, proximal pairs."""
+    with context.progress.step("nodes"):
+        entities, dropped = load_entities(panoptic_map, parameters, context)
+        for name, reason in dropped.items():
+            context.logger.info("%s is left out: %s", name, reason)
+        floor_note = "seen" if any(entity.class_name == "floor" for entity in entities) else "none"
+        if floor_note == "none":
+            floor = suppose_floor(panoptic_map, entities, parameters, context)
+            if floor is not None:
+                entities.append(floor)
+                floor_note = "supposed at z = 0"
+    with context.progress.step("supports"):
+        chosen = choose_parents(ranked_candidates(entities, parameters))
+        by_name, chosen = register_hidden_planes({entity.name: entity for entity in entities}, chosen)
+        entities = [by_name[entity.name] for entity in entities]
+    with context.progress.step("refinement"):
+        graph = contact_graph(entities, chosen, parameters)
+    graph.write(context.output / "graph.json")
+
+    supports = [link for link in graph.links if link.relation in ("supports", "contains")]
+    summary = {
+        "objects": sum(entity.node_type != "layout" for entity in entities),
+        "layout": sum(entity.node_type == "layout" for entity in entities),
+        "supports": sum(link.relation == "supports" for link in supports),
+        "contains": sum(link.relation == "contains" for link in supports),
+        "carried_on_wall": sum(link.relation == "carries_on_wall" for link in graph.links),
+        "proximal": sum(link.relation == "proximal" for link in graph.links),
+        "uncertain": sum(
+            link.confidence < parameters.minimum_score for link in graph.links if link.relation != "proximal"
+        ),
+        "hidden_planes": sum(plane.hidden for node in graph.nodes for plane in node.planes),
+        "floor": floor_note,
+        "dropped": len(dropped),
+    }
+    outcome = "ok" if summary["objects"] or summary["layout"] else "empty"
+    return ContactGraph(context.output, outcome=outcome, summary=summary)
+
+
+def contact_graph(
+    entities: list[Entity], chosen: dict[str, Candidate], parameters: GraphParameters
+) -> ContactGraphFile:
+    """Put nodes, tree and proximal relations into the file's form; boxes are refined on the way."""
+    boxes = {}
+    for entity in entities:
+        candidate = chosen.get(entity.name)
+        if candidate is None or candidate.patch is None:
+            boxes[entity.name] = entity.box
+        else:
+            boxes[entity.name] = refined_box(entity.box, candidate.height, parameters.maximum_extension)
+
+    nodes = [GraphNode(id=SCENE_NODE, instance=0, class_name=SCENE_NODE, node_type="scene")]
+    links = []
+    for entity in entities:
+        nodes.append(
+            GraphNode(
+                id=entity.name,
+                instance=entity.instance,
+                class_name=entity.class_name,
+                node_type=entity.node_type,
+                mesh=entity.mesh,
+                box=boxes[entity.name],
+                box_observed=entity.box,
+                planes=tuple(patch.plane for patch in entity.patches),
+                confidence=entity.confidence,
+            )
+        )
+        if entity.node_type == "layout":
+            links.append(Relation(source=SCENE_NODE, target=entity.name, relation="supports", confidence=1.0))
+        else:
+            links.append(relation_of(chosen[entity.name]))
+    linked = {(link.source, link.target) for link in links}
+    links += proximal_relations(entities, boxes, linked)
+    return ContactGraphFile(nodes=tuple(nodes), links=tuple(links), graph={"method": parameters.method})
+
+
+def relation_of(candidate: Candidate) -> Relation:
+    """Return the edge of a chosen relation."""
+    on_plane = candidate.patch is not None
+    return Relation(
+        source=candidate.parent,
+        target=candidate.child,
+        relation=candidate.relation,
+        confidence=float(min(1.0, max(0.0, candidate.score))),
+        plane=candidate.patch,
+        gap=float(candidate.gap) if on_plane or candidate.relation == "carries_on_wall" else None,
+        overlap=float(candidate.overlap) if on_plane else None,
+    )

@@ -1,0 +1,172 @@
+"""Panoptic maps made by hand: entities from meshes (whole, or as a camera above would see them) and perfect maps from
+the ground truth of a generated room."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import open3d as o3d
+import trimesh
+
+from schemas.ground_truth import GroundTruth
+from schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
+from schemas.vocabulary import load_vocabulary
+from stages.kit.geometry.point_clouds import sample_large_triangles, thin_to_grid
+
+TILE = 0.009
+"""Edge of the little squares that stand for seen surface [m]."""
+
+
+def box_mesh(low, high) -> trimesh.Trimesh:
+    """An axis-aligned box between two corners."""
+    low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+    return trimesh.creation.box(
+        extents=high - low, transform=trimesh.transformations.translation_matrix((low + high) / 2)
+    )
+
+
+def table_mesh(center=(0.0, 0.0), size=(1.2, 0.7, 0.75), yaw=0.0, base=0.0) -> trimesh.Trimesh:
+    """A table: 4 cm top and four legs."""
+    x, y, z = size
+    parts = [box_mesh((-x / 2, -y / 2, z - 0.04), (x / 2, y / 2, z))]
+    for sx in (-1, 1):
+        for sy in (-1, 1):
+            cx, cy = sx * (x / 2 - 0.04), sy * (y / 2 - 0.04)
+            parts.append(box_mesh((cx - 0.025, cy - 0.025, 0), (cx + 0.025, cy + 0.025, z - 0.04)))
+    return placed(trimesh.util.concatenate(parts), (*center, base), yaw)
+
+
+def chair_mesh(center=(0.0, 0.0), yaw=0.0) -> trimesh.Trimesh:
+    """A chair: seat at 0.45 m, back to 0.9 m, four legs; looks along -y."""
+    parts = [box_mesh((-0.22, -0.22, 0.42), (0.22, 0.22, 0.45)), box_mesh((-0.22, 0.19, 0.45), (0.22, 0.22, 0.9))]
+    for sx in (-1, 1):
+        for sy in (-1, 1):
+            parts.append(box_mesh((sx * 0.2 - 0.02, sy * 0.2 - 0.02, 0), (sx * 0.2 + 0.02, sy * 0.2 + 0.02, 0.42)))
+    return placed(trimesh.util.concatenate(parts), (*center, 0.0), yaw)
+
+
+def placed(mesh: trimesh.Trimesh, translation, yaw: float = 0.0) -> trimesh.Trimesh:
+    """A copy, turned about z and then shifted."""
+    copy = mesh.copy()
+    copy.apply_transform(trimesh.transformations.rotation_matrix(yaw, [0, 0, 1]))
+    copy.apply_translation(translation)
+    return copy
+
+
+def floor_mesh(low=(-3.0, -3.0), high=(3.0, 3.0), z=0.0) -> trimesh.Trimesh:
+    """A floor that looks up."""
+    vertices = [[low[0], low[1], z], [high[0], low[1], z], [high[0], high[1], z], [low[0], high[1], z]]
+    return trimesh.Trimesh(vertices, [[0, 1, 2], [0, 2, 3]], process=False)
+
+
+def tiles(points: np.ndarray, normals: np.ndarray) -> trimesh.Trimesh:
+    """A mesh of one little square for each oriented point (N, 3)."""
+    helper = np.where(np.abs(normals[:, :1]) < 0.9, [[1.0, 0, 0]], [[0, 1.0, 0]])
+    first = np.cross(normals, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(normals, first)
+    corners = [-first - second, first - second, first + second, -first + second]
+    vertices = np.stack([points + 0.5 * TILE * corner for corner in corners], axis=1).reshape(-1, 3)
+    base = 4 * np.arange(len(points))[:, None]
+    faces = np.concatenate([base + [0, 1, 2], base + [0, 2, 3]])
+    return trimesh.Trimesh(vertices, faces, process=False)
+
+
+def seen_surface(
+    meshes: dict[int, trimesh.Trimesh],
+    eyes: list[tuple[float, float, float]],
+    *,
+    noise: float = 0.0,
+    spacing: float = 0.01,
+    seed: int = 0,
+) -> dict[int, trimesh.Trimesh]:
+    """What cameras at `eyes` would see of each mesh, as tiles: points that face an eye with nothing in between."""
+    scene = o3d.t.geometry.RaycastingScene()
+    for mesh in meshes.values():
+        scene.add_triangles(
+            o3d.core.Tensor(np.asarray(mesh.vertices, dtype=np.float32)),
+            o3d.core.Tensor(np.asarray(mesh.faces, dtype=np.uint32)),
+        )
+    result = {}
+    for instance, mesh in meshes.items():
+        random = np.random.default_rng([seed, instance])
+        points, normals = sample_large_triangles(
+            np.asarray(mesh.vertices), np.asarray(mesh.faces), 0.5 * spacing, random
+        )
+        points, normals = thin_to_grid(points, normals, spacing)
+        seen = np.zeros(len(points), dtype=bool)
+        for eye in eyes:
+            ray = points - np.asarray(eye)
+            distance = np.linalg.norm(ray, axis=1)
+            direction = ray / distance[:, None]
+            facing = np.einsum("ij,ij->i", direction, normals) < -0.1
+            rays = np.concatenate([np.tile(eye, (len(points), 1)), direction], axis=1).astype(np.float32)
+            hit = scene.cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy()
+            seen |= facing & (hit > distance - 0.004)
+        points = points[seen] + noise * random.normal(size=(np.count_nonzero(seen), 1)) * normals[seen]
+        result[instance] = tiles(points, normals[seen])
+    return result
+
+
+def write_map(root: Path, meshes: dict[int, trimesh.Trimesh], classes: dict[int, str]) -> PanopticMap:
+    """Write a panoptic map artifact (without volume and counts) of the given entity meshes."""
+    root = Path(root)
+    (root / "entities").mkdir(parents=True, exist_ok=True)
+    entities = []
+    for instance, mesh in sorted(meshes.items()):
+        name = f"entities/{instance}.ply"
+        mesh.export(root / name)
+        entities.append(
+            Entity(
+                instance=instance,
+                class_name=classes[instance],
+                mesh=name,
+                vertices=len(mesh.vertices),
+                triangles=len(mesh.faces),
+                box_minimum=tuple(mesh.vertices.min(axis=0)) if len(mesh.vertices) else (0, 0, 0),
+                box_maximum=tuple(mesh.vertices.max(axis=0)) if len(mesh.vertices) else (0, 0, 0),
+                confidence=1.0,
+                observations=10,
+                segments=(instance,),
+            )
+        )
+    whole = [mesh for _, mesh in sorted(meshes.items())]
+    if whole:
+        merged = trimesh.util.concatenate(whole)
+        merged.export(root / "mesh.ply")
+        vocabulary = load_vocabulary()
+        owner = np.concatenate([np.full(len(m.vertices), k, dtype=np.int32) for k, m in sorted(meshes.items())])
+        class_id = np.array([vocabulary.by_name(classes[k]).id for k in owner], dtype=np.int32)
+        np.savez(root / "mesh_labels.npz", instance=owner, segment=owner, class_id=class_id)
+    EntitiesFile(
+        voxel_size=0.01,
+        truncation_distance=0.04,
+        frames_integrated=10,
+        segmentation="made by hand",
+        entities=tuple(entities),
+    ).write(root / "entities.json")
+    return PanopticMap(root)
+
+
+def perfect_map(truth: GroundTruth, root: Path) -> PanopticMap:
+    """The map that a perfect reconstruction of what was seen would give: true surface points with true labels.
+
+    Points come from visible.npz, their normals from the nearest triangle of mesh.ply.
+    """
+    with np.load(truth.path("visible.npz"), allow_pickle=False) as archive:
+        points, instance = archive["points"].astype(float), archive["instance"]
+    mesh = trimesh.load(truth.path("mesh.ply"), force="mesh", process=False)
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(
+        o3d.core.Tensor(np.asarray(mesh.vertices, dtype=np.float32)),
+        o3d.core.Tensor(np.asarray(mesh.faces, dtype=np.uint32)),
+    )
+    closest = scene.compute_closest_points(o3d.core.Tensor(points.astype(np.float32)))
+    normals = closest["primitive_normals"].numpy().astype(float)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    classes = {entry.instance: entry.class_name for entry in truth.truth.objects}
+    meshes = {
+        int(k): tiles(points[instance == k], normals[instance == k]) for k in np.unique(instance) if int(k) in classes
+    }
+    return write_map(root, meshes, {k: classes[k] for k in meshes})
