@@ -66,3 +66,16 @@ batch: setup ## Run a pipeline over a data set: make batch SPEC=batch.toml RUN=f
 .PHONY: clean
 clean: ## Remove everything that runs made (outputs/*)
 	find outputs -mindepth 1 -not -name README.md -delete
+
+# ---- experiments and measurements ---------------------------------------------------------------------------------
+
+# The folder that holds the real logs (see docs/DATA.md); none of it is part of the project.
+REAL_DATA ?= ../shared/data
+
+.PHONY: real bench
+real: setup ## The chain on real logs, one table; fails unless it finds what the pictures show (REAL_DATA=folder)
+	$(PYTHON) -m benchmarks.tables.real --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real
+
+bench: setup ## Speed beside named peers, medians (QUICK=1: fewer runs)
+	$(PYTHON) -m benchmarks.speed.fusion $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-fusion
+	$(PYTHON) -m benchmarks.speed.segmentation $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-segmentation
