@@ -15,6 +15,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile
+from schemas.errors import BadInput
 
 WRONG_SUPPORT_COST = 2
 EXPANSION_BUDGET = 200_000
@@ -39,7 +40,7 @@ class SupportTree:
 def support_tree(graph: ContactGraphFile, optional: frozenset[str] = frozenset()) -> SupportTree:
     """Return the parse tree of a contact graph in breadth-first order, children by id. Proximal edges are no part.
 
-    Nodes without a directed edge hang on the root.
+    Nodes without a directed edge hang on the root. Raises BadInput when the supports form a circle.
     """
     parent = {n.id: SCENE_NODE for n in graph.nodes if n.node_type != "scene"}
     for link in graph.links:
@@ -54,7 +55,7 @@ def support_tree(graph: ContactGraphFile, optional: frozenset[str] = frozenset()
         level = sorted(name for name, above in parent.items() if above in below)
     if len(ordered) != len(parent):
         circle = sorted(set(parent) - set(ordered))
-        raise ValueError(f"the supports form a circle: {', '.join(circle)}")
+        raise BadInput(f"contact graph: the supports form a circle: {', '.join(circle)}", hint="make the graph again")
     return SupportTree(
         tuple(ordered), tuple(classes[n] for n in ordered), tuple(parent[n] for n in ordered), optional
     )

@@ -1,0 +1,76 @@
+"""The plots of an evaluation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from schemas.contact_graph import ContactGraphFile
+from schemas.scene_parts import Box
+from stages.evaluate.graph_measures import GraphComparison, upright
+from stages.evaluate.truth import stuff_classes
+from stages.kit.geometry.boxes import footprint
+from stages.kit.measurement.palette import instance_color
+from stages.kit.measurement.panoptic_quality import ClassQuality
+from stages.kit.measurement.plots import plot_bars, plot_floor_plan, plot_graphs, plot_histograms
+
+MISSED, WRONG = "#b3261e", "#c2571a"
+
+
+def draw_quality(path: Path, qualities: Mapping[str, ClassQuality], label: str) -> None:
+    """PQ, SQ and RQ by class, stuff first."""
+    stuff = stuff_classes()
+    names = sorted(qualities, key=lambda name: (name not in stuff, name))
+    plot_bars(
+        path,
+        names,
+        {
+            "PQ": [qualities[n].pq for n in names],
+            "SQ": [qualities[n].sq if qualities[n].true_positives else None for n in names],
+            "RQ": [qualities[n].rq for n in names],
+        },
+        title=f"Panoptic quality by class\n{label}",
+        axis="share",
+    )
+
+
+def draw_surface(path: Path, to_truth: np.ndarray, to_map: np.ndarray, threshold: float, label: str) -> None:
+    """Distances between map and true surface, in millimetres."""
+    plot_histograms(
+        path,
+        {"map to true surface": 1000 * to_truth, "true surface to map": 1000 * to_map},
+        title=f"Distance between the map and the true surface\n{label}",
+        axis="distance [mm], last bin: all beyond",
+        limit=1000 * threshold * 1.2,
+        threshold=1000 * threshold,
+    )
+
+
+def draw_comparison(path: Path, comparison: GraphComparison, label: str) -> None:
+    """The true graph beside the reconstructed one; what is missing, extra or wrongly supported is coloured."""
+    distance = comparison.distance
+    true_marks = dict.fromkeys(distance.missing, MISSED) | {t: WRONG for t, _ in distance.wrong_supports}
+    predicted_marks = dict.fromkeys(distance.extra, MISSED) | {p: WRONG for _, p in distance.wrong_supports}
+    predicted_marks |= {p: WRONG for _, p in distance.substituted}
+    plot_graphs(
+        path,
+        {"true": comparison.true, "reconstructed": comparison.predicted},
+        marked={"true": true_marks, "reconstructed": predicted_marks},
+        title=f"Contact graphs, edit distance {distance.total} "
+        f"(red: missing or extra, orange: wrong support or class)\n{label}",
+    )
+
+
+def draw_graph(path: Path, graph: ContactGraphFile, label: str) -> None:
+    """The reconstructed graph alone."""
+    plot_graphs(path, {"reconstructed": graph}, marked={}, title=f"Contact graph\n{label}")
+
+
+def draw_floor_plan(
+    path: Path, boxes: list[tuple[str, int, Box]], paths: Mapping[str, np.ndarray], label: str
+) -> None:
+    """Boxes (name, instance, box) and camera paths from above."""
+    outlines = [(name, footprint(box), instance_color(instance)) for name, instance, box in boxes if upright(box)]
+    plot_floor_plan(path, outlines, paths, title=f"Camera path from above\n{label}")

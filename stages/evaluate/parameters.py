@@ -1,0 +1,78 @@
+"""Declaration of the step `evaluate`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import Field
+
+from schemas.errors import UsageError
+from schemas.kinds import (
+    CadScene,
+    ContactGraph,
+    Evaluation,
+    GroundTruth,
+    InteractiveScene,
+    PanopticMap,
+    Plan,
+    Segments,
+    Sequence,
+    Trajectory,
+)
+from stages.kit.stage import Optionally, Parameters, Stage
+
+
+class EvaluateParameters(Parameters):
+    """How predictions are matched with the truth."""
+
+    label_distance: float = Field(
+        0.05, gt=0, le=1, description="A true point takes the label of the nearest map vertex within this distance [m]"
+    )
+    match_iou: float = Field(
+        0.5, ge=0.5, lt=1, description="Segments and boxes match above this intersection over union"
+    )
+    node_match_iou: float = Field(
+        0.25, gt=0, lt=1, description="A graph node may be the same entity as a true one from this overlap (IoU) on"
+    )
+    mesh_threshold: float = Field(0.05, gt=0, description="Distance that counts as reconstructed [m]")
+    minimum_visible_points: int = Field(
+        40, ge=1, description="True entities with fewer visible points (1 cm grid) are optional: neither hit nor miss"
+    )
+    thesis_minimum_area: float = Field(
+        0.1, ge=0, description="The thesis's variant drops segments below this area (1000 points of 1 cm) [m^2]"
+    )
+    bootstrap_resamples: int = Field(2000, ge=100, le=100000, description="Resamples of the percentile bootstrap")
+    plots: bool = Field(True, description="Draw the plots")
+
+
+def check_inputs(parameters: EvaluateParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError when there is nothing to evaluate."""
+    if not set(inputs) - {"ground_truth"}:
+        raise UsageError(
+            "evaluate: there is nothing to evaluate", hint="give at least one of --panoptic-map, --contact-graph, ..."
+        )
+
+
+STAGE = Stage(
+    name="evaluate",
+    version=1,
+    summary="Measure a reconstruction against ground truth (PQ, AP, graph edit distance, ...), or count what is in it",
+    parameters=EvaluateParameters,
+    reads={
+        "ground_truth": Optionally(GroundTruth),
+        "sequence": Optionally(Sequence),
+        "trajectory": Optionally(Trajectory),
+        "segments": Optionally(Segments),
+        "panoptic_map": Optionally(PanopticMap),
+        "contact_graph": Optionally(ContactGraph),
+        "cad_scene": Optionally(CadScene),
+        "interactive_scene": Optionally(InteractiveScene),
+        "plan": Optionally(Plan),
+    },
+    writes=Evaluation,
+    libraries=("numpy", "scipy", "open3d", "trimesh", "matplotlib"),
+    check=check_inputs,
+    example="scenewright evaluate --ground-truth outputs/demo/ground_truth "
+    "--panoptic-map outputs/demo/panoptic_map --out outputs/demo/evaluation",
+)

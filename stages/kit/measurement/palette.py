@@ -1,0 +1,32 @@
+"""Colours that stay the same in every figure: one per instance, one per relation."""
+
+from __future__ import annotations
+
+import colorsys
+
+RELATION_COLORS = {
+    "supports": "#2f6fb3",
+    "contains": "#c2571a",
+    "carries_on_wall": "#7a4fb0",
+    "proximal": "#8c8c8c",
+}
+UNLABELLED = (0.62, 0.62, 0.60)
+GOLDEN_RATIO = 0.6180339887498949
+
+
+def instance_color(instance: int) -> tuple[float, float, float]:
+    """Return the colour (r, g, b) in [0, 1] of an instance label; grey for 0.
+
+    Hues advance by the golden ratio, so that neighbours in number differ; lightness takes three turns.
+    """
+    if instance <= 0:
+        return UNLABELLED
+    hue = (0.08 + instance * GOLDEN_RATIO) % 1.0
+    lightness = (0.52, 0.64, 0.44)[instance % 3]
+    saturation = (0.62, 0.55, 0.72)[(instance // 3) % 3]
+    return colorsys.hls_to_rgb(hue, lightness, saturation)
+
+
+def hex_color(color: tuple[float, float, float]) -> str:
+    """Return `#rrggbb` of (r, g, b) in [0, 1]."""
+    return "#" + "".join(f"{round(255 * min(max(c, 0.0), 1.0)):02x}" for c in color)

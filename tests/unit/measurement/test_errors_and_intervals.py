@@ -1,0 +1,163 @@
+"""Poses, trajectories, surfaces, labels by neighbour, bootstrap, tables, layout, plots."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from stages.kit.measurement.bootstrap import bootstrap_interval
+from stages.kit.measurement.mesh_distance import distances_to_mesh, surface_agreement
+from stages.kit.measurement.palette import hex_color, instance_color
+from stages.kit.measurement.plots import plot_bars, plot_graphs
+from stages.kit.measurement.point_labels import nearest_labels
+from stages.kit.measurement.pose_error import (
+    align_rigidly,
+    associate,
+    position_error,
+    trajectory_error,
+    yaw_error,
+    yaw_of,
+)
+from stages.kit.measurement.tables import Table, as_csv, as_markdown
+from stages.kit.measurement.tree_layout import tree_layout
+
+
+def test_yaw_error():
+    assert yaw_error(np.radians(179), np.radians(-179)) == pytest.approx(np.radians(2))
+    assert yaw_error(0.0, np.pi) == pytest.approx(np.pi)
+    assert yaw_error(0.1, 0.1 + np.pi, period=np.pi) == pytest.approx(0.0, abs=1e-12)
+    assert yaw_of(Rotation.from_euler("z", 0.7).as_matrix()) == pytest.approx(0.7)
+
+
+@given(st.floats(-20, 20), st.floats(-20, 20))
+def test_yaw_error_is_the_angle_between_directions(a, b):
+    expected = np.arccos(np.clip(np.cos(a) * np.cos(b) + np.sin(a) * np.sin(b), -1, 1))
+    assert yaw_error(a, b) == pytest.approx(expected, abs=1e-6)
+
+
+def test_position_error():
+    assert position_error(np.zeros(3), np.array([3.0, 4.0, 12.0])) == (13.0, 5.0)
+
+
+def test_alignment_recovers_a_rigid_motion():
+    random = np.random.default_rng(0)
+    points = random.normal(size=(20, 3))
+    rotation = Rotation.from_rotvec([0.3, -0.8, 1.1]).as_matrix()
+    transform = align_rigidly(points, points @ rotation.T + [1.0, 2.0, 3.0])
+    assert transform[:3, :3] == pytest.approx(rotation)
+    assert transform[:3, 3] == pytest.approx([1.0, 2.0, 3.0])
+    with pytest.raises(ValueError, match="three points"):
+        align_rigidly(points[:2], points[:2])
+
+
+def test_trajectory_error_sees_an_offset_that_alignment_removes():
+    random = np.random.default_rng(1)
+    times = np.arange(10) * 0.1
+    truth = np.tile(np.eye(4), (10, 1, 1))
+    truth[:, :3, 3] = random.normal(size=(10, 3))
+    moved = truth.copy()
+    moved[:, 0, 3] += 0.3
+    error = trajectory_error(times, truth, times + 0.005, moved)
+    assert error.rmse == pytest.approx(0.3)
+    assert error.rmse_aligned == pytest.approx(0.0, abs=1e-9)
+    assert (error.associated, error.rotation_mean) == (10, pytest.approx(0.0, abs=1e-6))
+    assert trajectory_error(times, truth, times + 50.0, moved) is None
+    turned = truth.copy()
+    turned[:, :3, :3] = Rotation.from_euler("z", 0.2).as_matrix()
+    assert trajectory_error(times, truth, times, turned).rotation_mean == pytest.approx(0.2)
+
+
+def test_association_takes_the_nearest_within_tolerance():
+    true_rows, rows = associate(np.array([0.0, 0.1, 0.2]), np.array([0.01, 0.09, 0.15, 0.5]))
+    assert true_rows.tolist() == [0, 1]
+    assert rows.tolist() == [0, 1]
+
+
+def test_distance_to_a_triangle():
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype=float)
+    points = np.array([[0.2, 0.2, 0.5], [-3.0, 0, 0], [0.25, 0.25, 0.0]])
+    assert distances_to_mesh(points, vertices, np.array([[0, 1, 2]])) == pytest.approx([0.5, 3.0, 0.0], abs=1e-6)
+    assert np.isinf(distances_to_mesh(points, vertices, np.zeros((0, 3)))).all()
+    assert distances_to_mesh(np.zeros((0, 3)), vertices, np.array([[0, 1, 2]])).shape == (0,)
+
+
+def test_surface_agreement():
+    agreement = surface_agreement(np.array([0.0, 0.02, 0.2, 0.02]), np.array([0.01, np.inf]), threshold=0.05)
+    assert (agreement.precision, agreement.recall) == (0.75, 0.5)
+    assert agreement.fscore == pytest.approx(2 * 0.75 * 0.5 / 1.25)
+    assert agreement.accuracy_mean == pytest.approx(0.06)
+    assert agreement.completeness_mean == pytest.approx((0.01 + 0.5) / 2)
+    assert surface_agreement(np.zeros(0), np.zeros(3), 0.05) is None
+
+
+def test_nearest_labels():
+    vertices = np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
+    labels = np.array([5, 0, 7])
+    points = np.array([[0.01, 0, 0], [1.01, 0, 0], [2.2, 0, 0], [9.0, 0, 0]])
+    assert nearest_labels(points, vertices, labels, 0.05).tolist() == [5, 0, 0, 0]
+    assert nearest_labels(points, vertices, labels).tolist() == [5, 0, 7, 7]
+    assert nearest_labels(points, np.zeros((0, 3)), np.zeros(0), 0.05).tolist() == [0, 0, 0, 0]
+
+
+def test_bootstrap_covers_the_truth():
+    """The 90 % interval of a mean of 40 values holds the true mean in about nine of ten experiments."""
+    random = np.random.default_rng(7)
+    held = 0
+    for _ in range(200):
+        interval = bootstrap_interval(random.exponential(size=40), random, level=0.9, resamples=300)
+        held += interval.low <= 1.0 <= interval.high
+    assert 0.80 <= held / 200 <= 0.95
+
+
+def test_bootstrap_is_repeatable_and_handles_little_data():
+    values = np.array([1.0, 2.0, 5.0])
+    first = bootstrap_interval(values, np.random.default_rng(3))
+    assert first == bootstrap_interval(values, np.random.default_rng(3))
+    assert first.low <= first.value == pytest.approx(8 / 3) <= first.high
+    assert bootstrap_interval(np.zeros(0), np.random.default_rng(0)) is None
+    middle = bootstrap_interval(values, np.random.default_rng(3), statistic=np.median)
+    assert middle.value == 2.0
+
+
+def test_tables():
+    table = Table("t", "A table", ("name", "value"), (("a|b", 0.12345), ("c,d", None)), "note")
+    assert list(csv.reader(io.StringIO(as_csv(table)))) == [["name", "value"], ["a|b", "0.12345"], ["c,d", ""]]
+    markdown = as_markdown(table)
+    assert "| a\\|b | 0.123 |" in markdown
+    assert "| c,d | – |" in markdown
+    assert markdown.endswith("note\n")
+
+
+def test_tree_layout_puts_parents_at_the_middle_of_their_children():
+    layout = tree_layout({"scene": None, "floor": "scene", "a": "floor", "b": "floor", "c": "floor", "wall": "scene"})
+    assert [layout[n][1] for n in ("a", "b", "c")] == [0.0, 1.0, 2.0]
+    assert layout["floor"] == (1.0, 1.0)
+    assert len({position for position in layout.values()}) == len(layout)
+    with pytest.raises(ValueError, match="circle"):
+        tree_layout({"a": "b", "b": "a"})
+
+
+def test_instance_colors_differ():
+    colors = {hex_color(instance_color(k)) for k in range(1, 41)}
+    assert len(colors) == 40
+    assert hex_color(instance_color(0)) == "#9e9e99"
+
+
+def test_plots_are_the_same_bytes_every_time(tmp_path):
+    for name in ("a.png", "b.png"):
+        plot_bars(tmp_path / name, ["chair", "cup"], {"PQ": [0.5, None]}, title="t", axis="x")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert b"matplotlib" not in (tmp_path / "a.png").read_bytes().lower()
+
+
+def test_plot_of_graphs_without_nodes(tmp_path):
+    from schemas.contact_graph import ContactGraphFile
+
+    plot_graphs(tmp_path / "g.png", {"empty": ContactGraphFile(nodes=(), links=())}, marked={}, title="nothing")
+    assert (tmp_path / "g.png").stat().st_size > 500
