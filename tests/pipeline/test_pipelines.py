@@ -1,0 +1,130 @@
+"""Pipelines: checked before anything runs; make and `scenewright run` execute the same commands."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from schemas.errors import UsageError
+from stages.kit.running.batch import read_batch, worst_exit_code
+from stages.kit.running.chain import run_pipeline
+from stages.kit.running.make_rules import makefile_for
+from stages.kit.running.pipelines import (
+    PIPELINES_FOLDER,
+    pipeline_path,
+    read_pipeline,
+    resolve_variables,
+    step_arguments,
+)
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+NAMES = sorted(path.stem for path in PIPELINES_FOLDER.glob("*.toml"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_generated_makefiles_are_current(name: str) -> None:
+    text = makefile_for(read_pipeline(pipeline_path(name)))
+    assert (PIPELINES_FOLDER / f"{name}.mk").read_text() == text, "stale: make rules"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_make_runs_the_same_commands_in_the_same_order(name: str, tmp_path: Path) -> None:
+    """`make -n` prints exactly what `scenewright run` would execute."""
+    pipeline = read_pipeline(pipeline_path(name))
+    given = {
+        variable: "value"
+        for variable, declared in pipeline.variables.items()
+        if declared.default is None and not declared.optional
+    }
+    log = tmp_path / "room log"
+    log.write_text("x")
+    given = {variable: (str(log) if variable == "log" else value) for variable, value in given.items()}
+    values = resolve_variables(pipeline, given)
+    expected = [step_arguments(step, f"{tmp_path}/outputs/run", values) for step in pipeline.step]
+    if "log" in given:  # make cannot have blanks in prerequisites: the rule has to survive a plain path
+        log = tmp_path / "room"
+        log.write_text("x")
+        given["log"] = str(log)
+        expected = [
+            step_arguments(step, f"{tmp_path}/outputs/run", resolve_variables(pipeline, given)) for step in pipeline.step
+        ]
+    done = subprocess.run(
+        ["make", "-n", "-f", f"data/pipelines/{name}.mk", "PYTHON=python", f"OUTPUTS={tmp_path}/outputs", "RUN=run"]
+        + [f"{variable.upper()}={value}" for variable, value in given.items()],
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    commands = [shlex.split(line)[3:] for line in done.stdout.splitlines() if line.startswith("python -m cli")]
+    assert commands == expected
+
+
+BASE = """
+name = "p"
+summary = "s"
+[variables.log]
+description = "a log"
+[[step]]
+name = "sequence"
+stage = "ingest"
+inputs = { log = "$log" }
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        (BASE.replace("ingest", "nonsense"), "no step"),
+        (BASE.replace("$log", "$nonsense"), "not declared"),
+        (BASE.replace("$log", "segments"), "no earlier step"),
+        (BASE.replace("log = ", "nonsense = "), "no input"),
+        (BASE.replace("inputs = ", "parameters = { nonsense = 1 }\ninputs = "), "no parameter"),
+        (BASE.replace('inputs = { log = "$log" }', ""), "missing"),
+        (BASE + BASE[BASE.index("[[step]]") :], "two steps"),
+        (BASE.replace('name = "sequence"', 'name = "../x"'), "not a name"),
+        (BASE.replace("summary", "nonsense"), "nonsense"),
+        ("not toml", "TOML"),
+    ],
+)
+def test_wrong_pipelines_are_refused_before_anything_runs(tmp_path: Path, text: str, match: str) -> None:
+    path = tmp_path / "p.toml"
+    path.write_text(text)
+    with pytest.raises(UsageError, match=match):
+        read_pipeline(path)
+
+
+def test_a_chain_stops_at_the_first_failure(tmp_path: Path) -> None:
+    calls: list[list[str]] = []
+
+    def execute(arguments: list[str]) -> tuple[int, str]:
+        calls.append(arguments)
+        return (4, '{"status": "made", "outcome": "empty"}') if "segment" in arguments else (0, "{}")
+
+    pipeline = read_pipeline(pipeline_path("reconstruct"))
+    reports = run_pipeline(pipeline, tmp_path, {"log": "x"}, execute=execute)
+    assert [report.name for report in reports] == ["cad_library", "sequence", "segments"]
+    assert reports[-1].exit_code == 4 and len(calls) == 3
+    assert "--weights" not in calls[2]
+
+
+def test_batch_file_is_checked_and_gives_the_gravest_code(tmp_path: Path) -> None:
+    path = tmp_path / "b.toml"
+    path.write_text('pipeline = "reconstruct"\n[[scene]]\nname = "a"\nset = { log = "x" }\n[[scene]]\nname = "b"\n')
+    with pytest.raises(UsageError, match="needs log"):
+        read_batch(path)
+    path.write_text('pipeline = "reconstruct"\nset = { log = "x" }\n[[scene]]\nname = "a"\n[[scene]]\nname = "a"\n')
+    with pytest.raises(UsageError, match="unique"):
+        read_batch(path)
+    assert worst_exit_code([0, 4, 3, 0]) == 3
+    assert worst_exit_code([0, 4, 1]) == 1
+    assert worst_exit_code([]) == 0
+
+
+def test_no_target_of_make_deletes_on_error() -> None:
+    for path in [REPOSITORY / "Makefile", *PIPELINES_FOLDER.glob("*.mk")]:
+        assert not re.search(r"^\.DELETE_ON_ERROR", path.read_text(), re.MULTILINE)
