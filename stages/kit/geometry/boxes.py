@@ -78,12 +78,13 @@ def minimum_rectangle(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float
 
 def convex_hull(points: np.ndarray) -> np.ndarray:
     """Return the hull vertices (K, 2) of points (N, 2), counter-clockwise; K is 1 or 2 for degenerate input."""
-    points = np.unique(np.asarray(points, dtype=float).reshape(-1, 2), axis=0)
+    points = np.asarray(points, dtype=float).reshape(-1, 2)
     if len(points) >= 3:
         try:
             return points[ConvexHull(points).vertices]
-        except QhullError:
+        except QhullError:  # all on one line, or in one point
             pass
+    points = np.unique(points, axis=0)
     if len(points) <= 2:
         return points
     # Collinear: the two ends along the direction of largest spread.
