@@ -74,6 +74,7 @@ def _source(log: McapLog, parameters: IngestParameters, rule: str) -> LogSource:
         notes.append(f"{unused} depth images without a colour image of their own were left")
     metadata = dict(log.metadata)
     stated = metadata.get(WORLD_METADATA, {})
+    registered = registered and stated.get("registered") != "no"
     given = stated.get("world_up") == "z" and stated.get("world_frame") == world
     return LogSource(
         format="foxglove-mcap",

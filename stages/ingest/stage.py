@@ -81,6 +81,7 @@ def _write_frames(
         source.camera,
         labels=source.has_labels,
         world_up="unknown" if gravity.method == "none" else "z",
+        registered=source.registered,
         label_table=source.label_table,
     ) as writer:
         for entry in context.progress.track(entries, total=len(entries), description="frames"):

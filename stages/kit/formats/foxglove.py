@@ -62,7 +62,8 @@ def decode_color(data: bytes) -> np.ndarray | None:
 
 def depth_to_millimetres(depth: np.ndarray) -> np.ndarray:
     """Return uint16 millimetres of float metres; what is not in (0, 65.534] m becomes 0 = invalid."""
-    millimetres = np.rint(np.asarray(depth, dtype=np.float32) * np.float32(1000))
+    with np.errstate(over="ignore", invalid="ignore"):
+        millimetres = np.rint(np.asarray(depth, dtype=np.float32) * np.float32(1000))
     valid = (millimetres > 0) & (millimetres < 65535)  # NaN compares false
     return np.where(valid, millimetres, np.float32(0)).astype("<u2")
 

@@ -64,7 +64,8 @@ class FrameWriter:
     """Writes frames in time order. Used as a context manager; a file that was left by an exception stays unfinished.
 
     `labels` announces a label stream. `world_up="z"` records that z of the poses' world is up (what our generated
-    logs know); `"unknown"` records that it is not known. `label_table` says what the labels mean.
+    logs know); `"unknown"` records that it is not known. `registered` records whether colour and depth pixels see the
+    same ray. `label_table` says what the labels mean.
     """
 
     def __init__(
@@ -74,6 +75,7 @@ class FrameWriter:
         *,
         labels: bool = False,
         world_up: Literal["z", "unknown"] = "z",
+        registered: bool = True,
         label_table: Iterable[LabelEntry] = (),
     ) -> None:
         self.camera = camera
@@ -95,7 +97,8 @@ class FrameWriter:
                     data=build_file_descriptor_set(kind).SerializeToString(deterministic=True),
                 )
             self._channels[topic] = self._writer.register_channel(topic, "protobuf", schemas[kind])
-        self._writer.add_metadata(WORLD_METADATA, {"world_frame": WORLD_FRAME, "world_up": world_up})
+        known = {"world_frame": WORLD_FRAME, "world_up": world_up, "registered": "yes" if registered else "no"}
+        self._writer.add_metadata(WORLD_METADATA, known)
         table = {str(entry.instance): entry.class_name for entry in sorted(label_table, key=lambda e: e.instance)}
         if table:
             self._writer.add_metadata(LABELS_METADATA, table)

@@ -43,6 +43,9 @@ def read_tum(path: Path) -> tuple[np.ndarray, np.ndarray]:
     rows = number_rows(path, 8)
     times = np.array([row[0] for _, row in rows])
     poses = [transform_from_numbers(row[1:], f"{path}: line {line}") for line, row in rows]
+    endless = np.flatnonzero(~np.isfinite(times))
+    if len(endless):
+        raise BadInput(f"{path}: line {rows[int(endless[0])][0]}: time is not finite")
     backward = np.flatnonzero(np.diff(times) <= 0)
     if len(backward):
         line = rows[int(backward[0]) + 1][0]

@@ -1,0 +1,105 @@
+"""Trajectories: round trips, and garbage that is refused as bad input and nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from schemas.errors import BadInput
+from stages.kit.formats.trajectories import (
+    number_rows,
+    read_matrix,
+    read_open3d_log,
+    read_tum,
+    write_open3d_log,
+    write_tum,
+)
+
+FILES = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@st.composite
+def trajectories(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
+    count = draw(st.integers(0, 6))
+    seed = draw(st.integers(0, 2**31))
+    random = np.random.default_rng(seed)
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    if count:
+        poses[:, :3, :3] = Rotation.random(count, random_state=seed).as_matrix()
+        poses[:, :3, 3] = random.uniform(-100, 100, (count, 3))
+    gaps = draw(st.lists(st.floats(1e-3, 1e3), min_size=count, max_size=count))
+    return np.cumsum(gaps), poses
+
+
+@FILES
+@given(trajectories())
+def test_tum_round_trip(tmp_path: Path, trajectory: tuple[np.ndarray, np.ndarray]) -> None:
+    times, poses = trajectory
+    write_tum(tmp_path / "t.tum", times, poses)
+    read_times, read_poses = read_tum(tmp_path / "t.tum")
+    np.testing.assert_allclose(read_times, times, atol=1e-9)
+    np.testing.assert_allclose(read_poses, poses, atol=2e-9)
+
+
+@FILES
+@given(trajectories())
+def test_open3d_log_round_trip_is_exact(tmp_path: Path, trajectory: tuple[np.ndarray, np.ndarray]) -> None:
+    write_open3d_log(tmp_path / "t.log", trajectory[1])
+    read = read_open3d_log(tmp_path / "t.log")
+    assert len(read) == len(trajectory[1])
+    for expected, pose in zip(trajectory[1], read, strict=True):
+        np.testing.assert_array_equal(pose, expected)
+
+
+@FILES
+@given(st.one_of(st.binary(max_size=200), st.text("0123456789.-+eEnaif #\n\t", max_size=300).map(str.encode)))
+def test_garbage_is_bad_input_or_numbers(tmp_path: Path, garbage: bytes) -> None:
+    path = tmp_path / "garbage.txt"
+    path.write_bytes(garbage)
+    for parse in (read_tum, read_open3d_log, read_matrix, lambda p: number_rows(p, 7)):
+        try:
+            parse(path)
+        except BadInput as error:
+            assert "garbage.txt" in str(error)
+
+
+def test_tum_columns_are_time_translation_quaternion_xyzw(tmp_path: Path) -> None:
+    path = tmp_path / "t.tum"
+    path.write_text("# comment\n\n1.5 1 2 3 0 0 0.70710678 0.70710678\n")
+    times, poses = read_tum(path)
+    assert times.tolist() == [1.5]
+    np.testing.assert_allclose(poses[0], [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]], atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("1 2 3", "3 columns, expected 8"),
+        ("1 0 0 0 0 0 0 0", "norm 0"),
+        ("1 0 0 0 0 0 0 2", "norm 2"),
+        ("1 0 0 0 0 0 0 one", "'one' is not a number"),
+        ("nan 0 0 0 0 0 0 1", "time is not finite"),
+        ("1 nan 0 0 0 0 0 1", "not finite"),
+        ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1", "line 2: time 1.0 s is not after"),
+        ("1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1", "line 2"),
+    ],
+)
+def test_wrong_tum_lines_are_named(tmp_path: Path, text: str, complaint: str) -> None:
+    (tmp_path / "t.tum").write_text(text)
+    with pytest.raises(BadInput, match=complaint):
+        read_tum(tmp_path / "t.tum")
+
+
+def test_missing_file_is_bad_input(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="missing"):
+        read_tum(tmp_path / "none.tum")
+
+
+def test_writer_refuses_a_mirrored_pose(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="not rigid"):
+        write_tum(tmp_path / "t", np.array([0.0]), np.diag([1.0, 1.0, -1.0, 1.0])[None])
