@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import trimesh
 
+from schemas.base import as_transform
 from schemas.cad_library import CadModel
-from schemas.contact_graph import ContactGraphFile
-from schemas.interactive_scene import InteractiveSceneFile
+from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from schemas.errors import BadInput
+from schemas.interactive_scene import InteractiveSceneFile, SceneBody
 from schemas.scene_parts import Box
+from schemas.vocabulary import load_vocabulary
+from stages.kit.formats.mjcf_file import write_mjcf
+from stages.kit.formats.scene_links import BodyLinks, box_links, layout_links, mesh_links, model_links
+from stages.kit.formats.urdf_check import NAME, require_sound
+from stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, write_urdf
+from stages.kit.geometry.layout_slabs import Slab, level_slab, surface_height, wall_slabs
+from stages.kit.geometry.transforms import inverse, is_rigid
+
+WORLD = "world"
+THIN_LAYOUT = ("door", "window", "curtain")
 
 
 @dataclass(frozen=True)
@@ -41,5 +53,169 @@ class BundleBody:
 
 
 def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraphFile) -> InteractiveSceneFile:
-    """Write kind interactive_scene into `root` and return what stands in scene.json. Raises BadInput."""
-    raise NotImplementedError("being written")
+    """Write kind interactive_scene into `root` and return what stands in scene.json.
+
+    `scene.urdf`: every body hangs on its parent, on a floating joint when it is movable, else on a fixed one; joints
+    inside articulated models are kept. `static.urdf`: what is not movable, fixed to the nearest ancestor that is
+    static too. `bodies/<name>.urdf`: one movable body each. Every file is checked before this returns.
+
+    Raises BadInput for names that are not unique ASCII, missing or cyclic parents, poses that are not rigid, scales
+    that are not positive, and for models whose files are broken.
+    """
+    ordered = _parents_first(_checked(bodies))
+    (root / "bodies").mkdir(parents=True, exist_ok=True)
+    (root / "meshes").mkdir(exist_ok=True)
+    center = _room_center(bodies)
+    nodes = {node.id: node for node in graph.nodes}
+    links = {body.name: _links(root, body, nodes.get(body.name), graph, center) for body in ordered}
+    by_name = {body.name: body for body in ordered}
+    static = [body for body in ordered if not body.movable]
+    combined = _tree("scene", ordered, links, {body.name: body.parent for body in ordered}, by_name)
+    anchors = {body.name: _static_ancestor(body, by_name) for body in static}
+    write_urdf(root / "scene.urdf", combined)
+    write_urdf(root / "static.urdf", _tree("static", static, links, anchors, by_name))
+    checked = [root / "scene.urdf", root / "static.urdf"]
+    for body in ordered:
+        if body.movable:
+            own = links[body.name]
+            file = root / "bodies" / f"{body.name}.urdf"
+            write_urdf(file, Urdf(body.name, tuple(_from_subfolder(link) for link in own.links), own.joints))
+            checked.append(file)
+    for file in checked:
+        require_sound(file, root)
+    values = {name: value for own in links.values() for name, value in (own.joint_values or {}).items()}
+    write_mjcf(root / "scene.mjcf.xml", combined, values)
+    scene = InteractiveSceneFile(bodies=tuple(_record(body, links[body.name]) for body in ordered))
+    scene.write(root / "scene.json")
+    graph.write(root / "graph.json")
+    return scene
+
+
+def _checked(bodies: list[BundleBody]) -> list[BundleBody]:
+    seen: set[str] = set()
+    for body in bodies:
+        if not NAME.fullmatch(body.name) or body.name == WORLD:
+            raise BadInput(f"body name {body.name!r} is not usable in URDF", hint="use ASCII letters, digits and _")
+        if body.name in seen:
+            raise BadInput(f"two bodies are called {body.name!r}")
+        seen.add(body.name)
+        if not is_rigid(body.world_from_body):
+            raise BadInput(f"body {body.name}: pose is not a rigid transform")
+        if not (np.isfinite(body.scale) and body.scale > 0):
+            raise BadInput(f"body {body.name}: scale is {body.scale}")
+        if body.mass is not None and not (np.isfinite(body.mass) and body.mass > 0):
+            raise BadInput(f"body {body.name}: mass is {body.mass} kg")
+        if (body.model is None) != (body.model_folder is None):
+            raise BadInput(f"body {body.name}: a CAD model needs both its record and its folder")
+    return bodies
+
+
+def _parents_first(bodies: list[BundleBody]) -> list[BundleBody]:
+    """Return the bodies in the order given, except that parents precede their children."""
+    by_name = {body.name: body for body in bodies}
+    ordered: dict[str, BundleBody] = {}
+
+    def place(body: BundleBody, path: tuple[str, ...]) -> None:
+        if body.name in ordered:
+            return
+        if body.name in path:
+            raise BadInput(f"bodies carry each other in a circle: {' -> '.join((*path, body.name))}")
+        if body.parent not in (None, SCENE_NODE):
+            if body.parent not in by_name:
+                raise BadInput(f"body {body.name}: parent {body.parent!r} does not exist")
+            place(by_name[body.parent], (*path, body.name))
+        ordered[body.name] = body
+
+    for body in bodies:
+        place(body, ())
+    return list(ordered.values())
+
+
+def _room_center(bodies: list[BundleBody]) -> np.ndarray:
+    """Return the middle (3,) of all boxes: the side of a wall on which the room is."""
+    if not bodies:
+        return np.zeros(3)
+    centers = np.array([body.box.center for body in bodies])
+    return 0.5 * (centers.min(axis=0) + centers.max(axis=0))
+
+
+def _links(root: Path, body: BundleBody, node: GraphNode | None, graph: ContactGraphFile, center: np.ndarray) -> BodyLinks:
+    if body.model is not None and body.model_folder is not None:
+        links = model_links(root, body.name, body.model, body.model_folder, body.scale, body.joint_values)
+    elif load_vocabulary().by_name(body.class_name).is_layout:
+        return layout_links(root, body.name, body.world_from_body, body.mesh, _slabs(body, node, graph, center))
+    elif body.mesh is not None and len(body.mesh.faces):
+        links = mesh_links(root, body.name, body.mesh)
+    else:
+        links = box_links(body.name, body.world_from_body, body.box)
+    return links if body.mass is None else links.with_mass(body.mass)
+
+
+def _slabs(body: BundleBody, node: GraphNode | None, graph: ContactGraphFile, center: np.ndarray) -> list[Slab]:
+    planes = () if node is None else node.planes
+    in_world = None
+    if body.mesh is not None and len(body.mesh.faces):
+        in_world = body.mesh.copy()
+        in_world.apply_transform(body.world_from_body)
+    if body.class_name in ("floor", "ceiling"):
+        carrying = [link.plane for link in graph.links if link.source == body.name and link.plane is not None]
+        used = [plane for k, plane in enumerate(planes) if k in carrying]
+        upwards = body.class_name == "floor"
+        height = surface_height(used or planes, in_world, body.box, upwards=upwards)
+        return [level_slab(body.box, height, downwards=upwards)]
+    thickness = 0.05 if body.class_name in THIN_LAYOUT else 0.1
+    return wall_slabs(planes, in_world, body.box, center, thickness)
+
+
+def _static_ancestor(body: BundleBody, by_name: dict[str, BundleBody]) -> str | None:
+    parent = body.parent
+    while parent not in (None, SCENE_NODE) and by_name[parent].movable:
+        parent = by_name[parent].parent
+    return parent
+
+
+def _tree(
+    name: str, bodies: list[BundleBody], links: dict[str, BodyLinks], parents: dict[str, str | None], by_name: dict[str, BundleBody]
+) -> Urdf:
+    """Return the kinematic tree of bodies under the link `world`; `parents`: body -> body that it hangs on, or None."""
+    all_links, joints = [Link(WORLD)], []
+    for body in bodies:
+        parent = parents[body.name]
+        world_from_parent = np.eye(4)
+        if parent in (None, SCENE_NODE):
+            parent = WORLD
+        else:
+            world_from_parent = by_name[parent].world_from_body
+        own = links[body.name]
+        joints.append(
+            UrdfJoint(
+                name=f"{body.name}__support", type="floating" if body.movable else "fixed", parent=parent, child=body.name,
+                parent_from_child=inverse(world_from_parent) @ body.world_from_body,
+            )
+        )  # fmt: skip
+        all_links.extend(own.links)
+        joints.extend(own.joints)
+    return Urdf(name, tuple(all_links), tuple(joints))
+
+
+def _from_subfolder(link: Link) -> Link:
+    """Return the link with mesh paths as seen from bodies/."""
+
+    def moved(shape: Shape) -> Shape:
+        return shape if shape.mesh is None else replace(shape, mesh=f"../{shape.mesh}")
+
+    return replace(
+        link, visuals=tuple(moved(shape) for shape in link.visuals), collisions=tuple(moved(shape) for shape in link.collisions)
+    )
+
+
+def _record(body: BundleBody, own: BodyLinks) -> SceneBody:
+    model = body.model
+    width = None if model is None or model.grasp_width is None else model.grasp_width * body.scale
+    return SceneBody(
+        name=body.name, class_name=body.class_name, movable=body.movable,
+        file=f"bodies/{body.name}.urdf" if body.movable else None,
+        parent=None if body.parent == SCENE_NODE else body.parent, relation=body.relation,
+        world_from_body=as_transform(body.world_from_body), joints=own.joint_records, joint_values=own.joint_values or {},
+        box=body.box, mass=own.mass, contains=model.contains if model is not None else False, grasp_width=width,
+    )  # fmt: skip

@@ -27,9 +27,10 @@ class Problem:
         return f"{self.element}: {self.message}"
 
 
-def check_urdf(path: Path) -> list[Problem]:
+def check_urdf(path: Path, root: Path | None = None) -> list[Problem]:
     """Return what is wrong with a URDF; an empty list when nothing is.
 
+    Mesh files must lie inside `root` (the folder of the URDF when None).
     Kinds: `unreadable`, `name`, `duplicate`, `dangling`, `cycle`, `roots`, `not_finite`, `axis`, `limits`,
     `joint_type`, `mass`, `inertia`, `no_inertia`, `mesh_missing`, `mesh_outside`, `geometry`.
     """
@@ -45,15 +46,15 @@ def check_urdf(path: Path) -> list[Problem]:
     for link in urdf.links:
         problems += _check_inertia(link, must_have=link.name in moving)
         for shape in (*link.visuals, *link.collisions):
-            problems += _check_shape(link.name, shape, path.parent)
+            problems += _check_shape(link.name, shape, path.parent, root or path.parent)
     for joint in urdf.joints:
         problems += _check_joint(joint)
     return problems
 
 
-def require_sound(path: Path) -> None:
+def require_sound(path: Path, root: Path | None = None) -> None:
     """Raise BadInput with the first problem of a URDF, and how many there are."""
-    problems = check_urdf(path)
+    problems = check_urdf(path, root)
     if problems:
         more = f", and {len(problems) - 1} more" if len(problems) > 1 else ""
         raise BadInput(f"{path}: {problems[0]}{more}", hint="the model or scene behind it is broken")
@@ -112,7 +113,7 @@ def _check_inertia(link: Link, must_have: bool) -> list[Problem]:
     return problems
 
 
-def _check_shape(link: str, shape: Shape, folder: Path) -> list[Problem]:
+def _check_shape(link: str, shape: Shape, folder: Path, root: Path) -> list[Problem]:
     element = f"link {link!r}"
     if not np.isfinite(shape.link_from_shape).all() or not np.isfinite(shape.scale):
         return [Problem("not_finite", element, "geometry origin or scale holds NaN or infinity")]
@@ -123,10 +124,10 @@ def _check_shape(link: str, shape: Shape, folder: Path) -> list[Problem]:
     name = shape.mesh or ""
     if shape.scale <= 0:
         return [Problem("geometry", element, f"mesh {name!r} has scale {shape.scale:g}")]
-    root = folder.resolve()
+    root = root.resolve()
     target = (folder / name).resolve()
     if "://" in name or PurePosixPath(name).is_absolute() or not target.is_relative_to(root) or target == root:
-        return [Problem("mesh_outside", element, f"mesh {name!r} is not a path inside the folder of the URDF")]
+        return [Problem("mesh_outside", element, f"mesh {name!r} is not a path inside the folder of the model")]
     if not target.is_file():
         return [Problem("mesh_missing", element, f"mesh {name!r} does not exist")]
     return []

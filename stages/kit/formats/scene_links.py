@@ -1,0 +1,200 @@
+"""Turn one body of a scene into links, internal joints and mesh files (scaled CAD model, own mesh, or layout slabs)."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from scipy.spatial import QhullError
+
+from schemas.cad_library import CadModel
+from schemas.errors import BadInput
+from schemas.scene_parts import Box, Joint
+from stages.kit.formats.cad_models import URDF_FILE, load_visual_parts
+from stages.kit.formats.model_writer import write_obj
+from stages.kit.formats.urdf_file import Link, Shape, UrdfJoint, parse_urdf
+from stages.kit.geometry.layout_slabs import Slab
+from stages.kit.geometry.solids import MassProperties, box, hull, mass_properties
+from stages.kit.geometry.transforms import inverse, transform_from_quaternion
+
+MESH_DENSITY = 200.0
+"""Of the convex hull of a thing without CAD model [kg/m^3]: furniture is mostly air."""
+LAYOUT_DENSITY = 1000.0
+GREY = (0.6, 0.6, 0.6, 1.0)
+URDF_MESHES = (".obj", ".stl")
+"""What every loader of URDF reads; pybullet refuses a whole file that names a GLB."""
+
+
+@dataclass(frozen=True)
+class BodyLinks:
+    """Links of one body (first the body's own), the joints among them, and the joints for scene.json."""
+
+    links: tuple[Link, ...]
+    joints: tuple[UrdfJoint, ...] = ()
+    joint_records: tuple[Joint, ...] = ()
+    joint_values: dict[str, float] | None = None
+
+    @property
+    def mass(self) -> float:
+        """Total mass [kg]."""
+        return sum(link.inertial.mass for link in self.links if link.inertial is not None)
+
+    def with_mass(self, mass: float) -> BodyLinks:
+        """Return the same body with its total mass set to `mass` [kg], shares and shape of inertia kept."""
+        ratio = mass / self.mass
+        links = []
+        for link in self.links:
+            old = link.inertial
+            new = None if old is None else MassProperties(old.mass * ratio, old.center, old.inertia * ratio)
+            links.append(replace(link, inertial=new))
+        return replace(self, links=tuple(links))
+
+
+def model_links(root: Path, name: str, model: CadModel, folder: Path, scale: float, values: dict[str, float]) -> BodyLinks:
+    """Return the links of a CAD model under uniform scaling, and copy its meshes to `root`/meshes/<model id>/.
+
+    Lengths and prismatic limits grow with the scale, angles stay, mass grows with its cube, inertia with its fifth power.
+    Raises BadInput for a model folder without a sound URDF, or whose meshes lie outside.
+    """
+    urdf = parse_urdf(folder / URDF_FILE)
+    names = {part: name if k == 0 else f"{name}__{part}" for k, part in enumerate(model.parts)}
+    missing = set(names) - {link.name for link in urdf.links}
+    if missing:
+        raise BadInput(f"{folder / URDF_FILE}: no link {sorted(missing)[0]!r}", hint="build the CAD library again")
+    links = []
+    for part in model.parts:
+        link = urdf.link(part)
+        visuals = tuple(_copied(root, model.id, part, folder, shape, scale, visual=True) for shape in link.visuals)
+        collisions = tuple(_copied(root, model.id, part, folder, shape, scale, visual=False) for shape in link.collisions)
+        inertial = None if link.inertial is None else link.inertial.scaled(scale)
+        links.append(Link(names[part], inertial, visuals, collisions))
+    by_name = {joint.name: joint for joint in urdf.joints}
+    joints, records, placed = [], [], {}
+    for record in model.joints:
+        length = scale if record.type == "prismatic" else 1.0
+        source = by_name.get(record.name)
+        if source is None:
+            raise BadInput(f"{folder / URDF_FILE}: no joint {record.name!r}", hint="build the CAD library again")
+        frame = source.parent_from_child.copy()
+        frame[:3, 3] *= scale
+        joints.append(
+            replace(source, name=f"{name}__{record.name}", parent=names[model.parts[0]], child=names[record.part],
+                    parent_from_child=frame, lower=record.lower * length, upper=record.upper * length)
+        )  # fmt: skip
+        records.append(scaled_joint(record, name, scale))
+        placed[f"{name}__{record.name}"] = float(np.clip(values.get(record.name, 0.0), record.lower, record.upper)) * length
+    return BodyLinks(tuple(links), tuple(joints), tuple(records), placed)
+
+
+def scaled_joint(joint: Joint, body: str, scale: float) -> Joint:
+    """Return the joint of a model as it is in a scene: prefixed names, lengths times `scale`, angles unchanged."""
+    length = scale if joint.type == "prismatic" else 1.0
+
+    def grown(point: tuple[float, float, float]) -> tuple[float, float, float]:
+        return (point[0] * scale, point[1] * scale, point[2] * scale)
+
+    return joint.model_copy(
+        update={
+            "name": f"{body}__{joint.name}", "part": f"{body}__{joint.part}", "origin": grown(joint.origin),
+            "lower": joint.lower * length, "upper": joint.upper * length,
+            "handle": None if joint.handle is None else grown(joint.handle),
+        }
+    )  # fmt: skip
+
+
+def _copied(root: Path, model_id: str, part: str, folder: Path, shape: Shape, scale: float, *, visual: bool) -> Shape:
+    frame = shape.link_from_shape.copy()
+    frame[:3, 3] *= scale
+    if shape.box_size is not None:
+        x, y, z = (float(v) * scale for v in shape.box_size)
+        return replace(shape, box_size=(x, y, z), link_from_shape=frame)
+    source = (folder / (shape.mesh or "")).resolve()
+    if not source.is_relative_to(folder.resolve()) or not source.is_file():
+        raise BadInput(f"{folder / URDF_FILE}: mesh {shape.mesh!r} is not a file of the model folder")
+    relative = source.relative_to(folder.resolve())
+    if relative.suffix.lower() not in URDF_MESHES:
+        relative = relative.with_suffix(".obj")
+    target = root / "meshes" / model_id / relative
+    color = shape.color
+    if not target.exists():
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.suffix == source.suffix:
+            shutil.copyfile(source, target)
+        else:
+            mesh = load_visual_parts(folder)[part]
+            write_obj(target, mesh.vertices, mesh.faces, _vertex_colors(mesh))
+    if visual and color is None:
+        color = _mean_color(load_visual_parts(folder).get(part))
+    return Shape(target.relative_to(root).as_posix(), shape.scale * scale, None, frame, color)
+
+
+def mesh_links(root: Path, name: str, mesh: trimesh.Trimesh) -> BodyLinks:
+    """Return the link of a thing without CAD model: its mesh (body frame) to look at, its convex hull to collide with.
+
+    A mesh too flat for a hull collides as the box around it, at least 5 mm thick.
+    """
+    visual = _own_mesh(root, name, mesh)
+    folder = root / "meshes" / name
+    try:
+        solid = hull(np.unique(np.asarray(mesh.vertices, dtype=float), axis=0))
+        properties = mass_properties([solid], [MESH_DENSITY])
+        if np.ptp(solid.vertices, axis=0).min() < 2e-3:
+            raise ValueError("flat")
+    except (QhullError, ValueError):
+        middle, half = mesh.bounds.mean(axis=0), np.maximum(0.5 * np.ptp(mesh.bounds, axis=0), 2.5e-3)
+        low, high = middle - half, middle + half
+        solid = box((low[0], high[0]), (low[1], high[1]), (low[2], high[2]))
+        properties = mass_properties([solid], [MESH_DENSITY])
+    write_obj(folder / "collision_0.obj", solid.vertices, solid.faces)
+    return BodyLinks((Link(name, properties, (visual,), (Shape(f"meshes/{name}/collision_0.obj"),)),))
+
+
+def box_links(name: str, world_from_body: np.ndarray, bounds: Box) -> BodyLinks:
+    """Return the link of a thing of which only the box (world frame) is known."""
+    frame = inverse(world_from_body) @ transform_from_quaternion(np.asarray(bounds.orientation), np.asarray(bounds.center))
+    x, y, z = (max(float(v), 5e-3) for v in bounds.size)
+    solid = box((-x / 2, x / 2), (-y / 2, y / 2), (-z / 2, z / 2)).moved(frame)
+    shape = Shape(box_size=(x, y, z), link_from_shape=frame, color=GREY)
+    return BodyLinks((Link(name, mass_properties([solid], [MESH_DENSITY]), (shape,), (replace(shape, color=None),)),))
+
+
+def layout_links(root: Path, name: str, world_from_body: np.ndarray, mesh: trimesh.Trimesh | None, slabs: list[Slab]) -> BodyLinks:
+    """Return the link of a floor, wall or ceiling: its mesh (body frame) to look at, slabs to collide with."""
+    body_from_world = inverse(world_from_body)
+    collisions, solids = [], []
+    for slab in slabs:
+        frame = body_from_world @ slab.world_from_slab
+        x, y, z = (float(v) for v in slab.size)
+        collisions.append(Shape(box_size=(x, y, z), link_from_shape=frame))
+        solids.append(box((-x / 2, x / 2), (-y / 2, y / 2), (-z / 2, z / 2)).moved(frame))
+    properties = mass_properties(solids, [LAYOUT_DENSITY] * len(solids)) if solids else None
+    if mesh is not None and len(mesh.faces):
+        visuals = (_own_mesh(root, name, mesh),)
+    else:
+        visuals = tuple(replace(shape, color=GREY) for shape in collisions)
+    return BodyLinks((Link(name, properties, visuals, tuple(collisions)),))
+
+
+def _own_mesh(root: Path, name: str, mesh: trimesh.Trimesh) -> Shape:
+    folder = root / "meshes" / name
+    folder.mkdir(parents=True, exist_ok=True)
+    write_obj(folder / "visual.obj", mesh.vertices, mesh.faces, _vertex_colors(mesh))
+    return Shape(f"meshes/{name}/visual.obj", color=_mean_color(mesh))
+
+
+def _vertex_colors(mesh: trimesh.Trimesh) -> np.ndarray | None:
+    """Return vertex colours (V, 3) uint8, or None for a mesh without any."""
+    if getattr(mesh.visual, "kind", None) not in ("vertex", "face"):
+        return None
+    return np.asarray(mesh.visual.vertex_colors)[:, :3]
+
+
+def _mean_color(mesh: trimesh.Trimesh | None) -> tuple[float, float, float, float]:
+    colors = None if mesh is None else _vertex_colors(mesh)
+    if colors is None or len(colors) == 0:
+        return GREY
+    red, green, blue = (float(v) for v in np.round(colors.mean(axis=0) / 255.0, 4))
+    return (red, green, blue, 1.0)

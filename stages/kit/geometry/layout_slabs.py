@@ -1,0 +1,139 @@
+"""Thick convex slabs that stand for floors, ceilings and walls in physics.
+
+A reconstructed floor is a thin bumpy sheet and a scene's walls are often one entity whose box is the whole room; neither
+can be given to a physics engine as it is. A slab starts at the surface and goes away from the room.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from schemas.scene_parts import Box, SurfacePlane
+from stages.kit.geometry.transforms import transform_from, transform_from_quaternion
+
+FLOOR_THICKNESS = 0.2
+FLOOR_MARGIN = 0.5
+"""How far the floor goes on beyond what was seen of it [m]."""
+WALL_THICKNESS = 0.1
+MINIMUM_AREA = 0.2
+"""Smaller upright surfaces get no slab [m^2]."""
+
+
+@dataclass(frozen=True)
+class Slab:
+    """A box: world_from_slab (4, 4) of its centre, full edge lengths (3,) [m]."""
+
+    world_from_slab: np.ndarray
+    size: np.ndarray
+
+
+def level_slab(box: Box, height: float, *, downwards: bool) -> Slab:
+    """Return a level slab over the footprint of `box` and a margin; its top (floor) or bottom (ceiling) is at `height`."""
+    frame = transform_from_quaternion(np.asarray(box.orientation), np.asarray(box.center))
+    frame[2, 3] = height + (-0.5 if downwards else 0.5) * FLOOR_THICKNESS
+    return Slab(frame, np.array([box.size[0] + 2 * FLOOR_MARGIN, box.size[1] + 2 * FLOOR_MARGIN, FLOOR_THICKNESS]))
+
+
+def surface_height(planes: Sequence[SurfacePlane], mesh: trimesh.Trimesh | None, box: Box, *, upwards: bool) -> float:
+    """Return the height [m] of a floor (`upwards`) or a ceiling.
+
+    The largest horizontal plane that looks into the room; else the area-weighted median height of such triangles of
+    the mesh (world frame); else the face of the box.
+    """
+    sign = 1.0 if upwards else -1.0
+    fitting = [plane for plane in planes if sign * plane.normal[2] > 0.9 or (plane.horizontal and upwards)]
+    if fitting:
+        return float(max(fitting, key=lambda plane: plane.area).center[2])
+    if mesh is not None and len(mesh.faces):
+        level = sign * mesh.face_normals[:, 2] > 0.9
+        if level.any():
+            heights, areas = mesh.triangles_center[level, 2], mesh.area_faces[level]
+            order = np.argsort(heights, kind="stable")
+            return float(heights[order][np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())])
+    return float(box.center[2] + sign * 0.5 * box.size[2])
+
+
+def wall_slabs(
+    planes: Sequence[SurfacePlane], mesh: trimesh.Trimesh | None, box: Box, room_center: np.ndarray, thickness: float = WALL_THICKNESS
+) -> list[Slab]:
+    """Return a slab behind every upright surface of a wall (seen from `room_center` (3,)).
+
+    Surfaces: planes with corners; else those found on the mesh (world frame); else the box, when it is thin. An
+    empty list when none is known: the entity then has no collision shape.
+    """
+    rectangles = [
+        np.asarray(plane.corners)
+        for plane in planes
+        if len(plane.corners) == 4 and abs(plane.normal[2]) < 0.3 and plane.area >= MINIMUM_AREA
+    ]
+    if not rectangles and mesh is not None and len(mesh.faces):
+        rectangles = upright_rectangles(mesh)
+    slabs = [slab for slab in (_behind(corners, room_center, thickness) for corners in rectangles) if slab is not None]
+    if not slabs and min(box.size[:2]) < 0.35:
+        frame = transform_from_quaternion(np.asarray(box.orientation), np.asarray(box.center))
+        size = np.asarray(box.size, dtype=float)
+        axis = int(np.argmin(size[:2]))
+        grow = max(thickness - size[axis], 0.0)
+        away = np.sign(frame[:3, axis] @ (frame[:3, 3] - room_center)) or 1.0
+        frame[:3, 3] += 0.5 * grow * away * frame[:3, axis]
+        size[axis] += grow
+        slabs = [Slab(frame, np.maximum(size, 1e-3))]
+    return slabs
+
+
+def _behind(corners: np.ndarray, room_center: np.ndarray, thickness: float) -> Slab | None:
+    """Return the slab whose one face is the rectangle (4, 3) and that lies on its side away from the room."""
+    first, second = corners[1] - corners[0], corners[3] - corners[0]
+    lengths = np.array([np.linalg.norm(first), np.linalg.norm(second)])
+    if lengths.min() < 0.02:
+        return None
+    first = first / lengths[0]
+    second = second / lengths[1]
+    normal = np.cross(first, second)
+    normal /= np.linalg.norm(normal)
+    second = np.cross(normal, first)
+    center = corners.mean(axis=0)
+    away = 1.0 if normal @ (center - room_center) >= 0 else -1.0
+    frame = transform_from(np.column_stack([first, second, normal]), center + 0.5 * thickness * away * normal)
+    return Slab(frame, np.array([*lengths, thickness]))
+
+
+def upright_rectangles(mesh: trimesh.Trimesh, *, maximum: int = 12) -> list[np.ndarray]:
+    """Return the corners (4, 3) of the large upright planar parts of a mesh (world frame, z up), largest first.
+
+    Area-weighted histograms: the commonest direction of upright triangles (5 degrees), then their commonest offset
+    (2 cm); the rectangle holds 98 % of them. Repeats on what is left.
+    """
+    normals, centers, areas = mesh.face_normals, mesh.triangles_center, mesh.area_faces
+    left = np.abs(normals[:, 2]) < 0.3
+    rectangles = []
+    for _ in range(maximum):
+        if areas[left].sum() < MINIMUM_AREA:
+            break
+        angle = np.arctan2(normals[left, 1], normals[left, 0])
+        bins = np.floor((angle + np.pi) / np.radians(5)).astype(int) % 72
+        histogram = np.bincount(bins, weights=areas[left], minlength=72)
+        peak = int(np.argmax(histogram + np.roll(histogram, 1) + np.roll(histogram, -1)))
+        near = np.abs((bins - peak + 36) % 72 - 36) <= 1
+        mean = (normals[left][near, :2] * areas[left][near, None]).sum(axis=0)
+        direction = np.array([*(mean / np.linalg.norm(mean)), 0.0])
+        aligned = left & (normals @ direction > np.cos(np.radians(15)))
+        offsets = centers[aligned] @ direction
+        steps = np.floor((offsets - offsets.min()) / 0.02).astype(int)
+        best = int(np.argmax(np.convolve(np.bincount(steps, weights=areas[aligned]), np.ones(3), mode="same")))
+        at = offsets.min() + (best + 0.5) * 0.02
+        inliers = aligned & (np.abs(centers @ direction - at) < 0.05)
+        if areas[inliers].sum() < MINIMUM_AREA:
+            left &= ~aligned
+            continue
+        left &= ~inliers
+        tangent = np.array([-direction[1], direction[0], 0.0])
+        (u0, u1), (z0, z1) = (np.percentile(values, [1, 99]) for values in (centers[inliers] @ tangent, centers[inliers, 2]))
+        rectangles.append(
+            np.array([at * direction + u * tangent + [0, 0, z] for u, z in ((u0, z0), (u1, z0), (u1, z1), (u0, z1))])
+        )
+    return rectangles

@@ -1,0 +1,80 @@
+"""From the nodes of cg' to the bodies of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from schemas.cad_scene import CadScene
+from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from schemas.errors import BadInput
+from schemas.scene_parts import Box
+from stages.kit.formats.cad_models import read_model
+from stages.kit.formats.scene_bundle import BundleBody
+from stages.kit.geometry.boxes import box_from_bounds
+
+
+def scene_bodies(cad_scene: CadScene, graph: ContactGraphFile, movable: Collection[str]) -> list[BundleBody]:
+    """Return one body for every node but the root: its CAD model, else its mesh, else its box.
+
+    `movable`: names of the classes that hang on floating joints. Raises BadInput for a missing model or mesh.
+    """
+    return [_body(cad_scene, graph, node, movable) for node in graph.nodes if node.id != SCENE_NODE]
+
+
+def _body(cad_scene: CadScene, graph: ContactGraphFile, node: GraphNode, movable: Collection[str]) -> BundleBody:
+    link = graph.parent_link(node.id)
+    relation = "supports" if link is None else link.relation
+    parent = None if link is None or link.source == SCENE_NODE else link.source
+    carried = node.class_name in movable and node.node_type != "layout"
+    if node.model_id is not None:
+        if node.world_from_model is None or node.scale is None:
+            raise BadInput(f"{cad_scene.path('graph.json')}: node {node.id} has a model but no pose or scale")
+        folder = cad_scene.path("models") / node.model_id
+        if not folder.is_dir():
+            raise BadInput(f"{folder}: model of node {node.id} is missing", hint="run `cad` again")
+        model = read_model(folder)
+        return BundleBody(
+            name=node.id, class_name=node.class_name, parent=parent, relation=relation, world_from_body=np.array(node.world_from_model),
+            movable=carried, box=_box(node, None, cad_scene), model=model, model_folder=folder, scale=node.scale, joint_values=dict(node.joints),
+        )  # fmt: skip
+    mesh = _mesh(cad_scene, node)
+    bounds = _box(node, mesh, cad_scene)
+    origin = np.eye(4)
+    if node.node_type != "layout":
+        # a body frame at the bottom of the thing, like that of a CAD model
+        origin[:3, 3] = np.array(bounds.center) - [0, 0, 0.5 * bounds.size[2]]
+    if mesh is not None:
+        mesh.apply_translation(-origin[:3, 3])
+    return BundleBody(
+        name=node.id, class_name=node.class_name, parent=parent, relation=relation, world_from_body=origin, movable=carried,
+        box=bounds, mesh=mesh,
+    )  # fmt: skip
+
+
+def _mesh(cad_scene: CadScene, node: GraphNode) -> trimesh.Trimesh | None:
+    """Return the mesh that stands for a node without model, world frame, or None when there is none."""
+    folder = "layout" if node.node_type == "layout" else "meshes"
+    file: Path = cad_scene.path(folder) / f"{node.id}.ply"
+    if not file.is_file():
+        return None
+    try:
+        mesh = trimesh.load(file, force="mesh", process=False)
+    except Exception as error:  # trimesh raises whatever its parsers raise
+        raise BadInput(f"{file}: cannot be read as a mesh: {error}") from None
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
+        return None
+    if not np.isfinite(mesh.vertices).all():
+        raise BadInput(f"{file}: vertices hold NaN or infinity", hint="run `cad` again")
+    return mesh
+
+
+def _box(node: GraphNode, mesh: trimesh.Trimesh | None, cad_scene: CadScene) -> Box:
+    if node.box is not None:
+        return node.box
+    if mesh is None:
+        raise BadInput(f"{cad_scene.path('graph.json')}: node {node.id} has neither box nor mesh")
+    return box_from_bounds(mesh.bounds[0], mesh.bounds[1])
