@@ -68,9 +68,7 @@ def draw_graph(path: Path, graph: ContactGraphFile, label: str) -> None:
     plot_graphs(path, {"reconstructed": graph}, marked={}, title=f"Contact graph\n{label}")
 
 
-def draw_floor_plan(
-    path: Path, boxes: list[tuple[str, int, Box]], paths: Mapping[str, np.ndarray], label: str
-) -> None:
+def draw_floor_plan(path: Path, boxes: list[tuple[str, int, Box]], paths: Mapping[str, np.ndarray], label: str) -> None:
     """Boxes (name, instance, box) and camera paths from above."""
     outlines = [(name, footprint(box), instance_color(instance)) for name, instance, box in boxes if upright(box)]
     plot_floor_plan(path, outlines, paths, title=f"Camera path from above\n{label}")

@@ -8,6 +8,7 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.panoptic_map import EntitiesFile, PanopticMap
+from stages.evaluate.arrays import read_arrays
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.results import Part
 from stages.evaluate.surfaces import Surface, read_surface
@@ -52,11 +53,7 @@ def load_map(panoptic_map: PanopticMap) -> PredictedMap:
     """Read mesh and labels. Raises BadInput when they disagree."""
     surface = read_surface(panoptic_map.path("mesh.ply"))
     path = panoptic_map.path("mesh_labels.npz")
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            instances = archive["instance"].astype(np.int64)
-    except (OSError, ValueError, KeyError) as error:
-        raise BadInput(f"{path}: {error}", hint="make the map again") from None
+    instances = read_arrays(path, "instance")[0].astype(np.int64)
     if len(instances) != len(surface.vertices):
         raise BadInput(f"{path}: {len(instances)} labels for {len(surface.vertices)} vertices")
     return PredictedMap(panoptic_map.info, surface, instances)
@@ -175,9 +172,7 @@ def measure_instances(
         rows = [e for e in entities if name in (e.class_name, ANY_CLASS)]
         iou = np.array([[ious.get((o.instance, e.instance), 0.0) for o in columns] for e in rows])
         confidence = np.array([float(e.vertices) for e in rows])
-        curve = precision_recall(
-            iou.reshape(len(rows), len(columns)), confidence, len(columns), parameters.match_iou
-        )
+        curve = precision_recall(iou.reshape(len(rows), len(columns)), confidence, len(columns), parameters.match_iou)
         result[name] = class_precision(curve)
     agnostic = result.pop(ANY_CLASS)
     part.set("instance_ap50_class_agnostic", agnostic.all_point)

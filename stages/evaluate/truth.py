@@ -12,6 +12,7 @@ from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth, TrueObject
 from schemas.scene_parts import Box
 from schemas.vocabulary import load_vocabulary
+from stages.evaluate.arrays import read_arrays
 from stages.evaluate.surfaces import Surface, read_surface
 from stages.kit.geometry.boxes import box_yaw, gravity_aligned_box
 from stages.kit.geometry.transforms import apply
@@ -73,11 +74,8 @@ def load_truth(truth: GroundTruth, world_from_log: np.ndarray, minimum_visible_p
     tilt. Raises BadInput when visible.npz is unreadable or its arrays disagree.
     """
     file = truth.truth
-    try:
-        with np.load(truth.path("visible.npz"), allow_pickle=False) as archive:
-            points, instances = archive["points"].astype(float), archive["instance"].astype(np.int64)
-    except (OSError, ValueError, KeyError) as error:
-        raise BadInput(f"{truth.path('visible.npz')}: {error}", hint="make the ground truth again") from None
+    points, instances = read_arrays(truth.path("visible.npz"), "points", "instance")
+    points, instances = points.astype(float), instances.astype(np.int64)
     if points.shape != (len(instances), 3):
         raise BadInput(f"{truth.path('visible.npz')}: {points.shape} points for {len(instances)} instances")
     counts = {int(k): int(n) for k, n in zip(*np.unique(instances, return_counts=True), strict=True)}

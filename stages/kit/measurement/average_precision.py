@@ -28,7 +28,9 @@ def match_greedily(iou: np.ndarray, confidence: np.ndarray, match_iou: float = 0
     `iou` (P, T), `confidence` (P,). Each prediction takes the free truth of highest IoU if that is > `match_iou`.
     Returns (prediction row, truth column or None) in the order of processing.
     """
-    iou = np.asarray(iou, dtype=float).reshape(len(confidence), -1)
+    iou = np.atleast_2d(np.asarray(iou, dtype=float))
+    if not len(confidence):
+        return []
     order = np.argsort(-np.asarray(confidence, dtype=float), kind="stable")
     free = np.ones(iou.shape[1], dtype=bool)
     result: list[tuple[int, int | None]] = []

@@ -56,9 +56,7 @@ def support_tree(graph: ContactGraphFile, optional: frozenset[str] = frozenset()
     if len(ordered) != len(parent):
         circle = sorted(set(parent) - set(ordered))
         raise BadInput(f"contact graph: the supports form a circle: {', '.join(circle)}", hint="make the graph again")
-    return SupportTree(
-        tuple(ordered), tuple(classes[n] for n in ordered), tuple(parent[n] for n in ordered), optional
-    )
+    return SupportTree(tuple(ordered), tuple(classes[n] for n in ordered), tuple(parent[n] for n in ordered), optional)
 
 
 @dataclass(frozen=True)
@@ -221,6 +219,4 @@ def describe_mapping(
 
 def rename_classes(tree: SupportTree, names: Mapping[str, str]) -> SupportTree:
     """Return the tree with classes replaced where `names` has them (to count synonyms as one class)."""
-    return SupportTree(
-        tree.names, tuple(names.get(c, c) for c in tree.classes), tree.parents, tree.optional
-    )
+    return SupportTree(tree.names, tuple(names.get(c, c) for c in tree.classes), tree.parents, tree.optional)

@@ -100,9 +100,7 @@ def intersection_over_union(true: np.ndarray, predicted: np.ndarray) -> dict[tup
     for (t, p), n in counts.items():
         true_area[t] = true_area.get(t, 0) + n
         predicted_area[p] = predicted_area.get(p, 0) + n
-    return {
-        (t, p): n / (true_area[t] + predicted_area[p] - n) for (t, p), n in counts.items() if p != VOID
-    }
+    return {(t, p): n / (true_area[t] + predicted_area[p] - n) for (t, p), n in counts.items() if p != VOID}
 
 
 def panoptic_quality(
@@ -127,9 +125,7 @@ def panoptic_quality(
     predicted, predicted_classes = merge_stuff(predicted, predicted_classes, stuff)
     ious = intersection_over_union(true, predicted)
     matched = {
-        (t, p): iou
-        for (t, p), iou in ious.items()
-        if iou > match_iou and true_classes[t] == predicted_classes[p]
+        (t, p): iou for (t, p), iou in ious.items() if iou > match_iou and true_classes[t] == predicted_classes[p]
     }
     matched_true = {t for t, _ in matched}
     matched_predicted = {p for _, p in matched}

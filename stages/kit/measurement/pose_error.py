@@ -57,9 +57,7 @@ class TrajectoryError:
     associated: int
 
 
-def associate(
-    true_times: np.ndarray, times: np.ndarray, tolerance: float = 0.02
-) -> tuple[np.ndarray, np.ndarray]:
+def associate(true_times: np.ndarray, times: np.ndarray, tolerance: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
     """Pair each time (M,) with the nearest true time (N, sorted) within `tolerance` [s]. Returns two index arrays."""
     if not len(true_times) or not len(times):
         return np.zeros(0, dtype=int), np.zeros(0, dtype=int)

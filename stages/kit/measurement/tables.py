@@ -49,9 +49,7 @@ def as_markdown(table: Table) -> str:
     def line(cells: Sequence[str]) -> str:
         return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
-    numeric = [
-        any(isinstance(row[k], int | float) for row in table.rows) for k in range(len(table.columns))
-    ]
+    numeric = [any(isinstance(row[k], int | float) for row in table.rows) for k in range(len(table.columns))]
     parts = [f"### {table.title}", "", line(table.columns), line(["--:" if n else ":--" for n in numeric])]
     parts += [line([format_cell(value) for value in row]) for row in table.rows]
     if table.note:

@@ -110,7 +110,9 @@ def poses(count: int = 6) -> np.ndarray:
     return np.array([look_at(np.array([-1.5 + 0.3 * k, -1.8, 1.5]), np.array([0.2, 0.6, 0.6])) for k in range(count)])
 
 
-def make_ground_truth(root: Path, things: tuple[Thing, ...] = ROOM, unseen: frozenset[int] = frozenset()) -> GroundTruth:
+def make_ground_truth(
+    root: Path, things: tuple[Thing, ...] = ROOM, unseen: frozenset[int] = frozenset()
+) -> GroundTruth:
     """Ground truth of the room; `unseen` instances have no visible point."""
     root.mkdir(parents=True)
     points, instances = surface_points(things)
