@@ -1,0 +1,130 @@
+"""The whole chain on a small generated room: end to end, twice with the same bytes, by make and by `scenewright run`."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from stages.kit.running.digests import content_digest, record_files
+from stages.kit.running.pipelines import pipeline_path, read_pipeline, resolve_variables, step_arguments
+from stages.kit.running.reading import open_artifact
+from stages.kit.running.verification import verify
+from tests.contract.test_command_line import scenewright
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+SMALL = {"frames": "24", "width": "240", "height": "180", "voxel_size": "0.04", "seed": "3"}
+PIPELINE = read_pipeline(pipeline_path("demo"))
+STEPS = [step.name for step in PIPELINE.step]
+
+
+def manifest(folder: Path):
+    found = open_artifact(folder).manifest
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs") / "small"
+    settings = [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]
+    done = scenewright("run", "demo", "--out", folder, *settings, "--json")
+    assert done.returncode == 0, done.stderr
+    assert [step["status"] for step in json.loads(done.stdout)["steps"]] == ["made"] * len(STEPS)
+    return folder
+
+
+def arguments_of(step_name: str, folder: Path, out: Path | None = None) -> list[str]:
+    step = next(step for step in PIPELINE.step if step.name == step_name)
+    words = step_arguments(step, str(folder), resolve_variables(PIPELINE, SMALL))
+    return words if out is None else [*words[:-1], str(out)]
+
+
+def test_everything_verifies_back_to_the_log(run_folder: Path) -> None:
+    findings = verify(run_folder / "report")
+    assert {finding.path.name for finding in findings} == set(STEPS)
+    for finding in findings:
+        assert finding.problems == () and finding.notes == ()
+
+
+def test_the_map_and_the_graph_are_about_the_room(run_folder: Path) -> None:
+    metrics = json.loads((run_folder / "evaluation" / "metrics.json").read_text())
+    assert "corruption 0.2" in metrics["label"]
+    assert metrics["metrics"]["map/pq"] > 0.3
+    assert metrics["metrics"]["map/pq"] > json.loads((run_folder / "geometric_evaluation" / "metrics.json").read_text())[
+        "metrics"
+    ].get("map/pq", 0.0)
+    graph = json.loads((run_folder / "contact_graph" / "graph.json").read_text())
+    classes = {node["id"]: node["class_name"] for node in graph["nodes"]}
+    assert {"scene", "floor", "wall"} <= set(classes.values()) and len(classes) > 8
+    parents = {link["target"]: link["source"] for link in graph["links"] if link["relation"] != "proximal"}
+    assert set(parents) == set(classes) - {"scene"}
+    html = (run_folder / "report" / "report.html").read_text()
+    assert "corruption 0.2" in html and "http://" not in html and "https://" not in html
+
+
+def test_a_second_run_has_nothing_to_do(run_folder: Path) -> None:
+    before = {path: path.stat().st_mtime_ns for path in run_folder.rglob("*")}
+    settings = [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]
+    done = scenewright("run", "demo", "--out", run_folder, *settings, "--json")
+    assert done.returncode == 0, done.stderr
+    assert [step["status"] for step in json.loads(done.stdout)["steps"]] == ["up to date"] * len(STEPS)
+    assert {path: path.stat().st_mtime_ns for path in run_folder.rglob("*")} == before
+
+
+def test_make_gives_identical_digests_and_rebuilds_what_is_deleted(run_folder: Path, tmp_path: Path) -> None:
+    """make starts from a copy without the middle of the chain, builds that, and ends with the same digests."""
+    folder = tmp_path / "outputs" / "demo"
+    shutil.copytree(run_folder, folder)
+    for name in ("contact_graph", "cad_scene", "interactive_scene"):
+        shutil.rmtree(folder / name)
+    command = ["make", "-f", "data/pipelines/demo.mk", f"PYTHON={sys.executable}", f"OUTPUTS={tmp_path}/outputs"]
+    command += [f"{name.upper()}={value}" for name, value in SMALL.items()]
+    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "graph: made" in done.stderr
+    for name in STEPS:
+        assert manifest(folder / name).content_digest == manifest(run_folder / name).content_digest, name
+        assert manifest(folder / name).key == manifest(run_folder / name).key, name
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_same_seed_same_bytes(run_folder: Path, tmp_path: Path, name: str) -> None:
+    """Every step made once more, elsewhere and on one thread, gives the same content digest."""
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "PYTHONHASHSEED": "7"}
+    done = scenewright(*arguments_of(name, run_folder, tmp_path / name), "--quiet", env=environment)
+    assert done.returncode == 0, done.stderr
+    first, again = manifest(run_folder / name), manifest(tmp_path / name)
+    if first.content_digest != again.content_digest:
+        pairs = {record.path: record.sha256 for record in first.files if record.digested}
+        pytest.fail(f"other bytes in {[r.path for r in again.files if r.digested and pairs.get(r.path) != r.sha256]}")
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_kill_leaves_the_previous_artifact(run_folder: Path, tmp_path: Path, name: str) -> None:
+    """SIGKILL while a step works on an existing artifact: the old one stays, sound, and nothing half-made shows."""
+    out = tmp_path / name
+    shutil.copytree(run_folder / name, out)
+    took = manifest(out).provenance.seconds
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cli", *arguments_of(name, run_folder, out), "--force", "--quiet"],
+        cwd=REPOSITORY,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    while not list(tmp_path.glob(f".{name}.partial-*")) and process.poll() is None:
+        time.sleep(0.002)
+    time.sleep(random.Random(name).uniform(0.0, min(took, 2.0)))
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    found = manifest(out)
+    assert content_digest(record_files(out, type(open_artifact(out)).undigested)) == found.content_digest
+    assert found.content_digest == manifest(run_folder / name).content_digest
