@@ -1,0 +1,119 @@
+"""Doors and drawers: how a point on the moving part goes with the joint, and tool poses that push or pull it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from schemas.scene_parts import Joint
+from stages.kit.geometry.transforms import apply
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class ContactPoint:
+    """Where the fingers meet the moving part. Body frame, joint at 0."""
+
+    point: np.ndarray
+    inward: np.ndarray
+    """Unit direction in which the part is pushed shut at this point."""
+
+
+def body_from_moved(joint: Joint, value: float) -> np.ndarray:
+    """Return the (4, 4) displacement, body frame, of the moving part when the joint goes from 0 to `value`."""
+    pose = np.eye(4)
+    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    if joint.type == "prismatic":
+        pose[:3, 3] = axis * value
+        return pose
+    turn = Rotation.from_rotvec(axis * value).as_matrix()
+    origin = np.array(joint.origin)
+    pose[:3, :3] = turn
+    pose[:3, 3] = origin - turn @ origin
+    return pose
+
+
+def closing_direction(joint: Joint, point: np.ndarray) -> np.ndarray:
+    """Return the unit direction (3,), body frame at value 0, in which a point moves while the joint closes."""
+    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    direction = -axis if joint.type == "prismatic" else -np.cross(axis, point - np.array(joint.origin))
+    return direction / np.linalg.norm(direction)
+
+
+def push_points(
+    joint: Joint, part: trimesh.Trimesh, random: np.random.Generator, count: int, height: tuple[float, float]
+) -> list[ContactPoint]:
+    """Return points on the outside of a moving part where it can be pushed shut, far from the hinge first.
+
+    `part` is the part's mesh in the body frame at value 0, `height` the range of z [m] in the body frame that the arm
+    reaches. A ray against the closing direction finds the surface; hits whose normal is slanted are left out.
+    """
+    vertices = np.asarray(part.vertices)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    middle = (low + high) / 2
+    direction = closing_direction(joint, middle if joint.type == "prismatic" else _widest(joint, vertices, axis))
+    starts, sides = [], []
+    for _ in range(count * 4):
+        start = random.uniform(low, high)
+        start[2] = random.uniform(max(low[2] + 0.02, height[0]), max(min(high[2] - 0.02, height[1]), low[2] + 0.03))
+        start -= direction * (direction @ (start - middle) + 2.0)
+        starts.append(start)
+        sides.append(direction)
+    hits, rays, triangles = part.ray.intersects_location(np.array(starts), np.array(sides), multiple_hits=False)
+    points = []
+    for hit, triangle in zip(hits, triangles, strict=True):
+        if float(part.face_normals[triangle] @ direction) < -0.9:
+            points.append(ContactPoint(hit, closing_direction(joint, hit)))
+    del rays
+    if joint.type == "revolute":
+        reach = max((_radius(joint, entry.point, axis) for entry in points), default=0.0)
+        points = [entry for entry in points if _radius(joint, entry.point, axis) > 0.55 * reach]
+        points.sort(key=lambda entry: -round(_radius(joint, entry.point, axis) / 0.08))
+    return points[:count]
+
+
+def _radius(joint: Joint, point: np.ndarray, axis: np.ndarray) -> float:
+    relative = point - np.array(joint.origin)
+    return float(np.linalg.norm(relative - axis * (axis @ relative)))
+
+
+def _widest(joint: Joint, vertices: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    relative = vertices - np.array(joint.origin)
+    radii = np.linalg.norm(relative - np.outer(relative @ axis, axis), axis=1)
+    return vertices[int(radii.argmax())]
+
+
+def tool_poses(
+    joint: Joint,
+    contact: ContactPoint,
+    world_from_body: np.ndarray,
+    values: np.ndarray,
+    *,
+    tilt: np.ndarray,
+    roll: float,
+    gap: float,
+) -> list[np.ndarray]:
+    """Return world_from_tool (4, 4) for each joint value (K,): the tool point `gap` [m] outside the contact point.
+
+    The approach is the closing direction turned by `tilt` (K,) [rad] about the vertical; `roll` [rad] turns the
+    closing axis of the fingers about the approach, 0 keeps it horizontal.
+    """
+    poses = []
+    for value, turn in zip(values, tilt, strict=True):
+        moved = world_from_body @ body_from_moved(joint, float(value))
+        point = apply(moved, contact.point)
+        inward = moved[:3, :3] @ contact.inward
+        approach = Rotation.from_rotvec(UP * float(turn)).as_matrix() @ inward
+        side = np.cross(UP, approach)
+        side = side / np.linalg.norm(side) if np.linalg.norm(side) > 1e-6 else np.array([1.0, 0.0, 0.0])
+        frame = np.column_stack([np.cross(side, approach), side, approach])
+        pose = np.eye(4)
+        pose[:3, :3] = frame @ Rotation.from_rotvec([0, 0, roll]).as_matrix()
+        pose[:3, 3] = point - gap * inward
+        poses.append(pose)
+    return poses

@@ -1,0 +1,104 @@
+"""Two-finger grasps of upright items: from the side, from above, and tilted between, around the vertical axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.kit.geometry.transforms import apply, inverse
+
+FINGER_DEPTH = 0.032
+"""How far the tool point can go in behind the front of an item before the palm touches it [m]."""
+FINGER_BAND = 0.011
+"""Half the breadth of a finger tip [m]: what lies within it is between the fingers."""
+MARGIN = 0.006
+"""Room left between the open fingers and the item, both sides together [m]."""
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """A pose of the tool relative to the item. Tool: z out of the hand, y along which the fingers close."""
+
+    body_from_tool: np.ndarray
+    width: float
+    """Extent of the item between the fingers [m]."""
+    pitch: float
+    """Downward tilt of the approach: 0 from the side, pi/2 from above [rad]."""
+
+
+def sample_grasps(
+    points: np.ndarray,
+    world_from_body: np.ndarray,
+    *,
+    opening: float,
+    random: np.random.Generator,
+    angles: int = 16,
+    pitches: tuple[float, ...] = (0.0, 0.35, 0.7, 1.1, np.pi / 2),
+    heights: tuple[float, ...] = (0.35, 0.5, 0.65, 0.8),
+) -> list[Grasp]:
+    """Return the grasps whose width fits the gripper, narrow ones first (those lie flat on the faces of a box).
+
+    `points` (N, 3) are on the item's surface, body frame. `opening` [m] is the widest distance of the fingers. The
+    list is empty when the item is too wide everywhere.
+    """
+    world_points = apply(world_from_body, points)
+    low, high = world_points.min(axis=0), world_points.max(axis=0)
+    offset = random.uniform(0, 2 * np.pi / angles)
+    headings = np.concatenate([_aligned_headings(world_from_body), offset + 2 * np.pi * np.arange(angles) / angles])
+    found = []
+    for pitch in pitches:
+        for heading in headings:
+            for height in heights if pitch < 1.2 else heights[:1]:
+                grasp = _grasp_at(world_points, low, high, float(heading), pitch, height, opening)
+                if grasp is None:
+                    continue
+                pose, width = grasp
+                for flip in (False, True):
+                    turned = pose @ np.diag([-1.0, -1.0, 1.0, 1.0]) if flip else pose
+                    found.append(Grasp(inverse(world_from_body) @ turned, width, pitch))
+    if not found:
+        return []
+    narrowest = min(grasp.width for grasp in found)
+    order = random.permutation(len(found))
+    ranked = sorted(order.tolist(), key=lambda index: round((found[index].width - narrowest) / 0.004))
+    return [found[index] for index in ranked]
+
+
+def narrowest_width(points: np.ndarray) -> float:
+    """Return the smallest horizontal extent [m] of points (N, 3) over all directions: why no grasp was found."""
+    directions = np.linspace(0, np.pi, 36, endpoint=False)
+    along = points[:, :2] @ np.array([np.cos(directions), np.sin(directions)])
+    return float((along.max(axis=0) - along.min(axis=0)).min())
+
+
+def _aligned_headings(world_from_body: np.ndarray) -> np.ndarray:
+    yaw = np.arctan2(world_from_body[1, 0], world_from_body[0, 0])
+    return yaw + np.pi / 2 * np.arange(4)
+
+
+def _grasp_at(
+    points: np.ndarray, low: np.ndarray, high: np.ndarray, heading: float, pitch: float, height: float, opening: float
+) -> tuple[np.ndarray, float] | None:
+    """Return world_from_tool (4, 4) and the width of a grasp, or None when the item is too wide there."""
+    approach = np.array([np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)])
+    closing = np.array([-np.sin(heading), np.cos(heading), 0.0])
+    across = np.cross(closing, approach)
+    axis_point = np.array([*(low + high)[:2] / 2, low[2] + height * (high[2] - low[2])])
+    relative = points - axis_point
+    band = np.abs(relative @ across) < FINGER_BAND
+    if band.sum() < 8:
+        return None
+    depth = relative @ approach
+    front = float(depth[band].min())
+    back = float(depth[band].max())
+    tool_depth = front + min((back - front) / 2, FINGER_DEPTH)
+    between = band & (depth < tool_depth + FINGER_BAND)
+    along = relative[between] @ closing
+    width = float(along.max() - along.min())
+    if width > opening - MARGIN:
+        return None
+    pose = np.eye(4)
+    pose[:3, :3] = np.column_stack([across, closing, approach])
+    pose[:3, 3] = axis_point + tool_depth * approach + (along.max() + along.min()) / 2 * closing
+    return pose, width

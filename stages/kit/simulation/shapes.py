@@ -1,0 +1,87 @@
+"""The shapes of a URDF's links as trimesh meshes: collision shapes for geometry, visual ones for pictures."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from schemas.errors import BadInput
+
+
+def _numbers(text: str | None, default: str) -> list[float]:
+    return [float(value) for value in (text or default).split()]
+
+
+def _placement(element: ElementTree.Element) -> np.ndarray:
+    pose = np.eye(4)
+    origin = element.find("origin")
+    if origin is not None:
+        pose[:3, 3] = _numbers(origin.get("xyz"), "0 0 0")
+        pose[:3, :3] = Rotation.from_euler("xyz", _numbers(origin.get("rpy"), "0 0 0")).as_matrix()
+    return pose
+
+
+def _mesh_of(geometry: ElementTree.Element) -> trimesh.Trimesh:
+    shape = geometry[0]
+    if shape.tag == "box":
+        return trimesh.creation.box(extents=_numbers(shape.get("size"), "1 1 1"))
+    if shape.tag == "cylinder":
+        return trimesh.creation.cylinder(
+            radius=float(shape.get("radius", 1)), height=float(shape.get("length", 1)), sections=32
+        )
+    if shape.tag == "sphere":
+        return trimesh.creation.icosphere(subdivisions=2, radius=float(shape.get("radius", 1)))
+    if shape.tag == "mesh":
+        path = Path(shape.get("filename", ""))
+        if not path.is_file():
+            raise BadInput(f"{path}: mesh is missing", hint="make the scene again")
+        mesh = trimesh.load(path, force="mesh", process=False)
+        assert isinstance(mesh, trimesh.Trimesh)
+        mesh.apply_scale(_numbers(shape.get("scale"), "1 1 1"))
+        return mesh
+    raise BadInput(f"URDF geometry <{shape.tag}> is not known", hint="box, cylinder, sphere and mesh are")
+
+
+def link_shapes(text: str, tag: Literal["collision", "visual"] = "collision") -> dict[str, list[trimesh.Trimesh]]:
+    """Return the shapes of each link of URDF text (absolute mesh paths), link frame, metres. Raises BadInput.
+
+    A URDF <material> colour is applied to shapes that have no colours of their own.
+    """
+    root = ElementTree.fromstring(text)
+    colors = {
+        material.get("name"): color.get("rgba")
+        for material in root.iter("material")
+        if (color := material.find("color")) is not None
+    }
+    shapes: dict[str, list[trimesh.Trimesh]] = {}
+    for link in root.findall("link"):
+        entries = shapes.setdefault(link.get("name", ""), [])
+        for element in link.findall(tag):
+            geometry = element.find("geometry")
+            if geometry is None or len(geometry) == 0:
+                continue
+            mesh = _mesh_of(geometry)
+            mesh.apply_transform(_placement(element))
+            material = element.find("material")
+            rgba = None if material is None else colors.get(material.get("name"))
+            if rgba is not None and mesh.visual.kind is None:
+                mesh.visual.face_colors = np.round(255 * np.array(_numbers(rgba, "1 1 1 1"))).astype(np.uint8)
+            entries.append(mesh)
+    return shapes
+
+
+def surface_points(meshes: list[trimesh.Trimesh], count: int, random: np.random.Generator) -> np.ndarray:
+    """Return (count, 3) points drawn uniformly from the surfaces of meshes of one frame [m]."""
+    mesh = trimesh.util.concatenate([trimesh.Trimesh(part.vertices, part.faces, process=False) for part in meshes])
+    weights = mesh.area_faces / mesh.area_faces.sum()
+    faces = random.choice(len(mesh.faces), size=count, p=weights)
+    u, v = random.random((2, count))
+    flip = u + v > 1
+    u, v = np.where(flip, 1 - u, u), np.where(flip, 1 - v, v)
+    corners = mesh.triangles[faces]
+    return corners[:, 0] + u[:, None] * (corners[:, 1] - corners[:, 0]) + v[:, None] * (corners[:, 2] - corners[:, 0])

@@ -1,0 +1,161 @@
+"""Pieces that every manipulation is made of: reach a pose, move straight, fold the arm; each checked for collision."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stages.kit.geometry.transforms import inverse, transform_from_yaw
+from stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
+from stages.kit.motion.cartesian import follow, straight_poses
+from stages.kit.motion.collision import Collision
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.kinematics import forward, inverse_kinematics, random_starts, reach
+from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
+from stages.kit.simulation.robot import base_pose
+from stages.plan.world_model import WorldModel
+
+ARM_RESOLUTION = np.full(7, 0.05)
+
+
+@dataclass
+class Tally:
+    """Counts of what ended the attempts of one query, for the typed failure at its end."""
+
+    unreachable: int = 0
+    nearest: float = np.inf
+    tried: int = 0
+    blockers: Counter[str] = field(default_factory=Counter)
+    depths: dict[str, float] = field(default_factory=dict)
+    last: MotionFailed | None = None
+
+    def collided(self, collision: Collision) -> None:
+        """Count a collision by the body in the way."""
+        self.blockers[collision.other] += 1
+        self.depths[collision.other] = max(collision.depth, self.depths.get(collision.other, -np.inf))
+
+    def failed(self, failure: MotionFailed) -> None:
+        """Count a failed path query."""
+        self.last = failure
+        for name in failure.failure.objects[-1:]:
+            self.blockers[name] += 1
+
+    def raise_for(self, what: str, objects: tuple[str, ...]) -> None:
+        """Raise MotionFailed with the condition that ended most attempts.
+
+        `no_inverse_kinematics` (nothing was within reach), `goal_in_collision` (a body was in the way most often) or
+        the kind of the last path query.
+        """
+        numbers = {"tried": self.tried, "unreachable": self.unreachable}
+        if not self.blockers:
+            if np.isfinite(self.nearest):
+                numbers["nearest_distance"] = self.nearest
+            raise MotionFailed(
+                "no_inverse_kinematics",
+                f"{what}: no joint values reach any of {self.tried} tool poses (nearest {self.nearest:.3f} m)",
+                objects,
+                numbers,
+            )
+        name, hits = self.blockers.most_common(1)[0]
+        numbers |= {"collisions": self.blockers.total(), "hits": hits}
+        if name in self.depths:
+            numbers["depth"] = self.depths[name]
+        kind = "goal_in_collision" if self.last is None else self.last.failure.kind
+        raise MotionFailed(
+            kind,
+            f"{what}: {self.tried} tool poses tried, {self.unreachable} out of reach; "
+            f"{name} was in the way most often ({hits} of {self.blockers.total()} times)",
+            (*objects, name),
+            numbers,
+        )
+
+
+class ArmPlanner:
+    """Arm motions from one base pose in a world model."""
+
+    def __init__(self, model: WorldModel, random: np.random.Generator, samples: int) -> None:
+        self.model = model
+        self.random = random
+        self.samples = samples
+        self.space = SearchSpace(model.chain.lower, model.chain.upper, ARM_RESOLUTION)
+        self.reach = reach(model.chain)
+
+    def reachable(self, base: np.ndarray, world_from_tool: np.ndarray, tally: Tally, starts: int = 6) -> np.ndarray | None:
+        """Return arm values (7,) for a tool pose, or None (counted in the tally)."""
+        tally.tried += 1
+        distance = shoulder_distance(base, world_from_tool, self.model.description)
+        if distance > self.reach:
+            tally.unreachable += 1
+            tally.nearest = min(tally.nearest, distance - self.reach)
+            return None
+        guesses = np.concatenate([self.model.description.carry[None], random_starts(self.model.chain, starts, self.random)])
+        target = in_arm_frame(base, world_from_tool, self.model.description)
+        solution = inverse_kinematics(self.model.chain, target, guesses)
+        if not solution.found:
+            tally.unreachable += 1
+            tally.nearest = min(tally.nearest, solution.position_error)
+            return None
+        return solution.arm
+
+    def free(self, base: np.ndarray, arm: np.ndarray, tally: Tally) -> bool:
+        """Whether a configuration is free; a collision is counted in the tally."""
+        collision = self.model.checker.check(np.concatenate([base, arm]))
+        if collision is not None:
+            tally.collided(collision)
+        return collision is None
+
+    def line(
+        self, base: np.ndarray, start: np.ndarray, world_from_goal: np.ndarray, tally: Tally
+    ) -> np.ndarray | None:
+        """Return arm values (K, 7) from `start` (7,) included along a straight line of the tool; None if not free."""
+        here = base_pose(base, self.model.description) @ forward(self.model.chain, start)
+        return self.along(base, start, straight_poses(here, world_from_goal), tally)
+
+    def along(
+        self, base: np.ndarray, start: np.ndarray, world_from_tools: list[np.ndarray], tally: Tally
+    ) -> np.ndarray | None:
+        """Return arm values (K + 1, 7) from `start` through tool poses; None (tallied) if not free."""
+        frame = inverse(base_pose(base, self.model.description))
+        try:
+            arms = follow(self.model.chain, [frame @ pose for pose in world_from_tools], start)
+        except MotionFailed as failed:
+            tally.unreachable += 1
+            tally.nearest = min(tally.nearest, failed.failure.numbers["distance"])
+            return None
+        path = np.concatenate([start[None], arms])
+        found = first_collision(densify(path, ARM_RESOLUTION), lambda arm: self._check(base, arm))
+        if found is not None:
+            tally.collided(found[1])
+            return None
+        return path
+
+    def _check(self, base: np.ndarray, arm: np.ndarray) -> Collision | None:
+        return self.model.checker.check(np.concatenate([base, arm]))
+
+    def path(self, base: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
+        """Return a free joint path (N, 7). Raises MotionFailed as rrt_connect does."""
+        return rrt_connect(
+            start, goal, lambda arm: self._check(base, arm), self.space, self.random, samples=self.samples
+        )
+
+    def folded(self, base: np.ndarray, arm: np.ndarray, tally: Tally) -> np.ndarray | None:
+        """Return arm values (7,) with the tool drawn in over the pedestal, its tilt kept: what is held stays upright."""
+        world_from_tool = base_pose(base, self.model.description) @ forward(self.model.chain, arm)
+        approach = world_from_tool[:3, 2]
+        heading = np.arctan2(approach[1], approach[0])
+        steep = float(np.linalg.norm(approach[:2])) < 0.2
+        turns = np.linspace(-np.pi, np.pi, 8, endpoint=False) if steep else np.array([0.0, 0.5, -0.5, 1.0, -1.0])
+        for turn in turns:
+            for forward_distance, height in ((0.38, 0.5), (0.42, 0.35), (0.45, 0.6), (0.35, 0.7)):
+                pose = world_from_tool.copy()
+                change = turn if steep else float(base[2]) - heading + turn
+                pose[:3, :3] = transform_from_yaw(change, np.zeros(3))[:3, :3] @ world_from_tool[:3, :3]
+                direction = np.array([np.cos(base[2]), np.sin(base[2])])
+                pose[:2, 3] = base[:2] + forward_distance * direction
+                pose[2, 3] = self.model.description.pedestal_height + height
+                solution = self.reachable(base, pose, tally)
+                if solution is not None and self.free(base, solution, tally):
+                    return solution
+        return None

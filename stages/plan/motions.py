@@ -1,0 +1,44 @@
+"""Motions as data: pieces of path of the whole body, with what the fingers do at their ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A piece of motion: a path, then an event of the gripper."""
+
+    path: np.ndarray
+    """(N, 10): base x, y [m], yaw [rad] and arm (7,) [rad]; straight between rows."""
+    opening: float
+    """Distance of the fingers during the path [m]."""
+    pace: float = 1.0
+    """Share of the full speed."""
+    event: Literal["", "grasp", "release"] = ""
+    item: str | None = None
+    """What is grasped or released."""
+
+
+@dataclass(frozen=True)
+class Manipulation:
+    """What the robot does from one place of its base: segments that start and end with the arm folded."""
+
+    base: np.ndarray
+    """(3,)"""
+    segments: tuple[Segment, ...]
+    joint_values: dict[str, float] = field(default_factory=dict)
+    """Values of scene joints after it."""
+    item_pose: np.ndarray | None = None
+    """world_from_item after a place."""
+    tool_from_item: np.ndarray | None = None
+    body_from_tool: np.ndarray | None = None
+    """The grasp, after a pick."""
+
+
+def whole_body(base: np.ndarray, arms: np.ndarray) -> np.ndarray:
+    """Return (N, 10) rows of one base pose (3,) with arm values (N, 7)."""
+    return np.concatenate([np.tile(base, (len(arms), 1)), arms], axis=1)

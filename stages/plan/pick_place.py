@@ -1,0 +1,365 @@
+"""Geometry of picking and placing: grasps, places to put down, base poses, and the motions between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+
+from schemas.scene_parts import SurfacePlane
+from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from stages.kit.motion.base_placement import free_bases, sample_bases
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.grasps import Grasp, narrowest_width, sample_grasps
+from stages.kit.simulation.robot import Configuration
+from stages.plan.arm_motion import ArmPlanner, Tally
+from stages.plan.motions import Manipulation, Segment, whole_body
+from stages.plan.world_model import RobotState, WorldModel
+
+APPROACH = 0.10
+LIFT = 0.03
+PUT_DOWN_HEIGHT = 0.006
+EDGE_MARGIN = 0.03
+SLOW = 0.35
+
+
+@dataclass(frozen=True)
+class Budgets:
+    """How much a query may try; counts, never seconds."""
+
+    bases: int
+    """Base poses drawn; a quarter as many free ones are used."""
+    pairs: int
+    """Pairs of base pose and tool pose given to inverse kinematics."""
+    path_samples: int
+    paths: int
+    """Joint-space path searches per query."""
+
+
+def _pairs(bases: np.ndarray, others: int, random: np.random.Generator, most: int) -> Iterator[tuple[int, int]]:
+    """Yield (base, other) index pairs, each once: early ones favour the first of the others (they are ranked)."""
+    if len(bases) == 0 or others == 0:
+        return
+    window = 24
+    pairs = [(base, other) for start in range(0, others, window) for other in range(start, min(start + window, others))
+             for base in range(len(bases))]  # fmt: skip
+    keys = [pair[1] // window + random.random() for pair in pairs]
+    for index in islice(np.argsort(keys, kind="stable").tolist(), most):
+        yield pairs[index]
+
+
+def _retreat(world_from_tool: np.ndarray, distance: float) -> np.ndarray:
+    """Return the tool pose drawn back against its approach [m]."""
+    pose = world_from_tool.copy()
+    pose[:3, 3] -= distance * pose[:3, 2]
+    return pose
+
+
+def _shifted(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    moved = pose.copy()
+    moved[:3, 3] += shift
+    return moved
+
+
+def _bases_around(
+    model: WorldModel, state: RobotState, target: np.ndarray, budgets: Budgets, random: np.random.Generator, tally: Tally,
+    fixed: np.ndarray | None,
+) -> np.ndarray:  # fmt: skip
+    if fixed is not None:
+        return fixed[None]
+    bases = sample_bases(target, model.room, budgets.bases, random)
+    return free_bases(bases, state.arm, model.checker, tally.blockers, budgets.bases // 4)
+
+
+def plan_pick(
+    model: WorldModel,
+    state: RobotState,
+    item: str,
+    source: str,
+    budgets: Budgets,
+    random: np.random.Generator,
+    preferred: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Manipulation:
+    """Return the motion that takes `item` off (or out of) `source`, base pose included.
+
+    `preferred` (base (3,), body_from_tool (4, 4)) is tried first. Raises MotionFailed: `no_grasp` when the item is
+    too wide for the gripper, otherwise what ended most attempts.
+    """
+    world_from_item = model.pose(item)
+    points = model.points(item)
+    grasps = sample_grasps(points, world_from_item, opening=model.description.opening, random=random)
+    if not grasps:
+        width = narrowest_width(apply(world_from_item, points))
+        raise MotionFailed(
+            "no_grasp",
+            f"{item} is {width:.3f} m wide at its narrowest, the gripper opens {model.description.opening:.3f} m",
+            (item,),
+            {"width": width, "opening": model.description.opening},
+        )
+    tally = Tally()
+    checker = model.checker
+    arm_planner = ArmPlanner(model, random, budgets.path_samples)
+    paths = budgets.paths
+    bases = _bases_around(model, state, world_from_item[:3, 3], budgets, random, tally, None)
+    queue = [(bases[i], grasps[j]) for i, j in _pairs(bases, len(grasps), random, budgets.pairs)]
+    if preferred is not None:
+        queue.insert(0, (preferred[0], Grasp(preferred[1], 0.0, 0.0)))
+    checker.allow(touch=model.links(item))
+    try:
+        for base, grasp in queue:
+            found = _try_pick(model, state, item, source, base, grasp, arm_planner, tally)
+            if isinstance(found, Manipulation):
+                return found
+            if found is not None:
+                paths -= 1
+                if paths == 0:
+                    break
+    finally:
+        checker.put_down(world_from_item)
+        checker.allow()
+    tally.raise_for(f"pick({item}, {source})", (item, source))
+    raise AssertionError("unreachable")
+
+
+def _try_pick(
+    model: WorldModel, state: RobotState, item: str, source: str, base: np.ndarray, grasp: Grasp,
+    arm_planner: ArmPlanner, tally: Tally,
+) -> Manipulation | MotionFailed | None:  # fmt: skip
+    """Return the motion, None when a cheap test fails, or the failure of a path search (they are counted)."""
+    world_from_item = model.pose(item)
+    world_from_tool = world_from_item @ grasp.body_from_tool
+    checker = model.checker
+    opening = model.description.opening
+    model.robot.set(_open(state, opening))
+    checker.allow(touch=model.links(item))
+    arm = arm_planner.reachable(base, world_from_tool, tally)
+    if arm is None or not arm_planner.free(base, arm, tally):
+        return None
+    approach = arm_planner.line(base, arm, _retreat(world_from_tool, APPROACH), tally)
+    if approach is None:
+        return None
+    approach = approach[::-1]
+    # With the item in hand: up a little, then back out the way the hand came, or further up.
+    tool_from_item = inverse(world_from_tool) @ world_from_item
+    rest = (*model.links(source), *_supports(model, item))
+    lifted = None
+    checker.carry(item, tool_from_item)
+    checker.allow(touch=model.links(item), rest_on=rest)
+    try:
+        for lift in (LIFT, 0.012):
+            up = arm_planner.line(base, arm, _shifted(world_from_tool, np.array([0, 0, lift])), tally)
+            if up is None:
+                continue
+            checker.allow(touch=model.links(item))
+            steep = grasp.pitch > 1.2
+            for distance in (0.25, 0.15):
+                goal = _shifted(world_from_tool, np.array([0.0, 0.0, lift]))
+                flat = goal[:3, 2] * np.array([1, 1, 0])
+                shift = np.array([0, 0, distance]) if steep else -flat / max(np.linalg.norm(flat), 1e-6) * distance
+                back = arm_planner.line(base, up[-1], _shifted(goal, shift), tally)
+                if back is not None:
+                    lifted = np.concatenate([up, back[1:]])
+                    break
+            if lifted is not None:
+                break
+            checker.allow(touch=model.links(item), rest_on=rest)
+        if lifted is None:
+            return None
+        checker.allow(touch=model.links(item))
+        folded = arm_planner.folded(base, lifted[-1], tally)
+        if folded is None:
+            return None
+        try:
+            home = arm_planner.path(base, lifted[-1], folded)
+        except MotionFailed as failed:
+            tally.failed(failed)
+            return failed
+    finally:
+        checker.put_down(world_from_item)
+        checker.allow(touch=model.links(item))
+    model.robot.set(_open(state, opening))
+    checker.allow()
+    try:
+        reach = arm_planner.path(base, state.arm, approach[0])
+    except MotionFailed as failed:
+        tally.failed(failed)
+        return failed
+    return Manipulation(
+        base,
+        (
+            Segment(whole_body(base, reach), opening),
+            Segment(whole_body(base, approach), opening, SLOW, "grasp", item),
+            Segment(whole_body(base, lifted), 0.0, SLOW, "", item),
+            Segment(whole_body(base, home), 0.0, 0.6, "", item),
+        ),
+        tool_from_item=tool_from_item,
+        body_from_tool=grasp.body_from_tool,
+    )
+
+
+def _open(state: RobotState, opening: float) -> Configuration:
+    return Configuration(state.base, state.arm, opening)
+
+
+def _supports(model: WorldModel, item: str) -> tuple[str, ...]:
+    """Return the links of what the item's record says it stands on."""
+    parent = model.records[item].parent
+    return model.links(parent) if parent in model.records else ()
+
+
+def plan_place(
+    model: WorldModel,
+    state: RobotState,
+    item: str,
+    surface: str,
+    budgets: Budgets,
+    random: np.random.Generator,
+    preferred: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Manipulation:
+    """Return the motion that puts the held `item` down on (or in) `surface`, base pose included.
+
+    `preferred` (base (3,), world_from_item (4, 4)) is tried first. Raises MotionFailed: `no_placement` when no
+    horizontal plane of the surface carries the item's footprint, otherwise what ended most attempts.
+    """
+    assert state.tool_from_item is not None
+    places = sample_placements(model, item, surface, random)
+    if not places and preferred is None:
+        planes = [plane for plane in model.planes[surface] if plane.horizontal]
+        raise MotionFailed(
+            "no_placement",
+            f"{surface} has no free horizontal plane that carries {item} ({len(planes)} planes)",
+            (item, surface),
+            {"planes": len(planes)},
+        )
+    tally = Tally()
+    arm_planner = ArmPlanner(model, random, budgets.path_samples)
+    paths = budgets.paths
+    checker = model.checker
+    queue: list[tuple[np.ndarray, np.ndarray]] = [] if preferred is None else [preferred]
+    model.robot.set(_open(state, model.description.opening))
+    checker.carry(item, state.tool_from_item)
+    checker.allow(touch=model.links(item))
+    for place in places[: max(4, budgets.bases // 16)]:
+        bases = sample_bases(place[:3, 3], model.room, budgets.bases // 8, random)
+        bases = free_bases(bases, state.arm, checker, tally.blockers, 4)
+        queue += [(base, place) for base in bases]
+    try:
+        for base, place in queue[: budgets.pairs]:
+            found = _try_place(model, state, item, surface, base, place, arm_planner, tally)
+            if isinstance(found, Manipulation):
+                return found
+            if found is not None:
+                paths -= 1
+                if paths == 0:
+                    break
+    finally:
+        checker.carry(item, state.tool_from_item)
+        checker.allow()
+    tally.raise_for(f"place({item}, {surface})", (item, surface))
+    raise AssertionError("unreachable")
+
+
+def sample_placements(
+    model: WorldModel, item: str, surface: str, random: np.random.Generator, count: int = 48
+) -> list[np.ndarray]:
+    """Return poses world_from_item (4, 4), upright, a hair above the horizontal planes of `surface`.
+
+    The planes with the largest area come first; the item's footprint circle stays `EDGE_MARGIN` inside the rectangle.
+    """
+    points = model.points(item)
+    radius = float(np.linalg.norm(points[:, :2], axis=1).max())
+    bottom = float(points[:, 2].min())
+    places = []
+    planes = [plane for plane in model.planes[surface] if plane.horizontal and len(plane.corners) == 4]
+    for plane in sorted(planes, key=lambda entry: -entry.area):
+        corners = np.array(plane.corners)
+        origin, along, across = corners[0], corners[1] - corners[0], corners[3] - corners[0]
+        lengths = np.array([np.linalg.norm(along), np.linalg.norm(across)])
+        inset = (radius + EDGE_MARGIN) / np.maximum(lengths, 1e-6)
+        if (inset >= 0.5).any():
+            continue
+        for _ in range(count):
+            share = random.uniform(inset, 1 - inset)
+            position = origin + share[0] * along + share[1] * across
+            position[2] = _height(plane, position) - bottom + PUT_DOWN_HEIGHT
+            places.append(transform_from_yaw(random.uniform(-np.pi, np.pi), position))
+    return places
+
+
+def _height(plane: SurfacePlane, position: np.ndarray) -> float:
+    normal = np.array(plane.normal)
+    return float(-(plane.offset + normal[:2] @ position[:2]) / normal[2])
+
+
+def _try_place(
+    model: WorldModel, state: RobotState, item: str, surface: str, base: np.ndarray, place: np.ndarray,
+    arm_planner: ArmPlanner, tally: Tally,
+) -> Manipulation | MotionFailed | None:  # fmt: skip
+    assert state.tool_from_item is not None
+    checker = model.checker
+    item_from_tool = inverse(state.tool_from_item)
+    model.robot.set(_open(state, model.description.opening))
+    checker.carry(item, state.tool_from_item)
+    touch, rest = model.links(item), model.links(surface)
+    checker.allow(touch=touch, rest_on=rest)
+    # The yaw in which the hand points away from the base is the one an arm likes; the sampled yaw varies it.
+    outward = np.arctan2(*(place[:2, 3] - base[:2])[::-1])
+    hand = item_from_tool[:3, 2]
+    steep = abs(hand[2]) > 0.95
+    for wish in (0.0, 0.6, -0.6):
+        yaw = float(np.arctan2(place[1, 0], place[0, 0])) if steep else outward - np.arctan2(hand[1], hand[0])
+        upright = transform_from_yaw(yaw + wish, place[:3, 3])
+        world_from_tool = upright @ item_from_tool
+        arm = arm_planner.reachable(base, world_from_tool, tally)
+        if arm is None or not arm_planner.free(base, arm, tally):
+            continue
+        inside = model.records[surface].contains
+        above = _shifted(world_from_tool, np.array([0, 0, LIFT if inside else APPROACH]))
+        down = arm_planner.line(base, arm, above, tally)
+        if down is None:
+            continue
+        checker.allow(touch=touch)
+        if inside:
+            flat = above[:3, 2] * np.array([1, 1, 0])
+            out = arm_planner.line(base, down[-1], _shifted(above, -0.25 * flat), tally)
+            if out is None:
+                checker.allow(touch=touch, rest_on=rest)
+                continue
+            down = np.concatenate([down, out[1:]])
+        break
+    else:
+        return None
+    try:
+        reach = arm_planner.path(base, state.arm, down[-1])
+    except MotionFailed as failed:
+        tally.failed(failed)
+        return failed
+    checker.put_down(upright)
+    try:
+        opening = model.description.opening
+        model.robot.set(_open(state, opening))
+        checker.allow(touch=touch)
+        away_pose = _retreat(world_from_tool, APPROACH + 0.02)
+        away = arm_planner.line(base, arm, away_pose, tally)
+        if away is None:
+            return None
+        checker.allow()
+        try:
+            home = arm_planner.path(base, away[-1], model.description.carry)
+        except MotionFailed as failed:
+            tally.failed(failed)
+            return failed
+    finally:
+        checker.carry(item, state.tool_from_item)
+    return Manipulation(
+        base,
+        (
+            Segment(whole_body(base, reach), 0.0, 0.6, "", item),
+            Segment(whole_body(base, down[::-1]), 0.0, SLOW, "release", item),
+            Segment(whole_body(base, away), opening, SLOW),
+            Segment(whole_body(base, home), opening),
+        ),
+        item_pose=upright,
+    )

@@ -1,0 +1,159 @@
+"""What the robot believes: the scene in a pybullet world used only for geometry, and the state of its own body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from schemas.base import as_transform, as_vector
+from schemas.contact_graph import ContactGraphFile
+from schemas.errors import BadInput
+from schemas.interactive_scene import SceneBody
+from schemas.scene_parts import Joint, SurfacePlane
+from stages.kit.geometry.transforms import apply, inverse, quaternion_of, transform_from_quaternion
+from stages.kit.motion.collision import CollisionChecker
+from stages.kit.motion.kinematics import ArmChain, arm_chain
+from stages.kit.simulation.robot import Configuration, Robot
+from stages.kit.simulation.robot_description import RobotDescription
+from stages.kit.simulation.shapes import link_shapes, surface_points
+from stages.kit.simulation.world import PhysicsWorld, read_scene_bodies
+
+
+@dataclass(frozen=True)
+class RobotState:
+    """Where the robot stands between two actions, and what it holds."""
+
+    base: np.ndarray
+    arm: np.ndarray
+    holding: str | None = None
+    tool_from_item: np.ndarray | None = None
+    body_from_tool: np.ndarray | None = None
+    """The grasp with which it holds."""
+
+
+class WorldModel:
+    """The scene as the robot believes it, with a robot in it. Nothing moves by physics here."""
+
+    def __init__(self, root: Path, graph: ContactGraphFile, description: RobotDescription, clearance: float) -> None:
+        self.description = description
+        self.chain: ArmChain = arm_chain(description)
+        self.world = PhysicsWorld()
+        self.records: dict[str, SceneBody] = {}
+        self._texts: dict[str, str] = {}
+        self.planes: dict[str, tuple[SurfacePlane, ...]] = {}
+        nodes = {node.id: node for node in graph.nodes}
+        for name, (record, text) in read_scene_bodies(root).items():
+            self.records[name], self._texts[name] = record, text
+            self.planes[name] = nodes[name].planes if name in nodes else ()
+            self.world.add_body(record, text)
+        self.robot = Robot(self.world, description)
+        self.checker = CollisionChecker(self.world, self.robot, clearance)
+        self.robot.set(Configuration(np.zeros(3), description.carry, description.opening))
+        self.room = self._room()
+        self._points: dict[str, np.ndarray] = {}
+
+    def close(self) -> None:
+        """End the pybullet world."""
+        self.world.close()
+
+    def _room(self) -> tuple[np.ndarray, np.ndarray]:
+        floors = [name for name, record in self.records.items() if record.class_name == "floor"]
+        bounds = [self.world.bounds(name) for name in floors or self.records]
+        if not bounds:
+            raise BadInput("the scene has no bodies", hint="look at scene.json")
+        return np.min([low[:2] for low, _ in bounds], axis=0), np.max([high[:2] for _, high in bounds], axis=0)
+
+    # --- beliefs ----------------------------------------------------------------------------------------------
+
+    def see(self, name: str, record: SceneBody, text: str, planes: tuple[SurfacePlane, ...]) -> None:
+        """Replace what is believed of a body: pose, joint values and shape (what a look from near by tells)."""
+        if name in self.records:
+            self.world.remove_body(name)
+        record = record.model_copy(update={"name": name})
+        self.records[name], self._texts[name], self.planes[name] = record, text, planes
+        self._points.pop(name, None)
+        self.world.add_body(record, text)
+        self.checker.add_body(name)
+
+    def forget(self, name: str) -> None:
+        """Take a body out of what is believed."""
+        self.world.remove_body(name)
+        del self.records[name], self._texts[name]
+        self.planes.pop(name, None)
+
+    def pose(self, name: str) -> np.ndarray:
+        """Return world_from_body (4, 4)."""
+        return self.world.pose(name)
+
+    def joint_value(self, name: str, joint: str) -> float:
+        """Return the believed value of a joint."""
+        return self.world.joint_value(name, joint)
+
+    def joint(self, name: str, joint: str) -> Joint:
+        """Return a joint of a body by its prefixed name. Raises KeyError."""
+        return next(entry for entry in self.records[name].joints if entry.name == joint)
+
+    def links(self, name: str) -> tuple[str, ...]:
+        """Return the link names of a body."""
+        return tuple(self.world.bodies[name].links)
+
+    # --- geometry ---------------------------------------------------------------------------------------------
+
+    def points(self, name: str, count: int = 3000) -> np.ndarray:
+        """Return (count, 3) points on the surface of a rigid body, body frame; the same ones every time."""
+        if name not in self._points:
+            meshes = [mesh for entries in link_shapes(self._texts[name]).values() for mesh in entries]
+            self._points[name] = surface_points(meshes, count, np.random.default_rng(0))
+        return self._points[name]
+
+    def part_mesh(self, name: str, link: str) -> trimesh.Trimesh:
+        """Return the collision mesh of a link in the body frame with all joints at 0. Raises KeyError."""
+        meshes = link_shapes(self._texts[name])[link]
+        with self.joints_at(name, {joint: 0.0 for joint in self.world.bodies[name].joints}):
+            body_from_link = inverse(self.pose(name)) @ self.world.link_pose(name, link)
+        mesh = trimesh.util.concatenate([trimesh.Trimesh(part.vertices, part.faces, process=False) for part in meshes])
+        mesh.apply_transform(body_from_link)
+        return mesh
+
+    @contextmanager
+    def joints_at(self, name: str, values: dict[str, float]) -> Iterator[None]:
+        """Put joints of a body at values for a while."""
+        before = {joint: self.joint_value(name, joint) for joint in values}
+        try:
+            for joint, value in values.items():
+                self.world.set_joint(name, joint, value)
+            yield
+        finally:
+            for joint, value in before.items():
+                self.world.set_joint(name, joint, value)
+
+    def extent_up(self, name: str, world_from_body: np.ndarray) -> tuple[float, float]:
+        """Return the lowest and highest z [m] of a rigid body put at a pose (4, 4)."""
+        heights = apply(world_from_body, self.points(name))[:, 2]
+        return float(heights.min()), float(heights.max())
+
+    def opening_for(self, grip: float) -> float:
+        """Return a finger distance [m] a little wider than `grip`, within what the gripper can."""
+        return float(min(self.description.opening, grip))
+
+
+def moved_record(record: SceneBody, world_from_body: np.ndarray, joint_values: dict[str, float]) -> SceneBody:
+    """Return the record with another pose and joint values; the box moves along."""
+    change = world_from_body @ inverse(np.array(record.world_from_body))
+    old = transform_from_quaternion(np.array(record.box.orientation), np.array(record.box.center))
+    new = change @ old
+    orientation = tuple(float(value) for value in quaternion_of(new))
+    box = record.box.model_copy(update={"center": as_vector(new[:3, 3]), "orientation": orientation})
+    return record.model_copy(
+        update={"world_from_body": as_transform(world_from_body), "joint_values": joint_values, "box": box}
+    )
+
+
+def with_state(state: RobotState, **changes: object) -> RobotState:
+    """Return the state with some fields changed."""
+    return replace(state, **changes)  # type: ignore[arg-type]
