@@ -8,7 +8,8 @@ from schemas.scene_parts import Camera
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import apply
 
-STRIDE = 8
+STRIDE_ANGLE = 0.014
+"""Angle between neighbouring samples [rad]: 8 pixels of a Kinect at 640x480."""
 SMALLEST_DEPTH, LARGEST_DEPTH = 0.3, 5.0
 
 
@@ -18,7 +19,8 @@ def surface_samples(depth: np.ndarray, camera: Camera, world_from_camera: np.nda
     `depth` is (H, W) float32 [m], 0 = invalid. Normals come from differences over two strides, so that
     quantisation and noise of the depth do not dominate; pixels at depth edges are left out.
     """
-    points = back_project(depth, camera)[::STRIDE, ::STRIDE].astype(np.float64)
+    stride = max(1, round(STRIDE_ANGLE * camera.fx))
+    points = back_project(depth, camera)[::stride, ::stride].astype(np.float64)
     valid = (points[..., 2] > SMALLEST_DEPTH) & (points[..., 2] < LARGEST_DEPTH)
     if min(points.shape[:2]) < 3:
         return np.zeros((0, 3)), np.zeros((0, 3))

@@ -73,7 +73,7 @@ def test_without_a_floor_the_camera_decides() -> None:
     world_from_true = np.array(gravity.world_from_log) @ TILT
     assert world_from_true[2, 2] > math.cos(math.radians(15))
     heights = apply(np.array(gravity.world_from_log), cloud[0])[:, 2]
-    assert abs(np.percentile(heights, 1)) < 1e-6
+    assert abs(np.percentile(heights, 1)) < 0.01
     with pytest.raises(BadInput, match="no floor"):
         align("floor", "z", None, logged, lambda: cloud, random)
 
