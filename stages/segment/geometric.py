@@ -215,8 +215,9 @@ def label_regions(
 ) -> np.ndarray:
     """Return geometric segment labels (H, W) int32, 0 = none, from an edge map (H, W) bool.
 
-    `points` (H, W, 3) [m], z = 0 without depth; `normals` (H, W, 3), zero where there is none. Connected (4-neighbour) regions without edges are segments; edge pixels join the nearest segment on their side of
-    a depth jump of `ratio`; a region under `minimum_pixels` joins the one large segment that surrounds it, or is none.
+    `points` (H, W, 3) [m], z = 0 without depth; `normals` (H, W, 3), zero where there is none. Connected
+    (4-neighbour) regions without edges are segments; edge pixels join the nearest segment on their side of a depth
+    jump of `ratio`; a region under `minimum_pixels` joins the one large segment that surrounds it, or is none.
     """
     _, labels = cv2.connectedComponents((~edges).astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
     small = np.bincount(labels.ravel()) < minimum_pixels

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from schemas.errors import BadInput, UsageError
+from schemas.errors import BadInput, MissingDependency, UsageError
 from schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
 from schemas.sequence import Sequence
 from schemas.vocabulary import load_vocabulary
@@ -44,7 +44,7 @@ def run(sequence: Sequence, weights: Path | None, *, parameters: SegmentParamete
         raise BadInput("this sequence has no depth", hint="compute it first: `scenewright disparity`")
     with FrameReader(sequence.path("frames.mcap")) as reader:
         with context.progress.step("prepare the backend"):
-            backend = choose_backend(sequence, reader, weights, parameters, context)
+            backend = choose_backend(sequence, reader, weights, parameters)
         annotations: list[FrameSegments] = []
 
         def images() -> Iterator[tuple[int, np.ndarray]]:
@@ -76,7 +76,7 @@ def run(sequence: Sequence, weights: Path | None, *, parameters: SegmentParamete
 
 
 def choose_backend(
-    sequence: Sequence, reader: FrameReader, weights: Path | None, parameters: SegmentParameters, context: Context
+    sequence: Sequence, reader: FrameReader, weights: Path | None, parameters: SegmentParameters
 ) -> Backend:
     """Return the backend that the parameters ask for. Raises UsageError, BadInput or MissingDependency."""
     vocabulary = load_vocabulary()
@@ -84,7 +84,38 @@ def choose_backend(
         raise UsageError("--corruption is for --backend ground-truth alone")
     if parameters.backend == "geometric":
         return GeometricBackend(vocabulary)
+    if parameters.backend == "detector":
+        return _detector_backend(sequence, reader, weights, parameters)
     return GroundTruthBackend(sequence.info, vocabulary, parameters.corruption)
+
+
+def _detector_backend(
+    sequence: Sequence, reader: FrameReader, weights: Path | None, parameters: SegmentParameters
+) -> Backend:
+    # Imported here: the other backends do not need OpenCV's dnn module.
+    from stages.segment.backend_detector import DetectorBackend
+    from stages.segment.yolox import Detector
+
+    if weights is None:
+        raise MissingDependency(
+            "--backend detector needs the weights of a detector",
+            hint="give an ONNX export of a YOLOX model (COCO-80) with --weights, or use --backend geometric",
+        )
+    detector = Detector(
+        weights,
+        score_threshold=parameters.score_threshold,
+        suppression_overlap=parameters.suppression_overlap,
+        tile_side=min(reader.camera.width, reader.camera.height) if parameters.tiles else 0,
+    )
+    return DetectorBackend(
+        sequence.info,
+        reader,
+        load_vocabulary(),
+        detector,
+        weights=weights,
+        geometric=geometric_settings(parameters),
+        minimum_pixels=parameters.small_object_pixels,
+    )
 
 
 def segment_frame(
