@@ -51,8 +51,10 @@ class LibraryFile(Model):
 
 
 class CadLibrary(Artifact):
-    """Folder `models/<id>/`: `model.urdf` (self-contained, meshes by relative path), `visual/<part>.glb`,
-    `collision/<part>_<k>.obj` (convex)."""
+    """`library.json`, and per model a self-contained folder `models/<id>/`: `model.json` (its CadModel), `model.urdf`
+    (meshes by relative path), `visual/<part>.glb` (vertex colours) and `visual/<part>_<k>.obj` (the same, one file a
+    colour: what the URDF names, because pybullet refuses GLB), `collision/<part>_<k>.obj` (convex). Meshes are in the
+    part frame: origin at the joint, axes of the model frame at joint value 0; the body's is the model frame."""
 
     kind: ClassVar[str] = "cad_library"
     description: ClassVar[str] = "CAD models: URDF, visual and convex collision meshes, planes, joints, affordances"

@@ -16,22 +16,26 @@ from schemas.base import as_vector
 from schemas.scene_parts import SurfacePlane
 from stages.kit.geometry.solids import Solid
 
-COVER_GAP = 0.003
-"""What stands within this of a surface covers it [m] (a closed door before the edges of a carcass)."""
+COVER_GAPS = (0.0005, 0.003)
+"""What stands at these distances from a surface covers it [m] (a closed door before the edges of a carcass)."""
+CLEARANCES = (0.008, 0.02, 0.04)
+"""What hangs this little over a surface that looks up leaves no room to put things there [m]."""
 JOIN_GAP = 0.004
 """Regions of one horizontal plane closer than this are one support surface [m]."""
+MINIMUM_FILL = 0.6
+"""A support region fills at least this share of its rectangle (a disc 0.79): what is put on the rectangle's middle stands."""
 UPRIGHT = 0.9
 """-a_th of equation 2.1: a plane supports when its normal's z exceeds this."""
 
 
 def surface_planes(
-    solids: Sequence[Solid], *, minimum_share: float = 0.02, support_share: float = 0.004, support_width: float = 0.05
+    solids: Sequence[Solid], *, minimum_share: float = 0.02, support_share: float = 0.004, support_width: float = 0.06
 ) -> tuple[SurfacePlane, ...]:
     """Return the planes of flat facets, largest first.
 
-    A plane is kept when its exposed area is at least `minimum_share` of the surface of the bounding box; a horizontal
-    region that looks up needs `support_share`, and a rectangle at least `support_width` wide [m] (0.35 of the smaller
-    horizontal extent on small things). Horizontal planes are split into connected regions, others are not.
+    A plane is kept when its exposed area is at least `minimum_share` of the surface of the bounding box. Planes that look
+    up are supports: they are split into connected regions, strips narrower than `support_width` [m] (0.35 of the
+    smaller horizontal extent on small things) are cut off, and `support_share` is enough.
     """
     points = np.concatenate([solid.vertices for solid in solids])
     size = points.max(axis=0) - points.min(axis=0)
@@ -47,16 +51,18 @@ def surface_planes(
         union = shapely.union_all([_outline(corners @ basis.T) for corners in facets])
         if union.area < least:
             continue
-        height = offset - COVER_GAP
-        near = _bounds_reach(bounds, normal, height)
-        cover = [_section(solids[k].vertices, edges[k], normal, height, basis) for k in np.flatnonzero(near)]
+        gaps = COVER_GAPS + tuple(gap for gap in CLEARANCES if up and gap <= 0.25 * size[2])
+        cover = []
+        for height in (offset - gap for gap in gaps):
+            near = np.flatnonzero(_bounds_reach(bounds, normal, height))
+            cover += [_section(solids[k].vertices, edges[k], normal, height, basis) for k in near]
         exposed = union.difference(shapely.union_all([c for c in cover if c is not None]))
-        regions = _regions(exposed) if up else [exposed]
+        regions = _regions(exposed, width) if up else [exposed]
         for region in regions:
             if region.area < least:
                 continue
             corners, narrow = _rectangle(region)
-            if up and narrow < width:
+            if up and (narrow < width or not _can_be_stood_on(region, corners)):
                 continue
             anchor = -offset * normal
             middle = np.asarray(region.centroid.coords[0])
@@ -128,12 +134,19 @@ def _section(vertices: np.ndarray, edges: np.ndarray, normal: np.ndarray, height
     return outline if outline.area > 0 else None
 
 
-def _regions(exposed: shapely.Geometry) -> list[shapely.Geometry]:
-    """Return the connected regions, joined over gaps up to JOIN_GAP, slivers left out."""
-    half = 0.5 * JOIN_GAP
-    closed = exposed.buffer(half, join_style="mitre").buffer(-half, join_style="mitre")
-    parts = list(getattr(closed, "geoms", [closed]))
+def _regions(exposed: shapely.Geometry, width: float) -> list[shapely.Geometry]:
+    """Return the connected regions, joined over gaps up to JOIN_GAP, without strips narrower than about `width` [m]."""
+    half, strip = 0.5 * JOIN_GAP, 0.45 * width
+    with np.errstate(divide="ignore", invalid="ignore"):  # GEOS divides by zero at corners that are nearly straight
+        closed = exposed.simplify(1e-6).buffer(half, join_style="mitre").buffer(-half, join_style="mitre")
+        opened = closed.buffer(-strip, join_style="mitre").buffer(strip, join_style="mitre").intersection(closed)
+    parts = list(getattr(opened, "geoms", [opened]))
     return [part for part in parts if isinstance(part, Polygon) and not part.is_empty]
+
+
+def _can_be_stood_on(region: shapely.Geometry, corners: np.ndarray) -> bool:
+    """Whether the region fills most of its rectangle and its middle (no rim, no ring around a turntable)."""
+    return bool(region.area >= MINIMUM_FILL * Polygon(corners).area and region.contains(region.centroid))
 
 
 def _rectangle(region: shapely.Geometry) -> tuple[np.ndarray, float]:

@@ -7,7 +7,19 @@ import numpy as np
 from schemas.base import as_vector
 from schemas.scene_parts import Joint
 from stages.kit.geometry.solids import Solid, bar, box, cylinder
-from stages.library.design import APPLIANCE, DARK_PLASTIC, PLASTIC, SCREEN, STEEL, Design, Moving, Paint, bar_handle, painted
+from stages.library.design import (
+    APPLIANCE,
+    DARK_PLASTIC,
+    PLASTIC,
+    SCREEN,
+    STEEL,
+    Design,
+    Moving,
+    Paint,
+    Piece,
+    bar_handle,
+    painted,
+)
 from stages.library.families.storage import GAP
 
 WHITE = Paint((242, 244, 246), 220.0)
@@ -26,6 +38,15 @@ def _hollow(x: tuple[float, float], y: tuple[float, float], z: tuple[float, floa
     ]
 
 
+def _lined(x: tuple[float, float], z: tuple[float, float], depth: float, wall: float, paint: Paint) -> list[Piece]:
+    """The hollow body of a chamber: outer walls in `paint`, a white liner inside."""
+    skin = 0.006
+    outer = painted(paint, _hollow(x, (0.0, depth), z, wall - skin))
+    inset = wall - skin
+    inner = _hollow((x[0] + inset, x[1] - inset), (0.0, depth - inset), (z[0] + inset, z[1] - inset), skin)
+    return outer + painted(WHITE, inner)
+
+
 def _fridge_door(
     name: str, x: tuple[float, float], z: tuple[float, float], hinge: str, paint: Paint, metal: Paint, racks: list[float], wall: float,
     handle_height: float,
@@ -33,7 +54,8 @@ def _fridge_door(
     """A thick door; inside it trays at the given heights, each a floor, a rail and two ends."""
     thick, standoff, radius = 0.055, 0.055, 0.011
     face = -GAP - thick
-    pieces = painted(paint, box(x, (face, -GAP), z))
+    liner = -GAP - 0.006
+    pieces = painted(paint, box(x, (face, liner), z)) + painted(WHITE, box(x, (liner, -GAP), z))
     depth, rail = 0.085, 0.06
     inner = (x[0] + wall + 0.03, x[1] - wall - 0.03)
     for height in racks:
@@ -64,7 +86,7 @@ def fridge(random: np.random.Generator, style: int) -> Design:
     paint, metal = APPLIANCE.sample(random), STEEL.sample(random)
     hinge = "right" if random.random() < 0.7 else "left"
     wall, foot = 0.04, 0.03
-    x, y = (-width / 2, width / 2), (0.0, depth)
+    x = (-width / 2, width / 2)
     split = {"top_freezer": foot + 0.68 * (height - foot), "bottom_freezer": foot + 0.36 * (height - foot)}.get(kind)
     chambers = [(foot, height)] if split is None else [(foot, split), (split, height)]
     main = 1 if kind == "bottom_freezer" else 0
@@ -72,7 +94,7 @@ def fridge(random: np.random.Generator, style: int) -> Design:
     pieces += painted(DARK_PLASTIC.sample(random), box((x[0] + 0.02, x[1] - 0.02), (0.04, depth - 0.02), (0.0, foot)))
     for number, z in enumerate(chambers):
         name = "door" if number == main else "freezer_door"
-        pieces += painted(paint, _hollow(x, y, z, wall))
+        pieces += _lined(x, z, depth, wall, paint)
         inner = (z[0] + wall, z[1] - wall)
         span = (x[0] + wall, x[1] - wall)
         shelves = max(1, round((inner[1] - inner[0]) / 0.31)) if number == main else max(0, round((inner[1] - inner[0]) / 0.3) - 1)

@@ -44,7 +44,7 @@ def keyboard(random: np.random.Generator, style: int) -> Design:
     """Return a keyboard: a wedge with rows of key caps."""
     full = style % 2 == 0
     width, depth = float(random.uniform(0.42, 0.45) if full else random.uniform(0.29, 0.32)), float(random.uniform(0.125, 0.14))
-    case = Paint(PLASTIC.colors[0] if random.random() < 0.6 else PLASTIC.colors[1], 500.0)
+    case = Paint(PLASTIC.colors[(0, 1, 1, 0)[style % 4]], 500.0)
     dark = sum(case.color) < 300
     keys = Paint((70, 72, 78), 500.0) if dark else Paint((245, 245, 245), 500.0)
     x, y, low, high = width / 2, depth / 2, 0.012, 0.022
@@ -61,7 +61,7 @@ def keyboard(random: np.random.Generator, style: int) -> Design:
         inset = 0.0015
         points += [(a, b, c + 0.004) for a, b, c in ((left + inset, y0 + inset, z0), (right - inset, y0 + inset, z0),
                                                      (left + inset, y1 - inset, z1), (right - inset, y1 - inset, z1))]  # fmt: skip
-        pieces.extend(painted(keys, hull(np.array(points), curved=True)))
+        pieces.extend(painted(keys, hull(np.array(points))))
 
     blocks = [(-x + margin, x - margin if not full else x - 0.105)] + ([(x - 0.095, x - margin)] if full else [])
     for number, (left, right) in enumerate(blocks):

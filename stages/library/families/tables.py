@@ -85,5 +85,9 @@ def desk(random: np.random.Generator, style: int) -> Design:
                 pieces += painted(wood, box((x + 0.10, x + 0.14), (y - 0.02, y + 0.02), (0, under - 0.04)))
             for dx in (-0.12, 0.12):
                 pieces += painted(wood, box((x + dx - 0.02, x + dx + 0.02), (-depth / 2 + 0.06, depth / 2 - 0.06), (under - 0.04, under)))
-            pieces += painted(wood, box((x - 0.10, x + 0.10), (depth / 2 - 0.10, depth / 2 - 0.06), (0.20, 0.24)))
+            for sy in (-1, 1):
+                y = sy * (depth / 2 - 0.08)
+                pieces += painted(wood, box((x - 0.10, x + 0.10), (y - 0.015, y + 0.015), (0.28, 0.32)))
+            lower = (-depth / 2 + 0.10, depth / 2 - 0.10)
+            pieces += painted(wood, box((x + 0.105, x + 0.135), lower, (0.20, 0.24)), box((x - 0.135, x - 0.105), lower, (0.20, 0.24)))
     return Design("desk", tuple(pieces), recipe={"style": kind})

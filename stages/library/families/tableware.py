@@ -49,7 +49,11 @@ def _ear(foot: float, radius: float, height: float) -> list[Solid]:
     middle, tall, wide = 0.52 * height, 0.30 * height, 0.030
     attach = 0.5 * (foot + radius) - 0.002
     points = [np.array([attach + wide * np.cos(a), 0.0, middle + tall * np.sin(a)]) for a in angles]
-    return [bar(a, b, 0.0045, count=8) for a, b in zip(points[:-1], points[1:], strict=True)]
+    bars = []
+    for a, b in zip(points[:-1], points[1:], strict=True):
+        overlap = 0.0022 * (b - a) / np.linalg.norm(b - a)  # closes the wedge that the bend opens on the outside
+        bars.append(bar(a - overlap, b + overlap, 0.0045, count=8))
+    return bars
 
 
 def bowl(random: np.random.Generator, style: int) -> Design:
