@@ -36,6 +36,8 @@ class Material:
     pattern_from_world: np.ndarray = field(default_factory=lambda: np.eye(4))
     skirting: float = 0.0
     """Height of a painted skirting board over z = 0 [m]; 0 for none."""
+    only_wood: bool = False
+    """The pattern is on wood-coloured triangles alone (see is_wood); the gloss is everywhere."""
 
     def row(self) -> np.ndarray:
         """Return the material as one (ROW,) float32 row of the material table."""
@@ -48,6 +50,12 @@ class Material:
             self.seed % 4096,
         ]
         return np.asarray([*head, *self.pattern_from_world[:3].reshape(-1), self.skirting, 0.0], dtype=np.float32)
+
+
+def is_wood(srgb: np.ndarray) -> np.ndarray:
+    """Return (...,) bool: whether sRGB colours (..., 3) in 0..1 are browns and beiges as wood has them, no reds."""
+    red, green, blue = srgb[..., 0], srgb[..., 1], srgb[..., 2]
+    return (green > 0.6 * red) & (green < 0.88 * red) & (blue < 0.86 * green)
 
 
 @njit(cache=True)

@@ -62,14 +62,14 @@ def default_lights(minimum: np.ndarray, maximum: np.ndarray) -> tuple[AreaLight,
 class SceneRenderer:
     """Holds meshes in the world frame as one Embree scene.
 
-    `meshes` are `(instance id, mesh)` pairs with face, vertex or texture colours; `materials` add patterns and gloss by
+    `meshes` are `(instance id, mesh)` pairs with face, vertex or texture colours, or a soup made of such; `materials` add patterns and gloss by
     instance id. Without a light map the colour of a light is what a matt white surface that faces it returns, at any
     distance; with one it is the lamp's radiance. Raises BadInput for an empty scene.
     """
 
     def __init__(
         self,
-        meshes: Sequence[tuple[int, trimesh.Trimesh]],
+        meshes: Sequence[tuple[int, trimesh.Trimesh]] | TriangleSoup,
         *,
         lights: Sequence[AreaLight] | None = None,
         ambient: tuple[float, float, float] = (0.34, 0.35, 0.37),
@@ -81,7 +81,7 @@ class SceneRenderer:
         texel: float = 0.05,
         antialias: bool = True,
     ) -> None:
-        self.soup: TriangleSoup = build_soup(meshes, materials)
+        self.soup = meshes if isinstance(meshes, TriangleSoup) else build_soup(meshes, materials)
         self.scene = o3d.t.geometry.RaycastingScene()
         triangles = self.soup.triangles
         self.scene.add_triangles(
@@ -242,7 +242,7 @@ class SceneRenderer:
         order = np.argsort(radiance, kind="stable")
         cumulated = np.cumsum(area[order])
         median = radiance[order][np.searchsorted(cumulated, 0.5 * cumulated[-1])]
-        return float(0.42 / max(float(median), 1e-6))
+        return float(0.38 / max(float(median), 1e-6))
 
 
 class _Hits:

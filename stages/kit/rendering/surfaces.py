@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import trimesh
 from numba import njit
 
 from schemas.errors import BadInput
-from stages.kit.rendering.patterns import Material
+from stages.kit.rendering.patterns import Material, is_wood
 
 CREASE_COSINE = float(np.cos(np.deg2rad(40.0)))
 """Faces that meet at a sharper angle keep a hard edge."""
@@ -139,19 +139,23 @@ def build_soup(
             continue
         corners = corners[keep]
         normals = edge[keep] / length[keep, None]
+        srgb = _corner_colors(mesh)[keep]
+        rows = np.zeros(len(corners), dtype=np.int32)
         if instance in materials:
-            row = len(table)
-            table.append(materials[instance])
-        else:
-            row = 0
+            material = materials[instance]
+            rows[:] = len(table)
+            table.append(material)
+            if material.only_wood:
+                rows[~is_wood(srgb.mean(axis=1))] = len(table)
+                table.append(replace(material, pattern="plain"))
         parts.append(
             (
                 corners.astype(np.float32),
                 normals.astype(np.float32),
                 corner_normals(corners, normals),
-                srgb_to_linear(_corner_colors(mesh)[keep]),
+                srgb_to_linear(srgb),
                 np.full(len(corners), instance, dtype=np.int32),
-                np.full(len(corners), row, dtype=np.int32),
+                rows,
             )
         )
     if not parts:

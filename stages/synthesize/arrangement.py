@@ -1,0 +1,376 @@
+"""Fill a room by the rules of a recipe: nothing overlaps, everything rests on something, doors can swing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from schemas.cad_library import CadModel
+from schemas.errors import BadInput
+from stages.kit.geometry.transforms import transform_from_yaw
+from stages.synthesize.collision import CollisionWorld, PlacedShape, box_shape
+from stages.synthesize.furniture import Catalogue, Furnishing, main_joint
+from stages.synthesize.recipes import CLUTTER_FACTOR, Place, Recipe
+from stages.synthesize.shell import Room, build_room
+from stages.synthesize.support import SupportSurfaces
+
+ATTEMPTS = 160
+"""Poses tried for one object."""
+RESTARTS = 24
+"""Rooms begun before the recipe is given up."""
+HEADROOM = 1.9
+"""Height of the space that must stay free for people and robots [m]."""
+WALL, CENTRE_MARGIN, FLOOR_MARGIN, TOUCH = 0.0, 0.8, 0.04, 4e-4
+
+
+@dataclass(frozen=True)
+class PlacedObject:
+    """An object in the room."""
+
+    name: str
+    """`<class>_<instance>`."""
+    instance: int
+    class_name: str
+    furnishing: Furnishing
+    world_from_model: np.ndarray
+    parent: str
+    relation: str
+    """`supports`, `contains` or `carries_on_wall`."""
+    plane: int | None = None
+    """Index of the supporting plane in the parent's planes."""
+
+    def world_mesh(self) -> trimesh.Trimesh:
+        """Visual mesh in the world frame."""
+        mesh = self.furnishing.mesh.copy()
+        mesh.apply_transform(self.world_from_model)
+        return mesh
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """A furnished room."""
+
+    room: Room
+    objects: tuple[PlacedObject, ...]
+    first_object: int
+    """Instances below this are layout: 1 the floor, then walls and ceiling."""
+
+
+@dataclass(frozen=True)
+class _Pose:
+    """A pose under trial and what it would hang on."""
+
+    world_from_model: np.ndarray
+    parent: str
+    relation: str = "supports"
+    plane: int | None = None
+    at: str = ""
+    """Object whose free floor it may stand on (a chair at its desk)."""
+
+
+class _Impossible(Exception):
+    """This start of a room cannot be finished."""
+
+
+def arrange(recipe: Recipe, catalogue: Catalogue, clutter: str, seed: int) -> Arrangement:
+    """Furnish a room. The same recipe, library, clutter and seed give the same room.
+
+    Raises BadInput when a class is missing from the library, or when no start satisfies the recipe's least counts.
+    """
+    for place in recipe.place:
+        if place.count[0] > 0 and not catalogue.by_class.get(place.class_name):
+            raise BadInput(
+                f"the CAD library has no {place.class_name!r}, which the recipe needs",
+                hint="build the library with all classes",
+            )
+    reasons: list[str] = []
+    for start in range(RESTARTS):
+        random = np.random.default_rng([seed, 11, start])
+        try:
+            return _Arranger(recipe, catalogue, clutter, random).run()
+        except _Impossible as reason:
+            reasons.append(str(reason))
+    raise BadInput(
+        f"no room found for seed {seed} in {RESTARTS} starts; last: {reasons[-1]}",
+        hint="take another --seed or a lower --clutter",
+    )
+
+
+class _Arranger:
+    """One start: places rule after rule."""
+
+    def __init__(self, recipe: Recipe, catalogue: Catalogue, clutter: str, random: np.random.Generator) -> None:
+        self.recipe, self.catalogue, self.random = recipe, catalogue, random
+        self.clutter = CLUTTER_FACTOR[clutter]
+        self.room = build_room(recipe.shell, random)
+        self.objects: list[PlacedObject] = []
+        self.first_object = len(self.room.layouts) + 1
+        self.solid = CollisionWorld()
+        self.kept_free = CollisionWorld()
+        """Floor that must stay free, and what doors sweep; named by the owner."""
+        self.surfaces = SupportSurfaces()
+
+    def run(self) -> Arrangement:
+        """Apply all rules in order. Raises _Impossible."""
+        for place in self.recipe.place:
+            least, most = place.count
+            if place.clutter:
+                least, most = int(round(least * self.clutter)), int(round(most * self.clutter))
+            wanted = int(self.random.integers(least, most + 1))
+            placed = 0
+            for _ in range(wanted):
+                placed += self._place_one(place)
+            if placed < least:
+                raise _Impossible(f"{place.class_name}: {placed} of at least {least} placed ({place.where})")
+        return Arrangement(self.room, tuple(self.objects), self.first_object)
+
+    def _place_one(self, place: Place) -> bool:
+        models = [m for m in self.catalogue.by_class.get(place.class_name, []) if _suits(m, place)]
+        if not models:
+            return False
+        for k in self.random.permutation(len(models))[:4]:
+            furnishing = self._furnish(models[int(k)], place)
+            best: tuple[float, _Pose, PlacedShape] | None = None
+            accepted = 0
+            for pose in self._poses(furnishing, place):
+                shape = self._acceptable(furnishing, pose, place)
+                if shape is None:
+                    continue
+                accepted += 1
+                score = self._distance_to(place.near, pose) if place.near else 0.0
+                if best is None or score < best[0]:
+                    best = (score, pose, shape)
+                if not place.near or accepted >= 8:
+                    break
+            if best is not None:
+                self._commit(furnishing, best[1], best[2], place)
+                return True
+        return False
+
+    def _furnish(self, model: CadModel, place: Place) -> Furnishing:
+        joints: dict[str, float] = {}
+        if place.open is not None and model.joints:
+            joint = main_joint(model)
+            share = self.random.uniform(*place.open)
+            joints[joint.name] = round(joint.lower + share * (joint.upper - joint.lower), 4)
+        scale = (
+            round(float(self.random.uniform(*place.scale)), 3) if place.scale[0] < place.scale[1] else place.scale[0]
+        )
+        return self.catalogue.furnishing(model, joints, scale)
+
+    # Candidate poses, rule by rule.
+
+    def _poses(self, furnishing: Furnishing, place: Place) -> Iterator[_Pose]:
+        rule = {
+            "wall": self._at_wall,
+            "mounted": self._on_wall,
+            "centre": self._in_centre,
+            "floor": self._on_floor,
+            "around": self._around,
+            "front": self._around,
+            "on": self._on_surface,
+        }[place.where]
+        for _ in range(ATTEMPTS):
+            pose = rule(furnishing, place)
+            if pose is not None:
+                yield pose
+
+    def _turn(self, place: Place) -> float:
+        return float(self.random.uniform(-place.yaw_spread, place.yaw_spread)) if place.yaw_spread else 0.0
+
+    def _at_wall(self, furnishing: Furnishing, place: Place) -> _Pose | None:
+        size = furnishing.closed_size
+        wall = self.room.walls[int(self.random.integers(4))]
+        inward = wall.inward[:2]
+        along = np.array([-inward[1], inward[0]])
+        half_room = self.room.size[:2] / 2
+        length = float(abs(along) @ half_room) - size[0] / 2 - 0.01
+        if length <= 0:
+            return None
+        depth = float(abs(inward) @ half_room) - size[1] / 2 - self.random.uniform(*place.gap)
+        middle = along * self.random.uniform(-length, length) - inward * depth
+        yaw = _yaw_facing(inward) + self._turn(place)
+        return _Pose(transform_from_yaw(yaw, np.array([*middle, 0.0])), "floor_1")
+
+    def _on_wall(self, furnishing: Furnishing, place: Place) -> _Pose | None:
+        size = furnishing.closed_size
+        k = int(self.random.integers(4))
+        inward = self.room.walls[k].inward[:2]
+        along = np.array([-inward[1], inward[0]])
+        half_room = self.room.size[:2] / 2
+        length = float(abs(along) @ half_room) - size[0] / 2 - 0.05
+        if length <= 0:
+            return None
+        depth = float(abs(inward) @ half_room) - size[1] / 2
+        middle = along * self.random.uniform(-length, length) - inward * depth
+        low, high = place.height or (1.3, 1.5)
+        bottom = float(self.random.uniform(low, high))
+        if bottom + size[2] > self.room.size[2] - 0.02:
+            return None
+        pose = transform_from_yaw(_yaw_facing(inward), np.array([*middle, bottom]))
+        return _Pose(pose, f"wall_{2 + k}", "carries_on_wall", 0)
+
+    def _in_centre(self, furnishing: Furnishing, place: Place) -> _Pose | None:
+        spare = self.room.size[:2] / 2 - CENTRE_MARGIN - furnishing.closed_size[:2].min() / 2
+        if np.any(spare <= 0):
+            return None
+        middle = self.random.uniform(-spare, spare)
+        yaw = float(self.random.integers(4)) * np.pi / 2 + self._turn(place)
+        return _Pose(transform_from_yaw(yaw, np.array([*middle, 0.0])), "floor_1")
+
+    def _on_floor(self, furnishing: Furnishing, place: Place) -> _Pose | None:
+        spare = self.room.size[:2] / 2 - furnishing.closed_size[:2].max() / 2
+        middle = self.random.uniform(-spare, spare)
+        yaw = float(self.random.uniform(-np.pi, np.pi))
+        return _Pose(transform_from_yaw(yaw, np.array([*middle, 0.0])), "floor_1")
+
+    def _around(self, furnishing: Furnishing, place: Place) -> _Pose | None:
+        targets = [o for o in self.objects if o.class_name in place.of]
+        if not targets:
+            return None
+        target = targets[int(self.random.integers(len(targets)))]
+        size, own = target.furnishing.closed_size, furnishing.closed_size
+        side = 0 if place.where == "front" else int(self.random.integers(4))
+        direction = np.array([(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)][side])
+        across = np.array([-direction[1], direction[0]])
+        slack = max(0.0, float(abs(across) @ size[:2]) / 2 - own[0] / 2 - 0.02)
+        reach = float(abs(direction) @ size[:2]) / 2 + own[1] / 2 + self.random.uniform(*place.gap)
+        at = direction * reach + across * self.random.uniform(-slack, slack)
+        world = target.world_from_model
+        middle = world[:2, :2] @ at + world[:2, 3]
+        yaw = _yaw_facing(world[:2, :2] @ -direction) + self._turn(place)
+        return _Pose(transform_from_yaw(yaw, np.array([*middle, 0.0])), "floor_1", at=target.name)
+
+    def _on_surface(self, furnishing: Furnishing, place: Place) -> _Pose | None:
+        targets = [o for o in self.objects if o.class_name in place.of]
+        if not targets:
+            return None
+        target = targets[int(self.random.integers(len(targets)))]
+        found = self.surfaces.sample(target, furnishing, place, self.random)
+        if found is None:
+            return None
+        pose, plane, inside = found
+        relation = "contains" if inside and target.furnishing.model.contains else "supports"
+        return _Pose(pose, target.name, relation, plane)
+
+    # Whether a pose is good.
+
+    def _acceptable(self, furnishing: Furnishing, pose: _Pose, place: Place) -> PlacedShape | None:
+        """Return the shape at the pose, or None."""
+        on_something = place.where == "on"
+        lift = np.eye(4)
+        lift[2, 3] = 2.0 * TOUCH
+        trial = furnishing.shape.placed(lift @ pose.world_from_model)
+        if not self.room.holds(trial.minimum, trial.maximum):
+            return None
+        margin = place.spare if on_something else 0.015
+        if place.where == "floor":
+            margin = FLOOR_MARGIN
+        if self.solid.conflict(trial, margin, margins={pose.parent: TOUCH}) is not None:
+            return None
+        own = [name for name in self.kept_free.shapes if pose.at and name.startswith(f"{pose.at}/floor")]
+        if self.kept_free.conflict(trial, 0.0, without=own) is not None:
+            return None
+        swing = furnishing.swing
+        if swing is not None:
+            swept = swing.placed(lift @ pose.world_from_model)
+            if not self.room.holds(swept.minimum, swept.maximum):
+                return None
+            if self.solid.conflict(swept, 0.005) is not None or self.kept_free.conflict(swept, 0.0) is not None:
+                return None
+        for space in self._free_spaces(furnishing, pose, place):
+            if not self.room.holds(space.minimum, space.maximum) or self.solid.conflict(space) is not None:
+                return None
+        if place.room_beside > 0 and self._free_side(furnishing, pose, place) is None:
+            return None
+        if on_something and not self._roomy(furnishing, pose, place):
+            return None
+        return furnishing.shape.placed(pose.world_from_model)
+
+    def _free_spaces(self, furnishing: Furnishing, pose: _Pose, place: Place) -> list[PlacedShape]:
+        """The free floor that the rule wants in front."""
+        if place.room_in_front <= 0:
+            return []
+        size = furnishing.closed_size
+        low = np.array([-size[0] / 2, -size[1] / 2 - place.room_in_front, 0.03])
+        high = np.array([size[0] / 2, -size[1] / 2 - 0.002, HEADROOM])
+        return [box_shape(low, high).placed(pose.world_from_model)]
+
+    def _free_side(self, furnishing: Furnishing, pose: _Pose, place: Place) -> PlacedShape | None:
+        """A strip of free floor along one of the four sides, the first that is free, or None."""
+        half, deep = furnishing.closed_size / 2, place.room_beside
+        sides = [
+            ((-half[0], -half[1] - deep), (half[0], -half[1] - 0.002)),
+            ((half[0] + 0.002, -half[1]), (half[0] + deep, half[1])),
+            ((-half[0], half[1] + 0.002), (half[0], half[1] + deep)),
+            ((-half[0] - deep, -half[1]), (-half[0] - 0.002, half[1])),
+        ]
+        for low, high in sides:
+            strip = box_shape(np.array([*low, 0.03]), np.array([*high, HEADROOM])).placed(pose.world_from_model)
+            if self.room.holds(strip.minimum, strip.maximum) and self.solid.conflict(strip) is None:
+                return strip
+        return None
+
+    def _roomy(self, furnishing: Furnishing, pose: _Pose, place: Place) -> bool:
+        """Whether the gripper's space beside and above an item is free (it may reach into other kept-free floor)."""
+        if place.spare_beside <= 0 and place.spare_above <= 0:
+            return True
+        half = furnishing.closed_size / 2
+        low = np.array([-half[0] - place.spare_beside, -half[1], 0.02])
+        high = np.array([half[0] + place.spare_beside, half[1], 2 * half[2] + place.spare_above])
+        # Turned with the parent, not with the item: the gripper comes from the parent's front.
+        parent = next(o for o in self.objects if o.name == pose.parent)
+        frame = parent.world_from_model.copy()
+        frame[:3, 3] = pose.world_from_model[:3, 3]
+        return self.solid.conflict(box_shape(low, high).placed(frame)) is None
+
+    def _distance_to(self, class_name: str | None, pose: _Pose) -> float:
+        places = [o.world_from_model[:2, 3] for o in self.objects if o.class_name == class_name]
+        return min((float(np.linalg.norm(p - pose.world_from_model[:2, 3])) for p in places), default=0.0)
+
+    def _commit(self, furnishing: Furnishing, pose: _Pose, shape: PlacedShape, place: Place) -> None:
+        instance = self.first_object + len(self.objects)
+        name = f"{place.class_name}_{instance}"
+        spaces = self._free_spaces(furnishing, pose, place)
+        if place.room_beside > 0:
+            strip = self._free_side(furnishing, pose, place)
+            if strip is not None:
+                spaces.append(strip)
+        for k, space in enumerate(spaces):
+            self.kept_free.add(f"{name}/floor{k}", space)
+        if furnishing.swing is not None:
+            self.kept_free.add(f"{name}/swing", furnishing.swing.placed(pose.world_from_model))
+        self.solid.add(name, shape)
+        self.objects.append(
+            PlacedObject(
+                name,
+                instance,
+                place.class_name,
+                furnishing,
+                pose.world_from_model,
+                pose.parent,
+                pose.relation,
+                pose.plane,
+            )
+        )
+
+
+def _suits(model: CadModel, place: Place) -> bool:
+    size = np.asarray(model.states[0].box_maximum) - np.asarray(model.states[0].box_minimum)
+    if place.largest_extent is not None and max(size[:2]) > place.largest_extent:
+        return False
+    if place.largest_height is not None and size[2] > place.largest_height:
+        return False
+    if place.smallest_height is not None and size[2] < place.smallest_height:
+        return False
+    if place.open is not None and not model.joints:
+        return False
+    return not (place.graspable and model.grasp_width is None)
+
+
+def _yaw_facing(direction: np.ndarray) -> float:
+    """Return the yaw [rad] that turns a model's front (-y) to a direction (2,)."""
+    return float(np.arctan2(direction[1], direction[0]) + np.pi / 2)

@@ -1,0 +1,243 @@
+"""What a structured-light depth camera makes of the true depth.
+
+In the order of the light's way: pixels jump sideways across depth edges (Nguyen, Izadi & Lovell 2012, lateral noise),
+mix into flying pixels there, lie in the projector's shadow (Khoshelham & Elberink 2012), scatter along the ray with
+the axial noise of Nguyen et al., are quantised in disparity (Khoshelham & Elberink, eq. 3), and are lost where too
+little light comes back: out of range, at grazing incidence, on dark and on shiny surfaces (the loss laws are ours;
+their shape follows Mallick, Das & Majumdar 2014, section III).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, prange
+
+from schemas.scene_parts import Camera
+
+
+@dataclass(frozen=True)
+class DepthCamera:
+    """Constants of the sensor."""
+
+    minimum_range: float = 0.3
+    """[m]"""
+    maximum_range: float = 5.0
+    """[m]"""
+    baseline: float = 0.075
+    """Distance from projector to camera [m]; the projector is on the left."""
+    disparity_levels: float = 16.0
+    """Quantisation steps per pixel of disparity."""
+    jump_share: float = 0.6
+    """Share of the lateral jumps that lands on the other side's depth; half of the rest flies, half is lost."""
+    grazing_start: float = float(np.deg2rad(72.0))
+    grazing_end: float = float(np.deg2rad(86.0))
+    """Incidence between which the loss grows from none to all [rad]."""
+    dark_signal: float = 0.0012
+    """Returned signal, reflectance * cosine / z^2 [1/m^2], at which half of the pixels are lost."""
+    shine_loss: float = 0.5
+    """Share of pixels that a mirror-like surface loses when it is seen at 90 degrees off its normal."""
+    block: int = 3
+    """Losses come in blocks of this many pixels."""
+
+
+@njit(cache=True)
+def axial_sigma(z: float, incidence: float) -> float:
+    """Return the axial standard deviation [m] at depth z [m] and incidence angle [rad] (Nguyen et al. 2012, eq. 3-4):
+    0.0012 + 0.0019 (z - 0.4)^2, and 0.0001 / sqrt(z) * theta^2 / (pi/2 - theta)^2 on top. The angle is cut at 82
+    degrees, the end of their measurements."""
+    angle = min(incidence, 1.4312)
+    slanted = 0.0001 / np.sqrt(z) * angle * angle / (np.pi / 2 - angle) ** 2
+    return 0.0012 + 0.0019 * (z - 0.4) ** 2 + slanted
+
+
+@njit(cache=True)
+def lateral_sigma(incidence: float) -> float:
+    """Return the lateral standard deviation [px] at an incidence angle [rad] (Nguyen et al. 2012, eq. 2):
+    0.8 + 0.035 theta / (pi/2 - theta)."""
+    angle = min(incidence, 1.4312)
+    return 0.8 + 0.035 * angle / (np.pi / 2 - angle)
+
+
+@njit(cache=True)
+def quantisation_step(z: float, focal_length: float, baseline: float, levels: float) -> float:
+    """Return the distance of neighbouring depth values at z [m]: z^2 / (f b levels)."""
+    return z * z / (focal_length * baseline * levels)
+
+
+@njit(cache=True)
+def quantise(z: float, focal_length: float, baseline: float, levels: float) -> float:
+    """Round z [m] to the nearest disparity level."""
+    disparity = np.floor(focal_length * baseline / z * levels + 0.5) / levels
+    return focal_length * baseline / disparity if disparity > 0.0 else 0.0
+
+
+@njit(cache=True)
+def loss_probability(
+    z: float,
+    incidence: float,
+    reflectance: float,
+    gloss: float,
+    grazing_start: float,
+    grazing_end: float,
+    dark_signal: float,
+    shine_loss: float,
+) -> float:
+    """Return the probability in 0..1 that a pixel gets no depth. The causes are independent.
+
+    Grazing: smooth step between the two angles. Dark: 1 / (1 + (signal / dark_signal)^4). Shiny: gloss * shine_loss *
+    sin^2(incidence).
+    """
+    step = min(1.0, max(0.0, (incidence - grazing_start) / (grazing_end - grazing_start)))
+    grazing = step * step * (3.0 - 2.0 * step)
+    signal = reflectance * np.cos(incidence) / (z * z)
+    dark = 1.0 / (1.0 + (signal / dark_signal) ** 4)
+    shiny = gloss * shine_loss * np.sin(incidence) ** 2
+    return 1.0 - (1.0 - grazing) * (1.0 - dark) * (1.0 - shiny)
+
+
+@njit(cache=True, parallel=True)
+def _projector_shadow(depth: np.ndarray, focal_length: float, baseline: float) -> np.ndarray:
+    """Mark pixels (H, W) that the projector, left of the camera, cannot see.
+
+    A pixel u at depth z appears in projector column u + f b / z. Walking to the left, a column that was passed already
+    hides what would have to lie behind it.
+    """
+    height, width = depth.shape
+    shadow = np.zeros((height, width), dtype=np.bool_)
+    for v in prange(height):
+        least = 1e9
+        for k in range(width):
+            u = width - 1 - k
+            z = depth[v, u]
+            if z <= 0.0:
+                continue
+            column = u + focal_length * baseline / z
+            if column > least + 0.5:
+                shadow[v, u] = True
+            else:
+                least = min(least, column)
+    return shadow
+
+
+@njit(cache=True, parallel=True)
+def _disturb(
+    depth: np.ndarray,
+    incidence_cosine: np.ndarray,
+    reflectance: np.ndarray,
+    gloss: np.ndarray,
+    shadow: np.ndarray,
+    normal: np.ndarray,
+    jump: np.ndarray,
+    chance: np.ndarray,
+    loss: np.ndarray,
+    shift: np.ndarray,
+    block: int,
+    focal_length: float,
+    constants: np.ndarray,
+) -> np.ndarray:
+    minimum, maximum, baseline, levels, jump_share = (
+        constants[0],
+        constants[1],
+        constants[2],
+        constants[3],
+        constants[4],
+    )
+    height, width = depth.shape
+    result = np.zeros((height, width), dtype=np.float32)
+    for v in prange(height):
+        for u in range(width):
+            z = float(depth[v, u])
+            if z <= 0.0 or shadow[v, u]:
+                continue
+            cosine = min(1.0, max(1e-3, float(incidence_cosine[v, u])))
+            incidence = np.arccos(cosine)
+            spread = lateral_sigma(incidence)
+            du, dv = spread * jump[v, u, 0], spread * jump[v, u, 1]
+            uu = min(width - 1, max(0, u + int(np.rint(du))))
+            vv = min(height - 1, max(0, v + int(np.rint(dv))))
+            there = float(depth[vv, uu])
+            slope = z * np.tan(min(incidence, 1.4312)) / focal_length
+            reach = max(abs(uu - u), abs(vv - v)) + 0.5
+            if there > 0.0 and abs(there - z) > 0.01 * z + 2.0 * reach * slope:
+                rest = 0.5 * (1.0 - jump_share)
+                if chance[v, u] < jump_share:
+                    z = there
+                elif chance[v, u] < jump_share + rest:
+                    z = z + (there - z) * (chance[v, u] - jump_share) / rest
+                else:
+                    continue
+            if z < minimum or z > maximum:
+                continue
+            lost = loss_probability(
+                z,
+                incidence,
+                float(reflectance[v, u]),
+                float(gloss[v, u]),
+                constants[5],
+                constants[6],
+                constants[7],
+                constants[8],
+            )
+            if loss[(v + shift[0]) // block, (u + shift[1]) // block] < lost:
+                continue
+            z += axial_sigma(z, incidence) * normal[v, u]
+            if z > 0.0:
+                z = quantise(z, focal_length, baseline, levels)
+            if minimum <= z <= maximum:
+                result[v, u] = z
+    return result
+
+
+def disturb_depth(
+    depth: np.ndarray,
+    incidence_cosine: np.ndarray,
+    reflectance: np.ndarray,
+    gloss: np.ndarray,
+    camera: Camera,
+    random: np.random.Generator,
+    sensor: DepthCamera | None = None,
+) -> np.ndarray:
+    """Return the depth (H, W) float32 [m] that the sensor reports, 0 where it reports none.
+
+    `depth` (H, W) true z-depth [m], 0 = nothing; `incidence_cosine` (H, W) between ray and surface normal;
+    `reflectance` (H, W) and `gloss` (H, W) in 0..1. Uses the same number of random values for every image of a size.
+    """
+    sensor = sensor or DepthCamera()
+    height, width = depth.shape
+    block = sensor.block
+    normal = random.standard_normal((height, width), dtype=np.float32)
+    jump = random.standard_normal((height, width, 2), dtype=np.float32)
+    chance = random.random((height, width), dtype=np.float32)
+    loss = random.random((height // block + 2, width // block + 2), dtype=np.float32)
+    shift = random.integers(0, block, 2)
+    shadow = _projector_shadow(depth, camera.fx, sensor.baseline)
+    constants = np.array(
+        [
+            sensor.minimum_range,
+            sensor.maximum_range,
+            sensor.baseline,
+            sensor.disparity_levels,
+            sensor.jump_share,
+            sensor.grazing_start,
+            sensor.grazing_end,
+            sensor.dark_signal,
+            sensor.shine_loss,
+        ]
+    )
+    return _disturb(
+        depth,
+        incidence_cosine,
+        reflectance,
+        gloss,
+        shadow,
+        normal,
+        jump,
+        chance,
+        loss,
+        shift,
+        block,
+        camera.fx,
+        constants,
+    )

@@ -1,0 +1,37 @@
+"""Options of `synthesize`."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from schemas.cad_library import CadLibrary
+from schemas.ground_truth import GroundTruth
+from stages.kit.stage import Parameters, Stage
+
+
+class SynthesizeParameters(Parameters):
+    """How the room is made and recorded. The room itself depends on the recipe, the clutter and the seed alone."""
+
+    recipe: str = Field("room", pattern=r"^[a-z][a-z0-9_]*$", description="Room recipe, a file of data/recipes")
+    clutter: Literal["none", "low", "medium", "high"] = Field("medium", description="How much lies about")
+    frames: int = Field(300, ge=2, le=20000, description="Frames, spread evenly over the walk")
+    width: int = Field(640, ge=32, le=4096, description="Image width [px]")
+    height: int = Field(480, ge=32, le=4096, description="Image height [px]")
+    field_of_view: float = Field(62.7, ge=20, le=120, description="Horizontal field of view [deg]")
+    rate: float = Field(30.0, gt=0, le=1000, description="Frame rate of the sensor; times are multiples of 1/rate [Hz]")
+    walking_speed: float = Field(0.5, gt=0.05, le=2.0, description="Speed between the places that are looked at [m/s]")
+    depth_noise: bool = Field(True, description="Depth as a structured-light camera reports it; off: exact")
+
+
+STAGE = Stage(
+    name="synthesize",
+    version=1,
+    summary="Make a room by support rules and record it with a simulated RGB-D camera, with all ground truth",
+    parameters=SynthesizeParameters,
+    reads={"library": CadLibrary},
+    writes=GroundTruth,
+    libraries=("open3d", "numba", "numpy", "opencv-python-headless", "trimesh", "python-fcl", "scipy"),
+    example="scenewright synthesize --library outputs/demo/cad_library --out outputs/demo/ground_truth --frames 300",
+)

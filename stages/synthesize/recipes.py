@@ -1,0 +1,117 @@
+"""Room recipes (data/recipes/<name>.toml): the size and look of a room, and what stands where by which rule."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, ValidationError
+
+from schemas.base import Model
+from schemas.errors import BadInput, UsageError
+
+RECIPE_FOLDER = Path(__file__).resolve().parents[2] / "data" / "recipes"
+CLUTTER_FACTOR = {"none": 0.0, "low": 0.5, "medium": 1.0, "high": 2.0}
+Range = tuple[float, float]
+Rgb = tuple[int, int, int]
+
+
+class SeedSplit(Model):
+    """Seeds [first, last] for choosing methods and constants, and those for reporting. They do not meet."""
+
+    tuning: tuple[int, int]
+    reporting: tuple[int, int]
+
+
+class Shell(Model):
+    """Floor, walls, ceiling."""
+
+    width: Range
+    """Along x [m]."""
+    depth: Range
+    """Along y [m]."""
+    height: Range
+    ceiling: bool = True
+    floor_pattern: Literal["plain", "planks", "tiles", "carpet"] = "planks"
+    floor_period: float = 0.14
+    floor_colors: tuple[Rgb, ...]
+    wall_colors: tuple[Rgb, ...]
+    lamp_color: tuple[float, float, float] = (1.0, 0.93, 0.84)
+
+
+class Place(Model):
+    """One rule: how many objects of a class stand where."""
+
+    class_name: str = Field(alias="class")
+    where: Literal["wall", "centre", "floor", "around", "front", "mounted", "on"]
+    """`wall`: back to a wall; `centre`: clear of the walls; `floor`: anywhere; `around`, `front`: at the sides or the
+    front of `of`, facing it; `mounted`: hung on a wall; `on`: on a supporting surface of one of `of`."""
+    count: tuple[int, int] = (1, 1)
+    """Least and most. Fewer than the least starts the room afresh."""
+    of: tuple[str, ...] = ()
+    """Classes that it stands at or on."""
+    clutter: bool = False
+    """Whether the count follows the clutter level."""
+    room_in_front: float = 0.0
+    """Free floor before the object's front [m]."""
+    room_beside: float = 0.0
+    """Free floor on at least one of its four sides, as deep as this [m]."""
+    gap: Range = (0.02, 0.05)
+    """To the wall, or from the edge of `of` [m]; negative pushes a chair under the table."""
+    near: str | None = None
+    """Prefer places close to objects of this class."""
+    height: Range | None = None
+    """`mounted`: height of the bottom [m]; `on`: allowed heights of the supporting surface."""
+    surface: Literal["any", "inside", "top"] = "any"
+    front: Range = (0.0, 1.0)
+    """`on`: where on the surface, from its front edge (0) to its back (1)."""
+    side: Range = (0.0, 1.0)
+    """`on`: where on the surface, from its left (0) to its right edge (1)."""
+    spare: float = 0.012
+    """`on`: distance to everything else [m]."""
+    spare_beside: float = 0.0
+    """`on`: free width on both sides for a gripper's fingers [m]."""
+    spare_above: float = 0.0
+    """`on`: free height above [m]."""
+    yaw_spread: float = 0.0
+    """Random turn to both sides [rad]."""
+    open: Range | None = None
+    """Share of the joint's range in which the widest door stands; closed when absent."""
+    largest_extent: float | None = None
+    """Only models whose closed box is not wider or deeper than this [m]."""
+    largest_height: float | None = None
+    smallest_height: float | None = None
+    graspable: bool = False
+    """Only models that a gripper can close on."""
+    scale: Range = (1.0, 1.0)
+
+
+class Recipe(Model):
+    """One recipe file."""
+
+    summary: str
+    seeds: SeedSplit
+    shell: Shell
+    place: tuple[Place, ...]
+
+
+def recipe_names() -> tuple[str, ...]:
+    """Return the names of the recipes that ship."""
+    return tuple(sorted(file.stem for file in RECIPE_FOLDER.glob("*.toml")))
+
+
+def load_recipe(name: str) -> Recipe:
+    """Read data/recipes/<name>.toml. Raises UsageError for an unknown name, BadInput for a broken file."""
+    file = RECIPE_FOLDER / f"{name}.toml"
+    if not file.is_file():
+        raise UsageError(f"no room recipe {name!r}", hint=f"there are: {', '.join(recipe_names())}")
+    try:
+        with file.open("rb") as stream:
+            return Recipe(**tomllib.load(stream))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise BadInput(f"{file.name}: {where}: {first['msg']}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise BadInput(f"{file.name}: {error}") from None

@@ -1,0 +1,166 @@
+"""Make a room, walk a camera through it, and write the log with everything that is true of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from schemas.cad_library import CadLibrary
+from schemas.ground_truth import GroundTruth, GroundTruthFile
+from schemas.scene_parts import Camera
+from schemas.sequence import LabelEntry
+from stages.kit.formats.frames import FrameWriter
+from stages.kit.formats.scene_bundle import write_scene_bundle
+from stages.kit.formats.trajectories import write_tum
+from stages.kit.rendering.ray_casting import SceneRenderer
+from stages.kit.stage import Context
+from stages.synthesize.appearance import AMBIENT, SKY, gloss_table, lamps, layout_materials, object_material
+from stages.synthesize.arrangement import Arrangement, arrange
+from stages.synthesize.depth_noise import DepthCamera, disturb_depth
+from stages.synthesize.free_space import find_free_space
+from stages.synthesize.furniture import Catalogue
+from stages.synthesize.parameters import SynthesizeParameters
+from stages.synthesize.recipes import Recipe, load_recipe
+from stages.synthesize.seen_surface import SeenSurface
+from stages.synthesize.truth import object_boxes, scene_bodies, true_graph, true_mesh, true_objects
+from stages.synthesize.viewpoints import choose_views
+from stages.synthesize.walk import Walk, frame_times, plan_walk
+
+VIEW_STREAM, TREMOR_STREAM, NOISE_STREAM = 1, 2, 3
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What the camera did and saw."""
+
+    times: np.ndarray
+    world_from_camera: np.ndarray
+    visible_pixels: np.ndarray
+    depth_share: float
+
+
+def run(library: CadLibrary, *, parameters: SynthesizeParameters, context: Context) -> GroundTruth:
+    """Furnish a room by the recipe, record it from a walk, and write the log and its ground truth.
+
+    Raises UsageError for an unknown recipe, BadInput when the library lacks a class or no room can be found.
+    """
+    recipe = load_recipe(parameters.recipe)
+    camera = make_camera(parameters)
+    with context.progress.step("furnish"):
+        arrangement = arrange(recipe, Catalogue(library), parameters.clutter, context.seed)
+    with context.progress.step("light"):
+        renderer = make_renderer(arrangement, recipe)
+    with context.progress.step("walk"):
+        space = find_free_space(renderer, arrangement.room.size)
+        views = choose_views(renderer, arrangement, space, camera, context.random(VIEW_STREAM))
+        walk = plan_walk(views, space, renderer, parameters.walking_speed, context.random(TREMOR_STREAM))
+    seen = SeenSurface(DepthCamera().minimum_range, DepthCamera().maximum_range)
+    with context.progress.step("render"):
+        recording = _record(arrangement, renderer, walk, camera, seen, parameters, context)
+    with context.progress.step("write truth"):
+        _write_truth(arrangement, recording, camera, seen, parameters, context)
+    return GroundTruth(
+        context.output,
+        summary={
+            "recipe": parameters.recipe,
+            "objects": len(arrangement.objects),
+            "frames": parameters.frames,
+            "seconds_walked": round(walk.duration, 1),
+            "depth_share": round(recording.depth_share, 3),
+            "seen_points": seen.count,
+        },
+    )
+
+
+def make_camera(parameters: SynthesizeParameters) -> Camera:
+    """Return the camera of the parameters: square pixels, principal point in the middle."""
+    focal = 0.5 * parameters.width / float(np.tan(np.deg2rad(parameters.field_of_view) / 2))
+    return Camera(
+        width=parameters.width, height=parameters.height, fx=focal, fy=focal,
+        cx=(parameters.width - 1) / 2, cy=(parameters.height - 1) / 2,
+    )  # fmt: skip
+
+
+def make_renderer(arrangement: Arrangement, recipe: Recipe) -> SceneRenderer:
+    """Return the renderer of a furnished room with its light map."""
+    meshes: list[tuple[int, trimesh.Trimesh]] = [
+        (k, layout.mesh) for k, layout in enumerate(arrangement.room.layouts, start=1)
+    ]
+    meshes += [(thing.instance, thing.world_mesh()) for thing in arrangement.objects]
+    materials = layout_materials(arrangement.room, recipe.shell)
+    materials |= {thing.instance: object_material(thing) for thing in arrangement.objects}
+    return SceneRenderer(
+        meshes,
+        lights=lamps(arrangement.room, recipe.shell),
+        ambient=AMBIENT,
+        sky=SKY,
+        materials=materials,
+        light_map=True,
+    )
+
+
+def _record(
+    arrangement: Arrangement,
+    renderer: SceneRenderer,
+    walk: Walk,
+    camera: Camera,
+    seen: SeenSurface,
+    parameters: SynthesizeParameters,
+    context: Context,
+) -> Recording:
+    """Render and write all frames; collects what was seen."""
+    times = frame_times(walk.duration, parameters.frames, parameters.rate)
+    pace = walk.duration / times[-1]
+    gloss = gloss_table(arrangement)
+    noise = context.random(NOISE_STREAM)
+    labels = [LabelEntry(instance=k, class_name=e.class_name) for k, e in enumerate(arrangement.room.layouts, start=1)]
+    labels += [LabelEntry(instance=thing.instance, class_name=thing.class_name) for thing in arrangement.objects]
+    visible = np.zeros(len(gloss), dtype=np.int64)
+    poses, valid = [], 0
+    with FrameWriter(context.output / "log.mcap", camera, labels=True, label_table=labels) as writer:
+        for time in context.progress.track(times, total=len(times), description="rendering"):
+            pose = walk.pose(time * pace)
+            view = renderer.render(camera, pose)
+            depth = view.depth
+            if parameters.depth_noise:
+                reflectance = view.albedo.mean(axis=2)
+                depth = disturb_depth(depth, view.incidence, reflectance, gloss[view.instance], camera, noise)
+            seen.add(view.depth, view.instance, pose, camera)
+            visible += np.bincount(view.instance.reshape(-1), minlength=len(visible))
+            valid += int(np.count_nonzero(depth))
+            writer.write(float(time), view.color, depth, pose, view.instance)
+            poses.append(pose)
+    return Recording(times, np.array(poses), visible, valid / (len(times) * camera.width * camera.height))
+
+
+def _write_truth(
+    arrangement: Arrangement,
+    recording: Recording,
+    camera: Camera,
+    seen: SeenSurface,
+    parameters: SynthesizeParameters,
+    context: Context,
+) -> None:
+    """Write everything of kind ground_truth beside the log."""
+    out = context.output
+    write_tum(out / "trajectory.tum", recording.times, recording.world_from_camera)
+    boxes = object_boxes(arrangement)
+    graph = true_graph(arrangement, boxes)
+    graph.write(out / "graph.json")
+    width, depth, height = (float(v) for v in arrangement.room.size)
+    GroundTruthFile(
+        seed=context.seed,
+        recipe=parameters.recipe,
+        room_size=(width, depth, height),
+        camera=camera,
+        frame_count=parameters.frames,
+        depth_noise=parameters.depth_noise,
+        objects=tuple(true_objects(arrangement, boxes, recording.visible_pixels)),
+    ).write(out / "ground_truth.json")
+    points, instance = seen.result()
+    np.savez(out / "visible.npz", points=points, instance=instance)
+    (out / "mesh.ply").write_bytes(true_mesh(arrangement).export(file_type="ply"))
+    (out / "room").mkdir()
+    write_scene_bundle(out / "room", scene_bodies(arrangement, boxes, graph), graph)

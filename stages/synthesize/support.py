@@ -1,0 +1,114 @@
+"""Places where something can stand: horizontal planes of the models, confirmed by rays down to the real surface."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import open3d as o3d
+
+from schemas.scene_parts import SurfacePlane
+from stages.kit.geometry.transforms import apply, transform_from_yaw
+from stages.synthesize.furniture import Furnishing
+from stages.synthesize.recipes import Place
+
+if TYPE_CHECKING:
+    from stages.synthesize.arrangement import PlacedObject
+
+CONTACT_BAND = 1.5e-3
+"""Vertices this close to the lowest one are what a thing stands on [m]."""
+CONTACT_TOLERANCE = 1e-3
+"""A contact point that hangs further than this over the surface is not supported [m]."""
+INSIDE_DEPTH = 0.02
+"""A surface this far below the top of its model is inside it [m]."""
+
+
+def contact_points(furnishing: Furnishing) -> np.ndarray:
+    """Return the vertices (K, 3) of the model frame that it stands on."""
+    points = np.asarray(furnishing.mesh.vertices)
+    lowest = points[points[:, 2] < points[:, 2].min() + CONTACT_BAND]
+    return np.unique(np.round(lowest, 6), axis=0)
+
+
+class SupportSurfaces:
+    """Samples poses on the surfaces of placed objects; keeps a ray scene per model."""
+
+    def __init__(self) -> None:
+        self._scenes: dict[int, o3d.t.geometry.RaycastingScene] = {}
+        self._contacts: dict[int, np.ndarray] = {}
+        self._held: list[Furnishing] = []
+
+    def _scene(self, furnishing: Furnishing) -> o3d.t.geometry.RaycastingScene:
+        key = id(furnishing)
+        if key not in self._scenes:
+            scene = o3d.t.geometry.RaycastingScene()
+            mesh = furnishing.mesh
+            scene.add_triangles(
+                o3d.core.Tensor(np.asarray(mesh.vertices, dtype=np.float32)),
+                o3d.core.Tensor(np.asarray(mesh.faces, dtype=np.uint32)),
+            )
+            self._scenes[key] = scene
+            self._held.append(furnishing)
+        return self._scenes[key]
+
+    def _contact(self, furnishing: Furnishing) -> np.ndarray:
+        key = id(furnishing)
+        if key not in self._contacts:
+            self._contacts[key] = contact_points(furnishing)
+            self._held.append(furnishing)
+        return self._contacts[key]
+
+    def sample(
+        self, target: PlacedObject, item: Furnishing, place: Place, random: np.random.Generator
+    ) -> tuple[np.ndarray, int, bool] | None:
+        """Return (world_from_model of the item, index of the plane, whether it is inside the target), or None.
+
+        A plane is drawn by area among those that the rule allows, then a point on its rectangle; the item stands where
+        rays from all its contact points meet the target's surface at one height.
+        """
+        base = float(target.world_from_model[2, 3])
+        top = float(np.asarray(target.furnishing.mesh.vertices)[:, 2].max())
+        choices = [
+            k for k, plane in enumerate(target.furnishing.planes) if self._allowed(plane, base, top, item, place)
+        ]
+        if not choices:
+            return None
+        areas = np.sqrt([target.furnishing.planes[k].area for k in choices])
+        index = int(random.choice(choices, p=areas / areas.sum()))
+        plane = target.furnishing.planes[index]
+        corners = np.asarray(plane.corners)[:, :2]
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        # `side` and `front` are shares of where the item's middle can be with its whole foot on the rectangle.
+        half = item.closed_size[:2] / 2
+        yaw = float(random.uniform(-place.yaw_spread, place.yaw_spread)) if place.yaw_spread else 0.0
+        low, high = low + half * 0.9, high - half * 0.9
+        if np.any(low > high):
+            return None
+        share = np.array([random.uniform(*place.side), random.uniform(*place.front)])
+        point = low + share * (high - low)
+        local = transform_from_yaw(yaw, np.array([*point, -plane.offset / plane.normal[2]]))
+        height = self._rest(target.furnishing, self._contact(item), local)
+        if height is None:
+            return None
+        local[2, 3] = height
+        return target.world_from_model @ local, index, height < top - INSIDE_DEPTH
+
+    def _allowed(self, plane: SurfacePlane, base: float, top: float, item: Furnishing, place: Place) -> bool:
+        if not plane.horizontal or plane.hidden or len(plane.corners) != 4:
+            return False
+        level = -plane.offset / plane.normal[2]
+        inside = level < top - INSIDE_DEPTH
+        if (place.surface == "inside" and not inside) or (place.surface == "top" and inside):
+            return False
+        return place.height is None or place.height[0] <= base + level <= place.height[1]
+
+    def _rest(self, target: Furnishing, contacts: np.ndarray, target_from_item: np.ndarray) -> float | None:
+        """Return the height of the item's origin in the target frame at which all contact points touch, or None."""
+        points = apply(target_from_item, contacts)
+        start = points + np.array([0.0, 0.0, 0.01])
+        rays = np.concatenate([start, np.tile([0.0, 0.0, -1.0], (len(points), 1))], axis=1).astype(np.float32)
+        distance = self._scene(target).cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy().astype(np.float64)
+        drop = distance - 0.01
+        if not np.isfinite(drop).all() or np.abs(drop).max() > 0.01 or np.ptp(drop) > CONTACT_TOLERANCE:
+            return None
+        return float(target_from_item[2, 3] - drop.min())

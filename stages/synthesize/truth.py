@@ -1,0 +1,211 @@
+"""What is true of a furnished room: boxes, planes, contact graph, bodies of the interactive scene."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from schemas.base import as_transform
+from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from schemas.ground_truth import TrueObject
+from schemas.scene_parts import Box, Relation, SurfacePlane
+from schemas.vocabulary import load_vocabulary
+from stages.kit.formats.scene_bundle import BundleBody
+from stages.kit.geometry.boxes import (
+    box_from_bounds,
+    boxes_overlap_volume,
+    clip_polygon,
+    convex_hull,
+    footprint,
+    minimum_box,
+    polygon_area,
+)
+from stages.synthesize.arrangement import Arrangement, PlacedObject
+from stages.synthesize.furniture import plane_in_world
+from stages.synthesize.shell import Layout
+
+LEAST_SHARED_VOLUME = 1e-6
+"""Boxes that share less than a cubic centimetre only touch [m^3]."""
+
+
+def layout_name(instance: int, layout: Layout) -> str:
+    """Return the node id of a slab, `<class>_<instance>`."""
+    return f"{layout.class_name}_{instance}"
+
+
+def object_boxes(arrangement: Arrangement) -> dict[str, Box]:
+    """Return the gravity-aligned minimum box of everything as it stands, by name; layout: the slab."""
+    boxes = {
+        layout_name(instance, layout): box_from_bounds(layout.minimum, layout.maximum)
+        for instance, layout in enumerate(arrangement.room.layouts, start=1)
+    }
+    for thing in arrangement.objects:
+        boxes[thing.name] = minimum_box(np.asarray(thing.world_mesh().vertices))
+    return boxes
+
+
+def true_objects(arrangement: Arrangement, boxes: dict[str, Box], visible_pixels: np.ndarray) -> list[TrueObject]:
+    """Return the records of layout and objects by instance. `visible_pixels` (I,) counts pixels by instance."""
+
+    def pixels(instance: int) -> int:
+        return int(visible_pixels[instance]) if instance < len(visible_pixels) else 0
+
+    records = [
+        TrueObject(
+            instance=instance,
+            name=layout_name(instance, layout),
+            class_name=layout.class_name,
+            world_from_model=as_transform(np.eye(4)),
+            box=boxes[layout_name(instance, layout)],
+            visible_pixels=pixels(instance),
+        )
+        for instance, layout in enumerate(arrangement.room.layouts, start=1)
+    ]
+    records += [
+        TrueObject(
+            instance=thing.instance,
+            name=thing.name,
+            class_name=thing.class_name,
+            model_id=thing.furnishing.model.id,
+            scale=thing.furnishing.scale,
+            world_from_model=as_transform(thing.world_from_model),
+            joints=_all_joints(thing),
+            box=boxes[thing.name],
+            visible_pixels=pixels(thing.instance),
+        )
+        for thing in arrangement.objects
+    ]
+    return records
+
+
+def true_graph(arrangement: Arrangement, boxes: dict[str, Box]) -> ContactGraphFile:
+    """Return the true contact graph: the scene carries floor, walls and ceiling, the rest hangs as it was placed."""
+    vocabulary = load_vocabulary()
+    nodes = [GraphNode(id=SCENE_NODE, instance=0, class_name=SCENE_NODE, node_type="scene")]
+    links: list[Relation] = []
+    planes: dict[str, tuple[SurfacePlane, ...]] = {}
+    for instance, layout in enumerate(arrangement.room.layouts, start=1):
+        name = layout_name(instance, layout)
+        planes[name] = (layout.plane,)
+        nodes.append(
+            GraphNode(
+                id=name,
+                instance=instance,
+                class_name=layout.class_name,
+                node_type="layout",
+                box=boxes[name],
+                planes=planes[name],
+            )
+        )
+        links.append(Relation(source=SCENE_NODE, target=name, relation="supports", confidence=1.0))
+    for thing in arrangement.objects:
+        planes[thing.name] = tuple(plane_in_world(p, thing.world_from_model) for p in thing.furnishing.planes)
+        kind = vocabulary.by_name(thing.class_name).node
+        nodes.append(
+            GraphNode(
+                id=thing.name,
+                instance=thing.instance,
+                class_name=thing.class_name,
+                node_type="rigid" if kind == "layout" else kind,
+                box=boxes[thing.name],
+                planes=planes[thing.name],
+                model_id=thing.furnishing.model.id,
+                world_from_model=as_transform(thing.world_from_model),
+                scale=thing.furnishing.scale,
+                joints=_all_joints(thing),
+            )
+        )
+    for thing in arrangement.objects:
+        links.append(_parent_link(thing, boxes, planes))
+    links += _proximal(arrangement, boxes, links)
+    return ContactGraphFile(nodes=tuple(nodes), links=tuple(links))
+
+
+def _all_joints(thing: PlacedObject) -> dict[str, float]:
+    return {joint.name: float(thing.furnishing.joints.get(joint.name, 0.0)) for joint in thing.furnishing.model.joints}
+
+
+def _parent_link(thing: PlacedObject, boxes: dict[str, Box], planes: dict[str, tuple[SurfacePlane, ...]]) -> Relation:
+    relation = thing.relation
+    box, parent_box = boxes[thing.name], boxes[thing.parent]
+    top, parent_top = (b.center[2] + b.size[2] / 2 for b in (box, parent_box))
+    if relation == "contains" and top > parent_top + 0.01:
+        relation = "supports"  # it sticks out, as a bottle in a low crate does
+    if relation == "carries_on_wall":
+        return Relation(source=thing.parent, target=thing.name, relation=relation, confidence=1.0, plane=0, gap=0.0)
+    index = 0 if thing.plane is None else thing.plane
+    plane = planes[thing.parent][index]
+    height = -plane.offset / plane.normal[2]
+    gap = box.center[2] - box.size[2] / 2 - height
+    outline = convex_hull(np.asarray(plane.corners)[:, :2])
+    foot = footprint(box)
+    overlap = polygon_area(clip_polygon(foot, outline)) / max(polygon_area(foot), 1e-12)
+    return Relation(
+        source=thing.parent, target=thing.name, relation=relation, confidence=1.0, plane=index, gap=float(gap),
+        overlap=float(min(1.0, overlap)),
+    )  # fmt: skip
+
+
+def _proximal(arrangement: Arrangement, boxes: dict[str, Box], links: list[Relation]) -> list[Relation]:
+    """Pairs whose boxes share volume and of which neither carries the other; not between two layout slabs."""
+    linked = {(link.source, link.target) for link in links}
+    layout = {layout_name(k, entry) for k, entry in enumerate(arrangement.room.layouts, start=1)}
+    names = list(boxes)
+    found = []
+    for k, a in enumerate(names):
+        for b in names[k + 1 :]:
+            if (a in layout and b in layout) or (a, b) in linked or (b, a) in linked:
+                continue
+            if boxes_overlap_volume(boxes[a], boxes[b]) > LEAST_SHARED_VOLUME:
+                found.append(Relation(source=a, target=b, relation="proximal", confidence=1.0))
+    return found
+
+
+def scene_bodies(arrangement: Arrangement, boxes: dict[str, Box], graph: ContactGraphFile) -> list[BundleBody]:
+    """Return layout and objects as bodies of an interactive scene."""
+    bodies = [
+        BundleBody(
+            name=layout_name(instance, layout),
+            class_name=layout.class_name,
+            parent=None,
+            relation="supports",
+            world_from_body=np.eye(4),
+            movable=False,
+            box=boxes[layout_name(instance, layout)],
+            mesh=layout.mesh,
+        )
+        for instance, layout in enumerate(arrangement.room.layouts, start=1)
+    ]
+    for thing in arrangement.objects:
+        link = graph.parent_link(thing.name)
+        bodies.append(
+            BundleBody(
+                name=thing.name,
+                class_name=thing.class_name,
+                parent=thing.parent,
+                relation=link.relation if link else thing.relation,
+                world_from_body=thing.world_from_model,
+                movable=thing.furnishing.model.movable,
+                box=boxes[thing.name],
+                model=thing.furnishing.model,
+                model_folder=thing.furnishing.folder,
+                scale=thing.furnishing.scale,
+                joint_values=_all_joints(thing),
+            )
+        )
+    return bodies
+
+
+def true_mesh(arrangement: Arrangement) -> trimesh.Trimesh:
+    """Return the whole surface in the world frame with vertex colours and the vertex attribute `instance`."""
+    parts, labels = [], []
+    meshes = [(k, layout.mesh) for k, layout in enumerate(arrangement.room.layouts, start=1)]
+    meshes += [(thing.instance, thing.world_mesh()) for thing in arrangement.objects]
+    for instance, mesh in meshes:
+        visual = mesh.visual
+        colors = np.asarray(visual.to_color().vertex_colors if visual.kind == "texture" else visual.vertex_colors)
+        parts.append(trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=colors, process=False))
+        labels.append(np.full(len(mesh.vertices), instance, dtype=np.int32))
+    whole = trimesh.util.concatenate(parts)
+    whole.vertex_attributes["instance"] = np.concatenate(labels)
+    return whole

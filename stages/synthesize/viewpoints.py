@@ -1,0 +1,162 @@
+"""What to look at from where: greedy coverage of the room's surface, after the looks that a room is recorded for.
+
+Next-best-view as set cover (Scott, Roth & Rivest 2003, section 3): surface samples, candidate views, and always the
+candidate that sees most of what was not seen yet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.scene_parts import Camera
+from stages.kit.geometry.cameras import project
+from stages.kit.geometry.transforms import apply, inverse, look_at
+from stages.kit.rendering.ray_casting import SceneRenderer
+from stages.synthesize.arrangement import Arrangement, PlacedObject
+from stages.synthesize.free_space import FreeSpace
+
+EYE_HEIGHT = 1.5
+"""[m]"""
+CANDIDATES, SAMPLES = 260, 5000
+NEAR, FAR, STEEPEST = 0.6, 3.5, 0.25
+"""A sample counts as seen between these depths [m] and with at least this cosine of incidence."""
+LAYOUT_WEIGHT = {"floor": 1.0, "wall": 0.5, "ceiling": 0.0}
+
+
+@dataclass(frozen=True)
+class View:
+    """A place to stand, an eye height and what to look at."""
+
+    eye: np.ndarray
+    """(3,) [m]."""
+    target: np.ndarray
+    """(3,) [m]."""
+
+
+def _reachable(space: FreeSpace, wanted: np.ndarray, radius: float) -> np.ndarray | None:
+    """Return the walkable floor point nearest to a wanted one (2,), or None when it is further than `radius`."""
+    cells = space.cells()
+    distance = np.linalg.norm(cells - wanted, axis=1)
+    best = int(np.argmin(distance))
+    return cells[best] if distance[best] <= radius else None
+
+
+def required_views(arrangement: Arrangement, space: FreeSpace) -> list[View]:
+    """Return the looks that must not be missing: into open furniture from the front (three angles, two heights), and
+    on every table and desk from several sides."""
+    views = []
+    for thing in arrangement.objects:
+        if thing.furnishing.joints:
+            views += _into(thing, space)
+        elif thing.class_name in ("table", "desk"):
+            views += _onto(thing, space)
+    return views
+
+
+def _into(thing: PlacedObject, space: FreeSpace) -> list[View]:
+    pose, size = thing.world_from_model, thing.furnishing.closed_size
+    views = []
+    for angle, reach, height, aim in (
+        (0.0, 1.25, 1.5, 0.6),
+        (0.0, 1.05, 1.15, 0.42),
+        (-0.4, 1.2, 1.4, 0.55),
+        (0.4, 1.2, 1.4, 0.55),
+    ):
+        local = np.array([reach * np.sin(angle), -size[1] / 2 - reach * np.cos(angle), 0.0])
+        spot = _reachable(space, apply(pose, local)[:2], 0.35)
+        if spot is not None:
+            views.append(View(np.array([*spot, height]), apply(pose, np.array([0.0, 0.0, aim * size[2]]))))
+    return views
+
+
+def _onto(thing: PlacedObject, space: FreeSpace) -> list[View]:
+    pose, size = thing.world_from_model, thing.furnishing.closed_size
+    views = []
+    for angle in np.arange(6) * np.pi / 3:
+        reach = 0.75 + 0.5 * np.hypot(size[0] * np.cos(angle), size[1] * np.sin(angle))
+        local = np.array([reach * np.cos(angle), reach * np.sin(angle), 0.0])
+        spot = _reachable(space, apply(pose, local)[:2], 0.3)
+        if spot is not None:
+            views.append(View(np.array([*spot, EYE_HEIGHT]), apply(pose, np.array([0.0, 0.0, size[2]]))))
+    return views[:4] if len(views) <= 4 else views[:: max(1, len(views) // 4)]
+
+
+def _surface_samples(
+    renderer: SceneRenderer, arrangement: Arrangement, random: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return points (SAMPLES, 3), normals and weights; every instance gets samples by the square root of its area.
+    Bare walls weigh little, the ceiling nothing."""
+    soup = renderer.soup
+    edges = np.cross(soup.corners[:, 1] - soup.corners[:, 0], soup.corners[:, 2] - soup.corners[:, 0])
+    area = 0.5 * np.linalg.norm(edges, axis=1).astype(np.float64)
+    whole = np.bincount(soup.instance, weights=area)
+    share = area / np.sqrt(whole[soup.instance])
+    pick = random.choice(len(area), SAMPLES, p=share / share.sum())
+    u, v = np.sqrt(random.random(SAMPLES)), random.random(SAMPLES)
+    corners = soup.corners[pick].astype(np.float64)
+    points = (
+        (1 - u)[:, None] * corners[:, 0] + (u * (1 - v))[:, None] * corners[:, 1] + (u * v)[:, None] * corners[:, 2]
+    )
+    weight = np.ones(arrangement.first_object + len(arrangement.objects))
+    for instance, layout in enumerate(arrangement.room.layouts, start=1):
+        weight[instance] = LAYOUT_WEIGHT[layout.class_name]
+    return points, soup.face_normals[pick].astype(np.float64), weight[soup.instance[pick]]
+
+
+def _seen(renderer: SceneRenderer, camera: Camera, view: View, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return (N,) bool: which samples a view sees well."""
+    world_from_camera = look_at(view.eye, view.target)
+    pixels, depth = project(apply(inverse(world_from_camera), points), camera)
+    with np.errstate(invalid="ignore"):
+        inside = (depth > NEAR) & (depth < FAR)
+        inside &= (
+            (pixels[:, 0] >= 0) & (pixels[:, 0] < camera.width) & (pixels[:, 1] >= 0) & (pixels[:, 1] < camera.height)
+        )
+    ray = view.eye - points
+    cosine = np.einsum("ij,ij->i", ray, normals) / np.linalg.norm(ray, axis=1)
+    inside &= cosine > STEEPEST
+    rows = np.flatnonzero(inside)
+    lifted = points[rows] + 2e-3 * normals[rows]
+    blocked = renderer.occluded(lifted, np.broadcast_to(view.eye, lifted.shape))
+    seen = np.zeros(len(points), dtype=bool)
+    seen[rows[~blocked]] = True
+    return seen
+
+
+def choose_views(
+    renderer: SceneRenderer,
+    arrangement: Arrangement,
+    space: FreeSpace,
+    camera: Camera,
+    random: np.random.Generator,
+    *,
+    extra: int = 22,
+) -> list[View]:
+    """Return the required views and up to `extra` more that see most of the rest of the room, in no useful order."""
+    points, normals, weight = _surface_samples(renderer, arrangement, random)
+    chosen = required_views(arrangement, space)
+    missing = np.ones(len(points), dtype=bool)
+    for view in chosen:
+        missing &= ~_seen(renderer, camera, view, points, normals)
+    cells = space.cells()
+    candidates = []
+    for _ in range(CANDIDATES):
+        eye = np.array([*cells[int(random.integers(len(cells)))], EYE_HEIGHT + random.uniform(-0.15, 0.12)])
+        target = points[int(random.integers(len(points)))].copy()
+        flat = np.linalg.norm(target[:2] - eye[:2])
+        if flat < 0.5:
+            continue
+        # A sensor in the hand looks a little down, and never steeper than this.
+        target[2] = np.clip(target[2], eye[2] - 1.2 * flat, eye[2] - 0.1 * flat)
+        candidates.append(View(eye, target))
+    seen = np.array([_seen(renderer, camera, view, points, normals) for view in candidates])
+    for _ in range(extra):
+        gain = (seen & missing) @ weight
+        best = int(np.argmax(gain))
+        if gain[best] < 0.004 * weight.sum():
+            break
+        chosen.append(candidates[best])
+        missing &= ~seen[best]
+    return chosen
