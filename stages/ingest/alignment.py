@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 
@@ -78,7 +79,10 @@ def _turned_to_walls(upright: np.ndarray, normals: np.ndarray) -> tuple[np.ndarr
     return transform_from_yaw(-yaw, np.zeros(3)) @ upright, f"turned {-math.degrees(yaw):.1f} deg to the walls"
 
 
-def _gravity(method: str, world_from_log: np.ndarray, detail: str, inlier_count: int = 0) -> Gravity:
-    return Gravity(
-        method=method, world_from_log=as_transform(world_from_log), inlier_count=inlier_count, detail=detail
-    )
+def _gravity(
+    method: Literal["given", "floor_plane", "mean_camera_up", "none"],
+    world_from_log: np.ndarray,
+    detail: str,
+    inlier_count: int = 0,
+) -> Gravity:
+    return Gravity(method=method, world_from_log=as_transform(world_from_log), inlier_count=inlier_count, detail=detail)

@@ -73,13 +73,13 @@ def _camera_of(message: Any, size: tuple[int, int], where: str) -> tuple[Camera,
         raise BadInput(f"{where}: K = {matrix} has no positive focal lengths", hint=HINT)
     if message.width <= 0 or message.height <= 0:
         raise BadInput(f"{where}: calibration is for images of {message.width}x{message.height}", hint=HINT)
-    camera = Camera(
-        width=message.width, height=message.height, fx=matrix[0], fy=matrix[4], cx=matrix[2], cy=matrix[5]
-    )
-    if (camera.width, camera.height) == size:
+    camera = Camera(width=message.width, height=message.height, fx=matrix[0], fy=matrix[4], cx=matrix[2], cy=matrix[5])
+    if size in ((camera.width, camera.height), (0, 0)):  # (0, 0): no depth image can be decoded, none will be used
         return camera, ()
     if camera.width * size[1] != camera.height * size[0]:
-        raise BadInput(f"{where}: is for {camera.width}x{camera.height}, depth images are {size[0]}x{size[1]}", hint=HINT)
+        raise BadInput(
+            f"{where}: is for {camera.width}x{camera.height}, depth images are {size[0]}x{size[1]}", hint=HINT
+        )
     note = f"calibration for {camera.width}x{camera.height} scaled to the depth images' {size[0]}x{size[1]}"
     return scaled(camera, size[0] / camera.width), (note,)
 
@@ -98,4 +98,5 @@ def _undistortion(message: Any, size: tuple[int, int], where: str) -> tuple[np.n
         )
     camera = _camera_of(message, size, where)[0]
     matrix = intrinsic_matrix(camera)
-    return cv2.initUndistortRectifyMap(matrix, coefficients, None, matrix, size, cv2.CV_32FC1)
+    shape = (camera.width, camera.height)
+    return cv2.initUndistortRectifyMap(matrix, coefficients, None, matrix, shape, cv2.CV_32FC1)

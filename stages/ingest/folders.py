@@ -24,7 +24,9 @@ def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
 def images_by_stem(folder: Path, suffixes: tuple[str, ...]) -> dict[str, Path]:
     """Return stem -> file of the images in a folder, in natural order. Raises BadInput when two share a stem."""
     found: dict[str, Path] = {}
-    for path in sorted((p for p in folder.iterdir() if p.suffix.lower() in suffixes), key=lambda p: natural_key(p.name)):
+    for path in sorted(
+        (p for p in folder.iterdir() if p.suffix.lower() in suffixes), key=lambda p: natural_key(p.name)
+    ):
         if path.stem in found:
             raise BadInput(f"{path}: {found[path.stem].name} has the same name", hint="keep one of the two")
         found[path.stem] = path

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from google.protobuf.message import DecodeError
@@ -69,7 +70,7 @@ def _source(log: McapLog, parameters: IngestParameters, rule: str) -> LogSource:
         notes.append("the calibration changes within the log; the first one is used")
     registered, registration_note = _registration(content, colors, depths)
     entries = _entries(log, content, colors, depths, labels, calibration, world, depth_frame, parameters)
-    unused = len(depths.messages) - sum(entry.problem != "no_depth_within_tolerance" for entry in entries)
+    unused = len(depths.messages) - sum(entry.problem is None for entry in entries)
     if unused > 0:
         notes.append(f"{unused} depth images without a colour image of their own were left")
     metadata = dict(log.metadata)
@@ -100,15 +101,11 @@ def _without_frames(log: McapLog, content: LogContent, color_topic: str | None, 
     return LogSource("foxglove-mcap", rule, camera, (), ("the log holds no image messages",), close=log.close)
 
 
-def _choose(
-    content: LogContent, role: str, wanted: str | None, words: tuple[str, ...], log: McapLog
-) -> str | None:
+def _choose(content: LogContent, role: str, wanted: str | None, words: tuple[str, ...], log: McapLog) -> str | None:
     topics = sorted(topic for topic, images in content.images.items() if images.role == role)
     if wanted is not None:
         if wanted not in topics:
-            raise BadInput(
-                f"{log.path}: no {role} images on topic {wanted!r}", hint=f"topics: {described_topics(log)}"
-            )
+            raise BadInput(f"{log.path}: no {role} images on topic {wanted!r}", hint=f"topics: {described_topics(log)}")
         return wanted
 
     def preference(topic: str) -> tuple[int, str]:
@@ -235,7 +232,8 @@ def _loader(
     return load
 
 
-def _body(log: McapLog, image: ImageMessage):  # noqa: ANN202 (a protobuf message)
+def _body(log: McapLog, image: ImageMessage) -> Any:
+    """Fetch and parse an image message."""
     message = log.fetch(image.location)
     schema = log.schemas[message.channel.schema_id]
     try:

@@ -21,7 +21,7 @@ from stages.ingest.transform_tree import TransformTree
 from stages.kit.formats.foxglove import stamp_nanoseconds, transform_matrix
 from stages.kit.formats.mcap_log import Location, McapLog
 
-TYPES: dict[str, type] = {
+TYPES: dict[str, Any] = {
     "foxglove.CompressedImage": CompressedImage,
     "foxglove.RawImage": RawImage,
     "foxglove.CameraCalibration": CameraCalibration,
@@ -51,7 +51,7 @@ class TopicImages:
     """`color`, `depth`, `labels` or `other`."""
     encoding: str
     size: tuple[int, int]
-    """(width, height) of the first image, (0, 0) when it does not say."""
+    """(width, height) of the first depth image that has a size; (0, 0) where none has, and for colour."""
     messages: list[ImageMessage] = field(default_factory=list)
 
 
@@ -135,6 +135,8 @@ def _stamp(body: Any, log_time: int, content: LogContent) -> int:
 def _add_image(content: LogContent, topic: str, body: Any, log_time: int, location: Location) -> None:
     if topic not in content.images:
         content.images[topic] = _describe(topic, body)
+    elif content.images[topic].size == (0, 0) and content.images[topic].role == "depth":
+        content.images[topic].size = _describe(topic, body).size
     stamp = _stamp(body, log_time, content)
     content.images[topic].messages.append(ImageMessage(stamp, location, body.frame_id))
 

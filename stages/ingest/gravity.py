@@ -62,9 +62,7 @@ def grid_samples(points: np.ndarray, normals: np.ndarray, size: float) -> tuple[
     return points[first], normals[first]
 
 
-def find_floor(
-    points: np.ndarray, normals: np.ndarray, up: np.ndarray, random: np.random.Generator
-) -> FloorFit | None:
+def find_floor(points: np.ndarray, normals: np.ndarray, up: np.ndarray, random: np.random.Generator) -> FloorFit | None:
     """Return the floor among points (N, 3) [m] with unit normals that face the camera, or None.
 
     Upward-facing planes near `up` are taken out one by one; the direction in which parallel ones have most support

@@ -30,7 +30,9 @@ def fitted_color(image: np.ndarray, camera: Camera) -> np.ndarray:
     height, width = image.shape[:2]
     if (height, width) == (camera.height, camera.width):
         return np.ascontiguousarray(image)
-    if abs(width * camera.height - height * camera.width) > max(camera.height, camera.width):
+    if not camera.width * camera.height or abs(width * camera.height - height * camera.width) > max(
+        camera.height, camera.width
+    ):
         raise Unusable("size_mismatch", f"colour {width}x{height}, depth {camera.width}x{camera.height}")
     shrinks = width > camera.width
     size = (camera.width, camera.height)

@@ -60,7 +60,15 @@ STAGE = Stage(
     parameters=IngestParameters,
     reads={"log": External("log file or folder")},
     writes=Sequence,
-    libraries=("numpy", "scipy", "opencv-python-headless", "mcap", "protobuf", "foxglove-schemas-protobuf", "zstandard"),
+    libraries=(
+        "numpy",
+        "scipy",
+        "opencv-python-headless",
+        "mcap",
+        "protobuf",
+        "foxglove-schemas-protobuf",
+        "zstandard",
+    ),
     example="scenewright ingest --log recording.mcap --out outputs/kitchen/sequence",
     check=check,
 )

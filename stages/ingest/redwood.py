@@ -74,7 +74,9 @@ def _camera(root: Path, size: tuple[int, int] | None) -> tuple[Camera, tuple[str
         if path.exists():
             return _read_intrinsics(path, size), (f"intrinsics read from {name}",)
     if size is not None and size != (640, 480):
-        raise BadInput(f"{root}: images are {width}x{height} and there is no {INTRINSICS[0]}", hint="add it (Open3D layout)")
+        raise BadInput(
+            f"{root}: images are {width}x{height} and there is no {INTRINSICS[0]}", hint="add it (Open3D layout)"
+        )
     note = "intrinsics assumed: PrimeSense default, fx = fy = 525, cx = 319.5, cy = 239.5"
     return Camera(width=width, height=height, **PRIMESENSE), (note,)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -135,13 +136,13 @@ def _finish(
     for note in notes:
         (context.logger.warning if note.startswith("WARNING") else context.logger.info)("%s", note)
     write_tum(context.output / "trajectory.tum", np.array(times[: len(poses)]), np.array(poses).reshape(-1, 4, 4))
-    streams = ["color", "depth"] + ["labels"] * source.has_labels + ["pose"] * bool(poses)
+    present = {"color": True, "depth": True, "labels": source.has_labels, "pose": bool(poses)}
     SequenceFile(
         source_format=source.format,
         rule=source.rule,
         notes=tuple(notes),
         camera=source.camera,
-        streams=tuple(streams) if times else (),
+        streams=tuple(name for name, there in present.items() if there and times),  # type: ignore[arg-type]
         frame_count=len(times),
         frames_in_log=len(source.entries),
         drops=dict(sorted(drops.items())),
@@ -151,7 +152,7 @@ def _finish(
         start_time=times[0] if times else 0.0,
         end_time=times[-1] if times else 0.0,
     ).write(context.output / "sequence.json")
-    summary = {
+    summary: dict[str, Any] = {
         "frames": len(times),
         "frames_in_log": len(source.entries),
         "dropped": sum(count for reason, count in drops.items() if reason != NOT_SELECTED),

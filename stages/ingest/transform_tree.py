@@ -49,9 +49,7 @@ class TransformTree:
             chain.append(above)
         return chain
 
-    def lookup(
-        self, target: str, source: str, stamp: int, *, gap: int, tolerance: int
-    ) -> np.ndarray | None:
+    def lookup(self, target: str, source: str, stamp: int, *, gap: int, tolerance: int) -> np.ndarray | None:
         """Return target_from_source (4, 4) at `stamp` [ns], or None where the samples do not cover it.
 
         Samples further apart than `gap` [ns] are not interpolated; up to `tolerance` [ns] before the first or after

@@ -17,7 +17,7 @@ from stages.kit.geometry.transforms import quaternion_of, transform_from_quatern
 
 JPEG_QUALITY = 95
 JPEG_START = b"\xff\xd8\xff"
-RAW_TYPES = {
+RAW_TYPES: dict[str, tuple[np.dtype[Any], int]] = {
     "mono8": (np.dtype("u1"), 1),
     "8UC1": (np.dtype("u1"), 1),
     "mono16": (np.dtype("<u2"), 1),

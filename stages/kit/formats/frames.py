@@ -35,7 +35,7 @@ CALIBRATION, TRANSFORMS = "/camera/calibration", "/tf"
 WORLD_FRAME, CAMERA_FRAME = "world", "camera"
 WORLD_METADATA, LABELS_METADATA = "scenewright", "labels"
 STREAM_TOPICS = {"color": COLOR, "depth": DEPTH, "labels": LABELS}
-MESSAGE_TYPES: dict[str, type] = {
+MESSAGE_TYPES: dict[str, Any] = {
     COLOR: CompressedImage,
     DEPTH: RawImage,
     LABELS: RawImage,
@@ -82,11 +82,11 @@ class FrameWriter:
         self.frame_count = 0
         self._labels = labels
         self._last_time = -1
-        self._file = Path(path).open("wb")
+        self._file = Path(path).open("wb")  # noqa: SIM115 (closed in __exit__)
         self._writer = McapWriter(self._file, chunk_size=1 << 20, compression=CompressionType.ZSTD)
         self._writer.start(profile="", library="scenewright")
         topics = [COLOR, DEPTH, LABELS, CALIBRATION, TRANSFORMS] if labels else [COLOR, DEPTH, CALIBRATION, TRANSFORMS]
-        schemas: dict[type, int] = {}
+        schemas: dict[Any, int] = {}
         self._channels: dict[str, int] = {}
         for topic in topics:
             kind = MESSAGE_TYPES[topic]

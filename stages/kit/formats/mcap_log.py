@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import lz4.frame
 import zstandard
@@ -289,11 +289,11 @@ class McapLog:
         _, length = _RECORD.unpack(self._file.read(_RECORD.size))
         return self._file.read(length)
 
-    def _parse(self, kind: type, offset: int, length: int):  # noqa: ANN202 (a record of `kind`)
+    def _parse(self, kind: Any, offset: int, length: int) -> Any:
         self._file.seek(offset + _RECORD.size)
         return self._record(kind, self._file.read(length), offset)
 
-    def _record(self, kind: type, body: bytes, offset: int):  # noqa: ANN202 (a record of `kind`)
+    def _record(self, kind: Any, body: bytes, offset: int) -> Any:
         try:
             return kind.read(ReadDataStream(BytesIO(body)))
         except (McapError, struct.error, UnicodeDecodeError, ValueError) as error:

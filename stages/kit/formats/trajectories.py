@@ -105,7 +105,8 @@ def read_open3d_log(path: Path) -> list[np.ndarray]:
         raise BadInput(f"{path}: {len(lines)} lines, expected a multiple of 5 (header and 4 matrix rows)")
     poses = []
     for start in range(0, len(lines), 5):
-        if len(lines[start].split()) != 3:
+        header = lines[start].split()
+        if len(header) != 3 or not all(field.lstrip("+-").isdecimal() for field in header):
             raise BadInput(f"{path}: entry {start // 5}: header {lines[start]!r:.60} is not three integers")
         rows = [line.split() for line in lines[start + 1 : start + 5]]
         if any(len(row) != 4 for row in rows):

@@ -29,7 +29,9 @@ def _write(path: Path, count: int = 5, **options) -> Path:
             depth = np.full((30, 40), 1.0 + 0.1 * index, np.float32)
             depth[0, :4] = [0, np.nan, np.inf, 70]
             labels = np.full((30, 40), 60000 + index, np.uint16)
-            writer.write(1.5 + index / 10, color, depth, transform_from_yaw(0.1 * index, np.array([index, 0, 1])), labels)
+            writer.write(
+                1.5 + index / 10, color, depth, transform_from_yaw(0.1 * index, np.array([index, 0, 1])), labels
+            )
     return path
 
 

@@ -187,7 +187,9 @@ def test_colour_of_the_same_shape_is_resized_to_the_depth(tmp_path: Path) -> Non
 @pytest.mark.parametrize(("scale", "warned"), [(1000.0, False), (1.0, True), (50000.0, True)])
 def test_implausible_depth_unit_is_pointed_out(tmp_path: Path, scale: float, warned: bool) -> None:
     log = write_seven_scenes(tmp_path / "log", frames(1))
-    (log / "frame-000000.depth.png").write_bytes(png(np.full((72, 96), 40, np.uint16) if scale == 1 else millimetres(frames(1)[0][1])))
+    (log / "frame-000000.depth.png").write_bytes(
+        png(np.full((72, 96), 40, np.uint16) if scale == 1 else millimetres(frames(1)[0][1]))
+    )
     notes = ingest(log, tmp_path / "out", depth_scale=scale, gravity="none").info.notes
     assert any("median depth" in note for note in notes) == warned
 

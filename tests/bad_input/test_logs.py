@@ -1,0 +1,397 @@
+"""Damaged and lying logs: refused with what was found, or frames left out and counted. Never a raw exception."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zstandard
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.opcode import Opcode
+
+from schemas.errors import BadInput
+from stages.kit.formats.frames import FrameReader, FrameWriter
+from stages.kit.formats.mcap_log import MAGIC, McapLog
+from tests.real_data import real_data
+from tests.unit.ingest.foxglove_logs import (
+    CompressionType,
+    LogWriter,
+    calibration,
+    compressed,
+    raw,
+    transform,
+    write_simple_log,
+)
+from tests.unit.ingest.running import ingest
+from tests.unit.ingest.tiny_room import CAMERA, frames, jpeg, millimetres, png, write_posed_images, write_redwood
+
+SECOND = 1_000_000_000
+
+
+def _records(data: bytes) -> list[tuple[int, int, int]]:
+    """Return (opcode, start, end) of the top-level records."""
+    found, offset = [], len(MAGIC)
+    while offset < len(data) - len(MAGIC):
+        opcode, length = struct.unpack_from("<BQ", data, offset)
+        found.append((opcode, offset, offset + 9 + length))
+        offset += 9 + length
+    return found
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    return write_simple_log(tmp_path_factory.mktemp("logs") / "log.mcap", frames(3), chunk_size=8000).read_bytes()
+
+
+def _read_everything(path: Path) -> int:
+    with McapLog(path) as log:
+        return sum(1 for _ in log.messages())
+
+
+# --- the container ---------------------------------------------------------------------------------------------
+
+
+def test_cut_at_every_record_boundary(tmp_path: Path, whole: bytes) -> None:
+    path = tmp_path / "cut.mcap"
+    for _, start, end in _records(whole):
+        for cut in {start - 1, start, start + 1, end - 1}:
+            path.write_bytes(whole[:cut])
+            with pytest.raises(BadInput, match="cut.mcap"):
+                _read_everything(path)
+    path.write_bytes(whole)
+    assert _read_everything(path) == 12
+
+
+def test_torn_file_says_what_was_found(tmp_path: Path, whole: bytes) -> None:
+    chunks = [record for record in _records(whole) if record[0] == Opcode.CHUNK]
+    cut = chunks[-1][1] + 100
+    (tmp_path / "torn.mcap").write_bytes(whole[:cut])
+    expected = rf"byte {chunks[-1][1]} of {cut}: {len(chunks) - 1} whole chunks with \d+ indexed messages"
+    with pytest.raises(BadInput, match=expected) as caught:
+        ingest(tmp_path / "torn.mcap", tmp_path / "out")
+    assert "mcap recover" in str(caught.value)
+
+
+def test_flipped_bytes_are_noticed_wherever_content_is(tmp_path: Path, whole: bytes) -> None:
+    """One byte in every record: chunks and the summary carry checksums, the rest must at least not crash."""
+    path = tmp_path / "flip.mcap"
+    for opcode, start, end in _records(whole):
+        for place in (start + 9 + (end - start - 9) // 2, end - 1):
+            if place < start + 9:
+                continue
+            damaged = bytearray(whole)
+            damaged[place] ^= 0x10
+            path.write_bytes(damaged)
+            try:
+                _read_everything(path)
+                noticed = False
+            except BadInput:
+                noticed = True
+            in_summary = start > next(s for o, s, _ in _records(whole) if o == Opcode.DATA_END)
+            assert noticed or not (opcode == Opcode.CHUNK or in_summary), f"opcode {opcode} at {place}"
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_any_damage_is_bad_input_or_harmless(tmp_path: Path, whole: bytes, data: st.DataObject) -> None:
+    damaged = bytearray(whole)
+    for _ in range(data.draw(st.integers(1, 3))):
+        place = data.draw(st.integers(0, len(whole) - 1))
+        kind = data.draw(st.sampled_from(["flip", "fill", "cut"]))
+        if kind == "flip":
+            damaged[place % len(damaged)] ^= 1 << data.draw(st.integers(0, 7))
+        elif kind == "fill":
+            place %= len(damaged)
+            damaged[place : place + 8] = b"\xff" * len(damaged[place : place + 8])
+        else:
+            damaged = damaged[: max(1, place)]
+    path = tmp_path / "fuzz.mcap"
+    path.write_bytes(damaged)
+    try:
+        _read_everything(path)
+    except BadInput as error:
+        assert "fuzz.mcap" in str(error)
+
+
+def test_bit_flip_in_a_sequence_is_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "frames.mcap"
+    with FrameWriter(path, CAMERA) as writer:
+        for index, (color, depth, pose) in enumerate(frames(3)):
+            writer.write(float(index), color, depth, pose)
+    damaged = bytearray(path.read_bytes())
+    chunk = next(record for record in _records(bytes(damaged)) if record[0] == Opcode.CHUNK)
+    damaged[(chunk[1] + chunk[2]) // 2] ^= 1
+    path.write_bytes(damaged)
+    with pytest.raises(BadInput), FrameReader(path) as reader:
+        list(reader.frames())
+
+
+def _forged_chunk(tmp_path: Path, content: bytes, claimed: int, compression: bytes = b"zstd") -> Path:
+    checksum = 0
+    body = struct.pack("<QQQI", 0, 0, claimed, checksum)
+    body += struct.pack("<I", len(compression)) + compression + struct.pack("<Q", len(content)) + content
+    header = struct.pack("<II", 0, 0)
+    data = MAGIC + struct.pack("<BQ", Opcode.HEADER, len(header)) + header
+    data += struct.pack("<BQ", Opcode.CHUNK, len(body)) + body
+    data += struct.pack("<BQI", Opcode.DATA_END, 4, 0) + struct.pack("<BQQQI", Opcode.FOOTER, 20, 0, 0, 0) + MAGIC
+    path = tmp_path / "forged.mcap"
+    path.write_bytes(data)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("content", "claimed", "compression", "complaint"),
+    [
+        (zstandard.compress(bytes(300_000_000)), 1000, b"zstd", "lies about its size"),
+        (zstandard.compress(bytes(1000)), 2**40, b"zstd", "more than"),
+        (zstandard.compress(bytes(1000)), 999, b"zstd", "lies about its size"),
+        (b"nonsense", 100, b"zstd", "cannot be unpacked"),
+        (b"nonsense", 100, b"lz4", "cannot be unpacked"),
+        (bytes(50), 100, b"", "holds 50 bytes, claims 100"),
+        (bytes(50), 50, b"rar", "unknown compression 'rar'"),
+        (b"\x05\xff\xff\xff\xff\xff\xff\xff\x7f", 9, b"", "ends within a record"),
+        (struct.pack("<BQHIQQ", Opcode.MESSAGE, 22, 9, 0, 0, 0), 31, b"", "channel 9, which the file does not define"),
+        (struct.pack("<BQ", Opcode.MESSAGE, 3) + b"abc", 12, b"", "shorter than its header"),
+    ],
+)
+def test_chunks_that_lie(tmp_path: Path, content: bytes, claimed: int, compression: bytes, complaint: str) -> None:
+    with pytest.raises(BadInput, match=complaint):
+        _read_everything(_forged_chunk(tmp_path, content, claimed, compression))
+
+
+def test_lz4_bomb_is_stopped(tmp_path: Path) -> None:
+    import lz4.frame
+
+    with pytest.raises(BadInput, match="claims 1000"):
+        _read_everything(_forged_chunk(tmp_path, lz4.frame.compress(bytes(200_000_000)), 1000, b"lz4"))
+
+
+def test_wrong_checksum_is_named(tmp_path: Path) -> None:
+    path = _forged_chunk(tmp_path, bytes(18), 18, b"")
+    data = bytearray(path.read_bytes())
+    place = data.find(struct.pack("<QQQI", 0, 0, 18, 0)) + 24
+    data[place : place + 4] = struct.pack("<I", zlib.crc32(bytes(18)) ^ 1)
+    path.write_bytes(data)
+    with pytest.raises(BadInput, match="checksum of the chunk"):
+        _read_everything(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n" + bytes(100)])
+def test_files_that_are_no_mcap(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "log.mcap"
+    path.write_bytes(content)
+    with pytest.raises(BadInput):
+        ingest(path, tmp_path / "out")
+
+
+# --- the messages ----------------------------------------------------------------------------------------------
+
+
+def _log(path: Path, **replaced) -> Path:
+    """Write a one-frame log in which some messages are replaced (None: left out)."""
+    color, depth, pose = frames(1)[0]
+    messages = {
+        "/info": calibration(SECOND),
+        "/tf": transform(SECOND, "map", "optical", pose),
+        "/color": compressed(SECOND, jpeg(color)),
+        "/depth": raw(SECOND, millimetres(depth), "16UC1"),
+    }
+    messages |= {"/" + name: message for name, message in replaced.items()}
+    with LogWriter(path, CompressionType.NONE) as log:
+        for topic, message in messages.items():
+            for one in message if isinstance(message, list) else [message]:
+                if one is not None:
+                    log.write(topic, one, SECOND)
+    return path
+
+
+BAD_CALIBRATIONS = {
+    "missing": (None, "no camera calibration"),
+    "zero focal length": (calibration(0, K=[0.0] * 9), "no positive focal lengths"),
+    "no K": (calibration(0, K=[]), "no positive focal lengths"),
+    "NaN": (calibration(0, K=[float("nan")] * 9), "no positive focal lengths"),
+    "negative": (calibration(0, K=[-80.0, 0, 40, 0, 80, 30, 0, 0, 1]), "no positive focal lengths"),
+    "zero size": (calibration(0, width=0, height=0), "0x0"),
+    "wrong shape": (calibration(0, width=100, height=100), "100x100, depth images are 96x72"),
+    "fisheye": (calibration(0, distortion_model="kannala_brandt", D=[0.1] * 4), "kannala_brandt"),
+    "endless distortion": (calibration(0, D=[float("inf")] * 5), "not finite"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_CALIBRATIONS)
+def test_calibrations_that_cannot_be(tmp_path: Path, case: str) -> None:
+    message, complaint = BAD_CALIBRATIONS[case]
+    log = _log(tmp_path / "log.mcap", info=message)
+    with pytest.raises(BadInput, match=complaint):
+        ingest(log, tmp_path / "out")
+    k = CAMERA
+    rescued = ingest(log, tmp_path / "rescued", fx=k.fx, fy=k.fy, cx=k.cx, cy=k.cy)
+    assert rescued.outcome == "ok" and rescued.info.camera == CAMERA
+
+
+DEPTH = millimetres(frames(1)[0][1])
+BAD_IMAGES = {
+    "8-bit depth": ({"depth": compressed(SECOND, png((DEPTH // 20).astype(np.uint8)), kind="png")}, "depth_not_16_bit"),
+    "all zero": ({"depth": raw(SECOND, DEPTH * 0, "16UC1")}, "no_valid_depth"),
+    "all 65535": ({"depth": raw(SECOND, DEPTH * 0 + 65535, "16UC1")}, "no_valid_depth"),
+    "all NaN": ({"depth": raw(SECOND, np.full(DEPTH.shape, np.nan, "<f4"), "32FC1")}, "no_valid_depth"),
+    "cut colour": ({"color": compressed(SECOND, jpeg(frames(1)[0][0])[:400])}, "undecodable_color"),
+    "no colour bytes": ({"color": compressed(SECOND, b"")}, "undecodable_color"),
+    "words as colour": ({"color": compressed(SECOND, b"not an image at all")}, "undecodable_color"),
+    "other shape": ({"color": compressed(SECOND, jpeg(np.zeros((96, 96, 3), np.uint8)))}, "size_mismatch"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_IMAGES)
+def test_images_that_cannot_be_used_are_counted(tmp_path: Path, case: str) -> None:
+    replaced, reason = BAD_IMAGES[case]
+    if case == "8-bit depth":  # named as depth, so that it is not taken for a picture
+        replaced = {"depth": None, "cam/depth": replaced["depth"]}
+    sequence = ingest(_log(tmp_path / "log.mcap", **replaced), tmp_path / "out")
+    assert sequence.outcome == "empty"
+    assert sequence.info.drops == {reason: 1}
+    assert reason in sequence.summary["reason"]
+
+
+def test_raw_images_with_too_few_bytes_or_no_size(tmp_path: Path) -> None:
+    short = raw(SECOND, DEPTH, "16UC1")
+    short.data = short.data[:-1]
+    assert ingest(_log(tmp_path / "a.mcap", depth=short), tmp_path / "a").info.drops == {"undecodable_depth": 1}
+    flat = raw(SECOND, DEPTH, "16UC1")
+    flat.step = 3
+    assert ingest(_log(tmp_path / "b.mcap", depth=flat), tmp_path / "b").info.drops == {"undecodable_depth": 1}
+    nothing = raw(SECOND, DEPTH, "16UC1")
+    nothing.width = nothing.height = 0
+    assert ingest(_log(tmp_path / "c.mcap", depth=nothing), tmp_path / "c").info.drops == {"undecodable_depth": 1}
+    later = raw(2 * SECOND, DEPTH, "16UC1")
+    color = [compressed(stamp, jpeg(frames(1)[0][0])) for stamp in (SECOND, 2 * SECOND)]
+    info = ingest(_log(tmp_path / "d.mcap", depth=[nothing, later], color=color), tmp_path / "d").info
+    assert info.frame_count == 1 and info.camera == CAMERA
+
+
+def test_depth_of_another_size_within_a_log(tmp_path: Path) -> None:
+    color, depth, pose = frames(1)[0]
+    log = _log(
+        tmp_path / "log.mcap",
+        tf=[transform(SECOND, "map", "optical", pose), transform(2 * SECOND, "map", "optical", pose)],
+        color=[compressed(SECOND, jpeg(color)), compressed(2 * SECOND, jpeg(color))],
+        depth=[raw(SECOND, DEPTH, "16UC1"), raw(2 * SECOND, DEPTH[::2, ::2], "16UC1")],
+    )
+    info = ingest(log, tmp_path / "out").info
+    assert info.frame_count == 1 and info.drops == {"size_mismatch": 1}
+
+
+def test_unknown_encoding_and_missing_depth_name_the_topics(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"no depth images.*/depth \(foxglove.RawImage"):
+        ingest(_log(tmp_path / "a.mcap", depth=raw(SECOND, DEPTH, "yuv422")), tmp_path / "a")
+    with pytest.raises(BadInput, match="no colour images"):
+        ingest(_log(tmp_path / "b.mcap", color=None), tmp_path / "b")
+
+
+def test_log_without_any_message_is_empty(tmp_path: Path) -> None:
+    with FrameWriter(tmp_path / "log.mcap", CAMERA):
+        pass
+    sequence = ingest(tmp_path / "log.mcap", tmp_path / "out")
+    assert sequence.outcome == "empty" and "no frames in the log" in sequence.summary["reason"]
+
+
+def test_trees_that_are_none(tmp_path: Path) -> None:
+    loop = [transform(SECOND, "a", "optical", np.eye(4)), transform(SECOND, "optical", "a", np.eye(4))]
+    with pytest.raises(BadInput, match="loop"):
+        ingest(_log(tmp_path / "a.mcap", tf=loop), tmp_path / "a")
+    parents = [transform(SECOND, "a", "optical", np.eye(4)), transform(SECOND, "b", "optical", np.eye(4))]
+    with pytest.raises(BadInput, match="two parents"):
+        ingest(_log(tmp_path / "b.mcap", tf=parents), tmp_path / "b")
+    own = transform(SECOND, "optical", "optical", np.eye(4))
+    with pytest.raises(BadInput, match="no tree"):
+        ingest(_log(tmp_path / "c.mcap", tf=own), tmp_path / "c")
+
+
+@pytest.mark.parametrize("quaternion", [(0, 0, 0, 0), (float("nan"), 0, 0, 1), (0, 0, 0, 5)])
+def test_transforms_that_are_not_rigid_are_left_out(tmp_path: Path, quaternion: tuple[float, ...]) -> None:
+    pose = frames(1)[0][2]
+    bad = transform(SECOND, "map", "optical", pose)
+    bad.rotation.x, bad.rotation.y, bad.rotation.z, bad.rotation.w = quaternion
+    info = ingest(_log(tmp_path / "log.mcap", tf=bad), tmp_path / "out").info
+    assert "pose" not in info.streams
+    assert any("non_rigid_transform /tf" in note for note in info.notes)
+
+
+def test_messages_that_are_no_protobuf_are_counted(tmp_path: Path) -> None:
+    path = _log(tmp_path / "log.mcap")
+    data = bytearray(path.read_bytes())
+    place = data.find(b"optical", data.find(b"map"))
+    data[place - 1] = 0xFF  # the length of a string: now runs over the end
+    for _, start, _end in (r for r in _records(bytes(data)) if r[0] == Opcode.CHUNK):
+        data[start + 9 + 24 : start + 9 + 28] = bytes(4)  # no checksum, as many recorders write
+    path.write_bytes(data)
+    info = ingest(path, tmp_path / "out").info
+    assert any("undecodable_message" in note for note in info.notes)
+
+
+@pytest.mark.parametrize("name", ["custom-camera-model.mcap", "example.mcap", "example.bag", "empty-file.bag"])
+def test_real_logs_that_are_not_rgbd_are_refused_by_name(tmp_path: Path, name: str) -> None:
+    with pytest.raises(BadInput, match=name):
+        ingest(real_data("logs") / name, tmp_path / "out")
+
+
+# --- folders ---------------------------------------------------------------------------------------------------
+
+
+def test_damaged_trajectories_of_folders(tmp_path: Path) -> None:
+    log = write_redwood(tmp_path / "redwood", frames(2))
+    text = (log / "trajectory.log").read_text()
+    for number, broken in enumerate([text[:-30], "0 0 1\n", text + text, text.replace("0", "x", 1), ""]):
+        (log / "trajectory.log").write_text(broken)
+        if broken == "":
+            assert "pose" not in ingest(log, tmp_path / f"out{number}").info.streams
+        else:
+            with pytest.raises(BadInput, match="trajectory.log"):
+                ingest(log, tmp_path / f"out{number}")
+
+
+def test_mirrored_and_endless_poses_of_folders_are_counted(tmp_path: Path) -> None:
+    recorded = frames(3)
+    recorded[0][2][:3, 0] *= -1
+    recorded[1][2][0, 3] = np.nan
+    info = ingest(write_redwood(tmp_path / "log", recorded), tmp_path / "out").info
+    assert info.drops == {"non_finite_pose": 1, "non_rigid_pose": 1} and info.frame_count == 1
+
+
+def test_posed_images_need_a_pose_for_each(tmp_path: Path) -> None:
+    log = write_posed_images(tmp_path / "log", frames(3))
+    lines = (log / "pose.txt").read_text().splitlines()
+    options = {"fx": 80.0, "fy": 80.0, "cx": 47.5, "cy": 35.5}
+    (log / "pose.txt").write_text("\n".join(lines[:2]))
+    with pytest.raises(BadInput, match="2 poses for 3 images"):
+        ingest(log, tmp_path / "a", **options)
+    (log / "pose.txt").write_text("\n".join([lines[0], "0 0 0 0 0 0 0", "nan 0 0 0 0 0 1"]))
+    assert ingest(log, tmp_path / "b", **options).info.drops == {"non_finite_pose": 1, "non_rigid_pose": 1}
+    (log / "pose.txt").write_text("1 2 3\n" * 3)
+    with pytest.raises(BadInput, match="3 columns, expected 7"):
+        ingest(log, tmp_path / "c", **options)
+
+
+def test_unequal_numbers_of_colour_and_depth(tmp_path: Path) -> None:
+    log = write_redwood(tmp_path / "log", frames(3))
+    (log / "image" / "00001.jpg").unlink()
+    with pytest.raises(BadInput, match="2 colour and 3 depth"):
+        ingest(log, tmp_path / "out")
+
+
+def test_palette_colour_is_read_and_palette_depth_refused(tmp_path: Path) -> None:
+    from PIL import Image
+
+    log = write_posed_images(tmp_path / "log", frames(2))
+    picture = Image.fromarray(frames(1)[0][0]).convert("P")
+    picture.save(log / "color" / "1.png")
+    (log / "depth" / "2.pgm").unlink()
+    picture.save(log / "depth" / "2.png")
+    sequence = ingest(log, tmp_path / "out", fx=80.0, fy=80.0, cx=47.5, cy=35.5, gravity="none")
+    assert sequence.info.drops == {"depth_not_16_bit": 1} and sequence.info.frame_count == 1
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        assert reader.read(0).color[..., 0].mean() > 150 > reader.read(0).color[..., 2].mean() + 50
