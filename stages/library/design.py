@@ -9,7 +9,7 @@ import numpy as np
 
 from schemas.base import as_vector
 from schemas.scene_parts import Joint
-from stages.kit.geometry.solids import Solid, bar, mass_properties
+from stages.kit.geometry.solids import MassProperties, Solid, bar, mass_properties
 
 Color = tuple[int, int, int]
 
@@ -43,20 +43,28 @@ class Paint:
 
 
 WOOD = Material(620.0, ((196, 154, 108), (160, 114, 72), (120, 80, 50), (222, 190, 148), (92, 62, 44), (178, 132, 84)))
-LACQUER = Material(680.0, ((240, 240, 236), (228, 226, 218), (206, 208, 210), (70, 74, 80), (150, 166, 160), (64, 88, 110)))
+LACQUER = Material(
+    680.0, ((240, 240, 236), (228, 226, 218), (206, 208, 210), (70, 74, 80), (150, 166, 160), (64, 88, 110))
+)
 STEEL = Material(2600.0, ((178, 182, 186), (120, 124, 128), (58, 60, 64), (206, 208, 210)))
 """Bars and legs: tubes, so far lighter than solid steel."""
 APPLIANCE = Material(220.0, ((238, 240, 242), (192, 196, 200), (58, 60, 64), (226, 220, 200), (158, 60, 52)))
 """Insulated walls between sheets."""
 FABRIC = Material(70.0, ((92, 110, 132), (150, 80, 70), (112, 126, 96), (176, 164, 146), (70, 72, 78), (196, 150, 90)))
 LINEN = Material(70.0, ((236, 232, 224), (180, 196, 210), (214, 196, 178), (140, 156, 140)))
-PLASTIC = Material(1000.0, ((40, 42, 46), (222, 222, 220), (180, 60, 54), (60, 108, 160), (84, 140, 100), (232, 188, 70)))
+PLASTIC = Material(
+    1000.0, ((40, 42, 46), (222, 222, 220), (180, 60, 54), (60, 108, 160), (84, 140, 100), (232, 188, 70))
+)
 DARK_PLASTIC = Material(900.0, ((34, 36, 40), (56, 58, 62)))
 SCREEN = Material(900.0, ((18, 20, 28), (26, 30, 40)))
-CERAMIC = Material(2300.0, ((238, 236, 230), (196, 70, 60), (66, 110, 160), (92, 150, 110), (236, 192, 80), (60, 62, 70)))
+CERAMIC = Material(
+    2300.0, ((238, 236, 230), (196, 70, 60), (66, 110, 160), (92, 150, 110), (236, 192, 80), (60, 62, 70))
+)
 GLASS = Material(950.0, ((64, 120, 84), (150, 96, 50), (110, 150, 190), (196, 214, 216)))
 """Filled bottles: close to water."""
-CARDBOARD = Material(180.0, ((190, 150, 106), (206, 60, 56), (60, 110, 180), (236, 190, 60), (96, 150, 90), (232, 226, 214)))
+CARDBOARD = Material(
+    180.0, ((190, 150, 106), (206, 60, 56), (60, 110, 180), (236, 190, 60), (96, 150, 90), (232, 226, 214))
+)
 PAPER = Material(700.0, ((236, 232, 220), (246, 244, 238)))
 
 
@@ -94,13 +102,15 @@ class Design:
 
 def painted(paint: Paint, *solids: Solid | Iterable[Solid]) -> list[Piece]:
     """Return the solids (or lists of solids) as pieces of one paint."""
-    pieces = []
+    pieces: list[Piece] = []
     for entry in solids:
         pieces.extend(Piece(solid, paint) for solid in ([entry] if isinstance(entry, Solid) else entry))
     return pieces
 
 
-def bar_handle(center: np.ndarray, along: str, length: float, standoff: float, radius: float, paint: Paint) -> list[Piece]:
+def bar_handle(
+    center: np.ndarray, along: str, length: float, standoff: float, radius: float, paint: Paint
+) -> list[Piece]:
     """Return a bar handle before a surface that looks along -y: `center` (3,) is the middle of the bar.
 
     The posts reach back by `standoff` [m] at both ends; a gripper closes on the bar between them.
@@ -109,7 +119,9 @@ def bar_handle(center: np.ndarray, along: str, length: float, standoff: float, r
     direction = np.array([1.0, 0, 0]) if along == "x" else np.array([0, 0, 1.0])
     start, end = center - 0.5 * length * direction, center + 0.5 * length * direction
     back = np.array([0, standoff, 0])
-    posts = [bar(tip, tip + back, 0.8 * radius, count=8) for tip in (start + radius * direction, end - radius * direction)]
+    posts = [
+        bar(tip, tip + back, 0.8 * radius, count=8) for tip in (start + radius * direction, end - radius * direction)
+    ]
     return painted(paint, bar(start, end, radius), posts)
 
 
@@ -130,7 +142,7 @@ def centered(design: Design) -> Design:
     return replace(design, body=moved(design.body), moving=moving)
 
 
-def mass_of(pieces: Iterable[Piece]):
+def mass_of(pieces: Iterable[Piece]) -> MassProperties:
     """Return the MassProperties of pieces, axes and origin of the frame they are in."""
     pieces = list(pieces)
     return mass_properties([piece.solid for piece in pieces], [piece.paint.density for piece in pieces])

@@ -23,7 +23,7 @@ CLEARANCES = (0.008, 0.02, 0.04)
 JOIN_GAP = 0.004
 """Regions of one horizontal plane closer than this are one support surface [m]."""
 MINIMUM_FILL = 0.6
-"""A support region fills at least this share of its rectangle (a disc 0.79): what is put on the rectangle's middle stands."""
+"""A support region fills at least this share of its rectangle (a disc 0.79)."""
 UPRIGHT = 0.9
 """-a_th of equation 2.1: a plane supports when its normal's z exceeds this."""
 
@@ -33,8 +33,8 @@ def surface_planes(
 ) -> tuple[SurfacePlane, ...]:
     """Return the planes of flat facets, largest first.
 
-    A plane is kept when its exposed area is at least `minimum_share` of the surface of the bounding box. Planes that look
-    up are supports: they are split into connected regions, strips narrower than `support_width` [m] (0.35 of the
+    A plane is kept when its exposed area is at least `minimum_share` of the surface of the bounding box. Planes that
+    look up are supports: they are split into connected regions, strips narrower than `support_width` [m] (0.35 of the
     smaller horizontal extent on small things) are cut off, and `support_share` is enough.
     """
     points = np.concatenate([solid.vertices for solid in solids])
@@ -42,7 +42,9 @@ def surface_planes(
     surface = 2 * float(size[0] * size[1] + size[1] * size[2] + size[0] * size[2])
     width = min(support_width, 0.35 * float(size[:2].min()))
     bounds = np.array([[solid.vertices.min(axis=0), solid.vertices.max(axis=0)] for solid in solids])
-    edges = [np.unique(np.sort(solid.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0) for solid in solids]
+    edges = [
+        np.unique(np.sort(solid.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0) for solid in solids
+    ]
     planes = []
     for normal, offset, facets in _coplanar_facets(solids):
         up = normal[2] > UPRIGHT
@@ -55,7 +57,7 @@ def surface_planes(
         cover = []
         for height in (offset - gap for gap in gaps):
             near = np.flatnonzero(_bounds_reach(bounds, normal, height))
-            cover += [_section(solids[k].vertices, edges[k], normal, height, basis) for k in near]
+            cover += [_section(solids[k].vertices, edges[k], normal, height, basis) for k in near.tolist()]
         exposed = union.difference(shapely.union_all([c for c in cover if c is not None]))
         regions = _regions(exposed, width) if up else [exposed]
         for region in regions:
@@ -68,12 +70,14 @@ def surface_planes(
             middle = np.asarray(region.centroid.coords[0])
             planes.append(
                 SurfacePlane(
-                    normal=as_vector(np.round(normal, 9) + 0.0), offset=round(float(offset), 9) + 0.0, area=round(region.area, 9),
+                    normal=as_vector(np.round(normal, 9) + 0.0),
+                    offset=round(float(offset), 9) + 0.0,
+                    area=round(region.area, 9),
                     center=as_vector(np.round(anchor + middle @ basis, 9) + 0.0),
                     corners=tuple(as_vector(np.round(anchor + corner @ basis, 9) + 0.0) for corner in corners),
                     horizontal=bool(up),
                 )
-            )  # fmt: skip
+            )
     planes.sort(key=lambda plane: (-round(plane.area, 6), plane.center, plane.normal))
     return tuple(planes)
 
@@ -104,7 +108,7 @@ def _coplanar_facets(solids: Sequence[Solid]) -> list[tuple[np.ndarray, float, l
 
 
 def _basis(normal: np.ndarray) -> np.ndarray:
-    """Return two orthonormal directions (2, 3) in the plane, axis-parallel where the normal is, right-handed with it."""
+    """Return two orthonormal directions (2, 3) in the plane, right-handed with the normal."""
     helper = np.array([1.0, 0, 0]) if abs(normal[0]) < 0.9 else np.array([0, 1.0, 0])
     first = helper - (helper @ normal) * normal
     first /= np.linalg.norm(first)
@@ -121,7 +125,9 @@ def _bounds_reach(bounds: np.ndarray, normal: np.ndarray, height: float) -> np.n
     return np.abs(center @ normal + height) < half @ np.abs(normal)
 
 
-def _section(vertices: np.ndarray, edges: np.ndarray, normal: np.ndarray, height: float, basis: np.ndarray) -> Polygon | None:
+def _section(
+    vertices: np.ndarray, edges: np.ndarray, normal: np.ndarray, height: float, basis: np.ndarray
+) -> Polygon | None:
     """Return the cross-section of a convex solid with the plane n.v + height = 0, in the plane's basis, or None."""
     signed = vertices @ normal + height
     start, end = signed[edges[:, 0]], signed[edges[:, 1]]

@@ -38,9 +38,18 @@ def _body(cad_scene: CadScene, graph: ContactGraphFile, node: GraphNode, movable
             raise BadInput(f"{folder}: model of node {node.id} is missing", hint="run `cad` again")
         model = read_model(folder)
         return BundleBody(
-            name=node.id, class_name=node.class_name, parent=parent, relation=relation, world_from_body=np.array(node.world_from_model),
-            movable=carried, box=_box(node, None, cad_scene), model=model, model_folder=folder, scale=node.scale, joint_values=dict(node.joints),
-        )  # fmt: skip
+            name=node.id,
+            class_name=node.class_name,
+            parent=parent,
+            relation=relation,
+            world_from_body=np.array(node.world_from_model),
+            movable=carried,
+            box=_box(node, None, cad_scene),
+            model=model,
+            model_folder=folder,
+            scale=node.scale,
+            joint_values=dict(node.joints),
+        )
     mesh = _mesh(cad_scene, node)
     bounds = _box(node, mesh, cad_scene)
     origin = np.eye(4)
@@ -50,9 +59,15 @@ def _body(cad_scene: CadScene, graph: ContactGraphFile, node: GraphNode, movable
     if mesh is not None:
         mesh.apply_translation(-origin[:3, 3])
     return BundleBody(
-        name=node.id, class_name=node.class_name, parent=parent, relation=relation, world_from_body=origin, movable=carried,
-        box=bounds, mesh=mesh,
-    )  # fmt: skip
+        name=node.id,
+        class_name=node.class_name,
+        parent=parent,
+        relation=relation,
+        world_from_body=origin,
+        movable=carried,
+        box=bounds,
+        mesh=mesh,
+    )
 
 
 def _mesh(cad_scene: CadScene, node: GraphNode) -> trimesh.Trimesh | None:

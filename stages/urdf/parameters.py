@@ -12,7 +12,9 @@ from stages.kit.stage import Parameters, Stage
 class UrdfParameters(Parameters):
     """Options of `urdf`."""
 
-    movable_classes: tuple[str, ...] = Field((), description="Further classes to put on floating joints (default: vocabulary)")
+    movable_classes: tuple[str, ...] = Field(
+        (), description="Further classes to put on floating joints (default: vocabulary)"
+    )
     fixed_classes: tuple[str, ...] = Field((), description="Classes to fix although the vocabulary calls them movable")
 
 

@@ -86,7 +86,7 @@ def posed_mesh(folder: Path, model: CadModel, joints: dict[str, float], scale: f
         mesh = parts[part]
         mesh.apply_transform(transforms[part])
         placed.append(mesh)
-    whole = placed[0] if len(placed) == 1 else trimesh.util.concatenate(placed)
+    whole: trimesh.Trimesh = placed[0] if len(placed) == 1 else trimesh.util.concatenate(placed)
     whole.apply_scale(scale)
     return whole
 

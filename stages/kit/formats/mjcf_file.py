@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -49,8 +50,12 @@ def write_mjcf(path: Path, urdf: Urdf, joint_values: dict[str, float]) -> None:
             ElementTree.SubElement(assets, "mesh", attributes)
         return meshes[key]
 
-    def add_body(parent: ElementTree.Element, joint: UrdfJoint, pose: np.ndarray, world_from_parent: np.ndarray) -> None:
-        body = ElementTree.SubElement(parent, "body", name=joint.child, pos=numbers(pose[:3, 3]), quat=_quaternion(pose))
+    def add_body(
+        parent: ElementTree.Element, joint: UrdfJoint, pose: np.ndarray, world_from_parent: np.ndarray
+    ) -> None:
+        body = ElementTree.SubElement(
+            parent, "body", name=joint.child, pos=numbers(pose[:3, 3]), quat=_quaternion(pose)
+        )
         world_from_body = world_from_parent @ pose
         if joint.type == "floating":
             ElementTree.SubElement(body, "freejoint", name=joint.name)
@@ -99,17 +104,24 @@ def _add_joint(body: ElementTree.Element, joint: UrdfJoint) -> None:
     ElementTree.SubElement(body, "joint", attributes)
 
 
-def _fill(body: ElementTree.Element, link: Link, add_mesh) -> None:
+def _fill(body: ElementTree.Element, link: Link, add_mesh: Callable[[Shape, bool], str]) -> None:
     if link.inertial is not None:
         tensor = link.inertial.inertia
         full = [tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]]
         ElementTree.SubElement(
-            body, "inertial", pos=numbers(link.inertial.center), mass=number(link.inertial.mass),
+            body,
+            "inertial",
+            pos=numbers(link.inertial.center),
+            mass=number(link.inertial.mass),
             fullinertia=" ".join(f"{value:.9g}" for value in full),
-        )  # fmt: skip
+        )
     for shapes, kind in ((link.visuals, "visual"), (link.collisions, "collision")):
         for shape in shapes:
-            attributes = {"class": kind, "pos": numbers(shape.link_from_shape[:3, 3]), "quat": _quaternion(shape.link_from_shape)}
+            attributes = {
+                "class": kind,
+                "pos": numbers(shape.link_from_shape[:3, 3]),
+                "quat": _quaternion(shape.link_from_shape),
+            }
             if shape.mesh is not None:
                 attributes |= {"type": "mesh", "mesh": add_mesh(shape, kind == "visual")}
             else:

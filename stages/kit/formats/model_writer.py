@@ -62,19 +62,26 @@ def write_model_folder(folder: Path, model: CadModel, parts: Sequence[PartGeomet
         revolute = joint.type == "revolute"
         joints.append(
             UrdfJoint(
-                name=joint.name, type=joint.type, parent=body, child=joint.part,
-                parent_from_child=transform_from(np.eye(3), np.asarray(joint.origin)), axis=joint.axis,
-                lower=joint.lower, upper=joint.upper, effort=HINGE_EFFORT if revolute else SLIDE_EFFORT,
-                velocity=3.0 if revolute else 1.0, damping=HINGE_DAMPING if revolute else SLIDE_DAMPING,
+                name=joint.name,
+                type=joint.type,
+                parent=body,
+                child=joint.part,
+                parent_from_child=transform_from(np.eye(3), np.asarray(joint.origin)),
+                axis=joint.axis,
+                lower=joint.lower,
+                upper=joint.upper,
+                effort=HINGE_EFFORT if revolute else SLIDE_EFFORT,
+                velocity=3.0 if revolute else 1.0,
+                damping=HINGE_DAMPING if revolute else SLIDE_DAMPING,
                 friction=HINGE_FRICTION if revolute else SLIDE_FRICTION,
             )
-        )  # fmt: skip
+        )
     write_urdf(folder / URDF_FILE, Urdf(model.id, tuple(links), tuple(joints)))
     model.write(folder / MODEL_FILE)
 
 
 def colored_mesh(solids: Sequence[Solid], colors: Sequence[tuple[int, int, int]] | None) -> trimesh.Trimesh:
-    """Return the solids as one mesh, vertices in their order, with vertex colours when `colors` (one a solid) is given."""
+    """Return the solids as one mesh, vertices in their order; vertex colours when `colors` (one a solid) is given."""
     vertices = np.concatenate([solid.vertices for solid in solids])
     starts = np.cumsum([0, *(len(solid.vertices) for solid in solids)])
     faces = np.concatenate([solid.faces + start for solid, start in zip(solids, starts, strict=False)])
@@ -88,11 +95,11 @@ def colored_mesh(solids: Sequence[Solid], colors: Sequence[tuple[int, int, int]]
 
 def glb_bytes(mesh: trimesh.Trimesh) -> bytes:
     """Return the mesh as binary glTF; the same mesh gives the same bytes."""
-    return trimesh.exchange.gltf.export_glb(trimesh.Scene({"mesh": mesh}), include_normals=False)
+    return trimesh.exchange.gltf.export_glb(trimesh.Scene([mesh]), include_normals=False)
 
 
 def write_obj(path: Path, vertices: np.ndarray, faces: np.ndarray, colors: np.ndarray | None = None) -> None:
-    """Write vertices (V, 3) [m] and triangles (F, 3) as OBJ with stable bytes; `colors` (V, 3) uint8 go with the vertices."""
+    """Write vertices (V, 3) [m] and triangles (F, 3) as OBJ with stable bytes; `colors`: (V, 3) uint8 or None."""
     rounded = np.round(np.asarray(vertices, dtype=float), 7) + 0.0
     if colors is None:
         lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in rounded.tolist()]

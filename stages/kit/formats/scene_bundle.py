@@ -139,7 +139,9 @@ def _room_center(bodies: list[BundleBody]) -> np.ndarray:
     return 0.5 * (centers.min(axis=0) + centers.max(axis=0))
 
 
-def _links(root: Path, body: BundleBody, node: GraphNode | None, graph: ContactGraphFile, center: np.ndarray) -> BodyLinks:
+def _links(
+    root: Path, body: BundleBody, node: GraphNode | None, graph: ContactGraphFile, center: np.ndarray
+) -> BodyLinks:
     if body.model is not None and body.model_folder is not None:
         links = model_links(root, body.name, body.model, body.model_folder, body.scale, body.joint_values)
     elif load_vocabulary().by_name(body.class_name).is_layout:
@@ -175,7 +177,11 @@ def _static_ancestor(body: BundleBody, by_name: dict[str, BundleBody]) -> str | 
 
 
 def _tree(
-    name: str, bodies: list[BundleBody], links: dict[str, BodyLinks], parents: dict[str, str | None], by_name: dict[str, BundleBody]
+    name: str,
+    bodies: list[BundleBody],
+    links: dict[str, BodyLinks],
+    parents: dict[str, str | None],
+    by_name: dict[str, BundleBody],
 ) -> Urdf:
     """Return the kinematic tree of bodies under the link `world`; `parents`: body -> body that it hangs on, or None."""
     all_links, joints = [Link(WORLD)], []
@@ -189,10 +195,13 @@ def _tree(
         own = links[body.name]
         joints.append(
             UrdfJoint(
-                name=f"{body.name}__support", type="floating" if body.movable else "fixed", parent=parent, child=body.name,
+                name=f"{body.name}__support",
+                type="floating" if body.movable else "fixed",
+                parent=parent,
+                child=body.name,
                 parent_from_child=inverse(world_from_parent) @ body.world_from_body,
             )
-        )  # fmt: skip
+        )
         all_links.extend(own.links)
         joints.extend(own.joints)
     return Urdf(name, tuple(all_links), tuple(joints))
@@ -205,7 +214,9 @@ def _from_subfolder(link: Link) -> Link:
         return shape if shape.mesh is None else replace(shape, mesh=f"../{shape.mesh}")
 
     return replace(
-        link, visuals=tuple(moved(shape) for shape in link.visuals), collisions=tuple(moved(shape) for shape in link.collisions)
+        link,
+        visuals=tuple(moved(shape) for shape in link.visuals),
+        collisions=tuple(moved(shape) for shape in link.collisions),
     )
 
 
@@ -213,9 +224,17 @@ def _record(body: BundleBody, own: BodyLinks) -> SceneBody:
     model = body.model
     width = None if model is None or model.grasp_width is None else model.grasp_width * body.scale
     return SceneBody(
-        name=body.name, class_name=body.class_name, movable=body.movable,
+        name=body.name,
+        class_name=body.class_name,
+        movable=body.movable,
         file=f"bodies/{body.name}.urdf" if body.movable else None,
-        parent=None if body.parent == SCENE_NODE else body.parent, relation=body.relation,
-        world_from_body=as_transform(body.world_from_body), joints=own.joint_records, joint_values=own.joint_values or {},
-        box=body.box, mass=own.mass, contains=model.contains if model is not None else False, grasp_width=width,
-    )  # fmt: skip
+        parent=None if body.parent == SCENE_NODE else body.parent,
+        relation=body.relation,
+        world_from_body=as_transform(body.world_from_body),
+        joints=own.joint_records,
+        joint_values=own.joint_values or {},
+        box=body.box,
+        mass=own.mass,
+        contains=model.contains if model is not None else False,
+        grasp_width=width,
+    )

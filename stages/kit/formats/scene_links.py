@@ -53,10 +53,13 @@ class BodyLinks:
         return replace(self, links=tuple(links))
 
 
-def model_links(root: Path, name: str, model: CadModel, folder: Path, scale: float, values: dict[str, float]) -> BodyLinks:
+def model_links(
+    root: Path, name: str, model: CadModel, folder: Path, scale: float, values: dict[str, float]
+) -> BodyLinks:
     """Return the links of a CAD model under uniform scaling, and copy its meshes to `root`/meshes/<model id>/.
 
-    Lengths and prismatic limits grow with the scale, angles stay, mass grows with its cube, inertia with its fifth power.
+    Lengths and prismatic limits grow with the scale, angles stay, mass grows with its cube, inertia with its fifth
+    power.
     Raises BadInput for a model folder without a sound URDF, or whose meshes lie outside.
     """
     urdf = parse_urdf(folder / URDF_FILE)
@@ -68,7 +71,9 @@ def model_links(root: Path, name: str, model: CadModel, folder: Path, scale: flo
     for part in model.parts:
         link = urdf.link(part)
         visuals = tuple(_copied(root, model.id, part, folder, shape, scale, visual=True) for shape in link.visuals)
-        collisions = tuple(_copied(root, model.id, part, folder, shape, scale, visual=False) for shape in link.collisions)
+        collisions = tuple(
+            _copied(root, model.id, part, folder, shape, scale, visual=False) for shape in link.collisions
+        )
         inertial = None if link.inertial is None else link.inertial.scaled(scale)
         links.append(Link(names[part], inertial, visuals, collisions))
     by_name = {joint.name: joint for joint in urdf.joints}
@@ -81,11 +86,20 @@ def model_links(root: Path, name: str, model: CadModel, folder: Path, scale: flo
         frame = source.parent_from_child.copy()
         frame[:3, 3] *= scale
         joints.append(
-            replace(source, name=f"{name}__{record.name}", parent=names[model.parts[0]], child=names[record.part],
-                    parent_from_child=frame, lower=record.lower * length, upper=record.upper * length)
-        )  # fmt: skip
+            replace(
+                source,
+                name=f"{name}__{record.name}",
+                parent=names[model.parts[0]],
+                child=names[record.part],
+                parent_from_child=frame,
+                lower=record.lower * length,
+                upper=record.upper * length,
+            )
+        )
         records.append(scaled_joint(record, name, scale))
-        placed[f"{name}__{record.name}"] = float(np.clip(values.get(record.name, 0.0), record.lower, record.upper)) * length
+        placed[f"{name}__{record.name}"] = (
+            float(np.clip(values.get(record.name, 0.0), record.lower, record.upper)) * length
+        )
     return BodyLinks(tuple(links), tuple(joints), tuple(records), placed)
 
 
@@ -98,11 +112,14 @@ def scaled_joint(joint: Joint, body: str, scale: float) -> Joint:
 
     return joint.model_copy(
         update={
-            "name": f"{body}__{joint.name}", "part": f"{body}__{joint.part}", "origin": grown(joint.origin),
-            "lower": joint.lower * length, "upper": joint.upper * length,
+            "name": f"{body}__{joint.name}",
+            "part": f"{body}__{joint.part}",
+            "origin": grown(joint.origin),
+            "lower": joint.lower * length,
+            "upper": joint.upper * length,
             "handle": None if joint.handle is None else grown(joint.handle),
         }
-    )  # fmt: skip
+    )
 
 
 def _copied(root: Path, model_id: str, part: str, folder: Path, shape: Shape, scale: float, *, visual: bool) -> Shape:
@@ -154,14 +171,18 @@ def mesh_links(root: Path, name: str, mesh: trimesh.Trimesh) -> BodyLinks:
 
 def box_links(name: str, world_from_body: np.ndarray, bounds: Box) -> BodyLinks:
     """Return the link of a thing of which only the box (world frame) is known."""
-    frame = inverse(world_from_body) @ transform_from_quaternion(np.asarray(bounds.orientation), np.asarray(bounds.center))
+    frame = inverse(world_from_body) @ transform_from_quaternion(
+        np.asarray(bounds.orientation), np.asarray(bounds.center)
+    )
     x, y, z = (max(float(v), 5e-3) for v in bounds.size)
     solid = box((-x / 2, x / 2), (-y / 2, y / 2), (-z / 2, z / 2)).moved(frame)
     shape = Shape(box_size=(x, y, z), link_from_shape=frame, color=GREY)
     return BodyLinks((Link(name, mass_properties([solid], [MESH_DENSITY]), (shape,), (replace(shape, color=None),)),))
 
 
-def layout_links(root: Path, name: str, world_from_body: np.ndarray, mesh: trimesh.Trimesh | None, slabs: list[Slab]) -> BodyLinks:
+def layout_links(
+    root: Path, name: str, world_from_body: np.ndarray, mesh: trimesh.Trimesh | None, slabs: list[Slab]
+) -> BodyLinks:
     """Return the link of a floor, wall or ceiling: its mesh (body frame) to look at, slabs to collide with."""
     body_from_world = inverse(world_from_body)
     collisions, solids = [], []
@@ -172,7 +193,7 @@ def layout_links(root: Path, name: str, world_from_body: np.ndarray, mesh: trime
         solids.append(box((-x / 2, x / 2), (-y / 2, y / 2), (-z / 2, z / 2)).moved(frame))
     properties = mass_properties(solids, [LAYOUT_DENSITY] * len(solids)) if solids else None
     if mesh is not None and len(mesh.faces):
-        visuals = (_own_mesh(root, name, mesh),)
+        visuals: tuple[Shape, ...] = (_own_mesh(root, name, mesh),)
     else:
         visuals = tuple(replace(shape, color=GREY) for shape in collisions)
     return BodyLinks((Link(name, properties, visuals, tuple(collisions)),))
@@ -187,9 +208,10 @@ def _own_mesh(root: Path, name: str, mesh: trimesh.Trimesh) -> Shape:
 
 def _vertex_colors(mesh: trimesh.Trimesh) -> np.ndarray | None:
     """Return vertex colours (V, 3) uint8, or None for a mesh without any."""
-    if getattr(mesh.visual, "kind", None) not in ("vertex", "face"):
+    visual = mesh.visual
+    if not isinstance(visual, trimesh.visual.ColorVisuals) or visual.kind not in ("vertex", "face"):
         return None
-    return np.asarray(mesh.visual.vertex_colors)[:, :3]
+    return np.asarray(visual.vertex_colors)[:, :3]
 
 
 def _mean_color(mesh: trimesh.Trimesh | None) -> tuple[float, float, float, float]:

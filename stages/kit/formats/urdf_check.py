@@ -63,8 +63,16 @@ def require_sound(path: Path, root: Path | None = None) -> None:
 def _check_names(urdf: Urdf) -> list[Problem]:
     problems = []
     for what, names in (("link", [link.name for link in urdf.links]), ("joint", [joint.name for joint in urdf.joints])):
-        problems += [Problem("name", f"{what} {n!r}", "name is empty or not ASCII letters, digits, _ . -") for n in names if not NAME.fullmatch(n)]
-        problems += [Problem("duplicate", f"{what} {n!r}", f"stands {count} times") for n, count in Counter(names).items() if count > 1]
+        problems += [
+            Problem("name", f"{what} {n!r}", "name is empty or not ASCII letters, digits, _ . -")
+            for n in names
+            if not NAME.fullmatch(n)
+        ]
+        problems += [
+            Problem("duplicate", f"{what} {n!r}", f"stands {count} times")
+            for n, count in Counter(names).items()
+            if count > 1
+        ]
     return problems
 
 
@@ -89,14 +97,20 @@ def _check_tree(urdf: Urdf) -> list[Problem]:
     if not names:
         problems.append(Problem("roots", "robot", "has no links"))
     elif len(urdf.roots()) != 1:
-        problems.append(Problem("roots", "robot", f"has {len(urdf.roots())} root links, expected 1: {urdf.roots()[:4]}"))
+        problems.append(
+            Problem("roots", "robot", f"has {len(urdf.roots())} root links, expected 1: {urdf.roots()[:4]}")
+        )
     return problems
 
 
 def _check_inertia(link: Link, must_have: bool) -> list[Problem]:
     element = f"link {link.name!r}"
     if link.inertial is None:
-        return [Problem("no_inertia", element, "moves but has no inertial (engines then assume 1 kg)")] if must_have else []
+        return (
+            [Problem("no_inertia", element, "moves but has no inertial (engines then assume 1 kg)")]
+            if must_have
+            else []
+        )
     mass, tensor = link.inertial.mass, link.inertial.inertia
     if not (np.isfinite(mass) and np.isfinite(tensor).all() and np.isfinite(link.inertial.center).all()):
         return [Problem("not_finite", element, "inertial holds NaN or infinity")]
@@ -105,10 +119,16 @@ def _check_inertia(link: Link, must_have: bool) -> list[Problem]:
         problems.append(Problem("mass", element, f"mass is {mass:g} kg"))
     moments = np.linalg.eigvalsh(tensor)
     if moments[0] <= 0:
-        problems.append(Problem("inertia", element, f"inertia is not positive definite, smallest moment {moments[0]:g} kg m^2"))
+        problems.append(
+            Problem("inertia", element, f"inertia is not positive definite, smallest moment {moments[0]:g} kg m^2")
+        )
     elif moments[0] + moments[1] < moments[2] * (1 - 1e-6):
         problems.append(
-            Problem("inertia", element, f"moments {moments[0]:g}, {moments[1]:g}, {moments[2]:g} break the triangle inequality")
+            Problem(
+                "inertia",
+                element,
+                f"moments {moments[0]:g}, {moments[1]:g}, {moments[2]:g} break the triangle inequality",
+            )
         )
     return problems
 
@@ -151,5 +171,7 @@ def _check_joint(joint: UrdfJoint) -> list[Problem]:
         if joint.lower > joint.upper:
             problems.append(Problem("limits", element, f"lower {joint.lower:g} > upper {joint.upper:g}"))
         if joint.effort <= 0 or joint.velocity <= 0:
-            problems.append(Problem("limits", element, f"effort {joint.effort:g} or velocity {joint.velocity:g} is not positive"))
+            problems.append(
+                Problem("limits", element, f"effort {joint.effort:g} or velocity {joint.velocity:g} is not positive")
+            )
     return problems

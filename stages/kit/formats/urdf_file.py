@@ -129,7 +129,9 @@ def _link_element(link: Link) -> ElementTree.Element:
         ElementTree.SubElement(inertial, "origin", xyz=numbers(link.inertial.center), rpy="0 0 0")
         ElementTree.SubElement(inertial, "mass", value=number(link.inertial.mass))
         tensor = link.inertial.inertia
-        entries = {f"i{a}{b}": f"{tensor['xyz'.index(a), 'xyz'.index(b)]:.9g}" for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")}
+        entries = {
+            f"i{a}{b}": f"{tensor['xyz'.index(a), 'xyz'.index(b)]:.9g}" for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")
+        }
         ElementTree.SubElement(inertial, "inertia", entries)
     for index, shape in enumerate(link.visuals):
         visual = ElementTree.SubElement(element, "visual")
@@ -238,7 +240,8 @@ def _parse_link(element: ElementTree.Element, path: Path) -> Link:
         if mass is None or tensor is None:
             raise BadInput(f"{where}: inertial without mass or inertia")
         xx, xy, xz, yy, yz, zz = (
-            float(_floats(tensor.get(key, "0"), 1, f"{where}: {key}")[0]) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+            float(_floats(tensor.get(key, "0"), 1, f"{where}: {key}")[0])
+            for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
         )
         matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         frame = _parse_origin(inertial, where)
@@ -265,8 +268,16 @@ def _parse_joint(element: ElementTree.Element, path: Path) -> UrdfJoint:
         return float(_floats(default if source is None else source.get(key, default), 1, f"{where}: {key}")[0])
 
     return UrdfJoint(
-        name=name, type=element.get("type", ""), parent=ends[0], child=ends[1],
-        parent_from_child=_parse_origin(element, where), axis=(float(axis[0]), float(axis[1]), float(axis[2])),
-        lower=value(limit, "lower", "0"), upper=value(limit, "upper", "0"), effort=value(limit, "effort", "0"),
-        velocity=value(limit, "velocity", "0"), damping=value(dynamics, "damping", "0"), friction=value(dynamics, "friction", "0"),
-    )  # fmt: skip
+        name=name,
+        type=element.get("type", ""),
+        parent=ends[0],
+        child=ends[1],
+        parent_from_child=_parse_origin(element, where),
+        axis=(float(axis[0]), float(axis[1]), float(axis[2])),
+        lower=value(limit, "lower", "0"),
+        upper=value(limit, "upper", "0"),
+        effort=value(limit, "effort", "0"),
+        velocity=value(limit, "velocity", "0"),
+        damping=value(dynamics, "damping", "0"),
+        friction=value(dynamics, "friction", "0"),
+    )

@@ -1,7 +1,7 @@
 """Thick convex slabs that stand for floors, ceilings and walls in physics.
 
-A reconstructed floor is a thin bumpy sheet and a scene's walls are often one entity whose box is the whole room; neither
-can be given to a physics engine as it is. A slab starts at the surface and goes away from the room.
+A reconstructed floor is a thin bumpy sheet, and a scene's walls are often one entity whose box is the whole room;
+neither can be given to a physics engine as it is. A slab starts at the surface and goes away from the room.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Slab:
 
 
 def level_slab(box: Box, height: float, *, downwards: bool) -> Slab:
-    """Return a level slab over the footprint of `box` and a margin; its top (floor) or bottom (ceiling) is at `height`."""
+    """Return a level slab over the footprint of `box` and a margin; its face towards the room is at `height`."""
     frame = transform_from_quaternion(np.asarray(box.orientation), np.asarray(box.center))
     frame[2, 3] = height + (-0.5 if downwards else 0.5) * FLOOR_THICKNESS
     return Slab(frame, np.array([box.size[0] + 2 * FLOOR_MARGIN, box.size[1] + 2 * FLOOR_MARGIN, FLOOR_THICKNESS]))
@@ -58,7 +58,11 @@ def surface_height(planes: Sequence[SurfacePlane], mesh: trimesh.Trimesh | None,
 
 
 def wall_slabs(
-    planes: Sequence[SurfacePlane], mesh: trimesh.Trimesh | None, box: Box, room_center: np.ndarray, thickness: float = WALL_THICKNESS
+    planes: Sequence[SurfacePlane],
+    mesh: trimesh.Trimesh | None,
+    box: Box,
+    room_center: np.ndarray,
+    thickness: float = WALL_THICKNESS,
 ) -> list[Slab]:
     """Return a slab behind every upright surface of a wall (seen from `room_center` (3,)).
 
@@ -132,7 +136,9 @@ def upright_rectangles(mesh: trimesh.Trimesh, *, maximum: int = 12) -> list[np.n
             continue
         left &= ~inliers
         tangent = np.array([-direction[1], direction[0], 0.0])
-        (u0, u1), (z0, z1) = (np.percentile(values, [1, 99]) for values in (centers[inliers] @ tangent, centers[inliers, 2]))
+        (u0, u1), (z0, z1) = (
+            np.percentile(values, [1, 99]) for values in (centers[inliers] @ tangent, centers[inliers, 2])
+        )
         rectangles.append(
             np.array([at * direction + u * tangent + [0, 0, z] for u, z in ((u0, z0), (u1, z0), (u1, z1), (u0, z1))])
         )

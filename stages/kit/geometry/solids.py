@@ -79,7 +79,9 @@ def box(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) 
     return Solid(lower + corners * (upper - lower), np.array(faces), np.zeros(12, dtype=bool))
 
 
-def prism(outline: np.ndarray, z: tuple[float, float], top_outline: np.ndarray | None = None, *, round_sides: bool = False) -> Solid:
+def prism(
+    outline: np.ndarray, z: tuple[float, float], top_outline: np.ndarray | None = None, *, round_sides: bool = False
+) -> Solid:
     """Return the solid between a convex counter-clockwise outline (N, 2) at z[0] and one (N, 2) at z[1] [m].
 
     `round_sides` marks the N side facets as a curved surface; bottom and top stay flat.
@@ -92,7 +94,9 @@ def prism(outline: np.ndarray, z: tuple[float, float], top_outline: np.ndarray |
     )
     here = np.arange(count)
     ahead = (here + 1) % count
-    sides = np.concatenate([np.column_stack([here, ahead, ahead + count]), np.column_stack([here, ahead + count, here + count])])
+    sides = np.concatenate(
+        [np.column_stack([here, ahead, ahead + count]), np.column_stack([here, ahead + count, here + count])]
+    )
     fan = np.column_stack([np.zeros(count - 2, dtype=int), np.arange(1, count - 1), np.arange(2, count)])
     faces = np.concatenate([fan[:, ::-1], fan + count, sides])
     curved = np.concatenate([np.zeros(2 * (count - 2), dtype=bool), np.full(2 * count, round_sides)])
@@ -106,7 +110,12 @@ def circle(radius: float, count: int = 16, center: tuple[float, float] = (0.0, 0
 
 
 def cylinder(
-    radius: float, z: tuple[float, float], center: tuple[float, float] = (0.0, 0.0), *, top_radius: float | None = None, count: int = 16
+    radius: float,
+    z: tuple[float, float],
+    center: tuple[float, float] = (0.0, 0.0),
+    *,
+    top_radius: float | None = None,
+    count: int = 16,
 ) -> Solid:
     """Return an upright cylinder (or truncated cone with `top_radius`) of `count` sides [m]."""
     upper = radius if top_radius is None else top_radius
@@ -132,7 +141,12 @@ def rounded_rectangle(x: tuple[float, float], y: tuple[float, float], radius: fl
     """Return the convex outline (4 * count, 2) of a rectangle [m] whose corners are arcs of `count` points."""
     radius = min(radius, 0.499 * (x[1] - x[0]), 0.499 * (y[1] - y[0]))
     points = []
-    corners = [(x[1] - radius, y[1] - radius), (x[0] + radius, y[1] - radius), (x[0] + radius, y[0] + radius), (x[1] - radius, y[0] + radius)]
+    corners = [
+        (x[1] - radius, y[1] - radius),
+        (x[0] + radius, y[1] - radius),
+        (x[0] + radius, y[0] + radius),
+        (x[1] - radius, y[0] + radius),
+    ]
     for quarter, (cx, cy) in enumerate(corners):
         for step in range(count):
             angle = 0.5 * np.pi * (quarter + step / (count - 1))
@@ -158,7 +172,10 @@ def cushion(x: tuple[float, float], y: tuple[float, float], z: tuple[float, floa
 
 
 def shell(
-    inner: Sequence[tuple[float, float]], outer: Sequence[tuple[float, float]], count: int = 12, center: tuple[float, float] = (0.0, 0.0)
+    inner: Sequence[tuple[float, float]],
+    outer: Sequence[tuple[float, float]],
+    count: int = 12,
+    center: tuple[float, float] = (0.0, 0.0),
 ) -> list[Solid]:
     """Return the convex wedges of a hollow solid of revolution: a wall between two profiles of equal length.
 

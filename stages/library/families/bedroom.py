@@ -11,8 +11,15 @@ from stages.library.design import CARDBOARD, FABRIC, LINEN, PAPER, STEEL, WOOD, 
 def bed(random: np.random.Generator, style: int) -> Design:
     """Return a single or double bed: frame, head board, mattress, blanket, pillows. The head is at the back (+y)."""
     double = style % 2 == 0
-    width, length = float(random.uniform(1.4, 1.65) if double else random.uniform(0.92, 1.05)), float(random.uniform(2.02, 2.12))
-    wood, linen, blanket = WOOD.sample(random), LINEN.sample(random), (FABRIC if random.random() < 0.5 else LINEN).sample(random)
+    width, length = (
+        float(random.uniform(1.4, 1.65) if double else random.uniform(0.92, 1.05)),
+        float(random.uniform(2.02, 2.12)),
+    )
+    wood, linen, blanket = (
+        WOOD.sample(random),
+        LINEN.sample(random),
+        (FABRIC if random.random() < 0.5 else LINEN).sample(random),
+    )
     rail, leg, top = 0.03, 0.07, float(random.uniform(0.46, 0.56))
     frame_top = float(random.uniform(0.28, 0.34))
     head = float(random.uniform(0.85, 1.1))
@@ -43,7 +50,11 @@ def bed(random: np.random.Generator, style: int) -> Design:
 
 def book(random: np.random.Generator, style: int) -> Design:
     """Return a closed book that lies flat: two covers, a spine, the pages set back."""
-    width, length, thick = float(random.uniform(0.13, 0.19)), float(random.uniform(0.19, 0.26)), float(random.uniform(0.018, 0.045))
+    width, length, thick = (
+        float(random.uniform(0.13, 0.19)),
+        float(random.uniform(0.19, 0.26)),
+        float(random.uniform(0.018, 0.045)),
+    )
     cover = Paint(CARDBOARD.sample(random).color, 800.0)
     page = PAPER.sample(random)
     board = 0.003
@@ -58,17 +69,29 @@ def lamp(random: np.random.Generator, style: int) -> Design:
     """Return a table lamp (even styles) or a floor lamp: foot, pole, a hollow shade."""
     tall = style % 2 == 1
     height = float(random.uniform(1.45, 1.65) if tall else random.uniform(0.38, 0.52))
-    shade_height, radius = (0.28, float(random.uniform(0.17, 0.21))) if tall else (0.18, float(random.uniform(0.11, 0.14)))
+    shade_height, radius = (
+        (0.28, float(random.uniform(0.17, 0.21))) if tall else (0.18, float(random.uniform(0.11, 0.14)))
+    )
     metal, cloth = STEEL.sample(random), LINEN.sample(random)
     base = 0.15 if tall else 0.075
     low = height - shade_height
-    pieces = painted(metal, cylinder(base, (0, 0.02), count=24), cylinder(0.012, (0.02, low + 0.6 * shade_height), count=10))
+    pieces = painted(
+        metal, cylinder(base, (0, 0.02), count=24), cylinder(0.012, (0.02, low + 0.6 * shade_height), count=10)
+    )
     bulb = Paint((250, 240, 200), 800.0)
-    pieces += painted(bulb, cylinder(0.03, (low + 0.6 * shade_height, low + 0.9 * shade_height), count=10, top_radius=0.015))
+    pieces += painted(
+        bulb, cylinder(0.03, (low + 0.6 * shade_height, low + 0.9 * shade_height), count=10, top_radius=0.015)
+    )
     upper = 0.7 * radius
     wall = 0.004
-    pieces += painted(cloth, shell([(radius - wall, low), (upper - wall, height)], [(radius, low), (upper, height)], count=16))
+    pieces += painted(
+        cloth, shell([(radius - wall, low), (upper - wall, height)], [(radius, low), (upper, height)], count=16)
+    )
     spoke = low + 0.55 * shade_height
     at = radius - (radius - upper) * 0.55 - wall
-    pieces += painted(metal, box((-at, at), (-0.004, 0.004), (spoke, spoke + 0.006)), box((-0.004, 0.004), (-at, at), (spoke + 0.006, spoke + 0.012)))
+    pieces += painted(
+        metal,
+        box((-at, at), (-0.004, 0.004), (spoke, spoke + 0.006)),
+        box((-0.004, 0.004), (-at, at), (spoke + 0.006, spoke + 0.012)),
+    )
     return Design("lamp", tuple(pieces), recipe={"tall": int(tall)})

@@ -24,11 +24,22 @@ def monitor(random: np.random.Generator, style: int) -> Design:
     pieces += painted(case, box((-x, x), (front, front + 0.004), (z[1] - bezel, z[1])))
     for side in ((-x, -x + bezel), (x - bezel, x)):
         pieces += painted(case, box(side, (front, front + 0.004), (z[0] + 2 * bezel, z[1] - bezel)))
-    pieces += painted(screen, box((-x + bezel, x - bezel), (front + 0.002, front + 0.004), (z[0] + 2 * bezel, z[1] - bezel)))
-    hump = [(a, front + thick + b, c) for a, b, c in
-            [(-0.5 * x, 0, z[0] + 0.15 * tall), (0.5 * x, 0, z[0] + 0.15 * tall), (-0.5 * x, 0, z[1] - 0.2 * tall),
-             (0.5 * x, 0, z[1] - 0.2 * tall), (-0.3 * x, 0.03, z[0] + 0.25 * tall), (0.3 * x, 0.03, z[0] + 0.25 * tall),
-             (-0.3 * x, 0.03, z[1] - 0.3 * tall), (0.3 * x, 0.03, z[1] - 0.3 * tall)]]  # fmt: skip
+    pieces += painted(
+        screen, box((-x + bezel, x - bezel), (front + 0.002, front + 0.004), (z[0] + 2 * bezel, z[1] - bezel))
+    )
+    hump = [
+        (a, front + thick + b, c)
+        for a, b, c in [
+            (-0.5 * x, 0, z[0] + 0.15 * tall),
+            (0.5 * x, 0, z[0] + 0.15 * tall),
+            (-0.5 * x, 0, z[1] - 0.2 * tall),
+            (0.5 * x, 0, z[1] - 0.2 * tall),
+            (-0.3 * x, 0.03, z[0] + 0.25 * tall),
+            (0.3 * x, 0.03, z[0] + 0.25 * tall),
+            (-0.3 * x, 0.03, z[1] - 0.3 * tall),
+            (0.3 * x, 0.03, z[1] - 0.3 * tall),
+        ]
+    ]
     pieces += painted(case, hull(np.array(hump)))
     neck = front + thick + 0.03
     pieces += painted(metal, box((-0.03, 0.03), (neck, neck + 0.02), (0.012, z[0] + 0.55 * tall)))
@@ -43,7 +54,10 @@ def monitor(random: np.random.Generator, style: int) -> Design:
 def keyboard(random: np.random.Generator, style: int) -> Design:
     """Return a keyboard: a wedge with rows of key caps."""
     full = style % 2 == 0
-    width, depth = float(random.uniform(0.42, 0.45) if full else random.uniform(0.29, 0.32)), float(random.uniform(0.125, 0.14))
+    width, depth = (
+        float(random.uniform(0.42, 0.45) if full else random.uniform(0.29, 0.32)),
+        float(random.uniform(0.125, 0.14)),
+    )
     case = Paint(PLASTIC.colors[(0, 1, 1, 0)[style % 4]], 500.0)
     dark = sum(case.color) < 300
     keys = Paint((70, 72, 78), 500.0) if dark else Paint((245, 245, 245), 500.0)
@@ -59,15 +73,20 @@ def keyboard(random: np.random.Generator, style: int) -> Design:
         z0, z1 = low + slope * (y0 + y), low + slope * (y1 + y)
         points = [(left, y0, z0), (right, y0, z0), (left, y1, z1), (right, y1, z1)]
         inset = 0.0015
-        points += [(a, b, c + 0.004) for a, b, c in ((left + inset, y0 + inset, z0), (right - inset, y0 + inset, z0),
-                                                     (left + inset, y1 - inset, z1), (right - inset, y1 - inset, z1))]  # fmt: skip
+        for row_edge in (y0 + inset, y1 - inset):  # all tops lie in one plane
+            height = low + slope * (row_edge + y) + 0.004
+            points += [(left + inset, row_edge, height), (right - inset, row_edge, height)]
         pieces.extend(painted(keys, hull(np.array(points))))
 
     blocks = [(-x + margin, x - margin if not full else x - 0.105)] + ([(x - 0.095, x - margin)] if full else [])
     for number, (left, right) in enumerate(blocks):
         for row in range(rows):
             # one long cap per group keeps the collision shape small: the space bar row, and three groups else
-            cuts = np.array([0.0, 0.28, 0.72, 1.0]) if number == 0 and row == 0 else np.linspace(0, 1, 5 if number == 0 else 2)
+            cuts = (
+                np.array([0.0, 0.28, 0.72, 1.0])
+                if number == 0 and row == 0
+                else np.linspace(0, 1, 5 if number == 0 else 2)
+            )
             for a, b in zip(cuts[:-1], cuts[1:], strict=True):
                 cap(left + a * (right - left) + 0.001, left + b * (right - left) - 0.001, row)
     return Design("keyboard", tuple(pieces), recipe={"full": int(full)})

@@ -55,8 +55,13 @@ def _slat_chair(random: np.random.Generator) -> Design:
     solids += [box((-inner, inner), (-depth / 2 + 0.008, -depth / 2 + 0.026), rail)]
     solids += [box((-inner, inner), (depth / 2 - 0.026, depth / 2 - 0.008), rail)]
     span = (-depth / 2 + leg, depth / 2 - leg)
-    solids += [box(x, span, rail) for x in ((-width / 2 + 0.008, -width / 2 + 0.026), (width / 2 - 0.026, width / 2 - 0.008))]
-    solids += [box(x, span, (0.16, 0.19)) for x in ((-width / 2 + 0.008, -width / 2 + 0.026), (width / 2 - 0.026, width / 2 - 0.008))]
+    solids += [
+        box(x, span, rail) for x in ((-width / 2 + 0.008, -width / 2 + 0.026), (width / 2 - 0.026, width / 2 - 0.008))
+    ]
+    solids += [
+        box(x, span, (0.16, 0.19))
+        for x in ((-width / 2 + 0.008, -width / 2 + 0.026), (width / 2 - 0.026, width / 2 - 0.008))
+    ]
     top = box((-width / 2 - 0.005, width / 2 + 0.005), (-depth / 2 - 0.012, depth / 2 - leg), (seat, seat + 0.02))
     return Design("chair", tuple(painted(wood, solids) + painted(wood.darker(1.05), top)), recipe={"style": "slats"})
 
@@ -112,9 +117,19 @@ def _swivel_chair(random: np.random.Generator) -> Design:
         angle = 2 * np.pi * k / 5 + np.pi / 2
         tip = np.array([reach * np.cos(angle), reach * np.sin(angle)])
         side = 0.02 * np.array([-np.sin(angle), np.cos(angle)])
-        points = [(*(tip * r + s * side), z) for r, s, z in
-                  [(0.08, -1, 0.07), (0.08, 1, 0.07), (0.08, -1, 0.12), (0.08, 1, 0.12),
-                   (1, -0.6, 0.07), (1, 0.6, 0.07), (1, -0.6, 0.085), (1, 0.6, 0.085)]]  # fmt: skip
+        points = [
+            (*(tip * r + s * side), z)
+            for r, s, z in [
+                (0.08, -1, 0.07),
+                (0.08, 1, 0.07),
+                (0.08, -1, 0.12),
+                (0.08, 1, 0.12),
+                (1, -0.6, 0.07),
+                (1, 0.6, 0.07),
+                (1, -0.6, 0.085),
+                (1, 0.6, 0.085),
+            ]
+        ]
         pieces += painted(metal, hull(np.array(points)))
         pieces += painted(caster, cylinder(0.027, (0.0, 0.07), (tip[0], tip[1]), count=10))
     pieces += painted(metal, cylinder(0.03, (0.12, seat - 0.10), count=12))
@@ -143,17 +158,27 @@ def sofa(random: np.random.Generator, style: int) -> Design:
     pieces = []
     for x in (-width / 2 + 0.06, width / 2 - 0.06):
         for y in (-depth / 2 + 0.06, depth / 2 - 0.06):
-            pieces += painted(wood, prism(circle(0.02, 10, (x, y)), (0, foot), circle(0.028, 10, (x, y)), round_sides=True))
-    pieces += painted(fabric.darker(0.9), box((-width / 2 + arm, width / 2 - arm), (-depth / 2 + 0.01, depth / 2), (foot, seat - 0.15)))
+            pieces += painted(
+                wood, prism(circle(0.02, 10, (x, y)), (0, foot), circle(0.028, 10, (x, y)), round_sides=True)
+            )
+    pieces += painted(
+        fabric.darker(0.9),
+        box((-width / 2 + arm, width / 2 - arm), (-depth / 2 + 0.01, depth / 2), (foot, seat - 0.15)),
+    )
     for sign in (-1, 1):
-        x = sorted((sign * width / 2, sign * (width / 2 - arm)))
-        pieces += painted(fabric, cushion((x[0], x[1]), (-depth / 2, depth / 2), (foot, arm_height), 0.03))
+        low, high = sorted((sign * width / 2, sign * (width / 2 - arm)))
+        pieces += painted(fabric, cushion((low, high), (-depth / 2, depth / 2), (foot, arm_height), 0.03))
     inner = (-width / 2 + arm, width / 2 - arm)
     pieces += painted(fabric, cushion(inner, (depth / 2 - thick, depth / 2), (seat - 0.15, back), 0.03))
     step = (inner[1] - inner[0]) / seats
     for k in range(seats):
-        x = (inner[0] + k * step + 0.004, inner[0] + (k + 1) * step - 0.004)
-        pieces += painted(fabric.darker(1.04), cushion(x, (-depth / 2, depth / 2 - thick), (seat - 0.15, seat), 0.02))
+        span = (inner[0] + k * step + 0.004, inner[0] + (k + 1) * step - 0.004)
+        pieces += painted(
+            fabric.darker(1.04), cushion(span, (-depth / 2, depth / 2 - thick), (seat - 0.15, seat), 0.02)
+        )
         if style % 4 < 2:
-            pieces += painted(fabric.darker(1.04), cushion(x, (depth / 2 - thick - 0.12, depth / 2 - thick), (seat, back - 0.05), 0.03))
+            pieces += painted(
+                fabric.darker(1.04),
+                cushion(span, (depth / 2 - thick - 0.12, depth / 2 - thick), (seat, back - 0.05), 0.03),
+            )
     return Design("sofa", tuple(pieces), recipe={"seats": seats})

@@ -46,9 +46,19 @@ class Carcass:
 
 
 def hinged_door(
-    number: int, x: tuple[float, float], z: tuple[float, float], front: float, hinge: str, paint: Paint, metal: Paint,
-    *, thick: float = 0.018, limit: float = 2.0, handle_at: float | None = None, name: str = "door",
-) -> Moving:  # fmt: skip
+    number: int,
+    x: tuple[float, float],
+    z: tuple[float, float],
+    front: float,
+    hinge: str,
+    paint: Paint,
+    metal: Paint,
+    *,
+    thick: float = 0.018,
+    limit: float = 2.0,
+    handle_at: float | None = None,
+    name: str = "door",
+) -> Moving:
     """Return an overlay door before the plane y = `front`, hinged at its `left` (x[0]) or `right` (x[1]) edge.
 
     Positive joint values open it towards -y. The handle is a vertical bar near the free edge, its middle at height
@@ -63,17 +73,30 @@ def hinged_door(
     handle = np.array([free, back - thick - STANDOFF, middle])
     origin = np.array([x[1] if hinge == "right" else x[0], back, 0.5 * (z[0] + z[1])])
     joint = Joint(
-        name=f"{name}_{number}_hinge", type="revolute", part=f"{name}_{number}", origin=as_vector(origin),
-        axis=(0.0, 0.0, 1.0) if hinge == "right" else (0.0, 0.0, -1.0), lower=0.0, upper=limit,
-        handle=as_vector(handle), handle_axis=(0.0, 0.0, 1.0),
-    )  # fmt: skip
+        name=f"{name}_{number}_hinge",
+        type="revolute",
+        part=f"{name}_{number}",
+        origin=as_vector(origin),
+        axis=(0.0, 0.0, 1.0) if hinge == "right" else (0.0, 0.0, -1.0),
+        lower=0.0,
+        upper=limit,
+        handle=as_vector(handle),
+        handle_axis=(0.0, 0.0, 1.0),
+    )
     pieces = painted(paint, panel) + bar_handle(handle, "z", length, STANDOFF, HANDLE_RADIUS, metal)
     return Moving(joint, tuple(pieces))
 
 
 def drawer(
-    number: int, x: tuple[float, float], z: tuple[float, float], front: float, depth: float, paint: Paint, inner: Paint, metal: Paint,
-) -> Moving:  # fmt: skip
+    number: int,
+    x: tuple[float, float],
+    z: tuple[float, float],
+    front: float,
+    depth: float,
+    paint: Paint,
+    inner: Paint,
+    metal: Paint,
+) -> Moving:
     """Return an open box that slides out along -y behind a front of size x, z [m]; handle: a horizontal bar.
 
     The box is `depth` deep behind the plane y = `front`, and narrower than the front, which overlaps the carcass.
@@ -93,17 +116,27 @@ def drawer(
     handle = np.array([0.5 * (x[0] + x[1]), back - thick - STANDOFF, 0.5 * (z[0] + z[1])])
     length = float(np.clip(0.4 * (x[1] - x[0]), 0.12, 0.26))
     joint = Joint(
-        name=f"drawer_{number}_slide", type="prismatic", part=f"drawer_{number}",
-        origin=as_vector(np.array([0.5 * (x[0] + x[1]), front, 0.5 * (z[0] + z[1])])), axis=(0.0, -1.0, 0.0),
-        lower=0.0, upper=round(0.85 * depth, 4), handle=as_vector(handle), handle_axis=(1.0, 0.0, 0.0),
-    )  # fmt: skip
-    pieces = painted(paint, panel) + painted(inner, walls) + bar_handle(handle, "x", length, STANDOFF, HANDLE_RADIUS, metal)
+        name=f"drawer_{number}_slide",
+        type="prismatic",
+        part=f"drawer_{number}",
+        origin=as_vector(np.array([0.5 * (x[0] + x[1]), front, 0.5 * (z[0] + z[1])])),
+        axis=(0.0, -1.0, 0.0),
+        lower=0.0,
+        upper=round(0.85 * depth, 4),
+        handle=as_vector(handle),
+        handle_axis=(1.0, 0.0, 0.0),
+    )
+    pieces = (
+        painted(paint, panel) + painted(inner, walls) + bar_handle(handle, "x", length, STANDOFF, HANDLE_RADIUS, metal)
+    )
     return Moving(joint, tuple(pieces))
 
 
 def _paints(random: np.random.Generator) -> tuple[Paint, Paint, Paint]:
     carcass = (WOOD if random.random() < 0.5 else LACQUER).sample(random)
-    front = carcass.darker(1.04) if random.random() < 0.5 else (WOOD if random.random() < 0.5 else LACQUER).sample(random)
+    front = (
+        carcass.darker(1.04) if random.random() < 0.5 else (WOOD if random.random() < 0.5 else LACQUER).sample(random)
+    )
     return carcass, front, STEEL.sample(random)
 
 
@@ -112,14 +145,18 @@ def cabinet(random: np.random.Generator, style: int) -> Design:
     kind = ("doors", "drawers", "mixed", "night_stand")[style % 4]
     carcass_paint, front_paint, metal = _paints(random)
     sizes = {
-        "doors": ((0.80, 1.0), (0.42, 0.55), (0.78, 0.90)), "drawers": ((0.70, 0.90), (0.42, 0.50), (0.76, 0.95)),
-        "mixed": ((0.80, 1.0), (0.45, 0.56), (0.82, 0.90)), "night_stand": ((0.42, 0.52), (0.36, 0.42), (0.50, 0.60)),
-    }[kind]  # fmt: skip
+        "doors": ((0.80, 1.0), (0.42, 0.55), (0.78, 0.90)),
+        "drawers": ((0.70, 0.90), (0.42, 0.50), (0.76, 0.95)),
+        "mixed": ((0.80, 1.0), (0.45, 0.56), (0.82, 0.90)),
+        "night_stand": ((0.42, 0.52), (0.36, 0.42), (0.50, 0.60)),
+    }[kind]
     width, depth, height = (float(random.uniform(*bounds)) for bounds in sizes)
     board, plinth = 0.018, 0.07
     frame = Carcass((-width / 2, width / 2), (0.0, depth), (plinth, height), board)
     pieces = painted(carcass_paint, frame.boards())
-    pieces += painted(carcass_paint.darker(0.7), box((-width / 2 + 0.02, width / 2 - 0.02), (0.05, depth - 0.02), (0.0, plinth)))
+    pieces += painted(
+        carcass_paint.darker(0.7), box((-width / 2 + 0.02, width / 2 - 0.02), (0.05, depth - 0.02), (0.0, plinth))
+    )
     low, high = plinth, height - GAP
     moving: list[Moving] = []
 
@@ -134,9 +171,17 @@ def cabinet(random: np.random.Generator, style: int) -> Design:
         edges = np.linspace(z[0], z[1], rows + 1)
         for k in range(rows):
             moving.append(
-                drawer(len(moving) + 1, (-width / 2, width / 2), (float(edges[k]), float(edges[k + 1])), 0.0, depth - 0.04,
-                       front_paint, carcass_paint.darker(1.1), metal)
-            )  # fmt: skip
+                drawer(
+                    len(moving) + 1,
+                    (-width / 2, width / 2),
+                    (float(edges[k]), float(edges[k + 1])),
+                    0.0,
+                    depth - 0.04,
+                    front_paint,
+                    carcass_paint.darker(1.1),
+                    metal,
+                )
+            )
 
     if kind == "doors":
         doors((low, high))
@@ -192,12 +237,16 @@ def shelf(random: np.random.Generator, style: int) -> Design:
             z = 0.12 + k * (height - 0.14) / (levels - 1)
             # boards between the posts, notched: a middle board and two strips that reach the sides
             pieces += painted(paint, box((-width / 2 + post, width / 2 - post), (0.0, depth), (z - 0.02, z)))
-            for x in ((-width / 2, -width / 2 + post), (width / 2 - post, width / 2)):
-                pieces += painted(paint, box(x, (post, depth - post), (z - 0.02, z)))
+            for strip in ((-width / 2, -width / 2 + post), (width / 2 - post, width / 2)):
+                pieces += painted(paint, box(strip, (post, depth - post), (z - 0.02, z)))
         return Design("shelf", tuple(pieces), contains=True, recipe={"style": kind, "levels": levels})
     board = 0.02 if kind == "bookcase" else 0.03
     columns, rows = (1, int(random.integers(4, 6))) if kind == "bookcase" else (2, int(random.integers(2, 4)))
-    width, depth = (random.uniform(0.70, 0.95), random.uniform(0.26, 0.33)) if kind == "bookcase" else (0.77, random.uniform(0.36, 0.40))
+    width, depth = (
+        (random.uniform(0.70, 0.95), random.uniform(0.26, 0.33))
+        if kind == "bookcase"
+        else (0.77, random.uniform(0.36, 0.40))
+    )
     height = random.uniform(1.5, 1.95) if kind == "bookcase" else rows * 0.36 + board
     frame = Carcass((-width / 2, width / 2), (0.0, float(depth)), (0.0, float(height)), board)
     pieces = painted(paint, frame.boards(back=0.008))
@@ -206,6 +255,6 @@ def shelf(random: np.random.Generator, style: int) -> Design:
     for column in range(1, columns):
         x = -width / 2 + column * width / columns
         for row in range(rows):
-            z = (board + row * (height - board) / rows, (row + 1) * (height - board) / rows)
-            pieces += painted(paint, box((x - board / 2, x + board / 2), (0.0, depth - 0.008), z))
+            upright = (board + row * (height - board) / rows, (row + 1) * (height - board) / rows)
+            pieces += painted(paint, box((x - board / 2, x + board / 2), (0.0, depth - 0.008), upright))
     return Design("shelf", tuple(pieces), contains=True, recipe={"style": kind, "rows": rows})

@@ -34,10 +34,17 @@ def table(random: np.random.Generator, style: int) -> Design:
         radius, height = random.uniform(0.45, 0.60), random.uniform(0.72, 0.76)
         metal = STEEL.sample(random)
         pieces = painted(top_wood, cylinder(radius, (height - thick, height), count=32))
-        pieces += painted(metal, cylinder(0.05, (0.03, height - thick), count=16), cylinder(0.26, (0, 0.03), count=24, top_radius=0.22))
+        pieces += painted(
+            metal,
+            cylinder(0.05, (0.03, height - thick), count=16),
+            cylinder(0.26, (0, 0.03), count=24, top_radius=0.22),
+        )
         return Design("table", tuple(pieces), recipe={"style": kind})
-    sizes = {"dining": ((1.4, 1.9), (0.8, 0.95), (0.73, 0.77)), "kitchen": ((0.9, 1.25), (0.70, 0.80), (0.72, 0.76)),
-             "coffee": ((0.85, 1.2), (0.5, 0.65), (0.40, 0.48))}[kind]  # fmt: skip
+    sizes = {
+        "dining": ((1.4, 1.9), (0.8, 0.95), (0.73, 0.77)),
+        "kitchen": ((0.9, 1.25), (0.70, 0.80), (0.72, 0.76)),
+        "coffee": ((0.85, 1.2), (0.5, 0.65), (0.40, 0.48)),
+    }[kind]
     width, depth, height = (random.uniform(*bounds) for bounds in sizes)
     leg, inset = random.uniform(0.045, 0.075), random.uniform(0.0, 0.05)
     if kind == "kitchen":
@@ -84,10 +91,15 @@ def desk(random: np.random.Generator, style: int) -> Design:
                 pieces += painted(wood, box((x - 0.14, x - 0.10), (y - 0.02, y + 0.02), (0, under - 0.04)))
                 pieces += painted(wood, box((x + 0.10, x + 0.14), (y - 0.02, y + 0.02), (0, under - 0.04)))
             for dx in (-0.12, 0.12):
-                pieces += painted(wood, box((x + dx - 0.02, x + dx + 0.02), (-depth / 2 + 0.06, depth / 2 - 0.06), (under - 0.04, under)))
+                pieces += painted(
+                    wood,
+                    box((x + dx - 0.02, x + dx + 0.02), (-depth / 2 + 0.06, depth / 2 - 0.06), (under - 0.04, under)),
+                )
             for sy in (-1, 1):
                 y = sy * (depth / 2 - 0.08)
                 pieces += painted(wood, box((x - 0.10, x + 0.10), (y - 0.015, y + 0.015), (0.28, 0.32)))
             lower = (-depth / 2 + 0.10, depth / 2 - 0.10)
-            pieces += painted(wood, box((x + 0.105, x + 0.135), lower, (0.20, 0.24)), box((x - 0.135, x - 0.105), lower, (0.20, 0.24)))
+            pieces += painted(
+                wood, box((x + 0.105, x + 0.135), lower, (0.20, 0.24)), box((x - 0.135, x - 0.105), lower, (0.20, 0.24))
+            )
     return Design("desk", tuple(pieces), recipe={"style": kind})

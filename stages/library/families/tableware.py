@@ -11,8 +11,12 @@ from stages.library.design import CERAMIC, GLASS, PLASTIC, Design, Paint, painte
 def bottle(random: np.random.Generator, style: int) -> Design:
     """Return a filled bottle: body, shoulder, neck and cap; slim (wine), round (soft drink) or squat (sauce)."""
     kind = ("slim", "round", "squat")[style % 3]
-    radius, height = {"slim": ((0.033, 0.038), (0.26, 0.30)), "round": ((0.031, 0.036), (0.20, 0.25)), "squat": ((0.030, 0.035), (0.14, 0.18))}[kind]
-    radius, height = float(random.uniform(*radius)), float(random.uniform(*height))
+    widths, heights = {
+        "slim": ((0.033, 0.038), (0.26, 0.30)),
+        "round": ((0.031, 0.036), (0.20, 0.25)),
+        "squat": ((0.030, 0.035), (0.14, 0.18)),
+    }[kind]
+    radius, height = float(random.uniform(*widths)), float(random.uniform(*heights))
     glass, label, cap = GLASS.sample(random), CERAMIC.sample(random), PLASTIC.sample(random)
     body = {"slim": 0.62, "round": 0.68, "squat": 0.66}[kind] * height
     shoulder = {"slim": 0.76, "round": 0.86, "squat": 0.84}[kind] * height
@@ -36,7 +40,9 @@ def cup(random: np.random.Generator, style: int) -> Design:
     wall, floor = (0.004, 0.006) if mug else (0.0025, 0.004)
     inner = paint.darker(1.04)
     pieces = painted(inner, cylinder(foot - wall * 0.5, (0, floor), count=16))
-    pieces += painted(paint, shell([(foot - wall, 0.0), (radius - wall, height)], [(foot, 0.0), (radius, height)], count=16))
+    pieces += painted(
+        paint, shell([(foot - wall, 0.0), (radius - wall, height)], [(foot, 0.0), (radius, height)], count=16)
+    )
     if mug:
         pieces += painted(paint, _ear(foot, radius, height))
     recipe: dict[str, float | int | str] = {"style": "mug" if mug else "tumbler"}
@@ -65,9 +71,17 @@ def bowl(random: np.random.Generator, style: int) -> Design:
     wall, floor, foot = 0.0045, 0.010, 0.45 * radius
     angles = np.linspace(0.18, 1.0, 4)
     rise = (angles - angles[0]) / (1 - angles[0])
-    outer = [(foot * 1.05 + (radius - foot * 1.05) * float(np.sin(0.5 * np.pi * r)), floor * 0.5 + (height - floor * 0.5) * float(r**1.6)) for r in rise]
+    outer = [
+        (
+            foot * 1.05 + (radius - foot * 1.05) * float(np.sin(0.5 * np.pi * r)),
+            floor * 0.5 + (height - floor * 0.5) * float(r**1.6),
+        )
+        for r in rise
+    ]
     inner = [(r - wall, z) for r, z in outer]
     inner[0] = (outer[0][0] - 2 * wall, outer[0][1])
-    pieces = painted(paint, cylinder(foot * 0.9, (0.0, floor * 0.5), count=16), cylinder(outer[0][0], (floor * 0.5, floor), count=16))
+    pieces = painted(
+        paint, cylinder(foot * 0.9, (0.0, floor * 0.5), count=16), cylinder(outer[0][0], (floor * 0.5, floor), count=16)
+    )
     pieces += painted(paint, shell(inner, outer, count=16))
     return Design("bowl", tuple(pieces), contains=True, recipe={"style": style % 2})

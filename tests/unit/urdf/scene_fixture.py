@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -37,9 +38,18 @@ def find(library: CadLibrary, model_id: str) -> CadModel:
 
 
 def placed(
-    library: CadLibrary, name: str, model_id: str, at: tuple[float, float, float], *, yaw: float = 0.0, parent: str | None = None,
-    relation: str = "supports", movable: bool = False, scale: float = 1.0, joints: dict[str, float] | None = None,
-) -> BundleBody:  # fmt: skip
+    library: CadLibrary,
+    name: str,
+    model_id: str,
+    at: tuple[float, float, float],
+    *,
+    yaw: float = 0.0,
+    parent: str | None = None,
+    relation: str = "supports",
+    movable: bool = False,
+    scale: float = 1.0,
+    joints: dict[str, float] | None = None,
+) -> BundleBody:
     """Return a body that is a model of the library at a pose."""
     model = find(library, model_id)
     folder = model_folder(library, model_id)
@@ -47,15 +57,34 @@ def placed(
     mesh = posed_mesh(folder, model, joints or {}, scale)
     mesh.apply_transform(pose)
     return BundleBody(
-        name=name, class_name=model.class_name, parent=parent, relation=relation, world_from_body=pose, movable=movable,
-        box=box_from_bounds(*mesh.bounds), model=model, model_folder=folder, scale=scale, joint_values=joints or {},
-    )  # fmt: skip
+        name=name,
+        class_name=model.class_name,
+        parent=parent,
+        relation=relation,
+        world_from_body=pose,
+        movable=movable,
+        box=box_from_bounds(*mesh.bounds),
+        model=model,
+        model_folder=folder,
+        scale=scale,
+        joint_values=joints or {},
+    )
 
 
-def layout(name: str, class_name: str, center: tuple[float, float, float], size: tuple[float, float, float]) -> BundleBody:
+def layout(
+    name: str, class_name: str, center: tuple[float, float, float], size: tuple[float, float, float]
+) -> BundleBody:
     """Return a layout body known by its box alone."""
     box = Box(center=center, size=size)
-    return BundleBody(name=name, class_name=class_name, parent=None, relation="supports", world_from_body=np.eye(4), movable=False, box=box)
+    return BundleBody(
+        name=name,
+        class_name=class_name,
+        parent=None,
+        relation="supports",
+        world_from_body=np.eye(4),
+        movable=False,
+        box=box,
+    )
 
 
 def surface_height(model: CadModel, scale: float = 1.0, *, highest: bool = True) -> float:
@@ -76,7 +105,9 @@ def room(library: CadLibrary) -> list[BundleBody]:
         layout("wall_2", "wall", (0.5, 1.52, 1.25), (4.0, 0.04, 2.5)),
         placed(library, "table_3", "table_00", (0, 0, 0), yaw=0.3, parent="floor_1", scale=0.9),
         placed(library, "fridge_4", "fridge_00", (2.0, 1.0, 0), parent="floor_1", joints={"door_hinge": 1.2}),
-        placed(library, "bottle_6", "bottle_01", (2.0, 1.05, inside), parent="fridge_4", relation="contains", movable=True),
+        placed(
+            library, "bottle_6", "bottle_01", (2.0, 1.05, inside), parent="fridge_4", relation="contains", movable=True
+        ),
         placed(library, "cup_7", "cup_01", (-1.2, 0.0, 1.0), parent="floor_1", movable=True),
     ]
 
@@ -87,14 +118,22 @@ def graph_of(bodies: list[BundleBody]) -> ContactGraphFile:
     links = []
     for body in bodies:
         layout_node = body.class_name in ("floor", "wall", "ceiling")
-        kind = "layout" if layout_node else ("articulated" if body.joint_values else "rigid")
+        kind: Literal["layout", "rigid", "articulated"] = (
+            "layout" if layout_node else ("articulated" if body.joint_values else "rigid")
+        )
         nodes.append(
             GraphNode(
-                id=body.name, instance=int(body.name.rsplit("_", 1)[1]), class_name=body.class_name, node_type=kind, box=body.box,
+                id=body.name,
+                instance=int(body.name.rsplit("_", 1)[1]),
+                class_name=body.class_name,
+                node_type=kind,
+                box=body.box,
                 model_id=body.model.id if body.model else None,
                 world_from_model=tuple(map(tuple, body.world_from_body.tolist())) if body.model else None,
-                scale=body.scale if body.model else None, joints=body.joint_values,
+                scale=body.scale if body.model else None,
+                joints=body.joint_values,
             )
-        )  # fmt: skip
-        links.append(Relation(source=body.parent or SCENE_NODE, target=body.name, relation=body.relation, confidence=1.0))
+        )
+        relation: Literal["supports", "contains"] = "contains" if body.relation == "contains" else "supports"
+        links.append(Relation(source=body.parent or SCENE_NODE, target=body.name, relation=relation, confidence=1.0))
     return ContactGraphFile(nodes=tuple(nodes), links=tuple(links))
