@@ -43,6 +43,16 @@ class Check(Model):
     numbers: dict[str, float] = {}
 
 
+class BodyMatch(Model):
+    """Which body of the room where the plan was executed a body of the planned scene was taken for."""
+
+    body: str
+    matched: str | None
+    """None: no body of its class stands near enough."""
+    distance: float | None = None
+    """Between the centres of their boxes [m]."""
+
+
 class PlanFile(Model):
     """plan.json."""
 
@@ -56,6 +66,10 @@ class PlanFile(Model):
     """Every failure met on the way, the last is the one that ended the search when there is no plan."""
     checks: tuple[Check, ...] = ()
     status: Literal["executed", "planned", "infeasible", "execution_failed"]
+    matches: tuple[BodyMatch, ...] = ()
+    """Bodies that the plan names, and what they are in the room of execution."""
+    assumptions: tuple[str, ...] = ()
+    """What the execution was allowed to know beyond the planned scene, in words."""
 
 
 class Plan(Artifact):

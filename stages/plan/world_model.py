@@ -17,6 +17,7 @@ from schemas.interactive_scene import SceneBody
 from schemas.scene_parts import Joint, SurfacePlane
 from stages.kit.geometry.transforms import apply, inverse, quaternion_of, transform_from_quaternion
 from stages.kit.motion.collision import CollisionChecker
+from stages.kit.motion.doors import body_from_moved
 from stages.kit.motion.kinematics import ArmChain, arm_chain
 from stages.kit.simulation.robot import Configuration, Robot
 from stages.kit.simulation.robot_description import RobotDescription
@@ -34,6 +35,15 @@ class RobotState:
     tool_from_item: np.ndarray | None = None
     body_from_tool: np.ndarray | None = None
     """The grasp with which it holds."""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Poses of movable bodies, joint values and records."""
+
+    poses: dict[str, np.ndarray]
+    joints: dict[str, dict[str, float]]
+    records: dict[str, SceneBody]
 
 
 class WorldModel:
@@ -101,6 +111,42 @@ class WorldModel:
     def links(self, name: str) -> tuple[str, ...]:
         """Return the link names of a body."""
         return tuple(self.world.bodies[name].links)
+
+    def put_on(self, item: str, parent: str) -> None:
+        """Note that an item now stands on (or in) another body."""
+        self.records[item] = self.records[item].model_copy(update={"parent": parent})
+
+    def move_joint(self, joint_name: str, value: float) -> None:
+        """Move a joint; what lies in a drawer goes with it."""
+        owner = next(name for name, record in self.records.items() if any(j.name == joint_name for j in record.joints))
+        joint = self.joint(owner, joint_name)
+        if joint.type == "prismatic":
+            low, high = (np.asarray(bound) for bound in self.part_mesh(owner, joint.part).bounds)
+            before = self.pose(owner) @ body_from_moved(joint, self.joint_value(owner, joint_name))
+            after = self.pose(owner) @ body_from_moved(joint, value)
+            for item, record in self.records.items():
+                if record.movable and record.parent == owner:
+                    inside = apply(inverse(before), self.pose(item)[:3, 3])
+                    if np.all(inside > low - 0.02) and np.all(inside < high + 0.02):
+                        self.world.set_pose(item, after @ inverse(before) @ self.pose(item))
+        self.world.set_joint(owner, joint_name, value)
+
+    def snapshot(self) -> Snapshot:
+        """Return where everything is, for `restore`."""
+        poses = {name: self.pose(name) for name, record in self.records.items() if record.movable}
+        joints = {name: {joint: self.joint_value(name, joint) for joint in body.joints}
+                  for name, body in self.world.bodies.items()}  # fmt: skip
+        return Snapshot(poses, joints, dict(self.records))
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Put everything where it was; nothing is carried afterwards."""
+        self.checker.put_down()
+        for name, pose in snapshot.poses.items():
+            self.world.set_pose(name, pose)
+        for name, values in snapshot.joints.items():
+            for joint, value in values.items():
+                self.world.set_joint(name, joint, value)
+        self.records = dict(snapshot.records)
 
     # --- geometry ---------------------------------------------------------------------------------------------
 

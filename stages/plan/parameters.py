@@ -1,0 +1,56 @@
+"""Declaration of the step `plan`."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from schemas.ground_truth import GroundTruth
+from schemas.interactive_scene import InteractiveScene
+from schemas.plan import Plan
+from stages.kit.stage import Optionally, Parameters, Stage
+
+
+class PlanParameters(Parameters):
+    """Options of `plan`. Budgets count attempts, never seconds."""
+
+    goal: tuple[str, ...] = Field(
+        (),
+        description="Goal literals such as on(bottle_7,table_3) closed(fridge_2); predicates on, in, open, closed, "
+        "holding. Empty: take an item out of furniture with a door, put it on a table, shut the door",
+    )
+    robot: str = Field("panda", description="Robot of data/robots/")
+    heuristic: Literal["add", "max", "ff"] = Field("add", description="Heuristic of the task search; max is optimal")
+    execute: bool = Field(True, description="Execute the plan in physics: in the true room when it is given")
+    relocalize: bool = Field(
+        True,
+        description="Before each action the robot sees pose and shape of the bodies that the action names, as they "
+        "are in the room of execution (stands for a look with a wrist camera); off: the planned motion is replayed",
+    )
+    match_radius: float = Field(
+        0.5, gt=0, le=5, description="A body is the nearest of its class in the true room within this [m]"
+    )
+    clearance: float = Field(0.004, ge=0, le=0.05, description="Distance kept from obstacles [m]")
+    base_samples: int = Field(240, ge=16, le=20000, description="Base poses drawn per query")
+    pair_samples: int = Field(2500, ge=16, le=1_000_000, description="Pairs of base and tool pose tried per query")
+    path_samples: int = Field(800, ge=16, le=1_000_000, description="Samples of one RRT-Connect search")
+    path_searches: int = Field(8, ge=1, le=1000, description="Path searches per query")
+    refinement_attempts: int = Field(3, ge=1, le=100, description="Times the geometry of one task plan is tried")
+    task_attempts: int = Field(4, ge=1, le=100, description="Task plans tried, each without what failed before")
+    execution_attempts: int = Field(3, ge=1, le=20, description="Times an action is tried when it fails physically")
+    video_rate: float = Field(2.0, ge=0, le=30, description="Images per second in execution.mcap [1/s]; 0: none")
+    image_width: int = Field(640, ge=64, le=4096, description="Width of the key frames [px]")
+
+
+STAGE = Stage(
+    name="plan",
+    version=1,
+    summary="Plan what a robot does in the scene, execute it in physics, check the goal or say why not",
+    parameters=PlanParameters,
+    reads={"scene": InteractiveScene, "ground_truth": Optionally(GroundTruth)},
+    writes=Plan,
+    libraries=("numpy", "scipy", "numba", "pybullet", "open3d", "trimesh"),
+    example="scenewright plan --scene outputs/demo/interactive_scene --ground-truth outputs/demo/ground_truth "
+    "--out outputs/demo/plan",
+)

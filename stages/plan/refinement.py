@@ -1,0 +1,246 @@
+"""Give every symbolic action its geometry; what fails is fed back to the task search as a blocked action."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from schemas.plan import Failure
+from stages.kit.geometry.transforms import inverse
+from stages.kit.motion.base_placement import plan_drive
+from stages.kit.motion.failures import MotionFailed
+from stages.plan.door_motion import plan_close, plan_open
+from stages.plan.motions import Manipulation, Segment
+from stages.plan.pick_place import Budgets, plan_pick, plan_place
+from stages.plan.strips import Domain, GroundAction, Problem, atom_text, ground
+from stages.plan.task_planner import Heuristic, plan_task
+from stages.plan.world_model import RobotState, WorldModel
+
+PLAIN_NAMES = {"take_out": "pick", "put_in": "place"}
+
+
+@dataclass(frozen=True)
+class Step:
+    """One action with its motion."""
+
+    name: str
+    """`drive`, `pick`, `place`, `open`, `close`."""
+    arguments: tuple[str, ...]
+    segments: tuple[Segment, ...]
+    manipulation: Manipulation | None
+    """None for drives."""
+
+    @property
+    def text(self) -> str:
+        """The action as people write it."""
+        return atom_text((self.name, *self.arguments))
+
+
+class RefinementFailed(Exception):
+    """An action of a task plan has no motion."""
+
+    def __init__(self, action: GroundAction, failure: Failure) -> None:
+        super().__init__(failure.message)
+        self.action = action
+        self.failure = failure
+
+
+def manipulate(
+    model: WorldModel,
+    state: RobotState,
+    name: str,
+    arguments: tuple[str, ...],
+    budgets: Budgets,
+    random: np.random.Generator,
+    preferred: tuple[np.ndarray, np.ndarray] | None = None,
+) -> tuple[Manipulation, ...]:
+    """Return the manipulations of `pick`, `place`, `open` or `close` (plain names). Raises MotionFailed."""
+    if name == "pick":
+        return (plan_pick(model, state, arguments[0], arguments[1], budgets, random, preferred),)
+    if name == "place":
+        return (plan_place(model, state, arguments[0], arguments[1], budgets, random, preferred),)
+    body = next(body for body, record in model.records.items() if any(j.name == arguments[0] for j in record.joints))
+    plan = plan_open if name == "open" else plan_close
+    return plan(model, state, body, arguments[0], budgets, random)
+
+
+def refine_action(
+    model: WorldModel,
+    state: RobotState,
+    name: str,
+    arguments: tuple[str, ...],
+    origin: str,
+    budgets: Budgets,
+    random: np.random.Generator,
+    preferred: tuple[np.ndarray, np.ndarray] | None = None,
+) -> tuple[list[Step], RobotState]:
+    """Return the drives and manipulations of one action, and the robot's state after it; the model is changed too.
+
+    `origin` names where the drive begins. Raises MotionFailed; the model is then as before.
+    """
+    snapshot = model.snapshot()
+    steps: list[Step] = []
+    try:
+        for manipulation in manipulate(model, state, name, arguments, budgets, random, preferred):
+            target = arguments[1] if name == "place" else arguments[0]
+            hold_for_checks(model, state)
+            path = plan_drive(
+                state.base, manipulation.base, state.arm, model.checker, model.room, random, samples=budgets.path_samples
+            )
+            manipulation, path = _same_turns(manipulation, path)
+            rows = np.concatenate([path, np.tile(state.arm, (len(path), 1))], axis=1)
+            opening = 0.0 if state.holding else model.description.opening
+            if len(path) > 1:
+                steps.append(Step("drive", (origin, target), (Segment(rows, opening, 1.0, "", state.holding),), None))
+            steps.append(Step(name, arguments, manipulation.segments, manipulation))
+            state = apply_effect(model, state, name, arguments, manipulation)
+            origin = target
+    except MotionFailed:
+        model.restore(snapshot)
+        raise
+    return steps, state
+
+
+def hold_for_checks(model: WorldModel, state: RobotState) -> None:
+    """Make the checker carry what the robot holds (or nothing)."""
+    model.checker.allow(touch=model.links(state.holding) if state.holding else ())
+    if state.holding is not None and state.tool_from_item is not None:
+        model.checker.carry(state.holding, state.tool_from_item)
+    else:
+        model.checker.put_down()
+
+
+def _same_turns(manipulation: Manipulation, path: np.ndarray) -> tuple[Manipulation, np.ndarray]:
+    """Shift the yaw of the manipulation by whole turns to where the drive ends."""
+    shift = path[-1] - manipulation.base
+    shift[:2] = 0.0
+    if abs(shift[2]) < 1e-9:
+        return manipulation, path
+    change = np.concatenate([shift, np.zeros(7)])
+    segments = tuple(replace(segment, path=segment.path + change) for segment in manipulation.segments)
+    return replace(manipulation, base=manipulation.base + shift, segments=segments), path
+
+
+def apply_effect(
+    model: WorldModel, state: RobotState, name: str, arguments: tuple[str, ...], manipulation: Manipulation
+) -> RobotState:
+    """Bring the model to what it is after a manipulation, and return the robot's state."""
+    arm = manipulation.segments[-1].path[-1, 3:]
+    if name == "pick":
+        state = RobotState(
+            manipulation.base, arm, arguments[0], manipulation.tool_from_item, manipulation.body_from_tool
+        )
+        hold_for_checks(model, state)
+        return state
+    state = RobotState(manipulation.base, arm)
+    hold_for_checks(model, state)
+    if name == "place" and manipulation.item_pose is not None:
+        model.world.set_pose(arguments[0], manipulation.item_pose)
+        model.put_on(arguments[0], arguments[1])
+    for joint, value in manipulation.joint_values.items():
+        model.move_joint(joint, value)
+    return state
+
+
+def refine_plan(
+    model: WorldModel, state: RobotState, actions: list[GroundAction], budgets: Budgets, random: np.random.Generator
+) -> list[Step]:
+    """Return the steps of a task plan; the model is left as it was. Raises RefinementFailed.
+
+    A symbolic `drive` has no geometry of its own: the base pose belongs to the manipulation that follows.
+    """
+    snapshot = model.snapshot()
+    steps: list[Step] = []
+    origin = "start"
+    try:
+        for action in actions:
+            if action.name == "drive":
+                continue
+            name = PLAIN_NAMES.get(action.name, action.name)
+            try:
+                found, state = refine_action(model, state, name, action.arguments, origin, budgets, random)
+            except MotionFailed as failed:
+                failure = failed.failure.model_copy(update={"action": action.text})
+                raise RefinementFailed(action, failure) from None
+            steps += found
+            origin = action.arguments[1] if name == "place" else action.arguments[0]
+    finally:
+        hold_for_checks(model, RobotState(state.base, state.arm))
+        model.restore(snapshot)
+    return steps
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What came of a goal: the task plan and its steps, or None, and every failure on the way."""
+
+    actions: list[GroundAction] | None
+    steps: list[Step] | None
+    failures: list[Failure]
+
+
+def plan_and_refine(
+    model: WorldModel,
+    state: RobotState,
+    domain: Domain,
+    problem: Problem,
+    budgets: Budgets,
+    random: np.random.Generator,
+    *,
+    heuristic: Heuristic,
+    task_attempts: int,
+    refinement_attempts: int,
+) -> Attempt:
+    """Alternate between task search and geometry.
+
+    An action whose geometry fails in all `refinement_attempts` (the earlier choices are drawn anew each time) is
+    taken away from the task search, at most `task_attempts` times.
+    """
+    actions = ground(domain, problem)
+    failures: list[Failure] = []
+    blocked: list[GroundAction] = []
+    for _ in range(task_attempts):
+        allowed = [action for action in actions if action not in blocked]
+        found = plan_task(problem, allowed, heuristic=heuristic)
+        if found.actions is None:
+            failures.append(_no_task_plan(problem, found.unreachable, found.exhausted, found.expanded, blocked))
+            return Attempt(None, None, failures)
+        worst: GroundAction | None = None
+        for _ in range(refinement_attempts):
+            try:
+                return Attempt(found.actions, refine_plan(model, state, found.actions, budgets, random), failures)
+            except RefinementFailed as failed:
+                failures.append(failed.failure)
+                worst = failed.action
+        assert worst is not None
+        blocked.append(worst)
+    return Attempt(None, None, failures)
+
+
+def _no_task_plan(
+    problem: Problem, unreachable: tuple[tuple[str, ...], ...], exhausted: bool, expanded: int,
+    blocked: list[GroundAction],
+) -> Failure:  # fmt: skip
+    without = f" without {', '.join(action.text for action in blocked)}" if blocked else ""
+    if unreachable:
+        names = ", ".join(atom_text(atom) for atom in unreachable)
+        message = f"no sequence of actions{without} makes {names} true"
+    elif exhausted:
+        names = ", ".join(sorted(atom_text(atom) for atom in problem.goal))
+        message = f"each of {names} can be reached, but not all together{without}"
+    else:
+        message = f"no task plan{without} within {expanded} expanded states"
+    objects = sorted({name for atom in unreachable or problem.goal for name in atom[1:]})
+    return Failure(
+        kind="goal_unsatisfiable" if exhausted else "search_limit",
+        message=message,
+        objects=tuple(objects),
+        numbers={"expanded": float(expanded), "blocked": float(len(blocked))},
+    )
+
+
+def relative_place(step: Step, model: WorldModel, surface: str) -> np.ndarray:
+    """Return surface_from_item (4, 4) of a planned place, to be used where the surface really is."""
+    assert step.manipulation is not None and step.manipulation.item_pose is not None
+    return inverse(model.pose(surface)) @ step.manipulation.item_pose
