@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -24,6 +24,7 @@ GRAVITY_FRAMES = 60
 """Frames whose depth is looked at to find the floor."""
 PLAUSIBLE_MEDIAN_DEPTH = (0.15, 15.0)
 LARGE_STEP = 1.0
+StreamName = Literal["color", "depth", "right", "labels", "pose"]
 
 
 def run(log: Path, *, parameters: IngestParameters, context: Context) -> Sequence:
@@ -136,13 +137,17 @@ def _finish(
     for note in notes:
         (context.logger.warning if note.startswith("WARNING") else context.logger.info)("%s", note)
     write_tum(context.output / "trajectory.tum", np.array(times[: len(poses)]), np.array(poses).reshape(-1, 4, 4))
-    present = {"color": True, "depth": True, "labels": source.has_labels, "pose": bool(poses)}
+    streams: list[StreamName] = ["color", "depth"] if times else []
+    if times and source.has_labels:
+        streams.append("labels")
+    if poses:
+        streams.append("pose")
     SequenceFile(
         source_format=source.format,
         rule=source.rule,
         notes=tuple(notes),
         camera=source.camera,
-        streams=tuple(name for name, there in present.items() if there and times),  # type: ignore[arg-type]
+        streams=tuple(streams),
         frame_count=len(times),
         frames_in_log=len(source.entries),
         drops=dict(sorted(drops.items())),
