@@ -101,6 +101,7 @@ def main() -> None:
     """Run the command line of this process."""
     _keep_standard_output_for_data()
     _refuse_foreign_packages()
+    os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the default probes TBB first and warns about its version
     signal.signal(signal.SIGTERM, _interrupt)
     code = run(sys.argv[1:])
     sys.stdout.flush()
