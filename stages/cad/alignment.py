@@ -1,0 +1,141 @@
+"""Optimization-based CAD alignment: equations 2.11 to 2.14 of Han 2024, by Levenberg-Marquardt."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.cad.matching import CUBE_ROTATIONS, Match
+from stages.cad.shapes import Observed
+from stages.kit.geometry.boxes import clip_polygon, polygon_area
+from stages.kit.geometry.transforms import transform_from_yaw
+
+STEP = 1e-6
+"""Of the forward difference (the released code's)."""
+
+
+@dataclass(frozen=True)
+class AlignmentWeights:
+    """Diagonals of Sigma_b and Sigma_p (2.12); the thesis gives no values, these names are those of its code."""
+
+    support: float
+    offset: float
+    angle: float
+    containment: float
+    height: float
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """T of equation 2.11: scale alpha, yaw theta, position p of the centre of the CAD model's box."""
+
+    scale: float
+    yaw: float
+    position: np.ndarray
+    """(3,) world [m]."""
+    cost: float
+    """J (2.12) at the solution."""
+
+
+def rectangle(center: np.ndarray, size: np.ndarray, yaw: float) -> np.ndarray:
+    """Return the corners (4, 2) of a ground rectangle, counter-clockwise."""
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    half = np.asarray(size[:2]) / 2
+    local = np.array([[-half[0], -half[1]], [half[0], -half[1]], [half[0], half[1]], [-half[0], half[1]]])
+    return local @ np.array([[cosine, sine], [-sine, cosine]]) + np.asarray(center[:2])
+
+
+def box_errors(frame: Observed, size_y: np.ndarray, scale: float, yaw: float, position: np.ndarray) -> np.ndarray:
+    """Equation 2.13: [A(T o y) - A(x n T o y), alpha s_y - s_x], with `size_y` (3,) of the oriented model."""
+    mine = rectangle(position, scale * size_y, yaw)
+    theirs = rectangle(frame.center, frame.size, frame.yaw)
+    outside = polygon_area(mine) - polygon_area(clip_polygon(mine, theirs))
+    return np.array([outside, scale * size_y[2] - frame.size[2]])
+
+
+def plane_errors(
+    normals_x: np.ndarray, offsets_x: np.ndarray, normals_y: np.ndarray, offsets_y: np.ndarray, shift: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Equation 2.14 for matched planes: (offset differences (M,), 1 - cosines (M,)).
+
+    Normals (M, 3) in the world frame. `offsets_x` are relative to the centre of x, `offsets_y` (already scaled) to
+    that of y, which lies at `shift` (3,) from the centre of x: T^-T f(pi) has offset d_y - n . shift. The centre of x
+    is the origin, as offsets from the far origin of the map would weigh every error of yaw by that distance.
+    """
+    return offsets_y - normals_y @ shift - offsets_x, 1.0 - np.einsum("ij,ij->i", normals_x, normals_y)
+
+
+def residual_function(match: Match, weights: AlignmentWeights) -> Callable[[np.ndarray], np.ndarray]:
+    """Return e(alpha, theta, px, py) with J = e^T e (2.12); p_z follows from the support: p = -d^s + alpha s_y / 2."""
+    frame, shape = match.frame, match.shape
+    rotation = CUBE_ROTATIONS[match.orientation]
+    size_y = np.abs(rotation) @ shape.size
+    rows = np.array([pair[0] for pair in match.pairs], dtype=int)
+    columns = np.array([pair[1] for pair in match.pairs], dtype=int)
+    normals_x, offsets_x = frame.planes.normals[rows], frame.planes.offsets[rows]
+    normals_y, offsets_y = shape.planes.normals[columns] @ rotation.T, shape.planes.offsets[columns]
+    carries = frame.planes.supporting[rows]
+    offset_weight = np.sqrt(np.where(carries, weights.support, weights.offset))
+    angle_weight = math.sqrt(weights.angle)
+    box_weight = np.sqrt([weights.containment, weights.height])
+
+    def residuals(parameters: np.ndarray) -> np.ndarray:
+        scale, yaw = float(parameters[0]), float(parameters[1])
+        position = np.array([parameters[2], parameters[3], frame.support_height + scale * size_y[2] / 2])
+        turned = normals_y @ transform_from_yaw(yaw, np.zeros(3))[:3, :3].T
+        offset, angle = plane_errors(normals_x, offsets_x, turned, scale * offsets_y, position - frame.center)
+        return np.concatenate(
+            [box_weight * box_errors(frame, size_y, scale, yaw, position), offset_weight * offset, angle_weight * angle]
+        )
+
+    return residuals
+
+
+def levenberg_marquardt(
+    residuals: Callable[[np.ndarray], np.ndarray], start: np.ndarray, evaluations: int, tolerance: float = 1e-10
+) -> tuple[np.ndarray, float]:
+    """Return (parameters (K,), squared norm) that minimise |residuals|^2 from `start` (K,).
+
+    Forward differences; works with fewer residuals than parameters, as damping keeps the normal matrix regular. Stops
+    after `evaluations` calls or when a step changes the cost by less than `tolerance` of it.
+    """
+    x = np.asarray(start, dtype=float).copy()
+    value = residuals(x)
+    cost, calls, damping = float(value @ value), 1, 1e-3
+    while calls < evaluations:
+        jacobian = np.empty((len(value), len(x)))
+        for k in range(len(x)):
+            ahead = x.copy()
+            ahead[k] += STEP
+            jacobian[:, k] = (residuals(ahead) - value) / STEP
+        calls += len(x)
+        normal, gradient = jacobian.T @ jacobian, jacobian.T @ value
+        improved = False
+        while calls < evaluations and damping < 1e12:
+            lifted = normal + damping * np.diag(np.maximum(np.diag(normal), 1e-9))
+            step = -np.linalg.solve(lifted, gradient)
+            trial = residuals(x + step)
+            calls += 1
+            trial_cost = float(trial @ trial)
+            if trial_cost < cost:
+                gain = cost - trial_cost
+                x, value, damping, improved = x + step, trial, damping / 10, gain > tolerance * cost
+                cost = trial_cost
+                break
+            damping *= 10
+        if not improved:
+            break
+    return x, cost
+
+
+def align(match: Match, weights: AlignmentWeights, evaluations: int) -> Alignment:
+    """Return the alignment of one oriented candidate (section 2.4.3), started at equal diagonals, yaw and centre."""
+    frame, size_y = match.frame, np.abs(CUBE_ROTATIONS[match.orientation]) @ match.shape.size
+    scale = float(np.linalg.norm(frame.size) / np.linalg.norm(match.shape.size))
+    start = np.array([scale, frame.yaw, frame.center[0], frame.center[1]])
+    solution, cost = levenberg_marquardt(residual_function(match, weights), start, evaluations)
+    height = frame.support_height + solution[0] * size_y[2] / 2
+    return Alignment(float(solution[0]), float(solution[1]), np.array([solution[2], solution[3], height]), cost)

@@ -1,0 +1,202 @@
+"""The candidates of one object: matched, aligned, measured, checked against what it carries and where walls are."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from schemas.cad_library import CadModel
+from schemas.contact_graph import ContactGraphFile, GraphNode
+from schemas.vocabulary import load_vocabulary
+from stages.cad.alignment import AlignmentWeights, align
+from stages.cad.fitting import refine_joints, refine_pose
+from stages.cad.matching import rank_matches
+from stages.cad.model_surfaces import ModelSurface, alignment_error, to_world
+from stages.cad.parameters import CadParameters
+from stages.cad.placing import placed_planes, placement_of, size_misfit, supporting_surface, wall_depth
+from stages.cad.shapes import Placement, Shape, observed_frames, shape_of_state
+from stages.kit.geometry.boxes import bottom, points_in_box
+from stages.kit.geometry.point_clouds import thin_to_grid
+
+GRID = 0.01
+BOX_MARGIN = 0.01
+"""Vertices outside the observed box by more than this were stray to the graph and are so here [m]."""
+SAME_PLACE = (0.01, 0.03)
+"""Placements of one model nearer than this in metres and radians are one candidate."""
+
+
+@dataclass(frozen=True)
+class Shortlist:
+    """What the global check chooses from, for one object."""
+
+    node: GraphNode
+    placements: tuple[Placement, ...]
+    """Valid candidates, best first."""
+    rejected: dict[str, int]
+    reason: str
+    """Why there is no valid candidate; empty when there is one."""
+
+
+def models_for(class_name: str, models: tuple[CadModel, ...]) -> list[CadModel]:
+    """Return the library's models of the same class; where there are none, of the classes that the vocabulary names
+    as stand-ins (`library`), in their order."""
+    semantic = load_vocabulary().by_name(class_name)
+    names = (class_name, *semantic.library)
+    return [model for name in names for model in models if model.class_name == name]
+
+
+def object_points(
+    node: GraphNode, vertices: np.ndarray, normals: np.ndarray, count: int, random: np.random.Generator
+) -> np.ndarray:
+    """Return at most `count` points (N, 3) of the object's mesh, evenly spread, without what the graph left out."""
+    if node.box_observed is not None:
+        inside = points_in_box(node.box_observed, vertices, margin=BOX_MARGIN)
+        if inside.any():
+            vertices, normals = vertices[inside], normals[inside]
+    points, _ = thin_to_grid(vertices, normals, GRID)
+    if len(points) > count:
+        points = points[np.sort(random.choice(len(points), size=count, replace=False))]
+    return points
+
+
+def support_height_of(node: GraphNode, graph: ContactGraphFile) -> float:
+    """Return -d^s of the plane that the node stands on [m]: after refinement that is the bottom of its box (2.1)."""
+    if node.box is None:
+        raise ValueError(f"{node.id} has no box")
+    return bottom(node.box)
+
+
+def shortlist(
+    node: GraphNode,
+    points: np.ndarray,
+    graph: ContactGraphFile,
+    models: list[CadModel],
+    surfaces: dict[str, ModelSurface],
+    parameters: CadParameters,
+) -> Shortlist:
+    """Return the valid candidates of one object (sections 2.4.2, 2.4.3 and the first half of 2.4.4).
+
+    `points` (N, 3): vertices of the object; `surfaces`: model id -> surface for every model in `models`.
+    """
+    if not models:
+        return Shortlist(node, (), {}, f"the library has no model of class {node.class_name}")
+    ours = parameters.method == "ours"
+    carried = [link for link in graph.links if link.source == node.id and link.relation in ("supports", "contains")]
+    carrying = frozenset(link.plane for link in carried if link.plane is not None)
+    height = support_height_of(node, graph)
+    shapes = [shape_of_state(model, state) for model in models for state in model.states]
+    matches, counts = rank_matches(
+        observed_frames(node, points, carrying, height, all_frames=ours),
+        shapes,
+        weights=(parameters.size_weight, parameters.plane_weight, parameters.upright_weight),
+        unmatched=parameters.unmatched_plane if ours else None,
+        scale_range=(parameters.minimum_scale, parameters.maximum_scale),
+        keep=parameters.candidates,
+    )
+    rejected = Counter(counts)
+    weights = AlignmentWeights(
+        parameters.support_weight,
+        parameters.offset_weight,
+        parameters.angle_weight,
+        parameters.containment_weight,
+        parameters.height_weight,
+    )
+    link = graph.parent_link(node.id)
+    hangs = link is not None and link.relation == "carries_on_wall"
+    placements: list[Placement] = []
+    for match in matches:
+        placement = placement_of(match, align(match, weights, parameters.evaluations))
+        if not parameters.minimum_scale <= placement.scale <= parameters.maximum_scale:
+            rejected["aligned scale out of range"] += 1
+            continue
+        surface = surfaces[match.shape.model.id]
+        if ours:
+            placement = fitted(surface, placement, points, free_height=hangs)
+            score = placement.alignment_error + parameters.misfit_weight * size_misfit(match.frame.size, placement)
+        else:
+            error = alignment_error(surface, placement, points)
+            placement, score = replace(placement, alignment_error=error), error
+        placement = replace(placement, score=score)
+        reason = why_invalid(placement, surface, node, graph, parameters)
+        if reason is None:
+            placements.append(placement)
+        else:
+            rejected[reason] += 1
+    placements.sort(key=lambda p: p.score)
+    unique = without_repeats(placements)
+    rejected["same as a better candidate"] += len(placements) - len(unique)
+    counted = {name: int(count) for name, count in sorted(rejected.items()) if count}
+    reason = "" if unique else "no valid candidate: " + ", ".join(f"{n} {k}" for n, k in counted.items())
+    return Shortlist(node, tuple(unique), counted, reason)
+
+
+def fitted(surface: ModelSurface, placement: Placement, points: np.ndarray, *, free_height: bool) -> Placement:
+    """Ours: refine the pose, then joints, then the pose again when a joint moved."""
+    refined = refine_pose(surface, placement, points, free_height=free_height)
+    if not surface.model.joints:
+        return refined
+    moved = refine_joints(surface, refined, points)
+    if moved.shape.joints == refined.shape.joints:
+        return refined
+    return refine_pose(surface, moved, points, free_height=free_height)
+
+
+def why_invalid(
+    placement: Placement,
+    surface: ModelSurface,
+    node: GraphNode,
+    graph: ContactGraphFile,
+    parameters: CadParameters,
+) -> str | None:
+    """Return why a placement is no candidate, or None: scale and error, (2.2) with every child, walls."""
+    if not parameters.minimum_scale <= placement.scale <= parameters.maximum_scale:
+        return "refined scale out of range"
+    if parameters.method == "ours" and placement.alignment_error > parameters.maximum_alignment_error:
+        return "alignment error too large"
+    planes = placed_planes(placement)
+    for link in graph.links:
+        if link.source != node.id or link.relation not in ("supports", "contains"):
+            continue
+        child = graph.node(link.target).box
+        if child is None:
+            continue
+        found = supporting_surface(
+            planes,
+            child,
+            bottom(child),
+            area_threshold=parameters.area_threshold,
+            tolerance=parameters.support_tolerance,
+        )
+        if found is None:
+            return "does not support a child"
+    if node.box is None:
+        return None
+    walls = [entry for entry in graph.nodes if entry.class_name == "wall"]
+    points = to_world(placement, surface.hull_points(placement.shape.joints))
+    if wall_depth(points, np.asarray(node.box.center), walls) > parameters.wall_penetration:
+        return "stands in a wall"
+    return None
+
+
+def without_repeats(placements: list[Placement]) -> list[Placement]:
+    """Drop placements that a better one (earlier in the list) repeats: same model, place, turn and joints."""
+    kept: list[Placement] = []
+    for placement in placements:
+        for other in kept:
+            if other.shape.model.id != placement.shape.model.id:
+                continue
+            near = np.linalg.norm(other.translation - placement.translation) < SAME_PLACE[0]
+            turn = np.arccos(np.clip((np.trace(other.rotation.T @ placement.rotation) - 1) / 2, -1, 1))
+            joints = _joint_distance(other.shape, placement.shape)
+            if near and turn < SAME_PLACE[1] and joints < SAME_PLACE[1]:
+                break
+        else:
+            kept.append(placement)
+    return kept
+
+
+def _joint_distance(a: Shape, b: Shape) -> float:
+    names = set(a.joints) | set(b.joints)
+    return max((abs(a.joints.get(name, 0.0) - b.joints.get(name, 0.0)) for name in names), default=0.0)

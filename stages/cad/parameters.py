@@ -1,0 +1,77 @@
+"""Declaration of `cad`: replace reconstructed objects by CAD models."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import CadScene
+from schemas.contact_graph import ContactGraph
+from schemas.panoptic_map import PanopticMap
+from stages.kit.stage import Parameters, Stage
+
+
+class CadParameters(Parameters):
+    """Defaults are the thesis's constants where it states them, its released code's where it does not (PROTOCOLS 3)."""
+
+    method: Literal["ours", "thesis"] = Field(
+        "ours",
+        description="`thesis`: matching, alignment and check as in section 2.4; `ours`: poses and joints are then "
+        "refined on the vertices, and the choice also weighs the size",
+    )
+    candidates: int = Field(10, ge=1, description="Oriented candidates kept after matching")
+    size_weight: float = Field(1.0, ge=0.0, description="omega_1 of the matching error (2.7): relative size")
+    plane_weight: float = Field(1.0, ge=0.0, description="omega_2 of the matching error (2.7): surface planes")
+    upright_weight: float = Field(0.2, ge=0.0, description="omega_3 of the matching error (2.7): not upright")
+    unmatched_plane: float = Field(
+        1.0,
+        ge=0.0,
+        description="ours: matching error of a plane that finds no partner (`thesis` rejects models with fewer planes)",
+    )
+    minimum_scale: float = Field(0.6, gt=0.0, description="Smaller scales of a CAD model are rejected")
+    maximum_scale: float = Field(1.6, gt=0.0, description="Larger scales of a CAD model are rejected")
+    support_weight: float = Field(8.0, ge=0.0, description="Alignment: weight of supporting planes' offsets")
+    offset_weight: float = Field(5.0, ge=0.0, description="Alignment: weight of other planes' offsets")
+    angle_weight: float = Field(5.0, ge=0.0, description="Alignment: weight of planes' angles")
+    containment_weight: float = Field(0.5, ge=0.0, description="Alignment: weight of the footprint outside the box")
+    height_weight: float = Field(2.0, ge=0.0, description="Alignment: weight of the height difference")
+    evaluations: int = Field(1000, ge=1, description="Alignment: most evaluations of the residuals")
+    vertices: int = Field(1500, ge=10, description="Object vertices drawn for the alignment error")
+    misfit_weight: float = Field(
+        0.1,
+        ge=0.0,
+        description="ours: metres of extent that differ from the observed box count this much beside the "
+        "alignment error (vertices of a partial mesh fit every model that is large enough)",
+    )
+    maximum_alignment_error: float = Field(
+        0.08, gt=0.0, description="ours: candidates with a larger alignment error are no candidates [m]"
+    )
+    area_threshold: float = Field(
+        0.5, ge=0.0, le=1.0, description="b_th: least share of a child's footprint over the CAD model's surface"
+    )
+    support_tolerance: float = Field(
+        0.12, gt=0.0, description="Largest height difference of a child's old and new supporting surface [m]"
+    )
+    wall_penetration: float = Field(0.15, ge=0.0, description="Candidates deeper than this in a wall are rejected [m]")
+    collision_tolerance: float = Field(
+        0.015, ge=0.0, description="Objects that interpenetrate by more than this are in conflict [m]"
+    )
+    conflict_iterations: int = Field(50, ge=0, description="Most steps of min-conflicts")
+    maximum_shift: float = Field(
+        0.05, ge=0.0, description="ours: objects still in conflict are moved apart sideways by at most this [m]"
+    )
+
+
+STAGE = Stage(
+    name="cad",
+    version=1,
+    summary="replace objects by CAD models that fit, stand on their supports and do not collide",
+    parameters=CadParameters,
+    reads={"contact_graph": ContactGraph, "panoptic_map": PanopticMap, "library": CadLibrary},
+    writes=CadScene,
+    libraries=("numpy", "scipy", "trimesh", "open3d", "python-fcl"),
+    example="scenewright cad --contact-graph outputs/demo/contact_graph --panoptic-map outputs/demo/panoptic_map "
+    "--library outputs/demo/cad_library --out outputs/demo/cad_scene",
+)

@@ -1,0 +1,266 @@
+"""Wiring of `cad`: contact graph, map and library in, functionally equivalent scene cg' out (Han 2024, section 2.4)."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+
+from schemas.base import as_transform
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import CadCandidate, CadScene, CadSceneFile, Replacement
+from schemas.contact_graph import ContactGraph, ContactGraphFile, GraphNode
+from schemas.errors import BadInput, UsageError
+from schemas.panoptic_map import PanopticMap
+from stages.cad.candidates import Shortlist, models_for, object_points, shortlist
+from stages.cad.conflicts import Selection, Solid, min_conflicts, penetration, placed_solid
+from stages.cad.model_surfaces import ModelSurface, load_surface
+from stages.cad.parameters import CadParameters
+from stages.cad.placing import placed_box, placed_planes
+from stages.cad.settling import Settled, separate, settle
+from stages.cad.shapes import Placement
+from stages.kit.formats.cad_models import model_folder
+from stages.kit.formats.entity_meshes import load_entity_mesh
+from stages.kit.geometry.point_clouds import sample_large_triangles, vertex_normals
+from stages.kit.geometry.transforms import transform_from
+from stages.kit.stage import Context
+
+VERTICES, CONFLICTS, SAMPLES = 1, 2, 3
+"""Random streams."""
+
+
+def run(
+    contact_graph: ContactGraph,
+    panoptic_map: PanopticMap,
+    library: CadLibrary,
+    *,
+    parameters: CadParameters,
+    context: Context,
+) -> CadScene:
+    """Replace every object by the CAD model that fits it best, such that the scene as a whole can exist."""
+    if parameters.minimum_scale > parameters.maximum_scale:
+        raise UsageError("minimum_scale is larger than maximum_scale")
+    graph = contact_graph.graph
+    surfaces: dict[str, ModelSurface] = {}
+    with context.progress.step("candidates"):
+        shortlists = find_candidates(graph, panoptic_map, library, surfaces, parameters, context)
+    with context.progress.step("global check"):
+        chosen, selection = select(graph, shortlists, surfaces, parameters, context)
+        settled, conflicts_after = adjust(graph, chosen, surfaces, parameters)
+    with context.progress.step("writing"):
+        scene = scene_file(graph, shortlists, settled, selection, conflicts_after)
+        scene.write(context.output / "scene.json")
+        cad_graph(graph, settled, surfaces).write(context.output / "graph.json")
+        copy_models(settled, library, context)
+        copy_meshes(graph, settled, panoptic_map, context)
+
+    decisions = [replacement.decision for replacement in scene.replacements]
+    errors = [placement.alignment_error for placement in settled.placements.values()]
+    summary = {
+        "cad": decisions.count("cad"),
+        "mesh": decisions.count("mesh"),
+        "layout": decisions.count("layout"),
+        "conflicts_before": scene.conflicts_before,
+        "conflicts_after": scene.conflicts_after,
+        "alignment_error_median": round(float(np.median(errors)), 4) if errors else None,
+    }
+    return CadScene(context.output, outcome="ok" if decisions else "empty", summary=summary)
+
+
+def find_candidates(
+    graph: ContactGraphFile,
+    panoptic_map: PanopticMap,
+    library: CadLibrary,
+    surfaces: dict[str, ModelSurface],
+    parameters: CadParameters,
+    context: Context,
+) -> dict[str, Shortlist]:
+    """Return the shortlist of every object; surfaces of the models that were needed are added to `surfaces`."""
+    models = library.library.models
+    objects = [node for node in graph.nodes if node.node_type in ("rigid", "articulated")]
+    found: dict[str, Shortlist] = {}
+    for node in context.progress.track(objects, description="objects"):
+        if node.mesh is None:
+            found[node.id] = Shortlist(node, (), {}, "the map has no mesh of it")
+            continue
+        suitable = models_for(node.class_name, models)
+        for model in suitable:
+            if model.id not in surfaces:
+                surfaces[model.id] = load_surface(model_folder(library, model.id), model)
+        mesh = load_entity_mesh(panoptic_map.path(node.mesh))
+        used = np.unique(mesh.faces)
+        normals = vertex_normals(mesh.vertices, mesh.faces)
+        extra, extra_normals = sample_large_triangles(
+            mesh.vertices, mesh.faces, 0.01, context.random(SAMPLES, node.instance)
+        )
+        points = object_points(
+            node,
+            np.concatenate([mesh.vertices[used], extra]),
+            np.concatenate([normals[used], extra_normals]),
+            parameters.vertices,
+            context.random(VERTICES, node.instance),
+        )
+        found[node.id] = shortlist(node, points, graph, suitable, surfaces, parameters)
+    return found
+
+
+def may_touch(graph: ContactGraphFile) -> set[frozenset[str]]:
+    """Return pairs that are no collision: parent and child."""
+    return {frozenset((link.source, link.target)) for link in graph.links if link.relation != "proximal"}
+
+
+def select(
+    graph: ContactGraphFile,
+    shortlists: dict[str, Shortlist],
+    surfaces: dict[str, ModelSurface],
+    parameters: CadParameters,
+    context: Context,
+) -> tuple[dict[str, Placement], Selection]:
+    """Choose one candidate for each object that has any, by min-conflicts."""
+    names = [name for name, entry in shortlists.items() if entry.placements]
+    touching = may_touch(graph)
+    solids: dict[tuple[int, int], Solid] = {}
+    depths: dict[tuple[int, int, int, int], float] = {}
+
+    def solid(i: int, a: int) -> Solid:
+        if (i, a) not in solids:
+            placement = shortlists[names[i]].placements[a]
+            solids[i, a] = placed_solid(placement, surfaces[placement.shape.model.id])
+        return solids[i, a]
+
+    def depth(i: int, a: int, j: int, b: int) -> float:
+        if frozenset((names[i], names[j])) in touching:
+            return 0.0
+        if i > j:
+            i, a, j, b = j, b, i, a
+        if (i, a, j, b) not in depths:
+            depths[i, a, j, b] = penetration(solid(i, a), solid(j, b)).depth
+        return depths[i, a, j, b]
+
+    selection = min_conflicts(
+        [len(shortlists[name].placements) for name in names],
+        depth,
+        tolerance=parameters.collision_tolerance,
+        iterations=parameters.conflict_iterations,
+        random=context.random(CONFLICTS),
+    )
+    chosen = {name: shortlists[name].placements[k] for name, k in zip(names, selection.choice, strict=True)}
+    return chosen, selection
+
+
+def adjust(
+    graph: ContactGraphFile,
+    chosen: dict[str, Placement],
+    surfaces: dict[str, ModelSurface],
+    parameters: CadParameters,
+) -> tuple[Settled, int]:
+    """Put the chosen models on their supports and (ours) apart; returns the scene and the pairs still colliding."""
+    settled = settle(graph, chosen, surfaces, area_threshold=parameters.area_threshold)
+    touching = may_touch(graph)
+    names = sorted(settled.placements)
+    pairs = [(a, b) for k, a in enumerate(names) for b in names[k + 1 :] if frozenset((a, b)) not in touching]
+    if parameters.method == "ours" and parameters.maximum_shift > 0:
+        carriers = frozenset(link.source for link in graph.links if link.relation in ("supports", "contains"))
+        apart = separate(
+            settled.placements,
+            surfaces,
+            pairs,
+            carriers,
+            tolerance=parameters.collision_tolerance,
+            maximum_shift=parameters.maximum_shift,
+        )
+        settled = Settled(apart, settled.relations)
+    solids = {name: placed_solid(p, surfaces[p.shape.model.id]) for name, p in settled.placements.items()}
+    after = sum(penetration(solids[a], solids[b]).depth > parameters.collision_tolerance for a, b in pairs)
+    return settled, after
+
+
+def candidate_record(placement: Placement) -> CadCandidate:
+    """Return a placement as it is written."""
+    return CadCandidate(
+        model_id=placement.shape.model.id,
+        joints=placement.shape.joints,
+        scale=placement.scale,
+        world_from_model=as_transform(transform_from(placement.rotation, placement.translation)),
+        matching_error=placement.matching_error,
+        alignment_error=placement.alignment_error,
+    )
+
+
+def scene_file(
+    graph: ContactGraphFile,
+    shortlists: dict[str, Shortlist],
+    settled: Settled,
+    selection: Selection,
+    conflicts_after: int,
+) -> CadSceneFile:
+    """Return scene.json: the decision on every node."""
+    replacements = []
+    for node in graph.nodes:
+        if node.node_type == "layout":
+            replacements.append(Replacement(node=node.id, decision="layout"))
+        elif node.id in settled.placements:
+            entry, placement = shortlists[node.id], settled.placements[node.id]
+            chosen = candidate_record(placement)
+            others = [candidate_record(p) for p in entry.placements if p.score != placement.score]
+            replacements.append(
+                Replacement(
+                    node=node.id, decision="cad", chosen=chosen, alternatives=tuple(others), rejected=entry.rejected
+                )
+            )
+        elif node.id in shortlists:
+            entry = shortlists[node.id]
+            replacements.append(
+                Replacement(node=node.id, decision="mesh", reason=entry.reason, rejected=entry.rejected)
+            )
+    return CadSceneFile(
+        replacements=tuple(replacements),
+        conflicts_before=selection.conflicts_before,
+        conflicts_after=conflicts_after,
+        iterations=selection.steps,
+    )
+
+
+def cad_graph(graph: ContactGraphFile, settled: Settled, surfaces: dict[str, ModelSurface]) -> ContactGraphFile:
+    """Return cg': the same nodes and relations, with model, pose, scale, joints, and the model's box and planes."""
+    nodes: list[GraphNode] = []
+    for node in graph.nodes:
+        placement = settled.placements.get(node.id)
+        if placement is None:
+            nodes.append(node)
+            continue
+        nodes.append(
+            node.model_copy(
+                update={
+                    "box": placed_box(placement, surfaces[placement.shape.model.id]),
+                    "planes": placed_planes(placement),
+                    "model_id": placement.shape.model.id,
+                    "world_from_model": as_transform(transform_from(placement.rotation, placement.translation)),
+                    "scale": placement.scale,
+                    "joints": dict(placement.shape.joints),
+                }
+            )
+        )
+    links = tuple(
+        settled.relations.get(link.target, link) if link.relation != "proximal" else link for link in graph.links
+    )
+    return graph.model_copy(update={"nodes": tuple(nodes), "links": links})
+
+
+def copy_models(settled: Settled, library: CadLibrary, context: Context) -> None:
+    """Copy the folders of the chosen models, so that the scene needs no library."""
+    for model_id in sorted({placement.shape.model.id for placement in settled.placements.values()}):
+        shutil.copytree(model_folder(library, model_id), context.output / "models" / model_id)
+
+
+def copy_meshes(graph: ContactGraphFile, settled: Settled, panoptic_map: PanopticMap, context: Context) -> None:
+    """Copy the meshes of layout nodes and of objects that keep theirs."""
+    for node in graph.nodes:
+        if node.mesh is None or node.id in settled.placements:
+            continue
+        folder = context.output / ("layout" if node.node_type == "layout" else "meshes")
+        folder.mkdir(exist_ok=True)
+        source = panoptic_map.path(node.mesh)
+        if not source.is_file():
+            raise BadInput(f"{source}: mesh of node {node.id} is missing", hint="make the panoptic map again")
+        shutil.copyfile(source, folder / f"{node.id}.ply")
