@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from schemas.scene_parts import Camera
+from stages.ingest.source import LoadedFrame, Unusable
+from stages.kit.formats.foxglove import decode_color, millimetres_to_depth
 from stages.kit.geometry.cameras import back_project
+
+
+def registered_loader(
+    load: Callable[[], LoadedFrame], depth_camera: Camera, color_camera: Camera, color_from_depth: np.ndarray
+) -> Callable[[], LoadedFrame]:
+    """Return a function that loads a frame as `load` does, with its colour resampled into the depth camera."""
+
+    def registered() -> LoadedFrame:
+        frame = load()
+        color = decode_color(frame.color) if isinstance(frame.color, bytes) else frame.color
+        if color is None:
+            raise Unusable("undecodable_color")
+        depth = millimetres_to_depth(frame.depth)
+        seen = color_in_depth_camera(color, depth, depth_camera, color_camera, color_from_depth)
+        return LoadedFrame(color=seen, depth=frame.depth, labels=frame.labels)
+
+    return registered
 
 
 def color_in_depth_camera(

@@ -36,6 +36,11 @@ class IngestParameters(Parameters):
         0.5, gt=0, description="Largest gap between transforms that a pose is interpolated over [s]"
     )
     maximum_depth: float | None = Field(None, gt=0, description="Depth beyond this becomes invalid [m]")
+    register_color: bool = Field(
+        True,
+        description="Resample the colour of 7-Scenes Kinect logs (640x480, focal length 585) into the depth camera, "
+        "from which it was recorded 3 cm apart",
+    )
     gravity: Literal["auto", "given", "floor", "camera-up", "none"] = Field(
         "auto",
         description="How the world is made upright: auto takes what the log says, else the floor, else the mean "
