@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import trimesh
@@ -86,7 +87,7 @@ def posed_mesh(folder: Path, model: CadModel, joints: dict[str, float], scale: f
         mesh = parts[part]
         mesh.apply_transform(transforms[part])
         placed.append(mesh)
-    whole: trimesh.Trimesh = placed[0] if len(placed) == 1 else trimesh.util.concatenate(placed)
+    whole = placed[0] if len(placed) == 1 else cast(trimesh.Trimesh, trimesh.util.concatenate(placed))
     whole.apply_scale(scale)
     return whole
 
