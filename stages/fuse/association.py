@@ -1,0 +1,211 @@
+"""Which global segment and which global instance a frame's segments belong to (Han 2024, section 2.3.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from schemas.scene_parts import Camera
+from stages.fuse.counts import TripleCounts
+from stages.fuse.integration import intrinsics_of
+from stages.fuse.voxel_blocks import SIDE, VoxelBlocks, find, mix, pack
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """How a frame's segments lie in the map, in distinct voxels.
+
+    `sizes` (K,) int64: voxels under each frame segment's points, mapped or not. `rows`, `labels`, `counts` (N,): frame
+    segment, global label, shared voxels; only positive counts, sorted by (row, label).
+    """
+
+    sizes: np.ndarray
+    rows: np.ndarray
+    labels: np.ndarray
+    counts: np.ndarray
+
+
+@njit(cache=True)
+def index_segments(ids: np.ndarray, sorted_ids: np.ndarray) -> tuple[np.ndarray, int]:
+    """Replace the ids (H, W) int32 of a frame by 1 + their place in sorted_ids (K,) int32; 0 stays 0.
+
+    Returns the (H, W) uint16 image and some id that is not in the list, or -1.
+    """
+    height, width = ids.shape
+    result = np.zeros((height, width), dtype=np.uint16)
+    unlisted = -1
+    for row in range(height):
+        last_id, last_index = 0, 0
+        for column in range(width):
+            value = ids[row, column]
+            if value != last_id:
+                last_id = value
+                place = np.searchsorted(sorted_ids, value)
+                if value == 0:
+                    last_index = 0
+                elif place < sorted_ids.shape[0] and sorted_ids[place] == value:
+                    last_index = place + 1
+                else:
+                    last_index = 0
+                    unlisted = value
+            result[row, column] = last_index
+    return result, unlisted
+
+
+@njit(cache=True)
+def _sample_voxels(
+    depth: np.ndarray,
+    index_image: np.ndarray,
+    intrinsics: np.ndarray,
+    world_from_camera: np.ndarray,
+    stride: int,
+    near: float,
+    far: float,
+    voxel_size: float,
+    keys: np.ndarray,
+    slots: np.ndarray,
+    segment: np.ndarray,
+    canonical: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return frame segment index and global label (0: none) of every distinct (segment, voxel) under the points."""
+    height, width = depth.shape
+    fx, fy, cx, cy = intrinsics
+    samples = ((height + stride - 1) // stride) * ((width + stride - 1) // stride)
+    size = 16
+    while size < 2 * samples:
+        size *= 2
+    seen_key = np.full(size, -1, dtype=np.int64)
+    seen_row = np.zeros(size, dtype=np.uint16)
+    rows = np.empty(samples, dtype=np.int64)
+    labels = np.empty(samples, dtype=np.int64)
+    count = 0
+    for row in range(stride // 2, height, stride):
+        for column in range(stride // 2, width, stride):
+            index = index_image[row, column]
+            z = depth[row, column]
+            if index == 0 or not (near <= z <= far):
+                continue
+            x = (column - cx) / fx * z
+            y = (row - cy) / fy * z
+            i = int(np.floor((world_from_camera[0, 0] * x + world_from_camera[0, 1] * y + world_from_camera[0, 2] * z
+                              + world_from_camera[0, 3]) / voxel_size))  # fmt: skip
+            j = int(np.floor((world_from_camera[1, 0] * x + world_from_camera[1, 1] * y + world_from_camera[1, 2] * z
+                              + world_from_camera[1, 3]) / voxel_size))  # fmt: skip
+            k = int(np.floor((world_from_camera[2, 0] * x + world_from_camera[2, 1] * y + world_from_camera[2, 2] * z
+                              + world_from_camera[2, 3]) / voxel_size))  # fmt: skip
+            key = pack(i, j, k)
+            place = mix(key, size - 1)
+            known = False
+            while seen_key[place] != -1:
+                if seen_key[place] == key and seen_row[place] == index:
+                    known = True
+                    break
+                place = (place + 1) & (size - 1)
+            if known:
+                continue
+            seen_key[place] = key
+            seen_row[place] = index
+            slot = find(keys, slots, pack(i // SIDE, j // SIDE, k // SIDE))
+            rows[count] = index - 1
+            labels[count] = 0
+            if slot >= 0:
+                labels[count] = canonical[segment[slot, (i % SIDE) + SIDE * (j % SIDE) + SIDE * SIDE * (k % SIDE)]]
+            count += 1
+    return rows[:count], labels[:count]
+
+
+def measure_overlap(
+    blocks: VoxelBlocks,
+    depth: np.ndarray,
+    index_image: np.ndarray,
+    segment_count: int,
+    camera: Camera,
+    world_from_camera: np.ndarray,
+    *,
+    canonical: np.ndarray,
+    near: float,
+    far: float,
+    stride: int = 2,
+) -> Overlap:
+    """Count the voxels that each frame segment shares with each global segment label.
+
+    index_image (H, W) uint16 holds 1 + the number of the frame segment, 0 for none; every `stride`-th row and column
+    of depth (H, W) float32 [m] is looked at. `canonical` (int32) tells which label each label was merged into.
+    """
+    rows, labels = _sample_voxels(
+        np.ascontiguousarray(depth, dtype=np.float32), index_image, intrinsics_of(camera),
+        np.ascontiguousarray(world_from_camera, dtype=np.float64), stride, near, far, blocks.voxel_size, blocks.keys,
+        blocks.slots, blocks.segment, canonical,
+    )  # fmt: skip
+    sizes = np.bincount(rows, minlength=segment_count)
+    width = len(canonical)
+    mapped = labels > 0
+    pairs, counts = np.unique(rows[mapped] * width + labels[mapped], return_counts=True)
+    return Overlap(sizes, pairs // width, pairs % width, counts)
+
+
+def match_segments(overlap: Overlap, *, minimum_voxels: int, minimum_share: float) -> list[int]:
+    """Return the global segment label of each frame segment: 0 where a new label is due, -1 where it is too small.
+
+    Greedy (section 2.3.2): the pair with the largest overlap first; a label goes to one frame segment at most. Pairs
+    under `minimum_voxels`, or under `minimum_share` of the frame segment, are no match; segments of fewer voxels than
+    `minimum_voxels` take no part. Ties go to the earlier frame segment, then to the older label.
+    """
+    result = [0 if size >= minimum_voxels else -1 for size in overlap.sizes]
+    taken: set[int] = set()
+    pairs = zip(overlap.counts.tolist(), overlap.rows.tolist(), overlap.labels.tolist(), strict=True)
+    for count, row, label in sorted(pairs, key=lambda pair: (-pair[0], pair[1], pair[2])):
+        enough = count >= minimum_voxels and count >= minimum_share * overlap.sizes[row]
+        if enough and result[row] == 0 and label not in taken:
+            result[row] = label
+            taken.add(label)
+    return result
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A frame segment that was matched: global label l, class c_k, instance o_k within the frame."""
+
+    segment: int
+    class_id: int
+    frame_instance: int
+
+
+def associate_instances(
+    predictions: Sequence[Prediction], counts: TripleCounts, next_instance: int
+) -> tuple[dict[tuple[int, int], int], int]:
+    """Return {(frame instance, class): global instance} and the next unused global instance label.
+
+    The segments of a frame instance o vote together: p = argmax of the sum over its segments of Phi(l, c, p) > 0, which
+    for a single segment is the thesis's rule, and gives all its segments one label ("prevent assigning multiple
+    labels"). Two instances of one frame never get the same global label: the larger sum chooses first. Where no sum is
+    positive, a new label is made.
+    """
+    keys = sorted({(p.frame_instance, p.class_id) for p in predictions})
+    sums: dict[tuple[tuple[int, int], int], int] = {}
+    for prediction in predictions:
+        key = (prediction.frame_instance, prediction.class_id)
+        for instance, count in counts.instances(prediction.segment, prediction.class_id).items():
+            sums[key, instance] = sums.get((key, instance), 0) + count
+    result: dict[tuple[int, int], int] = {}
+    taken: set[int] = set()
+    for key, instance in sorted(sums, key=lambda pair: (-sums[pair], pair)):
+        if key not in result and instance not in taken:
+            result[key] = instance
+            taken.add(instance)
+    for key in keys:
+        if key not in result:
+            result[key] = next_instance
+            next_instance += 1
+    return result, next_instance
+
+
+def overlapping_labels(overlap: Overlap, minimum_share: float) -> Iterable[list[int]]:
+    """Yield, for each frame segment, the global labels that fill at least `minimum_share` of it, ascending."""
+    for row in range(len(overlap.sizes)):
+        inside = overlap.rows == row
+        enough = overlap.counts[inside] >= minimum_share * overlap.sizes[row]
+        yield overlap.labels[inside][enough].tolist()

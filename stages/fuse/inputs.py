@@ -1,0 +1,60 @@
+"""Which frames are fused, with which pose and which segments. What does not fit together raises BadInput."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.scene_parts import Camera
+from schemas.segments import FrameSegment, SegmentsFile
+from schemas.vocabulary import Vocabulary
+
+
+def check_segments(segments: SegmentsFile, camera: Camera, frame_count: int, vocabulary: Vocabulary) -> None:
+    """Raise BadInput unless the segments can belong to this sequence."""
+    remake = "run `scenewright segment` on this sequence"
+    if (segments.width, segments.height) != (camera.width, camera.height):
+        raise BadInput(
+            f"segments are {segments.width}x{segments.height}, frames are {camera.width}x{camera.height}", hint=remake
+        )
+    indices = [frame.frame for frame in segments.frames]
+    if len(set(indices)) != len(indices):
+        twice = next(index for index in indices if indices.count(index) > 1)
+        raise BadInput(f"segments.json lists frame {twice} twice", hint=remake)
+    beyond = [index for index in indices if not 0 <= index < frame_count]
+    if beyond:
+        raise BadInput(
+            f"segments are of another sequence: frame {beyond[0]} does not exist, there are {frame_count}", hint=remake
+        )
+    known = {entry.id for entry in vocabulary.classes}
+    for frame in segments.frames:
+        ids = [segment.id for segment in frame.segments]
+        if len(set(ids)) != len(ids) or any(value <= 0 for value in ids):
+            raise BadInput(f"segments.json: ids of frame {frame.frame} are not positive and different", hint=remake)
+        for segment in frame.segments:
+            if segment.category_id != 0 and segment.category_id not in known:
+                raise BadInput(
+                    f"segments.json: frame {frame.frame} has class id {segment.category_id}, which is not in the "
+                    "vocabulary",
+                    hint=remake,
+                )
+
+
+def listings(segments: SegmentsFile) -> dict[int, tuple[FrameSegment, ...]]:
+    """Return frame index -> its segments."""
+    return {frame.frame: frame.segments for frame in segments.frames}
+
+
+def poses_at(times: np.ndarray, pose_times: np.ndarray, poses: np.ndarray, tolerance: float) -> list[np.ndarray | None]:
+    """Return for each time (N,) [s] the nearest of poses (M, 4, 4) at pose_times (M,) ascending, or None.
+
+    Poses farther than `tolerance` [s] from a frame do not belong to it; the earlier of two equally near ones is taken.
+    """
+    result: list[np.ndarray | None] = []
+    for time in times:
+        place = int(np.searchsorted(pose_times, time))
+        around = [k for k in (place - 1, place) if 0 <= k < len(pose_times)]
+        nearest = min(around, key=lambda k: abs(pose_times[k] - time), default=None)
+        near_enough = nearest is not None and abs(pose_times[nearest] - time) <= tolerance + 1e-9
+        result.append(poses[nearest] if near_enough and nearest is not None else None)
+    return result

@@ -1,0 +1,75 @@
+"""Declaration of `scenewright fuse`. Defaults are the published system's, at the voxel size of the quick chain."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from schemas.panoptic_map import PanopticMap
+from schemas.segments import Segments
+from schemas.sequence import Sequence
+from schemas.trajectory import Trajectory
+from stages.kit.stage import Optionally, Parameters, Stage
+
+
+class FuseParameters(Parameters):
+    """Options of `fuse`."""
+
+    voxel_size: float = Field(0.02, gt=0, le=1, description="TSDF voxel edge [m]")
+    truncation_voxels: float = Field(4.0, ge=1, le=32, description="Truncation distance [voxels]")
+    minimum_depth: float = Field(0.1, ge=0.01, description="Nearer depth is not used [m]")
+    maximum_depth: float = Field(4.0, gt=0.01, description="Farther depth is not used [m]")
+    maximum_weight: float = Field(1000.0, gt=0, description="Weight at which a voxel starts to forget")
+    every: int = Field(1, ge=1, description="Integrate every how many-th frame")
+    block_stride: int = Field(4, ge=1, le=16, description="Every how many-th pixel looks for voxel blocks")
+    pose_tolerance: float = Field(
+        0.02, ge=0, description="A pose of --trajectory belongs to the frame at most this far from its time [s]"
+    )
+
+    label_band: float = Field(
+        1.0, gt=0, le=1, description="Voxels within this share of the truncation distance take part in the label vote"
+    )
+    overlap_stride: int = Field(2, ge=1, le=16, description="Every how many-th pixel measures overlap with the map")
+    minimum_overlap_voxels: int = Field(
+        8, ge=1, description="Smaller overlaps, and smaller frame segments, are not matched [voxels]"
+    )
+    minimum_overlap_share: float = Field(
+        0.1, ge=0, le=1, description="A frame segment is matched where this share of its voxels agrees"
+    )
+
+    merging: Literal["ours", "thesis"] = Field(
+        "ours",
+        description="`thesis` merges segment labels that share voxels whatever they are; `ours` never merges labels "
+        "that stand for different things",
+    )
+    merge_overlap_share: float = Field(
+        0.2, gt=0, le=1, description="Two segment labels share a frame segment when each fills this share of it"
+    )
+    merge_minimum_frames: int = Field(3, ge=1, description="... and are merged after so many frame segments")
+    instance_threshold: float = Field(0.5, gt=0, le=1, description="m_th of eq. 2.5")
+    instance_minimum_count: int = Field(10, ge=0, description="Things merge only above this common count")
+    regularize_every: int = Field(10, ge=1, description="Instances are merged every how many-th frame, and at the end")
+
+    minimum_weight: float = Field(
+        0.1, ge=0, description="Surfaces are drawn through voxels of at least this weight (a frame at depth z: 1/z^2)"
+    )
+    minimum_entity_voxels: int = Field(20, ge=1, description="Entities of fewer surface voxels are dropped")
+    minimum_observations: int = Field(2, ge=1, description="Entities that fewer frames voted for are dropped")
+    speck_share: float = Field(
+        0.05, ge=0, lt=1, description="Parts of a thing smaller than this share of its largest part take the label of "
+        "what surrounds them"
+    )  # fmt: skip
+
+
+STAGE = Stage(
+    name="fuse",
+    version=1,
+    summary="Integrate posed frames and their segments into one labelled map with a mesh per entity",
+    parameters=FuseParameters,
+    reads={"sequence": Sequence, "segments": Segments, "trajectory": Optionally(Trajectory)},
+    writes=PanopticMap,
+    libraries=("numpy", "numba", "scipy"),
+    example="scenewright fuse --sequence outputs/demo/sequence --segments outputs/demo/segments "
+    "--out outputs/demo/panoptic_map",
+)

@@ -1,0 +1,88 @@
+"""The files of a panoptic map."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from schemas.base import as_vector
+from schemas.panoptic_map import EntitiesFile, Entity
+from schemas.vocabulary import Vocabulary
+from stages.fuse.counts import TripleCounts
+from stages.fuse.extraction import ExtractedEntity, LabelledSurface
+from stages.fuse.surface import Surface
+from stages.fuse.voxel_blocks import FIXED_POINT, VoxelBlocks
+from stages.kit.formats.ply_files import ColoredMesh, write_ply
+
+FIXED_TIMESTAMP = (1980, 1, 1, 0, 0, 0)
+
+
+def mesh_name(instance: int) -> str:
+    """Return the name of an entity's mesh within the artifact."""
+    return f"entities/{instance}.ply"
+
+
+def describe(entity: ExtractedEntity, vocabulary: Vocabulary) -> Entity:
+    """Return an entity's row of entities.json."""
+    return Entity(
+        instance=entity.instance,
+        class_name=vocabulary.by_id(entity.class_id).name,
+        mesh=mesh_name(entity.instance),
+        vertices=len(entity.mesh.vertices),
+        triangles=len(entity.mesh.faces),
+        box_minimum=as_vector(entity.mesh.vertices.min(axis=0)),
+        box_maximum=as_vector(entity.mesh.vertices.max(axis=0)),
+        confidence=round(entity.confidence, 6),
+        observations=entity.observations,
+        segments=entity.segments,
+    )
+
+
+def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write arrays as NPZ that np.load reads: names sorted, fixed time stamps, fast compression, the same bytes."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name in sorted(arrays):
+            entry = zipfile.ZipInfo(f"{name}.npy", date_time=FIXED_TIMESTAMP)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = 3
+            entry.external_attr = 0o644 << 16
+            with archive.open(entry, "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, np.ascontiguousarray(arrays[name]), allow_pickle=False)
+
+
+def volume_arrays(blocks: VoxelBlocks, merged: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the voxels in canonical block order: block_coordinates (B, 3) int32, tsdf (B, 512) float16 in truncation
+    distances, weight (B, 512) float16, segment (B, 512) int32 merged labels, color (B, 512, 3) uint8."""
+    order = blocks.canonical_order()
+    return {
+        "block_coordinates": blocks.coordinates[order],
+        "tsdf": blocks.tsdf[order].astype(np.float16),
+        "weight": blocks.weight[order].astype(np.float16),
+        "segment": merged[blocks.segment[order]],
+        "color": ((blocks.color[order].astype(np.uint32) + FIXED_POINT // 2) // FIXED_POINT).clip(0, 255).astype(np.uint8),
+    }
+
+
+def write_payload(
+    root: Path,
+    file: EntitiesFile,
+    entities: Sequence[ExtractedEntity],
+    surface: Surface,
+    labelled: LabelledSurface,
+    counts: TripleCounts,
+    blocks: VoxelBlocks,
+    merged: np.ndarray,
+) -> None:
+    """Write every file of schemas/panoptic_map.py under `root`."""
+    (root / "entities").mkdir(parents=True, exist_ok=True)
+    file.write(root / "entities.json")
+    write_ply(root / "mesh.ply", ColoredMesh(surface.vertices, surface.faces, surface.colors))
+    for entity in entities:
+        write_ply(root / mesh_name(entity.instance), entity.mesh)
+    labels = {"instance": labelled.instance, "segment": labelled.segment, "class_id": labelled.class_id}
+    write_arrays(root / "mesh_labels.npz", labels)
+    write_arrays(root / "counts.npz", counts.as_arrays())
+    write_arrays(root / "volume.npz", volume_arrays(blocks, merged))

@@ -1,0 +1,105 @@
+"""`scenewright fuse`: a sequence and its segments become one panoptic map (Han 2024, sections 2.3.2 to 2.3.4)."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from schemas.panoptic_map import EntitiesFile, PanopticMap
+from schemas.segments import Segments
+from schemas.sequence import Sequence
+from schemas.trajectory import Trajectory
+from schemas.vocabulary import Vocabulary, load_vocabulary
+from stages.fuse.extraction import extract_entities
+from stages.fuse.inputs import check_segments, listings, poses_at
+from stages.fuse.mapping import PanopticMapper
+from stages.fuse.parameters import FuseParameters
+from stages.fuse.payload import describe, write_payload
+from stages.fuse.surface import extract_surface
+from stages.kit.formats.frames import FrameReader
+from stages.kit.formats.masks import PanopticReader
+from stages.kit.formats.trajectories import read_tum
+from stages.kit.stage import Context
+
+
+def run(
+    sequence: Sequence,
+    segments: Segments,
+    trajectory: Trajectory | None = None,
+    *,
+    parameters: FuseParameters,
+    context: Context,
+) -> PanopticMap:
+    """Fuse every frame that has depth and a pose; write the map, a mesh per entity, and the counts.
+
+    Frames without depth or pose are skipped and counted; frames without segments add geometry only. With nothing to
+    integrate the outcome is `empty`. Raises BadInput when the segments do not belong to the sequence.
+    """
+    vocabulary = load_vocabulary()
+    info = segments.info
+    with context.progress.step("integrate frames"):
+        mapper, skipped = _integrate_frames(sequence, segments, trajectory, vocabulary, parameters, context)
+    with context.progress.step("merge instances"):
+        mapper.regularize()
+    with context.progress.step("extract surface"):
+        surface = extract_surface(mapper.blocks, minimum_weight=parameters.minimum_weight)
+    with context.progress.step("extract entities"):
+        merged = mapper.labels.table()
+        entities, labelled = extract_entities(
+            surface, merged[surface.segment], mapper.counts, mapper.seen_in, mapper.things,
+            minimum_voxels=parameters.minimum_entity_voxels, minimum_observations=parameters.minimum_observations,
+            speck_share=parameters.speck_share,
+        )  # fmt: skip
+    with context.progress.step("write the map"):
+        file = EntitiesFile(
+            voxel_size=parameters.voxel_size,
+            truncation_distance=mapper.truncation_distance,
+            frames_integrated=mapper.frames_integrated,
+            segmentation=info.label,
+            entities=tuple(describe(entity, vocabulary) for entity in entities),
+        )
+        write_payload(context.output, file, entities, surface, labelled, mapper.counts, mapper.blocks, merged)
+    summary = {
+        "frames": mapper.frames_integrated,
+        **{f"skipped_{reason}": count for reason, count in sorted(skipped.items())},
+        "entities": len(entities),
+        "segments": int(len(set(merged.tolist())) - 1),
+        "segment_merges": mapper.segment_merges,
+        "instance_merges": mapper.instance_merges,
+        "vertices": len(surface.vertices),
+        "blocks": mapper.blocks.count,
+    }
+    return PanopticMap(context.output, outcome="ok" if len(surface.faces) else "empty", summary=summary)
+
+
+def _integrate_frames(
+    sequence: Sequence,
+    segments: Segments,
+    trajectory: Trajectory | None,
+    vocabulary: Vocabulary,
+    parameters: FuseParameters,
+    context: Context,
+) -> tuple[PanopticMapper, Counter[str]]:
+    """Return the map of all frames, and how many frames were skipped by reason."""
+    things = frozenset(entry.id for entry in vocabulary.classes if entry.kind == "thing")
+    skipped: Counter[str] = Counter()
+    with FrameReader(sequence.path("frames.mcap")) as reader, PanopticReader(segments.path("panoptic.zip")) as masks:
+        check_segments(segments.info, reader.camera, len(reader), vocabulary)
+        listed = listings(segments.info)
+        poses = None
+        if trajectory is not None:
+            poses = poses_at(reader.times, *read_tum(trajectory.path("trajectory.tum")), parameters.pose_tolerance)
+        mapper = PanopticMapper(parameters, reader.camera, things)
+        total = -(-len(reader) // parameters.every)
+        frames = reader.frames(streams=("color", "depth"), every=parameters.every)
+        for frame in context.progress.track(frames, total=total, description="fuse"):
+            pose = frame.world_from_camera if poses is None else poses[frame.index]
+            if frame.depth is None or not (frame.depth > 0).any():
+                skipped["no_depth"] += 1
+            elif pose is None:
+                skipped["no_pose"] += 1
+            else:
+                listing = listed.get(frame.index)
+                ids = None if listing is None else masks.read(frame.index)
+                skipped["no_segments"] += listing is None
+                mapper.add_frame(frame.depth, frame.color, pose, ids, listing or ())
+    return mapper, +skipped

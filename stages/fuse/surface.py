@@ -1,0 +1,261 @@
+"""The zero surface of the map as a triangle mesh: surface nets over voxel blocks (Gibson 1998), one vertex a cell.
+
+A cell is the cube between eight voxel centres. It has a vertex, the mean of the zero crossings on its edges, as soon as
+one edge crosses; every crossing edge yields two triangles between the four cells around it. Unlike marching cubes this
+asks only for the two ends of an edge to be observed, so surfaces end where observation ends, not a voxel before. Blocks
+are visited in canonical order and voxels in their order, which makes vertex and face order canonical too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, prange
+
+from stages.fuse.voxel_blocks import FIXED_POINT, SIDE, VOXELS, VoxelBlocks, find, pack
+
+
+@dataclass(frozen=True)
+class Surface:
+    """vertices (V, 3) float32 [m], faces (F, 3) int32 (counter-clockwise from free space), colors (V, 3) uint8,
+    segment (V,) int32: global segment label as stored in the nearest surface voxel, 0 none."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    colors: np.ndarray
+    segment: np.ndarray
+
+
+@njit(cache=True, inline="always")
+def _voxel(neighbours: np.ndarray, rank: int, x: int, y: int, z: int) -> int:
+    """Return slot * 512 + index of a voxel at -8 <= x, y, z < 16 relative to a block, or -1 where there is no block."""
+    slot = neighbours[rank, (x // SIDE + 1) + 3 * (y // SIDE + 1) + 9 * (z // SIDE + 1)]
+    if slot < 0:
+        return -1
+    return slot * VOXELS + (x % SIDE) + SIDE * (y % SIDE) + SIDE * SIDE * (z % SIDE)
+
+
+@njit(cache=True, inline="always")
+def _crosses(first: float, second: float, jump: float) -> bool:
+    return (first < 0) != (second < 0) and abs(first - second) <= jump
+
+
+@njit(parallel=True, cache=True)
+def _vertices(
+    write: bool,
+    order: np.ndarray,
+    neighbours: np.ndarray,
+    coordinates: np.ndarray,
+    tsdf: np.ndarray,
+    weight: np.ndarray,
+    color: np.ndarray,
+    segment: np.ndarray,
+    voxel_size: float,
+    minimum_weight: float,
+    jump: float,
+    offsets: np.ndarray,
+    index: np.ndarray,
+    vertices: np.ndarray,
+    colors: np.ndarray,
+    labels: np.ndarray,
+) -> None:
+    """Count the vertices of every block into `offsets`, or (write) store them from offsets[rank] on."""
+    for rank in prange(order.shape[0]):
+        count = 0
+        start = offsets[rank]
+        origin = coordinates[order[rank]]
+        value = np.empty(8, dtype=np.float32)
+        voxels = np.empty(8, dtype=np.int64)
+        for cell in range(VOXELS):
+            x, y, z = cell % SIDE, (cell // SIDE) % SIDE, cell // (SIDE * SIDE)
+            below = 0
+            above = 0
+            for corner in range(8):
+                voxel = _voxel(neighbours, rank, x + (corner & 1), y + ((corner >> 1) & 1), z + (corner >> 2))
+                if voxel >= 0 and weight[voxel] < minimum_weight:
+                    voxel = -1
+                voxels[corner] = voxel
+                if voxel >= 0:
+                    value[corner] = tsdf[voxel]
+                    if value[corner] < 0:
+                        below += 1
+                    else:
+                        above += 1
+            if below == 0 or above == 0:
+                continue
+            crossings = 0
+            sum_x = 0.0
+            sum_y = 0.0
+            sum_z = 0.0
+            red = 0.0
+            green = 0.0
+            blue = 0.0
+            for axis in range(3):
+                bit = 1 << axis
+                for corner in range(8):
+                    if corner & bit or voxels[corner] < 0 or voxels[corner | bit] < 0:
+                        continue
+                    first, second = value[corner], value[corner | bit]
+                    if not _crosses(first, second, jump):
+                        continue
+                    along = first / (first - second)
+                    crossings += 1
+                    sum_x += (corner & 1) + (along if axis == 0 else 0.0)
+                    sum_y += ((corner >> 1) & 1) + (along if axis == 1 else 0.0)
+                    sum_z += (corner >> 2) + (along if axis == 2 else 0.0)
+                    if write:
+                        nearest = voxels[corner | bit] if along > 0.5 else voxels[corner]
+                        red += color[nearest, 0]
+                        green += color[nearest, 1]
+                        blue += color[nearest, 2]
+            if crossings == 0:
+                continue
+            if write:
+                place = start + count
+                index[rank * VOXELS + cell] = place
+                vertices[place, 0] = (origin[0] * SIDE + x + 0.5 + sum_x / crossings) * voxel_size
+                vertices[place, 1] = (origin[1] * SIDE + y + 0.5 + sum_y / crossings) * voxel_size
+                vertices[place, 2] = (origin[2] * SIDE + z + 0.5 + sum_z / crossings) * voxel_size
+                scale = 1.0 / (crossings * FIXED_POINT)
+                colors[place, 0] = np.uint8(min(255.0, red * scale + 0.5))
+                colors[place, 1] = np.uint8(min(255.0, green * scale + 0.5))
+                colors[place, 2] = np.uint8(min(255.0, blue * scale + 0.5))
+                best = np.float32(2.0)
+                for corner in range(8):
+                    if voxels[corner] >= 0 and segment[voxels[corner]] > 0 and abs(value[corner]) < best:
+                        best = abs(value[corner])
+                        labels[place] = segment[voxels[corner]]
+            count += 1
+        if not write:
+            offsets[rank] = count
+
+
+@njit(parallel=True, cache=True)
+def _faces(
+    write: bool,
+    order: np.ndarray,
+    rank_of_slot: np.ndarray,
+    neighbours: np.ndarray,
+    tsdf: np.ndarray,
+    weight: np.ndarray,
+    minimum_weight: float,
+    jump: float,
+    index: np.ndarray,
+    vertices: np.ndarray,
+    offsets: np.ndarray,
+    faces: np.ndarray,
+) -> None:
+    """Count the faces of every block into `offsets`, or (write) store them from offsets[rank] on."""
+    for rank in prange(order.shape[0]):
+        count = 0
+        start = offsets[rank]
+        quad = np.empty(4, dtype=np.int64)
+        for cell in range(VOXELS):
+            x, y, z = cell % SIDE, (cell // SIDE) % SIDE, cell // (SIDE * SIDE)
+            here = order[rank] * VOXELS + cell
+            if weight[here] < minimum_weight:
+                continue
+            for axis in range(3):
+                there = _voxel(neighbours, rank, x + (axis == 0), y + (axis == 1), z + (axis == 2))
+                if there < 0 or weight[there] < minimum_weight or not _crosses(tsdf[here], tsdf[there], jump):
+                    continue
+                # The four cells around the edge, counter-clockwise seen from its far end.
+                complete = True
+                for turn in range(4):
+                    second = 1 if turn == 1 or turn == 2 else 0
+                    third = 1 if turn >= 2 else 0
+                    a, b, c = x, y, z
+                    if axis == 0:
+                        b, c = y - 1 + second, z - 1 + third
+                    elif axis == 1:
+                        c, a = z - 1 + second, x - 1 + third
+                    else:
+                        a, b = x - 1 + second, y - 1 + third
+                    around = _voxel(neighbours, rank, a, b, c)
+                    if around < 0:
+                        complete = False
+                        break
+                    quad[turn] = index[rank_of_slot[around // VOXELS] * VOXELS + around % VOXELS]
+                    if quad[turn] < 0:
+                        complete = False
+                        break
+                if not complete:
+                    continue
+                if write:
+                    if tsdf[here] >= 0:
+                        quad[1], quad[3] = quad[3], quad[1]
+                    first = 0.0
+                    second_diagonal = 0.0
+                    for k in range(3):
+                        first += (vertices[quad[0], k] - vertices[quad[2], k]) ** 2
+                        second_diagonal += (vertices[quad[1], k] - vertices[quad[3], k]) ** 2
+                    turn = 0 if first <= second_diagonal else 1
+                    place = start + count
+                    for k in range(3):
+                        faces[place, k] = quad[(turn + k) % 4]
+                        faces[place + 1, k] = quad[(turn + (k + 2 if k else 0)) % 4]
+                    faces[place + 1, 1] = quad[(turn + 2) % 4]
+                    faces[place + 1, 2] = quad[(turn + 3) % 4]
+                count += 2
+        if not write:
+            offsets[rank] = count
+
+
+@njit(cache=True)
+def _neighbours(order: np.ndarray, coordinates: np.ndarray, keys: np.ndarray, slots: np.ndarray) -> np.ndarray:
+    """Return the slots (B, 27) int32 of the blocks around every block, -1 where there is none."""
+    result = np.empty((order.shape[0], 27), dtype=np.int32)
+    for rank in range(order.shape[0]):
+        x, y, z = coordinates[order[rank]]
+        for side in range(27):
+            result[rank, side] = find(
+                keys, slots, pack(x + side % 3 - 1, y + (side // 3) % 3 - 1, z + side // 9 - 1)
+            )
+    return result
+
+
+def _starts(counts: np.ndarray) -> tuple[np.ndarray, int]:
+    ends = np.cumsum(counts)
+    return ends - counts, int(ends[-1]) if len(ends) else 0
+
+
+def extract_surface(blocks: VoxelBlocks, *, minimum_weight: float, jump: float = 0.75) -> Surface:
+    """Return the zero surface of the map.
+
+    Voxels under `minimum_weight` count as unobserved. Neighbouring voxels whose values [truncation distances] differ by
+    more than `jump` do not make a surface: such steps stand between what lies behind a silhouette and the free space
+    beside it, not on anything that was measured.
+    """
+    order = blocks.canonical_order()
+    neighbours = _neighbours(order, blocks.coordinates, blocks.keys, blocks.slots)
+    rank_of_slot = np.empty(len(order), dtype=np.int32)
+    rank_of_slot[order] = np.arange(len(order), dtype=np.int32)
+    tsdf, weight = blocks.tsdf.reshape(-1), blocks.weight.reshape(-1)
+    fields = (blocks.color.reshape(-1, 3), blocks.segment.reshape(-1))
+    index = np.full(len(order) * VOXELS, -1, dtype=np.int32)
+
+    def vertex_pass(write: bool, offsets: np.ndarray, count: int) -> Surface:
+        arrays = np.zeros((count, 3), np.float32), np.zeros((count, 3), np.uint8), np.zeros(count, np.int32)
+        _vertices(
+            write, order, neighbours, blocks.coordinates, tsdf, weight, *fields, blocks.voxel_size, minimum_weight,
+            jump, offsets, index, *arrays,
+        )  # fmt: skip
+        return Surface(arrays[0], np.zeros((0, 3), np.int32), arrays[1], arrays[2])
+
+    offsets = np.zeros(len(order), dtype=np.int64)
+    vertex_pass(False, offsets, 0)
+    surface = vertex_pass(True, *_starts(offsets))
+
+    def face_pass(write: bool, offsets: np.ndarray, count: int) -> np.ndarray:
+        faces = np.zeros((count, 3), dtype=np.int32)
+        _faces(
+            write, order, rank_of_slot, neighbours, tsdf, weight, minimum_weight, jump, index, surface.vertices,
+            offsets, faces,
+        )  # fmt: skip
+        return faces
+
+    offsets = np.zeros(len(order), dtype=np.int64)
+    face_pass(False, offsets, 0)
+    faces = face_pass(True, *_starts(offsets))
+    return Surface(surface.vertices, faces, surface.colors, surface.segment)
