@@ -1,0 +1,1 @@
+"""Step `report`: one self-contained HTML page about a run."""

@@ -1,0 +1,228 @@
+"""Figures of an evaluation as rows for people, with a baseline beside them."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.evaluation import Evaluation
+from stages.report.images import Picture, plot
+
+MISSING = "–"
+
+
+def percent(value: float) -> str:
+    """0.623 -> 62.3 %."""
+    return f"{100 * value:.1f} %"
+
+
+def whole(value: float) -> str:
+    """A count."""
+    return f"{value:.0f}"
+
+
+def millimetres(value: float) -> str:
+    """Already in mm."""
+    return f"{value:.1f} mm"
+
+
+def from_metres(value: float) -> str:
+    """Metres as mm (small) or m."""
+    return f"{1000 * value:.0f} mm" if abs(value) < 1.0 else f"{value:.2f} m"
+
+
+def degrees(value: float) -> str:
+    """Radians as degrees."""
+    return f"{np.degrees(value):.1f}°"
+
+
+def yes_no(value: float) -> str:
+    """1 -> yes."""
+    return "yes" if value >= 0.5 else "no"
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A measure as the page names it."""
+
+    key: str
+    name: str
+    form: Callable[[float], str]
+    better: str = ""
+    """`higher` or `lower`, where one is better."""
+
+
+GROUPS: tuple[tuple[str, tuple[Measure, ...]], ...] = (
+    (
+        "Panoptic map",
+        (
+            Measure("map/pq", "Panoptic quality PQ, mean over classes", percent, "higher"),
+            Measure("map/sq", "Segmentation quality SQ", percent, "higher"),
+            Measure("map/rq", "Recognition quality RQ", percent, "higher"),
+            Measure("map/pq_stuff", "PQ of stuff", percent, "higher"),
+            Measure("map/pq_thing", "PQ of things", percent, "higher"),
+            Measure("map/pq_class_agnostic", "PQ whatever the class", percent, "higher"),
+            Measure("map/pq_thesis_code", "PQ as the thesis's code counts", percent, "higher"),
+            Measure("map/instance_ap50", "Instance AP at IoU 0.5", percent, "higher"),
+            Measure("map/instance_ap50_thesis_code", "Instance AP as the thesis's code counts", percent, "higher"),
+            Measure("map/instance_ap50_class_agnostic", "Instance AP whatever the class", percent, "higher"),
+            Measure("map/accuracy_mean_mm", "Map to true surface, mean", millimetres, "lower"),
+            Measure("map/accuracy_p95_mm", "Map to true surface, 95th percentile", millimetres, "lower"),
+            Measure("map/mesh_precision", "Map near the true surface", percent, "higher"),
+            Measure("map/mesh_recall", "Visible surface that is mapped", percent, "higher"),
+        ),
+    ),
+    (
+        "Contact graph",
+        (
+            Measure("graph/edit_distance", "Edit distance to the true graph", whole, "lower"),
+            Measure("graph/true_nodes", "… of true nodes", whole),
+            Measure("graph/wrong_supports", "… wrong supports (cost 2 each)", whole, "lower"),
+            Measure("graph/missing_detections", "… missing detections", whole, "lower"),
+            Measure("graph/wrong_detections", "… wrong detections", whole, "lower"),
+            Measure("graph/any_support_f1", "Support edges, F1", percent, "higher"),
+            Measure("graph/contains_f1", "Containment edges, F1", percent, "higher"),
+            Measure("graph/proximal_f1", "Proximal edges, F1", percent, "higher"),
+            Measure("graph/obb_ap50_observed", "Oriented-box AP before refinement", percent, "higher"),
+            Measure("graph/obb_ap50_refined", "Oriented-box AP after refinement", percent, "higher"),
+            Measure("graph/obb_ap50_refined_thesis_code", "… as the thesis's code counts", percent, "higher"),
+        ),
+    ),
+    (
+        "CAD scene",
+        (
+            Measure("cad/replaced", "Objects replaced by CAD models", whole, "higher"),
+            Measure("cad/true_objects", "… of true objects seen", whole),
+            Measure("cad/class_match", "Right class", percent, "higher"),
+            Measure("cad/model_top1", "The very model", percent, "higher"),
+            Measure("cad/model_in_candidates", "The very model among the candidates", percent, "higher"),
+            Measure("cad/position_error_m_mean", "Position error, mean", from_metres, "lower"),
+            Measure("cad/yaw_error_rad_median", "Yaw error, median", degrees, "lower"),
+            Measure("cad/yaw_error_quarter_turn_rad_median", "… modulo a quarter turn", degrees, "lower"),
+            Measure("cad/box_iou_mean", "Box IoU, mean", percent, "higher"),
+            Measure("cad/joint_error_revolute_rad_mean", "Hinge angle error, mean", degrees, "lower"),
+            Measure("cad/joint_error_prismatic_m_mean", "Drawer opening error, mean", from_metres, "lower"),
+            Measure("cad/open_state_match", "Open or closed as in truth", percent, "higher"),
+            Measure("cad/conflicts_after", "Collisions left after the global check", whole, "lower"),
+        ),
+    ),
+    (
+        "Camera",
+        (
+            Measure("trajectory/ate_rmse_m", "Trajectory error, root mean square", from_metres, "lower"),
+            Measure("trajectory/rotation_error_mean_rad", "Rotation error, mean", degrees, "lower"),
+        ),
+    ),
+    (
+        "Plan",
+        (
+            Measure("plan/goal_reached", "Goal reached", yes_no, "higher"),
+            Measure("plan/actions", "Actions", whole),
+            Measure("plan/checks_held", "Conditions that hold afterwards", whole, "higher"),
+            Measure("plan/checks", "… of conditions checked", whole),
+        ),
+    ),
+    (
+        "Counts",
+        (
+            Measure("counts/frames", "Frames used", whole),
+            Measure("counts/frames_dropped", "Frames dropped", whole),
+            Measure("counts/entities", "Entities in the map", whole),
+            Measure("counts/labelled_vertices_share", "Map surface with a label", percent),
+            Measure("counts/support_edges", "Support edges of objects", whole),
+            Measure("counts/edges_proximal", "Proximal edges", whole),
+            Measure("counts/floor_height_rms_m", "Floor off z = 0, root mean square", from_metres),
+            Measure("counts/floor_tilt_rad", "Floor tilt", degrees),
+            Measure("counts/bodies", "Bodies of the interactive scene", whole),
+            Measure("counts/joints", "Joints", whole),
+        ),
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the table."""
+
+    name: str
+    value: str
+    interval: str
+    baseline: str
+    better: str
+
+
+@dataclass(frozen=True)
+class DataTable:
+    """A CSV table of the evaluation."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def metric_groups(evaluation: Evaluation, baseline: Evaluation | None) -> list[tuple[str, list[Row]]]:
+    """Return the groups of rows of which at least one value is defined."""
+    ours = evaluation.metrics.metrics
+    theirs = baseline.metrics.metrics if baseline is not None else {}
+    groups = []
+    for title, measures in GROUPS:
+        rows = [
+            Row(m.name, _form(m, ours.get(m.key)), _interval(m, ours), _form(m, theirs.get(m.key)), m.better)
+            for m in measures
+            if ours.get(m.key) is not None or theirs.get(m.key) is not None
+        ]
+        if rows:
+            groups.append((title, rows))
+    return groups
+
+
+def _form(measure: Measure, value: float | None) -> str:
+    return MISSING if value is None else measure.form(value)
+
+
+def _interval(measure: Measure, metrics: dict[str, float | None]) -> str:
+    low, high = metrics.get(f"{measure.key}_low"), metrics.get(f"{measure.key}_high")
+    return "" if low is None or high is None else f"{measure.form(low)} to {measure.form(high)}"
+
+
+def read_tables(evaluation: Evaluation) -> list[DataTable]:
+    """Read every table of the evaluation for display (numbers rounded)."""
+    tables = []
+    for path in sorted((evaluation.root / "tables").glob("*.csv")):
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = list(csv.reader(file))
+        if not rows:
+            continue
+        title = path.stem.replace("_", " ")
+        markdown = path.with_suffix(".md")
+        if markdown.is_file():
+            title = markdown.read_text(encoding="utf-8").split("\n", 1)[0].removeprefix("### ")
+        tables.append(DataTable(title, tuple(rows[0]), tuple(tuple(_rounded(c) for c in row) for row in rows[1:])))
+    return tables
+
+
+def _rounded(cell: str) -> str:
+    if cell == "":
+        return MISSING
+    if "." in cell or "e-" in cell:
+        try:
+            return f"{float(cell):.3f}"
+        except ValueError:
+            return cell
+    return cell
+
+
+def read_plots(evaluation: Evaluation) -> list[Picture]:
+    """Embed every plot of the evaluation."""
+    return [plot(path, path.stem.replace("_", " ")) for path in sorted((evaluation.root / "plots").glob("*.png"))]
+
+
+def all_metrics(evaluation: Evaluation) -> list[tuple[str, str]]:
+    """Every metric by name, as text."""
+    return [
+        (name, MISSING if value is None else f"{value:.4g}")
+        for name, value in sorted(evaluation.metrics.metrics.items())
+    ]

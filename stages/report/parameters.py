@@ -1,0 +1,68 @@
+"""Declaration of the step `report`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import Field
+
+from schemas.errors import UsageError
+from schemas.kinds import (
+    CadScene,
+    ContactGraph,
+    Evaluation,
+    GroundTruth,
+    InteractiveScene,
+    PanopticMap,
+    Plan,
+    Report,
+    Segments,
+    Sequence,
+    Trajectory,
+)
+from stages.kit.stage import Optionally, Parameters, Stage
+
+
+class ReportParameters(Parameters):
+    """What the page shows."""
+
+    title: str = Field("", description="Title of the page; empty: made from the inputs")
+    frames: int = Field(6, ge=0, le=24, description="Input frames shown")
+    frame_width: int = Field(400, ge=120, le=1280, description="Width of frame pictures [px]")
+    view_width: int = Field(960, ge=240, le=1920, description="Width of rendered views [px]")
+    keyframes: int = Field(16, ge=0, le=40, description="Key frames of the plan shown at most")
+
+
+def check_inputs(parameters: ReportParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError when there is nothing to report."""
+    if not inputs:
+        raise UsageError(
+            "report: there is nothing to report", hint="give at least one artifact, --sequence for example"
+        )
+
+
+STAGE = Stage(
+    name="report",
+    version=1,
+    summary="Write one self-contained HTML page about a run: pictures, graph, figures, times, how it was made",
+    parameters=ReportParameters,
+    reads={
+        "ground_truth": Optionally(GroundTruth),
+        "sequence": Optionally(Sequence),
+        "trajectory": Optionally(Trajectory),
+        "segments": Optionally(Segments),
+        "panoptic_map": Optionally(PanopticMap),
+        "contact_graph": Optionally(ContactGraph),
+        "cad_scene": Optionally(CadScene),
+        "interactive_scene": Optionally(InteractiveScene),
+        "plan": Optionally(Plan),
+        "evaluation": Optionally(Evaluation),
+        "baseline_evaluation": Optionally(Evaluation),
+    },
+    writes=Report,
+    libraries=("numpy", "jinja2", "pillow", "open3d"),
+    check=check_inputs,
+    example="scenewright report --sequence outputs/demo/sequence --panoptic-map outputs/demo/panoptic_map "
+    "--evaluation outputs/demo/evaluation --out outputs/demo/report",
+)

@@ -1,0 +1,322 @@
+"""The step `report`: gathers the sections of the page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from schemas.artifact import Artifact
+from schemas.cad_scene import CadScene, Replacement
+from schemas.contact_graph import ContactGraph
+from schemas.errors import BadInput
+from schemas.evaluation import Evaluation, Report, ReportFile
+from schemas.ground_truth import GroundTruth
+from schemas.interactive_scene import InteractiveScene
+from schemas.manifest import CONVENTIONS
+from schemas.panoptic_map import PanopticMap
+from schemas.plan import Plan
+from schemas.segments import Segments
+from schemas.sequence import Sequence
+from schemas.trajectory import Trajectory
+from stages.kit.rendering.ray_casting import Rendering
+from stages.kit.stage import Context
+from stages.report.acting import body_rows, plan_view
+from stages.report.figures import GROUPS, all_metrics, metric_groups, read_plots, read_tables
+from stages.report.frames import frame_views
+from stages.report.graph_drawing import draw_graph, marks_from_evaluation
+from stages.report.images import Picture, jpeg
+from stages.report.page import render_page
+from stages.report.parameters import ReportParameters
+from stages.report.provenance import made_of
+from stages.report.surfaces import Model, cad_model, map_model, true_model
+from stages.report.views import Label, View, oblique_view, place_labels, render, top_view
+
+MAXIMUM_BYTES = 15_000_000
+HEADLINES = (
+    "counts/frames", "counts/entities", "map/pq", "map/mesh_recall", "map/accuracy_mean_mm", "graph/edit_distance",
+    "counts/support_edges", "cad/replaced", "cad/position_error_m_mean", "counts/joints", "plan/goal_reached",
+)  # fmt: skip
+SECTIONS = (
+    ("frames", "Frames", "frames"), ("map", "Map", "map_text"), ("graph", "Contact graph", "graph"),
+    ("cad", "CAD scene", "cad_views"), ("scene", "Interactive scene", "bodies"), ("plan", "Plan", "plan"),
+    ("figures", "Figures", "groups"), ("cost", "Time and memory", "made"), ("made", "How it was made", "made"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class DrawnView:
+    """A rendered picture with names on it."""
+
+    picture: Picture
+    labels: tuple[Label, ...]
+    width: int
+    height: int
+    caption: str
+
+
+def run(
+    ground_truth: GroundTruth | None = None,
+    sequence: Sequence | None = None,
+    trajectory: Trajectory | None = None,
+    segments: Segments | None = None,
+    panoptic_map: PanopticMap | None = None,
+    contact_graph: ContactGraph | None = None,
+    cad_scene: CadScene | None = None,
+    interactive_scene: InteractiveScene | None = None,
+    plan: Plan | None = None,
+    evaluation: Evaluation | None = None,
+    baseline_evaluation: Evaluation | None = None,
+    *,
+    parameters: ReportParameters,
+    context: Context,
+) -> Report:
+    """Write report.html, one file that needs no network, and report.json. Whatever is missing has no section."""
+    given: dict[str, Artifact | None] = {
+        "ground_truth": ground_truth, "sequence": sequence, "trajectory": trajectory, "segments": segments,
+        "panoptic_map": panoptic_map, "contact_graph": contact_graph, "cad_scene": cad_scene,
+        "interactive_scene": interactive_scene, "plan": plan, "evaluation": evaluation,
+        "baseline_evaluation": baseline_evaluation,
+    }  # fmt: skip
+    artifacts = {role: artifact for role, artifact in given.items() if artifact is not None}
+    values: dict[str, Any] = _empty_page()
+    values["label"] = _label(evaluation, segments, panoptic_map)
+    values["baseline_label"] = baseline_evaluation.metrics.label if baseline_evaluation is not None else ""
+    if sequence is not None:
+        with context.progress.step("frames"):
+            _add_frames(values, sequence, segments, parameters)
+    with context.progress.step("views"):
+        _add_views(values, ground_truth, sequence, panoptic_map, cad_scene, parameters)
+    if contact_graph is not None:
+        _add_graph(values, contact_graph, evaluation)
+    if interactive_scene is not None:
+        _add_scene(values, interactive_scene)
+    if plan is not None:
+        with context.progress.step("plan"):
+            values["plan"] = plan_view(plan, parameters.keyframes, 640)
+            values["plan_ok"] = all(check.holds for check in plan.plan.checks)
+    if evaluation is not None:
+        with context.progress.step("figures"):
+            _add_figures(values, evaluation, baseline_evaluation)
+    values["made"] = made_of(artifacts, context.output.parent / "report")
+    values["timed"] = any(m.known for m in values["made"])
+    values["title"] = parameters.title or _title(ground_truth, sequence)
+    values["lead"] = _lead(ground_truth, sequence, artifacts)
+    values["sections"] = [{"id": i, "name": name} for i, name, key in SECTIONS if values[key]]
+    return _write(values, artifacts, context)
+
+
+def _empty_page() -> dict[str, Any]:
+    empty = (
+        "frames legend map_views graph cad_views replacements bodies groups notes plots tables metrics tiles plan "
+        "baseline has_intervals plan_ok"
+    )
+    texts = "frames_text map_text graph_text graph_errors cad_text scene_text figures_text"
+    values: dict[str, Any] = dict.fromkeys(empty.split(), None)
+    values.update(dict.fromkeys(texts.split(), ""))
+    values["conventions"] = "; ".join(f"{name.replace('_', ' ')}: {text}" for name, text in CONVENTIONS.items())
+    try:
+        values["version"] = version("scenewright")
+    except PackageNotFoundError:
+        values["version"] = ""
+    return values
+
+
+def _label(evaluation: Evaluation | None, segments: Segments | None, panoptic_map: PanopticMap | None) -> str:
+    if evaluation is not None and evaluation.metrics.label:
+        return evaluation.metrics.label
+    if segments is not None:
+        return segments.info.label
+    return panoptic_map.info.segmentation if panoptic_map is not None else ""
+
+
+def _title(ground_truth: GroundTruth | None, sequence: Sequence | None) -> str:
+    if ground_truth is not None:
+        truth = ground_truth.truth
+        return f"A generated room, reconstructed ({truth.recipe}, seed {truth.seed})"
+    if sequence is not None:
+        return f"A scanned room, reconstructed ({sequence.info.source_format})"
+    return "A reconstructed room"
+
+
+def _lead(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts: dict[str, Artifact]) -> str:
+    parts = []
+    if sequence is not None:
+        info = sequence.info
+        camera = f"{info.camera.width} x {info.camera.height}"
+        parts.append(f"{info.frame_count} RGB-D frames of {camera} pixels over {info.end_time - info.start_time:.0f} s")
+    names = {
+        "panoptic_map": "a labelled map", "contact_graph": "a contact graph", "cad_scene": "a scene of CAD models",
+        "interactive_scene": "a scene that simulators load", "plan": "a plan that was tried out",
+    }  # fmt: skip
+    made = [text for role, text in names.items() if role in artifacts]
+    if made:
+        parts.append(", ".join(made[:-1]) + (" and " if len(made) > 1 else "") + made[-1])
+    text = " became ".join(parts) if len(parts) == 2 else "".join(parts)
+    truth = " The room was generated, so everything can be compared with the truth." if ground_truth is not None else ""
+    return (text[:1].upper() + text[1:] + "." if text else "") + truth
+
+
+def _add_frames(
+    values: dict[str, Any], sequence: Sequence, segments: Segments | None, parameters: ReportParameters
+) -> None:
+    info = sequence.info
+    views, legend = frame_views(sequence, segments, parameters.frames, parameters.frame_width)
+    dropped = ", ".join(f"{count} {reason}" for reason, count in sorted(info.drops.items()) if count)
+    text = f"{info.frame_count} of {info.frames_in_log} frames of the log were used"
+    text += f" ({dropped} left out). " if dropped else ". "
+    gravity = info.gravity.method.replace("_", " ")
+    text += f"Read as {info.source_format}; which way is up: {gravity}. "
+    text += "Each card: colour, depth (yellow near, blue far)" + (", segments." if segments is not None else ".")
+    values.update(frames=views, legend=legend, frames_text=text)
+
+
+def _add_views(
+    values: dict[str, Any],
+    ground_truth: GroundTruth | None,
+    sequence: Sequence | None,
+    panoptic_map: PanopticMap | None,
+    cad_scene: CadScene | None,
+    parameters: ReportParameters,
+) -> None:
+    width = parameters.view_width
+    height = round(0.62 * width)
+    scanned = map_model(panoptic_map) if panoptic_map is not None else None
+    oblique: View | None = None
+    if panoptic_map is not None:
+        info = panoptic_map.info
+        values["map_text"] = (
+            f"{len(info.entities)} entities in a map of {100 * info.voxel_size:g} cm voxels from "
+            f"{info.frames_integrated} frames, masks: {info.segmentation}. Grey surface has no label. The near walls "
+            "and the ceiling are cut away."
+        )
+    if scanned is not None:
+        coloured = scanned.by_instance()
+        oblique = oblique_view(coloured, width, height)
+        values["map_views"] = {
+            "oblique": _draw(coloured, oblique, "The map, every instance in its colour", labelled=True),
+            "top": _draw(coloured, top_view(coloured, round(0.75 * width)), "From above, y up", labelled=True),
+            "color": _draw(scanned, oblique, "In the colours of the images"),
+        }
+    if cad_scene is None:
+        return
+    model = cad_model(cad_scene)
+    if model is None:
+        return
+    view = oblique or oblique_view(model, width, height)
+    pictures = [_draw(model, view, "CAD scene", labelled=True)]
+    if scanned is not None:
+        pictures.append(_draw(scanned, view, "The map from the same place"))
+    if ground_truth is not None:
+        moved = np.eye(4) if sequence is None else np.array(sequence.info.gravity.world_from_log)
+        truth = true_model(ground_truth, moved)
+        if truth is not None:
+            pictures.append(_draw(truth, view, "The true room from the same place"))
+    pictures.append(
+        _draw(model, top_view(scanned or model, round(0.75 * width)), "CAD scene from above", labelled=True)
+    )
+    scene = cad_scene.scene
+    decisions = [r.decision for r in scene.replacements]
+    values.update(
+        cad_views=pictures,
+        replacements=[_replacement_row(r) for r in scene.replacements if r.decision != "layout"],
+        cad_text=f"{decisions.count('cad')} objects are CAD models, {decisions.count('mesh')} keep their mesh, "
+        f"{decisions.count('layout')} are layout. The global check went from {scene.conflicts_before} to "
+        f"{scene.conflicts_after} colliding pairs in {scene.iterations} iterations.",
+    )
+
+
+def _draw(model: Model, view: View, caption: str, labelled: bool = False) -> DrawnView:
+    drawn: Rendering = render(model, view)
+    labels = tuple(place_labels(drawn.instance, model.names)) if labelled else ()
+    camera = view.camera
+    return DrawnView(jpeg(drawn.color, caption, camera.width), labels, camera.width, camera.height, caption + ".")
+
+
+def _replacement_row(replacement: Replacement) -> dict[str, str]:
+    chosen = replacement.chosen
+    rejected = ", ".join(f"{count} {reason}" for reason, count in sorted(replacement.rejected.items()))
+    others = ", ".join(dict.fromkeys(c.model_id for c in replacement.alternatives[:4]))
+    what = chosen.model_id if chosen is not None and replacement.decision == "cad" else replacement.decision
+    if replacement.reason:
+        what += f" ({replacement.reason})"
+    return {
+        "node": replacement.node,
+        "what": what,
+        "scale": f"{chosen.scale:.3f}" if chosen else "",
+        "matching": f"{chosen.matching_error:.3f}" if chosen else "",
+        "alignment": f"{1000 * chosen.alignment_error:.0f} mm" if chosen else "",
+        "rest": "; ".join(text for text in (others, f"rejected: {rejected}" if rejected else "") if text),
+    }
+
+
+def _add_graph(values: dict[str, Any], contact_graph: ContactGraph, evaluation: Evaluation | None) -> None:
+    graph = contact_graph.graph
+    marks, missing = marks_from_evaluation(evaluation.root) if evaluation is not None else ({}, ())
+    try:
+        values["graph"] = draw_graph(graph, marks, missing)
+    except ValueError as error:
+        raise BadInput(f"{contact_graph.path('graph.json')}: {error}", hint="make the graph again") from None
+    counts: dict[str, int] = {}
+    for link in graph.links:
+        counts[link.relation] = counts.get(link.relation, 0) + 1
+    edges = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(counts.items()))
+    values["graph_text"] = f"{len(graph.nodes) - 1} entities; relations: {edges or 'none'}."
+    errors: dict[str, int] = {}
+    for mark in marks.values():
+        name = mark.split(",")[0]
+        errors[name] = errors.get(name, 0) + 1
+    values["graph_errors"] = ", ".join(f"{count} {name}" for name, count in sorted(errors.items()))
+
+
+def _add_scene(values: dict[str, Any], interactive_scene: InteractiveScene) -> None:
+    scene = interactive_scene.scene
+    movable = sum(body.movable for body in scene.bodies)
+    joints = sum(len(body.joints) for body in scene.bodies)
+    values["bodies"] = body_rows(interactive_scene)
+    values["scene_text"] = (
+        f"{len(scene.bodies)} bodies, {movable} of them free to move, {joints} joints. {scene.combined_file} is the "
+        f"whole kinematic tree; {scene.static_file} and one file per free body are for engines without floating joints."
+    )
+
+
+def _add_figures(values: dict[str, Any], evaluation: Evaluation, baseline: Evaluation | None) -> None:
+    groups = metric_groups(evaluation, baseline)
+    metrics = evaluation.metrics.metrics
+    against_truth = any(not name.startswith("counts/") for name in metrics)
+    measures = {measure.key: measure for _, rows in GROUPS for measure in rows}
+    values.update(
+        groups=groups,
+        baseline=baseline is not None,
+        has_intervals=any(row.interval for _, rows in groups for row in rows),
+        notes=evaluation.metrics.notes,
+        plots=read_plots(evaluation),
+        tables=read_tables(evaluation),
+        metrics=all_metrics(evaluation),
+        tiles=[
+            {"name": measures[key].name, "value": measures[key].form(value)}
+            for key in HEADLINES
+            if (value := metrics.get(key)) is not None
+        ],
+        figures_text=(
+            "Against the ground truth of the generated room. Arrows say which way is better."
+            if against_truth
+            else "Counts; there is no ground truth to compare with."
+        ),
+    )
+
+
+def _write(values: dict[str, Any], artifacts: dict[str, Artifact], context: Context) -> Report:
+    page = render_page(values)
+    size = len(page.encode("utf-8"))
+    if size > MAXIMUM_BYTES:
+        raise BadInput(
+            f"the report would have {size / 1e6:.0f} MB", hint="use smaller --frame-width, --view-width or --frames"
+        )
+    context.output.joinpath("report.html").write_text(page, encoding="utf-8")
+    sections = tuple(section["id"] for section in values["sections"])
+    sources = {role: a.manifest.content_digest if a.manifest is not None else "" for role, a in artifacts.items()}
+    ReportFile(title=values["title"], sections=sections, sources=sources).write(context.output / "report.json")
+    return Report(context.output, summary={"sections": len(sections), "pictures": page.count("data:image/")})

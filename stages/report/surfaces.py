@@ -1,0 +1,139 @@
+"""Triangle soups of the artifacts, with what belongs to which node, for pictures of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import trimesh
+
+from schemas.cad_scene import CadScene
+from schemas.errors import BadInput
+from schemas.ground_truth import GroundTruth
+from schemas.panoptic_map import PanopticMap
+from schemas.vocabulary import load_vocabulary
+from stages.kit.formats.cad_models import posed_mesh, read_model
+from stages.kit.measurement.palette import UNLABELLED, instance_color
+from stages.kit.rendering.surfaces import TriangleSoup, build_soup, srgb_to_linear
+
+LAYOUT_OPEN_FROM_BEHIND = "wall"
+
+
+@dataclass(frozen=True)
+class Model:
+    """A soup and the meaning of its instance numbers."""
+
+    soup: TriangleSoup
+    classes: dict[int, str]
+    """Instance -> class name; instances that are missing are unlabelled."""
+    names: dict[int, str]
+    """Instance -> what to call it."""
+    keep_back_faces: bool = True
+    """Whether things are drawn from behind too (they were scanned from one side)."""
+
+    def solid(self) -> np.ndarray:
+        """(T,) bool: triangles that are never cut away, those of things and floors."""
+        layout = {entry.name for entry in load_vocabulary().classes if entry.is_layout and entry.name != "floor"}
+        kept = sorted(i for i, name in self.classes.items() if name not in layout)
+        return np.isin(self.soup.instance, kept)
+
+    def ceiling(self) -> np.ndarray:
+        """(T,) bool: triangles of ceilings."""
+        return np.isin(self.soup.instance, sorted(i for i, name in self.classes.items() if name == "ceiling"))
+
+    def by_instance(self) -> Model:
+        """The same shape, coloured by instance."""
+        values, inverse = np.unique(self.soup.instance, return_inverse=True)
+        table = srgb_to_linear(
+            np.array([instance_color(int(v)) if int(v) in self.classes else UNLABELLED for v in values])
+        )
+        colors = np.repeat(table[inverse][:, None, :], 3, axis=1)
+        return replace(self, soup=replace(self.soup, corner_colors=colors.astype(np.float32)))
+
+
+def map_model(panoptic_map: PanopticMap) -> Model | None:
+    """The whole map in the colours of the images; a triangle belongs to the instance of most of its corners.
+
+    None for an empty map.
+    """
+    mesh = _load(panoptic_map, "mesh.ply")
+    if mesh is None:
+        return None
+    try:
+        with np.load(panoptic_map.path("mesh_labels.npz"), allow_pickle=False) as archive:
+            labels = archive["instance"].astype(np.int64)
+    except (OSError, ValueError, KeyError) as error:
+        raise BadInput(f"{panoptic_map.path('mesh_labels.npz')}: {error}", hint="make the map again") from None
+    if len(labels) != len(mesh.vertices):
+        raise BadInput(f"{panoptic_map.root.name}: {len(labels)} labels for {len(mesh.vertices)} vertices")
+    a, b, c = labels[mesh.faces].T
+    instance = np.where((b == c) & (a != b), b, a)
+    kept = np.linalg.norm(mesh.face_normals, axis=1) > 0.5
+    corners = mesh.vertices[mesh.faces]
+    kept &= np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) > 1e-12
+    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces[kept], vertex_colors=_vertex_colors(mesh), process=False)
+    soup = replace(build_soup([(0, mesh)]), instance=instance[kept].astype(np.int32))
+    entities = panoptic_map.info.entities
+    return Model(
+        soup,
+        {e.instance: e.class_name for e in entities},
+        {e.instance: f"{e.class_name} {e.instance}" for e in entities},
+    )
+
+
+def _vertex_colors(mesh: trimesh.Trimesh) -> np.ndarray:
+    if mesh.visual.kind == "vertex":
+        return np.asarray(mesh.visual.vertex_colors)
+    return np.full((len(mesh.vertices), 4), 170, dtype=np.uint8)
+
+
+def cad_model(cad_scene: CadScene) -> Model | None:
+    """The CAD scene: chosen models where they stand, reconstructed meshes where there is none, layout."""
+    nodes = {node.id: node for node in cad_scene.graph.nodes}
+    meshes: list[tuple[int, trimesh.Trimesh]] = []
+    classes: dict[int, str] = {}
+    names: dict[int, str] = {}
+    for row, replacement in enumerate(cad_scene.scene.replacements, start=1):
+        node = nodes.get(replacement.node)
+        class_name = node.class_name if node is not None else "object"
+        number = node.instance if node is not None and node.instance > 0 else 100_000 + row
+        if replacement.decision == "cad" and replacement.chosen is not None:
+            chosen = replacement.chosen
+            folder = cad_scene.path("models") / chosen.model_id
+            if not folder.is_dir():
+                continue
+            mesh: trimesh.Trimesh | None = posed_mesh(folder, read_model(folder), chosen.joints, chosen.scale)
+            if mesh is not None:
+                mesh.apply_transform(np.array(chosen.world_from_model))
+        else:
+            where = "layout" if replacement.decision == "layout" else "meshes"
+            mesh = _load(cad_scene, f"{where}/{replacement.node}.ply")
+        if mesh is None:
+            continue
+        meshes.append((number, mesh))
+        classes[number] = class_name
+        names[number] = replacement.node
+    return Model(build_soup(meshes), classes, names) if meshes else None
+
+
+def true_model(truth: GroundTruth, world_from_log: np.ndarray) -> Model | None:
+    """The whole true surface, moved into the reconstruction's world; nothing is known of its parts."""
+    mesh = _load(truth, "mesh.ply")
+    if mesh is None:
+        return None
+    mesh.apply_transform(world_from_log)
+    return Model(build_soup([(0, mesh)]), {}, {})
+
+
+def _load(artifact: PanopticMap | CadScene | GroundTruth, name: str) -> trimesh.Trimesh | None:
+    """Read a PLY of an artifact; None when it is absent or has no triangles."""
+    path = artifact.path(name)
+    if not path.is_file():
+        return None
+    try:
+        mesh = trimesh.load(path, process=False)
+    except Exception as error:  # trimesh raises whatever its parser stumbled over
+        raise BadInput(f"{path}: {error}", hint="make the artifact again") from None
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
+        return None
+    return mesh

@@ -1,0 +1,187 @@
+"""Views into a room from outside: near walls and the ceiling are cut away, the side that shows most is chosen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from schemas.scene_parts import Camera
+from stages.kit.geometry.transforms import look_at
+from stages.kit.rendering.ray_casting import Rendering, SceneRenderer
+from stages.kit.rendering.surfaces import TriangleSoup
+from stages.report.surfaces import Model
+
+FIELD_OF_VIEW = np.radians(32.0)
+ELEVATION = np.radians(42.0)
+AZIMUTHS = 12
+SHELL = 0.25
+"""Triangles this near to the bounds that look outward belong to the outside of the room [m]."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What a view shows."""
+
+    low: np.ndarray
+    high: np.ndarray
+
+    @property
+    def center(self) -> np.ndarray:
+        """(3,) centre."""
+        return (self.low + self.high) / 2.0
+
+    def corners(self) -> np.ndarray:
+        """(8, 3)."""
+        return np.array([[x, y, z] for x in (self.low[0], self.high[0]) for y in (self.low[1], self.high[1])
+                         for z in (self.low[2], self.high[2])])  # fmt: skip
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera pose and which way it was chosen."""
+
+    camera: Camera
+    world_from_camera: np.ndarray
+
+
+def bounds_of(model: Model, highest: float = 2.2) -> Bounds:
+    """Bounds without outliers: the 0.5 and 99.5 percent quantiles of triangle centres, not above `highest` [m]
+    over the lowest."""
+    centers = model.soup.corners.mean(axis=1)
+    centers = centers[~model.ceiling()] if (~model.ceiling()).any() else centers
+    low, high = np.quantile(centers, [0.005, 0.995], axis=0)
+    high[2] = min(high[2], low[2] + highest)
+    return Bounds(low.astype(float), np.maximum(high, low + 0.1).astype(float))
+
+
+def page_camera(width: int, height: int) -> Camera:
+    """A camera of the views' field of view (over the width)."""
+    focal = width / (2.0 * np.tan(FIELD_OF_VIEW / 2.0))
+    return Camera(width=width, height=height, fx=focal, fy=focal, cx=(width - 1) / 2, cy=(height - 1) / 2)
+
+
+def fitted_pose(
+    camera: Camera, bounds: Bounds, direction: np.ndarray, up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+) -> np.ndarray:
+    """world_from_camera that looks along -`direction` at the bounds, as near as they fit, centred in the picture."""
+    direction = direction / np.linalg.norm(direction)
+    corners = bounds.corners()
+    target = bounds.center
+    distance = 1.0
+    for _ in range(40):
+        pose = look_at(target + distance * direction, target, np.array(up))
+        local = (corners - pose[:3, 3]) @ pose[:3, :3]
+        if local[:, 2].min() < 0.1:
+            distance *= 1.3
+            continue
+        u, v = local[:, 0] / local[:, 2], local[:, 1] / local[:, 2]
+        # Move the aim so that the box sits in the middle, then the distance so that it fills the picture.
+        shift = pose[:3, 0] * (u.min() + u.max()) / 2 + pose[:3, 1] * (v.min() + v.max()) / 2
+        target = target + distance * shift
+        fill = max((u.max() - u.min()) * camera.fx / camera.width, (v.max() - v.min()) * camera.fy / camera.height)
+        distance *= float(np.clip(fill / 0.94, 0.5, 2.0))
+    return look_at(target + distance * direction, target, np.array(up))
+
+
+def cut_away(model: Model, eye: np.ndarray, bounds: Bounds) -> TriangleSoup:
+    """Return the soup without what hides the inside from `eye`: ceilings, and walls and unlabelled surface that turn
+    their back to the eye or are the outside of the room."""
+    soup = model.soup
+    centers = soup.corners.mean(axis=1)
+    normals = soup.face_normals * _inward_sign(model, bounds)
+    away = np.einsum("ij,ij->i", normals, centers - eye) > 0
+    outward = np.einsum("ij,ij->i", normals, bounds.center - centers) < 0
+    sides = np.minimum(np.abs(centers[:, :2] - bounds.low[:2]), np.abs(centers[:, :2] - bounds.high[:2])).min(axis=1)
+    outside = np.any((centers[:, :2] < bounds.low[:2]) | (centers[:, :2] > bounds.high[:2]), axis=1)
+    shell = outward & ((sides < SHELL) | outside | (centers[:, 2] > bounds.high[2] - SHELL))
+    up = (normals[:, 2] > 0.8) & (centers[:, 2] < bounds.low[2] + SHELL)
+    keep = (model.solid() | up | ~(away | shell)) & ~model.ceiling()
+    if not keep.any():
+        return soup
+    arrays = {f.name: getattr(soup, f.name)[keep] for f in fields(soup) if f.name != "material_table"}
+    return replace(soup, **arrays)
+
+
+def _inward_sign(model: Model, bounds: Bounds) -> float:
+    """+1 when the normals of the room's shell look inward, as a scan's do, -1 when the mesh is turned inside out."""
+    soup = model.soup
+    loose = ~model.solid()
+    if not loose.any():
+        return 1.0
+    centers = soup.corners[loose].mean(axis=1)
+    edges = soup.corners[loose]
+    area = np.linalg.norm(np.cross(edges[:, 1] - edges[:, 0], edges[:, 2] - edges[:, 0]), axis=1)
+    inward = np.einsum("ij,ij->i", soup.face_normals[loose], bounds.center - centers)
+    return -1.0 if float(np.sum(area * np.sign(inward))) < 0 else 1.0
+
+
+def direction_of(azimuth: float, elevation: float = ELEVATION) -> np.ndarray:
+    """Unit vector (3,) from the room towards the eye."""
+    return np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
+
+
+def oblique_view(model: Model, width: int, height: int) -> View:
+    """The oblique view, of twelve around the room, in which most things are seen, and most of them."""
+    bounds = bounds_of(model)
+    small = page_camera(180, round(180 * height / width))
+    things = {i for i, name in model.classes.items() if name not in ("floor", "wall", "ceiling")}
+    best, best_score = 0.0, -1.0
+    for k in range(AZIMUTHS):
+        azimuth = 2.0 * np.pi * (k + 0.5) / AZIMUTHS
+        pose = fitted_pose(small, bounds, direction_of(azimuth))
+        seen = render(model, View(small, pose), bounds, fast=True)
+        values, counts = np.unique(seen.instance[seen.depth > 0], return_counts=True)
+        score = sum(np.sqrt(n) for v, n in zip(values, counts, strict=True) if int(v) in things)
+        score += 0.01 * np.sqrt(np.count_nonzero(seen.depth))
+        if score > best_score:
+            best, best_score = azimuth, float(score)
+    camera = page_camera(width, height)
+    return View(camera, fitted_pose(camera, bounds, direction_of(best)))
+
+
+def top_view(model: Model, width: int) -> View:
+    """Straight down, north (y) up; the picture's height follows the room's shape."""
+    bounds = bounds_of(model)
+    extent = bounds.high - bounds.low
+    camera = page_camera(width, int(np.clip(width * (extent[1] + 0.3) / (extent[0] + 0.3), 0.45 * width, 1.1 * width)))
+    return View(camera, fitted_pose(camera, bounds, np.array([0.0, 0.0, 1.0]), up=(0.0, 1.0, 0.0)))
+
+
+def render(model: Model, view: View, bounds: Bounds | None = None, fast: bool = False) -> Rendering:
+    """Render a model with the near side of the room cut away. `fast`: without shadows and smoothing."""
+    bounds = bounds or bounds_of(model)
+    soup = cut_away(model, view.world_from_camera[:3, 3], bounds)
+    renderer = SceneRenderer(soup, shadows=not fast, antialias=not fast)
+    return renderer.render(view.camera, view.world_from_camera)
+
+
+@dataclass(frozen=True)
+class Label:
+    """A name on a picture, in pixels."""
+
+    x: int
+    y: int
+    text: str
+    title: str
+
+
+def place_labels(instance: np.ndarray, names: dict[int, str], minimum_pixels: int = 120) -> list[Label]:
+    """Put names on (H, W) instance images: in the middle of what is seen, large things first, none over another."""
+    values, counts = np.unique(instance, return_counts=True)
+    taken: list[tuple[float, float, float, float]] = []
+    labels: list[Label] = []
+    for value, count in sorted(zip(values.tolist(), counts.tolist(), strict=True), key=lambda vc: (-vc[1], vc[0])):
+        if value not in names or count < minimum_pixels:
+            continue
+        rows, columns = np.nonzero(instance == value)
+        nearest = int(np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2))
+        x, y = int(columns[nearest]), int(rows[nearest])
+        half = 3.6 * len(names[value]) + 4
+        x = int(np.clip(x, half, instance.shape[1] - half)) if instance.shape[1] > 2 * half else x
+        box = (x - half, y - 9, x + half, y + 9)
+        if any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in taken):
+            continue
+        taken.append(box)
+        labels.append(Label(x, y, names[value], f"{names[value]}: {count} pixels in this view"))
+    return labels
