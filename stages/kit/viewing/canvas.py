@@ -1,0 +1,198 @@
+"""What the viewers draw on: arrays in our conventions, Rerun behind it. Rerun is imported only here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import cv2
+import numpy as np
+import trimesh
+
+from schemas.errors import BadInput, MissingDependency
+from schemas.scene_parts import Box, Camera
+from stages.kit.geometry.cameras import intrinsic_matrix
+from stages.kit.geometry.transforms import quaternion_of
+
+WORLD = "world"
+DISTRIBUTION = "rerun-sdk"
+Color = tuple[float, float, float]
+"""(r, g, b) in 0..1."""
+
+
+def import_rerun() -> ModuleType:
+    """Return the rerun module. Raises MissingDependency with the command that installs it."""
+    try:
+        import rerun
+    except ImportError:
+        raise MissingDependency(
+            f"the viewer needs {DISTRIBUTION}, which is not installed", hint=f'pip install "{DISTRIBUTION}>=0.41"'
+        ) from None
+    return rerun
+
+
+def bytes_of(color: Color) -> list[int]:
+    """Return a colour as three bytes."""
+    return [round(255 * min(max(channel, 0.0), 1.0)) for channel in color]
+
+
+class Canvas:
+    """One Rerun recording, shown in a window or written to a file. Lengths in metres, z up, times in seconds.
+
+    Paths are entity paths below `world/`. What is drawn before `time` was called is there all the time.
+    """
+
+    def __init__(self, name: str, save: Path | None) -> None:
+        self._rerun: Any = import_rerun()
+        self._recording = self._rerun.RecordingStream("scenewright", send_properties=False)
+        self._recording.send_recording_name(name)
+        self._static = True
+        if save is None:
+            self._recording.spawn()
+        else:
+            try:
+                save.parent.mkdir(parents=True, exist_ok=True)
+                self._recording.save(save)
+            except (OSError, RuntimeError) as error:
+                raise BadInput(f"{save}: cannot be written: {error}") from None
+        self._log(WORLD, self._rerun.ViewCoordinates.RIGHT_HAND_Z_UP)
+
+    def __enter__(self) -> Canvas:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._recording.flush()
+        self._recording.disconnect()
+
+    def time(self, seconds: float, timeline: str = "time") -> None:
+        """Set the time [s] of what is drawn from now on."""
+        self._static = False
+        self._recording.set_time(timeline, duration=float(seconds))
+
+    def always(self) -> None:
+        """What is drawn from now on is there all the time."""
+        self._static = True
+
+    def mesh(self, path: str, mesh: trimesh.Trimesh, colors: np.ndarray | None = None) -> None:
+        """Draw a mesh; `colors` (V, 3 or 4) uint8 per vertex override its own."""
+        if len(mesh.faces) == 0:
+            return
+        if colors is None and isinstance(mesh.visual, trimesh.visual.ColorVisuals) and mesh.visual.kind == "face":
+            mesh = mesh.copy()
+            face_colors = mesh.visual.face_colors
+            mesh.unmerge_vertices()
+            colors = np.repeat(face_colors, 3, axis=0)
+        elif colors is None:
+            colors = _vertex_colors(mesh)
+        self._log(
+            f"{WORLD}/{path}",
+            self._rerun.Mesh3D(
+                vertex_positions=np.asarray(mesh.vertices, dtype=np.float32),
+                triangle_indices=np.asarray(mesh.faces, dtype=np.uint32),
+                vertex_normals=np.asarray(mesh.vertex_normals, dtype=np.float32),
+                vertex_colors=colors,
+            ),
+        )
+
+    def points(self, path: str, points: np.ndarray, colors: np.ndarray | None = None, radius: float = 0.005) -> None:
+        """Draw points (N, 3) with colours (N, 3) uint8."""
+        self._log(
+            f"{WORLD}/{path}",
+            self._rerun.Points3D(np.asarray(points, dtype=np.float32), colors=colors, radii=radius),
+        )
+
+    def line(self, path: str, strips: list[np.ndarray], colors: list[Color], radius: float = 0.004) -> None:
+        """Draw polylines, each (N, 3), in one colour each."""
+        strips = [np.asarray(strip, dtype=np.float32) for strip in strips]
+        self._log(
+            f"{WORLD}/{path}",
+            self._rerun.LineStrips3D(strips, colors=[bytes_of(color) for color in colors], radii=radius),
+        )
+
+    def boxes(self, path: str, boxes: list[Box], labels: list[str], colors: list[Color]) -> None:
+        """Draw oriented boxes with labels."""
+        if boxes:
+            self._log(
+                f"{WORLD}/{path}",
+                self._rerun.Boxes3D(
+                    centers=[box.center for box in boxes],
+                    sizes=[box.size for box in boxes],
+                    quaternions=[self._rerun.Quaternion(xyzw=box.orientation) for box in boxes],
+                    colors=[bytes_of(color) for color in colors],
+                    labels=labels,
+                ),
+            )
+
+    def transform(self, path: str, parent_from_child: np.ndarray, scale: float = 1.0) -> None:
+        """Place what lies under `path` with a rigid (4, 4) transform, after scaling it."""
+        self._log(
+            f"{WORLD}/{path}",
+            self._rerun.Transform3D(
+                translation=parent_from_child[:3, 3],
+                quaternion=self._rerun.Quaternion(xyzw=quaternion_of(parent_from_child)),
+                scale=None if scale == 1.0 else scale,
+            ),
+        )
+
+    def camera(self, path: str, camera: Camera) -> None:
+        """Say that `path` is a pinhole camera (OpenCV axes)."""
+        self._log(
+            f"{WORLD}/{path}",
+            self._rerun.Pinhole(
+                image_from_camera=intrinsic_matrix(camera),
+                width=camera.width,
+                height=camera.height,
+                camera_xyz=self._rerun.ViewCoordinates.RDF,
+                image_plane_distance=0.3,
+            ),
+        )
+
+    def jpeg(self, path: str, data: bytes) -> None:
+        """Show a JPEG as it is."""
+        self._log(f"{WORLD}/{path}", self._rerun.EncodedImage(contents=data, media_type="image/jpeg"))
+
+    def png(self, path: str, data: bytes) -> None:
+        """Show a PNG as it is."""
+        self._log(f"{WORLD}/{path}", self._rerun.EncodedImage(contents=data, media_type="image/png"))
+
+    def depth(self, path: str, depth: np.ndarray) -> None:
+        """Show depth (H, W) float [m], 0 = invalid; under a camera Rerun draws it as points."""
+        millimetres = np.clip(np.rint(depth * 1000), 0, 65535).astype(np.uint16)
+        data = cv2.imencode(".png", millimetres, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()
+        image = self._rerun.EncodedDepthImage(
+            blob=data, media_type="image/png", meter=1000.0, depth_range=(0.0, 5000.0)
+        )
+        self._log(f"{WORLD}/{path}", image)
+
+    def label_names(self, path: str, rows: list[tuple[int, str, Color]]) -> None:
+        """Say what the ids of the label images under `path` mean."""
+        infos = [
+            self._rerun.AnnotationInfo(id=number, label=name, color=[*bytes_of(color), 255])
+            for number, name, color in rows
+        ]
+        self._log(f"{WORLD}/{path}", self._rerun.AnnotationContext(infos))
+
+    def labels(self, path: str, ids: np.ndarray) -> None:
+        """Show ids (H, W) 0..65535 over the picture; 0 is void."""
+        self._log(f"{WORLD}/{path}", self._rerun.SegmentationImage(ids.astype(np.uint16), opacity=0.5))
+
+    def graph(self, names: list[str], colors: list[Color], edges: list[tuple[str, str]]) -> None:
+        """Show a directed graph in a view of its own."""
+        nodes = self._rerun.GraphNodes(names, labels=names, colors=[bytes_of(color) for color in colors])
+        self._log("graph", nodes, self._rerun.GraphEdges(edges, graph_type="directed"))
+
+    def document(self, path: str, markdown: str) -> None:
+        """Show a text in Markdown."""
+        self._log(path, self._rerun.TextDocument(markdown, media_type="text/markdown"))
+
+    def _log(self, path: str, *what: Any) -> None:
+        self._recording.log(path, *what, static=self._static)
+
+
+def _vertex_colors(mesh: trimesh.Trimesh) -> np.ndarray | None:
+    visual = mesh.visual
+    if isinstance(visual, trimesh.visual.TextureVisuals):
+        visual = visual.to_color()
+    colors = np.asarray(visual.vertex_colors)
+    return colors if colors.shape == (len(mesh.vertices), 4) else None

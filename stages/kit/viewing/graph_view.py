@@ -1,0 +1,70 @@
+"""Contact graphs: boxes in the room, edges between them, and the graph as a graph."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.contact_graph import ContactGraph, ContactGraphFile, GraphNode
+from schemas.panoptic_map import PanopticMap
+from stages.kit.measurement.palette import RELATION_COLORS, UNLABELLED, instance_color
+from stages.kit.viewing.canvas import Canvas, Color
+from stages.kit.viewing.inputs import input_artifact
+from stages.kit.viewing.meshes import load_mesh
+
+
+def draw_contact_graph(graph: ContactGraph, canvas: Canvas) -> None:
+    """Draw the graph over the meshes of the map it was made from, where that map is still there."""
+    draw_graph(graph.graph, canvas)
+    panoptic_map = input_artifact(graph, PanopticMap)
+    if panoptic_map is not None:
+        for node in graph.graph.nodes:
+            if node.mesh is not None and panoptic_map.path(node.mesh).exists():
+                canvas.mesh(f"meshes/{node.id}", load_mesh(panoptic_map.path(node.mesh)))
+
+
+def draw_graph(graph: ContactGraphFile, canvas: Canvas) -> None:
+    """Draw boxes, supporting planes, edges between box centres, and the graph in a view of its own."""
+    boxed = [node for node in graph.nodes if node.box is not None]
+    canvas.boxes(
+        "boxes",
+        [node.box for node in boxed if node.box is not None],
+        [node.id for node in boxed],
+        [_color(node) for node in boxed],
+    )
+    observed = [node for node in boxed if node.box_observed is not None and node.box_observed != node.box]
+    canvas.boxes(
+        "boxes_before_refinement",
+        [node.box_observed for node in observed if node.box_observed is not None],
+        [f"{node.id} (observed)" for node in observed],
+        [UNLABELLED] * len(observed),
+    )
+    _draw_planes(graph, canvas)
+    centers = {node.id: np.array(node.box.center) for node in boxed if node.box is not None}
+    for relation, color in RELATION_COLORS.items():
+        ends = [(link.source, link.target) for link in graph.links if link.relation == relation]
+        strips = [np.stack([centers[a], centers[b]]) for a, b in ends if a in centers and b in centers]
+        if strips:
+            canvas.line(f"edges/{relation}", strips, [_rgb(color)] * len(strips), radius=0.008)
+    tree = [(link.source, link.target) for link in graph.links if link.relation != "proximal"]
+    canvas.graph([node.id for node in graph.nodes], [_color(node) for node in graph.nodes], tree)
+
+
+def _draw_planes(graph: ContactGraphFile, canvas: Canvas) -> None:
+    strips, colors = [], []
+    for node in graph.nodes:
+        for plane in node.planes:
+            if plane.horizontal and plane.corners:
+                corners = np.array(plane.corners)
+                strips.append(np.concatenate([corners, corners[:1]]))
+                colors.append(_color(node))
+    if strips:
+        canvas.line("supporting_planes", strips, colors, radius=0.003)
+
+
+def _color(node: GraphNode) -> Color:
+    return instance_color(node.instance)
+
+
+def _rgb(hexadecimal: str) -> Color:
+    red, green, blue = (int(hexadecimal[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    return red, green, blue

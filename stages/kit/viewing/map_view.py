@@ -1,0 +1,48 @@
+"""Panoptic maps: the mesh as it looks, the mesh by instance, boxes of the entities."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.panoptic_map import PanopticMap
+from stages.kit.geometry.boxes import box_from_bounds
+from stages.kit.measurement.palette import instance_color
+from stages.kit.viewing.canvas import Canvas, bytes_of
+from stages.kit.viewing.meshes import load_mesh
+
+
+def draw_map(panoptic_map: PanopticMap, canvas: Canvas) -> None:
+    """Draw the whole mesh twice (colour, instance) and a labelled box for every entity."""
+    info = panoptic_map.info
+    path = panoptic_map.path("mesh.ply")
+    if not path.exists() or not info.entities:
+        canvas.document("map", f"{len(info.entities)} entities from {info.frames_integrated} frames")
+    if path.exists():
+        mesh = load_mesh(path)
+        canvas.mesh("color", mesh)
+        canvas.mesh("instance", mesh, instance_colors(_vertex_instances(panoptic_map, len(mesh.vertices))))
+    canvas.boxes(
+        "boxes",
+        [box_from_bounds(entity.box_minimum, entity.box_maximum) for entity in info.entities],
+        [f"{entity.class_name} {entity.instance}" for entity in info.entities],
+        [instance_color(entity.instance) for entity in info.entities],
+    )
+
+
+def instance_colors(instances: np.ndarray) -> np.ndarray:
+    """Return colours (V, 3) uint8 of instance labels (V,)."""
+    values, inverse = np.unique(instances, return_inverse=True)
+    return np.array([bytes_of(instance_color(int(value))) for value in values], dtype=np.uint8).reshape(-1, 3)[inverse]
+
+
+def _vertex_instances(panoptic_map: PanopticMap, count: int) -> np.ndarray:
+    path = panoptic_map.path("mesh_labels.npz")
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            labels = archive["instance"]
+    except (OSError, ValueError, KeyError) as error:
+        raise BadInput(f"{path}: {error}", hint="make the map again") from None
+    if labels.shape != (count,):
+        raise BadInput(f"{path}: {labels.shape} labels for {count} vertices", hint="make the map again")
+    return labels

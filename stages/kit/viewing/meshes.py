@@ -1,0 +1,38 @@
+"""Loading meshes for views. A torn file is bad input, as everywhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from schemas.errors import BadInput
+from stages.kit.formats.urdf_file import Shape
+
+
+def load_mesh(path: Path) -> trimesh.Trimesh:
+    """Return the mesh in a file, in file order. Raises BadInput."""
+    try:
+        mesh = trimesh.load(path, force="mesh", process=False)
+    except Exception as error:  # trimesh raises whatever its parsers raise
+        raise BadInput(f"{path}: cannot be read as a mesh: {error}") from None
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise BadInput(f"{path}: holds no mesh")
+    return mesh
+
+
+def shape_mesh(shape: Shape, folder: Path) -> trimesh.Trimesh:
+    """Return the mesh of a URDF shape in its link's frame [m]; mesh files lie relative to `folder`. Raises BadInput."""
+    if shape.mesh is not None:
+        mesh = load_mesh(folder / shape.mesh.removeprefix("package://"))
+        mesh.apply_scale(shape.scale)
+    else:
+        assert shape.box_size is not None
+        mesh = trimesh.creation.box(shape.box_size)
+    plain = isinstance(mesh.visual, trimesh.visual.ColorVisuals) and not mesh.visual.defined
+    if shape.color is not None and plain:
+        rgba = np.round(255 * np.array(shape.color)).astype(np.uint8)
+        mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=np.tile(rgba, (len(mesh.vertices), 1)))
+    mesh.apply_transform(shape.link_from_shape)
+    return mesh

@@ -1,0 +1,110 @@
+"""Plans: the room and the robot as they moved during execution."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from google.protobuf.message import DecodeError
+
+from schemas.errors import BadInput
+from schemas.ground_truth import GroundTruth
+from schemas.interactive_scene import InteractiveScene
+from schemas.plan import Plan
+from stages.kit.formats.foxglove import JPEG_START, stamp_nanoseconds, transform_matrix
+from stages.kit.formats.mcap_log import McapLog
+from stages.kit.formats.urdf_file import parse_urdf
+from stages.kit.viewing.canvas import Canvas
+from stages.kit.viewing.inputs import input_artifact
+from stages.kit.viewing.meshes import shape_mesh
+from stages.kit.viewing.scene_view import draw_scene_folder
+
+ROBOT = "robot/"
+
+
+def draw_plan(plan: Plan, canvas: Canvas) -> None:
+    """Draw the room of execution, the robot, both animated, the images that were taken, and the plan as text."""
+    canvas.document("plan", plan_text(plan))
+    folder = _room(plan)
+    if folder is not None:
+        draw_scene_folder(folder, canvas)
+    path = plan.path("execution.mcap")
+    if not path.exists():
+        return
+    with McapLog(path) as log:
+        _draw_robot(log, canvas)
+        _animate(log, canvas)
+
+
+def plan_text(plan: Plan) -> str:
+    """Return the plan, its checks and failures in Markdown."""
+    content = plan.plan
+    rows = [f"**{content.status}**, goal: {', '.join(content.goal) or '-'}", ""]
+    rows += [f"{k}. {action.name}({', '.join(action.arguments)})" for k, action in enumerate(content.actions, 1)]
+    rows += ["", *(f"- {'holds' if c.holds else 'FAILS'}: {c.condition} ({c.detail})" for c in content.checks)]
+    rows += ["", *(f"- {failure.kind}: {failure.message}" for failure in content.failures)]
+    return "\n".join(rows)
+
+
+def _room(plan: Plan) -> Path | None:
+    if plan.plan.executed_in == "ground_truth":
+        truth = input_artifact(plan, GroundTruth)
+        return truth.path("room") if truth is not None else None
+    scene = input_artifact(plan, InteractiveScene)
+    return scene.root if scene is not None else None
+
+
+def _topics(log: McapLog, schema_name: str) -> set[int]:
+    return {
+        channel.id
+        for channel in log.channels.values()
+        if channel.schema_id in log.schemas and log.schemas[channel.schema_id].name == schema_name
+    }
+
+
+def _animate(log: McapLog, canvas: Canvas) -> None:
+    transforms, images = _topics(log, "foxglove.FrameTransforms"), _topics(log, "foxglove.CompressedImage")
+    try:
+        for message in log.messages(transforms | images):
+            if message.channel.id in transforms:
+                for transform in FrameTransforms.FromString(message.data).transforms:
+                    canvas.time(stamp_nanoseconds(transform) * 1e-9)
+                    pose = transform_matrix(transform.translation, transform.rotation)
+                    canvas.transform(_entity(transform.child_frame_id), pose)
+            else:
+                image = CompressedImage.FromString(message.data)
+                canvas.time(stamp_nanoseconds(image) * 1e-9)
+                if image.data.startswith(JPEG_START):
+                    canvas.jpeg("execution", bytes(image.data))
+    except (DecodeError, ValueError) as error:
+        raise BadInput(f"{log.path}: {error}", hint="make the plan again") from None
+
+
+def _entity(frame: str) -> str:
+    return frame if frame.startswith(ROBOT) else f"scene/{frame}"
+
+
+def _draw_robot(log: McapLog, canvas: Canvas) -> None:
+    """Draw the robot's links where its description is installed; without it only the room moves."""
+    from stages.kit.simulation.robot_description import load_robot
+
+    try:
+        robot = load_robot("panda")
+        links = parse_urdf(robot.urdf).links
+    except Exception as error:  # noqa: BLE001 (a view without the robot is better than none)
+        canvas.document("robot", f"not drawn: {error}")
+        return
+    for link in links:
+        meshes = []
+        for shape in link.visuals:
+            try:
+                meshes.append(shape_mesh(shape, robot.urdf.parent))
+            except BadInput:
+                continue
+        if meshes:
+            mesh = meshes[0] if len(meshes) == 1 else trimesh.util.concatenate(meshes)
+            colors = np.tile(np.array([225, 225, 230], np.uint8), (len(mesh.vertices), 1))
+            canvas.mesh(f"{ROBOT}{link.name}", mesh, colors)

@@ -1,0 +1,43 @@
+"""Ground truth: the room, what was seen of it, true boxes and graph, the log's frames."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.ground_truth import GroundTruth
+from stages.kit.formats.frames import FrameReader
+from stages.kit.measurement.palette import instance_color
+from stages.kit.viewing.canvas import Canvas
+from stages.kit.viewing.graph_view import draw_graph
+from stages.kit.viewing.map_view import instance_colors
+from stages.kit.viewing.scene_view import draw_scene_folder
+from stages.kit.viewing.sequence_view import draw_frames, draw_path
+
+
+def draw_ground_truth(truth: GroundTruth, canvas: Canvas) -> None:
+    """Draw the true room with its graph, visible points by instance, the camera's walk and its frames."""
+    description = truth.truth
+    if (truth.path("room") / "scene.json").exists():
+        draw_scene_folder(truth.path("room"), canvas, prefix="room")
+    objects = description.objects
+    canvas.boxes(
+        "true_boxes", [o.box for o in objects], [o.name for o in objects], [instance_color(o.instance) for o in objects]
+    )
+    draw_graph(truth.graph, canvas)
+    points, instances = _visible(truth)
+    canvas.points("visible", points, instance_colors(instances), radius=0.006)
+    with FrameReader(truth.path("log.mcap")) as reader:
+        draw_path(canvas, reader.poses()[1])
+        canvas.label_names("camera/labels", [(o.instance, o.name, instance_color(o.instance)) for o in objects])
+        if len(reader):
+            draw_frames(canvas, reader)
+
+
+def _visible(truth: GroundTruth) -> tuple[np.ndarray, np.ndarray]:
+    path = truth.path("visible.npz")
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return archive["points"], archive["instance"]
+    except (OSError, ValueError, KeyError) as error:
+        raise BadInput(f"{path}: {error}", hint="make the ground truth again") from None
