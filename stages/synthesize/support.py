@@ -91,6 +91,8 @@ class SupportSurfaces:
         if height is None:
             return None
         local[2, 3] = height
+        if not self._reachable(target.furnishing, item, local):
+            return None
         return target.world_from_model @ local, index, height < top - INSIDE_DEPTH
 
     def _allowed(self, plane: SurfacePlane, base: float, top: float, item: Furnishing, place: Place) -> bool:
@@ -101,6 +103,18 @@ class SupportSurfaces:
         if (place.surface == "inside" and not inside) or (place.surface == "top" and inside):
             return False
         return place.height is None or place.height[0] <= base + level <= place.height[1]
+
+    def _reachable(self, target: Furnishing, item: Furnishing, target_from_item: np.ndarray) -> bool:
+        """Whether rays from the item's middle leave the target upwards, or all three of them (left, middle, right)
+        through its front (-y): nobody puts things behind closed doors."""
+        size = item.closed_size
+        middle = target_from_item[:3, 3] + [0.0, 0.0, 0.5 * size[2]]
+        side = np.array([0.3 * size[0], 0.0, 0.0])
+        starts = np.array([middle, middle - side, middle, middle + side])
+        directions = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [0.0, -1.0, 0.0], [0.0, -1.0, 0.0]])
+        rays = np.concatenate([starts, directions], axis=1).astype(np.float32)
+        free = ~np.isfinite(self._scene(target).cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy())
+        return bool(free[0] or free[1:].all())
 
     def _rest(self, target: Furnishing, contacts: np.ndarray, target_from_item: np.ndarray) -> float | None:
         """Return the height of the item's origin in the target frame at which all contact points touch, or None."""

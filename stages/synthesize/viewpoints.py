@@ -134,11 +134,12 @@ def choose_views(
     *,
     extra: int = 22,
 ) -> list[View]:
-    """Return the required views and up to `extra` more that see most of the rest of the room, in no useful order."""
+    """Return first the view that sees most of the room, then the required views, then up to `extra` more that see most
+    of the rest."""
     points, normals, weight = _surface_samples(renderer, arrangement, random)
-    chosen = required_views(arrangement, space)
+    required = required_views(arrangement, space)
     missing = np.ones(len(points), dtype=bool)
-    for view in chosen:
+    for view in required:
         missing &= ~_seen(renderer, camera, view, points, normals)
     cells = space.cells()
     candidates = []
@@ -152,6 +153,9 @@ def choose_views(
         target[2] = np.clip(target[2], eye[2] - 1.2 * flat, eye[2] - 0.1 * flat)
         candidates.append(View(eye, target))
     seen = np.array([_seen(renderer, camera, view, points, normals) for view in candidates])
+    overview = int(np.argmax(seen @ weight))
+    missing &= ~seen[overview]
+    chosen = [candidates[overview], *required]
     for _ in range(extra):
         gain = (seen & missing) @ weight
         best = int(np.argmax(gain))

@@ -88,7 +88,7 @@ def draw_tremor(random: np.random.Generator) -> Tremor:
 
 
 def order_views(views: list[View], space: FreeSpace) -> list[View]:
-    """Return the views in the order of a short tour: nearest neighbour from the best of all starts, then 2-opt.
+    """Return the views in the order of a short tour from the first one: nearest neighbour, then 2-opt.
 
     The cost between two views is the walking cost plus half a metre for every radian that the look turns.
     """
@@ -97,28 +97,24 @@ def order_views(views: list[View], space: FreeSpace) -> list[View]:
     heading = np.array([np.arctan2(*(view.target - view.eye)[1::-1]) for view in views])
     turn = np.abs((heading[:, None] - heading[None] + np.pi) % (2 * np.pi) - np.pi)
     cost = cost + 0.5 * turn
-    best_tour, best_length = list(range(len(views))), np.inf
-    for start in range(len(views)):
-        tour, left = [start], set(range(len(views))) - {start}
-        while left:
-            following = min(left, key=lambda k: (cost[tour[-1], k], k))
-            tour.append(following)
-            left.remove(following)
-        length = float(sum(cost[a, b] for a, b in zip(tour, tour[1:], strict=False)))
-        if length < best_length - 1e-9:
-            best_tour, best_length = tour, length
-    return [views[k] for k in _two_opt(best_tour, cost)]
+    tour, left = [0], set(range(1, len(views)))
+    while left:
+        following = min(left, key=lambda k: (cost[tour[-1], k], k))
+        tour.append(following)
+        left.remove(following)
+    return [views[k] for k in _two_opt(tour, cost)]
 
 
 def _two_opt(tour: list[int], cost: np.ndarray) -> list[int]:
+    """Reverse stretches of an open tour while that shortens it; the first stop stays."""
     improved = True
     while improved:
         improved = False
-        for i in range(len(tour) - 1):
+        for i in range(1, len(tour) - 1):
             for j in range(i + 1, len(tour)):
-                before = cost[tour[i - 1], tour[i]] if i else 0.0
+                before = cost[tour[i - 1], tour[i]]
                 after = cost[tour[j], tour[j + 1]] if j + 1 < len(tour) else 0.0
-                new_before = cost[tour[i - 1], tour[j]] if i else 0.0
+                new_before = cost[tour[i - 1], tour[j]]
                 new_after = cost[tour[i], tour[j + 1]] if j + 1 < len(tour) else 0.0
                 if new_before + new_after < before + after - 1e-9:
                     tour = tour[:i] + tour[i : j + 1][::-1] + tour[j + 1 :]

@@ -102,7 +102,7 @@ def _visible_detail(detail: float, footprint: float) -> float:
 
 
 @njit(cache=True)
-def _line(distance: float, width: float, footprint: float) -> float:
+def pattern_line(distance: float, width: float, footprint: float) -> float:
     """Return how dark a joint of this width is in a pixel, box-filtered over its footprint, 0..1."""
     spread = max(width, footprint)
     return max(0.0, 1.0 - distance / spread) * min(1.0, width / spread)
@@ -134,7 +134,7 @@ def pattern_factor(row: np.ndarray, x: float, y: float, z: float, footprint: flo
         warmth = 0.25 * tone
         gap = min(across, 1.0 - across) * period
         seam = min(along, 1.0 - along) * length
-        factor -= 0.5 * _line(min(gap, seam), 0.004, footprint)
+        factor -= 0.5 * pattern_line(min(gap, seam), 0.004, footprint)
     elif kind == 2:  # square tiles with grout
         across, along = px / period, py / period
         i, j = int(np.floor(across)), int(np.floor(along))
@@ -142,7 +142,7 @@ def pattern_factor(row: np.ndarray, x: float, y: float, z: float, footprint: flo
         blotch = value_noise(px * 9.0, py * 9.0, pz * 9.0, seed) * _visible_detail(0.1, footprint)
         factor = 0.10 * tone + 0.05 * blotch
         fx, fy = across - i, along - j
-        factor -= 0.35 * _line(min(min(fx, 1.0 - fx), min(fy, 1.0 - fy)) * period, 0.006, footprint)
+        factor -= 0.35 * pattern_line(min(min(fx, 1.0 - fx), min(fy, 1.0 - fy)) * period, 0.006, footprint)
     elif kind == 3:  # carpet
         fine = value_noise(px * 220.0, py * 220.0, pz * 220.0, seed) * _visible_detail(0.005, footprint)
         broad = value_noise(px * 6.0, py * 6.0, pz * 6.0, seed + 1)
@@ -155,10 +155,10 @@ def pattern_factor(row: np.ndarray, x: float, y: float, z: float, footprint: flo
         factor = 0.035 * broad + 0.02 * marks + 0.03 * fine
     elif kind == 5:  # wood: rings seen along x
         bend = value_noise(px * 1.3, py * 4.0, pz * 4.0, seed)
-        ring = np.sin(6.2831853 * ((py + 0.6 * pz) / period + 1.6 * bend))
+        ring = np.sin(6.2831853 * ((py + 0.6 * pz) / period + 2.6 * bend))
         grain = value_noise(px * 5.0, py * 130.0, pz * 130.0, seed + 1) * _visible_detail(0.008, footprint)
-        factor = 0.10 * ring * _visible_detail(0.5 * period, footprint) + 0.10 * grain + 0.05 * bend
-        warmth = 0.10 * ring
+        factor = 0.07 * ring * _visible_detail(0.5 * period, footprint) + 0.10 * grain + 0.06 * bend
+        warmth = 0.06 * ring
     elif kind == 6:  # woven fabric
         weave = np.sin(6.2831853 * px / period) * np.sin(6.2831853 * (py + pz) / period)
         broad = value_noise(px * 8.0, py * 8.0, pz * 8.0, seed)

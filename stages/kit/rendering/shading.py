@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit, prange
 
 from stages.kit.rendering.light_map import lookup
-from stages.kit.rendering.patterns import pattern_factor
+from stages.kit.rendering.patterns import pattern_factor, pattern_line
 
 MISS = np.uint32(0xFFFFFFFF)
 
@@ -86,19 +86,21 @@ def surface_color(
         x = rays[k, 0] + t_hit[k] * rays[k, 3]
         y = rays[k, 1] + t_hit[k] * rays[k, 4]
         z = rays[k, 2] + t_hit[k] * rays[k, 5]
+        # The geometric mean of a pixel's two extents on the slanted surface.
+        footprint = t_hit[k] * pixel_angle / np.sqrt(max(float(cosine[k]), 0.05))
         if row[0] > 0.5:
-            # The geometric mean of a pixel's two extents on the slanted surface.
-            footprint = t_hit[k] * pixel_angle / np.sqrt(max(float(cosine[k]), 0.05))
             factor, warmth = pattern_factor(row, x, y, z, footprint)
         for channel in range(3):
             value = (
                 w * corner_colors[t, 0, channel] + u * corner_colors[t, 1, channel] + v * corner_colors[t, 2, channel]
             )
             albedo[k, channel] = min(1.0, value * factor * (1.0 + 0.3 * warmth * (1.0 - channel)))
-        if row[18] > 0.0 and z < row[18]:
-            edge = 0.55 if z > row[18] - 0.006 else 1.0
+        if row[18] > 0.0 and z < row[18] + 0.01:
+            # A painted board, its upper edge box-filtered over the pixel.
+            below = min(1.0, max(0.0, (row[18] - z) / max(footprint, 1e-4) + 0.5))
+            rim = pattern_line(abs(row[18] - 0.004 - z), 0.004, footprint)
             for channel in range(3):
-                albedo[k, channel] = 0.72 * edge
+                albedo[k, channel] = below * 0.70 * (1.0 - 0.35 * rim) + (1.0 - below) * albedo[k, channel]
     return albedo
 
 
