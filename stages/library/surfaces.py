@@ -46,13 +46,13 @@ def surface_planes(
         np.unique(np.sort(solid.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0) for solid in solids
     ]
     planes = []
-    for normal, offset, facets in _coplanar_facets(solids):
+    for normal, offset, area, facets in _coplanar_facets(solids):
         up = normal[2] > UPRIGHT
         least = (support_share if up else minimum_share) * surface
+        if area < least:
+            continue
         basis = _basis(normal)
         union = shapely.union_all([_outline(corners @ basis.T) for corners in facets])
-        if union.area < least:
-            continue
         gaps = COVER_GAPS + tuple(gap for gap in CLEARANCES if up and gap <= 0.25 * size[2])
         cover = []
         for height in (offset - gap for gap in gaps):
@@ -82,8 +82,8 @@ def surface_planes(
     return tuple(planes)
 
 
-def _coplanar_facets(solids: Sequence[Solid]) -> list[tuple[np.ndarray, float, list[np.ndarray]]]:
-    """Return (unit normal, offset d of n.v + d = 0, facet corner points per solid) of every plane of flat facets."""
+def _coplanar_facets(solids: Sequence[Solid]) -> list[tuple[np.ndarray, float, float, list[np.ndarray]]]:
+    """Return (unit normal, offset d of n.v + d = 0, area, facet corners per solid) of every plane of flat facets."""
     groups: dict[tuple[int, ...], tuple[list[np.ndarray], list[float], list[float], dict[int, list[np.ndarray]]]] = {}
     for number, solid in enumerate(solids):
         corners = solid.vertices[solid.faces]
@@ -103,7 +103,10 @@ def _coplanar_facets(solids: Sequence[Solid]) -> list[tuple[np.ndarray, float, l
         normals, offsets, weights, facets = groups[key]
         normal = np.sum(normals, axis=0)
         normal = normal / np.linalg.norm(normal)
-        planes.append((normal, sum(offsets) / sum(weights), [np.concatenate(corners) for corners in facets.values()]))
+        total = sum(weights)
+        planes.append(
+            (normal, sum(offsets) / total, 0.5 * total, [np.concatenate(corners) for corners in facets.values()])
+        )
     return planes
 
 
