@@ -25,6 +25,8 @@ REFERENCE_AREA = 640 * 480
 class GeometricSettings:
     """Constants of the convexity segmentation; see stages/segment/parameters.py for their meaning."""
 
+    smoothing_window: int = 7
+    smoothing_deviation: float = 0.009
     normal_window: int = 13
     normal_step: int = 2
     normal_distance_factor: float = 0.05
@@ -46,9 +48,22 @@ class GeometricFrame:
     labels: np.ndarray
     """(H, W) int32, 0 = none, else 1..n."""
     points: np.ndarray
-    """(H, W, 3) float32 [m], camera frame, zero where depth is invalid."""
+    """(H, W, 3) float32 [m], camera frame, of the smoothed depth; zero where depth is invalid."""
     normals: np.ndarray
     """(H, W, 3) float32 unit vectors that face the camera, zero where there is none."""
+
+
+def smooth_depth(depth: np.ndarray, *, window: int = 7, deviation: float = 0.009) -> np.ndarray:
+    """Return z-depth (H, W) float32 [m] after a bilateral filter of `window` pixels on the inverse depth.
+
+    The noise of structured light and time of flight grows with the square of the depth, so that of the inverse depth
+    is nearly constant: one `deviation` [1/m] (0.009; the noise is about 0.002, Nguyen et al. 2012) serves all ranges.
+    Missing depth stays missing and takes no part. Not in the published system, whose input was smooth.
+    """
+    valid = depth > 0
+    inverse = np.where(valid, 1 / np.where(valid, depth, 1), np.float32(-1000)).astype(np.float32)
+    smooth = cv2.bilateralFilter(inverse, window, deviation, window / 3, borderType=cv2.BORDER_REPLICATE)
+    return np.where(valid & (smooth > 1e-4), 1 / np.maximum(smooth, np.float32(1e-4)), 0).astype(np.float32)
 
 
 @njit(cache=True, parallel=True)
@@ -237,6 +252,8 @@ def segment_depth(depth: np.ndarray, camera: Camera, settings: GeometricSettings
     """Return the geometric segments of a z-depth image (H, W) [m], 0 invalid (Han 2024, section 2.3.1)."""
     settings = settings or GeometricSettings()
     depth = np.ascontiguousarray(depth, dtype=np.float32)
+    if settings.smoothing_window:
+        depth = smooth_depth(depth, window=settings.smoothing_window, deviation=settings.smoothing_deviation)
     points = back_project(depth, camera)
     normals = surface_normals(
         points,

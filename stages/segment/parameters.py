@@ -28,6 +28,12 @@ class SegmentParameters(Parameters):
         "segment that several masks share",
     )
 
+    smoothing_window: int = Field(
+        7, ge=0, le=31, description="Window of the bilateral filter on inverse depth [pixels]; 0 = none, as published"
+    )
+    smoothing_deviation: float = Field(
+        0.009, gt=0, description="Depth steps under this are smoothed as noise, over it kept [1/m]"
+    )
     normal_window: int = Field(13, ge=3, le=31, description="Window of the normals [pixels, odd]")
     normal_step: int = Field(2, ge=1, le=6, description="Every how many-th row and column of that window is used")
     normal_distance_factor: float = Field(

@@ -132,6 +132,8 @@ def segment_frame(
 def geometric_settings(parameters: SegmentParameters) -> GeometricSettings:
     """Return the constants of the geometric segmentation."""
     return GeometricSettings(
+        smoothing_window=parameters.smoothing_window,
+        smoothing_deviation=parameters.smoothing_deviation,
         normal_window=parameters.normal_window,
         normal_step=parameters.normal_step,
         normal_distance_factor=parameters.normal_distance_factor,
