@@ -78,9 +78,10 @@ class Canvas:
         """Draw a mesh; `colors` (V, 3 or 4) uint8 per vertex override its own."""
         if len(mesh.faces) == 0:
             return
-        if colors is None and isinstance(mesh.visual, trimesh.visual.ColorVisuals) and mesh.visual.kind == "face":
+        visual = mesh.visual
+        if colors is None and isinstance(visual, trimesh.visual.ColorVisuals) and visual.kind == "face":
+            face_colors = np.asarray(visual.face_colors)
             mesh = mesh.copy()
-            face_colors = mesh.visual.face_colors
             mesh.unmerge_vertices()
             colors = np.repeat(face_colors, 3, axis=0)
         elif colors is None:
@@ -191,7 +192,7 @@ class Canvas:
 
 
 def _vertex_colors(mesh: trimesh.Trimesh) -> np.ndarray | None:
-    visual = mesh.visual
+    visual: Any = mesh.visual
     if isinstance(visual, trimesh.visual.TextureVisuals):
         visual = visual.to_color()
     colors = np.asarray(visual.vertex_colors)

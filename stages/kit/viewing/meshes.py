@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -20,6 +21,12 @@ def load_mesh(path: Path) -> trimesh.Trimesh:
     if not isinstance(mesh, trimesh.Trimesh):
         raise BadInput(f"{path}: holds no mesh")
     return mesh
+
+
+def merged(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """Return several meshes (at least one) as one."""
+    whole: Any = meshes[0] if len(meshes) == 1 else trimesh.util.concatenate(meshes)
+    return whole
 
 
 def shape_mesh(shape: Shape, folder: Path) -> trimesh.Trimesh:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from google.protobuf.message import DecodeError
@@ -19,7 +18,7 @@ from stages.kit.formats.mcap_log import McapLog
 from stages.kit.formats.urdf_file import parse_urdf
 from stages.kit.viewing.canvas import Canvas
 from stages.kit.viewing.inputs import input_artifact
-from stages.kit.viewing.meshes import shape_mesh
+from stages.kit.viewing.meshes import merged, shape_mesh
 from stages.kit.viewing.scene_view import draw_scene_folder
 
 ROBOT = "robot/"
@@ -105,6 +104,6 @@ def _draw_robot(log: McapLog, canvas: Canvas) -> None:
             except BadInput:
                 continue
         if meshes:
-            mesh = meshes[0] if len(meshes) == 1 else trimesh.util.concatenate(meshes)
+            mesh = merged(meshes)
             colors = np.tile(np.array([225, 225, 230], np.uint8), (len(mesh.vertices), 1))
             canvas.mesh(f"{ROBOT}{link.name}", mesh, colors)

@@ -15,7 +15,7 @@ from stages.kit.geometry.transforms import transform_from
 from stages.kit.measurement.palette import instance_color
 from stages.kit.viewing.canvas import Canvas
 from stages.kit.viewing.graph_view import draw_graph
-from stages.kit.viewing.meshes import shape_mesh
+from stages.kit.viewing.meshes import merged, shape_mesh
 
 
 def draw_scene(scene: InteractiveScene, canvas: Canvas) -> None:
@@ -35,8 +35,7 @@ def draw_scene_folder(root: Path, canvas: Canvas, prefix: str = "scene") -> tupl
         shapes = link.visuals or link.collisions
         if not shapes:
             continue
-        meshes = [shape_mesh(shape, root) for shape in shapes]
-        mesh = meshes[0] if len(meshes) == 1 else trimesh.util.concatenate(meshes)
+        mesh = merged([shape_mesh(shape, root) for shape in shapes])
         plain = isinstance(mesh.visual, trimesh.visual.ColorVisuals) and not mesh.visual.defined
         colors = np.tile(np.array(instance_color(number)) * 255, (len(mesh.vertices), 1)).astype(np.uint8)
         canvas.transform(f"{prefix}/{link.name}", poses[link.name])

@@ -1,0 +1,196 @@
+"""Views: every kind becomes a recording that Rerun reads, with the entities that belong in it, at the right places."""
+
+from __future__ import annotations
+
+import builtins
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from schemas.artifact import KINDS
+from schemas.cad_library import CadLibrary
+from schemas.errors import BadInput, MissingDependency, UsageError
+from schemas.interactive_scene import InteractiveSceneFile
+from stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
+from stages.kit.viewing.canvas import import_rerun
+from stages.kit.viewing.library_view import row_places
+from stages.kit.viewing.scene_view import joint_motion, link_poses
+from stages.kit.viewing.segments_view import segment_images
+from stages.kit.viewing.view import VIEWERS, view_artifact
+from tests.unit.viewing import artifacts
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("run")
+    artifacts.make_sequence(folder)
+    artifacts.make_segments(folder)
+    artifacts.make_map(folder)
+    library = CadLibrary(root=artifacts.make_library(folder))
+    artifacts.make_contact_graph(folder, library)
+    artifacts.make_cad_scene(folder, library)
+    artifacts.make_interactive_scene(folder, library)
+    artifacts.make_plan(folder)
+    artifacts.make_ground_truth(folder, library)
+    artifacts.make_evaluation(folder)
+    artifacts.make_report(folder)
+    artifacts.make_trajectory(folder)
+    return folder
+
+
+EXPECTED = {
+    "sequence": {"/world/camera", "/world/camera/color", "/world/camera/depth", "/world/cloud", "/world/camera_path"},
+    "trajectory": {"/world/camera_path"},
+    "segments": {"/world/class/labels", "/world/class/color", "/world/instance/labels", "/world/segment/labels"},
+    "panoptic_map": {"/world/color", "/world/instance", "/world/boxes"},
+    "contact_graph": {
+        "/world/boxes",
+        "/world/edges/supports",
+        "/world/edges/contains",
+        "/graph",
+        "/world/meshes/table_3",
+    },
+    "cad_scene": {"/world/cad/table_3", "/world/meshes/cup_5", "/world/layout/floor_1", "/replacements", "/graph"},
+    "interactive_scene": {"/world/scene/table_3", "/world/scene/fridge_4", "/world/scene/fridge_4__door", "/graph"},
+    "plan": {"/plan", "/world/scene/cup_5", "/world/robot/panda_hand", "/world/execution"},
+    "ground_truth": {"/world/room/fridge_4", "/world/true_boxes", "/world/visible", "/world/camera/labels"},
+    "cad_library": {"/world/library/table/table_00/body", "/world/library/fridge/fridge_01/door"},
+    "evaluation": {"/figures", "/tables/map", "/world/plots/map"},
+    "report": {"/report"},
+}
+
+
+@pytest.fixture(scope="module")
+def recordings(run: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, list]]:
+    """Kind -> entity path -> chunks, as Rerun reads the file back."""
+    pytest.importorskip("rerun", reason="the viewer is an extra: pip install rerun-sdk")
+    from rerun.chunk import RrdReader
+
+    read = {}
+    for kind in VIEWERS:
+        path = tmp_path_factory.mktemp("rrd") / f"{kind}.rrd"
+        view_artifact(run / kind, path)
+        entities: dict[str, list] = {}
+        for chunk in RrdReader(str(path)).stream():
+            entities.setdefault(chunk.entity_path, []).append(chunk)
+        read[kind] = entities
+    return read
+
+
+def _column(chunks: list, name: str) -> list:
+    values = []
+    for chunk in chunks:
+        batch = chunk.to_record_batch()
+        for column in batch.schema.names:
+            if name in column:
+                values.extend(row for row in batch.column(column).to_pylist() if row is not None)
+    return values
+
+
+@pytest.mark.parametrize("kind", EXPECTED)
+def test_every_kind_is_drawn(recordings: dict, kind: str) -> None:
+    assert EXPECTED[kind] <= set(recordings[kind])
+
+
+def test_every_kind_that_steps_write_has_a_view() -> None:
+    import schemas.kinds  # noqa: F401
+
+    assert set(VIEWERS) == set(EXPECTED) == set(KINDS) - {"depth"}
+
+
+def test_camera_moves_with_the_frames(recordings: dict) -> None:
+    cameras = [chunk for chunk in recordings["sequence"]["/world/camera"] if not chunk.is_static]
+    assert len(_column(cameras, "Transform3D:translation")) == 5
+    assert len(_column(recordings["sequence"]["/world/camera/depth"], "blob")) == 5
+    assert all("time" in chunk.timeline_names for chunk in cameras)
+
+
+def test_lifted_cup_is_animated(recordings: dict) -> None:
+    moving = [chunk for chunk in recordings["plan"]["/world/scene/cup_5"] if not chunk.is_static]
+    heights = sorted(row[0][2] for row in _column(moving, "Transform3D:translation"))
+    assert heights == [0.0, 0.5, 1.0]
+
+
+def test_map_is_coloured_by_instance_and_by_itself(recordings: dict) -> None:
+    assert set(_column(recordings["panoptic_map"]["/world/color"], "vertex_colors")[0]) == {0x0A141EFF}
+    assert len(set(_column(recordings["panoptic_map"]["/world/instance"], "vertex_colors")[0])) == 1
+
+
+def test_link_poses_are_those_of_the_scene(run: Path) -> None:
+    root = run / "interactive_scene"
+    description = InteractiveSceneFile.read(root / "scene.json")
+    values = {name: value for body in description.bodies for name, value in body.joint_values.items()}
+    poses = link_poses(parse_urdf(root / "scene.urdf"), values)
+    for body in description.bodies:
+        np.testing.assert_allclose(poses[body.name], np.array(body.world_from_body), atol=1e-6)
+    closed = link_poses(parse_urdf(root / "scene.urdf"), {})
+    turned = np.linalg.inv(closed["fridge_4__door"]) @ poses["fridge_4__door"]
+    assert math.acos((np.trace(turned[:3, :3]) - 1) / 2) == pytest.approx(1.2, abs=1e-6)
+
+
+def test_joint_motions() -> None:
+    joint = UrdfJoint("j", "prismatic", "a", "b", np.eye(4), axis=(0.0, 1.0, 0.0))
+    np.testing.assert_array_equal(joint_motion(joint, 0.3)[:3, 3], [0, 0.3, 0])
+    assert (joint_motion(UrdfJoint("j", "floating", "a", "b", np.eye(4)), 5.0) == np.eye(4)).all()
+
+
+def test_links_that_are_no_tree_are_bad_input() -> None:
+    from stages.kit.formats.urdf_file import Link
+
+    links = (Link("a"), Link("b"))
+    loop = (UrdfJoint("1", "fixed", "a", "b", np.eye(4)), UrdfJoint("2", "fixed", "b", "a", np.eye(4)))
+    with pytest.raises(BadInput, match="hangs on nothing"):
+        link_poses(Urdf("u", links, loop), {})
+
+
+def test_segment_images_look_up_class_and_instance() -> None:
+    from schemas.segments import FrameSegment, FrameSegments
+
+    records = (
+        FrameSegment(id=70000, category_id=5, instance=2, is_thing=True, score=1, area=1),
+        FrameSegment(id=3, category_id=6, instance=8, is_thing=True, score=1, area=1),
+    )
+    images = segment_images(FrameSegments(frame=0, segments=records), np.array([[70000, 3], [0, 99]]))
+    assert images["class"].tolist() == [[5, 6], [0, 0]]
+    assert images["instance"].tolist() == [[2, 8], [0, 0]]
+
+
+def test_models_stand_side_by_side(run: Path) -> None:
+    models = CadLibrary(root=run / "cad_library").library.models
+    places = row_places(models)
+    footprints = [
+        (
+            places[m.id][:2] + np.array(m.states[0].box_minimum)[:2],
+            places[m.id][:2] + np.array(m.states[0].box_maximum)[:2],
+        )
+        for m in models
+    ]
+    for i, (low, high) in enumerate(footprints):
+        for other_low, other_high in footprints[:i]:
+            assert (high <= other_low).any() or (other_high <= low).any()
+
+
+def test_missing_viewer_names_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    real_import = builtins.__import__
+
+    def without_rerun(name: str, *arguments, **options):
+        if name == "rerun":
+            raise ImportError(name)
+        return real_import(name, *arguments, **options)
+
+    monkeypatch.setattr(builtins, "__import__", without_rerun)
+    with pytest.raises(MissingDependency, match="pip install"):
+        import_rerun()
+
+
+def test_wrong_requests_are_refused(run: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"\.rrd"):
+        view_artifact(run / "sequence", tmp_path / "picture.png")
+    pytest.importorskip("rerun", reason="the viewer is an extra: pip install rerun-sdk")
+    with pytest.raises(BadInput, match="not an artifact"):
+        view_artifact(tmp_path, tmp_path / "a.rrd")
+    with pytest.raises(BadInput, match="cannot be written"):
+        (tmp_path / "file").write_text("")
+        view_artifact(run / "report", tmp_path / "file" / "a.rrd")
