@@ -88,8 +88,8 @@ def plan_pick(
     too wide for the gripper, otherwise what ended most attempts.
     """
     world_from_item = model.pose(item)
-    points = model.points(item)
-    grasps = sample_grasps(points, world_from_item, opening=model.description.opening, random=random)
+    points, normals = model.surface(item)
+    grasps = sample_grasps(points, normals, world_from_item, opening=model.description.opening, random=random)
     if not grasps:
         width = narrowest_width(apply(world_from_item, points))
         raise MotionFailed(

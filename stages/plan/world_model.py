@@ -23,6 +23,7 @@ from stages.kit.simulation.robot import Configuration, Robot
 from stages.kit.simulation.robot_description import RobotDescription
 from stages.kit.simulation.shapes import link_shapes, surface_points
 from stages.kit.simulation.world import PhysicsWorld, read_scene_bodies
+from stages.plan.support_planes import top_planes
 
 
 @dataclass(frozen=True)
@@ -60,12 +61,14 @@ class WorldModel:
         for name, (record, text) in read_scene_bodies(root).items():
             self.records[name], self._texts[name] = record, text
             self.planes[name] = nodes[name].planes if name in nodes else ()
+            if not any(plane.horizontal and len(plane.corners) == 4 for plane in self.planes[name]):
+                self.planes[name] += body_planes(record, text)
             self.world.add_body(record, text)
         self.robot = Robot(self.world, description)
         self.checker = CollisionChecker(self.world, self.robot, clearance)
         self.robot.set(Configuration(np.zeros(3), description.carry, description.opening))
         self.room = self._room()
-        self._points: dict[str, np.ndarray] = {}
+        self._points: dict[str, tuple[np.ndarray, np.ndarray]] = {}
 
     def close(self) -> None:
         """End the pybullet world."""
@@ -152,6 +155,10 @@ class WorldModel:
 
     def points(self, name: str, count: int = 3000) -> np.ndarray:
         """Return (count, 3) points on the surface of a rigid body, body frame; the same ones every time."""
+        return self.surface(name, count)[0]
+
+    def surface(self, name: str, count: int = 3000) -> tuple[np.ndarray, np.ndarray]:
+        """Return (count, 3) points on the surface of a rigid body and their outward normals, body frame."""
         if name not in self._points:
             meshes = [mesh for entries in link_shapes(self._texts[name]).values() for mesh in entries]
             self._points[name] = surface_points(meshes, count, np.random.default_rng(0))
@@ -186,6 +193,14 @@ class WorldModel:
     def opening_for(self, grip: float) -> float:
         """Return a finger distance [m] a little wider than `grip`, within what the gripper can."""
         return float(min(self.description.opening, grip))
+
+
+def body_planes(record: SceneBody, text: str) -> tuple[SurfacePlane, ...]:
+    """Return the horizontal planes on top of a body's base link at its pose, world frame, from its shapes."""
+    meshes = [mesh.copy() for mesh in link_shapes(text).get(record.name, [])]
+    for mesh in meshes:
+        mesh.apply_transform(np.array(record.world_from_body))
+    return top_planes(meshes)
 
 
 def moved_record(record: SceneBody, world_from_body: np.ndarray, joint_values: dict[str, float]) -> SceneBody:

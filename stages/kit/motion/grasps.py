@@ -14,6 +14,10 @@ FINGER_BAND = 0.011
 """Half the breadth of a finger tip [m]: what lies within it is between the fingers."""
 MARGIN = 0.006
 """Room left between the open fingers and the item, both sides together [m]."""
+CONTACT_BAND = 0.003
+"""Points this near the outermost one are where a finger touches [m]."""
+SQUARE = 0.85
+"""Least mean cosine between the surface normals there and the closing direction: at a corner fingers slip off."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,7 @@ class Grasp:
 
 def sample_grasps(
     points: np.ndarray,
+    normals: np.ndarray,
     world_from_body: np.ndarray,
     *,
     opening: float,
@@ -37,12 +42,13 @@ def sample_grasps(
     pitches: tuple[float, ...] = (0.0, 0.35, 0.7, 1.1, np.pi / 2),
     heights: tuple[float, ...] = (0.35, 0.5, 0.65, 0.8),
 ) -> list[Grasp]:
-    """Return the grasps whose width fits the gripper, narrow ones first (those lie flat on the faces of a box).
+    """Return the grasps whose width fits the gripper and whose fingers meet the surface squarely, narrow ones first.
 
-    `points` (N, 3) are on the item's surface, body frame. `opening` [m] is the widest distance of the fingers. The
+    `points`, `normals` (N, 3) are of the item's surface, body frame. `opening` [m] is the widest distance of the fingers. The
     list is empty when the item is too wide everywhere.
     """
     world_points = apply(world_from_body, points)
+    world_normals = normals @ world_from_body[:3, :3].T
     low, high = world_points.min(axis=0), world_points.max(axis=0)
     offset = random.uniform(0, 2 * np.pi / angles)
     headings = np.concatenate([_aligned_headings(world_from_body), offset + 2 * np.pi * np.arange(angles) / angles])
@@ -50,7 +56,7 @@ def sample_grasps(
     for pitch in pitches:
         for heading in headings:
             for height in heights if pitch < 1.2 else heights[:1]:
-                grasp = _grasp_at(world_points, low, high, float(heading), pitch, height, opening)
+                grasp = _grasp_at(world_points, world_normals, low, high, float(heading), pitch, height, opening)
                 if grasp is None:
                     continue
                 pose, width = grasp
@@ -78,9 +84,10 @@ def _aligned_headings(world_from_body: np.ndarray) -> np.ndarray:
 
 
 def _grasp_at(
-    points: np.ndarray, low: np.ndarray, high: np.ndarray, heading: float, pitch: float, height: float, opening: float
-) -> tuple[np.ndarray, float] | None:
-    """Return world_from_tool (4, 4) and the width of a grasp, or None when the item is too wide there."""
+    points: np.ndarray, normals: np.ndarray, low: np.ndarray, high: np.ndarray, heading: float, pitch: float,
+    height: float, opening: float,
+) -> tuple[np.ndarray, float] | None:  # fmt: skip
+    """Return world_from_tool (4, 4) and the width, or None when the item is too wide there or the fingers would slip."""
     approach = np.array([np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)])
     closing = np.array([-np.sin(heading), np.cos(heading), 0.0])
     across = np.cross(closing, approach)
@@ -97,6 +104,9 @@ def _grasp_at(
     along = relative[between] @ closing
     width = float(along.max() - along.min())
     if width > opening - MARGIN:
+        return None
+    facing = normals[between] @ closing
+    if facing[along > along.max() - CONTACT_BAND].mean() < SQUARE or facing[along < along.min() + CONTACT_BAND].mean() > -SQUARE:
         return None
     pose = np.eye(4)
     pose[:3, :3] = np.column_stack([across, closing, approach])

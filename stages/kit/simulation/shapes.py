@@ -75,8 +75,10 @@ def link_shapes(text: str, tag: Literal["collision", "visual"] = "collision") ->
     return shapes
 
 
-def surface_points(meshes: list[trimesh.Trimesh], count: int, random: np.random.Generator) -> np.ndarray:
-    """Return (count, 3) points drawn uniformly from the surfaces of meshes of one frame [m]."""
+def surface_points(
+    meshes: list[trimesh.Trimesh], count: int, random: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return (count, 3) points drawn uniformly from the surfaces of meshes of one frame [m], and their normals."""
     mesh = trimesh.util.concatenate([trimesh.Trimesh(part.vertices, part.faces, process=False) for part in meshes])
     weights = mesh.area_faces / mesh.area_faces.sum()
     faces = random.choice(len(mesh.faces), size=count, p=weights)
@@ -84,4 +86,5 @@ def surface_points(meshes: list[trimesh.Trimesh], count: int, random: np.random.
     flip = u + v > 1
     u, v = np.where(flip, 1 - u, u), np.where(flip, 1 - v, v)
     corners = mesh.triangles[faces]
-    return corners[:, 0] + u[:, None] * (corners[:, 1] - corners[:, 0]) + v[:, None] * (corners[:, 2] - corners[:, 0])
+    points = corners[:, 0] + u[:, None] * (corners[:, 1] - corners[:, 0]) + v[:, None] * (corners[:, 2] - corners[:, 0])
+    return points, np.asarray(mesh.face_normals)[faces]

@@ -1,0 +1,117 @@
+"""Whether the goal holds in the room after execution, each condition with its numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.plan import BodyMatch, Check
+from stages.kit.simulation.world import PhysicsWorld
+
+AT_REST = 0.02
+"""Largest speed of something that lies still [m/s]."""
+CLOSED_ANGLE, CLOSED_SLIDE = 0.1, 0.02
+"""A door counts as shut below this [rad], a drawer below this [m]."""
+CONTACT_HEIGHT = 0.02
+"""Largest distance of an item's lowest point from the height at which it touches its support [m]."""
+
+
+def check_on(world: PhysicsWorld, literal: str, item: str, support: str) -> Check:
+    """Whether an item rests on a support: in contact with it from above, within its outline, at rest."""
+    item_id, support_id = world.bodies[item].body_id, world.bodies[support].body_id
+    contacts = [contact for contact in world.contacts(item_id, support_id) if contact.depth > -0.002]
+    low, high = world.bounds(item)
+    below = [contact for contact in contacts if abs(contact.normal[2]) > 0.7]
+    height = float(np.mean([contact.point[2] for contact in below])) if below else float("nan")
+    gap = float(low[2]) - height if below else None
+    speed, turning = world.velocity(item)
+    support_low, support_high = world.bounds(support)
+    center = (low + high)[:2] / 2
+    inside = bool(np.all(center > support_low[:2]) and np.all(center < support_high[:2]))
+    numbers = {"contacts": float(len(below)), "speed": round(speed, 6), "angular_speed": round(turning, 6)}
+    if gap is not None:
+        numbers |= {"height": round(height, 6), "gap": round(gap, 6)}
+    holds = gap is not None and abs(gap) < CONTACT_HEIGHT and inside and speed < AT_REST
+    if gap is None:
+        detail = f"{item} does not touch {support} from above (its lowest point is at {low[2]:.3f} m)"
+    else:
+        detail = f"{item} rests at {height:.3f} m on {support}, speed {speed:.3f} m/s"
+        if not inside:
+            detail += ", outside its outline"
+    return Check(condition=literal, holds=holds, detail=detail, numbers=numbers)
+
+
+def check_joints(world: PhysicsWorld, literal: str, body: str, joints: list[str], shut: bool) -> Check:
+    """Whether all the joints of a body stand shut (or, `shut` false, open)."""
+    values = {joint: world.joint_value(body, joint) for joint in joints}
+    kinds = {joint.name: joint for joint in world.bodies[body].record.joints}
+    limits = {name: CLOSED_ANGLE if kinds[name].type == "revolute" else CLOSED_SLIDE for name in values}
+    if shut:
+        wrong = [name for name, value in values.items() if value > limits[name]]
+    else:
+        wrong = [name for name, value in values.items() if value < 0.5 * kinds[name].upper]
+    detail = ", ".join(
+        f"{name} at {value:.3f} {'rad' if kinds[name].type == 'revolute' else 'm'}" for name, value in values.items()
+    )
+    return Check(
+        condition=literal, holds=not wrong, detail=detail, numbers={k: round(v, 6) for k, v in values.items()}
+    )
+
+
+def check_in(world: PhysicsWorld, literal: str, item: str, container: str) -> Check:
+    """Whether an item's centre lies within a container's bounds and it touches the container, at rest."""
+    low, high = world.bounds(item)
+    container_low, container_high = world.bounds(container)
+    center = (low + high) / 2
+    outside = float(np.maximum(container_low - center, center - container_high).max())
+    touching = any(
+        contact.depth > -0.002
+        for contact in world.contacts(world.bodies[item].body_id, world.bodies[container].body_id)
+    )
+    speed, _ = world.velocity(item)
+    return Check(
+        condition=literal,
+        holds=outside < 0 and touching and speed < AT_REST,
+        detail=f"{item} is {abs(outside):.3f} m {'inside' if outside < 0 else 'outside'} {container}'s bounds, "
+        f"{'touching' if touching else 'not touching'} it",
+        numbers={"outside": round(outside, 6), "speed": round(speed, 6)},
+    )
+
+
+def check_goal(
+    world: PhysicsWorld,
+    goal: tuple[str, ...],
+    matches: dict[str, BodyMatch],
+    joint_names: dict[str, str],
+    held: str | None,
+) -> tuple[Check, ...]:
+    """Check ground literals such as `on(bottle_7, table_3)`, whose names are those of the plan.
+
+    `joint_names` maps joints of the plan to those of this world. A body without a match makes its condition false.
+    """
+    checks = []
+    for literal in goal:
+        predicate, inner = literal.rstrip(")").split("(")
+        names = [word.strip() for word in inner.split(",")]
+        owners = [name if name in matches else _owner(name, matches) for name in names]
+        missing = [name for name in owners if matches[name].matched is None]
+        if missing:
+            detail = f"the room has no body of the class of {missing[0]} near it"
+            checks.append(Check(condition=literal, holds=False, detail=detail))
+            continue
+        here = [matches[name].matched or "" for name in owners]
+        if predicate == "on":
+            checks.append(check_on(world, literal, here[0], here[1]))
+        elif predicate == "in":
+            checks.append(check_in(world, literal, here[0], here[1]))
+        elif predicate == "holding":
+            detail = f"the hand holds {held or 'nothing'}"
+            checks.append(Check(condition=literal, holds=held == here[0], detail=detail))
+        else:
+            whole = names[0] in matches
+            joints = list(world.bodies[here[0]].joints) if whole else [joint_names[names[0]]]
+            checks.append(check_joints(world, literal, here[0], joints, predicate == "closed"))
+    return tuple(checks)
+
+
+def _owner(joint: str, matches: dict[str, BodyMatch]) -> str:
+    return max((name for name in matches if joint.startswith(f"{name}__")), key=len)

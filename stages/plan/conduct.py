@@ -1,0 +1,256 @@
+"""Carry out a plan in a room: look, adapt the motion, execute, try again; then check the goal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from schemas.interactive_scene import SceneBody
+from schemas.plan import BodyMatch, Failure
+from schemas.scene_parts import SurfacePlane
+from stages.kit.geometry.transforms import inverse
+from stages.kit.motion.failures import MotionFailed
+from stages.plan.correspondence import match_joint, renamed
+from stages.plan.door_motion import is_closed, is_open
+from stages.plan.execution import PhysicalRobot, true_record
+from stages.plan.motions import Segment
+from stages.plan.pick_place import Budgets
+from stages.plan.refinement import Step, refine_action
+from stages.plan.world_model import RobotState, WorldModel
+
+
+@dataclass(frozen=True)
+class Room:
+    """The room where the plan is executed, as files tell it; its physics is in the robot's world."""
+
+    records: dict[str, SceneBody]
+    texts: dict[str, str]
+    planes: dict[str, tuple[SurfacePlane, ...]]
+
+
+@dataclass
+class Conduct:
+    """What is carried out, and what came of it."""
+
+    model: WorldModel
+    room: Room
+    physical: PhysicalRobot
+    matches: dict[str, BodyMatch]
+    joint_names: dict[str, str]
+    """Joint of the plan -> joint in the room."""
+    budgets: Budgets
+    random: np.random.Generator
+    relocalize: bool
+    attempts: int
+    failures: list[Failure] = field(default_factory=list)
+
+    def run(self, state: RobotState, steps: list[Step]) -> bool:
+        """Execute the steps; return whether all were carried out. Failures are collected."""
+        if not self.relocalize:
+            return self._replay(steps)
+        origin = "start"
+        number = 0
+        for group in _by_action(steps):
+            carried_out = self._act(state, group, origin, number)
+            if carried_out is None:
+                return False
+            state = carried_out
+            name, arguments = group[-1].name, group[-1].arguments
+            origin = arguments[1] if name == "place" else arguments[0]
+            number += len(group)
+        return True
+
+    # --- closed loop ------------------------------------------------------------------------------------------
+
+    def _act(self, state: RobotState, group: list[Step], origin: str, number: int) -> RobotState | None:
+        """Carry out one action with its drives, trying again after a look; return the state after it or None."""
+        name, arguments = group[-1].name, group[-1].arguments
+        for attempt in range(self.attempts):
+            self.physical.action = number
+            preferred = self._anchor(group[-1]) if attempt == 0 else None
+            try:
+                self._look(name, arguments)
+                if preferred is not None:
+                    preferred = self._re_anchored(group[-1], *preferred)
+                steps, after = refine_action(
+                    self.model, state, name, arguments, origin, self.budgets, self.random, preferred
+                )
+            except MotionFailed as failed:
+                self._note(failed, name, arguments)
+                continue
+            try:
+                for offset, step in enumerate(steps):
+                    self.physical.action = number + min(offset, len(group) - 1)
+                    self._execute(step)
+                self._check_effect(name, arguments)
+                return self._perceived(after)
+            except MotionFailed as failed:
+                self._note(failed, name, arguments)
+                if state.holding is not None and self.physical.held is None and name != "place":
+                    return None
+                if state.holding is not None and self.physical.held is None:
+                    return None  # what was held is gone: nothing left to place
+                state = self._recover(state)
+        return None
+
+    def _note(self, failed: MotionFailed, name: str, arguments: tuple[str, ...]) -> None:
+        action = f"{name}({', '.join(arguments)})"
+        self.failures.append(failed.failure.model_copy(update={"action": action}))
+
+    def _matched(self, body: str) -> str:
+        """Return the body of the room that a planned body is. Raises MotionFailed `not_found`."""
+        match = self.matches[body]
+        if match.matched is None:
+            raise MotionFailed("not_found", f"the room has no body of the class of {body} near it", (body,))
+        return match.matched
+
+    def _named_bodies(self, name: str, arguments: tuple[str, ...]) -> list[str]:
+        if name in ("open", "close"):
+            return [self._owner(arguments[0])]
+        bodies = [arguments[1]] if name == "place" else [arguments[0], arguments[1]]
+        return [body for body in bodies if body in self.model.records]
+
+    def _owner(self, joint: str) -> str:
+        return next(body for body, record in self.model.records.items() if any(j.name == joint for j in record.joints))
+
+    def _look(self, name: str, arguments: tuple[str, ...]) -> None:
+        """Take over pose, joints and shape of the bodies that an action names, as they are in the room now."""
+        world = self.physical.world
+        for body in self._named_bodies(name, arguments):
+            here = self._matched(body)
+            parent = self.model.records[body].parent
+            record = true_record(world, here, self.room.records[here])
+            names = {there: planned for planned, there in self.joint_names.items() if planned.startswith(f"{body}__")}
+            record, text = renamed(record, self.room.texts[here], body, names)
+            record = record.model_copy(update={"parent": parent, "movable": self.model.records[body].movable})
+            self.model.see(body, record, text, self.room.planes[here])
+
+    def _anchor(self, step: Step) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return the pose of what a planned motion is tied to, before the look: (world_from_body, empty)."""
+        if step.name in ("pick", "place"):
+            body = step.arguments[0] if step.name == "pick" else step.arguments[1]
+            return self.model.pose(body), np.zeros(0)
+        return None
+
+    def _re_anchored(self, step: Step, before: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return base pose and grasp (or place) of the planned step, moved along with the body they are tied to."""
+        manipulation = step.manipulation
+        assert manipulation is not None
+        body = step.arguments[0] if step.name == "pick" else step.arguments[1]
+        shift = self.model.pose(body)[:3, 3] - before[:3, 3]
+        base = manipulation.base + np.array([shift[0], shift[1], 0.0])
+        if step.name == "pick":
+            assert manipulation.body_from_tool is not None
+            return base, manipulation.body_from_tool
+        assert manipulation.item_pose is not None
+        place = manipulation.item_pose.copy()
+        place[:3, 3] += shift
+        heights = [plane.center[2] for plane in self.model.planes[body] if plane.horizontal]
+        if heights:
+            bottom = place[2, 3] + float(self.model.points(step.arguments[0])[:, 2].min())
+            nearest = min(heights, key=lambda height: abs(height - bottom))
+            place[2, 3] += nearest - bottom + 0.006
+        return base, place
+
+    def _execute(self, step: Step) -> None:
+        item = None
+        if step.name == "pick":
+            item = self._matched(step.arguments[0])
+        for segment in step.segments:
+            self.physical.follow(segment, item)
+        self.physical.recording.keyframe(self.physical.action, step.name)
+
+    def _check_effect(self, name: str, arguments: tuple[str, ...]) -> None:
+        """Raises MotionFailed `condition_not_met` when a door is not as the action should leave it."""
+        if name not in ("open", "close"):
+            return
+        there = self.joint_names[arguments[0]]
+        body = self._matched(self._owner(arguments[0]))
+        joint = next(joint for joint in self.room.records[body].joints if joint.name == there)
+        value = self.physical.world.joint_value(body, there)
+        if not (is_open if name == "open" else is_closed)(joint, value):
+            raise MotionFailed(
+                "condition_not_met",
+                f"after {name} the joint {there} stands at {value:.3f} of {joint.upper:.3f}",
+                (arguments[0],),
+                {"value": value, "upper": joint.upper},
+            )
+
+    def _perceived(self, state: RobotState) -> RobotState:
+        """Correct what the robot believes of itself and of what it holds by what the joints and a look say."""
+        base, arm = state.base, state.arm
+        if self.physical.held is None:
+            return RobotState(base, arm)
+        tool_from_item = self.physical.held_pose()
+        if state.holding is not None:
+            self.model.checker.carry(state.holding, tool_from_item)
+        return RobotState(base, arm, state.holding, tool_from_item, inverse(tool_from_item))
+
+    def _recover(self, state: RobotState) -> RobotState:
+        """Go back the way the arm came since the base last stood still, then believe what the joints say."""
+        rows = self.physical.way_back()
+        if self.physical.held is None:
+            self.physical.release()
+        self.physical.recording.keyframe(self.physical.action, "failed")
+        self.physical.follow(Segment(rows, self.model.description.opening, 0.5), None)
+        self.physical.bumps.clear()
+        base, arm = rows[-1, :3], rows[-1, 3:]
+        return self._perceived(RobotState(base, arm, state.holding, state.tool_from_item, state.body_from_tool))
+
+    # --- open loop --------------------------------------------------------------------------------------------
+
+    def _replay(self, steps: list[Step]) -> bool:
+        """Replay the planned motions as they are."""
+        for number, step in enumerate(steps):
+            self.physical.action = number
+            try:
+                self._execute(step)
+            except MotionFailed as failed:
+                self._note(failed, step.name, step.arguments)
+                return False
+            last = number + 1 == len(steps) or steps[number + 1].arguments != step.arguments
+            if last and step.manipulation is not None:
+                try:
+                    self._check_effect(step.name, step.arguments)
+                except MotionFailed as failed:
+                    self._note(failed, step.name, step.arguments)
+                    return False
+        return True
+
+
+def _by_action(steps: list[Step]) -> list[list[Step]]:
+    """Group steps so that each group ends with the last manipulation of one action."""
+    groups: list[list[Step]] = []
+    for step in steps:
+        same = (
+            groups and groups[-1][-1].name == step.name and groups[-1][-1].arguments == step.arguments
+        )  # fmt: skip
+        if groups and (groups[-1][-1].name == "drive" or same):
+            groups[-1].append(step)
+        else:
+            groups.append([step])
+    merged: list[list[Step]] = []
+    for group in groups:
+        last = group[-1]
+        if merged and merged[-1][-1].name == last.name and merged[-1][-1].arguments == last.arguments:
+            merged[-1] += group
+        else:
+            merged.append(group)
+    return merged
+
+
+def joint_pairs(
+    planned: dict[str, SceneBody], room: dict[str, SceneBody], matches: dict[str, BodyMatch]
+) -> dict[str, str]:
+    """Return which joint of the room each planned joint is; joints without a counterpart are left out."""
+    pairs = {}
+    for name, record in planned.items():
+        there = matches[name].matched
+        if there is None:
+            continue
+        for joint in record.joints:
+            found = match_joint(record, joint.name, room[there])
+            if found is not None and found not in pairs.values():
+                pairs[joint.name] = found
+    return pairs
