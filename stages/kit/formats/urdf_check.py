@@ -42,7 +42,7 @@ def check_urdf(path: Path, root: Path | None = None) -> list[Problem]:
     problems = _check_names(urdf) + _check_tree(urdf)
     moving = {joint.child for joint in urdf.joints if joint.type != "fixed"}
     if not urdf.joints:
-        moving |= {link.name for link in urdf.links}
+        moving |= {link.name for link in urdf.links if link.visuals or link.collisions}
     for link in urdf.links:
         problems += _check_inertia(link, must_have=link.name in moving)
         for shape in (*link.visuals, *link.collisions):

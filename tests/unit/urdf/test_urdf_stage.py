@@ -1,0 +1,88 @@
+"""The step `urdf`: from a CAD scene on disk to an interactive scene."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from schemas.cad_scene import CadScene, CadSceneFile
+from schemas.errors import BadInput, UsageError
+from stages.kit.formats.cad_models import model_folder
+from stages.kit.formats.urdf_file import parse_urdf
+from stages.urdf.parameters import UrdfParameters
+from stages.urdf.stage import run
+from tests.unit.urdf.small_room import context, graph_of, placed, room, small_library
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    return small_library(tmp_path_factory.mktemp("library"), "table", "fridge", "cup", "bottle", "monitor")
+
+
+@pytest.fixture
+def cad_scene(library, tmp_path) -> CadScene:
+    """The small room, with a monitor that kept its reconstructed mesh."""
+    root = tmp_path / "cad_scene"
+    for folder in ("models", "meshes", "layout"):
+        (root / folder).mkdir(parents=True)
+    bodies = [*room(library), placed(library, "monitor_8", "monitor_00", (0.1, -0.1, 0.7), parent="table_3")]
+    for body in bodies:
+        if body.model is not None:
+            shutil.copytree(model_folder(library, body.model.id), root / "models" / body.model.id, dirs_exist_ok=True)
+    sheet = trimesh.creation.box((3, 3, 0.01))
+    sheet.export(root / "layout" / "floor_1.ply")
+    blob = trimesh.creation.icosphere(subdivisions=2, radius=0.2)
+    blob.apply_translation([0.1, -0.1, 0.9])
+    blob.export(root / "meshes" / "monitor_8.ply")
+    graph = graph_of(bodies)
+    kept = {"model_id": None, "world_from_model": None, "scale": None}
+    nodes = tuple(node.model_copy(update=kept) if node.id == "monitor_8" else node for node in graph.nodes)
+    graph.model_copy(update={"nodes": nodes}).write(root / "graph.json")
+    CadSceneFile(replacements=(), conflicts_before=0, conflicts_after=0, iterations=0).write(root / "scene.json")
+    return CadScene(root)
+
+
+def test_supports_become_joints_by_what_is_movable(cad_scene, tmp_path):
+    made = run(cad_scene, parameters=UrdfParameters(), context=context(tmp_path / "out"))
+    assert made.outcome == "ok"
+    assert made.summary == {"bodies": 8, "movable": 3, "joints": 1, "cad_models": 5}
+    joints = {joint.child: (joint.parent, joint.type) for joint in parse_urdf(made.path("scene.urdf")).joints}
+    assert joints["cup_5"] == ("table_3", "floating")
+    assert joints["table_3"] == ("floor_1", "fixed")
+    assert joints["monitor_8"] == ("table_3", "fixed")
+    assert joints["fridge_4__door"] == ("fridge_4", "revolute")
+    assert made.graph == cad_scene.graph
+    monitor = next(body for body in made.scene.bodies if body.name == "monitor_8")
+    pose = np.array(monitor.world_from_body)
+    visual = trimesh.load(made.root / "meshes/monitor_8/visual.obj", force="mesh", process=False)
+    assert (visual.bounds + pose[:3, 3])[0] == pytest.approx([-0.1, -0.3, 0.7], abs=0.01)
+
+
+def test_movability_can_be_overruled(cad_scene, tmp_path):
+    parameters = UrdfParameters(movable_classes=("monitor",), fixed_classes=("bottle",))
+    made = run(cad_scene, parameters=parameters, context=context(tmp_path / "out"))
+    movable = {body.name for body in made.scene.bodies if body.movable}
+    assert movable == {"cup_5", "cup_7", "monitor_8"}
+    with pytest.raises(UsageError, match="unicorn"):
+        run(cad_scene, parameters=UrdfParameters(fixed_classes=("unicorn",)), context=context(tmp_path / "x"))
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda root: shutil.rmtree(root / "models" / "cup_00"), "cup_00"),
+        (lambda root: (root / "models" / "cup_00" / "model.json").unlink(), "model.json"),
+        (lambda root: (root / "models" / "cup_00" / "model.urdf").write_text("<robot"), "XML"),
+        (lambda root: (root / "models" / "cup_00" / "collision" / "body_0.obj").unlink(), "body_0.obj"),
+        (lambda root: (root / "meshes" / "monitor_8.ply").write_bytes(b"ply\nformat nonsense"), "monitor_8.ply"),
+        (lambda root: (root / "graph.json").write_text("{}"), "graph.json"),
+    ],
+)
+def test_a_damaged_scene_is_bad_input(cad_scene, tmp_path, damage, message):
+    damage(Path(cad_scene.root))
+    with pytest.raises(BadInput, match=message):
+        run(cad_scene, parameters=UrdfParameters(), context=context(tmp_path / "out"))
