@@ -7,11 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from stages.cad.matching import CUBE_ROTATIONS, Match
 from stages.cad.shapes import Observed
-from stages.kit.geometry.boxes import clip_polygon, polygon_area
-from stages.kit.geometry.transforms import transform_from_yaw
 
 STEP = 1e-6
 """Of the forward difference (the released code's)."""
@@ -48,11 +47,54 @@ def rectangle(center: np.ndarray, size: np.ndarray, yaw: float) -> np.ndarray:
     return local @ np.array([[cosine, sine], [-sine, cosine]]) + np.asarray(center[:2])
 
 
+@njit(cache=True)
+def convex_overlap_area(subject: np.ndarray, clip: np.ndarray) -> float:
+    """Return the area [m^2] that two convex counter-clockwise polygons (K, 2), (M, 2) share (Sutherland-Hodgman).
+
+    As boxes.clip_polygon; spelled out because the alignment asks for it at every evaluation.
+    """
+    count = len(subject)
+    points = np.empty((count + len(clip) + 4, 2))
+    points[:count] = subject
+    kept = np.empty_like(points)
+    for m in range(len(clip)):
+        sx, sy = clip[m, 0], clip[m, 1]
+        ex, ey = clip[(m + 1) % len(clip), 0] - sx, clip[(m + 1) % len(clip), 1] - sy
+        total = 0
+        for k in range(count):
+            b = (k - 1) % count
+            side = ex * (points[k, 1] - sy) - ey * (points[k, 0] - sx)
+            before = ex * (points[b, 1] - sy) - ey * (points[b, 0] - sx)
+            if (side >= 0.0) != (before >= 0.0):
+                share = before / (before - side)
+                kept[total] = points[b] + share * (points[k] - points[b])
+                total += 1
+            if side >= 0.0:
+                kept[total] = points[k]
+                total += 1
+        count = total
+        points[:count] = kept[:count]
+        if count == 0:
+            return 0.0
+    area = 0.0
+    for k in range(count):
+        ahead = (k + 1) % count
+        x, y = points[k, 0] - points[0, 0], points[k, 1] - points[0, 1]
+        area += x * (points[ahead, 1] - points[0, 1]) - y * (points[ahead, 0] - points[0, 0])
+    return max(0.0, 0.5 * area)
+
+
+def turn_about_z(yaw: float) -> np.ndarray:
+    """Return the (3, 3) rotation by `yaw` [rad] about z."""
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+
 def box_errors(frame: Observed, size_y: np.ndarray, scale: float, yaw: float, position: np.ndarray) -> np.ndarray:
     """Equation 2.13: [A(T o y) - A(x n T o y), alpha s_y - s_x], with `size_y` (3,) of the oriented model."""
     mine = rectangle(position, scale * size_y, yaw)
     theirs = rectangle(frame.center, frame.size, frame.yaw)
-    outside = polygon_area(mine) - polygon_area(clip_polygon(mine, theirs))
+    outside = scale**2 * size_y[0] * size_y[1] - convex_overlap_area(mine, theirs)
     return np.array([outside, scale * size_y[2] - frame.size[2]])
 
 
@@ -85,7 +127,7 @@ def residual_function(match: Match, weights: AlignmentWeights) -> Callable[[np.n
     def residuals(parameters: np.ndarray) -> np.ndarray:
         scale, yaw = float(parameters[0]), float(parameters[1])
         position = np.array([parameters[2], parameters[3], frame.support_height + scale * size_y[2] / 2])
-        turned = normals_y @ transform_from_yaw(yaw, np.zeros(3))[:3, :3].T
+        turned = normals_y @ turn_about_z(yaw).T
         offset, angle = plane_errors(normals_x, offsets_x, turned, scale * offsets_y, position - frame.center)
         return np.concatenate(
             [box_weight * box_errors(frame, size_y, scale, yaw, position), offset_weight * offset, angle_weight * angle]
@@ -95,7 +137,7 @@ def residual_function(match: Match, weights: AlignmentWeights) -> Callable[[np.n
 
 
 def levenberg_marquardt(
-    residuals: Callable[[np.ndarray], np.ndarray], start: np.ndarray, evaluations: int, tolerance: float = 1e-10
+    residuals: Callable[[np.ndarray], np.ndarray], start: np.ndarray, evaluations: int, tolerance: float = 1e-8
 ) -> tuple[np.ndarray, float]:
     """Return (parameters (K,), squared norm) that minimise |residuals|^2 from `start` (K,).
 

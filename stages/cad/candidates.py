@@ -11,7 +11,7 @@ from schemas.cad_library import CadModel
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.vocabulary import load_vocabulary
 from stages.cad.alignment import AlignmentWeights, align
-from stages.cad.fitting import refine_joints, refine_pose
+from stages.cad.fitting import fitted, shapes_of_model
 from stages.cad.matching import rank_matches
 from stages.cad.model_surfaces import ModelSurface, alignment_error, to_world
 from stages.cad.parameters import CadParameters
@@ -21,6 +21,8 @@ from stages.kit.geometry.boxes import bottom, points_in_box
 from stages.kit.geometry.point_clouds import thin_to_grid
 
 GRID = 0.01
+SCREENING_STEP = 5
+"""Every so many vertices count when aligned candidates are screened."""
 BOX_MARGIN = 0.01
 """Vertices outside the observed box by more than this were stray to the graph and are so here [m]."""
 SAME_PLACE = (0.01, 0.03)
@@ -86,14 +88,20 @@ def shortlist(
     carried = [link for link in graph.links if link.source == node.id and link.relation in ("supports", "contains")]
     carrying = frozenset(link.plane for link in carried if link.plane is not None)
     height = support_height_of(node, graph)
-    shapes = [shape_of_state(model, state) for model in models for state in model.states]
+    if ours:
+        closed = [shape_of_state(model, model.states[0]) for model in models]
+        shapes = [shape for one in closed for shape in shapes_of_model(surfaces[one.model.id], one)]
+    else:
+        shapes = [shape_of_state(model, state) for model in models for state in model.states]
+    movable = load_vocabulary().by_name(node.class_name).movable
     matches, counts = rank_matches(
         observed_frames(node, points, carrying, height, all_frames=ours),
         shapes,
         weights=(parameters.size_weight, parameters.plane_weight, parameters.upright_weight),
         unmatched=parameters.unmatched_plane if ours else None,
         scale_range=(parameters.minimum_scale, parameters.maximum_scale),
-        keep=parameters.candidates,
+        keep=parameters.candidates * (parameters.screening if ours else 1),
+        upright_only=ours and not movable,
     )
     rejected = Counter(counts)
     weights = AlignmentWeights(
@@ -105,19 +113,31 @@ def shortlist(
     )
     link = graph.parent_link(node.id)
     hangs = link is not None and link.relation == "carries_on_wall"
-    placements: list[Placement] = []
+    aligned = []
     for match in matches:
         placement = placement_of(match, align(match, weights, parameters.evaluations))
         if not parameters.minimum_scale <= placement.scale <= parameters.maximum_scale:
             rejected["aligned scale out of range"] += 1
             continue
         surface = surfaces[match.shape.model.id]
+        error = alignment_error(surface, placement, points[::SCREENING_STEP] if ours else points)
+        aligned.append((match, replace(placement, alignment_error=error)))
+    if ours:
+        # Planes alone rank badly where few were seen; vertices are the better judge of what deserves refinement.
+        aligned.sort(key=lambda entry: entry[1].alignment_error + parameters.tilt_weight * entry[0].tilt)
+        rejected["alignment rank"] = max(0, len(aligned) - parameters.candidates)
+        aligned = aligned[: parameters.candidates]
+    placements: list[Placement] = []
+    for match, placement in aligned:
+        surface = surfaces[match.shape.model.id]
+        score = placement.alignment_error
         if ours:
             placement = fitted(surface, placement, points, free_height=hangs)
-            score = placement.alignment_error + parameters.misfit_weight * size_misfit(match.frame.size, placement)
-        else:
-            error = alignment_error(surface, placement, points)
-            placement, score = replace(placement, alignment_error=error), error
+            score = (
+                placement.alignment_error
+                + parameters.misfit_weight * size_misfit(match.frame.size, placement)
+                + parameters.tilt_weight * match.tilt
+            )
         placement = replace(placement, score=score)
         reason = why_invalid(placement, surface, node, graph, parameters)
         if reason is None:
@@ -130,17 +150,6 @@ def shortlist(
     counted = {name: int(count) for name, count in sorted(rejected.items()) if count}
     reason = "" if unique else "no valid candidate: " + ", ".join(f"{n} {k}" for n, k in counted.items())
     return Shortlist(node, tuple(unique), counted, reason)
-
-
-def fitted(surface: ModelSurface, placement: Placement, points: np.ndarray, *, free_height: bool) -> Placement:
-    """Ours: refine the pose, then joints, then the pose again when a joint moved."""
-    refined = refine_pose(surface, placement, points, free_height=free_height)
-    if not surface.model.joints:
-        return refined
-    moved = refine_joints(surface, refined, points)
-    if moved.shape.joints == refined.shape.joints:
-        return refined
-    return refine_pose(surface, moved, points, free_height=free_height)
 
 
 def why_invalid(

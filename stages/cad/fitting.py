@@ -3,142 +3,164 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from itertools import product
 
 import numpy as np
 
 from schemas.base import as_vector
+from stages.cad.alignment import turn_about_z
 from stages.cad.model_surfaces import ModelSurface, alignment_error, to_model, to_world
 from stages.cad.shapes import Placement, Shape, relative_planes
 from stages.kit.formats.cad_models import part_transforms
-from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from stages.kit.geometry.transforms import apply, inverse
 
-ITERATIONS = 15
+ITERATIONS = 30
 ROBUST_DISTANCE = 0.03
 """Vertices farther from the model than this pull with constant force (Huber) [m]."""
-SCALE_PRIOR = 0.05
-"""Weight of (ln alpha / alpha_0)^2 against the mean squared distance [m^2]: vertices that say nothing of the scale
-leave it where the planes put it."""
+SCALE_PRIOR = 0.02
+"""Weight of (ln alpha / alpha_0)^2 against the mean squared distance, in squared diagonals of the model: vertices that
+say nothing of the scale leave it where the planes put it."""
+STATES_PER_JOINT = 4
+"""Joint values that are tried in matching, between the limits."""
+MOST_COMBINED = 2
+"""With more joints than this, values are tried for one joint at a time."""
+SAMPLE = 500
+"""Vertices that the refinement looks at."""
 GRID = 9
-GOLDEN_STEPS = 8
 LEAST_GAIN = 0.02
 """A joint value other than the stored state's must lower the alignment error by this share."""
 SAME_PART = 0.003
 """A plane belongs to the part that its corners are this close to [m]."""
 
 
-def refine_pose(surface: ModelSurface, placement: Placement, points: np.ndarray, *, free_height: bool) -> Placement:
-    """Return the placement after iterative closest points in (scale, yaw, shift), if that lowers the alignment error.
+def refine(
+    surface: ModelSurface, placement: Placement, points: np.ndarray, *, free_height: bool, iterations: int = ITERATIONS
+) -> Placement:
+    """Return the placement after iterative closest points in scale, yaw, shift and joint values, if that lowers the
+    alignment error on the vertices (N, 3).
 
-    Point-to-plane distances from vertices (N, 3) with Huber weights; the foot of the model stays on its supporting
-    plane (p_z constraint of 2.11) unless `free_height` (things on walls stand on nothing). The thesis stops at the
-    planes, whose offsets are biased where only edges or noise were seen.
+    Gauss-Newton on point-to-plane distances with Huber weights. The foot of the model stays on its supporting plane
+    (the constraint on p_z in 2.11) unless `free_height` (things on walls stand on nothing). The thesis stops at the
+    planes, whose offsets are biased where only edges or noise were seen, and at the stored states.
     """
     best = replace(placement, alignment_error=alignment_error(surface, placement, points))
-    current, first_scale = best, placement.scale
-    foot = float(to_world(placement, surface.hull_points(placement.shape.joints))[:, 2].min())
-    for _ in range(ITERATIONS):
-        distance, nearest, normals = surface.closest(to_model(current, points), current.shape.joints)
-        target = to_world(current, nearest)
-        normal = normals @ current.rotation.T
+    scale, rotation, translation = placement.scale, placement.rotation, placement.translation
+    joints, limits = dict(placement.shape.joints), surface.model.joints
+    foot = float(to_world(placement, surface.hull_points(joints))[:, 2].min())
+    prior = (SCALE_PRIOR * placement.scale * float(np.linalg.norm(placement.shape.size))) ** 2
+    best_error, best_state = best.alignment_error, (scale, rotation, translation, dict(joints))
+    for _ in range(iterations):
+        found = surface.closest((points - translation) @ rotation / scale, joints)
+        error = scale * float(np.sqrt(np.mean(found.distance**2)))
+        if error < best_error:
+            best_error, best_state = error, (scale, rotation, translation, dict(joints))
+        target = scale * found.points @ rotation.T + translation
+        normal = found.normals @ rotation.T
         gap = np.einsum("ij,ij->i", normal, points - target)
-        weight = np.minimum(1.0, ROBUST_DISTANCE / np.maximum(current.scale * distance, 1e-9)) / len(points)
-        anchor = np.array([*current.translation[:2], foot])
+        weight = np.minimum(1.0, ROBUST_DISTANCE / np.maximum(scale * found.distance, 1e-9)) / len(points)
+        # The model grows and turns about its foot below the model origin.
+        anchor = np.array([*translation[:2], foot])
         arm = target - anchor
-        turn = np.column_stack([-arm[:, 1], arm[:, 0], np.zeros(len(arm))])
-        columns = [
-            np.einsum("ij,ij->i", normal, arm),
-            np.einsum("ij,ij->i", normal, turn),
-            normal[:, 0],
-            normal[:, 1],
-        ]
-        if free_height:
-            columns.append(normal[:, 2])
+        motions = [arm, np.column_stack([-arm[:, 1], arm[:, 0], np.zeros(len(arm))])]
+        columns = [np.einsum("ij,ij->i", normal, motion) for motion in motions]
+        columns += [normal[:, 0], normal[:, 1]] + ([normal[:, 2]] if free_height else [])
+        first_joint = len(columns)
+        for joint in limits:
+            owned = found.part == surface.model.parts.index(joint.part)
+            axis = np.asarray(joint.axis)
+            if joint.type == "revolute":
+                motion = scale * np.cross(axis, found.points - np.asarray(joint.origin)) @ rotation.T
+            else:
+                motion = np.broadcast_to(scale * rotation @ axis, target.shape)
+            columns.append(np.where(owned, np.einsum("ij,ij->i", normal, motion), 0.0))
         jacobian = np.stack(columns, axis=1)
-        matrix = jacobian.T @ (weight[:, None] * jacobian) + 1e-9 * np.eye(jacobian.shape[1])
+        matrix = jacobian.T @ (weight[:, None] * jacobian) + 1e-9 * np.eye(len(columns))
         right = jacobian.T @ (weight * gap)
-        matrix[0, 0] += SCALE_PRIOR**2
-        right[0] -= SCALE_PRIOR**2 * math.log(current.scale / first_scale)
+        matrix[0, 0] += prior
+        right[0] -= prior * math.log(scale / placement.scale)
         step = np.linalg.solve(matrix, right)
         growth, angle = math.exp(float(np.clip(step[0], -0.1, 0.1))), float(np.clip(step[1], -0.3, 0.3))
         shift = np.clip(np.array([step[2], step[3], step[4] if free_height else 0.0]), -0.2, 0.2)
-        spin = transform_from_yaw(angle, np.zeros(3))[:3, :3]
-        # The model grows and turns about its foot below the model origin.
-        translation = anchor + growth * spin @ (current.translation - anchor) + shift
-        current = replace(
-            current, scale=current.scale * growth, rotation=spin @ current.rotation, translation=translation
-        )
-        foot += float(shift[2])
-        error = alignment_error(surface, current, points)
-        current = replace(current, alignment_error=error)
-        if error < best.alignment_error:
-            best = current
-        if abs(growth - 1) < 1e-5 and abs(angle) < 1e-5 and np.abs(shift).max() < 1e-5:
+        spin = turn_about_z(angle)
+        translation = anchor + growth * spin @ (translation - anchor) + shift
+        scale, rotation, foot = scale * growth, spin @ rotation, foot + float(shift[2])
+        for joint, change in zip(limits, np.clip(step[first_joint:], -0.3, 0.3), strict=True):
+            joints[joint.name] = float(np.clip(joints.get(joint.name, 0.0) + change, joint.lower, joint.upper))
+        if np.abs(step).max() < 1e-4:
             break
-    return best
+    final = _state(surface, placement, (scale, rotation, translation, joints), points)
+    if best_error < final.alignment_error:
+        final = _state(surface, placement, best_state, points)
+    return final if final.alignment_error < best.alignment_error else best
 
 
-def refine_joints(surface: ModelSurface, placement: Placement, points: np.ndarray) -> Placement:
-    """Return the placement with every joint at the value that fits the vertices (N, 3) best.
+def _state(
+    surface: ModelSurface,
+    placement: Placement,
+    state: tuple[float, np.ndarray, np.ndarray, dict[str, float]],
+    points: np.ndarray,
+) -> Placement:
+    scale, rotation, translation, joints = state
+    shape = placement.shape if joints == placement.shape.joints else shape_at(surface, placement.shape, joints)
+    moved = replace(placement, shape=shape, scale=scale, rotation=rotation, translation=translation)
+    return replace(moved, alignment_error=alignment_error(surface, moved, points))
 
-    Each joint by itself: a grid over its range, then golden section around the best. The stored states are a few
-    degrees or centimetres apart from what was seen. A joint that the vertices do not tell stays in its state.
+
+def search_joints(surface: ModelSurface, placement: Placement, points: np.ndarray) -> Placement:
+    """Return the placement with every joint at the best of a grid of values, one joint after the other.
+
+    The 1-D search on the alignment error over the vertices (N, 3) finds the valley that `refine` then descends. A
+    joint that the vertices do not tell stays in its state.
     """
     joints = dict(placement.shape.joints)
     local = to_model(placement, points)
 
     def error(name: str, value: float) -> float:
-        distance = surface.closest(local, {**joints, name: value})[0]
-        return placement.scale * float(np.sqrt(np.mean(distance**2)))
+        return float(np.sqrt(np.mean(surface.closest(local, {**joints, name: value}).distance ** 2)))
 
     for joint in surface.model.joints:
-        before_value = joints.get(joint.name, 0.0)
-        before = error(joint.name, before_value)
-        values = np.linspace(joint.lower, joint.upper, GRID)
-        errors = [error(joint.name, float(value)) for value in values]
-        k = int(np.argmin(errors))
-        low, high = float(values[max(k - 1, 0)]), float(values[min(k + 1, GRID - 1)])
-        value, found = golden_section(partial(error, joint.name), low, high, GOLDEN_STEPS)
-        if errors[k] < found:
-            value, found = float(values[k]), errors[k]
-        if found < (1.0 - LEAST_GAIN) * before:
+        before = error(joint.name, joints.get(joint.name, 0.0))
+        errors = {float(v): error(joint.name, float(v)) for v in np.linspace(joint.lower, joint.upper, GRID)}
+        value = min(errors, key=lambda v: (errors[v], v))
+        if errors[value] < (1.0 - LEAST_GAIN) * before:
             joints[joint.name] = value
-    if joints == placement.shape.joints:
-        return placement
-    shape = shape_at(surface, placement.shape, joints)
-    moved = replace(placement, shape=shape)
-    return replace(moved, alignment_error=alignment_error(surface, moved, points))
+    return _state(surface, placement, (placement.scale, placement.rotation, placement.translation, joints), points)
 
 
-def golden_section(function: Callable[[float], float], low: float, high: float, steps: int) -> tuple[float, float]:
-    """Return (argument, value) near a minimum of a scalar function within [low, high]."""
-    ratio = (math.sqrt(5.0) - 1.0) / 2.0
-    a, b = high - ratio * (high - low), low + ratio * (high - low)
-    value_a, value_b = function(a), function(b)
-    for _ in range(steps):
-        if value_a <= value_b:
-            high, b, value_b = b, a, value_a
-            a = high - ratio * (high - low)
-            value_a = function(a)
-        else:
-            low, a, value_a = a, b, value_b
-            b = low + ratio * (high - low)
-            value_b = function(b)
-    return (a, value_a) if value_a <= value_b else (b, value_b)
+def joint_values_to_try(shape: Shape) -> list[dict[str, float]]:
+    """Return joint configurations for matching: all combinations of a few values, or one joint at a time.
+
+    The library stores the ends and the middle of each range; the box of a door at 60 degrees is unlike both.
+    """
+    joints = shape.model.joints
+    values = {joint.name: np.linspace(joint.lower, joint.upper, STATES_PER_JOINT).tolist() for joint in joints}
+    closed = {joint.name: 0.0 for joint in joints}
+    if len(joints) <= MOST_COMBINED:
+        return [dict(zip(values, combination, strict=True)) for combination in product(*values.values())]
+    return [closed, *({**closed, name: value} for name in values for value in values[name] if value != 0.0)]
 
 
-def shape_at(surface: ModelSurface, shape: Shape, joints: dict[str, float]) -> Shape:
-    """Return the shape with other joint values: its planes move with the parts that they lie on."""
-    old, new = part_transforms(surface.model, shape.joints), part_transforms(surface.model, joints)
+def plane_owners(surface: ModelSurface, shape: Shape) -> list[str | None]:
+    """Return for each plane of a shape the moving part that it lies on, or None for the body."""
+    part_from_model = {part: inverse(t) for part, t in part_transforms(surface.model, shape.joints).items()}
     moving = [joint.part for joint in surface.model.joints]
-    planes = []
+    owners: list[str | None] = []
     for plane in shape.surfaces:
         probe = np.array([plane.center, *plane.corners])
-        owner = next(
-            (p for p in moving if surface.part_distances(apply(inverse(old[p]), probe), p).max() < SAME_PART), None
-        )
+        near = (p for p in moving if surface.part_distances(apply(part_from_model[p], probe), p).max() < SAME_PART)
+        owners.append(next(near, None))
+    return owners
+
+
+def shape_at(
+    surface: ModelSurface, shape: Shape, joints: dict[str, float], owners: list[str | None] | None = None
+) -> Shape:
+    """Return the shape with other joint values: its planes move with the parts that they lie on (`plane_owners`)."""
+    owners = plane_owners(surface, shape) if owners is None else owners
+    old, new = part_transforms(surface.model, shape.joints), part_transforms(surface.model, joints)
+    planes = []
+    for plane, owner in zip(shape.surfaces, owners, strict=True):
         if owner is None:
             planes.append(plane)
             continue
@@ -146,16 +168,13 @@ def shape_at(surface: ModelSurface, shape: Shape, joints: dict[str, float]) -> S
         normal = motion[:3, :3] @ np.asarray(plane.normal)
         center = apply(motion, np.asarray(plane.center))
         corners = apply(motion, np.asarray(plane.corners).reshape(-1, 3))
-        planes.append(
-            plane.model_copy(
-                update={
-                    "normal": as_vector(normal),
-                    "offset": -float(normal @ center),
-                    "center": as_vector(center),
-                    "corners": tuple(as_vector(corner) for corner in corners),
-                }
-            )
-        )
+        moved = {
+            "normal": as_vector(normal),
+            "offset": -float(normal @ center),
+            "center": as_vector(center),
+            "corners": tuple(as_vector(corner) for corner in corners),
+        }
+        planes.append(plane.model_copy(update=moved))
     hull = surface.hull_points(joints)
     low, high = hull.min(axis=0), hull.max(axis=0)
     center = (low + high) / 2
@@ -168,3 +187,42 @@ def shape_at(surface: ModelSurface, shape: Shape, joints: dict[str, float]) -> S
         planes=relative_planes(surfaces, center, np.array([p.horizontal for p in surfaces], dtype=bool)),
         surfaces=surfaces,
     )
+
+
+def shapes_of_model(surface: ModelSurface, closed: Shape) -> list[Shape]:
+    """Return the shapes of an articulated model that matching tries; the closed one comes first."""
+    if not closed.model.joints:
+        return [closed]
+    owners = plane_owners(surface, closed)
+    return [shape_at(surface, closed, joints, owners) for joints in joint_values_to_try(closed)]
+
+
+def fitted(surface: ModelSurface, placement: Placement, points: np.ndarray, *, free_height: bool) -> Placement:
+    """Return the placement refined on the object's vertices (N, 3): pose, then joints, then both.
+
+    The search works on a sample of the vertices; the alignment error that is returned counts all of them.
+    """
+    some = points[:: max(1, len(points) // SAMPLE)]
+    best = refine(surface, placement, some, free_height=free_height)
+    if surface.model.joints:
+        searched = search_joints(surface, best, some)
+        if searched.shape.joints != best.shape.joints:
+            again = refine(surface, searched, some, free_height=free_height)
+            best = again if again.alignment_error < best.alignment_error else best
+        best = with_quiet_joints_closed(surface, best, some)
+    return replace(best, alignment_error=alignment_error(surface, best, points))
+
+
+def with_quiet_joints_closed(surface: ModelSurface, placement: Placement, points: np.ndarray) -> Placement:
+    """Return the placement with those joints closed (0) whose closing costs no more than `LEAST_GAIN` of the alignment
+    error: noise opens doors by a degree, and what was not seen is taken to be closed."""
+    current = placement
+    for joint in surface.model.joints:
+        joints = dict(current.shape.joints)
+        if joints.get(joint.name, 0.0) == 0.0:
+            continue
+        joints[joint.name] = float(np.clip(0.0, joint.lower, joint.upper))
+        closed = _state(surface, current, (current.scale, current.rotation, current.translation, joints), points)
+        if closed.alignment_error <= (1.0 + LEAST_GAIN) * current.alignment_error:
+            current = closed
+    return current

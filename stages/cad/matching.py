@@ -29,6 +29,11 @@ class Match:
     pairs: tuple[tuple[int, int], ...]
     """f_Pi: (plane of x, plane of y)."""
 
+    @property
+    def tilt(self) -> float:
+        """d_b of equation 2.10."""
+        return upright_error(CUBE_ROTATIONS[self.orientation])
+
 
 def cube_rotations() -> np.ndarray:
     """Return the 24 rotations (24, 3, 3) of a cube; the first four are upright, by quarter turns about z."""
@@ -126,21 +131,24 @@ def rank_matches(
     unmatched: float | None,
     scale_range: tuple[float, float],
     keep: int,
+    upright_only: bool = False,
 ) -> tuple[list[Match], dict[str, int]]:
     """Return the `keep` oriented candidates with the least matching error, and why others were discarded.
 
-    Every shape (model and state) is tried in 24 orientations and every frame of the object. Ties fall to the model's
+    Every shape (model and state) is tried in 24 orientations (with `upright_only` in the 4 upright ones) and every
+    frame of the object. Ties fall to the model's
     name, then the order of states, frames and orientations.
     """
     matches: list[Match] = []
+    rotations = CUBE_ROTATIONS[:4] if upright_only else CUBE_ROTATIONS
     rejected = {"no admissible plane assignment": 0, "scale out of range": 0}
     for shape in shapes:
         for frame in frames:
             ratio = float(np.linalg.norm(frame.size) / np.linalg.norm(shape.size))
             if not scale_range[0] <= ratio <= scale_range[1]:
-                rejected["scale out of range"] += len(CUBE_ROTATIONS)
+                rejected["scale out of range"] += len(rotations)
                 continue
-            for orientation, rotation in enumerate(CUBE_ROTATIONS):
+            for orientation, rotation in enumerate(rotations):
                 found = matching_error(frame, shape, rotation, weights, unmatched)
                 if found is None:
                     rejected["no admissible plane assignment"] += 1

@@ -16,6 +16,20 @@ from stages.kit.geometry.transforms import apply, inverse
 
 
 @dataclass(frozen=True)
+class Nearest:
+    """Where points come closest to a model: model frame, scale 1."""
+
+    distance: np.ndarray
+    """(N,)."""
+    points: np.ndarray
+    """(N, 3)."""
+    normals: np.ndarray
+    """(N, 3) of the triangles."""
+    part: np.ndarray
+    """(N,) index into the model's parts."""
+
+
+@dataclass(frozen=True)
 class ModelSurface:
     """The parts of a model, each ready for distance queries in its own frame at scale 1.
 
@@ -29,21 +43,21 @@ class ModelSurface:
     pieces: dict[str, tuple[trimesh.Trimesh, ...]]
     """Part -> convex collision pieces, part frame."""
 
-    def closest(self, points: np.ndarray, joints: dict[str, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return for points (N, 3) in the model frame at scale 1: distances (N,), nearest surface points (N, 3) and
-        the normals there (N, 3)."""
-        best = np.full(len(points), np.inf)
+    def closest(self, points: np.ndarray, joints: dict[str, float]) -> Nearest:
+        """Return the nearest surface points of points (N, 3) in the model frame at scale 1."""
+        distance = np.full(len(points), np.inf)
         nearest, normal = np.zeros((len(points), 3)), np.zeros((len(points), 3))
-        for part, model_from_part in part_transforms(self.model, joints).items():
+        part_index = np.zeros(len(points), dtype=int)
+        for k, (part, model_from_part) in enumerate(part_transforms(self.model, joints).items()):
             local = apply(inverse(model_from_part), points).astype(np.float32)
             answer = self.scenes[part].compute_closest_points(o3d.core.Tensor.from_numpy(local))
             found = answer["points"].numpy().astype(float)
-            distance = np.linalg.norm(local - found, axis=1)
-            closer = distance < best
-            best[closer] = distance[closer]
+            gap = np.linalg.norm(local - found, axis=1)
+            closer = gap < distance
+            distance[closer], part_index[closer] = gap[closer], k
             nearest[closer] = apply(model_from_part, found[closer])
             normal[closer] = answer["primitive_normals"].numpy()[closer].astype(float) @ model_from_part[:3, :3].T
-        return best, nearest, normal
+        return Nearest(distance, nearest, normal, part_index)
 
     def part_distances(self, points: np.ndarray, part: str) -> np.ndarray:
         """Return distances (N,) of points (N, 3) in the part's frame to that part."""
@@ -97,7 +111,7 @@ def to_world(placement: Placement, points: np.ndarray) -> np.ndarray:
 
 def vertex_distances(surface: ModelSurface, placement: Placement, points: np.ndarray) -> np.ndarray:
     """Return distances (N,) [m] from world points (N, 3) to the placed model."""
-    return placement.scale * surface.closest(to_model(placement, points), placement.shape.joints)[0]
+    return placement.scale * surface.closest(to_model(placement, points), placement.shape.joints).distance
 
 
 def alignment_error(surface: ModelSurface, placement: Placement, points: np.ndarray) -> float:

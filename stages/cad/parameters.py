@@ -22,6 +22,11 @@ class CadParameters(Parameters):
         "refined on the vertices, and the choice also weighs the size",
     )
     candidates: int = Field(10, ge=1, description="Oriented candidates kept after matching")
+    screening: int = Field(
+        4,
+        ge=1,
+        description="ours: so many times more candidates are aligned, and those with the least alignment error kept",
+    )
     size_weight: float = Field(1.0, ge=0.0, description="omega_1 of the matching error (2.7): relative size")
     plane_weight: float = Field(1.0, ge=0.0, description="omega_2 of the matching error (2.7): surface planes")
     upright_weight: float = Field(0.2, ge=0.0, description="omega_3 of the matching error (2.7): not upright")
@@ -44,6 +49,12 @@ class CadParameters(Parameters):
         ge=0.0,
         description="ours: metres of extent that differ from the observed box count this much beside the "
         "alignment error (vertices of a partial mesh fit every model that is large enough)",
+    )
+    tilt_weight: float = Field(
+        0.02,
+        ge=0.0,
+        description="ours: not standing upright (2.10) counts this much beside the alignment error; "
+        "furniture only stands upright",
     )
     maximum_alignment_error: float = Field(
         0.08, gt=0.0, description="ours: candidates with a larger alignment error are no candidates [m]"

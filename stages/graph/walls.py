@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -13,15 +15,17 @@ NEAREST_SHARE = 0.02
 """The distance is that of the nearest 2 % of the object's points: one leaked vertex is no contact."""
 
 
-def wall_distance(child: Entity, wall: Entity, tree: cKDTree | None = None) -> float:
-    """Return the distance [m] from an object to a wall (or another upright layout entity).
+def wall_distance(child: Entity, wall: Entity, tree: cKDTree | None = None, limit: float = math.inf) -> float:
+    """Return the distance [m] from an object to a wall (or another upright layout entity); inf beyond `limit`.
 
     The thesis falls back to "the nearest wall by mesh distance". The wall is hidden just where the object hangs,
     so the distance to the plane behind the object counts too, where the object lies within the plane's rectangle.
     """
     tree = cKDTree(wall.points) if tree is None else tree
-    mesh_distance, _ = tree.query(child.points)
-    distances = [float(np.quantile(mesh_distance, NEAREST_SHARE))]
+    mesh_distance, _ = tree.query(child.points, distance_upper_bound=limit)
+    # The order statistic, as interpolation fails between infinite distances.
+    nearest = np.sort(mesh_distance)[int(NEAREST_SHARE * (len(mesh_distance) - 1))]
+    distances = [float(nearest)]
     for patch in wall.patches:
         plane = patch.plane
         if abs(plane.normal[2]) < 0.5 and within_rectangle(np.asarray(child.box.center), plane):
@@ -47,7 +51,7 @@ def wall_candidate(child: Entity, walls: list[Entity], limit: float, trees: dict
     The confidence falls linearly from 1 at contact to 0.5 at the limit. (The released code takes min(distance, 0) and
     so gives every wall the same score, and the first one every object.)
     """
-    measured = [(wall_distance(child, wall, trees[wall.name]), wall.instance, wall) for wall in walls]
+    measured = [(wall_distance(child, wall, trees[wall.name], 2 * limit), wall.instance, wall) for wall in walls]
     near = [entry for entry in measured if entry[0] <= limit]
     if not near:
         return None
