@@ -92,7 +92,7 @@ def loss_probability(
     step = min(1.0, max(0.0, (incidence - grazing_start) / (grazing_end - grazing_start)))
     grazing = step * step * (3.0 - 2.0 * step)
     signal = reflectance * np.cos(incidence) / (z * z)
-    dark = 1.0 / (1.0 + (signal / dark_signal) ** 4)
+    dark = dark_signal**4 / (dark_signal**4 + signal**4 + 1e-30)
     shiny = gloss * shine_loss * np.sin(incidence) ** 2
     return 1.0 - (1.0 - grazing) * (1.0 - dark) * (1.0 - shiny)
 
@@ -101,23 +101,22 @@ def loss_probability(
 def _projector_shadow(depth: np.ndarray, focal_length: float, baseline: float) -> np.ndarray:
     """Mark pixels (H, W) that the projector, left of the camera, cannot see.
 
-    A pixel u at depth z appears in projector column u + f b / z. Walking to the left, a column that was passed already
-    hides what would have to lie behind it.
+    A pixel u at depth z appears in projector column u + f b / z. Walking to the right, a column that was passed already
+    belongs to something nearer, which throws its shadow there.
     """
     height, width = depth.shape
     shadow = np.zeros((height, width), dtype=np.bool_)
     for v in prange(height):
-        least = 1e9
-        for k in range(width):
-            u = width - 1 - k
+        passed = -1e9
+        for u in range(width):
             z = depth[v, u]
             if z <= 0.0:
                 continue
             column = u + focal_length * baseline / z
-            if column > least + 0.5:
+            if column < passed - 0.5:
                 shadow[v, u] = True
             else:
-                least = min(least, column)
+                passed = max(passed, column)
     return shadow
 
 

@@ -63,8 +63,9 @@ class SceneRenderer:
     """Holds meshes in the world frame as one Embree scene.
 
     `meshes` are `(instance id, mesh)` pairs with face, vertex or texture colours, or a soup made of such (which has its
-    materials); `materials` add patterns and gloss by instance id. Without a light map the colour of a light is what a matt white surface that faces it returns, at any
-    distance; with one it is the lamp's radiance. Raises BadInput for an empty scene.
+    materials); `materials` add patterns and gloss by instance id. Without a light map the colour of a light is what a
+    matt white surface that faces it returns, at any distance; with one it is the lamp's radiance. Raises BadInput for
+    an empty scene.
     """
 
     def __init__(
