@@ -16,6 +16,8 @@ class UrdfParameters(Parameters):
         (), description="Further classes to put on floating joints (default: vocabulary)"
     )
     fixed_classes: tuple[str, ...] = Field((), description="Classes to fix although the vocabulary calls them movable")
+    settle_seconds: float = Field(1.0, ge=0, le=30, description="Simulated time of the settle test, 0 for none [s]")
+    settle_distance: float = Field(0.05, gt=0, description="A movable body that moves further is called unstable [m]")
 
 
 STAGE = Stage(
@@ -25,6 +27,6 @@ STAGE = Stage(
     parameters=UrdfParameters,
     reads={"cad_scene": CadScene},
     writes=InteractiveScene,
-    libraries=("numpy", "scipy", "trimesh"),
+    libraries=("numpy", "scipy", "trimesh", "pybullet"),
     example="scenewright urdf --cad-scene outputs/demo/cad_scene --out outputs/demo/interactive_scene",
 )

@@ -254,7 +254,8 @@ def test_mjcf_has_the_same_tree(bundle):
         child.get("name"): parent.get("name", "world") for parent in world.iter() for child in parent.findall("body")
     }
     assert parents == {
-        "floor_1": "world", "wall_2": "world", "table_3": "floor_1", "fridge_4": "floor_1", "fridge_4__door": "fridge_4",
+        "floor_1": "world", "wall_2": "world", "table_3": "floor_1", "fridge_4": "floor_1",
+        "fridge_4__door": "fridge_4",
         "cup_5": "world", "bottle_6": "world", "cup_7": "world",
     }  # fmt: skip
     free = {body.get("name") for body in world.findall("body") if body.find("freejoint") is not None}

@@ -49,7 +49,7 @@ def cad_scene(library, tmp_path) -> CadScene:
 def test_supports_become_joints_by_what_is_movable(cad_scene, tmp_path):
     made = run(cad_scene, parameters=UrdfParameters(), context=context(tmp_path / "out"))
     assert made.outcome == "ok"
-    assert made.summary == {"bodies": 8, "movable": 3, "joints": 1, "cad_models": 5}
+    assert made.summary == {"bodies": 8, "movable": 3, "joints": 1, "cad_models": 5, "unstable": 1}
     joints = {joint.child: (joint.parent, joint.type) for joint in parse_urdf(made.path("scene.urdf")).joints}
     assert joints["cup_5"] == ("table_3", "floating")
     assert joints["table_3"] == ("floor_1", "fixed")
@@ -60,6 +60,14 @@ def test_supports_become_joints_by_what_is_movable(cad_scene, tmp_path):
     pose = np.array(monitor.world_from_body)
     visual = trimesh.load(made.root / "meshes/monitor_8/visual.obj", force="mesh", process=False)
     assert (visual.bounds + pose[:3, 3])[0] == pytest.approx([-0.1, -0.3, 0.7], abs=0.01)
+
+
+def test_what_hangs_in_the_air_is_named(cad_scene, tmp_path, caplog):
+    run(cad_scene, parameters=UrdfParameters(), context=context(tmp_path / "out"))
+    messages = [record.getMessage() for record in caplog.records]
+    assert [message.split()[0] for message in messages] == ["cup_7"]
+    made = run(cad_scene, parameters=UrdfParameters(settle_seconds=0), context=context(tmp_path / "unsettled"))
+    assert made.summary["unstable"] == 0
 
 
 def test_movability_can_be_overruled(cad_scene, tmp_path):
