@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-from scipy.ndimage import distance_transform_edt
 
 from schemas.scene_parts import Camera
 from stages.ingest.source import LoadedFrame, Unusable
@@ -45,15 +44,25 @@ def color_in_depth_camera(
     picture has no holes. Depth, its camera and the poses stay as they are. A surface that the colour camera cannot
     see behind a nearer one gets the nearer one's colour: a seam of a few pixels.
     """
-    if depth.any():
-        nearest = distance_transform_edt(depth <= 0, return_distances=False, return_indices=True)
-        depth = depth[tuple(nearest)]
-    else:
-        depth = np.ones_like(depth)
+    depth = filled_depth(depth)
     # Depth quantisation must not fray the edges of the picture.
-    depth = cv2.medianBlur(depth.astype(np.float32), 5)
-    points = back_project(depth, depth_camera) @ color_from_depth[:3, :3].T + color_from_depth[:3, 3]
-    z = np.maximum(points[..., 2], 1e-3)
-    u = (color_camera.fx * points[..., 0] / z + color_camera.cx).astype(np.float32)
-    v = (color_camera.fy * points[..., 1] / z + color_camera.cy).astype(np.float32)
+    depth = cv2.medianBlur(depth, 5)
+    motion = color_from_depth.astype(np.float32)
+    points = back_project(depth, depth_camera) @ motion[:3, :3].T + motion[:3, 3]
+    z = np.maximum(points[..., 2], np.float32(1e-3))
+    u = np.float32(color_camera.fx) * points[..., 0] / z + np.float32(color_camera.cx)
+    v = np.float32(color_camera.fy) * points[..., 1] / z + np.float32(color_camera.cy)
     return cv2.remap(color, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+
+
+def filled_depth(depth: np.ndarray) -> np.ndarray:
+    """Return depth (H, W) float32 [m] in which every invalid pixel has the depth of the nearest valid one (1 m when
+    there is none)."""
+    valid = depth > 0
+    if not valid.any():
+        return np.ones(depth.shape, np.float32)
+    hole = (~valid).astype(np.uint8)
+    _, nearest = cv2.distanceTransformWithLabels(hole, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    values = np.zeros(int(nearest.max()) + 1, np.float32)
+    values[nearest[valid]] = depth[valid]
+    return values[nearest]
