@@ -1,0 +1,59 @@
+"""execution.mcap: where every body and link was, and what a camera saw, in Foxglove's schemas; the same bytes always."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
+from mcap_protobuf.schema import build_file_descriptor_set
+
+from schemas.scene_parts import Camera
+from stages.kit.formats import foxglove
+from stages.plan.recording import Snapshot
+
+COLOR, CALIBRATION, TRANSFORMS = "/camera/color", "/camera/calibration", "/tf"
+_KINDS = {COLOR: CompressedImage, CALIBRATION: CameraCalibration, TRANSFORMS: FrameTransforms}
+
+
+def write_execution(
+    path: Path,
+    snapshots: Iterable[Snapshot],
+    images: dict[int, np.ndarray],
+    camera: Camera,
+    world_from_camera: np.ndarray,
+) -> None:
+    """Write the snapshots as FrameTransforms (world -> every link and body), and images (H, W, 3) by snapshot index."""
+    with Path(path).open("wb") as file:
+        writer = McapWriter(file, chunk_size=1 << 20, compression=CompressionType.ZSTD)
+        writer.start(profile="", library="scenewright")
+        channels = {}
+        for topic, kind in _KINDS.items():
+            data = build_file_descriptor_set(kind).SerializeToString(deterministic=True)
+            schema = writer.register_schema(kind.DESCRIPTOR.full_name, "protobuf", data)
+            channels[topic] = writer.register_channel(topic, "protobuf", schema)
+        last = -1
+        for index, snapshot in enumerate(snapshots):
+            stamp = foxglove.nanoseconds(snapshot.time)
+            if stamp <= last:
+                continue
+            last = stamp
+            poses = {**snapshot.links, "camera": world_from_camera}
+            message = FrameTransforms()
+            for name in sorted(poses):
+                message.transforms.extend(foxglove.transforms_message(stamp, "world", name, poses[name]).transforms)
+            _add(writer, channels[TRANSFORMS], stamp, message)
+            if index in images:
+                _add(writer, channels[CALIBRATION], stamp, foxglove.calibration_message(stamp, camera, "camera"))
+                jpeg = foxglove.encode_jpeg(images[index])
+                _add(writer, channels[COLOR], stamp, foxglove.color_message(stamp, jpeg, "camera"))
+        writer.finish()
+
+
+def _add(writer: McapWriter, channel: int, stamp: int, message) -> None:  # noqa: ANN001 (a protobuf message)
+    writer.add_message(channel, stamp, message.SerializeToString(deterministic=True), publish_time=stamp)

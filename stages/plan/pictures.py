@@ -1,0 +1,130 @@
+"""Pictures of the execution: coloured meshes of the room and of the robot, posed as a snapshot says, ray cast."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import trimesh
+
+from schemas.interactive_scene import SceneBody
+from schemas.scene_parts import Camera
+from stages.kit.geometry.transforms import apply, look_at
+from stages.kit.rendering.ray_casting import SceneRenderer
+from stages.kit.rendering.surfaces import TriangleSoup, build_soup
+from stages.kit.simulation.robot_description import PEDESTAL_LINK, RobotDescription, mobile_robot_urdf
+from stages.kit.simulation.shapes import link_shapes
+from stages.kit.simulation.world import PhysicsWorld
+from stages.plan.recording import Snapshot
+
+ROBOT_COLORS = {"hand": (70, 72, 78), "finger": (40, 42, 46), PEDESTAL_LINK: (58, 66, 84), "link": (236, 238, 240)}
+PALETTE = ((166, 143, 120), (139, 158, 171), (171, 139, 139), (146, 164, 136), (181, 166, 127), (150, 141, 168))
+
+
+def _moved(soup: TriangleSoup, pose: np.ndarray) -> TriangleSoup:
+    turn = pose[:3, :3].T.astype(np.float32)
+    return replace(
+        soup,
+        corners=soup.corners @ turn + pose[:3, 3].astype(np.float32),
+        face_normals=soup.face_normals @ turn,
+        corner_normals=soup.corner_normals @ turn,
+    )
+
+
+def _joined(soups: list[TriangleSoup]) -> TriangleSoup:
+    names = ("corners", "face_normals", "corner_normals", "corner_colors", "instance", "material")
+    columns = {name: np.concatenate([getattr(soup, name) for soup in soups]) for name in names}
+    return TriangleSoup(**columns, material_table=soups[0].material_table)
+
+
+def _painted(mesh: trimesh.Trimesh, color: tuple[int, int, int]) -> trimesh.Trimesh:
+    plain = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    plain.visual.face_colors = np.tile(np.array([*color, 255], dtype=np.uint8), (len(mesh.faces), 1))
+    return plain
+
+
+class RoomPictures:
+    """Renders snapshots of one room. Meshes are prepared once; each picture poses the moving ones anew."""
+
+    def __init__(
+        self, world: PhysicsWorld, records: dict[str, SceneBody], texts: dict[str, str], robot: RobotDescription
+    ) -> None:
+        self._still: list[TriangleSoup] = []
+        self._shell: list[TriangleSoup] = []
+        """Walls and ceilings: in pictures from inside, not in those from above."""
+        self._moving: dict[str, TriangleSoup] = {}
+        low, high = [], []
+        for number, (name, record) in enumerate(records.items(), start=1):
+            shapes = link_shapes(texts[name], "visual")
+            parts = {joint.part for joint in record.joints}
+            for link, meshes in shapes.items():
+                colored = [mesh if mesh.visual.kind else _painted(mesh, PALETTE[number % len(PALETTE)]) for mesh in meshes]
+                if not any(len(mesh.faces) for mesh in colored):
+                    continue
+                soup = build_soup([(number, mesh) for mesh in colored])
+                if record.movable or link in parts:
+                    self._moving[link] = soup
+                    continue
+                placed = _moved(soup, world.link_pose(name, link))
+                if record.class_name in ("wall", "ceiling"):
+                    self._shell.append(placed)
+                else:
+                    self._still.append(placed)
+                    low.append(placed.corners.min(axis=(0, 1)))
+                    high.append(placed.corners.max(axis=(0, 1)))
+        self.low, self.high = np.min(low, axis=0), np.max(high, axis=0)
+        for link, meshes in link_shapes(mobile_robot_urdf(robot)).items():
+            if meshes:
+                color = next(color for key, color in ROBOT_COLORS.items() if key in link)
+                self._moving[f"robot/{link}"] = build_soup([(10_000, _painted(mesh, color)) for mesh in meshes])
+
+    def _renderer(self, snapshot: Snapshot, shell: bool) -> SceneRenderer:
+        moving = [_moved(soup, snapshot.links[link]) for link, soup in self._moving.items() if link in snapshot.links]
+        return SceneRenderer(_joined([*self._still, *(self._shell if shell else []), *moving]))
+
+    def overview(self, snapshot: Snapshot, camera: Camera) -> np.ndarray:
+        """Return (H, W, 3) uint8: the whole room from above and aside, without walls and ceiling."""
+        return self._renderer(snapshot, False).render(camera, self.overview_pose(camera)).color
+
+    def overview_pose(self, camera: Camera) -> np.ndarray:
+        """Return world_from_camera (4, 4) of the overview."""
+        middle = (self.low + self.high) / 2
+        size = self.high - self.low
+        distance = 0.62 * float(np.hypot(size[0], size[1])) * camera.fx / camera.width * 1.9
+        direction = np.array([-0.45, -0.62, 0.75]) if size[0] >= size[1] else np.array([0.62, -0.45, 0.75])
+        eye = middle + distance * direction / np.linalg.norm(direction)
+        return look_at(eye, np.array([middle[0], middle[1], 0.4]))
+
+    def near(self, snapshot: Snapshot, camera: Camera) -> np.ndarray:
+        """Return (H, W, 3) uint8: the robot at work, from the place in the room where most of it can be seen."""
+        renderer = self._renderer(snapshot, True)
+        robot = np.array([snapshot.links[f"robot/{name}"][:3, 3] for name in sorted(_shown(snapshot))])
+        hand = snapshot.links["robot/panda_hand"] if "robot/panda_hand" in snapshot.links else np.eye(4)
+        points = np.concatenate([robot, apply(hand, np.array([[0, 0, 0.05], [0, 0, 0.1], [0, 0, 0.12]]))])
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        best: tuple[float, np.ndarray] | None = None
+        for height in (1.7, 2.15):
+            for angle in np.linspace(0, 2 * np.pi, 16, endpoint=False):
+                for distance in (1.6, 2.0, 2.5):
+                    eye = np.array([*(middle[:2] + distance * np.array([np.cos(angle), np.sin(angle)])), height])
+                    if np.any(eye[:2] < self.low[:2] + 0.15) or np.any(eye[:2] > self.high[:2] - 0.15):
+                        continue
+                    hidden = renderer.occluded(points + 0.08 * (eye - points) / distance, np.tile(eye, (len(points), 1)))
+                    close = float(renderer.distance(eye[None])[0])
+                    score = float(np.mean(~hidden)) + min(close, 0.3) - 0.05 * abs(distance - 2.0)
+                    if best is None or score > best[0] + 1e-6:
+                        best = (score, eye)
+        eye = best[1] if best is not None else middle + np.array([0.0, 0.0, 2.5])
+        up_target = np.array([middle[0], middle[1], 0.85 * middle[2] + 0.05])
+        return renderer.render(camera, look_at(eye, up_target)).color
+
+
+def _shown(snapshot: Snapshot) -> list[str]:
+    return [name[6:] for name in snapshot.links if name.startswith("robot/panda_link") or name == "robot/panda_hand"]
+
+
+def picture_camera(width: int, field_of_view: float = 1.15) -> Camera:
+    """Return a camera of 3:2 pictures with a horizontal field of view [rad]."""
+    height = round(width * 2 / 3)
+    focal = width / 2 / np.tan(field_of_view / 2)
+    return Camera(width=width, height=height, fx=focal, fy=focal, cx=(width - 1) / 2, cy=(height - 1) / 2)

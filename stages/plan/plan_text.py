@@ -1,0 +1,37 @@
+"""plan.txt: the plan and what came of it, for people."""
+
+from __future__ import annotations
+
+from schemas.plan import PlanFile
+from stages.plan.refinement import Step
+
+
+def plan_text(plan: PlanFile, steps: list[Step]) -> str:
+    """Return the plan as plain text: goal, actions, checks, failures, assumptions."""
+    lines = [f"goal: {', '.join(plan.goal) or 'none'}", f"status: {plan.status}"]
+    where = f"planned in the {plan.planned_in} scene"
+    if plan.executed_in is not None:
+        where += f", executed in the {plan.executed_in.replace('_', ' ')} room"
+    lines += [where, "", "actions:"]
+    for number, (action, step) in enumerate(zip(plan.actions, steps, strict=True), start=1):
+        x, y = action.base_pose[0][3], action.base_pose[1][3]
+        lines.append(f"{number:3d}. {step.text}   base at ({x:.2f}, {y:.2f}) m, rows {action.start} to {action.end}")
+    if not steps:
+        lines.append("  none")
+    if plan.checks:
+        lines += ["", "checked after execution:"]
+        lines += [f"  {'yes' if check.holds else 'NO '} {check.condition}: {check.detail}" for check in plan.checks]
+    if plan.matches:
+        lines += ["", "bodies of the plan in the room:"]
+        for match in plan.matches:
+            away = "" if match.distance is None else f" ({match.distance:.3f} m apart)"
+            lines.append(f"  {match.body} is {match.matched or 'nowhere'}{away}")
+    if plan.failures:
+        lines += ["", "failures on the way:"]
+        for failure in plan.failures:
+            action = f" in {failure.action}" if failure.action else ""
+            lines.append(f"  {failure.kind}{action}: {failure.message}")
+    if plan.assumptions:
+        lines += ["", "what the execution was allowed to know:"]
+        lines += [f"  - {text}" for text in plan.assumptions]
+    return "\n".join([*lines, ""])

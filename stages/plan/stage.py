@@ -1,0 +1,283 @@
+"""The step `plan`: symbols and geometry in the planned scene, execution in physics, checks, pictures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.base import as_transform
+from schemas.contact_graph import ContactGraphFile
+from schemas.ground_truth import GroundTruth
+from schemas.interactive_scene import InteractiveScene
+from schemas.plan import BodyMatch, Check, Failure, Plan, PlanFile, PlannedAction
+from stages.kit.geometry.transforms import transform_from_yaw
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.simulation.robot import Configuration
+from stages.kit.simulation.robot_description import load_robot
+from stages.kit.simulation.world import load_scene, read_scene_bodies
+from stages.kit.stage import Context
+from stages.plan.checks import check_goal
+from stages.plan.conduct import Conduct, Room, joint_pairs
+from stages.plan.correspondence import match_bodies
+from stages.plan.execution import PhysicalRobot
+from stages.plan.execution_log import write_execution
+from stages.plan.goals import default_goals
+from stages.plan.parameters import PlanParameters
+from stages.plan.pddl import domain_text, problem_text
+from stages.plan.pick_place import Budgets
+from stages.plan.pictures import RoomPictures, picture_camera
+from stages.plan.plan_text import plan_text
+from stages.plan.refinement import Attempt, Step, plan_and_refine
+from stages.plan.start_pose import start_base
+from stages.plan.strips import Atom
+from stages.plan.symbols import DOMAIN, parse_goal, symbolic_state, task_problem
+from stages.plan.trajectories import executed_rows, planned_rows, write_trajectory
+from stages.plan.updated_graph import update_graph
+from stages.plan.world_model import RobotState, WorldModel, body_planes
+
+RECORD_RATE = 20.0
+SETTLE_SECONDS = 1.0
+START, SEARCH, EXECUTION = 1, 2, 3
+"""Random streams."""
+LOOK = (
+    "before each action the robot saw pose, joint values and shape of the bodies that the action names, as they are in "
+    "the room (stands for a wrist camera's look); everything else it knew from the planned scene"
+)
+PROPRIOCEPTION = "the pose of a held item in the hand was read from the simulation"
+GRIP = "items are held by friction of the two fingers alone; no constraint is added"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What goes into plan.json beyond the plan itself."""
+
+    executed_in: str | None
+    carried_out: bool
+    checks: tuple[Check, ...]
+    matches: tuple[BodyMatch, ...]
+    assumptions: tuple[str, ...]
+    failures: tuple[Failure, ...]
+
+
+def run(
+    scene: InteractiveScene, ground_truth: GroundTruth | None, *, parameters: PlanParameters, context: Context
+) -> Plan:
+    """Plan in `scene`; execute in the true room of `ground_truth`, or in `scene` itself when there is none."""
+    robot = load_robot(parameters.robot)
+    budgets = Budgets(
+        parameters.base_samples, parameters.pair_samples, parameters.path_samples, parameters.path_searches
+    )
+    graph = scene.graph
+    with context.progress.step("load the scene"):
+        model = WorldModel(scene.root, graph, robot, parameters.clearance)
+    try:
+        objects, initial = symbolic_state(model, graph)
+        failures: list[Failure] = []
+        candidates = [parameters.goal] if parameters.goal else default_goals(model, initial)
+        goals = [parse_goal(literals, objects) for literals in candidates]
+        try:
+            base = start_base(model, robot.carry, context.random(START))
+        except MotionFailed as failed:
+            base, goals = np.zeros(3), goals[:1]
+            failures.append(failed.failure)
+        state = RobotState(base, robot.carry)
+        with context.progress.step("plan"):
+            goal, literals, attempt = _first_feasible(
+                model, state, goals if not failures else [], objects, initial, budgets, parameters, context, failures
+            )
+        if not goals:
+            failures.append(_nothing_to_do(model, initial))
+        problem = task_problem(objects, initial, goal)
+        context.output.joinpath("domain.pddl").write_text(domain_text(DOMAIN), encoding="utf-8")
+        context.output.joinpath("problem.pddl").write_text(problem_text(problem, DOMAIN.name), encoding="utf-8")
+        steps = attempt.steps if attempt is not None else None
+        rows, ranges = planned_rows(steps or [], robot)
+        outcome = Outcome(None, False, (), (), (), ())
+        arrays = dict(rows)
+        updated = graph
+        if steps is not None and parameters.execute:
+            with context.progress.step("execute"):
+                outcome, snapshots, updated = _execute(
+                    model, scene, ground_truth, graph, state, steps, literals, budgets, parameters, context
+                )
+            arrays |= snapshots
+        return _write(parameters, context, literals, steps, ranges, failures, outcome, arrays, updated)
+    finally:
+        model.close()
+
+
+def _first_feasible(
+    model: WorldModel, state: RobotState, goals: list[tuple[frozenset[Atom], tuple[str, ...]]], objects: dict[str, str],
+    initial: frozenset[Atom], budgets: Budgets, parameters: PlanParameters, context: Context, failures: list[Failure],
+) -> tuple[frozenset[Atom], tuple[str, ...], Attempt | None]:  # fmt: skip
+    """Try the goals in order; return the first with a plan, or the first of all without one. Failures are collected."""
+    for number, (goal, literals) in enumerate(goals):
+        attempt = plan_and_refine(
+            model, state, DOMAIN, task_problem(objects, initial, goal), budgets, context.random(SEARCH, number),
+            heuristic=parameters.heuristic, task_attempts=parameters.task_attempts,
+            refinement_attempts=parameters.refinement_attempts,
+        )  # fmt: skip
+        failures += attempt.failures
+        if attempt.steps is not None:
+            return goal, literals, attempt
+    return (*goals[0], None) if goals else (frozenset(), (), None)
+
+
+def _nothing_to_do(model: WorldModel, initial: frozenset[Atom]) -> Failure:
+    inside = sum(atom[0] == "in" for atom in initial)
+    tables = sum(record.class_name in ("table", "desk") for record in model.records.values())
+    return Failure(
+        kind="no_goal",
+        message=f"the scene has {inside} items behind doors and {tables} tables: the demo's goal needs one of each",
+        numbers={"items_inside": float(inside), "tables": float(tables)},
+    )
+
+
+def _execute(
+    model: WorldModel, scene: InteractiveScene, ground_truth: GroundTruth | None, graph: ContactGraphFile,
+    state: RobotState, steps: list[Step], literals: tuple[str, ...], budgets: Budgets, parameters: PlanParameters,
+    context: Context,
+) -> tuple[Outcome, dict[str, np.ndarray], ContactGraphFile]:  # fmt: skip
+    """Carry out the steps in the room, write pictures and log, and return what came of it."""
+    root = scene.root if ground_truth is None else ground_truth.path("room")
+    nodes = {node.id: node for node in (graph if ground_truth is None else ground_truth.graph).nodes}
+    bodies = read_scene_bodies(root)
+    records = {name: record for name, (record, _) in bodies.items()}
+    texts = {name: text for name, (_, text) in bodies.items()}
+    planes = {}
+    for name in records:
+        known = nodes[name].planes if name in nodes else ()
+        flat = any(plane.horizontal and len(plane.corners) == 4 for plane in known)
+        planes[name] = known if flat else known + body_planes(records[name], texts[name])
+    planned = dict(model.records)
+    matches = match_bodies(planned, records, parameters.match_radius)
+    joint_names = joint_pairs(planned, records, matches)
+    with load_scene(root) as world:
+        start = Configuration(state.base, state.arm, model.description.opening)
+        physical = PhysicalRobot(world, model.description, start, RECORD_RATE)
+        physical.wait(SETTLE_SECONDS)
+        poses = {name: world.pose(name) for name, record in records.items() if record.movable}
+        physical.recording.keyframe(-1, "start")
+        conduct = Conduct(
+            model, Room(records, texts, planes), physical, matches, joint_names, budgets, context.random(EXECUTION),
+            parameters.relocalize, parameters.execution_attempts,
+        )  # fmt: skip
+        carried_out = conduct.run(state, steps)
+        physical.wait(SETTLE_SECONDS)
+        physical.recording.keyframe(len(steps) - 1, "end")
+        checks = check_goal(world, literals, matches, joint_names, physical.held)
+        updated = _updated(graph, planned, matches, joint_names, conduct, poses, checks)
+        with context.progress.step("pictures"):
+            _draw(RoomPictures(world, records, texts, model.description), physical, parameters, context)
+    named = {name for step in steps for name in step.arguments} | {
+        name for name in planned for step in steps for argument in step.arguments if argument.startswith(f"{name}__")
+    }
+    assumptions = (LOOK, PROPRIOCEPTION, GRIP) if parameters.relocalize else ("the planned motion was replayed", GRIP)
+    outcome = Outcome(
+        "reconstructed" if ground_truth is None else "ground_truth", carried_out, checks,
+        tuple(match for name, match in matches.items() if name in named), assumptions, tuple(conduct.failures),
+    )  # fmt: skip
+    return outcome, executed_rows(physical.recording.snapshots), updated
+
+
+def _updated(
+    graph: ContactGraphFile, planned: dict, matches: dict[str, BodyMatch], joint_names: dict[str, str],
+    conduct: Conduct, before: dict[str, np.ndarray], checks: tuple[Check, ...],
+) -> ContactGraphFile:  # fmt: skip
+    """Return the planned scene's graph with what the execution changed: moved items, their parents, joint values."""
+    world = conduct.physical.world
+    moved, joints = {}, {}
+    for name, match in matches.items():
+        if match.matched is None:
+            continue
+        if match.matched in before:
+            now = world.pose(match.matched)
+            change = now @ np.linalg.inv(before[match.matched])
+            if np.linalg.norm(now[:3, 3] - before[match.matched][:3, 3]) > 0.05:
+                old = np.array(planned[name].world_from_body)
+                moved[name] = (old, change @ old)
+        values = {
+            joint.name.removeprefix(f"{name}__"): round(world.joint_value(match.matched, joint_names[joint.name]), 6)
+            for joint in planned[name].joints
+            if joint.name in joint_names
+        }
+        if values:
+            joints[name] = values
+    parents = {}
+    for check in checks:
+        predicate, inner = check.condition.rstrip(")").split("(")
+        names = [word.strip() for word in inner.split(",")]
+        if check.holds and predicate in ("on", "in"):
+            parents[names[0]] = (names[1], "supports" if predicate == "on" else "contains")
+    return update_graph(graph, moved, parents, joints)
+
+
+def _draw(pictures: RoomPictures, physical: PhysicalRobot, parameters: PlanParameters, context: Context) -> None:
+    import cv2
+
+    recording = physical.recording
+    folder = context.output / "keyframes"
+    folder.mkdir()
+    camera = picture_camera(parameters.image_width)
+    for number, (index, label) in enumerate(context.progress.track(recording.keyframes, description="key frames")):
+        image = pictures.near(recording.snapshots[index], camera)
+        cv2.imwrite(str(folder / f"{number:02d}_{label}.png"), cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+    small = picture_camera(min(480, parameters.image_width), 0.8)
+    images: dict[int, np.ndarray] = {}
+    if parameters.video_rate > 0:
+        every = max(1, round(RECORD_RATE / parameters.video_rate))
+        wanted = list(range(0, len(recording.snapshots), every))
+        for index in context.progress.track(wanted, description="video"):
+            images[index] = pictures.overview(recording.snapshots[index], small)
+    write_execution(
+        context.output / "execution.mcap", recording.snapshots, images, small, pictures.overview_pose(small)
+    )
+
+
+def _write(
+    parameters: PlanParameters, context: Context, literals: tuple[str, ...], steps: list[Step] | None,
+    ranges: list[tuple[int, int]], failures: list[Failure], outcome: Outcome, arrays: dict[str, np.ndarray],
+    graph: ContactGraphFile,
+) -> Plan:  # fmt: skip
+    actions = tuple(
+        PlannedAction(
+            name=step.name, arguments=step.arguments, start=start, end=end, base_pose=as_transform(_base(step))
+        )
+        for step, (start, end) in zip(steps or [], ranges, strict=True)
+    )
+    reached = bool(outcome.checks) and all(check.holds for check in outcome.checks)
+    if steps is None:
+        status = "infeasible"
+    elif outcome.executed_in is None:
+        status = "planned"
+    else:
+        status = "executed" if reached else "execution_failed"
+    unmet = tuple(
+        Failure(kind="condition_not_met", message=f"{check.condition} does not hold: {check.detail}",
+                numbers=check.numbers)
+        for check in outcome.checks if not check.holds
+    )  # fmt: skip
+    plan = PlanFile(
+        goal=literals, planned_in="reconstructed", executed_in=outcome.executed_in, actions=actions,
+        failures=(*failures, *outcome.failures, *unmet), checks=outcome.checks, status=status,
+        matches=outcome.matches, assumptions=outcome.assumptions,
+    )  # fmt: skip
+    plan.write(context.output / "plan.json")
+    graph.write(context.output / "graph.json")
+    write_trajectory(context.output / "trajectory.npz", arrays)
+    context.output.joinpath("plan.txt").write_text(plan_text(plan, steps or []), encoding="utf-8")
+    for name in ("keyframes",):
+        (context.output / name).mkdir(exist_ok=True)
+    ok = status in ("executed", "planned")
+    summary = {
+        "goal": " ".join(literals), "status": status, "actions": len(actions),
+        "checks": f"{sum(check.holds for check in outcome.checks)}/{len(outcome.checks)}",
+        "failures": len(plan.failures),
+    }  # fmt: skip
+    return Plan(context.output, outcome="ok" if ok else status, summary=summary)
+
+
+def _base(step: Step) -> np.ndarray:
+    x, y, yaw = step.segments[-1].path[-1, :3]
+    return transform_from_yaw(float(yaw), np.array([x, y, 0.0]))

@@ -1,0 +1,40 @@
+"""Where the robot stands at the beginning: the roomiest free place of the floor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.kit.motion.failures import MotionFailed
+from stages.plan.world_model import WorldModel
+
+SHELL = ("floor", "wall", "ceiling")
+
+
+def start_base(model: WorldModel, arm: np.ndarray, random: np.random.Generator, count: int = 400) -> np.ndarray:
+    """Return a base pose (3,) x, y [m], yaw [rad]: of `count` random free ones, the farthest from furniture and walls.
+
+    Distances are to the boxes of bodies below 1 m, in the plane. Raises MotionFailed `start_in_collision` when no
+    sample is free.
+    """
+    low, high = model.room
+    boxes = []
+    for name, record in model.records.items():
+        if record.class_name in SHELL:
+            continue
+        bottom, top = model.world.bounds(name)
+        if bottom[2] < 1.0:
+            boxes.append((bottom[:2], top[:2]))
+    places = random.uniform(low + 0.2, high - 0.2, size=(count, 2))
+    turns = random.uniform(-np.pi, np.pi, size=count)
+    distance = np.minimum((places - low).min(axis=1), (high - places).min(axis=1))
+    for bottom, top in boxes:
+        away = np.maximum(np.maximum(bottom - places, places - top), 0.0)
+        distance = np.minimum(distance, np.linalg.norm(away, axis=1))
+    for index in np.argsort(-distance, kind="stable"):
+        base = np.array([*places[index], turns[index]])
+        collision = model.checker.check(np.concatenate([base, arm]))
+        if collision is None:
+            return base
+    raise MotionFailed(
+        "start_in_collision", f"none of {count} places on the floor is free for the robot", (), {"tried": count}
+    )
