@@ -27,7 +27,7 @@ class GeometricSettings:
 
     smoothing_window: int = 7
     smoothing_deviation: float = 0.009
-    normal_window: int = 13
+    normal_window: int = 9
     normal_step: int = 2
     normal_distance_factor: float = 0.05
     convexity_window: int = 5
@@ -82,20 +82,18 @@ def _minimum_convexity(
             smallest = np.float32(1.0)
             for row in range(max(0, v - half), min(height, v + half + 1)):
                 for column in range(max(0, u - half), min(width, u + half + 1)):
-                    if points[row, column, 2] <= 0.0:
+                    mx, my, mz = normals[row, column, 0], normals[row, column, 1], normals[row, column, 2]
+                    cosine = mx * nx + my * ny + mz * nz
+                    if cosine >= smallest or points[row, column, 2] <= 0.0:
                         continue
                     dx = points[row, column, 0] - px
                     dy = points[row, column, 1] - py
                     dz = points[row, column, 2] - pz
-                    mx, my, mz = normals[row, column, 0], normals[row, column, 1], normals[row, column, 2]
                     over = dx * nx + dy * ny + dz * nz
                     if mutual:
                         over -= dx * mx + dy * my + dz * mz
                     # A neighbour on or below the tangent plane is convex (1); one above it counts by its normal.
-                    if -over > mask_threshold:
-                        continue
-                    cosine = mx * nx + my * ny + mz * nz
-                    if cosine < smallest:
+                    if -over <= mask_threshold:
                         smallest = cosine
             result[v, u] = smallest
     return result
@@ -216,13 +214,27 @@ def _sole_neighbours(labels: np.ndarray, small: np.ndarray) -> np.ndarray:
     return sole
 
 
+@njit(cache=True)
+def _relabel(labels: np.ndarray, largest: int) -> np.ndarray:
+    height, width = labels.shape
+    number = np.zeros(largest + 1, dtype=np.int32)
+    result = np.zeros((height, width), dtype=np.int32)
+    count = 0
+    for v in range(height):
+        for u in range(width):
+            label = labels[v, u]
+            if label == 0:
+                continue
+            if number[label] == 0:
+                count += 1
+                number[label] = count
+            result[v, u] = number[label]
+    return result
+
+
 def relabel(labels: np.ndarray) -> np.ndarray:
-    """Return the labels (H, W) renumbered 1..n in the order in which they first appear row by row; 0 stays."""
-    values, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
-    order = np.argsort(np.where(values == 0, -1, first), kind="stable")
-    rank = np.empty(values.size, dtype=np.int32)
-    rank[order] = np.arange(values.size, dtype=np.int32) + (0 if values.size and (values == 0).any() else 1)
-    return rank[inverse].reshape(labels.shape)
+    """Return the labels (H, W) >= 0 renumbered 1..n in the order in which they first appear row by row; 0 stays."""
+    return _relabel(labels, int(labels.max(initial=0)))
 
 
 def label_regions(

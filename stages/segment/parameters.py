@@ -34,7 +34,9 @@ class SegmentParameters(Parameters):
     smoothing_deviation: float = Field(
         0.009, gt=0, description="Depth steps under this are smoothed as noise, over it kept [1/m]"
     )
-    normal_window: int = Field(13, ge=3, le=31, description="Window of the normals [pixels, odd]")
+    normal_window: int = Field(
+        9, ge=3, le=31, description="Window of the normals [pixels, odd]; published: 13, on depth that is not smoothed"
+    )
     normal_step: int = Field(2, ge=1, le=6, description="Every how many-th row and column of that window is used")
     normal_distance_factor: float = Field(
         0.05, gt=0, description="Points farther than this times the depth take no part in a normal"
