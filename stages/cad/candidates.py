@@ -38,7 +38,7 @@ class Shortlist:
     """Valid candidates, best first."""
     rejected: dict[str, int]
     reason: str
-    """Why there is no valid candidate; empty when there is one."""
+    """Why there is no valid candidate, or in what the valid ones fall short."""
 
 
 def models_for(class_name: str, models: tuple[CadModel, ...]) -> list[CadModel]:
@@ -51,16 +51,18 @@ def models_for(class_name: str, models: tuple[CadModel, ...]) -> list[CadModel]:
 
 def object_points(
     node: GraphNode, vertices: np.ndarray, normals: np.ndarray, count: int, random: np.random.Generator
-) -> np.ndarray:
-    """Return at most `count` points (N, 3) of the object's mesh, evenly spread, without what the graph left out."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return at most `count` points (N, 3) and normals of the object's mesh, evenly spread, without what the graph
+    left out."""
     if node.box_observed is not None:
         inside = points_in_box(node.box_observed, vertices, margin=BOX_MARGIN)
         if inside.any():
             vertices, normals = vertices[inside], normals[inside]
-    points, _ = thin_to_grid(vertices, normals, GRID)
+    points, normals = thin_to_grid(vertices, normals, GRID)
     if len(points) > count:
-        points = points[np.sort(random.choice(len(points), size=count, replace=False))]
-    return points
+        drawn = np.sort(random.choice(len(points), size=count, replace=False))
+        points, normals = points[drawn], normals[drawn]
+    return points, normals
 
 
 def support_height_of(node: GraphNode, graph: ContactGraphFile) -> float:
@@ -73,6 +75,7 @@ def support_height_of(node: GraphNode, graph: ContactGraphFile) -> float:
 def shortlist(
     node: GraphNode,
     points: np.ndarray,
+    normals: np.ndarray,
     graph: ContactGraphFile,
     models: list[CadModel],
     surfaces: dict[str, ModelSurface],
@@ -80,7 +83,7 @@ def shortlist(
 ) -> Shortlist:
     """Return the valid candidates of one object (sections 2.4.2, 2.4.3 and the first half of 2.4.4).
 
-    `points` (N, 3): vertices of the object; `surfaces`: model id -> surface for every model in `models`.
+    `points`, `normals` (N, 3): vertices of the object; `surfaces`: model id -> surface for every model in `models`.
     """
     if not models:
         return Shortlist(node, (), {}, f"the library has no model of class {node.class_name}")
@@ -120,7 +123,10 @@ def shortlist(
             rejected["aligned scale out of range"] += 1
             continue
         surface = surfaces[match.shape.model.id]
-        error = alignment_error(surface, placement, points[::SCREENING_STEP] if ours else points)
+        if ours:
+            error = alignment_error(surface, placement, points[::SCREENING_STEP], normals[::SCREENING_STEP])
+        else:
+            error = alignment_error(surface, placement, points)
         aligned.append((match, replace(placement, alignment_error=error)))
     if ours:
         # Planes alone rank badly where few were seen; vertices are the better judge of what deserves refinement.
@@ -132,23 +138,35 @@ def shortlist(
         surface = surfaces[match.shape.model.id]
         score = placement.alignment_error
         if ours:
-            placement = fitted(surface, placement, points, free_height=hangs)
+            placement = fitted(surface, placement, points, normals, free_height=hangs)
             score = (
-                placement.alignment_error
+                alignment_error(surface, placement, points, normals)
                 + parameters.misfit_weight * size_misfit(match.frame.size, placement)
                 + parameters.tilt_weight * match.tilt
             )
+            placement = replace(placement, alignment_error=alignment_error(surface, placement, points))
         placement = replace(placement, score=score)
         reason = why_invalid(placement, surface, node, graph, parameters)
         if reason is None:
             placements.append(placement)
         else:
             rejected[reason] += 1
+    fitting = len(placements)
+    missing = {id(p): unsupported_children(p, node, graph, parameters) for p in placements}
+    # One child that was badly seen must not cost a shelf its model: the best that exists will do, and the child goes
+    # on the nearest surface. The thesis discards all.
+    allowed = min((len(names) for names in missing.values()), default=0) if ours else 0
+    placements = [p for p in placements if len(missing[id(p)]) <= allowed]
+    rejected["does not support a child"] = fitting - len(placements)
     placements.sort(key=lambda p: p.score)
     unique = without_repeats(placements)
     rejected["same as a better candidate"] += len(placements) - len(unique)
     counted = {name: int(count) for name, count in sorted(rejected.items()) if count}
-    reason = "" if unique else "no valid candidate: " + ", ".join(f"{n} {k}" for n, k in counted.items())
+    reason = ""
+    if not unique:
+        reason = "no valid candidate: " + ", ".join(f"{name} {count}" for name, count in counted.items())
+    elif missing[id(unique[0])]:
+        reason = "does not quite support " + ", ".join(missing[id(unique[0])])
     return Shortlist(node, tuple(unique), counted, reason)
 
 
@@ -159,17 +177,29 @@ def why_invalid(
     graph: ContactGraphFile,
     parameters: CadParameters,
 ) -> str | None:
-    """Return why a placement is no candidate, or None: scale and error, (2.2) with every child, walls."""
+    """Return why a placement is no candidate whatever it carries, or None: scale, error, walls."""
     if not parameters.minimum_scale <= placement.scale <= parameters.maximum_scale:
         return "refined scale out of range"
     if parameters.method == "ours" and placement.alignment_error > parameters.maximum_alignment_error:
         return "alignment error too large"
+    if node.box is None:
+        return None
+    walls = [entry for entry in graph.nodes if entry.class_name == "wall"]
+    points = to_world(placement, surface.hull_points(placement.shape.joints))
+    if wall_depth(points, np.asarray(node.box.center), walls) > parameters.wall_penetration:
+        return "stands in a wall"
+    return None
+
+
+def unsupported_children(
+    placement: Placement, node: GraphNode, graph: ContactGraphFile, parameters: CadParameters
+) -> tuple[str, ...]:
+    """Return the children for which no surface of the placed model satisfies (2.2) near where they stand."""
     planes = placed_planes(placement)
+    missing = []
     for link in graph.links:
-        if link.source != node.id or link.relation not in ("supports", "contains"):
-            continue
         child = graph.node(link.target).box
-        if child is None:
+        if link.source != node.id or link.relation not in ("supports", "contains") or child is None:
             continue
         found = supporting_surface(
             planes,
@@ -179,14 +209,8 @@ def why_invalid(
             tolerance=parameters.support_tolerance,
         )
         if found is None:
-            return "does not support a child"
-    if node.box is None:
-        return None
-    walls = [entry for entry in graph.nodes if entry.class_name == "wall"]
-    points = to_world(placement, surface.hull_points(placement.shape.joints))
-    if wall_depth(points, np.asarray(node.box.center), walls) > parameters.wall_penetration:
-        return "stands in a wall"
-    return None
+            missing.append(link.target)
+    return tuple(missing)
 
 
 def without_repeats(placements: list[Placement]) -> list[Placement]:

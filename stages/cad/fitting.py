@@ -35,7 +35,13 @@ SAME_PART = 0.003
 
 
 def refine(
-    surface: ModelSurface, placement: Placement, points: np.ndarray, *, free_height: bool, iterations: int = ITERATIONS
+    surface: ModelSurface,
+    placement: Placement,
+    points: np.ndarray,
+    normals: np.ndarray,
+    *,
+    free_height: bool,
+    iterations: int = ITERATIONS,
 ) -> Placement:
     """Return the placement after iterative closest points in scale, yaw, shift and joint values, if that lowers the
     alignment error on the vertices (N, 3).
@@ -44,14 +50,14 @@ def refine(
     (the constraint on p_z in 2.11) unless `free_height` (things on walls stand on nothing). The thesis stops at the
     planes, whose offsets are biased where only edges or noise were seen, and at the stored states.
     """
-    best = replace(placement, alignment_error=alignment_error(surface, placement, points))
+    best = replace(placement, alignment_error=alignment_error(surface, placement, points, normals))
     scale, rotation, translation = placement.scale, placement.rotation, placement.translation
     joints, limits = dict(placement.shape.joints), surface.model.joints
     foot = float(to_world(placement, surface.hull_points(joints))[:, 2].min())
     prior = (SCALE_PRIOR * placement.scale * float(np.linalg.norm(placement.shape.size))) ** 2
     best_error, best_state = best.alignment_error, (scale, rotation, translation, dict(joints))
     for _ in range(iterations):
-        found = surface.closest((points - translation) @ rotation / scale, joints)
+        found = surface.closest((points - translation) @ rotation / scale, joints, normals @ rotation)
         error = scale * float(np.sqrt(np.mean(found.distance**2)))
         if error < best_error:
             best_error, best_state = error, (scale, rotation, translation, dict(joints))
@@ -79,7 +85,9 @@ def refine(
         right = jacobian.T @ (weight * gap)
         matrix[0, 0] += prior
         right[0] -= prior * math.log(scale / placement.scale)
-        step = np.linalg.solve(matrix, right)
+        values = np.array([joints.get(joint.name, 0.0) for joint in limits])
+        low, high = (np.array([getattr(joint, side) for joint in limits]) for side in ("lower", "upper"))
+        step = solve_within_limits(matrix, right, first_joint, low - values, high - values)
         growth, angle = math.exp(float(np.clip(step[0], -0.1, 0.1))), float(np.clip(step[1], -0.3, 0.3))
         shift = np.clip(np.array([step[2], step[3], step[4] if free_height else 0.0]), -0.2, 0.2)
         spin = turn_about_z(angle)
@@ -89,10 +97,32 @@ def refine(
             joints[joint.name] = float(np.clip(joints.get(joint.name, 0.0) + change, joint.lower, joint.upper))
         if np.abs(step).max() < 1e-4:
             break
-    final = _state(surface, placement, (scale, rotation, translation, joints), points)
+    final = _state(surface, placement, (scale, rotation, translation, joints), points, normals)
     if best_error < final.alignment_error:
-        final = _state(surface, placement, best_state, points)
+        final = _state(surface, placement, best_state, points, normals)
     return final if final.alignment_error < best.alignment_error else best
+
+
+def solve_within_limits(
+    matrix: np.ndarray, right: np.ndarray, first: int, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Solve matrix @ step = right (K,) where the unknowns from `first` on must lie in [low, high].
+
+    An unknown that leaves its range is held at the limit and the others are solved for again: clipping alone would
+    leave the pose where it only makes sense together with a drawer that is pushed through the back of its cabinet.
+    """
+    step = np.zeros(len(right))
+    free = np.ones(len(right), dtype=bool)
+    while True:
+        held = ~free
+        reduced = right[free] - matrix[np.ix_(free, held)] @ step[held]
+        step[free] = np.linalg.solve(matrix[np.ix_(free, free)], reduced)
+        limited = np.clip(step[first:], low, high)
+        beyond = np.flatnonzero(free[first:] & (np.abs(limited - step[first:]) > 1e-12))
+        if len(beyond) == 0:
+            return step
+        step[first + beyond] = limited[beyond]
+        free[first + beyond] = False
 
 
 def _state(
@@ -100,24 +130,25 @@ def _state(
     placement: Placement,
     state: tuple[float, np.ndarray, np.ndarray, dict[str, float]],
     points: np.ndarray,
+    normals: np.ndarray,
 ) -> Placement:
     scale, rotation, translation, joints = state
     shape = placement.shape if joints == placement.shape.joints else shape_at(surface, placement.shape, joints)
     moved = replace(placement, shape=shape, scale=scale, rotation=rotation, translation=translation)
-    return replace(moved, alignment_error=alignment_error(surface, moved, points))
+    return replace(moved, alignment_error=alignment_error(surface, moved, points, normals))
 
 
-def search_joints(surface: ModelSurface, placement: Placement, points: np.ndarray) -> Placement:
+def search_joints(surface: ModelSurface, placement: Placement, points: np.ndarray, normals: np.ndarray) -> Placement:
     """Return the placement with every joint at the best of a grid of values, one joint after the other.
 
     The 1-D search on the alignment error over the vertices (N, 3) finds the valley that `refine` then descends. A
     joint that the vertices do not tell stays in its state.
     """
     joints = dict(placement.shape.joints)
-    local = to_model(placement, points)
+    local, facing = to_model(placement, points), normals @ placement.rotation
 
     def error(name: str, value: float) -> float:
-        return float(np.sqrt(np.mean(surface.closest(local, {**joints, name: value}).distance ** 2)))
+        return float(np.sqrt(np.mean(surface.closest(local, {**joints, name: value}, facing).distance ** 2)))
 
     for joint in surface.model.joints:
         before = error(joint.name, joints.get(joint.name, 0.0))
@@ -125,7 +156,9 @@ def search_joints(surface: ModelSurface, placement: Placement, points: np.ndarra
         value = min(errors, key=lambda v: (errors[v], v))
         if errors[value] < (1.0 - LEAST_GAIN) * before:
             joints[joint.name] = value
-    return _state(surface, placement, (placement.scale, placement.rotation, placement.translation, joints), points)
+    return _state(
+        surface, placement, (placement.scale, placement.rotation, placement.translation, joints), points, normals
+    )
 
 
 def joint_values_to_try(shape: Shape) -> list[dict[str, float]]:
@@ -197,23 +230,28 @@ def shapes_of_model(surface: ModelSurface, closed: Shape) -> list[Shape]:
     return [shape_at(surface, closed, joints, owners) for joints in joint_values_to_try(closed)]
 
 
-def fitted(surface: ModelSurface, placement: Placement, points: np.ndarray, *, free_height: bool) -> Placement:
+def fitted(
+    surface: ModelSurface, placement: Placement, points: np.ndarray, normals: np.ndarray, *, free_height: bool
+) -> Placement:
     """Return the placement refined on the object's vertices (N, 3): pose, then joints, then both.
 
-    The search works on a sample of the vertices; the alignment error that is returned counts all of them.
+    The search works on a sample of the vertices, and its alignment error is that to surface that faces their way.
     """
-    some = points[:: max(1, len(points) // SAMPLE)]
-    best = refine(surface, placement, some, free_height=free_height)
+    step = max(1, len(points) // SAMPLE)
+    some, facing = points[::step], normals[::step]
+    best = refine(surface, placement, some, facing, free_height=free_height)
     if surface.model.joints:
-        searched = search_joints(surface, best, some)
+        searched = search_joints(surface, best, some, facing)
         if searched.shape.joints != best.shape.joints:
-            again = refine(surface, searched, some, free_height=free_height)
+            again = refine(surface, searched, some, facing, free_height=free_height)
             best = again if again.alignment_error < best.alignment_error else best
-        best = with_quiet_joints_closed(surface, best, some)
-    return replace(best, alignment_error=alignment_error(surface, best, points))
+        best = with_quiet_joints_closed(surface, best, some, facing)
+    return best
 
 
-def with_quiet_joints_closed(surface: ModelSurface, placement: Placement, points: np.ndarray) -> Placement:
+def with_quiet_joints_closed(
+    surface: ModelSurface, placement: Placement, points: np.ndarray, normals: np.ndarray
+) -> Placement:
     """Return the placement with those joints closed (0) whose closing costs no more than `LEAST_GAIN` of the alignment
     error: noise opens doors by a degree, and what was not seen is taken to be closed."""
     current = placement
@@ -222,7 +260,9 @@ def with_quiet_joints_closed(surface: ModelSurface, placement: Placement, points
         if joints.get(joint.name, 0.0) == 0.0:
             continue
         joints[joint.name] = float(np.clip(0.0, joint.lower, joint.upper))
-        closed = _state(surface, current, (current.scale, current.rotation, current.translation, joints), points)
+        closed = _state(
+            surface, current, (current.scale, current.rotation, current.translation, joints), points, normals
+        )
         if closed.alignment_error <= (1.0 + LEAST_GAIN) * current.alignment_error:
             current = closed
     return current

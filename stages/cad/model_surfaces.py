@@ -14,6 +14,9 @@ from stages.cad.shapes import Placement
 from stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, part_transforms
 from stages.kit.geometry.transforms import apply, inverse
 
+FACING = 0.5
+"""Cosine within which a triangle belongs to a side."""
+
 
 @dataclass(frozen=True)
 class Nearest:
@@ -38,25 +41,40 @@ class ModelSurface:
 
     model: CadModel
     scenes: dict[str, o3d.t.geometry.RaycastingScene]
+    sides: dict[str, dict[int, o3d.t.geometry.RaycastingScene]]
+    """Part -> side (0 to 5: -x, +x, -y, +y, -z, +z of the part frame) -> the triangles that face that way."""
     corners: dict[str, np.ndarray]
     """Part -> hull vertices (K, 3) of the visual mesh, part frame; they bound the part in every pose."""
     pieces: dict[str, tuple[trimesh.Trimesh, ...]]
     """Part -> convex collision pieces, part frame."""
 
-    def closest(self, points: np.ndarray, joints: dict[str, float]) -> Nearest:
-        """Return the nearest surface points of points (N, 3) in the model frame at scale 1."""
+    def closest(self, points: np.ndarray, joints: dict[str, float], normals: np.ndarray | None = None) -> Nearest:
+        """Return the nearest surface points of points (N, 3) in the model frame at scale 1.
+
+        With `normals` (N, 3) of the points a point only meets triangles that face its way (within 60 degrees of the
+        axis of the part frame that its normal is nearest to; any triangle where the part has none such). A cabinet's
+        observed top is closer to the underside of a top board two centimetres too high than to the board's top.
+        """
         distance = np.full(len(points), np.inf)
         nearest, normal = np.zeros((len(points), 3)), np.zeros((len(points), 3))
         part_index = np.zeros(len(points), dtype=int)
         for k, (part, model_from_part) in enumerate(part_transforms(self.model, joints).items()):
             local = apply(inverse(model_from_part), points).astype(np.float32)
-            answer = self.scenes[part].compute_closest_points(o3d.core.Tensor.from_numpy(local))
-            found = answer["points"].numpy().astype(float)
-            gap = np.linalg.norm(local - found, axis=1)
-            closer = gap < distance
-            distance[closer], part_index[closer] = gap[closer], k
-            nearest[closer] = apply(model_from_part, found[closer])
-            normal[closer] = answer["primitive_normals"].numpy()[closer].astype(float) @ model_from_part[:3, :3].T
+            groups: list[tuple[int | None, np.ndarray]] = [(None, np.arange(len(points)))]
+            if normals is not None:
+                side = facing_side(normals @ model_from_part[:3, :3])
+                groups = [(int(value), np.flatnonzero(side == value)) for value in np.unique(side)]
+            for value, rows in groups:
+                scene = self.scenes[part] if value is None else self.sides[part].get(value, self.scenes[part])
+                answer = scene.compute_closest_points(o3d.core.Tensor.from_numpy(np.ascontiguousarray(local[rows])))
+                found = answer["points"].numpy().astype(float)
+                gap = np.linalg.norm(local[rows] - found, axis=1)
+                closer = gap < distance[rows]
+                chosen = rows[closer]
+                distance[chosen], part_index[chosen] = gap[closer], k
+                nearest[chosen] = apply(model_from_part, found[closer])
+                facing = answer["primitive_normals"].numpy()[closer].astype(float)
+                normal[chosen] = facing @ model_from_part[:3, :3].T
         return Nearest(distance, nearest, normal, part_index)
 
     def part_distances(self, points: np.ndarray, part: str) -> np.ndarray:
@@ -83,20 +101,40 @@ class ModelSurface:
         ]
 
 
+def facing_side(normals: np.ndarray) -> np.ndarray:
+    """Return the side (N,) that normals (N, 3) face: 2 * axis, + 1 when they point along the axis."""
+    axis = np.argmax(np.abs(normals), axis=1)
+    return 2 * axis + (normals[np.arange(len(normals)), axis] > 0)
+
+
 def load_surface(folder: Path, model: CadModel) -> ModelSurface:
     """Read a model folder of the library. Raises BadInput when meshes are missing."""
     visual, collision = load_visual_parts(folder), load_collision_parts(folder)
     scenes, corners = {}, {}
+    sides: dict[str, dict[int, o3d.t.geometry.RaycastingScene]] = {}
     for part in model.parts:
-        scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-        scene.add_triangles(
-            o3d.core.Tensor.from_numpy(np.asarray(visual[part].vertices, dtype=np.float32)),
-            o3d.core.Tensor.from_numpy(np.asarray(visual[part].faces, dtype=np.uint32)),
-        )
-        scenes[part] = scene
+        vertices, faces = np.asarray(visual[part].vertices), np.asarray(visual[part].faces)
+        scenes[part] = _scene(vertices, faces)
+        triangles = vertices[faces]
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-18)
+        sides[part] = {}
+        for side in range(6):
+            facing = faces[normals[:, side // 2] * (1.0 if side % 2 else -1.0) >= FACING]
+            if len(facing):
+                sides[part][side] = _scene(vertices, facing)
         corners[part] = np.asarray(visual[part].convex_hull.vertices)
     pieces = {part: tuple(collision.get(part, [])) for part in model.parts}
-    return ModelSurface(model, scenes, corners, pieces)
+    return ModelSurface(model, scenes, sides, corners, pieces)
+
+
+def _scene(vertices: np.ndarray, faces: np.ndarray) -> o3d.t.geometry.RaycastingScene:
+    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+    scene.add_triangles(
+        o3d.core.Tensor.from_numpy(np.ascontiguousarray(vertices, dtype=np.float32)),
+        o3d.core.Tensor.from_numpy(np.ascontiguousarray(faces, dtype=np.uint32)),
+    )
+    return scene
 
 
 def to_model(placement: Placement, points: np.ndarray) -> np.ndarray:
@@ -109,11 +147,13 @@ def to_world(placement: Placement, points: np.ndarray) -> np.ndarray:
     return placement.scale * points @ placement.rotation.T + placement.translation
 
 
-def vertex_distances(surface: ModelSurface, placement: Placement, points: np.ndarray) -> np.ndarray:
-    """Return distances (N,) [m] from world points (N, 3) to the placed model."""
-    return placement.scale * surface.closest(to_model(placement, points), placement.shape.joints).distance
+def alignment_error(
+    surface: ModelSurface, placement: Placement, points: np.ndarray, normals: np.ndarray | None = None
+) -> float:
+    """Root mean square distance [m] from object vertices (N, 3) to the placed model (section 2.4.3, AE).
 
-
-def alignment_error(surface: ModelSurface, placement: Placement, points: np.ndarray) -> float:
-    """Root mean square distance [m] from object vertices (N, 3) to the placed model (section 2.4.3, AE)."""
-    return float(np.sqrt(np.mean(vertex_distances(surface, placement, points) ** 2)))
+    With `normals` (N, 3, world) the distance is to surface that faces the same way (ModelSurface.closest).
+    """
+    turned = None if normals is None else normals @ placement.rotation
+    found = surface.closest(to_model(placement, points), placement.shape.joints, turned)
+    return placement.scale * float(np.sqrt(np.mean(found.distance**2)))

@@ -93,14 +93,14 @@ def find_candidates(
         extra, extra_normals = sample_large_triangles(
             mesh.vertices, mesh.faces, 0.01, context.random(SAMPLES, node.instance)
         )
-        points = object_points(
+        points, facing = object_points(
             node,
             np.concatenate([mesh.vertices[used], extra]),
             np.concatenate([normals[used], extra_normals]),
             parameters.vertices,
             context.random(VERTICES, node.instance),
         )
-        found[node.id] = shortlist(node, points, graph, suitable, surfaces, parameters)
+        found[node.id] = shortlist(node, points, facing, graph, suitable, surfaces, parameters)
     return found
 
 
@@ -205,7 +205,12 @@ def scene_file(
             others = [candidate_record(p) for p in entry.placements if p.score != placement.score]
             replacements.append(
                 Replacement(
-                    node=node.id, decision="cad", chosen=chosen, alternatives=tuple(others), rejected=entry.rejected
+                    node=node.id,
+                    decision="cad",
+                    reason=entry.reason,
+                    chosen=chosen,
+                    alternatives=tuple(others),
+                    rejected=entry.rejected,
                 )
             )
         elif node.id in shortlists:

@@ -127,7 +127,9 @@ def candidates_for(child: Entity, entities: list[Entity], parameters: GraphParam
         seen = [_seen(child, parent, k, parameters) for k in parent.supporting]
         accepted = [candidate for candidate in seen if candidate is not None]
         found += accepted
-        if not accepted and parent.node_type != "layout":
+        # A shelf shows its boards to a camera that is too low to see its top, on which the child stands.
+        close = [c for c in accepted if abs(c.gap) <= HIDDEN_TOP_DISTANCE]
+        if not (close if ours else accepted) and parent.node_type != "layout":
             hidden = hidden_candidate(child, parent, parameters)
             if hidden is not None:
                 found.append(hidden)
