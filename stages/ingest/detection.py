@@ -39,7 +39,7 @@ def open_log(path: Path, parameters: IngestParameters) -> LogSource:
     what = "a file" if path.is_file() else "a folder with " + (_listing(path) or "nothing in it")
     raise BadInput(
         f"{path}: is not a log in a format that is known ({', '.join(names)}); it is {what}",
-        hint="docs/FORMATS.md describes the layouts",
+        hint="docs/LOGS.md describes the layouts",
     )
 
 

@@ -333,6 +333,27 @@ def test_messages_that_are_no_protobuf_are_counted(tmp_path: Path) -> None:
     assert any("undecodable_message" in note for note in info.notes)
 
 
+def test_any_damage_inside_messages_is_survived(tmp_path: Path) -> None:
+    """Without checksums damage reaches the messages: stamps, frames, sizes, encodings, calibration, transforms."""
+    options = {"compression": CompressionType.NONE, "enable_crcs": False}
+    whole = write_simple_log(tmp_path / "whole.mcap", frames(3), **options).read_bytes()
+    words = (b"/tf", b"map", b"optical", b"camera_info", b"16UC1", b"jpeg", b"plumb")
+    sites = [place for word in words for place in range(len(whole)) if whole.startswith(word, place)]
+    random, outcomes = np.random.default_rng(0), set()
+    for number in range(60):
+        damaged = bytearray(whole)
+        for place in random.choice(sites, 3) + random.integers(-40, 80, 3):
+            damaged[place % len(damaged)] = random.integers(0, 256)
+        path = tmp_path / "damaged.mcap"
+        path.write_bytes(damaged)
+        try:
+            outcomes.add(ingest(path, tmp_path / f"out{number}").outcome)
+        except BadInput as error:
+            assert "damaged.mcap" in str(error) or "frame" in str(error)
+            outcomes.add("bad input")
+    assert {"ok", "bad input"} <= outcomes
+
+
 @pytest.mark.parametrize("name", ["custom-camera-model.mcap", "example.mcap", "example.bag", "empty-file.bag"])
 def test_real_logs_that_are_not_rgbd_are_refused_by_name(tmp_path: Path, name: str) -> None:
     with pytest.raises(BadInput, match=name):
