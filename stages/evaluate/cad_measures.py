@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from schemas.cad_scene import CadSceneFile, Replacement
+from schemas.cad_scene import CadScene, CadSceneFile, Replacement
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.ground_truth import GroundTruth, TrueObject
 from schemas.interactive_scene import InteractiveSceneFile
@@ -17,8 +17,9 @@ from stages.evaluate.graph_measures import upright
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.results import Part
 from stages.evaluate.truth import TrueRoom
+from stages.kit.formats.cad_models import posed_mesh, read_model
 from stages.kit.geometry.boxes import box_iou
-from stages.kit.measurement.pose_error import position_error, yaw_error, yaw_of
+from stages.kit.measurement.pose_error import position_error, rotation_period, yaw_error, yaw_of
 from stages.kit.measurement.tables import Cell, Table
 
 QUARTER_TURN = np.pi / 2
@@ -41,6 +42,8 @@ class CadPair:
     position: float | None = None
     position_ground: float | None = None
     yaw: float | None = None
+    yaw_symmetric: float | None = None
+    """Yaw error modulo the turn after which the chosen model's closed shape looks the same (0 for round ones)."""
     yaw_quarter: float | None = None
     """Yaw error modulo a quarter turn: the error of the alignment, without confusions of front and side."""
     scale: float | None = None
@@ -58,20 +61,38 @@ def pair_replacements(
     graph: ContactGraphFile,
     overlaps: Mapping[tuple[int, int], float] | None,
     minimum_iou: float,
+    periods: Mapping[str, float],
 ) -> list[CadPair]:
     """Pair true objects with graph nodes by overlap alone (class and pose decide nothing) and compare them.
 
-    Takes true objects that have a CAD model and were seen. `overlaps` as in `node_affinity`.
+    Takes true objects that have a CAD model and were seen. `overlaps` as in `node_affinity`, `periods` from
+    `model_periods`.
     """
     objects = {o.name: o for o in truth.evaluated(things_only=True) if o.model_id is not None}
     true_nodes = [n for n in truth.graph.nodes if n.id in objects]
     nodes = [n for n in graph.nodes if n.node_type in ("rigid", "articulated")]
     replacements = {r.node: r for r in scene.replacements}
     pairs = assign(node_affinity(true_nodes, nodes, overlaps, minimum_iou))
-    return [_compare(objects[true_nodes[i].id], nodes[j], replacements.get(nodes[j].id)) for i, j in pairs]
+    return [_compare(objects[true_nodes[i].id], nodes[j], replacements.get(nodes[j].id), periods) for i, j in pairs]
 
 
-def _compare(true: TrueObject, node: GraphNode, replacement: Replacement | None) -> CadPair:
+def model_periods(cad_scene: CadScene, samples: int = 2000) -> dict[str, float]:
+    """Turn after which each chosen model's closed shape looks the same (`rotation_period`); without its colours."""
+    import trimesh
+
+    periods: dict[str, float] = {}
+    for model_id in sorted({r.chosen.model_id for r in cad_scene.scene.replacements if r.chosen is not None}):
+        folder = cad_scene.path("models") / model_id
+        if folder.is_dir():
+            mesh = posed_mesh(folder, read_model(folder), {})
+            points, _ = trimesh.sample.sample_surface(mesh, samples, seed=0)
+            periods[model_id] = rotation_period(np.asarray(points))
+    return periods
+
+
+def _compare(
+    true: TrueObject, node: GraphNode, replacement: Replacement | None, periods: Mapping[str, float]
+) -> CadPair:
     comparison = CadPair(
         true=true.name,
         predicted=node.id,
@@ -96,6 +117,7 @@ def _compare(true: TrueObject, node: GraphNode, replacement: Replacement | None)
         position=in_space,
         position_ground=on_ground,
         yaw=yaw_error(true_yaw, yaw),
+        yaw_symmetric=yaw_error(true_yaw, yaw, periods.get(chosen.model_id, 2 * np.pi)),
         yaw_quarter=yaw_error(true_yaw, yaw, QUARTER_TURN),
         scale=abs(chosen.scale / true.scale - 1.0) if same else None,
         joints=joints if same else {},
@@ -149,7 +171,9 @@ def measure_cad(
     part.set_mean("position_error_ground_m", grounds, random, resamples)
     yaws = [p.yaw for p in replaced if p.yaw is not None]
     part.set_mean("yaw_error_rad", yaws, random, resamples)
-    part.set("yaw_within_20deg", share(sum(y < np.radians(20) for y in yaws), len(yaws)))
+    symmetric = [p.yaw_symmetric for p in replaced if p.yaw_symmetric is not None]
+    part.set_mean("yaw_error_symmetric_rad", symmetric, random, resamples)
+    part.set("yaw_symmetric_within_20deg", share(sum(y < np.radians(20) for y in symmetric), len(symmetric)))
     quarters = [p.yaw_quarter for p in replaced if p.yaw_quarter is not None]
     part.set("yaw_error_quarter_turn_rad_median", float(np.median(quarters)) if quarters else None)
     part.set_mean("scale_error", [p.scale for p in replaced if p.scale is not None], random, resamples)
@@ -168,16 +192,16 @@ def measure_cad(
     part.set("conflicts_before", scene.conflicts_before)
     part.set("conflicts_after", scene.conflicts_after)
     part.notes.append(
-        "CAD errors compare model frames (bottom centre, front along -y). Yaw of round or square things means "
-        "little; the error modulo a quarter turn leaves such confusions out. Scale and joint errors are taken where "
-        "the chosen model is the true one."
+        "CAD errors compare model frames (bottom centre, front along -y). Yaw is also given modulo the symmetry of "
+        "the chosen model's closed shape (colours do not count), and modulo a quarter turn, which leaves every "
+        "confusion of front and side out. Scale and joint errors are taken where the chosen model is the true one."
     )
     part.tables.append(
         Table(
             "cad_objects",
             "CAD replacement by object",
             ("true object", "node", "class", "decision", "model", "true model", "position [m]", "yaw [deg]",
-             "yaw mod 90 [deg]", "scale error", "box IoU", "largest joint error"),
+             "yaw mod symmetry [deg]", "scale error", "box IoU", "largest joint error"),
             tuple(_row(p) for p in sorted(pairs, key=lambda p: p.true)),
         )
     )  # fmt: skip
@@ -189,6 +213,6 @@ def _row(pair: CadPair) -> tuple[Cell, ...]:
 
     return (
         pair.true, pair.predicted, "same" if pair.class_match else "other", pair.decision, pair.model,
-        pair.true_model, pair.position, degrees(pair.yaw), degrees(pair.yaw_quarter), pair.scale, pair.box_iou,
+        pair.true_model, pair.position, degrees(pair.yaw), degrees(pair.yaw_symmetric), pair.scale, pair.box_iou,
         max(pair.joints.values()) if pair.joints else None,
     )  # fmt: skip

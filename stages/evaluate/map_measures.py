@@ -88,9 +88,11 @@ def measure_quality(
         part.set(f"sq{suffix}", mean.sq)
         part.set(f"rq{suffix}", mean.rq)
     part.set("classes", average_quality(qualities.values()).classes)
+    # Whatever the class: things only, true stuff is void (what lies on it is no mistake, walls in parts neither).
+    true_things = {i: ANY_CLASS for i, name in true_classes.items() if name not in stuff}
     agnostic = panoptic_quality(
-        true_labels, labels, dict.fromkeys(true_classes, ANY_CLASS), dict.fromkeys(predicted.classes(), ANY_CLASS),
-        frozenset(), parameters.match_iou,
+        np.where(np.isin(true_labels, sorted(true_things)), true_labels, 0), labels, true_things,
+        dict.fromkeys(predicted.classes(), ANY_CLASS), frozenset(), parameters.match_iou,
     )  # fmt: skip
     whole = agnostic.get(ANY_CLASS, ClassQuality())
     part.set("pq_class_agnostic", whole.pq if whole.segments else None)
@@ -158,10 +160,16 @@ def quality_thesis_code(
 def measure_instances(
     part: Part, truth: TrueRoom, predicted: PredictedMap, labels: np.ndarray, parameters: EvaluateParameters
 ) -> dict[str, ClassPrecision]:
-    """Instance AP by class over things; confidence is the number of points (vertices), as in the thesis's code."""
+    """Instance AP by class over things; confidence is the number of points (vertices), as in the thesis's code.
+
+    Predictions that lie for more than half on entities that were hardly seen count neither way; in the
+    class-agnostic figure neither do those on true stuff.
+    """
     stuff = stuff_classes()
+    stuff_instances = frozenset(o.instance for o in truth.objects if o.class_name in stuff)
+    on_stuff = _shares_on(truth, labels, truth.optional | stuff_instances)
     ious = intersection_over_union(truth.labelled_points(), labels)
-    on_optional = _shares_on_optional(truth, labels)
+    on_optional = _shares_on(truth, labels, truth.optional)
     things = [e for e in predicted.info.entities if e.class_name not in stuff]
     entities = [e for e in things if on_optional.get(e.instance, 0.0) <= 0.5]
     true = truth.evaluated(things_only=True)
@@ -170,6 +178,8 @@ def measure_instances(
     for name in [*classes, ANY_CLASS]:
         columns = [o for o in true if name in (o.class_name, ANY_CLASS)]
         rows = [e for e in entities if name in (e.class_name, ANY_CLASS)]
+        if name == ANY_CLASS:
+            rows = [e for e in rows if on_stuff.get(e.instance, 0.0) <= 0.5]
         iou = np.array([[ious.get((o.instance, e.instance), 0.0) for o in columns] for e in rows])
         confidence = np.array([float(e.vertices) for e in rows])
         curve = precision_recall(iou.reshape(len(rows), len(columns)), confidence, len(columns), parameters.match_iou)
@@ -181,9 +191,9 @@ def measure_instances(
     return result
 
 
-def _shares_on_optional(truth: TrueRoom, labels: np.ndarray) -> dict[int, float]:
-    """Share of each predicted instance's true points that lie on optional entities."""
-    counts = overlaps(np.isin(truth.instances, sorted(truth.optional)).astype(np.int64), labels)
+def _shares_on(truth: TrueRoom, labels: np.ndarray, instances: frozenset[int]) -> dict[int, float]:
+    """Share of each predicted instance's true points that lie on the given true instances."""
+    counts = overlaps(np.isin(truth.instances, sorted(instances)).astype(np.int64), labels)
     predicted = {p for _, p in counts if p}
     return {p: counts.get((1, p), 0) / (counts.get((1, p), 0) + counts.get((0, p), 0)) for p in predicted}
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from schemas.cad_scene import CadScene
 from schemas.contact_graph import ContactGraph, ContactGraphFile
+from schemas.errors import BadInput
 from schemas.evaluation import Evaluation, MetricsFile
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
@@ -18,7 +19,7 @@ from schemas.segments import Segments
 from schemas.sequence import Sequence
 from schemas.trajectory import Trajectory
 from stages.evaluate import counts, figures
-from stages.evaluate.cad_measures import measure_cad, pair_replacements, true_joints
+from stages.evaluate.cad_measures import measure_cad, model_periods, pair_replacements, true_joints
 from stages.evaluate.correspondence import point_overlaps
 from stages.evaluate.graph_measures import compare_graphs, measure_boxes, measure_graph
 from stages.evaluate.map_measures import (
@@ -38,6 +39,8 @@ from stages.kit.formats.trajectories import read_tum
 from stages.kit.measurement.tables import write_table
 from stages.kit.stage import Context
 
+FAR_FROM_TRUTH = 0.3
+"""An aligned trajectory error from which on the reader is warned [m]."""
 HEADLINES = (
     "map/pq", "map/pq_class_agnostic", "map/instance_ap50", "map/accuracy_mean_mm", "map/mesh_recall",
     "graph/edit_distance", "graph/any_support_f1", "graph/obb_ap50_refined", "cad/position_error_m_mean",
@@ -195,7 +198,8 @@ def _evaluate_cad(inputs: Inputs, parameters: EvaluateParameters, context: Conte
     if inputs.truth is None or inputs.ground_truth is None or inputs.cad_scene is None:
         return
     scene, graph = inputs.cad_scene.scene, inputs.cad_scene.graph
-    pairs = pair_replacements(inputs.truth, scene, graph, inputs.overlaps, parameters.node_match_iou)
+    periods = model_periods(inputs.cad_scene)
+    pairs = pair_replacements(inputs.truth, scene, graph, inputs.overlaps, parameters.node_match_iou, periods)
     joints = true_joints(inputs.ground_truth)
     measure_cad(inputs.part("cad"), inputs.truth, scene, pairs, joints, parameters, context.random(1))
 
@@ -208,7 +212,9 @@ def _evaluate_trajectory(inputs: Inputs, parameters: EvaluateParameters, context
     if inputs.ground_truth is not None and estimated is not None:
         times, poses = read_tum(inputs.ground_truth.path("trajectory.tum"))
         poses = world_from_log(inputs.sequence) @ poses
-        measure_trajectory(inputs.part("trajectory"), times, poses, *estimated)
+        part = inputs.part("trajectory")
+        measure_trajectory(part, times, poses, *estimated)
+        _check_same_walk(inputs, part, len(estimated[0]))
         paths["true camera"] = poses[:, :3, 3]
     if not parameters.plots or not paths:
         return
@@ -223,6 +229,20 @@ def _evaluate_trajectory(inputs: Inputs, parameters: EvaluateParameters, context
         if node.box is not None and node.node_type != "layout"
     ]
     figures.draw_floor_plan(context.output / "plots" / "camera_path.png", boxes, paths, inputs.label)
+
+
+def _check_same_walk(inputs: Inputs, part: Part, poses: int) -> None:
+    """Refuse a sequence that was not recorded on the walk that the ground truth describes."""
+    if inputs.trajectory is None and 2 * (part.metrics["trajectory/poses_associated"] or 0) < poses:
+        raise BadInput(
+            "evaluate: the sequence has other time stamps than the ground truth's log",
+            hint="ingest the log.mcap of this ground truth",
+        )
+    error = part.metrics["trajectory/ate_rmse_aligned_m"]
+    if error is not None and error > FAR_FROM_TRUTH:
+        part.notes.append(
+            f"The camera path is {error:.2f} m from the truth even after alignment: lost tracking, or another log."
+        )
 
 
 def _trajectory(artifact: Trajectory | Sequence | None) -> tuple[np.ndarray, np.ndarray] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -207,8 +207,8 @@ def _add_views(
         return
     view = oblique or oblique_view(model, width, height)
     pictures = [_draw(model, view, "CAD scene", labelled=True)]
-    if scanned is not None:
-        pictures.append(_draw(scanned, view, "The map from the same place"))
+    if values["map_views"] is not None:
+        pictures.append(replace(values["map_views"]["color"], caption="The map from the same place."))
     if ground_truth is not None:
         moved = np.eye(4) if sequence is None else np.array(sequence.info.gravity.world_from_log)
         truth = true_model(ground_truth, moved)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import trimesh
@@ -16,8 +17,6 @@ from stages.kit.formats.cad_models import posed_mesh, read_model
 from stages.kit.measurement.palette import UNLABELLED, instance_color
 from stages.kit.rendering.surfaces import TriangleSoup, build_soup, srgb_to_linear
 
-LAYOUT_OPEN_FROM_BEHIND = "wall"
-
 
 @dataclass(frozen=True)
 class Model:
@@ -28,18 +27,43 @@ class Model:
     """Instance -> class name; instances that are missing are unlabelled."""
     names: dict[int, str]
     """Instance -> what to call it."""
-    keep_back_faces: bool = True
-    """Whether things are drawn from behind too (they were scanned from one side)."""
 
+    def _table(self, names: set[str], unlabelled: bool) -> np.ndarray:
+        """(T,) bool: triangles of instances whose class is in `names`."""
+        table = np.full(int(self.soup.instance.max(initial=0)) + 1, unlabelled)
+        for instance, name in self.classes.items():
+            if 0 <= instance < len(table):
+                table[instance] = name in names
+        return table[self.soup.instance]
+
+    @cached_property
+    def centers(self) -> np.ndarray:
+        """(T, 3) centres of the triangles."""
+        return self.soup.corners.mean(axis=1)
+
+    @cached_property
+    def things(self) -> np.ndarray:
+        """(T,) bool: triangles of things."""
+        return self._table({entry.name for entry in load_vocabulary().classes if not entry.is_layout}, False)
+
+    @cached_property
     def solid(self) -> np.ndarray:
         """(T,) bool: triangles that are never cut away, those of things and floors."""
-        layout = {entry.name for entry in load_vocabulary().classes if entry.is_layout and entry.name != "floor"}
-        kept = sorted(i for i, name in self.classes.items() if name not in layout)
-        return np.isin(self.soup.instance, kept)
+        return self.things | self._table({"floor"}, False)
 
+    @cached_property
     def ceiling(self) -> np.ndarray:
         """(T,) bool: triangles of ceilings."""
-        return np.isin(self.soup.instance, sorted(i for i, name in self.classes.items() if name == "ceiling"))
+        return self._table({"ceiling"}, False)
+
+    def inward_sign(self, center: np.ndarray) -> float:
+        """+1 when the normals of the room's shell look towards `center`, as a scan's do, -1 when the mesh is turned
+        inside out."""
+        loose = ~self.solid
+        corners = self.soup.corners[loose]
+        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        inward = np.einsum("ij,ij->i", self.soup.face_normals[loose], center - self.centers[loose])
+        return -1.0 if float(np.sum(area * np.sign(inward))) < 0 else 1.0
 
     def by_instance(self) -> Model:
         """The same shape, coloured by instance."""

@@ -48,8 +48,7 @@ class View:
 def bounds_of(model: Model, highest: float = 2.2) -> Bounds:
     """Bounds without outliers: the 0.5 and 99.5 percent quantiles of triangle centres, not above `highest` [m]
     over the lowest."""
-    centers = model.soup.corners.mean(axis=1)
-    centers = centers[~model.ceiling()] if (~model.ceiling()).any() else centers
+    centers = model.centers[~model.ceiling] if not model.ceiling.all() else model.centers
     low, high = np.quantile(centers, [0.005, 0.995], axis=0)
     high[2] = min(high[2], low[2] + highest)
     return Bounds(low.astype(float), np.maximum(high, low + 0.1).astype(float))
@@ -87,33 +86,18 @@ def fitted_pose(
 def cut_away(model: Model, eye: np.ndarray, bounds: Bounds) -> TriangleSoup:
     """Return the soup without what hides the inside from `eye`: ceilings, and walls and unlabelled surface that turn
     their back to the eye or are the outside of the room."""
-    soup = model.soup
-    centers = soup.corners.mean(axis=1)
-    normals = soup.face_normals * _inward_sign(model, bounds)
+    centers, normals = model.centers, model.soup.face_normals * model.inward_sign(bounds.center)
     away = np.einsum("ij,ij->i", normals, centers - eye) > 0
     outward = np.einsum("ij,ij->i", normals, bounds.center - centers) < 0
     sides = np.minimum(np.abs(centers[:, :2] - bounds.low[:2]), np.abs(centers[:, :2] - bounds.high[:2])).min(axis=1)
     outside = np.any((centers[:, :2] < bounds.low[:2]) | (centers[:, :2] > bounds.high[:2]), axis=1)
     shell = outward & ((sides < SHELL) | outside | (centers[:, 2] > bounds.high[2] - SHELL))
-    up = (normals[:, 2] > 0.8) & (centers[:, 2] < bounds.low[2] + SHELL)
-    keep = (model.solid() | up | ~(away | shell)) & ~model.ceiling()
+    floor = (normals[:, 2] > 0.8) & (centers[:, 2] < bounds.low[2] + SHELL)
+    keep = (model.solid | floor | ~(away | shell)) & ~model.ceiling
     if not keep.any():
-        return soup
-    arrays = {f.name: getattr(soup, f.name)[keep] for f in fields(soup) if f.name != "material_table"}
-    return replace(soup, **arrays)
-
-
-def _inward_sign(model: Model, bounds: Bounds) -> float:
-    """+1 when the normals of the room's shell look inward, as a scan's do, -1 when the mesh is turned inside out."""
-    soup = model.soup
-    loose = ~model.solid()
-    if not loose.any():
-        return 1.0
-    centers = soup.corners[loose].mean(axis=1)
-    edges = soup.corners[loose]
-    area = np.linalg.norm(np.cross(edges[:, 1] - edges[:, 0], edges[:, 2] - edges[:, 0]), axis=1)
-    inward = np.einsum("ij,ij->i", soup.face_normals[loose], bounds.center - centers)
-    return -1.0 if float(np.sum(area * np.sign(inward))) < 0 else 1.0
+        return model.soup
+    arrays = {f.name: getattr(model.soup, f.name)[keep] for f in fields(model.soup) if f.name != "material_table"}
+    return replace(model.soup, **arrays)
 
 
 def direction_of(azimuth: float, elevation: float = ELEVATION) -> np.ndarray:
@@ -121,23 +105,30 @@ def direction_of(azimuth: float, elevation: float = ELEVATION) -> np.ndarray:
     return np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
 
 
+def best_azimuth(model: Model) -> float:
+    """Return the azimuth [rad], of twelve, towards which the things' surfaces face most.
+
+    Each thing counts with the square root of its area that faces the eye, so that many small things outweigh one
+    large one; occlusion is not considered.
+    """
+    things = model.things
+    if not things.any():
+        return 2.0 * np.pi * 0.5 / AZIMUTHS
+    corners = model.soup.corners[things]
+    area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    _, owner = np.unique(model.soup.instance[things], return_inverse=True)
+    sign = model.inward_sign(model.centers.mean(axis=0))
+    azimuths = 2.0 * np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS
+    scores = [
+        np.sqrt(np.bincount(owner, weights=np.maximum(sign * (area @ direction_of(a)), 0.0))).sum() for a in azimuths
+    ]
+    return float(azimuths[int(np.argmax(np.round(scores, 9)))])
+
+
 def oblique_view(model: Model, width: int, height: int) -> View:
-    """The oblique view, of twelve around the room, in which most things are seen, and most of them."""
-    bounds = bounds_of(model)
-    small = page_camera(180, round(180 * height / width))
-    things = {i for i, name in model.classes.items() if name not in ("floor", "wall", "ceiling")}
-    best, best_score = 0.0, -1.0
-    for k in range(AZIMUTHS):
-        azimuth = 2.0 * np.pi * (k + 0.5) / AZIMUTHS
-        pose = fitted_pose(small, bounds, direction_of(azimuth))
-        seen = render(model, View(small, pose), bounds, fast=True)
-        values, counts = np.unique(seen.instance[seen.depth > 0], return_counts=True)
-        score = sum(np.sqrt(n) for v, n in zip(values, counts, strict=True) if int(v) in things)
-        score += 0.01 * np.sqrt(np.count_nonzero(seen.depth))
-        if score > best_score:
-            best, best_score = azimuth, float(score)
+    """The oblique view of the whole room from its best side."""
     camera = page_camera(width, height)
-    return View(camera, fitted_pose(camera, bounds, direction_of(best)))
+    return View(camera, fitted_pose(camera, bounds_of(model), direction_of(best_azimuth(model))))
 
 
 def top_view(model: Model, width: int) -> View:
@@ -148,12 +139,10 @@ def top_view(model: Model, width: int) -> View:
     return View(camera, fitted_pose(camera, bounds, np.array([0.0, 0.0, 1.0]), up=(0.0, 1.0, 0.0)))
 
 
-def render(model: Model, view: View, bounds: Bounds | None = None, fast: bool = False) -> Rendering:
-    """Render a model with the near side of the room cut away. `fast`: without shadows and smoothing."""
-    bounds = bounds or bounds_of(model)
-    soup = cut_away(model, view.world_from_camera[:3, 3], bounds)
-    renderer = SceneRenderer(soup, shadows=not fast, antialias=not fast)
-    return renderer.render(view.camera, view.world_from_camera)
+def render(model: Model, view: View) -> Rendering:
+    """Render a model with the near side of the room cut away."""
+    soup = cut_away(model, view.world_from_camera[:3, 3], bounds_of(model))
+    return SceneRenderer(soup).render(view.camera, view.world_from_camera)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 
 def yaw_of(rotation: np.ndarray) -> float:
@@ -15,10 +16,35 @@ def yaw_of(rotation: np.ndarray) -> float:
 def yaw_error(true: float, estimated: float, period: float = 2.0 * np.pi) -> float:
     """Absolute difference of two yaw angles [rad] modulo `period`: pi for shapes that look the same after half a turn.
 
-    The result lies in [0, period / 2].
+    The result lies in [0, period / 2]; period 0 (round shapes) gives 0.
     """
+    if period == 0.0:
+        return 0.0
     difference = (estimated - true) % period
     return float(min(difference, period - difference))
+
+
+def rotation_period(points: np.ndarray, tolerance: float = 0.01) -> float:
+    """Return after which turn about z (through the origin) a shape looks the same: 2 pi, pi, pi / 2, or 0 for any turn.
+
+    `points` (N, 3): surface samples in the model frame, whose origin is the middle of the footprint. A turn counts
+    when the mean distance from turned points to the nearest point grows by less than `tolerance` times the diagonal
+    over that of the points among themselves. Turns by 1/8 and 1/5 stand for any turn.
+    """
+    tree = cKDTree(points)
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    spacing = float(np.mean(tree.query(points, k=2)[0][:, 1]))
+
+    def same_after(angle: float) -> bool:
+        cosine, sine = np.cos(angle), np.sin(angle)
+        turned = points @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+        return float(np.mean(tree.query(turned)[0])) - spacing < tolerance * diagonal
+
+    if same_after(np.pi / 4) and same_after(2 * np.pi / 5):
+        return 0.0
+    if same_after(np.pi / 2):
+        return float(np.pi / 2)
+    return float(np.pi) if same_after(np.pi) else float(2 * np.pi)
 
 
 def position_error(true: np.ndarray, estimated: np.ndarray) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from schemas.sequence import Gravity
 from stages.evaluate.correspondence import merge_stuff_nodes
 from stages.evaluate.parameters import STAGE, EvaluateParameters, check_inputs
 from stages.evaluate.stage import run
+from stages.kit.formats.trajectories import write_tum
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
@@ -32,6 +33,7 @@ from tests.unit.evaluate.handmade import (
     make_plan,
     make_segments,
     make_sequence,
+    poses,
 )
 
 FLOOR, WALL, TABLE, CUP, CHAIR, CABINET, BOTTLE = ROOM
@@ -154,7 +156,7 @@ def test_cad_errors(tmp_path, truth):
     assert metrics["cad/position_error_m_mean_low"] <= 0.03 + 1e-9 <= metrics["cad/position_error_m_mean_high"] + 2e-9
     assert metrics["cad/yaw_error_rad_mean"] == pytest.approx(np.radians(100))
     assert metrics["cad/yaw_error_quarter_turn_rad_median"] == pytest.approx(np.radians(10))
-    assert metrics["cad/yaw_within_20deg"] == 0.0
+    assert metrics["cad/yaw_symmetric_within_20deg"] == 0.0
     assert metrics["cad/open_state_match"] == 1.0
     assert metrics["cad/joint_error_prismatic_m_mean"] is None
 
@@ -222,6 +224,13 @@ def test_truncated_visible_points_are_refused(tmp_path):
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(BadInput, match="visible"):
         evaluate(tmp_path / "evaluation", ground_truth=broken, panoptic_map=make_map(tmp_path / "map"))
+
+
+def test_a_sequence_of_another_log_is_refused(tmp_path, truth):
+    sequence = make_sequence(tmp_path / "sequence")
+    write_tum(sequence.path("trajectory.tum"), np.arange(6) * 0.1 + 100.0, poses())
+    with pytest.raises(BadInput, match="time stamps"):
+        evaluate(tmp_path / "evaluation", ground_truth=truth, sequence=sequence)
 
 
 def test_nothing_to_evaluate_is_a_usage_error():

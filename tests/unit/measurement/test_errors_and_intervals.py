@@ -7,6 +7,7 @@ import io
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -20,6 +21,7 @@ from stages.kit.measurement.pose_error import (
     align_rigidly,
     associate,
     position_error,
+    rotation_period,
     trajectory_error,
     yaw_error,
     yaw_of,
@@ -39,6 +41,24 @@ def test_yaw_error():
 def test_yaw_error_is_the_angle_between_directions(a, b):
     expected = np.arccos(np.clip(np.cos(a) * np.cos(b) + np.sin(a) * np.sin(b), -1, 1))
     assert yaw_error(a, b) == pytest.approx(expected, abs=1e-6)
+
+
+def test_rotation_period():
+    random = np.random.default_rng(0)
+
+    def box(x, y, z):
+        return trimesh.creation.box(extents=(x, y, z)).sample(2000, seed=random)
+
+    assert rotation_period(box(0.6, 0.6, 0.4)) == pytest.approx(np.pi / 2)
+    assert rotation_period(box(1.2, 0.6, 0.7)) == pytest.approx(np.pi)
+    round_ = trimesh.creation.cylinder(radius=0.04, height=0.1).sample(2000, seed=random)
+    assert rotation_period(round_) == 0.0
+    back = trimesh.creation.box(extents=(0.5, 0.05, 0.5))
+    back.apply_translation([0, 0.225, 0.45])
+    seat = trimesh.creation.box(extents=(0.5, 0.5, 0.05))
+    chair = trimesh.util.concatenate([seat, back]).sample(2000, seed=random)
+    assert rotation_period(chair) == pytest.approx(2 * np.pi)
+    assert yaw_error(0.0, 1.0, period=0.0) == 0.0
 
 
 def test_position_error():
