@@ -13,6 +13,8 @@ from stages.kit.geometry.transforms import is_rigid
 POSE_TOLERANCE = 1e-2
 """Deviation from a rotation that rounding in a text file explains; more is no pose."""
 NOT_SELECTED = "not_selected"
+LARGEST_POSITION = 1e6
+"""Metres from the origin: beyond it float32 no longer resolves centimetres, and nobody walked there."""
 
 
 def select(
@@ -48,6 +50,8 @@ def checked_pose(matrix: np.ndarray | None, needed: bool) -> tuple[np.ndarray | 
         return None, "missing_pose" if needed else None
     if not np.isfinite(matrix).all():
         return None, "non_finite_pose"
+    if np.abs(matrix[:3, 3]).max() > LARGEST_POSITION:
+        return None, "implausible_pose"
     if not is_rigid(matrix, POSE_TOLERANCE):
         return None, "non_rigid_pose"
     if is_rigid(matrix, 1e-9):

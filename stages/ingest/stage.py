@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from schemas.errors import BadInput
 from schemas.sequence import Gravity, Sequence, SequenceFile
 from stages.ingest.alignment import align
 from stages.ingest.detection import open_log
@@ -32,6 +33,7 @@ def run(log: Path, *, parameters: IngestParameters, context: Context) -> Sequenc
     with context.progress.step("read the log"):
         source = open_log(Path(log), parameters)
     try:
+        _check_camera(source, log)
         context.logger.info("%s: %s", log, source.rule)
         entries, drops = select(source.entries, parameters, source.has_poses)
         with context.progress.step("find gravity"):
@@ -42,6 +44,23 @@ def run(log: Path, *, parameters: IngestParameters, context: Context) -> Sequenc
     finally:
         source.close()
     return _finish(source, gravity, drops, times, poses, median_depth, context)
+
+
+def _check_camera(source: LogSource, log: Path) -> None:
+    """Refuse intrinsics of no camera: they would only show up as a room of nonsense."""
+    camera = source.camera
+    if camera.width == 0:
+        return  # no image could be decoded, so there will be no frame either
+    for name, focal, center, size in (
+        ("x", camera.fx, camera.cx, camera.width),
+        ("y", camera.fy, camera.cy, camera.height),
+    ):
+        if not (0.1 * size <= focal <= 100 * size and -size <= center <= 2 * size):
+            raise BadInput(
+                f"{log}: focal length {focal:g} and centre {center:g} pixels along {name} cannot be those of an image "
+                f"of {size} pixels",
+                hint="give --fx --fy --cx --cy",
+            )
 
 
 def _find_gravity(source: LogSource, entries: list[Entry], parameters: IngestParameters, context: Context) -> Gravity:

@@ -152,7 +152,8 @@ def transform_matrix(translation: Any, rotation: Any) -> np.ndarray:
     """Return (4, 4) of a Foxglove Vector3 and Quaternion. Raises ValueError when not finite or of zero norm."""
     vector = np.array([translation.x, translation.y, translation.z])
     quaternion = np.array([rotation.x, rotation.y, rotation.z, rotation.w])
-    norm = np.linalg.norm(quaternion)
+    with np.errstate(over="ignore"):
+        norm = np.linalg.norm(quaternion)
     if not (np.isfinite(vector).all() and np.isfinite(norm)) or abs(norm - 1) > 0.02:
         raise ValueError(f"translation {vector.tolist()}, quaternion {quaternion.tolist()} is no rigid transform")
     return transform_from_quaternion(quaternion / norm, vector)
