@@ -14,9 +14,6 @@ from schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
 from schemas.vocabulary import load_vocabulary
 from stages.kit.geometry.point_clouds import sample_large_triangles, thin_to_grid
 
-TILE = 0.009
-"""Edge of the little squares that stand for seen surface [m]."""
-
 
 def box_mesh(low, high) -> trimesh.Trimesh:
     """An axis-aligned box between two corners."""
@@ -54,20 +51,20 @@ def placed(mesh: trimesh.Trimesh, translation, yaw: float = 0.0) -> trimesh.Trim
     return copy
 
 
-def floor_mesh(low=(-3.0, -3.0), high=(3.0, 3.0), z=0.0) -> trimesh.Trimesh:
+def floor_mesh(low=(-1.2, -1.2), high=(1.2, 1.2), z=0.0) -> trimesh.Trimesh:
     """A floor that looks up."""
     vertices = [[low[0], low[1], z], [high[0], low[1], z], [high[0], high[1], z], [low[0], high[1], z]]
     return trimesh.Trimesh(vertices, [[0, 1, 2], [0, 2, 3]], process=False)
 
 
-def tiles(points: np.ndarray, normals: np.ndarray) -> trimesh.Trimesh:
-    """A mesh of one little square for each oriented point (N, 3)."""
+def tiles(points: np.ndarray, normals: np.ndarray, edge: float = 0.009) -> trimesh.Trimesh:
+    """A mesh of one little square of `edge` [m] for each oriented point (N, 3)."""
     helper = np.where(np.abs(normals[:, :1]) < 0.9, [[1.0, 0, 0]], [[0, 1.0, 0]])
     first = np.cross(normals, helper)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(normals, first)
     corners = [-first - second, first - second, first + second, -first + second]
-    vertices = np.stack([points + 0.5 * TILE * corner for corner in corners], axis=1).reshape(-1, 3)
+    vertices = np.stack([points + 0.5 * edge * corner for corner in corners], axis=1).reshape(-1, 3)
     base = 4 * np.arange(len(points))[:, None]
     faces = np.concatenate([base + [0, 1, 2], base + [0, 2, 3]])
     return trimesh.Trimesh(vertices, faces, process=False)
@@ -78,7 +75,7 @@ def seen_surface(
     eyes: list[tuple[float, float, float]],
     *,
     noise: float = 0.0,
-    spacing: float = 0.01,
+    spacing: float = 0.013,
     seed: int = 0,
 ) -> dict[int, trimesh.Trimesh]:
     """What cameras at `eyes` would see of each mesh, as tiles: points that face an eye with nothing in between."""
@@ -105,7 +102,7 @@ def seen_surface(
             hit = scene.cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy()
             seen |= facing & (hit > distance - 0.004)
         points = points[seen] + noise * random.normal(size=(np.count_nonzero(seen), 1)) * normals[seen]
-        result[instance] = tiles(points, normals[seen])
+        result[instance] = tiles(points, normals[seen], 0.9 * spacing)
     return result
 
 

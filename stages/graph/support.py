@@ -70,7 +70,7 @@ def rectangle_overlap(points: np.ndarray, child: Box) -> float:
     child's box) around those points (K, 3) near the plane takes up, which lie within the footprint."""
     local = transform_points_to_box(child, points)[:, :2]
     half = np.asarray(child.size[:2]) / 2
-    inside = local[np.all(np.abs(local) <= half, axis=1)]
+    inside = local[np.all(np.abs(local) <= half + 1e-9, axis=1)]
     area = float(child.size[0] * child.size[1])
     if len(inside) < 2 or area <= 0.0:
         return 0.0

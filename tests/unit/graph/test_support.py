@@ -1,0 +1,155 @@
+"""Equations 2.1 to 2.3 in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from schemas.scene_parts import SurfacePlane
+from stages.graph.nodes import Entity, Patch, is_horizontal, level_patch, plane_height
+from stages.graph.parameters import GraphParameters
+from stages.graph.support import (
+    Candidate,
+    candidates_for,
+    height_gap,
+    hull_overlap,
+    prefer_the_highest,
+    rectangle_overlap,
+    support_score,
+)
+from stages.kit.geometry.boxes import box_from_bounds, gravity_aligned_box
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+
+def entity(name, box, patches=(), class_name="box", node_type="rigid", movable=True):
+    return Entity(
+        name=name,
+        instance=int(name.split("_")[-1]),
+        class_name=class_name,
+        node_type=node_type,
+        movable=movable,
+        mesh=None,
+        confidence=1.0,
+        points=np.zeros((0, 3)),
+        box=box,
+        patches=tuple(patches),
+    )
+
+
+def solid(name, low, high, **kinds):
+    """A box whose top is a supporting plane."""
+    outline = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    return entity(name, box_from_bounds(low, high), [level_patch(outline, high[2], hidden=False)], **kinds)
+
+
+def test_horizontal_is_normal_times_gravity_at_most_a_th():
+    assert is_horizontal((0, 0, 1), -1.0)
+    assert is_horizontal((np.sin(0.4), 0, np.cos(0.4)), -0.9)
+    assert not is_horizontal((np.sin(0.5), 0, np.cos(0.5)), -0.9)
+    assert not is_horizontal((0, 0, -1), -0.9)
+
+
+def test_height_gap_is_2_1():
+    patch = level_patch(SQUARE, 0.75, hidden=False)
+    child = gravity_aligned_box((0.5, 0.5, 1.0), (0.2, 0.2, 0.4), 0.3)
+    # p - (-d + s / 2) with p = 1, d = -0.75, s = 0.4
+    assert height_gap(child, patch) == pytest.approx(1.0 - (0.75 + 0.2))
+
+
+def test_height_of_a_sloping_plane_is_taken_under_the_child():
+    slope = np.array([np.sin(0.3), 0.0, np.cos(0.3)])
+    plane = SurfacePlane(normal=tuple(slope), offset=-float(slope @ [2.0, 0, 1.0]), area=1, center=(2, 0, 1))
+    assert plane_height(plane, np.array([2.0, 5.0])) == pytest.approx(1.0)
+    assert plane_height(plane, np.array([3.0, 5.0])) == pytest.approx(1.0 - np.tan(0.3))
+
+
+def test_rectangle_overlap_is_2_2_as_the_thesis_words_it():
+    child = gravity_aligned_box((0.0, 0.0, 1.0), (2.0, 1.0, 1.0), 0.0)
+    points = np.array([[-0.5, -0.5, 0.5], [0.5, 0.25, 0.5], [5.0, 5.0, 0.5]])
+    assert rectangle_overlap(points, child) == pytest.approx(1.0 * 0.75 / 2.0)
+    turned = gravity_aligned_box((0.0, 0.0, 1.0), (2.0, 1.0, 1.0), np.pi / 2)
+    assert rectangle_overlap(np.array([[0.5, -1.0, 0], [-0.5, 1.0, 0]]), turned) == pytest.approx(1.0)
+    assert rectangle_overlap(points[2:], child) == 0.0
+
+
+def test_hull_overlap_spans_the_hole_under_the_child():
+    child = gravity_aligned_box((0.5, 0.5, 1.0), (0.4, 0.4, 1.0), 0.0)
+    grid = np.stack(np.meshgrid(np.linspace(0, 1, 21), np.linspace(0, 1, 21)), axis=-1).reshape(-1, 2)
+    seen = grid[(np.abs(grid - 0.5).max(axis=1) > 0.22) & (grid[:, 1] < 0.95)]
+    assert hull_overlap(SQUARE, child) == pytest.approx(1.0)
+    # The camera looked along +y: nothing was seen inside the footprint.
+    assert rectangle_overlap(np.column_stack([seen, np.zeros(len(seen))]), child) < 0.5
+    half_off = gravity_aligned_box((1.0, 0.5, 1.0), (0.4, 0.4, 1.0), 0.0)
+    assert hull_overlap(SQUARE, half_off) == pytest.approx(0.5)
+    assert hull_overlap(np.zeros((0, 2)), child) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("gap", "overlap", "score"), [(0, 1, 1), (0.25, 0.8, 0.6), (-0.25, 0.8, 0.6), (1.5, 1, 0), (0, 0.3, 0.3)]
+)
+def test_score_is_2_3(gap, overlap, score):
+    assert support_score(gap, overlap) == pytest.approx(score)
+
+
+def test_best_parent_maximises_the_score():
+    floor = solid("floor_1", (-3, -3, -0.01), (3, 3, 0), class_name="floor", node_type="layout")
+    table = solid("table_2", (0, 0, 0), (1, 1, 0.75), class_name="table", movable=False)
+    cup = solid("cup_3", (0.4, 0.4, 0.76), (0.5, 0.5, 0.86), class_name="cup")
+    ranked = candidates_for(cup, [floor, table, cup], GraphParameters(tie_margin=0.0))
+    assert [c.parent for c in ranked] == ["table_2", "floor_1"]
+    assert ranked[0].score == pytest.approx(0.99)
+    assert ranked[0].gap == pytest.approx(0.01) and ranked[0].overlap == pytest.approx(1.0)
+    assert ranked[1].score == pytest.approx(0.24)
+
+
+def test_area_threshold_and_minimum_score_reject():
+    table = solid("table_2", (0, 0, 0), (1, 1, 0.75), class_name="table", movable=False)
+    edge = solid("box_3", (0.9, 0.2, 0.75), (1.2, 0.5, 0.9))
+    assert candidates_for(edge, [table, edge], GraphParameters()) == []
+    found = candidates_for(edge, [table, edge], GraphParameters(area_threshold=0.3))
+    assert found[0].overlap == pytest.approx(1 / 3)
+    floating = solid("box_4", (0.2, 0.2, 1.6), (0.5, 0.5, 1.7))
+    assert candidates_for(floating, [table, floating], GraphParameters()) == []
+
+
+def test_a_plane_through_the_child_does_not_carry_it():
+    """What is left of a chair under a table (its back) reaches above the table top."""
+    table = solid("table_2", (0, 0, 0), (1, 1, 0.75), class_name="table", movable=False)
+    chair = solid("chair_3", (0.3, 0.3, 0.5), (0.7, 0.7, 0.9), class_name="chair", movable=False)
+    assert candidates_for(chair, [table, chair], GraphParameters()) == []
+    thesis = candidates_for(
+        chair,
+        [entity("table_2", table.box, [Patch(table.patches[0].plane, SQUARE_3D, SQUARE)]), chair],
+        GraphParameters(method="thesis"),
+    )
+    assert thesis[0].parent == "table_2"
+
+
+SQUARE_3D = np.column_stack([0.3 + 0.4 * SQUARE, np.full(4, 0.75)])
+
+
+def test_furniture_rather_stands_on_the_desk_than_on_the_keyboard():
+    desk = solid("desk_1", (0, 0, 0), (1.2, 0.7, 0.73), class_name="desk", movable=False)
+    keyboard = solid("keyboard_2", (0.3, 0.2, 0.73), (0.8, 0.4, 0.75), class_name="keyboard")
+    monitor = solid("monitor_3", (0.35, 0.25, 0.77), (0.75, 0.39, 1.2), class_name="monitor", movable=False)
+    assert candidates_for(monitor, [desk, keyboard, monitor], GraphParameters())[0].parent == "desk_1"
+
+
+def test_among_near_equals_the_highest_surface_wins():
+    table = solid("table_1", (0, 0, 0), (1, 1, 0.75), class_name="table", movable=False)
+    book = solid("book_2", (0.3, 0.3, 0.75), (0.5, 0.5, 0.78), class_name="book")
+    # A cup on the book whose rim sticks out over it: (2.3) gives the table 0.97 and the book 0.9.
+    cup = solid("cup_3", (0.41, 0.35, 0.78), (0.51, 0.45, 0.88), class_name="cup")
+    plain = candidates_for(cup, [table, book, cup], GraphParameters(tie_margin=0.0))
+    assert plain[0].parent == "table_1"
+    assert candidates_for(cup, [table, book, cup], GraphParameters())[0].parent == "book_2"
+
+
+def test_prefer_the_highest_ignores_planes_that_the_child_sinks_into():
+    def candidate(parent, score, gap, height):
+        return Candidate("x_9", parent, score, "supports", gap, 1.0, height, 0)
+
+    ranked = [candidate("a_1", 0.97, 0.0, 0.75), candidate("b_2", 0.95, -0.04, 0.79)]
+    assert prefer_the_highest(ranked, GraphParameters())[0].parent == "a_1"
+    assert prefer_the_highest([], GraphParameters()) == []
