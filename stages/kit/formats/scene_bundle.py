@@ -19,6 +19,7 @@ from stages.kit.formats.mjcf_file import write_mjcf
 from stages.kit.formats.scene_links import BodyLinks, box_links, layout_links, mesh_links, model_links
 from stages.kit.formats.urdf_check import NAME, require_sound
 from stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, write_urdf
+from stages.kit.geometry.boxes import box_yaw
 from stages.kit.geometry.layout_slabs import Slab, level_slab, surface_height, wall_slabs
 from stages.kit.geometry.transforms import inverse, is_rigid
 
@@ -147,7 +148,8 @@ def _links(
     elif load_vocabulary().by_name(body.class_name).is_layout:
         return layout_links(root, body.name, body.world_from_body, body.mesh, _slabs(body, node, graph, center))
     elif body.mesh is not None and len(body.mesh.faces):
-        links = mesh_links(root, body.name, body.mesh)
+        world_yaw = box_yaw(body.box) - np.arctan2(body.world_from_body[1, 0], body.world_from_body[0, 0])
+        links = mesh_links(root, body.name, body.mesh, movable=body.movable, yaw=float(world_yaw))
     else:
         links = box_links(body.name, body.world_from_body, body.box)
     return links if body.mass is None else links.with_mass(body.mass)

@@ -16,9 +16,10 @@ from schemas.scene_parts import Box, Joint
 from stages.kit.formats.cad_models import URDF_FILE, load_visual_parts
 from stages.kit.formats.model_writer import write_obj
 from stages.kit.formats.urdf_file import Link, Shape, UrdfJoint, parse_urdf
+from stages.kit.geometry.box_cover import cover_with_boxes
 from stages.kit.geometry.layout_slabs import Slab
 from stages.kit.geometry.solids import MassProperties, box, hull, mass_properties
-from stages.kit.geometry.transforms import inverse, transform_from_quaternion
+from stages.kit.geometry.transforms import inverse, transform_from_quaternion, transform_from_yaw
 
 MESH_DENSITY = 200.0
 """Of the convex hull of a thing without CAD model [kg/m^3]: furniture is mostly air."""
@@ -148,13 +149,13 @@ def _copied(root: Path, model_id: str, part: str, folder: Path, shape: Shape, sc
     return Shape(target.relative_to(root).as_posix(), shape.scale * scale, None, frame, color)
 
 
-def mesh_links(root: Path, name: str, mesh: trimesh.Trimesh) -> BodyLinks:
-    """Return the link of a thing without CAD model: its mesh (body frame) to look at, its convex hull to collide with.
+def mesh_links(root: Path, name: str, mesh: trimesh.Trimesh, *, movable: bool, yaw: float = 0.0) -> BodyLinks:
+    """Return the link of a thing without CAD model: its mesh (body frame) to look at.
 
-    A mesh too flat for a hull collides as the box around it, at least 5 mm thick.
+    A movable thing collides as its convex hull (too flat for one: as the box around it, at least 5 mm thick); one that
+    stays where it is as boxes over its surface, turned by `yaw` [rad], so that what lies in it or under it is free.
     """
     visual = _own_mesh(root, name, mesh)
-    folder = root / "meshes" / name
     try:
         solid = hull(np.unique(np.asarray(mesh.vertices, dtype=float), axis=0))
         properties = mass_properties([solid], [MESH_DENSITY])
@@ -165,8 +166,17 @@ def mesh_links(root: Path, name: str, mesh: trimesh.Trimesh) -> BodyLinks:
         low, high = middle - half, middle + half
         solid = box((low[0], high[0]), (low[1], high[1]), (low[2], high[2]))
         properties = mass_properties([solid], [MESH_DENSITY])
-    write_obj(folder / "collision_0.obj", solid.vertices, solid.faces)
-    return BodyLinks((Link(name, properties, (visual,), (Shape(f"meshes/{name}/collision_0.obj"),)),))
+    if movable:
+        write_obj(root / "meshes" / name / "collision_0.obj", solid.vertices, solid.faces)
+        return BodyLinks((Link(name, properties, (visual,), (Shape(f"meshes/{name}/collision_0.obj"),)),))
+    turned = transform_from_yaw(yaw, np.zeros(3))
+    collisions = []
+    for center, size in cover_with_boxes(mesh, yaw):
+        frame = turned.copy()
+        frame[:3, 3] = turned[:3, :3] @ center
+        x, y, z = (float(v) for v in size)
+        collisions.append(Shape(box_size=(x, y, z), link_from_shape=frame))
+    return BodyLinks((Link(name, properties, (visual,), tuple(collisions)),))
 
 
 def box_links(name: str, world_from_body: np.ndarray, bounds: Box) -> BodyLinks:

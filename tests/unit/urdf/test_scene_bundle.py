@@ -388,6 +388,18 @@ def without(scene: InteractiveSceneFile, *names: str) -> InteractiveSceneFile:
     return scene.model_copy(update={"bodies": tuple(body for body in scene.bodies if body.name not in names)})
 
 
+def test_a_reconstructed_container_keeps_its_contents(library, tmp_path):
+    """A bin that stayed a mesh: a hull would throw the cup out, boxes over its surface leave it where it is."""
+    mesh = trimesh.creation.box((0.5, 0.5, 0.4))
+    mesh.update_faces(mesh.face_normals[:, 2] < 0.5)
+    mesh.apply_translation([0, 0, 0.2])
+    bin_body = replace(layout("bin_1", "bin", (0, 0, 0.2), (0.5, 0.5, 0.4)), mesh=mesh)
+    cup = placed(library, "cup_2", "cup_00", (0.05, 0, 0.005), parent="bin_1", relation="contains", movable=True)
+    scene = write_scene_bundle(tmp_path, [bin_body, cup], graph_of([bin_body, cup]))
+    positions, _ = simulate(tmp_path, scene, 1.5)
+    assert positions["cup_2"] == pytest.approx([0.05, 0, 0.005], abs=0.01)
+
+
 def test_a_fixed_thing_on_a_movable_one_stands_in_the_static_tree(library, tmp_path):
     table = replace(placed(library, "table_1", "table_00", (0, 0, 0)), movable=True)
     fridge = placed(library, "fridge_2", "fridge_00", (0, 0, 0.8), parent="table_1")
