@@ -11,7 +11,7 @@ HEIGHT_BIN = 0.02
 OFFSET_BIN = 0.04
 AZIMUTH_BIN = np.radians(3.0)
 MINIMUM_WALL_HEIGHT = 1.0
-MINIMUM_WALL_TOP = 1.5
+MINIMUM_WALL_TOP = 1.25
 """A wall is seen up to here over the floor [m]: kitchen units and desks end below."""
 MINIMUM_WALL_LENGTH = 1.0
 """Narrower upright planes are sides of tall furniture [m]."""
@@ -118,7 +118,7 @@ def find_walls(points: np.ndarray, normals: np.ndarray, floor: float, *, maximum
     """Return the upright planes that bound the room, best supported first.
 
     `points`, `normals` (N, 3), world frame. Planes come from votes of the points for (azimuth, offset); a plane is a
-    wall when its points span at least a metre in height and length, reach 1.5 m over the `floor`, and hardly
+    wall when its points span at least a metre in height and length, reach 1.25 m over the `floor`, and hardly
     anything (3 %) was seen behind that part of it.
     """
     upright = np.abs(normals[:, 2]) < 0.25
