@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,6 +34,34 @@ SHUT = 0.06
 """Share of a joint's range below which it counts as shut."""
 OPEN = 0.5
 """Share of a joint's range above which it counts as open."""
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A way of the hand along with a moving part."""
+
+    body: str
+    joint: Joint
+    contact: ContactPoint
+    values: np.ndarray
+    """(K,) joint values on the way."""
+    tilt: np.ndarray
+    """(K,) turn of the approach against the closing direction about the vertical [rad]."""
+    roll: float
+    gap: float
+    """Of the tool point outside the contact point [m]."""
+    opening: float
+    """Of the fingers on approach [m]; 0: closed, they push."""
+    grip: float
+    """To which the fingers close on the handle [m]."""
+
+    def poses(self, world_from_body: np.ndarray, rows: list[int] | None = None) -> list[np.ndarray]:
+        """Return world_from_tool (4, 4) at all joint values, or at some rows of them."""
+        values = self.values if rows is None else self.values[rows]
+        tilt = self.tilt if rows is None else self.tilt[rows]
+        return tool_poses(
+            self.joint, self.contact, world_from_body, values, tilt=tilt, roll=self.roll, gap=self.gap
+        )
 
 
 def is_closed(joint: Joint, value: float) -> bool:
@@ -144,6 +173,7 @@ def _push(
     contacts = push_points(joint, model.part_mesh(body, joint.part), random, 6, (0.45 - lift, 1.25 - lift))
     values = _values(start, end)
     gap = model.description.tip_overhang - PRESS
+    planner = ArmPlanner(model, random, budgets.path_samples)
     for contact in contacts:
         route = np.array([
             apply(world_from_body @ body_from_moved(joint, float(value)), contact.point) for value in values
@@ -151,9 +181,9 @@ def _push(
         bases = _candidate_bases(model, state, route, budgets, random, tally)
         for tilt in _tilts(len(values)):
             for roll in (0.0, np.pi / 2):
-                poses = tool_poses(joint, contact, world_from_body, values, tilt=tilt, roll=roll, gap=gap)
+                arc = Arc(body, joint, contact, values, tilt, roll, gap, 0.0, 0.0)
                 for base in bases[:6]:
-                    found = _try_arc(model, state, body, joint, values, poses, base, 0.0, 0.0, budgets, random, tally)
+                    found = _try_arc(model, state, arc, base, planner, tally)
                     if found is not None:
                         return found
     return None
@@ -170,31 +200,28 @@ def _drag(
     ])  # fmt: skip
     bases = _candidate_bases(model, state, route, budgets, random, tally)
     opening = model.description.opening
+    planner = ArmPlanner(model, random, budgets.path_samples)
     for tilt in _tilts(len(values)):
         for flip in (0.0, np.pi):
-            poses = tool_poses(joint, contact, world_from_body, values, tilt=tilt, roll=roll + flip, gap=0.0)
+            arc = Arc(body, joint, contact, values, tilt, roll + flip, 0.0, opening, GRIP_SLACK)
             for base in bases[:10]:
-                found = _try_arc(
-                    model, state, body, joint, values, poses, base, opening, GRIP_SLACK, budgets, random, tally
-                )
+                found = _try_arc(model, state, arc, base, planner, tally)
                 if found is not None:
                     return found
     return None
 
 
 def _try_arc(
-    model: WorldModel, state: RobotState, body: str, joint: Joint, values: np.ndarray, poses: list[np.ndarray],
-    base: np.ndarray, opening: float, grip: float, budgets: Budgets, random: np.random.Generator, tally: Tally,
-) -> Manipulation | None:  # fmt: skip
-    """Return the motion in which the tool follows `poses` while the joint takes `values`, or None (tallied).
-
-    `opening` is how wide the fingers are on approach, `grip` how wide they close on the handle (0: they push).
-    """
-    planner = ArmPlanner(model, random, budgets.path_samples)
+    model: WorldModel, state: RobotState, arc: Arc, base: np.ndarray, planner: ArmPlanner, tally: Tally
+) -> Manipulation | None:
+    """Return the motion in which the tool goes along an arc from a base pose, or None (tallied)."""
+    world_from_body = model.pose(arc.body)
+    body, joint, values, opening, grip = arc.body, arc.joint, arc.values, arc.opening, arc.grip
     # Cheap tests at the ends and in the middle first.
-    for index in (0, len(poses) // 2, len(poses) - 1):
-        if planner.reachable(base, poses[index], tally, starts=2) is None:
+    for pose in arc.poses(world_from_body, [0, len(values) // 2, len(values) - 1]):
+        if planner.reachable(base, pose, tally, starts=2) is None:
             return None
+    poses = arc.poses(world_from_body)
     model.robot.set(Configuration(base, state.arm, max(opening, grip)))
     start = planner.reachable(base, poses[0], tally)
     if start is None:
@@ -230,11 +257,15 @@ def _try_arc(
         checker.allow()
     segments = [
         Segment(whole_body(base, reach), opening),
-        Segment(whole_body(base, approach[::-1]), opening, SLOW),
+        Segment(whole_body(base, approach[::-1]), opening, SLOW, label="reach"),
     ]
     if pulling:
         segments.append(Segment(whole_body(base, approach[:1]), grip, SLOW))
-    segments.append(Segment(whole_body(base, arms), grip if pulling else 0.0, SLOW))
+    half = len(arms) // 2
+    held = grip if pulling else 0.0
+    verb = "pull" if pulling else "push"
+    segments.append(Segment(whole_body(base, arms[: half + 1]), held, SLOW, label=verb))
+    segments.append(Segment(whole_body(base, arms[half:]), held, SLOW, label=verb))
     segments.append(Segment(whole_body(base, away), opening, SLOW))
     segments.append(Segment(whole_body(base, home), opening))
     return Manipulation(base, tuple(segments), joint_values={joint.name: max(0.0, float(values[-1]))})

@@ -89,9 +89,14 @@ class PhysicalRobot:
         if self.held is not None:
             self.check_hold()
         if segment.event == "grasp" and item is not None:
+            self.world.wake()
             self.grasp(item)
+            self.recording.keyframe(self.action, "grasp")
         elif segment.event == "release":
             self.release()
+            self.recording.keyframe(self.action, "release")
+        elif segment.label:
+            self.recording.keyframe(self.action, segment.label)
 
     def _follow_rows(self, path: np.ndarray, speed: np.ndarray, acceleration: np.ndarray, opening: float) -> None:
         start = self._target

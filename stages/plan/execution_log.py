@@ -28,7 +28,10 @@ def write_execution(
     camera: Camera,
     world_from_camera: np.ndarray,
 ) -> None:
-    """Write the snapshots as FrameTransforms (world -> every link and body), and images (H, W, 3) by snapshot index."""
+    """Write the snapshots as FrameTransforms (world -> every link and body), and images (H, W, 3) by snapshot index.
+
+    A frame that did not move since it was last said (0.1 mm, 0.1 mrad) is not said again.
+    """
     with Path(path).open("wb") as file:
         writer = McapWriter(file, chunk_size=1 << 20, compression=CompressionType.ZSTD)
         writer.start(profile="", library="scenewright")
@@ -38,14 +41,17 @@ def write_execution(
             schema = writer.register_schema(kind.DESCRIPTOR.full_name, "protobuf", data)
             channels[topic] = writer.register_channel(topic, "protobuf", schema)
         last = -1
+        said: dict[str, np.ndarray] = {}
         for index, snapshot in enumerate(snapshots):
             stamp = foxglove.nanoseconds(snapshot.time)
             if stamp <= last:
                 continue
             last = stamp
             poses = {**snapshot.links, "camera": world_from_camera}
+            changed = [name for name in sorted(poses) if name not in said or _differs(said[name], poses[name])]
+            said.update({name: poses[name] for name in changed})
             message = FrameTransforms()
-            for name in sorted(poses):
+            for name in changed:
                 message.transforms.extend(foxglove.transforms_message(stamp, "world", name, poses[name]).transforms)
             _add(writer, channels[TRANSFORMS], stamp, message)
             if index in images:
@@ -53,6 +59,10 @@ def write_execution(
                 jpeg = foxglove.encode_jpeg(images[index])
                 _add(writer, channels[COLOR], stamp, foxglove.color_message(stamp, jpeg, "camera"))
         writer.finish()
+
+
+def _differs(first: np.ndarray, second: np.ndarray) -> bool:
+    return bool(np.abs(first - second).max() > 1e-4)
 
 
 def _add(writer: McapWriter, channel: int, stamp: int, message) -> None:  # noqa: ANN001 (a protobuf message)

@@ -21,6 +21,8 @@ class Segment:
     event: Literal["", "grasp", "release"] = ""
     item: str | None = None
     """What is grasped or released."""
+    label: str = ""
+    """Name of the key frame to be taken at the end; "" takes none."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ class PlanParameters(Parameters):
     refinement_attempts: int = Field(3, ge=1, le=100, description="Times the geometry of one task plan is tried")
     task_attempts: int = Field(4, ge=1, le=100, description="Task plans tried, each without what failed before")
     execution_attempts: int = Field(3, ge=1, le=20, description="Times an action is tried when it fails physically")
-    video_rate: float = Field(2.0, ge=0, le=30, description="Images per second in execution.mcap [1/s]; 0: none")
+    video_rate: float = Field(1.0, ge=0, le=30, description="Images per second in execution.mcap [1/s]; 0: none")
     image_width: int = Field(640, ge=64, le=4096, description="Width of the key frames [px]")
 
 

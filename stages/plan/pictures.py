@@ -10,6 +10,7 @@ import trimesh
 from schemas.interactive_scene import SceneBody
 from schemas.scene_parts import Camera
 from stages.kit.geometry.transforms import apply, look_at
+from stages.kit.rendering.light_map import AreaLight
 from stages.kit.rendering.ray_casting import SceneRenderer
 from stages.kit.rendering.surfaces import TriangleSoup, build_soup
 from stages.kit.simulation.robot_description import PEDESTAL_LINK, RobotDescription, mobile_robot_urdf
@@ -51,7 +52,7 @@ class RoomPictures:
     ) -> None:
         self._still: list[TriangleSoup] = []
         self._shell: list[TriangleSoup] = []
-        """Walls and ceilings: in pictures from inside, not in those from above."""
+        """Walls: in pictures from inside, not in those from above. Ceilings are in none: light comes from there."""
         self._moving: dict[str, TriangleSoup] = {}
         low, high = [], []
         for number, (name, record) in enumerate(records.items(), start=1):
@@ -66,9 +67,9 @@ class RoomPictures:
                     self._moving[link] = soup
                     continue
                 placed = _moved(soup, world.link_pose(name, link))
-                if record.class_name in ("wall", "ceiling"):
+                if record.class_name == "wall":
                     self._shell.append(placed)
-                else:
+                elif record.class_name != "ceiling":
                     self._still.append(placed)
                     low.append(placed.corners.min(axis=(0, 1)))
                     high.append(placed.corners.max(axis=(0, 1)))
@@ -80,7 +81,16 @@ class RoomPictures:
 
     def _renderer(self, snapshot: Snapshot, shell: bool) -> SceneRenderer:
         moving = [_moved(soup, snapshot.links[link]) for link, soup in self._moving.items() if link in snapshot.links]
-        return SceneRenderer(_joined([*self._still, *(self._shell if shell else []), *moving]))
+        if not shell:
+            return SceneRenderer(_joined([*self._still, *moving]), antialias=False)
+        x, y = (self.low + self.high)[:2] / 2
+        lights = (
+            AreaLight((x + 0.8, y - 0.6, 9.0), (0.5, 0.0, 0.0), (0.0, -0.5, 0.0), (0.62, 0.60, 0.57)),
+            AreaLight((x - 0.9, y + 0.9, 8.0), (0.5, 0.0, 0.0), (0.0, -0.5, 0.0), (0.18, 0.19, 0.21)),
+        )
+        return SceneRenderer(
+            _joined([*self._still, *self._shell, *moving]), lights=lights, ambient=(0.46, 0.47, 0.49)
+        )
 
     def overview(self, snapshot: Snapshot, camera: Camera) -> np.ndarray:
         """Return (H, W, 3) uint8: the whole room from above and aside, without walls and ceiling."""

@@ -36,7 +36,7 @@ from stages.plan.trajectories import executed_rows, planned_rows, write_trajecto
 from stages.plan.updated_graph import update_graph
 from stages.plan.world_model import RobotState, WorldModel, body_planes
 
-RECORD_RATE = 20.0
+RECORD_RATE = 10.0
 SETTLE_SECONDS = 1.0
 START, SEARCH, EXECUTION = 1, 2, 3
 """Random streams."""
@@ -164,6 +164,7 @@ def _execute(
             parameters.relocalize, parameters.execution_attempts,
         )  # fmt: skip
         carried_out = conduct.run(state, steps)
+        world.wake()
         physical.wait(SETTLE_SECONDS)
         physical.recording.keyframe(len(steps) - 1, "end")
         checks = check_goal(world, literals, matches, joint_names, physical.held)
@@ -223,7 +224,7 @@ def _draw(pictures: RoomPictures, physical: PhysicalRobot, parameters: PlanParam
     for number, (index, label) in enumerate(context.progress.track(recording.keyframes, description="key frames")):
         image = pictures.near(recording.snapshots[index], camera)
         cv2.imwrite(str(folder / f"{number:02d}_{label}.png"), cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
-    small = picture_camera(min(480, parameters.image_width), 0.8)
+    small = picture_camera(min(400, parameters.image_width), 0.8)
     images: dict[int, np.ndarray] = {}
     if parameters.video_rate > 0:
         every = max(1, round(RECORD_RATE / parameters.video_rate))
@@ -267,8 +268,6 @@ def _write(
     graph.write(context.output / "graph.json")
     write_trajectory(context.output / "trajectory.npz", arrays)
     context.output.joinpath("plan.txt").write_text(plan_text(plan, steps or []), encoding="utf-8")
-    for name in ("keyframes",):
-        (context.output / name).mkdir(exist_ok=True)
     ok = status in ("executed", "planned")
     summary = {
         "goal": " ".join(literals), "status": status, "actions": len(actions),

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-from scipy.spatial.transform import Rotation
 
 from schemas.scene_parts import Joint
-from stages.kit.geometry.transforms import apply
-
-UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -30,11 +27,18 @@ def body_from_moved(joint: Joint, value: float) -> np.ndarray:
     if joint.type == "prismatic":
         pose[:3, 3] = axis * value
         return pose
-    turn = Rotation.from_rotvec(axis * value).as_matrix()
+    turn = _turn(axis, value)
     origin = np.array(joint.origin)
     pose[:3, :3] = turn
     pose[:3, 3] = origin - turn @ origin
     return pose
+
+
+def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Return the rotation (3, 3) by an angle about a unit axis (Rodrigues' formula)."""
+    x, y, z = axis.tolist()
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
 
 
 def closing_direction(joint: Joint, point: np.ndarray) -> np.ndarray:
@@ -104,16 +108,20 @@ def tool_poses(
     closing axis of the fingers about the approach, 0 keeps it horizontal.
     """
     poses = []
-    for value, turn in zip(values, tilt, strict=True):
-        moved = world_from_body @ body_from_moved(joint, float(value))
-        point = apply(moved, contact.point)
+    for value, turn in zip(values.tolist(), tilt.tolist(), strict=True):
+        moved = world_from_body @ body_from_moved(joint, value)
+        point = moved[:3, :3] @ contact.point + moved[:3, 3]
         inward = moved[:3, :3] @ contact.inward
-        approach = Rotation.from_rotvec(UP * float(turn)).as_matrix() @ inward
-        side = np.cross(UP, approach)
-        side = side / np.linalg.norm(side) if np.linalg.norm(side) > 1e-6 else np.array([1.0, 0.0, 0.0])
-        frame = np.column_stack([np.cross(side, approach), side, approach])
+        sine, cosine = math.sin(turn), math.cos(turn)
+        x, y, z = cosine * inward[0] - sine * inward[1], sine * inward[0] + cosine * inward[1], inward[2]
+        # The closing axis is horizontal, the third one perpendicular to both; then the hand rolls about its approach.
+        flat = math.hypot(x, y)
+        side = np.array([-y / flat, x / flat, 0.0]) if flat > 1e-6 else np.array([1.0, 0.0, 0.0])
+        third = np.array([side[1] * z, -side[0] * z, side[0] * y - side[1] * x])
         pose = np.eye(4)
-        pose[:3, :3] = frame @ Rotation.from_rotvec([0, 0, roll]).as_matrix()
+        pose[:3, 0] = math.cos(roll) * third + math.sin(roll) * side
+        pose[:3, 1] = math.cos(roll) * side - math.sin(roll) * third
+        pose[:3, 2] = (x, y, z)
         pose[:3, 3] = point - gap * inward
         poses.append(pose)
     return poses
