@@ -142,9 +142,9 @@ def edge_map(depth: np.ndarray, points: np.ndarray, normals: np.ndarray, setting
         mask_threshold=settings.convexity_mask_threshold,
         mutual=settings.mutual_convexity,
     )
-    convex = (convexity > settings.convexity_threshold).astype(np.uint8)
+    convex: np.ndarray = (convexity > settings.convexity_threshold).astype(np.uint8)
     jumps = depth_discontinuity(depth, ratio=settings.discontinuity_ratio, window=settings.discontinuity_window)
-    jump_mask = jumps.astype(np.uint8)
+    jump_mask: np.ndarray = jumps.astype(np.uint8)
     if settings.opening:
         convex = cv2.morphologyEx(convex, cv2.MORPH_OPEN, np.ones((2 * settings.opening + 1,) * 2, np.uint8))
     if settings.closing:

@@ -95,9 +95,8 @@ def find_floor(heights: np.ndarray, upwardness: np.ndarray) -> float | None:
         # Climb to the top of this hill of the histogram.
         while index + 1 < support.size and support[index + 1] > support[index]:
             index += 1
-        height = low + (index + 0.5) * HEIGHT_BIN
-        near = level[np.abs(level - height) < 0.06]
-        height = float(np.median(near))
+        height = low + (float(index) + 0.5) * HEIGHT_BIN
+        height = float(np.median(level[np.abs(level - height) < 0.06]))
         if np.mean(heights < height - 0.15) <= 0.01:
             return height
     return None

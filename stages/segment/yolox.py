@@ -9,19 +9,12 @@ import cv2
 import numpy as np
 
 from schemas.errors import BadInput, MissingDependency
+from stages.segment.coco import COCO_NAMES
 
 STRIDES = (8, 16, 32)
 PAD_VALUE = 114
 INPUT_SIZES = (416, 640)
 """Square inputs of the published YOLOX models (nano and tiny; small to extra large)."""
-COCO_NAMES = tuple(
-    "person,bicycle,car,motorcycle,airplane,bus,train,truck,boat,traffic light,fire hydrant,stop sign,parking meter,"
-    "bench,bird,cat,dog,horse,sheep,cow,elephant,bear,zebra,giraffe,backpack,umbrella,handbag,tie,suitcase,frisbee,"
-    "skis,snowboard,sports ball,kite,baseball bat,baseball glove,skateboard,surfboard,tennis racket,bottle,wine glass,"
-    "cup,fork,knife,spoon,bowl,banana,apple,sandwich,orange,broccoli,carrot,hot dog,pizza,donut,cake,chair,couch,"
-    "potted plant,bed,dining table,toilet,tv,laptop,mouse,remote,keyboard,cell phone,microwave,oven,toaster,sink,"
-    "refrigerator,book,clock,vase,scissors,teddy bear,hair drier,toothbrush".split(",")
-)
 
 
 @dataclass(frozen=True)

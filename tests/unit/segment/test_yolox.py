@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.errors import BadInput, MissingDependency
-from stages.segment.yolox import COCO_NAMES, Detector, decode, letterbox, overlap_of_boxes, suppress, tile_windows
+from stages.segment.coco import COCO_NAMES
+from stages.segment.yolox import Detector, decode, letterbox, overlap_of_boxes, suppress, tile_windows
 from tests.real_data import real_data
 
 
@@ -70,7 +71,9 @@ def test_suppression_keeps_what_it_must(seed: int, count: int, overlap: float) -
     assert kept == expected
 
 
-@pytest.mark.parametrize(("width", "height", "side"), [(640, 480, 480), (1280, 960, 640), (641, 480, 480), (100, 90, 480)])
+@pytest.mark.parametrize(
+    ("width", "height", "side"), [(640, 480, 480), (1280, 960, 640), (641, 480, 480), (100, 90, 480)]
+)
 def test_tiles_cover_the_image_and_overlap(width: int, height: int, side: int) -> None:
     windows = tile_windows(width, height, side)
     if max(width, height) <= side:
@@ -111,7 +114,9 @@ def test_the_kitchen_has_a_table_a_chair_and_a_cup() -> None:
     color = np.ascontiguousarray(cv2.imread(str(picture))[..., ::-1])
     whole, tiled = detector(weights, tile_side=0).detect(color), detector(weights).detect(color)
     for found in (whole, tiled):
-        names = {COCO_NAMES[number]: score for number, score in zip(found.classes[::-1], found.scores[::-1], strict=True)}
+        names = {
+            COCO_NAMES[number]: score for number, score in zip(found.classes[::-1], found.scores[::-1], strict=True)
+        }
         assert names["dining table"] > 0.7 and names["chair"] > 0.6 and names["cup"] > 0.5
         assert (found.boxes[:, 2:] > found.boxes[:, :2]).all()
     cup = tiled.boxes[tiled.classes == COCO_NAMES.index("cup")][0]
