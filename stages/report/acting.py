@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from schemas.contact_graph import SCENE_NODE
 from schemas.interactive_scene import InteractiveScene
 from schemas.plan import Check, Failure, Plan
 from stages.report.images import Picture, from_file
@@ -19,8 +20,8 @@ class BodyRow:
     name: str
     class_name: str
     movable: bool
-    parent: str
-    relation: str
+    place: str
+    """On or in what."""
     mass: str
     joints: tuple[str, ...]
 
@@ -65,11 +66,18 @@ def body_rows(scene: InteractiveScene) -> list[BodyRow]:
                 joints.append(f"{name}: slide {low:.0f} to {high:.0f} cm, seen at {now:.0f} cm")
         rows.append(
             BodyRow(
-                body.name, body.class_name, body.movable, body.parent or "world", body.relation.replace("_", " "),
-                f"{body.mass:.2f} kg", tuple(joints),
+                body.name, body.class_name, body.movable, _place(body.relation, body.parent), f"{body.mass:.2f} kg",
+                tuple(joints),
             )
         )  # fmt: skip
     return sorted(rows, key=lambda r: (not r.joints, not r.movable, r.name))
+
+
+def _place(relation: str, parent: str | None) -> str:
+    if parent is None or parent == SCENE_NODE:
+        return "part of the room"
+    word = {"contains": "in", "carries_on_wall": "hangs on"}.get(relation, "on")
+    return f"{word} {parent}"
 
 
 def plan_view(plan: Plan, most: int, width: int) -> PlanView:

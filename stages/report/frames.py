@@ -11,7 +11,7 @@ from schemas.sequence import Sequence
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.masks import PanopticReader
-from stages.kit.measurement.palette import hex_color, instance_color
+from stages.kit.measurement.palette import entity_color, hex_color, instance_color
 from stages.report.images import Picture, jpeg
 
 
@@ -68,9 +68,19 @@ def frame_views(
                     overlay,
                 )
             )
-    names = {entry.id: entry.name for entry in load_vocabulary().classes}
-    legend = [Chip(names.get(c, f"class {c}"), hex_color(instance_color(c))) for c in sorted(seen)]
+    names = class_names()
+    legend = [Chip(spaced(names.get(c, f"class {c}")), hex_color(entity_color(c, names.get(c)))) for c in sorted(seen)]
     return views, legend
+
+
+def class_names() -> dict[int, str]:
+    """Class id -> name."""
+    return {entry.id: entry.name for entry in load_vocabulary().classes}
+
+
+def spaced(name: str) -> str:
+    """A class name for people."""
+    return name.replace("_", " ")
 
 
 def segment_colors(segments: tuple[FrameSegment, ...]) -> tuple[dict[int, tuple[float, float, float]], set[int]]:
@@ -80,22 +90,25 @@ def segment_colors(segments: tuple[FrameSegment, ...]) -> tuple[dict[int, tuple[
     """
     classes = {s.category_id for s in segments if s.category_id > 0}
     if len(classes) > 1:
-        return {s.id: instance_color(s.category_id) for s in segments}, classes
+        names = class_names()
+        return {s.id: entity_color(s.category_id, names.get(s.category_id)) for s in segments}, classes
     return {s.id: instance_color(s.instance) for s in segments}, set()
 
 
 def blend_segments(
     color: np.ndarray, ids: np.ndarray, colors: dict[int, tuple[float, float, float]], strength: float = 0.55
 ) -> np.ndarray:
-    """Tint (H, W, 3) uint8 by segment; borders between segments are white; void keeps its colour, darker."""
+    """Tint (H, W, 3) uint8 by segment; borders between segments are white; void (no depth, say) is dimmed."""
     values, inverse = np.unique(ids, return_inverse=True)
     table = np.array([colors.get(int(v), (0.25, 0.25, 0.25)) for v in values])
     tint = table[inverse.reshape(ids.shape)] * 255.0
     grey = color.mean(axis=2, keepdims=True)
     result = (1.0 - strength) * (0.5 * color + 0.5 * grey) + strength * tint
     border = np.zeros(ids.shape, dtype=bool)
-    border[:, 1:] |= ids[:, 1:] != ids[:, :-1]
-    border[1:] |= ids[1:] != ids[:-1]
+    border[:, 1:] |= (ids[:, 1:] != ids[:, :-1]) & (ids[:, 1:] > 0) & (ids[:, :-1] > 0)
+    border[1:] |= (ids[1:] != ids[:-1]) & (ids[1:] > 0) & (ids[:-1] > 0)
+    void = ids == 0
+    result[void] = 0.7 * color[void]
     result[border] = 0.25 * result[border] + 0.75 * 255.0
     return np.clip(np.round(result), 0, 255).astype(np.uint8)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.scene_parts import Relation
-from stages.kit.measurement.palette import hex_color, instance_color
+from stages.kit.measurement.palette import entity_color, hex_color
 from stages.kit.measurement.tree_layout import tree_layout
 
 ROW = 30
@@ -79,7 +79,7 @@ def draw_graph(
     }
     nodes = tuple(
         DrawnNode(
-            *boxes[node.id], node.id, node.node_type, hex_color(instance_color(node.instance)),
+            *boxes[node.id], node.id, node.node_type, hex_color(entity_color(node.instance, node.class_name)),
             _node_title(node), marks.get(node.id, ""),
         )
         for node in graph.nodes

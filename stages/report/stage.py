@@ -55,6 +55,8 @@ class DrawnView:
     width: int
     height: int
     caption: str
+    of_masks: bool = True
+    """Whether the segmentation masks have to do with it: then their label stands beside it."""
 
 
 def run(
@@ -110,8 +112,8 @@ def run(
 
 def _empty_page() -> dict[str, Any]:
     empty = (
-        "frames legend map_views graph cad_views replacements bodies groups notes plots tables metrics tiles plan "
-        "baseline has_intervals plan_ok"
+        "frames legend map_views graph cad_views replacements bodies fixed_bodies groups notes plots tables metrics "
+        "tiles plan baseline has_intervals plan_ok"
     )
     texts = "frames_text map_text graph_text graph_errors cad_text scene_text figures_text"
     values: dict[str, Any] = dict.fromkeys(empty.split(), None)
@@ -134,11 +136,8 @@ def _label(evaluation: Evaluation | None, segments: Segments | None, panoptic_ma
 
 def _title(ground_truth: GroundTruth | None, sequence: Sequence | None) -> str:
     if ground_truth is not None:
-        truth = ground_truth.truth
-        return f"A generated room, reconstructed ({truth.recipe}, seed {truth.seed})"
-    if sequence is not None:
-        return f"A scanned room, reconstructed ({sequence.info.source_format})"
-    return "A reconstructed room"
+        return "A generated room, reconstructed"
+    return "A scanned room, reconstructed" if sequence is not None else "A reconstructed room"
 
 
 def _lead(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts: dict[str, Artifact]) -> str:
@@ -155,7 +154,10 @@ def _lead(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts
     if made:
         parts.append(", ".join(made[:-1]) + (" and " if len(made) > 1 else "") + made[-1])
     text = " became ".join(parts) if len(parts) == 2 else "".join(parts)
-    truth = " The room was generated, so everything can be compared with the truth." if ground_truth is not None else ""
+    truth = ""
+    if ground_truth is not None:
+        file = ground_truth.truth
+        truth = f" The room was generated (recipe {file.recipe}, seed {file.seed}), so the truth is known."
     return (text[:1].upper() + text[1:] + "." if text else "") + truth
 
 
@@ -213,7 +215,7 @@ def _add_views(
         moved = np.eye(4) if sequence is None else np.array(sequence.info.gravity.world_from_log)
         truth = true_model(ground_truth, moved)
         if truth is not None:
-            pictures.append(_draw(truth, view, "The true room from the same place"))
+            pictures.append(replace(_draw(truth, view, "The true room from the same place"), of_masks=False))
     pictures.append(
         _draw(model, top_view(scanned or model, round(0.75 * width)), "CAD scene from above", labelled=True)
     )
@@ -268,14 +270,19 @@ def _add_graph(values: dict[str, Any], contact_graph: ContactGraph, evaluation: 
     for mark in marks.values():
         name = mark.split(",")[0]
         errors[name] = errors.get(name, 0) + 1
-    values["graph_errors"] = ", ".join(f"{count} {name}" for name, count in sorted(errors.items()))
+    plurals = {"wrong class": "wrong classes"}
+    values["graph_errors"] = ", ".join(
+        f"{count} {name if count == 1 else plurals.get(name, name + 's')}" for name, count in sorted(errors.items())
+    )
 
 
 def _add_scene(values: dict[str, Any], interactive_scene: InteractiveScene) -> None:
     scene = interactive_scene.scene
     movable = sum(body.movable for body in scene.bodies)
     joints = sum(len(body.joints) for body in scene.bodies)
-    values["bodies"] = body_rows(interactive_scene)
+    rows = body_rows(interactive_scene)
+    values["bodies"] = [row for row in rows if row.joints or row.movable] or rows
+    values["fixed_bodies"] = [row for row in rows if row not in values["bodies"]]
     values["scene_text"] = (
         f"{len(scene.bodies)} bodies, {movable} of them free to move, {joints} joints. {scene.combined_file} is the "
         f"whole kinematic tree; {scene.static_file} and one file per free body are for engines without floating joints."

@@ -14,7 +14,7 @@ from schemas.ground_truth import GroundTruth
 from schemas.panoptic_map import PanopticMap
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.cad_models import posed_mesh, read_model
-from stages.kit.measurement.palette import UNLABELLED, instance_color
+from stages.kit.measurement.palette import LAYOUT_COLORS, UNLABELLED, entity_color
 from stages.kit.rendering.surfaces import TriangleSoup, build_soup, srgb_to_linear
 
 
@@ -26,7 +26,7 @@ class Model:
     classes: dict[int, str]
     """Instance -> class name; instances that are missing are unlabelled."""
     names: dict[int, str]
-    """Instance -> what to call it."""
+    """Instance -> what to call it in pictures; floor, walls and ceiling need no name."""
 
     def _table(self, names: set[str], unlabelled: bool) -> np.ndarray:
         """(T,) bool: triangles of instances whose class is in `names`."""
@@ -69,7 +69,9 @@ class Model:
         """The same shape, coloured by instance."""
         values, inverse = np.unique(self.soup.instance, return_inverse=True)
         table = srgb_to_linear(
-            np.array([instance_color(int(v)) if int(v) in self.classes else UNLABELLED for v in values])
+            np.array(
+                [entity_color(int(v), self.classes[int(v)]) if int(v) in self.classes else UNLABELLED for v in values]
+            )
         )
         colors = np.repeat(table[inverse][:, None, :], 3, axis=1)
         return replace(self, soup=replace(self.soup, corner_colors=colors.astype(np.float32)))
@@ -101,7 +103,7 @@ def map_model(panoptic_map: PanopticMap) -> Model | None:
     return Model(
         soup,
         {e.instance: e.class_name for e in entities},
-        {e.instance: f"{e.class_name} {e.instance}" for e in entities},
+        {e.instance: f"{e.class_name} {e.instance}" for e in entities if e.class_name not in LAYOUT_COLORS},
     )
 
 
@@ -136,7 +138,8 @@ def cad_model(cad_scene: CadScene) -> Model | None:
             continue
         meshes.append((number, mesh))
         classes[number] = class_name
-        names[number] = replacement.node
+        if replacement.decision != "layout":
+            names[number] = f"{class_name} {number}" if node is not None else replacement.node
     return Model(build_soup(meshes), classes, names) if meshes else None
 
 

@@ -13,6 +13,8 @@ from stages.kit.rendering.surfaces import TriangleSoup
 from stages.report.surfaces import Model
 
 FIELD_OF_VIEW = np.radians(32.0)
+PLAN_FIELD_OF_VIEW = np.radians(8.0)
+"""From above: almost parallel rays, so that walls stay lines."""
 ELEVATION = np.radians(42.0)
 AZIMUTHS = 12
 SHELL = 0.25
@@ -54,9 +56,9 @@ def bounds_of(model: Model, highest: float = 2.2) -> Bounds:
     return Bounds(low.astype(float), np.maximum(high, low + 0.1).astype(float))
 
 
-def page_camera(width: int, height: int) -> Camera:
-    """A camera of the views' field of view (over the width)."""
-    focal = width / (2.0 * np.tan(FIELD_OF_VIEW / 2.0))
+def page_camera(width: int, height: int, field_of_view: float = FIELD_OF_VIEW) -> Camera:
+    """A camera with a field of view [rad] over its width."""
+    focal = width / (2.0 * np.tan(field_of_view / 2.0))
     return Camera(width=width, height=height, fx=focal, fy=focal, cx=(width - 1) / 2, cy=(height - 1) / 2)
 
 
@@ -132,10 +134,11 @@ def oblique_view(model: Model, width: int, height: int) -> View:
 
 
 def top_view(model: Model, width: int) -> View:
-    """Straight down, north (y) up; the picture's height follows the room's shape."""
+    """Straight down, y up; the picture's height follows the room's shape."""
     bounds = bounds_of(model)
     extent = bounds.high - bounds.low
-    camera = page_camera(width, int(np.clip(width * (extent[1] + 0.3) / (extent[0] + 0.3), 0.45 * width, 1.1 * width)))
+    height = int(np.clip(width * (extent[1] + 0.3) / (extent[0] + 0.3), 0.45 * width, 1.1 * width))
+    camera = page_camera(width, height, PLAN_FIELD_OF_VIEW)
     return View(camera, fitted_pose(camera, bounds, np.array([0.0, 0.0, 1.0]), up=(0.0, 1.0, 0.0)))
 
 

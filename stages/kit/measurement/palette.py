@@ -11,6 +11,12 @@ RELATION_COLORS = {
     "proximal": "#8c8c8c",
 }
 UNLABELLED = (0.62, 0.62, 0.60)
+LAYOUT_COLORS = {
+    "floor": (0.80, 0.755, 0.69),
+    "wall": (0.715, 0.755, 0.785),
+    "ceiling": (0.84, 0.84, 0.82),
+}
+"""Calm colours for what is large and behind everything."""
 GOLDEN_RATIO = 0.6180339887498949
 
 
@@ -25,6 +31,11 @@ def instance_color(instance: int) -> tuple[float, float, float]:
     lightness = (0.52, 0.64, 0.44)[instance % 3]
     saturation = (0.62, 0.55, 0.72)[(instance // 3) % 3]
     return colorsys.hls_to_rgb(hue, lightness, saturation)
+
+
+def entity_color(number: int, class_name: str | None) -> tuple[float, float, float]:
+    """Return the colour of an entity: calm for floor, wall and ceiling, else by `number` (instance or class id)."""
+    return LAYOUT_COLORS.get(class_name or "", instance_color(number))
 
 
 def hex_color(color: tuple[float, float, float]) -> str:

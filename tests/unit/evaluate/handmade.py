@@ -210,10 +210,12 @@ def make_cad_scene(root: Path, things: tuple[Thing, ...] = ROOM, shift: float = 
 def make_interactive_scene(root: Path, things: tuple[Thing, ...] = ROOM) -> InteractiveScene:
     """scene.json and graph.json alone."""
     root.mkdir(parents=True)
+    names = {thing.instance: thing.name for thing in things}
     bodies = tuple(
         SceneBody(
             name=t.name, class_name=t.class_name, movable=t.class_name in ("cup", "bottle"),
-            world_from_body=as_transform(model_pose(t)), box=t.box, mass=1.0,
+            parent=names.get(t.parent), relation=t.relation, world_from_body=as_transform(model_pose(t)), box=t.box,
+            mass=1.0,
             joints=tuple(
                 Joint(name=f"{t.name}__{name}", type="revolute", part=f"{t.name}__{name}", origin=(0, 0, 0),
                       axis=(0, 0, 1), lower=0.0, upper=1.6)
