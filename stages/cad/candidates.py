@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import dataclass, replace
 
@@ -11,8 +12,8 @@ from schemas.cad_library import CadModel
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.vocabulary import load_vocabulary
 from stages.cad.alignment import AlignmentWeights, align
-from stages.cad.fitting import fitted, shapes_of_model
-from stages.cad.matching import rank_matches
+from stages.cad.fitting import QUICK_ITERATIONS, fitted, refine, shapes_of_model
+from stages.cad.matching import Match, rank_matches
 from stages.cad.model_surfaces import ModelSurface, alignment_error, to_world
 from stages.cad.parameters import CadParameters
 from stages.cad.placing import placed_planes, placement_of, size_misfit, supporting_surface, wall_depth
@@ -23,6 +24,10 @@ from stages.kit.geometry.point_clouds import thin_to_grid
 GRID = 0.01
 SCREENING_STEP = 5
 """Every so many vertices count when aligned candidates are screened."""
+QUICK_POINTS = 250
+"""Vertices that the quick refinement looks at."""
+FULL_FITS = 4
+"""Candidates that are refined thoroughly."""
 BOX_MARGIN = 0.01
 """Vertices outside the observed box by more than this were stray to the graph and are so here [m]."""
 SAME_PLACE = (0.01, 0.03)
@@ -42,8 +47,8 @@ class Shortlist:
 
 
 def models_for(class_name: str, models: tuple[CadModel, ...]) -> list[CadModel]:
-    """Return the library's models of the same class; where there are none, of the classes that the vocabulary names
-    as stand-ins (`library`), in their order."""
+    """Return the library's models of the class, then of the classes that the vocabulary names as stand-ins (`library`):
+    a desk may well be modelled by a table."""
     semantic = load_vocabulary().by_name(class_name)
     names = (class_name, *semantic.library)
     return [model for name in names for model in models if model.class_name == name]
@@ -133,20 +138,10 @@ def shortlist(
         aligned.sort(key=lambda entry: entry[1].alignment_error + parameters.tilt_weight * entry[0].tilt)
         rejected["alignment rank"] = max(0, len(aligned) - parameters.candidates)
         aligned = aligned[: parameters.candidates]
+        aligned = fit_the_best(aligned, surfaces, points, normals, parameters, free_height=hangs)
     placements: list[Placement] = []
-    for match, placement in aligned:
-        surface = surfaces[match.shape.model.id]
-        score = placement.alignment_error
-        if ours:
-            placement = fitted(surface, placement, points, normals, free_height=hangs)
-            score = (
-                alignment_error(surface, placement, points, normals)
-                + parameters.misfit_weight * size_misfit(match.frame.size, placement)
-                + parameters.tilt_weight * match.tilt
-            )
-            placement = replace(placement, alignment_error=alignment_error(surface, placement, points))
-        placement = replace(placement, score=score)
-        reason = why_invalid(placement, surface, node, graph, parameters)
+    for placement in aligned_placements(aligned, surfaces, points, normals, parameters):
+        reason = why_invalid(placement, surfaces[placement.shape.model.id], node, graph, parameters)
         if reason is None:
             placements.append(placement)
         else:
@@ -168,6 +163,72 @@ def shortlist(
     elif missing[id(unique[0])]:
         reason = "does not quite support " + ", ".join(missing[id(unique[0])])
     return Shortlist(node, tuple(unique), counted, reason)
+
+
+def fit_the_best(
+    aligned: list[tuple[Match, Placement]],
+    surfaces: dict[str, ModelSurface],
+    points: np.ndarray,
+    normals: np.ndarray,
+    parameters: CadParameters,
+    *,
+    free_height: bool,
+) -> list[tuple[Match, Placement]]:
+    """Ours: refine all candidates quickly on the vertices (N, 3), then the best `FULL_FITS` thoroughly, with joints."""
+    some = slice(None, None, max(1, len(points) // QUICK_POINTS))
+    quick = [
+        (
+            match,
+            refine(
+                surfaces[placement.shape.model.id],
+                placement,
+                points[some],
+                normals[some],
+                free_height=free_height,
+                iterations=QUICK_ITERATIONS,
+            ),
+        )
+        for match, placement in aligned
+    ]
+    quick.sort(key=lambda entry: score_of(entry[0], entry[1], entry[1].alignment_error, parameters))
+    return [
+        (
+            match,
+            fitted(surfaces[placement.shape.model.id], placement, points, normals, free_height=free_height)
+            if k < FULL_FITS
+            else placement,
+        )
+        for k, (match, placement) in enumerate(quick)
+    ]
+
+
+def score_of(match: Match, placement: Placement, error: float, parameters: CadParameters) -> float:
+    """Ours: alignment error [m] plus what the vertices of a partial mesh do not tell: size, tilt, scale."""
+    return (
+        error
+        + parameters.misfit_weight * size_misfit(match.frame.size, placement)
+        + parameters.tilt_weight * match.tilt
+        + parameters.scale_weight * abs(math.log(placement.scale))
+    )
+
+
+def aligned_placements(
+    aligned: list[tuple[Match, Placement]],
+    surfaces: dict[str, ModelSurface],
+    points: np.ndarray,
+    normals: np.ndarray,
+    parameters: CadParameters,
+) -> list[Placement]:
+    """Return placements with the alignment error over all vertices (N, 3) and the score that the choice minimises."""
+    result = []
+    for match, placement in aligned:
+        surface = surfaces[placement.shape.model.id]
+        error = alignment_error(surface, placement, points)
+        score = error
+        if parameters.method == "ours":
+            score = score_of(match, placement, alignment_error(surface, placement, points, normals), parameters)
+        result.append(replace(placement, alignment_error=error, score=score))
+    return result
 
 
 def why_invalid(

@@ -16,6 +16,10 @@ from stages.kit.formats.cad_models import part_transforms
 from stages.kit.geometry.transforms import apply, inverse
 
 ITERATIONS = 30
+QUICK_ITERATIONS = 8
+"""Of candidates that may still turn out to be no good."""
+LEAST_STEP = 3e-4
+"""The refinement stops at smaller steps [m, rad, share of the scale]."""
 ROBUST_DISTANCE = 0.03
 """Vertices farther from the model than this pull with constant force (Huber) [m]."""
 SCALE_PRIOR = 0.02
@@ -95,7 +99,7 @@ def refine(
         scale, rotation, foot = scale * growth, spin @ rotation, foot + float(shift[2])
         for joint, change in zip(limits, np.clip(step[first_joint:], -0.3, 0.3), strict=True):
             joints[joint.name] = float(np.clip(joints.get(joint.name, 0.0) + change, joint.lower, joint.upper))
-        if np.abs(step).max() < 1e-4:
+        if np.abs(step).max() < LEAST_STEP:
             break
     final = _state(surface, placement, (scale, rotation, translation, joints), points, normals)
     if best_error < final.alignment_error:

@@ -58,12 +58,19 @@ class ModelSurface:
         distance = np.full(len(points), np.inf)
         nearest, normal = np.zeros((len(points), 3)), np.zeros((len(points), 3))
         part_index = np.zeros(len(points), dtype=int)
-        for k, (part, model_from_part) in enumerate(part_transforms(self.model, joints).items()):
+        transforms = part_transforms(self.model, joints)
+        for k, part in enumerate(self.model.parts):
+            model_from_part = transforms[part]
             local = apply(inverse(model_from_part), points).astype(np.float32)
-            groups: list[tuple[int | None, np.ndarray]] = [(None, np.arange(len(points)))]
+            # Only points that may come closer than to the parts before.
+            outside = np.maximum(
+                np.maximum(self.corners[part].min(axis=0) - local, 0.0), local - self.corners[part].max(axis=0)
+            )
+            asked = np.flatnonzero(np.linalg.norm(outside, axis=1) < distance)
+            groups: list[tuple[int | None, np.ndarray]] = [(None, asked)]
             if normals is not None:
-                side = facing_side(normals @ model_from_part[:3, :3])
-                groups = [(int(value), np.flatnonzero(side == value)) for value in np.unique(side)]
+                side = facing_side(normals[asked] @ model_from_part[:3, :3])
+                groups = [(int(value), asked[side == value]) for value in np.unique(side)]
             for value, rows in groups:
                 scene = self.scenes[part] if value is None else self.sides[part].get(value, self.scenes[part])
                 answer = scene.compute_closest_points(o3d.core.Tensor.from_numpy(np.ascontiguousarray(local[rows])))

@@ -56,6 +56,18 @@ class CadParameters(Parameters):
         description="ours: not standing upright (2.10) counts this much beside the alignment error; "
         "furniture only stands upright",
     )
+    scale_weight: float = Field(
+        0.01,
+        ge=0.0,
+        description="ours: |ln(scale)| counts this much beside the alignment error, as the library's "
+        "models have the size of real things",
+    )
+    choice_margin: float = Field(
+        0.01,
+        ge=0.0,
+        description="ours: min-conflicts only exchanges candidates whose score is this close to the best: "
+        "a wrong model is worse than a collision that a small shift resolves [m]",
+    )
     maximum_alignment_error: float = Field(
         0.08, gt=0.0, description="ours: candidates with a larger alignment error are no candidates [m]"
     )

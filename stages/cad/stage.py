@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 
 import numpy as np
@@ -137,8 +138,13 @@ def select(
             depths[i, a, j, b] = penetration(solid(i, a), solid(j, b)).depth
         return depths[i, a, j, b]
 
+    counts = []
+    for name in names:
+        scores = [placement.score for placement in shortlists[name].placements]
+        limit = scores[0] + parameters.choice_margin if parameters.method == "ours" else math.inf
+        counts.append(sum(score <= limit for score in scores))
     selection = min_conflicts(
-        [len(shortlists[name].placements) for name in names],
+        counts,
         depth,
         tolerance=parameters.collision_tolerance,
         iterations=parameters.conflict_iterations,

@@ -11,13 +11,15 @@ from schemas.vocabulary import load_vocabulary
 from stages.graph.nodes import THINNEST_DISTANCE, Entity, observed_box, patch_from_fit, surface_planes
 from stages.graph.parameters import GraphParameters
 from stages.kit.formats.entity_meshes import load_entity_mesh
-from stages.kit.geometry.boxes import convex_hull, minimum_box
+from stages.kit.geometry.boxes import box_volume, boxes_overlap_volume, convex_hull, minimum_box
 from stages.kit.geometry.planes import PlaneFit
 from stages.kit.geometry.point_clouds import sample_large_triangles, thin_to_grid, vertex_normals
 from stages.kit.stage import Context
 
-SAMPLES, PLANES, FLOOR = 1, 2, 3
+SAMPLES, PLANES = 1, 2
 """Random streams."""
+PIECE_SHARE = 0.7
+"""Share of its box that a piece has within the whole."""
 
 
 def load_entities(
@@ -38,7 +40,31 @@ def load_entities(
             dropped[f"{entry.class_name}_{entry.instance}"] = entity
         else:
             entities.append(entity)
+    if parameters.method == "ours":
+        for name, whole in fragments(entities).items():
+            dropped[name] = f"a piece of {whole}"
+        entities = [entity for entity in entities if entity.name not in dropped]
     return entities, dropped
+
+
+def fragments(entities: list[Entity]) -> dict[str, str]:
+    """Return entities that can only be pieces of another one: name -> name of the whole.
+
+    Furniture of one class does not interpenetrate, so a chair whose box lies within the box of a larger chair is a
+    part of it that the map failed to merge. Small things of one class do lie in each other (bowls, boxes).
+    """
+    found: dict[str, str] = {}
+    for piece in entities:
+        if piece.movable or piece.node_type == "layout":
+            continue
+        for whole in entities:
+            if whole.class_name != piece.class_name or len(whole.points) <= len(piece.points):
+                continue
+            shared = boxes_overlap_volume(piece.box, whole.box)
+            if shared >= PIECE_SHARE * box_volume(piece.box) and whole.name not in found:
+                found[piece.name] = whole.name
+                break
+    return found
 
 
 def load_entity(
