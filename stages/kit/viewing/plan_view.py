@@ -29,7 +29,7 @@ def draw_plan(plan: Plan, canvas: Canvas) -> None:
     canvas.document("plan", plan_text(plan))
     folder = _room(plan)
     if folder is not None:
-        draw_scene_folder(folder, canvas)
+        draw_scene_folder(folder, canvas, animated=True)
     path = plan.path("execution.mcap")
     if not path.exists():
         return

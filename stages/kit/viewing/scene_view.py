@@ -24,8 +24,11 @@ def draw_scene(scene: InteractiveScene, canvas: Canvas) -> None:
     draw_graph(scene.graph, canvas)
 
 
-def draw_scene_folder(root: Path, canvas: Canvas, prefix: str = "scene") -> tuple[str, ...]:
-    """Draw the links of an interactive scene's folder under `prefix`, and return their names."""
+def draw_scene_folder(root: Path, canvas: Canvas, prefix: str = "scene", *, animated: bool = False) -> tuple[str, ...]:
+    """Draw the links of an interactive scene's folder under `prefix`, and return their names.
+
+    `animated`: the poses hold from time 0 on, until others are drawn (in Rerun what is always there never changes).
+    """
     description = InteractiveSceneFile.read(root / "scene.json")
     urdf = parse_urdf(root / description.combined_file)
     values = {name: value for body in description.bodies for name, value in body.joint_values.items()}
@@ -38,7 +41,10 @@ def draw_scene_folder(root: Path, canvas: Canvas, prefix: str = "scene") -> tupl
         mesh = merged([shape_mesh(shape, root) for shape in shapes])
         plain = isinstance(mesh.visual, trimesh.visual.ColorVisuals) and not mesh.visual.defined
         colors = np.tile(np.array(instance_color(number)) * 255, (len(mesh.vertices), 1)).astype(np.uint8)
+        if animated:
+            canvas.time(0.0)
         canvas.transform(f"{prefix}/{link.name}", poses[link.name])
+        canvas.always()
         canvas.mesh(f"{prefix}/{link.name}", mesh, colors if plain else None)
         drawn.append(link.name)
     return tuple(drawn)
