@@ -68,7 +68,7 @@ class _Pose:
     relation: str = "supports"
     plane: int | None = None
     at: str = ""
-    """Object whose free floor it may stand on (a chair at its desk)."""
+    """Object whose free floor it may stand in (a chair at its desk) or over (a handle past the edge of its cabinet)."""
 
 
 class _Impossible(Exception):
@@ -254,7 +254,7 @@ class _Arranger:
             return None
         pose, plane, inside = found
         relation = "contains" if inside and target.furnishing.model.contains else "supports"
-        return _Pose(pose, target.name, relation, plane)
+        return _Pose(pose, target.name, relation, plane, at=target.name)
 
     # Whether a pose is good.
 
@@ -279,7 +279,8 @@ class _Arranger:
             swept = swing.placed(lift @ pose.world_from_model)
             if not self.room.holds(swept.minimum, swept.maximum):
                 return None
-            if self.solid.conflict(swept, 0.005) is not None or self.kept_free.conflict(swept, 0.0) is not None:
+            # It may swing through free floor and through where another door swings, not into things.
+            if self.solid.conflict(swept, 0.005) is not None:
                 return None
         for space in self._free_spaces(furnishing, pose, place):
             if not self.room.holds(space.minimum, space.maximum) or self.solid.conflict(space) is not None:

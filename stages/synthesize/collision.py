@@ -25,7 +25,9 @@ class ConvexShape:
         rotation, shift = world_from_shape[:3, :3], world_from_shape[:3, 3]
         objects = tuple(fcl.CollisionObject(g, fcl.Transform(rotation, shift)) for g in self.geometry)
         moved = [apply(world_from_shape, v) for v in self.vertices]
-        return PlacedShape(objects, np.array([v.min(axis=0) for v in moved]), np.array([v.max(axis=0) for v in moved]))
+        minimum = np.array([v.min(axis=0) for v in moved])
+        maximum = np.array([v.max(axis=0) for v in moved])
+        return PlacedShape(objects, minimum, maximum, minimum.min(axis=0), maximum.max(axis=0))
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,9 @@ class PlacedShape:
     minimum: np.ndarray
     """(K, 3) [m]."""
     maximum: np.ndarray
+    whole_minimum: np.ndarray
+    """(3,) of all pieces."""
+    whole_maximum: np.ndarray
 
 
 def convex_shape(pieces: Iterable[trimesh.Trimesh]) -> ConvexShape:
@@ -89,6 +94,10 @@ class CollisionWorld:
             if name in skipped:
                 continue
             reach = (margins or {}).get(name, margin)
+            if (shape.whole_minimum - reach > other.whole_maximum).any():
+                continue
+            if (other.whole_minimum > shape.whole_maximum + reach).any():
+                continue
             near = np.all(
                 (shape.minimum[:, None] - reach <= other.maximum[None])
                 & (other.minimum[None] <= shape.maximum[:, None] + reach),

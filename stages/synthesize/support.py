@@ -78,10 +78,10 @@ class SupportSurfaces:
         plane = target.furnishing.planes[index]
         corners = np.asarray(plane.corners)[:, :2]
         low, high = corners.min(axis=0), corners.max(axis=0)
-        # `side` and `front` are shares of where the item's middle can be with its whole foot on the rectangle.
-        half = item.closed_size[:2] / 2
         yaw = float(random.uniform(-place.yaw_spread, place.yaw_spread)) if place.yaw_spread else 0.0
-        low, high = low + half * 0.9, high - half * 0.9
+        # `side` and `front` are shares of where the item's origin can be with its whole foot on the rectangle.
+        foot = apply(transform_from_yaw(yaw, np.zeros(3)), self._contact(item))[:, :2]
+        low, high = low - foot.min(axis=0), high - foot.max(axis=0)
         if np.any(low > high):
             return None
         share = np.array([random.uniform(*place.side), random.uniform(*place.front)])

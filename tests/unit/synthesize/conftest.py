@@ -1,0 +1,26 @@
+"""A small CAD library for all tests of this folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from schemas.cad_library import CadLibrary
+from stages.kit.progress import SilentProgress
+from stages.kit.stage import Context
+from stages.library.parameters import LibraryParameters
+from stages.library.stage import run
+from stages.synthesize.furniture import Catalogue
+
+
+@pytest.fixture(scope="session")
+def library(tmp_path_factory: pytest.TempPathFactory) -> CadLibrary:
+    output: Path = tmp_path_factory.mktemp("library")
+    parameters = LibraryParameters(shapes_per_class=3, small_shapes_per_class=3)
+    return run(parameters=parameters, context=Context(output=output, seed=5, device="cpu", progress=SilentProgress()))
+
+
+@pytest.fixture(scope="session")
+def catalogue(library: CadLibrary) -> Catalogue:
+    return Catalogue(library)
