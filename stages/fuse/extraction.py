@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
+from numba import njit
 
 from stages.fuse.counts import TripleCounts
 from stages.fuse.surface import Surface
@@ -34,13 +33,20 @@ class LabelledSurface:
     instance: np.ndarray
 
 
-def label_of_segments(counts: TripleCounts, largest_segment: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return class id and instance (L + 1,) int32 of every segment label 0 .. L (eq. 2.6); 0 where none was counted."""
+def label_of_segments(
+    counts: TripleCounts, sightings: dict[int, int], largest_segment: int, minimum_share: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return class id and instance (L + 1,) int32 of every segment label 0 .. L (eq. 2.6); 0 where none was counted.
+
+    A label whose predictions are fewer than `minimum_share` of its sightings (frame segments that were matched to it,
+    background included) stays unlabelled: a detector that takes a cupboard for a fridge in one frame out of thirty is
+    outvoted by the frames in which it sees nothing there. Equation 2.6 itself never weighs the background; 0 is that.
+    """
     class_ids = np.zeros(largest_segment + 1, dtype=np.int32)
     instances = np.zeros(largest_segment + 1, dtype=np.int32)
-    for segment in counts.by_segment:
+    for segment, row in counts.by_segment.items():
         best = counts.best(segment)
-        if best is not None:
+        if best is not None and sum(row.values()) >= minimum_share * sightings.get(segment, 0):
             class_ids[segment], instances[segment] = best
     return class_ids, instances
 
@@ -52,9 +58,25 @@ def confidence_of(counts: TripleCounts, segments: tuple[int, ...], class_id: int
     return sum(row.get((class_id, instance), 0) for row in rows) / total if total else 0.0
 
 
-def _edges(faces: np.ndarray) -> np.ndarray:
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    return np.unique(np.sort(edges, axis=1), axis=0)
+@njit(cache=True)
+def connected_parts(labels: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return for every vertex (V,) the smallest vertex that edges between equal labels (V,) connect it with."""
+    parents = np.arange(labels.shape[0])
+    for face in range(faces.shape[0]):
+        for corner in range(3):
+            first, second = faces[face, corner], faces[face, (corner + 1) % 3]
+            if labels[first] != labels[second]:
+                continue
+            while parents[first] != first:
+                parents[first] = parents[parents[first]]
+                first = parents[first]
+            while parents[second] != second:
+                parents[second] = parents[parents[second]]
+                second = parents[second]
+            parents[max(first, second)] = min(first, second)
+    for vertex in range(parents.shape[0]):
+        parents[vertex] = parents[parents[vertex]]
+    return parents
 
 
 def absorb_specks(
@@ -63,37 +85,27 @@ def absorb_specks(
     """Return labels (V,) in which small connected parts have taken the label of most of their neighbours.
 
     A part is a set of vertices of one label > 0 that triangles (F, 3) connect. It is small under `minimum_size`
-    vertices, or, unless its label is in `whole`, under `minimum_share` of the label's largest part. Parts without
-    neighbours become 0. Ties go to the smaller label.
+    vertices, or, unless its label is in `whole`, under `minimum_share` of the label's largest part. The neighbours of a
+    small part are the parts that are not small; a part without such becomes 0. Ties go to the smaller label.
     """
-    if len(faces) == 0:
-        return np.zeros_like(labels)
-    edges = _edges(faces)
-    first, second = labels[edges[:, 0]], labels[edges[:, 1]]
-    inside = edges[first == second]
-    graph = coo_matrix((np.ones(len(inside), dtype=np.int8), (inside[:, 0], inside[:, 1])), shape=(len(labels),) * 2)
-    count, part = connected_components(graph, directed=False)
-    sizes = np.bincount(part, minlength=count)
-    label_of_part = np.zeros(count, dtype=labels.dtype)
-    label_of_part[part] = labels
+    if len(labels) == 0:
+        return labels.copy()
+    part = connected_parts(labels, faces)
+    sizes = np.bincount(part, minlength=len(labels))
     largest = np.zeros(int(labels.max()) + 1, dtype=np.int64)
-    np.maximum.at(largest, label_of_part, sizes)
-    divisible = ~np.isin(label_of_part, sorted(whole))
-    small = (sizes < minimum_size) | (divisible & (sizes < minimum_share * largest[label_of_part]))
-    small &= label_of_part > 0
-    # Votes of the neighbours across the border, both ways.
-    border = edges[first != second]
-    border = np.concatenate([border, border[:, ::-1]])
-    border = border[small[part[border[:, 0]]] & ~small[part[border[:, 1]]]]
-    replacement = np.zeros(count, dtype=labels.dtype)
-    if len(border):
-        width = int(labels.max()) + 1
-        keys, votes = np.unique(part[border[:, 0]].astype(np.int64) * width + labels[border[:, 1]], return_counts=True)
-        order = np.lexsort((-keys, votes))
-        replacement[keys[order] // width] = (keys % width)[order]
-    result = labels.copy()
-    result[small[part]] = replacement[part][small[part]]
-    return result
+    np.maximum.at(largest, labels[part], sizes[part])
+    divisible = ~np.isin(labels, sorted(whole))
+    size = sizes[part]
+    small = (labels > 0) & ((size < minimum_size) | (divisible & (size < minimum_share * largest[labels])))
+    # Every edge from a small part to another one is a vote for the label behind it (inner edges count for both faces).
+    edges = np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 0], [1, 2], [2, 1], [2, 0], [0, 2])])
+    edges = edges[small[edges[:, 0]] & ~small[edges[:, 1]]]
+    replacement = np.zeros(len(labels), dtype=labels.dtype)
+    width = int(labels.max()) + 1
+    keys, votes = np.unique(part[edges[:, 0]] * width + labels[edges[:, 1]], return_counts=True)
+    order = np.lexsort((-keys, votes))
+    replacement[keys[order] // width] = (keys % width)[order]
+    return np.where(small, replacement[part], labels)
 
 
 def face_labels(labels: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -103,12 +115,10 @@ def face_labels(labels: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def cut_mesh(surface: Surface, chosen: np.ndarray) -> ColoredMesh:
-    """Return the chosen faces (F,) bool as a mesh of their own; vertices keep their order."""
+    """Return the chosen faces (indices) as a mesh of their own; vertices and faces keep their order."""
     faces = surface.faces[chosen]
-    used = np.unique(faces)
-    return ColoredMesh(
-        surface.vertices[used], np.searchsorted(used, faces).astype(np.int32).reshape(-1, 3), surface.colors[used]
-    )
+    used, places = np.unique(faces, return_inverse=True)
+    return ColoredMesh(surface.vertices[used], places.astype(np.int32).reshape(-1, 3), surface.colors[used])
 
 
 def extract_entities(
@@ -116,8 +126,10 @@ def extract_entities(
     segment: np.ndarray,
     counts: TripleCounts,
     seen_in: dict[int, int],
+    sightings: dict[int, int],
     things: frozenset[int],
     *,
+    minimum_share: float,
     minimum_voxels: int,
     minimum_observations: int,
     speck_share: float,
@@ -129,18 +141,21 @@ def extract_entities(
     frames, are dropped, and their vertices are unlabelled.
     """
     largest = max([0, *counts.by_segment, int(segment.max(initial=0))])
-    class_of, instance_of = label_of_segments(counts, largest)
+    class_of, instance_of = label_of_segments(counts, sightings, largest, minimum_share)
     class_of_instance = {int(p): int(c) for c, p in zip(class_of, instance_of, strict=True) if p > 0}
     stuff = frozenset(p for p, c in class_of_instance.items() if c not in things)
     instance = absorb_specks(
         instance_of[segment], surface.faces, whole=stuff, minimum_size=minimum_voxels, minimum_share=speck_share
     )
     of_face = face_labels(instance, surface.faces)
+    by_label = np.argsort(of_face, kind="stable")
+    sorted_labels = of_face[by_label]
     entities = []
     kept = np.zeros_like(instance)
     for label in sorted(class_of_instance):
         observations = seen_in.get(label, 0).bit_count()
-        mesh = cut_mesh(surface, of_face == label)
+        start, end = np.searchsorted(sorted_labels, (label, label + 1))
+        mesh = cut_mesh(surface, by_label[start:end])
         if len(mesh.vertices) < minimum_voxels or observations < minimum_observations or len(mesh.faces) == 0:
             continue
         class_id = class_of_instance[label]

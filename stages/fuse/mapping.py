@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from schemas.segments import FrameSegment
 from stages.fuse.association import (
+    Overlap,
     Prediction,
     associate_instances,
     index_segments,
@@ -20,7 +22,14 @@ from stages.fuse.association import (
 from stages.fuse.counts import TripleCounts
 from stages.fuse.integration import integrate
 from stages.fuse.parameters import FuseParameters
-from stages.fuse.regularization import MergedLabels, SharedSegments, merge_instances, merge_segments
+from stages.fuse.regularization import (
+    MergedLabels,
+    PairEvidence,
+    label_pairs,
+    merge_evident_instances,
+    merge_instances,
+    merge_segments,
+)
 from stages.fuse.voxel_blocks import COORDINATE_LIMIT, SIDE, VoxelBlocks
 
 
@@ -36,7 +45,10 @@ class PanopticMapper:
         self.things = things
         self.blocks = VoxelBlocks(parameters.voxel_size)
         self.labels = MergedLabels()
-        self.shared = SharedSegments()
+        self.shared = PairEvidence()
+        self.instance_evidence = PairEvidence()
+        self.sightings: dict[int, int] = {}
+        """Frame segments that each segment label was matched to, predicted or background."""
         self.counts = TripleCounts()
         self.seen_in: dict[int, int] = {}
         """Frames in which each instance was predicted, as the bits of an integer."""
@@ -85,11 +97,19 @@ class PanopticMapper:
             self.regularize()
 
     def regularize(self) -> None:
-        """Merge instance labels that are one instance (eq. 2.5)."""
+        """Merge instance labels that are one instance (eq. 2.5; in `ours` also those that frames saw as one)."""
         options = self.parameters
-        for removed, kept in merge_instances(
+        done: list[tuple[int, int]] = []
+        if options.merging == "ours":
+            done += merge_evident_instances(
+                self.instance_evidence, self.counts, minimum_frames=options.instance_minimum_frames
+            )
+        by_count = merge_instances(
             self.counts, self.things, threshold=options.instance_threshold, minimum_count=options.instance_minimum_count
-        ):
+        )
+        for removed, kept in by_count:
+            self.instance_evidence.rename(removed, kept)
+        for removed, kept in done + by_count:
             self.seen_in[kept] = self.seen_in.get(kept, 0) | self.seen_in.pop(removed, 0)
             self.instance_merges += 1
 
@@ -115,7 +135,7 @@ class PanopticMapper:
             overlap, minimum_voxels=options.minimum_overlap_voxels, minimum_share=options.minimum_overlap_share
         )
         labels = [self.labels.new() if label == 0 else max(label, 0) for label in matched]
-        self.shared.observe(overlapping_labels(overlap, options.merge_overlap_share))
+        self._observe_shared(overlap, segments, labels)
         self._predict(
             [
                 Prediction(label, segment.category_id, segment.instance)
@@ -123,17 +143,46 @@ class PanopticMapper:
                 if label > 0 and segment.category_id > 0
             ]
         )
-        self.segment_merges += merge_segments(
-            self.shared, self.labels, self.counts, self.things, minimum_frames=options.merge_minimum_frames,
-            guarded=options.merging == "ours",
+        for label in labels:
+            if label > 0:
+                self.sightings[label] = self.sightings.get(label, 0) + 1
+        merged = merge_segments(
+            self.shared, self.labels, self.counts, minimum_frames=options.merge_minimum_frames,
+            contested=options.merging == "ours",
         )  # fmt: skip
+        for removed, kept in merged:
+            self.sightings[kept] = self.sightings.get(kept, 0) + self.sightings.pop(removed, 0)
+        self.segment_merges += len(merged)
         return index_image, np.array([0, *(self.labels.root(label) for label in labels)], dtype=np.int32)
+
+    def _observe_shared(self, overlap: Overlap, segments: Sequence[FrameSegment], labels: Sequence[int]) -> None:
+        """Count which global labels lie together in a segment of this frame, and which apart."""
+        options = self.parameters
+        inside = overlapping_labels(overlap, options.merge_overlap_share)
+        groups = [
+            label_pairs(group, segment.category_id, self.counts, guarded=options.merging == "ours")
+            for group, segment in zip(inside, segments, strict=True)
+        ]
+        self.shared.observe(groups, [label for label in labels if label > 0] if options.merging == "ours" else [])
 
     def _predict(self, predictions: list[Prediction]) -> None:
         """Give every predicted instance its global label and increase the triple-wise count."""
+        self._observe_instances(predictions)
         instances, self._next_instance = associate_instances(predictions, self.counts, self._next_instance)
         for prediction in predictions:
             instance = instances[prediction.frame_instance, prediction.class_id]
             self.counts.add(prediction.segment, prediction.class_id, instance)
             self.seen_in[instance] = self.seen_in.get(instance, 0) | (1 << self.labelled_frames)
         self.labelled_frames += 1
+
+    def _observe_instances(self, predictions: list[Prediction]) -> None:
+        """Count which instances of things the frame sees as one, and which as two: a frame instance stands for the
+        leading instances of the global segments that it lies on."""
+        homes: dict[int, dict[int, set[int]]] = {}
+        for prediction in predictions:
+            best = self.counts.best(prediction.segment)
+            if prediction.class_id in self.things and best is not None and best[0] == prediction.class_id:
+                homes.setdefault(best[0], {}).setdefault(prediction.frame_instance, set()).add(best[1])
+        for by_instance in homes.values():
+            groups = [list(combinations(sorted(labels), 2)) for labels in by_instance.values()]
+            self.instance_evidence.observe(groups, set().union(*by_instance.values()))

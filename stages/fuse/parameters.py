@@ -40,13 +40,16 @@ class FuseParameters(Parameters):
 
     merging: Literal["ours", "thesis"] = Field(
         "ours",
-        description="`thesis` merges segment labels that share voxels whatever they are; `ours` never merges labels "
-        "that stand for different things",
+        description="`thesis` merges segment labels that lie in one frame segment, whatever they are; `ours` only when "
+        "they are of that segment's class, and lie together more often than apart",
     )
     merge_overlap_share: float = Field(
         0.2, gt=0, le=1, description="Two segment labels share a frame segment when each fills this share of it"
     )
     merge_minimum_frames: int = Field(3, ge=1, description="... and are merged after so many frame segments")
+    instance_minimum_frames: int = Field(
+        2, ge=1, description="`ours` also merges things that frames saw as one so often, and less often as two"
+    )
     instance_threshold: float = Field(0.5, gt=0, le=1, description="m_th of eq. 2.5")
     instance_minimum_count: int = Field(10, ge=0, description="Things merge only above this common count")
     regularize_every: int = Field(10, ge=1, description="Instances are merged every how many-th frame, and at the end")
@@ -55,7 +58,13 @@ class FuseParameters(Parameters):
         0.1, ge=0, description="Surfaces are drawn through voxels of at least this weight (a frame at depth z: 1/z^2)"
     )
     minimum_entity_voxels: int = Field(20, ge=1, description="Entities of fewer surface voxels are dropped")
-    minimum_observations: int = Field(2, ge=1, description="Entities that fewer frames voted for are dropped")
+    minimum_observations: int = Field(
+        3, ge=1, description="Entities that fewer frames voted for are dropped; a tenth of the frames where that is less"
+    )
+    minimum_prediction_share: float = Field(
+        0.15, ge=0, le=1, description="Segments that are background in more than the rest of their frames stay "
+        "unlabelled (0: the thesis, in which the background has no vote)"
+    )  # fmt: skip
     speck_share: float = Field(
         0.05, ge=0, lt=1, description="Parts of a thing smaller than this share of its largest part take the label of "
         "what surrounds them"
@@ -69,7 +78,7 @@ STAGE = Stage(
     parameters=FuseParameters,
     reads={"sequence": Sequence, "segments": Segments, "trajectory": Optionally(Trajectory)},
     writes=PanopticMap,
-    libraries=("numpy", "numba", "scipy"),
+    libraries=("numpy", "numba"),
     example="scenewright fuse --sequence outputs/demo/sequence --segments outputs/demo/segments "
     "--out outputs/demo/panoptic_map",
 )

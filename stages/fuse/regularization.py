@@ -42,73 +42,72 @@ class MergedLabels:
 
 
 @dataclass
-class SharedSegments:
-    """In how many frame segments each pair of global segment labels was seen together (Grinvald 2019)."""
+class PairEvidence:
+    """How often two labels were seen as one (`together`), and how often as two in one frame (`apart`).
 
-    frames: dict[tuple[int, int], int] = field(default_factory=dict)
+    Of global segment labels: lying in one frame segment (Grinvald 2019), or matched to different ones. Of global
+    instance labels: on the segments of one frame instance, or of different ones. Keys: (smaller label, larger label).
+    """
 
-    def observe(self, groups: Iterable[list[int]]) -> None:
-        """Count every pair within each group: the labels that fill enough of one frame segment."""
-        for group in groups:
-            for pair in combinations(sorted(group), 2):
-                self.frames[pair] = self.frames.get(pair, 0) + 1
+    together: dict[tuple[int, int], int] = field(default_factory=dict)
+    apart: dict[tuple[int, int], int] = field(default_factory=dict)
 
-    def due(self, minimum_frames: int) -> list[tuple[int, int]]:
-        """Return the pairs that were seen together in at least `minimum_frames`, ascending."""
-        return sorted(pair for pair, count in self.frames.items() if count >= minimum_frames)
+    def observe(self, groups: Iterable[Iterable[tuple[int, int]]], matched: Iterable[int]) -> None:
+        """Count one frame: `groups` holds the pairs of labels that were seen as one, by segment or instance of the
+        frame; `matched` all labels of the frame. Pairs that were seen as one are not counted as apart."""
+        seen = [pair for group in groups for pair in group]
+        for pair in seen:
+            self.together[pair] = self.together.get(pair, 0) + 1
+        for pair in set(combinations(sorted(matched), 2)) - set(seen):
+            self.apart[pair] = self.apart.get(pair, 0) + 1
 
-    def forget(self, pair: tuple[int, int]) -> None:
-        """Drop the count of a pair."""
-        self.frames.pop(pair, None)
+    def due(self, minimum_frames: int, *, contested: bool) -> list[tuple[int, int]]:
+        """Return the pairs that were seen as one at least `minimum_frames` times, ascending; if `contested`, only those
+        that were less often apart."""
+        return sorted(
+            pair
+            for pair, count in self.together.items()
+            if count >= minimum_frames and not (contested and self.apart.get(pair, 0) >= count)
+        )
 
     def rename(self, removed: int, kept: int) -> None:
         """Move the counts of label `removed` to `kept`."""
-        for first, second in [pair for pair in self.frames if removed in pair]:
-            count = self.frames.pop((first, second))
-            other = first if second == removed else second
-            if other != kept:
-                pair = (min(other, kept), max(other, kept))
-                self.frames[pair] = self.frames.get(pair, 0) + count
+        for counts in (self.together, self.apart):
+            for pair in [pair for pair in counts if removed in pair]:
+                count = counts.pop(pair)
+                other = pair[0] if pair[1] == removed else pair[1]
+                if other != kept:
+                    renamed = (min(other, kept), max(other, kept))
+                    counts[renamed] = counts.get(renamed, 0) + count
 
 
-def may_merge(first: int, second: int, counts: TripleCounts, things: frozenset[int]) -> bool:
-    """Whether two segment labels may be one: not when they stand for different things.
+def label_pairs(labels: list[int], class_id: int, counts: TripleCounts, *, guarded: bool) -> list[tuple[int, int]]:
+    """Return the pairs of global labels whose merging a frame segment of class `class_id` (0: background) speaks for.
 
-    A geometric segment that runs over two objects in a few frames would otherwise join them for good. Labels that were
-    never predicted, and labels of the same (class, instance), may always merge; two stuff classes may not either.
+    Without `guarded` these are all pairs, as in the thesis. `guarded` asks that the frame segment knows what it sees: a
+    label that was predicted before takes part only if its class is the frame segment's. A geometric segment that runs
+    from a cupboard onto the floor then joins nothing, however often it is seen.
     """
-    one, two = counts.best(first), counts.best(second)
-    if one is None or two is None or one == two:
-        return True
-    return one[0] == two[0] and one[0] not in things
+    if guarded:
+        best = {label: counts.best(label) for label in labels}
+        labels = [label for label, known in best.items() if (known[0] if known else 0) in (0, class_id)]
+        if class_id == 0:
+            labels = [label for label in labels if best[label] is None]
+    return list(combinations(sorted(labels), 2))
 
 
 def merge_segments(
-    shared: SharedSegments,
-    labels: MergedLabels,
-    counts: TripleCounts,
-    things: frozenset[int],
-    *,
-    minimum_frames: int,
-    guarded: bool,
-) -> int:
-    """Merge segment labels that were seen together often enough; return how many were removed.
-
-    `guarded` refuses merges across different things (`may_merge`); without it this is the rule of the thesis.
-    """
-    merged = 0
-    for pair in shared.due(minimum_frames):
-        first, second = labels.root(pair[0]), labels.root(pair[1])
-        if first != second and guarded and not may_merge(first, second, counts, things):
-            shared.forget(pair)
-            continue
-        shared.forget(pair)
-        done = labels.merge(first, second)
+    shared: PairEvidence, labels: MergedLabels, counts: TripleCounts, *, minimum_frames: int, contested: bool
+) -> list[tuple[int, int]]:
+    """Merge segment labels that lay together often enough, counts included; return the (removed, kept) pairs."""
+    merged = []
+    for pair in shared.due(minimum_frames, contested=contested):
+        done = labels.merge(*pair)
         if done is not None:
             removed, kept = done
             counts.merge_segments(removed, kept)
             shared.rename(removed, kept)
-            merged += 1
+            merged.append(done)
     return merged
 
 
@@ -137,6 +136,21 @@ def merge_instances(
     while (pair := _due_pair(counts, things, threshold, minimum_count)) is not None:
         kept, removed = pair
         counts.merge_instances(removed, kept)
+        done.append((removed, kept))
+    return done
+
+
+def merge_evident_instances(evidence: PairEvidence, counts: TripleCounts, *, minimum_frames: int) -> list[tuple[int, int]]:
+    """Merge instance labels that frames saw as one instance at least `minimum_frames` times, and less often as two.
+
+    Ours, beside eq. 2.5: an object whose parts were first seen in different frames gets a label for each part; eq. 2.5
+    never joins them when the parts are separate segments of which one was seen alone for long. Returns (removed, kept).
+    """
+    done: list[tuple[int, int]] = []
+    while due := evidence.due(minimum_frames, contested=True):
+        kept, removed = due[0]
+        counts.merge_instances(removed, kept)
+        evidence.rename(removed, kept)
         done.append((removed, kept))
     return done
 

@@ -45,8 +45,9 @@ def run(
     with context.progress.step("extract entities"):
         merged = mapper.labels.table()
         entities, labelled = extract_entities(
-            surface, merged[surface.segment], mapper.counts, mapper.seen_in, mapper.things,
-            minimum_voxels=parameters.minimum_entity_voxels, minimum_observations=parameters.minimum_observations,
+            surface, merged[surface.segment], mapper.counts, mapper.seen_in, mapper.sightings, mapper.things,
+            minimum_share=parameters.minimum_prediction_share, minimum_voxels=parameters.minimum_entity_voxels,
+            minimum_observations=min(parameters.minimum_observations, max(1, mapper.labelled_frames // 10)),
             speck_share=parameters.speck_share,
         )  # fmt: skip
     with context.progress.step("write the map"):
