@@ -33,6 +33,8 @@ from stages.kit.measurement.point_labels import nearest_labels
 from stages.kit.measurement.tables import Cell, Table
 
 ANY_CLASS = "any"
+NAMELESS = "object"
+"""The class of class-agnostic entities."""
 
 
 @dataclass(frozen=True)
@@ -77,13 +79,16 @@ def measure_quality(
     qualities = panoptic_quality(true_labels, labels, true_classes, predicted.classes(), stuff, parameters.match_iou)
     for name, count in _entities_off_the_truth(predicted, labels).items():
         qualities[name] = qualities.get(name, ClassQuality()) + ClassQuality(false_positives=count)
+    nameless = is_nameless(predicted)
+    if nameless:
+        part.notes.append("The masks are class-agnostic, so figures by class are undefined.")
     groups = {
         "": list(qualities.values()),
         "_stuff": [q for name, q in qualities.items() if name in stuff],
         "_thing": [q for name, q in qualities.items() if name not in stuff],
     }
     for suffix, group in groups.items():
-        mean = average_quality(group)
+        mean = average_quality([] if nameless else group)
         part.set(f"pq{suffix}", mean.pq)
         part.set(f"sq{suffix}", mean.sq)
         part.set(f"rq{suffix}", mean.rq)
@@ -99,7 +104,7 @@ def measure_quality(
     part.set("rq_class_agnostic", whole.rq if whole.segments else None)
     part.set("labelled_share", float(np.mean(labels[true_labels > 0] > 0)) if (true_labels > 0).any() else None)
     thesis = quality_thesis_code(truth, predicted, parameters)
-    mean = average_quality_thesis_code(thesis.values())
+    mean = average_quality_thesis_code([] if nameless else thesis.values())
     part.set("pq_thesis_code", mean.pq)
     part.set("sq_thesis_code", mean.sq)
     part.set("rq_thesis_code", mean.rq)
@@ -123,6 +128,12 @@ def measure_quality(
         )
     )
     return qualities
+
+
+def is_nameless(predicted: PredictedMap) -> bool:
+    """Whether the map's masks are class-agnostic: it has entities, and all of them are of class `object`."""
+    names = {entity.class_name for entity in predicted.info.entities}
+    return names == {NAMELESS}
 
 
 def _entities_off_the_truth(predicted: PredictedMap, labels: np.ndarray) -> dict[str, int]:
@@ -186,7 +197,7 @@ def measure_instances(
         result[name] = class_precision(curve)
     agnostic = result.pop(ANY_CLASS)
     part.set("instance_ap50_class_agnostic", agnostic.all_point)
-    record_precision(part, "instance_ap50", result)
+    record_precision(part, "instance_ap50", {} if is_nameless(predicted) else result)
     part.tables.append(precision_table("instance_precision", "Instance AP at IoU 0.5 by class", result))
     return result
 

@@ -46,7 +46,8 @@ class PlanView:
     actions: tuple[ActionRow, ...]
     keyframes: tuple[tuple[Picture, str], ...]
     checks: tuple[Check, ...]
-    failures: tuple[Failure, ...]
+    failures: tuple[tuple[Failure, int], ...]
+    """Each kind of failure of each action once, with how often it was met; in order of the last time."""
     seconds: str
 
 
@@ -108,9 +109,18 @@ def plan_view(plan: Plan, most: int, width: int) -> PlanView:
         actions=tuple(actions),
         keyframes=tuple(keyframes),
         checks=file.checks,
-        failures=file.failures,
+        failures=_together(file.failures),
         seconds="" if times is None or not len(times) else f"{times[-1] - times[0]:.0f} s",
     )
+
+
+def _together(failures: tuple[Failure, ...]) -> tuple[tuple[Failure, int], ...]:
+    last: dict[tuple[str, str | None, tuple[str, ...]], tuple[Failure, int]] = {}
+    for failure in failures:
+        key = (failure.kind, failure.action, failure.objects)
+        count = last.pop(key, (failure, 0))[1]
+        last[key] = (failure, count + 1)
+    return tuple(last.values())
 
 
 def _times(plan: Plan) -> np.ndarray | None:

@@ -65,7 +65,7 @@ def plot(path: Path, alt: str, width: int = 1100) -> Picture:
     except (OSError, SyntaxError, Image.DecompressionBombError) as error:
         raise BadInput(f"{path}: {error}", hint="make the artifact again") from None
     buffer = io.BytesIO()
-    image.quantize(64).save(buffer, "PNG", optimize=True)
+    image.quantize(240, method=Image.Quantize.MAXCOVERAGE).save(buffer, "PNG", optimize=True)
     return _picture("png", buffer, image, alt)
 
 

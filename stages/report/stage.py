@@ -148,8 +148,14 @@ def _lead(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts
         parts.append(f"{info.frame_count} RGB-D frames of {camera} pixels over {info.end_time - info.start_time:.0f} s")
     names = {
         "panoptic_map": "a labelled map", "contact_graph": "a contact graph", "cad_scene": "a scene of CAD models",
-        "interactive_scene": "a scene that simulators load", "plan": "a plan that was tried out",
+        "interactive_scene": "a scene that simulators load",
     }  # fmt: skip
+    if isinstance(plan := artifacts.get("plan"), Plan):
+        status = plan.plan.status
+        executed = {"executed": "a plan that a robot executed", "execution_failed": "a plan whose execution failed"}
+        names["plan"] = executed.get(
+            status, "a plan" if status == "planned" else "an attempt to plan that found no way"
+        )
     made = [text for role, text in names.items() if role in artifacts]
     if made:
         parts.append(", ".join(made[:-1]) + (" and " if len(made) > 1 else "") + made[-1])
@@ -224,8 +230,8 @@ def _add_views(
     values.update(
         cad_views=pictures,
         replacements=[_replacement_row(r) for r in scene.replacements if r.decision != "layout"],
-        cad_text=f"{decisions.count('cad')} objects are CAD models, {decisions.count('mesh')} keep their mesh, "
-        f"{decisions.count('layout')} are layout. The global check went from {scene.conflicts_before} to "
+        cad_text=f"CAD models: {decisions.count('cad')}; objects that keep their mesh: {decisions.count('mesh')}; "
+        f"layout: {decisions.count('layout')}. The global check went from {scene.conflicts_before} to "
         f"{scene.conflicts_after} colliding pairs in {scene.iterations} iterations.",
     )
 
@@ -311,8 +317,19 @@ def _add_figures(values: dict[str, Any], evaluation: Evaluation, baseline: Evalu
             "Against the ground truth of the generated room. Arrows say which way is better."
             if against_truth
             else "Counts; there is no ground truth to compare with."
+        )
+        + (
+            " Class-agnostic masks name nothing: compare the rows that say “whatever the class”."
+            if baseline is not None and metrics.get("map/pq") is not None and baseline_is_nameless(baseline)
+            else ""
         ),
     )
+
+
+def baseline_is_nameless(baseline: Evaluation) -> bool:
+    """Whether the baseline's masks have no classes (its class-wise figures are undefined)."""
+    theirs = baseline.metrics.metrics
+    return theirs.get("map/pq") is None and theirs.get("map/pq_class_agnostic") is not None
 
 
 def _write(values: dict[str, Any], artifacts: dict[str, Artifact], context: Context) -> Report:

@@ -103,7 +103,11 @@ def map_model(panoptic_map: PanopticMap) -> Model | None:
     return Model(
         soup,
         {e.instance: e.class_name for e in entities},
-        {e.instance: f"{e.class_name} {e.instance}" for e in entities if e.class_name not in LAYOUT_COLORS},
+        {
+            e.instance: f"{e.class_name} {e.instance}".replace("_", " ")
+            for e in entities
+            if e.class_name not in LAYOUT_COLORS
+        },
     )
 
 
@@ -139,7 +143,7 @@ def cad_model(cad_scene: CadScene) -> Model | None:
         meshes.append((number, mesh))
         classes[number] = class_name
         if replacement.decision != "layout":
-            names[number] = f"{class_name} {number}" if node is not None else replacement.node
+            names[number] = (f"{class_name} {number}" if node is not None else replacement.node).replace("_", " ")
     return Model(build_soup(meshes), classes, names) if meshes else None
 
 

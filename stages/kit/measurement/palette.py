@@ -10,7 +10,7 @@ RELATION_COLORS = {
     "carries_on_wall": "#7a4fb0",
     "proximal": "#8c8c8c",
 }
-UNLABELLED = (0.62, 0.62, 0.60)
+UNLABELLED = (0.46, 0.45, 0.44)
 LAYOUT_COLORS = {
     "floor": (0.80, 0.755, 0.69),
     "wall": (0.715, 0.755, 0.785),

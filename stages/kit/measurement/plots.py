@@ -15,10 +15,13 @@ from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 
 from schemas.contact_graph import ContactGraphFile  # noqa: E402
+from stages.kit.geometry.boxes import polygon_area  # noqa: E402
 from stages.kit.measurement.palette import RELATION_COLORS  # noqa: E402
 from stages.kit.measurement.tree_layout import tree_layout  # noqa: E402
 
 SERIES_COLORS = ("#2f6fb3", "#e08a2e", "#4d9a6a", "#7a4fb0", "#b0413e")
+NAMED_FROM_AREA = 0.12
+"""Outlines below this area have no name in the plan [m^2]."""
 STYLE = {
     "font.size": 9.5,
     "axes.spines.top": False,
@@ -50,7 +53,7 @@ def plot_bars(
 ) -> None:
     """Horizontal bars, one group a label; undefined values (None) have no bar and are marked n/a."""
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(figsize=(6.4, 0.9 + 0.42 * max(len(labels), 1) * max(1.0, 0.6 * len(series))))
+        figure, axes = plt.subplots(figsize=(6.4, 0.9 + 0.3 * max(len(labels), 1) * max(1.0, 0.55 * len(series))))
         thickness = 0.8 / max(len(series), 1)
         rows = np.arange(len(labels))
         for k, (name, values) in enumerate(series.items()):
@@ -105,7 +108,8 @@ def plot_floor_plan(
         figure, axes = plt.subplots(figsize=(6.4, 5.2))
         for name, corners, color in outlines:
             axes.fill(corners[:, 0], corners[:, 1], facecolor=(*color, 0.35), edgecolor=color, linewidth=1)
-            axes.annotate(name, corners.mean(axis=0), ha="center", va="center", size=6.5, color="#333333")
+            if abs(polygon_area(corners)) > NAMED_FROM_AREA:
+                axes.annotate(name, corners.mean(axis=0), ha="center", va="center", size=6.5, color="#333333")
         for k, (name, points) in enumerate(paths.items()):
             style = "-" if k == 0 else "--"
             axes.plot(points[:, 0], points[:, 1], style, color=SERIES_COLORS[k % 5], linewidth=1.4, label=name)
@@ -127,7 +131,7 @@ def plot_graphs(
     with plt.rc_context(STYLE):
         layouts = {name: tree_layout(_parents(graph)) for name, graph in graphs.items()}
         rows = max([1.0] + [row + 1 for layout in layouts.values() for _, row in layout.values()])
-        figure, all_axes = plt.subplots(1, len(graphs), figsize=(4.6 * len(graphs), 0.9 + 0.24 * rows), squeeze=False)
+        figure, all_axes = plt.subplots(1, len(graphs), figsize=(5.0 * len(graphs), 0.9 + 0.24 * rows), squeeze=False)
         for axes, (name, graph) in zip(all_axes[0], graphs.items(), strict=True):
             _draw_tree(axes, graph, layouts[name], marked.get(name, {}))
             axes.set_title(name)
@@ -151,17 +155,25 @@ def _parents(graph: ContactGraphFile) -> dict[str, str | None]:
 def _draw_tree(
     axes: Axes, graph: ContactGraphFile, layout: dict[str, tuple[float, float]], marked: Mapping[str, str]
 ) -> None:
+    # A column is as wide as its longest name; positions count letters.
+    left = {0: 0.0}
+    for depth in range(int(max((x for x, _ in layout.values()), default=0.0)) + 1):
+        left[depth + 1] = (
+            left[depth] + max((len(name) for name, (x, _) in layout.items() if x == depth), default=0) + 4.0
+        )
+    places = {name: (left[int(x)], y) for name, (x, y) in layout.items()}
     for link in graph.links:
-        if link.relation == "proximal" or link.source not in layout or link.target not in layout:
+        if link.relation == "proximal" or link.source not in places or link.target not in places:
             continue
-        (x0, y0), (x1, y1) = layout[link.source], layout[link.target]
-        axes.plot([x0, x0 + 0.5, x0 + 0.5, x1], [y0, y0, y1, y1], color=RELATION_COLORS[link.relation], linewidth=1.1)
-    for name, (x, y) in layout.items():
+        (x0, y0), (x1, y1) = places[link.source], places[link.target]
+        bend = x1 - 2.0
+        axes.plot([x0, bend, bend, x1], [y0, y0, y1, y1], color=RELATION_COLORS[link.relation], linewidth=1.2)
+    for name, (x, y) in places.items():
         axes.annotate(
             name, (x, y), ha="left", va="center", size=7.5, color=marked.get(name, "#222222"),
+            weight="bold" if name in marked else "normal",
             bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"},
         )  # fmt: skip
-    deepest = max((x for x, _ in layout.values()), default=0.0)
-    axes.set_xlim(-0.1, deepest + 1.0)
+    axes.set_xlim(-1.0, max(left.values()) + 1.0)
     axes.set_ylim(max((y for _, y in layout.values()), default=0.0) + 0.7, -0.7)
     axes.axis("off")

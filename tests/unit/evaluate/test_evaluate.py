@@ -121,6 +121,20 @@ def test_an_empty_map_is_zero_and_not_a_crash(tmp_path, truth):
     assert metrics["counts/entities"] == 0
 
 
+def test_class_agnostic_masks_have_no_figures_by_class(tmp_path, truth):
+    """Every entity found and none named; the floor in two parts and the wall count neither way."""
+    low = replace(FLOOR, instance=20, high=(0.0, 2.0, 0.0))
+    high = replace(FLOOR, instance=21, low=(0.0, -2.0, -0.02))
+    nameless = tuple(replace(t, class_name="object") for t in (low, high, *ROOM[1:]))
+    metrics = evaluate(
+        tmp_path / "evaluation", ground_truth=truth, panoptic_map=make_map(tmp_path / "map", nameless)
+    ).metrics.metrics
+    assert metrics["map/pq"] is None
+    assert metrics["map/instance_ap50"] is None
+    assert metrics["map/rq_class_agnostic"] == 1.0
+    assert metrics["map/instance_ap50_class_agnostic"] == 1.0
+
+
 def test_refinement_is_measured(tmp_path, truth):
     """Before refinement the chair's box hangs in the air at half height; after it stands on the floor."""
     graph = graph_of(ROOM)

@@ -167,7 +167,7 @@ def test_tree_layout_puts_parents_at_the_middle_of_their_children():
 def test_instance_colors_differ():
     colors = {hex_color(instance_color(k)) for k in range(1, 41)}
     assert len(colors) == 40
-    assert hex_color(instance_color(0)) == "#9e9e99"
+    assert hex_color(instance_color(0)) == "#757370"
 
 
 def test_plots_are_the_same_bytes_every_time(tmp_path):
