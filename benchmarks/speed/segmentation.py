@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
+import numba
 import numpy as np
 import trimesh
 
@@ -244,7 +245,7 @@ def table(seconds: dict[str, Timing], repeats: int) -> str:
 
 def main() -> None:
     """Measure, print the table, write metrics.json and table.md."""
-    os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the default probes TBB first and warns about its version
+    numba.config.THREADING_LAYER = "omp"  # the default probes TBB first and warns about its version
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, help="folder for metrics.json and table.md")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions")

@@ -164,18 +164,33 @@ def _distance_outside(points: np.ndarray, covered: np.ndarray) -> np.ndarray:
     return (points @ outward.T - np.einsum("ij,ij->i", outward, hull)).max(axis=1)
 
 
+def _grid_cells(points: np.ndarray, size: float) -> tuple[np.ndarray, int]:
+    """Return for every point (N, 3) the number (0..n-1) of its occupied grid cell of edge `size` [m], and n.
+
+    Cells are numbered by x, then y, then z. A table of all cells of the bounding box is much faster than sorting.
+    """
+    cell = np.floor((points - points.min(axis=0)) / size).astype(np.int64)
+    shape = cell.max(axis=0) + 1
+    key = (cell[:, 0] * shape[1] + cell[:, 1]) * shape[2] + cell[:, 2]
+    if int(shape.prod()) > 20_000_000:
+        return np.unique(key, return_inverse=True)[1], int(np.unique(key).size)
+    occupied = np.zeros(int(shape.prod()), dtype=bool)
+    occupied[key] = True
+    number = np.cumsum(occupied) - 1
+    return number[key], int(occupied.sum())
+
+
 def _main_cluster(foreground: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return the foreground pixels (h, w) of the heaviest Euclidean cluster; the middle of the window counts twice."""
     rows, columns = np.nonzero(foreground)
     cloud = points[rows, columns].astype(float)
     extent = float(np.linalg.norm(np.percentile(cloud, 90, axis=0) - np.percentile(cloud, 10, axis=0)))
     distance = float(np.clip(0.15 * extent, 0.03, 0.12))
-    cells, cell_of = np.unique(np.floor(cloud / (distance / 2)).astype(np.int64), axis=0, return_inverse=True)
-    cell_of = cell_of.ravel()
-    counts = np.bincount(cell_of)
+    cell_of, count = _grid_cells(cloud, distance / 2)
+    counts = np.bincount(cell_of, minlength=count)
     centers = np.stack([np.bincount(cell_of, cloud[:, k]) / counts for k in range(3)], axis=1)
     pairs = cKDTree(centers).query_pairs(distance, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     cluster = connected_components(graph, directed=False)[1][cell_of]
     height, width = foreground.shape
     middle = (np.abs(rows - height / 2) < 0.3 * height) & (np.abs(columns - width / 2) < 0.3 * width)
