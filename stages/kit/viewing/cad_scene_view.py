@@ -27,7 +27,7 @@ def draw_cad_scene(cad_scene: CadScene, canvas: Canvas) -> None:
         group = "layout" if replacement.decision == "layout" else "meshes"
         path = cad_scene.path(group) / f"{replacement.node}.ply"
         if path.exists():
-            canvas.mesh(f"{group}/{replacement.node}", load_mesh(path))
+            canvas.mesh(f"{group}/{replacement.node}", load_mesh(path), front_only=True)
         rows.append(f"| {replacement.node} | {replacement.decision} | {replacement.reason} | | |")
     draw_graph(cad_scene.graph, canvas)
     canvas.document("replacements", "\n".join(rows))

@@ -9,13 +9,17 @@ from typing import Any
 import cv2
 import numpy as np
 import trimesh
+from numpy.typing import ArrayLike
 
 from schemas.errors import BadInput, MissingDependency
 from schemas.scene_parts import Box, Camera
 from stages.kit.geometry.cameras import intrinsic_matrix
 from stages.kit.geometry.transforms import quaternion_of
+from stages.kit.viewing.arrangement import Arrangement
 
 WORLD = "world"
+SHELL = "shell"
+"""Walls and ceilings that are solid, below this path: hidden at first, as one looks from outside."""
 DISTRIBUTION = "rerun-sdk"
 Color = tuple[float, float, float]
 """(r, g, b) in 0..1."""
@@ -48,6 +52,7 @@ class Canvas:
         self._recording = self._rerun.RecordingStream("scenewright", send_properties=False)
         self._recording.send_recording_name(name)
         self._static = True
+        self._arrangement = Arrangement(WORLD)
         if save is None:
             self._recording.spawn()
         else:
@@ -61,7 +66,9 @@ class Canvas:
     def __enter__(self) -> Canvas:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self._recording.send_blueprint(self._arrangement.blueprint())
         self._recording.flush()
         self._recording.disconnect()
 
@@ -74,10 +81,24 @@ class Canvas:
         """What is drawn from now on is there all the time."""
         self._static = True
 
-    def mesh(self, path: str, mesh: trimesh.Trimesh, colors: np.ndarray | None = None) -> None:
-        """Draw a mesh; `colors` (V, 3 or 4) uint8 per vertex override its own."""
+    def enclose(self, minimum: ArrayLike, maximum: ArrayLike) -> None:
+        """Keep the box from `minimum` to `maximum` (3,) [m] in sight when the recording is opened."""
+        self._arrangement.enclose(np.asarray(minimum, dtype=float), np.asarray(maximum, dtype=float))
+
+    def view(self, name: str, *hidden: str) -> None:
+        """Open a 3D view of everything but what lies under the hidden paths; without any there is one of all."""
+        self._arrangement.views.append((name, hidden))
+
+    def mesh(
+        self, path: str, mesh: trimesh.Trimesh, colors: np.ndarray | None = None, *, front_only: bool = False
+    ) -> None:
+        """Draw a mesh; `colors` (V, 3 or 4) uint8 per vertex override its own.
+
+        `front_only` leaves out faces that look away, so that one looks into a room through its walls.
+        """
         if len(mesh.faces) == 0:
             return
+        self._arrangement.drawn = True
         visual = mesh.visual
         if colors is None and isinstance(visual, trimesh.visual.ColorVisuals) and visual.kind == "face":
             face_colors = np.asarray(visual.face_colors)
@@ -93,11 +114,13 @@ class Canvas:
                 triangle_indices=np.asarray(mesh.faces, dtype=np.uint32),
                 vertex_normals=np.asarray(mesh.vertex_normals, dtype=np.float32),
                 vertex_colors=colors,
+                face_rendering=self._rerun.components.MeshFaceRendering.Front if front_only else None,
             ),
         )
 
     def points(self, path: str, points: np.ndarray, colors: np.ndarray | None = None, radius: float = 0.005) -> None:
         """Draw points (N, 3) with colours (N, 3) uint8."""
+        self._arrangement.drawn = True
         self._log(
             f"{WORLD}/{path}",
             self._rerun.Points3D(np.asarray(points, dtype=np.float32), colors=colors, radii=radius),
@@ -105,15 +128,19 @@ class Canvas:
 
     def line(self, path: str, strips: list[np.ndarray], colors: list[Color], radius: float = 0.004) -> None:
         """Draw polylines, each (N, 3), in one colour each."""
+        self._arrangement.drawn = True
         strips = [np.asarray(strip, dtype=np.float32) for strip in strips]
         self._log(
             f"{WORLD}/{path}",
             self._rerun.LineStrips3D(strips, colors=[bytes_of(color) for color in colors], radii=radius),
         )
 
-    def boxes(self, path: str, boxes: list[Box], labels: list[str], colors: list[Color]) -> None:
+    def boxes(
+        self, path: str, boxes: list[Box], labels: list[str], colors: list[Color], *, show_labels: bool = True
+    ) -> None:
         """Draw oriented boxes with labels."""
         if boxes:
+            self._arrangement.drawn = True
             self._log(
                 f"{WORLD}/{path}",
                 self._rerun.Boxes3D(
@@ -122,6 +149,7 @@ class Canvas:
                     quaternions=[self._rerun.Quaternion(xyzw=box.orientation) for box in boxes],
                     colors=[bytes_of(color) for color in colors],
                     labels=labels,
+                    show_labels=show_labels,
                 ),
             )
 
@@ -138,6 +166,7 @@ class Canvas:
 
     def camera(self, path: str, camera: Camera) -> None:
         """Say that `path` is a pinhole camera (OpenCV axes)."""
+        self._arrangement.drawn = True
         self._log(
             f"{WORLD}/{path}",
             self._rerun.Pinhole(
@@ -150,11 +179,13 @@ class Canvas:
         )
 
     def jpeg(self, path: str, data: bytes) -> None:
-        """Show a JPEG as it is."""
+        """Show a JPEG as it is, in the 2D view of the path above."""
+        self._picture(path)
         self._log(f"{WORLD}/{path}", self._rerun.EncodedImage(contents=data, media_type="image/jpeg"))
 
     def png(self, path: str, data: bytes) -> None:
-        """Show a PNG as it is."""
+        """Show a PNG as it is, in the 2D view of the path above."""
+        self._picture(path)
         self._log(f"{WORLD}/{path}", self._rerun.EncodedImage(contents=data, media_type="image/png"))
 
     def depth(self, path: str, depth: np.ndarray) -> None:
@@ -176,16 +207,25 @@ class Canvas:
 
     def labels(self, path: str, ids: np.ndarray) -> None:
         """Show ids (H, W) 0..65535 over the picture; 0 is void."""
+        self._picture(path)
         self._log(f"{WORLD}/{path}", self._rerun.SegmentationImage(ids.astype(np.uint16), opacity=0.5))
 
     def graph(self, names: list[str], colors: list[Color], edges: list[tuple[str, str]]) -> None:
         """Show a directed graph in a view of its own."""
+        self._arrangement.graph = True
         nodes = self._rerun.GraphNodes(names, labels=names, colors=[bytes_of(color) for color in colors])
         self._log("graph", nodes, self._rerun.GraphEdges(edges, graph_type="directed"))
 
     def document(self, path: str, markdown: str) -> None:
         """Show a text in Markdown."""
+        if path not in self._arrangement.documents:
+            self._arrangement.documents.append(path)
         self._log(path, self._rerun.TextDocument(markdown, media_type="text/markdown"))
+
+    def _picture(self, path: str) -> None:
+        group = path.rpartition("/")[0] or path
+        if group not in self._arrangement.pictures:
+            self._arrangement.pictures.append(group)
 
     def _log(self, path: str, *what: Any) -> None:
         self._recording.log(path, *what, static=self._static)

@@ -6,10 +6,14 @@ import numpy as np
 
 from schemas.contact_graph import ContactGraph, ContactGraphFile, GraphNode
 from schemas.panoptic_map import PanopticMap
+from stages.kit.geometry.boxes import box_corners
 from stages.kit.measurement.palette import RELATION_COLORS, UNLABELLED, instance_color
-from stages.kit.viewing.canvas import Canvas, Color
+from stages.kit.viewing.canvas import SHELL, Canvas, Color
 from stages.kit.viewing.inputs import input_artifact
 from stages.kit.viewing.meshes import load_mesh
+
+HIDDEN = ("boxes_before_refinement", "boxes_of_layout", SHELL)
+"""Drawn, but not shown until somebody asks for it: it hides the room."""
 
 
 def draw_contact_graph(graph: ContactGraph, canvas: Canvas) -> None:
@@ -19,24 +23,30 @@ def draw_contact_graph(graph: ContactGraph, canvas: Canvas) -> None:
     if panoptic_map is not None:
         for node in graph.graph.nodes:
             if node.mesh is not None and panoptic_map.path(node.mesh).exists():
-                canvas.mesh(f"meshes/{node.id}", load_mesh(panoptic_map.path(node.mesh)))
+                canvas.mesh(f"meshes/{node.id}", load_mesh(panoptic_map.path(node.mesh)), front_only=True)
 
 
 def draw_graph(graph: ContactGraphFile, canvas: Canvas) -> None:
     """Draw boxes, supporting planes, edges between box centres, and the graph in a view of its own."""
     boxed = [node for node in graph.nodes if node.box is not None]
-    canvas.boxes(
-        "boxes",
-        [node.box for node in boxed if node.box is not None],
-        [node.id for node in boxed],
-        [_color(node) for node in boxed],
-    )
+    for path, group in (
+        ("boxes", [node for node in boxed if node.node_type != "layout"]),
+        ("boxes_of_layout", [node for node in boxed if node.node_type == "layout"]),
+    ):
+        boxes = [node.box for node in group if node.box is not None]
+        canvas.boxes(path, boxes, [node.id for node in group], [_color(node) for node in group])
+    for node in boxed:
+        if node.box is not None:
+            corners = box_corners(node.box)
+            canvas.enclose(corners.min(axis=0), corners.max(axis=0))
+    canvas.view("world", *HIDDEN)
     observed = [node for node in boxed if node.box_observed is not None and node.box_observed != node.box]
     canvas.boxes(
         "boxes_before_refinement",
         [node.box_observed for node in observed if node.box_observed is not None],
         [f"{node.id} (observed)" for node in observed],
         [UNLABELLED] * len(observed),
+        show_labels=False,
     )
     _draw_planes(graph, canvas)
     centers = {node.id: np.array(node.box.center) for node in boxed if node.box is not None}

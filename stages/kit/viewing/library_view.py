@@ -29,6 +29,8 @@ def draw_library(library: CadLibrary, canvas: Canvas) -> None:
         canvas.boxes(
             f"{entity}/box", [box], [model.id], [instance_color(1 + sorted_classes(models).index(model.class_name))]
         )
+    reach = np.array([places[m.id] + np.array(m.states[0].box_maximum) for m in models] or [np.ones(3)])
+    canvas.enclose(np.zeros(3), reach.max(axis=0))
     moving = [model for model in models if model.joints]
     for step in range(SWING_STEPS + 1) if moving else ():
         share = step / SWING_STEPS

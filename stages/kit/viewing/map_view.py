@@ -20,13 +20,19 @@ def draw_map(panoptic_map: PanopticMap, canvas: Canvas) -> None:
         canvas.document("map", f"{len(info.entities)} entities from {info.frames_integrated} frames")
     if path.exists():
         mesh = load_mesh(path)
-        canvas.mesh("color", mesh)
-        canvas.mesh("instance", mesh, instance_colors(_vertex_instances(panoptic_map, len(mesh.vertices))))
+        instances = _vertex_instances(panoptic_map, len(mesh.vertices))
+        canvas.mesh("color", mesh, front_only=True)
+        canvas.mesh("instance", mesh, instance_colors(instances), front_only=True)
+        canvas.view("by instance", "color")
+        canvas.view("colour", "instance", "boxes")
+        if len(mesh.vertices):
+            canvas.enclose(*mesh.bounds)
     canvas.boxes(
         "boxes",
         [box_from_bounds(entity.box_minimum, entity.box_maximum) for entity in info.entities],
         [f"{entity.class_name} {entity.instance}" for entity in info.entities],
         [instance_color(entity.instance) for entity in info.entities],
+        show_labels=len(info.entities) <= 60,
     )
 
 

@@ -16,7 +16,7 @@ from schemas.plan import Plan
 from stages.kit.formats.foxglove import JPEG_START, stamp_nanoseconds, transform_matrix
 from stages.kit.formats.mcap_log import McapLog
 from stages.kit.formats.urdf_file import parse_urdf
-from stages.kit.viewing.canvas import Canvas
+from stages.kit.viewing.canvas import SHELL, Canvas
 from stages.kit.viewing.inputs import input_artifact
 from stages.kit.viewing.meshes import merged, shape_mesh
 from stages.kit.viewing.scene_view import draw_scene_folder
@@ -27,6 +27,7 @@ ROBOT = "robot/"
 def draw_plan(plan: Plan, canvas: Canvas) -> None:
     """Draw the room of execution, the robot, both animated, the images that were taken, and the plan as text."""
     canvas.document("plan", plan_text(plan))
+    canvas.view("world", SHELL)
     folder = _room(plan)
     if folder is not None:
         draw_scene_folder(folder, canvas, animated=True)

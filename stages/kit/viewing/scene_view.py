@@ -13,9 +13,11 @@ from schemas.interactive_scene import InteractiveScene, InteractiveSceneFile
 from stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
 from stages.kit.geometry.transforms import transform_from
 from stages.kit.measurement.palette import instance_color
-from stages.kit.viewing.canvas import Canvas
+from stages.kit.viewing.canvas import SHELL, Canvas
 from stages.kit.viewing.graph_view import draw_graph
 from stages.kit.viewing.meshes import merged, shape_mesh
+
+SHELL_CLASSES = ("wall", "ceiling")
 
 
 def draw_scene(scene: InteractiveScene, canvas: Canvas) -> None:
@@ -33,6 +35,7 @@ def draw_scene_folder(root: Path, canvas: Canvas, prefix: str = "scene", *, anim
     urdf = parse_urdf(root / description.combined_file)
     values = {name: value for body in description.bodies for name, value in body.joint_values.items()}
     poses = link_poses(urdf, values)
+    shell = {body.name for body in description.bodies if body.class_name in SHELL_CLASSES}
     drawn = []
     for number, link in enumerate(urdf.links):
         shapes = link.visuals or link.collisions
@@ -41,11 +44,12 @@ def draw_scene_folder(root: Path, canvas: Canvas, prefix: str = "scene", *, anim
         mesh = merged([shape_mesh(shape, root) for shape in shapes])
         plain = isinstance(mesh.visual, trimesh.visual.ColorVisuals) and not mesh.visual.defined
         colors = np.tile(np.array(instance_color(number)) * 255, (len(mesh.vertices), 1)).astype(np.uint8)
+        path = f"{SHELL if link.name in shell else prefix}/{link.name}"
         if animated:
             canvas.time(0.0)
-        canvas.transform(f"{prefix}/{link.name}", poses[link.name])
+        canvas.transform(path, poses[link.name])
         canvas.always()
-        canvas.mesh(f"{prefix}/{link.name}", mesh, colors if plain else None)
+        canvas.mesh(path, mesh, colors if plain else None)
         drawn.append(link.name)
     return tuple(drawn)
 

@@ -33,6 +33,7 @@ def draw_sequence(sequence: Sequence, canvas: Canvas) -> None:
         cloud = accumulated_cloud(reader)
         if cloud is not None:
             canvas.points("cloud", *cloud, radius=CLOUD_GRID / 2)
+            canvas.enclose(*np.percentile(cloud[0], [2, 98], axis=0))
         canvas.label_names(
             "camera/labels", [(e.instance, e.class_name, instance_color(e.instance)) for e in info.label_table]
         )

@@ -9,7 +9,7 @@ from schemas.ground_truth import GroundTruth
 from stages.kit.formats.frames import FrameReader
 from stages.kit.measurement.palette import instance_color
 from stages.kit.viewing.canvas import Canvas
-from stages.kit.viewing.graph_view import draw_graph
+from stages.kit.viewing.graph_view import HIDDEN, draw_graph
 from stages.kit.viewing.map_view import instance_colors
 from stages.kit.viewing.scene_view import draw_scene_folder
 from stages.kit.viewing.sequence_view import draw_frames, draw_path
@@ -21,12 +21,10 @@ def draw_ground_truth(truth: GroundTruth, canvas: Canvas) -> None:
     if (truth.path("room") / "scene.json").exists():
         draw_scene_folder(truth.path("room"), canvas, prefix="room")
     objects = description.objects
-    canvas.boxes(
-        "true_boxes", [o.box for o in objects], [o.name for o in objects], [instance_color(o.instance) for o in objects]
-    )
     draw_graph(truth.graph, canvas)
     points, instances = _visible(truth)
     canvas.points("visible", points, instance_colors(instances), radius=0.006)
+    canvas.view("what was seen", *HIDDEN, "room", "boxes")
     with FrameReader(truth.path("log.mcap")) as reader:
         draw_path(canvas, reader.poses()[1])
         canvas.label_names("camera/labels", [(o.instance, o.name, instance_color(o.instance)) for o in objects])

@@ -55,7 +55,7 @@ EXPECTED = {
     "cad_scene": {"/world/cad/table_3", "/world/meshes/cup_5", "/world/layout/floor_1", "/replacements", "/graph"},
     "interactive_scene": {"/world/scene/table_3", "/world/scene/fridge_4", "/world/scene/fridge_4__door", "/graph"},
     "plan": {"/plan", "/world/scene/cup_5", "/world/robot/panda_hand", "/world/execution"},
-    "ground_truth": {"/world/room/fridge_4", "/world/true_boxes", "/world/visible", "/world/camera/labels"},
+    "ground_truth": {"/world/room/fridge_4", "/world/boxes", "/world/visible", "/world/camera/labels"},
     "cad_library": {"/world/library/table/table_00/body", "/world/library/fridge/fridge_01/door"},
     "evaluation": {"/figures", "/tables/map", "/world/plots/map"},
     "report": {"/report"},
