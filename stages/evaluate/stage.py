@@ -168,9 +168,9 @@ def _evaluate_map(inputs: Inputs, parameters: EvaluateParameters, context: Conte
     qualities = measure_quality(part, truth, predicted, labels, parameters)
     measure_instances(part, truth, predicted, labels, parameters)
     to_truth, to_map = measure_surface(part, truth, predicted, parameters.mesh_threshold)
-    part.notes.append(
-        f"The camera hardly saw {len(truth.optional)} of {len(truth.objects)} true entities; they count neither way."
-    )
+    if truth.optional:
+        seen = f"{len(truth.optional)} of {len(truth.objects)}"
+        part.notes.append(f"The camera hardly saw {seen} true entities; they count neither way.")
     if parameters.plots:
         plots = context.output / "plots"
         figures.draw_quality(plots / "panoptic_quality.png", qualities, inputs.label)

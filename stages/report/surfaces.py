@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -112,8 +113,9 @@ def map_model(panoptic_map: PanopticMap) -> Model | None:
 
 
 def _vertex_colors(mesh: trimesh.Trimesh) -> np.ndarray:
-    if mesh.visual.kind == "vertex":
-        return np.asarray(mesh.visual.vertex_colors)
+    visual: Any = mesh.visual
+    if visual is not None and visual.kind == "vertex":
+        return np.asarray(visual.vertex_colors)
     return np.full((len(mesh.vertices), 4), 170, dtype=np.uint8)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -31,13 +32,14 @@ def distances_to_mesh(points: np.ndarray, vertices: np.ndarray, triangles: np.nd
         return np.zeros(0)
     if not len(triangles):
         return np.full(len(points), np.inf)
+    tensor: Any = o3d.core.Tensor  # its stub forgets that dtype and device have defaults
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(
-        o3d.core.Tensor(np.ascontiguousarray(vertices, dtype=np.float32)),
-        o3d.core.Tensor(np.ascontiguousarray(triangles, dtype=np.uint32)),
+        tensor(np.ascontiguousarray(vertices, dtype=np.float32)),
+        tensor(np.ascontiguousarray(triangles, dtype=np.uint32)),
     )
-    query = o3d.core.Tensor(np.ascontiguousarray(points, dtype=np.float32))
-    return np.asarray(scene.compute_distance(query).numpy(), dtype=float)
+    distances = scene.compute_distance(tensor(np.ascontiguousarray(points, dtype=np.float32)))
+    return np.asarray(distances.numpy(), dtype=float)
 
 
 def surface_agreement(

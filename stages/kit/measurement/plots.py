@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -22,7 +23,7 @@ from stages.kit.measurement.tree_layout import tree_layout  # noqa: E402
 SERIES_COLORS = ("#2f6fb3", "#e08a2e", "#4d9a6a", "#7a4fb0", "#b0413e")
 NAMED_FROM_AREA = 0.12
 """Outlines below this area have no name in the plan [m^2]."""
-STYLE = {
+STYLE: Any = {
     "font.size": 9.5,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -70,7 +71,7 @@ def plot_bars(
         axes.set_xlabel(axis)
         axes.set_title(title)
         if len(series) > 1:
-            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=len(series))
+            axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=3.8, ncols=len(series))
         save(figure, path)
 
 
@@ -120,7 +121,7 @@ def plot_floor_plan(
         axes.set_ylabel("y [m]")
         axes.set_title(title)
         if paths:
-            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=len(paths))
+            axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=3.8, ncols=len(paths))
         save(figure, path)
 
 
