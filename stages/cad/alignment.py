@@ -157,7 +157,7 @@ def levenberg_marquardt(
         normal, gradient = jacobian.T @ jacobian, jacobian.T @ value
         improved = False
         while calls < evaluations and damping < 1e12:
-            lifted = normal + damping * np.diag(np.maximum(np.diag(normal), 1e-9))
+            lifted = normal + damping * np.diag(np.maximum(np.diag(normal), 1e-6)) + 1e-9 * np.eye(len(x))
             step = -np.linalg.solve(lifted, gradient)
             trial = residuals(x + step)
             calls += 1

@@ -14,9 +14,17 @@ from schemas.vocabulary import load_vocabulary
 from stages.cad.alignment import AlignmentWeights, align
 from stages.cad.fitting import QUICK_ITERATIONS, fitted, refine, shapes_of_model
 from stages.cad.matching import Match, rank_matches
-from stages.cad.model_surfaces import ModelSurface, alignment_error, to_world
+from stages.cad.model_surfaces import ModelSurface, alignment_error, robust_error, to_world
 from stages.cad.parameters import CadParameters
-from stages.cad.placing import placed_planes, placement_of, size_misfit, supporting_surface, wall_depth
+from stages.cad.placing import (
+    facing_wall,
+    placed_planes,
+    placement_of,
+    size_misfit,
+    supporting_surface,
+    surface_share,
+    wall_depth,
+)
 from stages.cad.shapes import Placement, Shape, observed_frames, shape_of_state
 from stages.kit.geometry.boxes import bottom, points_in_box
 from stages.kit.geometry.point_clouds import thin_to_grid
@@ -26,6 +34,10 @@ SCREENING_STEP = 5
 """Every so many vertices count when aligned candidates are screened."""
 QUICK_POINTS = 250
 """Vertices that the quick refinement looks at."""
+TRUNCATION = 0.05
+"""Distances are cut off here when candidates are compared [m]."""
+MOST_MOVE = 0.2
+"""A child without any surface below or above it counts as if it moved this far [m]."""
 FULL_FITS = 4
 """Candidates that are refined thoroughly."""
 BOX_MARGIN = 0.01
@@ -119,6 +131,7 @@ def shortlist(
         parameters.containment_weight,
         parameters.height_weight,
     )
+    walls = [entry for entry in graph.nodes if entry.class_name == "wall"]
     link = graph.parent_link(node.id)
     hangs = link is not None and link.relation == "carries_on_wall"
     aligned = []
@@ -138,9 +151,9 @@ def shortlist(
         aligned.sort(key=lambda entry: entry[1].alignment_error + parameters.tilt_weight * entry[0].tilt)
         rejected["alignment rank"] = max(0, len(aligned) - parameters.candidates)
         aligned = aligned[: parameters.candidates]
-        aligned = fit_the_best(aligned, surfaces, points, normals, parameters, free_height=hangs)
+        aligned = fit_the_best(aligned, surfaces, points, normals, node, graph, walls, parameters, free_height=hangs)
     placements: list[Placement] = []
-    for placement in aligned_placements(aligned, surfaces, points, normals, parameters):
+    for placement in aligned_placements(aligned, surfaces, points, normals, node, graph, walls, parameters):
         reason = why_invalid(placement, surfaces[placement.shape.model.id], node, graph, parameters)
         if reason is None:
             placements.append(placement)
@@ -170,6 +183,9 @@ def fit_the_best(
     surfaces: dict[str, ModelSurface],
     points: np.ndarray,
     normals: np.ndarray,
+    node: GraphNode,
+    graph: ContactGraphFile,
+    walls: list[GraphNode],
     parameters: CadParameters,
     *,
     free_height: bool,
@@ -185,12 +201,13 @@ def fit_the_best(
                 points[some],
                 normals[some],
                 free_height=free_height,
+                move_joints=False,
                 iterations=QUICK_ITERATIONS,
             ),
         )
         for match, placement in aligned
     ]
-    quick.sort(key=lambda entry: score_of(entry[0], entry[1], entry[1].alignment_error, parameters))
+    quick.sort(key=lambda entry: score_of(entry[0], entry[1], entry[1].alignment_error, node, graph, walls, parameters))
     return [
         (
             match,
@@ -202,14 +219,41 @@ def fit_the_best(
     ]
 
 
-def score_of(match: Match, placement: Placement, error: float, parameters: CadParameters) -> float:
-    """Ours: alignment error [m] plus what the vertices of a partial mesh do not tell: size, tilt, scale."""
+def score_of(
+    match: Match,
+    placement: Placement,
+    error: float,
+    node: GraphNode,
+    graph: ContactGraphFile,
+    walls: list[GraphNode],
+    parameters: CadParameters,
+) -> float:
+    """Ours: alignment error [m] plus what the vertices of a partial mesh do not tell: size, tilt, scale, children,
+    front."""
     return (
         error
         + parameters.misfit_weight * size_misfit(match.frame.size, placement)
         + parameters.tilt_weight * match.tilt
         + parameters.scale_weight * abs(math.log(placement.scale))
+        + parameters.carrying_weight * carrying_misfit(placement, node, graph)
+        + parameters.facing_weight * (0.0 if node.box is None else facing_wall(placement, node.box, walls))
     )
+
+
+def carrying_misfit(placement: Placement, node: GraphNode, graph: ContactGraphFile) -> float:
+    """Return the mean height [m] by which children would have to move to stand on the placed model's surfaces."""
+    children = [
+        graph.node(link.target).box
+        for link in graph.links
+        if link.source == node.id and link.relation in ("supports", "contains")
+    ]
+    level = [plane for plane in placed_planes(placement) if plane.horizontal] if children else []
+    moves = []
+    for child in children:
+        if child is not None:
+            heights = [abs(p.center[2] - bottom(child)) for p in level if surface_share(p, child) > 0.0]
+            moves.append(min([*heights, MOST_MOVE]))
+    return float(np.mean(moves)) if moves else 0.0
 
 
 def aligned_placements(
@@ -217,6 +261,9 @@ def aligned_placements(
     surfaces: dict[str, ModelSurface],
     points: np.ndarray,
     normals: np.ndarray,
+    node: GraphNode,
+    graph: ContactGraphFile,
+    walls: list[GraphNode],
     parameters: CadParameters,
 ) -> list[Placement]:
     """Return placements with the alignment error over all vertices (N, 3) and the score that the choice minimises."""
@@ -226,7 +273,8 @@ def aligned_placements(
         error = alignment_error(surface, placement, points)
         score = error
         if parameters.method == "ours":
-            score = score_of(match, placement, alignment_error(surface, placement, points, normals), parameters)
+            oriented = robust_error(surface, placement, points, normals, TRUNCATION)
+            score = score_of(match, placement, oriented, node, graph, walls, parameters)
         result.append(replace(placement, alignment_error=error, score=score))
     return result
 

@@ -45,7 +45,7 @@ class CadParameters(Parameters):
     evaluations: int = Field(1000, ge=1, description="Alignment: most evaluations of the residuals")
     vertices: int = Field(1500, ge=10, description="Object vertices drawn for the alignment error")
     misfit_weight: float = Field(
-        0.1,
+        0.05,
         ge=0.0,
         description="ours: metres of extent that differ from the observed box count this much beside the "
         "alignment error (vertices of a partial mesh fit every model that is large enough)",
@@ -61,6 +61,16 @@ class CadParameters(Parameters):
         ge=0.0,
         description="ours: |ln(scale)| counts this much beside the alignment error, as the library's "
         "models have the size of real things",
+    )
+    carrying_weight: float = Field(
+        0.1,
+        ge=0.0,
+        description="ours: the height by which children would move counts this much beside the alignment error",
+    )
+    facing_weight: float = Field(
+        0.004,
+        ge=0.0,
+        description="ours: a front that looks at the wall right behind counts this much beside the alignment error",
     )
     choice_margin: float = Field(
         0.01,

@@ -14,6 +14,7 @@ from stages.cad.matching import CUBE_ROTATIONS, Match
 from stages.cad.model_surfaces import ModelSurface, to_world
 from stages.cad.shapes import Placement
 from stages.kit.geometry.boxes import (
+    box_corners,
     clip_polygon,
     footprint,
     gravity_aligned_box,
@@ -24,6 +25,8 @@ from stages.kit.geometry.transforms import transform_from_yaw
 UPWARD = 0.9
 COVER_SHARE = 0.1
 """A surface above a child limits its height when it covers this share of the child's footprint."""
+WALL_NEAR = 0.15
+"""A wall this near to an object is right behind it [m]."""
 HEIGHT_SLACK = 0.03
 """A child may be this much too high for the room above a surface: its height is an estimate [m]."""
 
@@ -133,6 +136,37 @@ def supporting_surface(
             continue
         fitting.append((round(difference, 6), -share, k))
     return min(fitting)[2] if fitting else None
+
+
+def facing_wall(placement: Placement, box: Box, walls: list[GraphNode]) -> float:
+    """Return how much the model's front (-y) looks at a wall right behind or before it: 0 away from it, 1 into it.
+
+    0 as well when no wall is nearer than `WALL_NEAR` to the object's box. (The released code prefers fronts that face
+    away from the nearest wall; a closed cabinet or microwave looks much the same from behind.)
+    """
+    front = -placement.rotation[:, 1]
+    corners, center = box_corners(box), np.asarray(box.center)
+    nearest, result = WALL_NEAR, 0.0
+    for wall in walls:
+        for plane in wall.planes:
+            normal = np.asarray(plane.normal)
+            if abs(normal[2]) > 0.5 or float(center @ normal) + plane.offset <= 0.0 or not within(plane, center):
+                continue
+            gap = abs(float((corners @ normal + plane.offset).min()))
+            if gap < nearest:
+                nearest, result = gap, 0.5 * (1.0 - float(front @ normal))
+    return result
+
+
+def within(plane: SurfacePlane, point: np.ndarray) -> bool:
+    """Whether the projection of a point (3,) lies in the rectangle of a plane."""
+    if len(plane.corners) != 4:
+        return False
+    corners = np.asarray(plane.corners)
+    first, second = corners[1] - corners[0], corners[3] - corners[0]
+    u = float((point - corners[0]) @ first) / max(float(first @ first), 1e-12)
+    v = float((point - corners[0]) @ second) / max(float(second @ second), 1e-12)
+    return 0.0 <= u <= 1.0 and 0.0 <= v <= 1.0
 
 
 def wall_depth(points: np.ndarray, observed: np.ndarray, walls: list[GraphNode]) -> float:

@@ -17,6 +17,8 @@ from stages.cad.shapes import Placement
 from stages.kit.geometry.boxes import bottom, footprint
 
 ROUNDS = 10
+UNEXPLAINED_GAP = 0.05
+"""A refined box that ends farther than this from its plane was not put on it by the graph [m]."""
 CLEARANCE = 0.001
 """Objects that are moved apart end up this far from each other [m]."""
 
@@ -78,6 +80,9 @@ def settle(
                     plane = graph.node(link.source).planes[link.plane]
                     index, shift = link.plane, np.zeros(2)
                     height = _height_at(plane, np.asarray(box.center[:2]))
+                    if abs(height - seen_bottom) > UNEXPLAINED_GAP:
+                        # The graph found nothing that this stands on and named the floor for want of a better.
+                        index, height = None, seen_bottom
                 else:
                     index, height, shift = None, seen_bottom, np.zeros(2)
                 if own is not None:

@@ -18,6 +18,10 @@ from stages.kit.stage import Context
 
 SAMPLES, PLANES = 1, 2
 """Random streams."""
+LEDGE_AREA = 0.05
+"""Least area of a supporting surface in a wall entity [m^2]."""
+LEDGE_GAP = 0.2
+"""Gap between supporting surfaces of one wall entity [m]."""
 PIECE_SHARE = 0.7
 """Share of its box that a piece has within the whole."""
 
@@ -91,6 +95,12 @@ def load_entity(
     distance = parameters.plane_distance
     if not semantic.is_layout:
         distance = max(min(distance, min(box.size) / 4), THINNEST_DISTANCE)
+    least_area: float | None = parameters.minimum_support_area
+    if parameters.method == "thesis" or semantic.name in ("floor", "ceiling"):
+        least_area = None
+    elif semantic.is_layout:
+        # Window sills, and furniture that was taken for a piece of the wall behind it.
+        least_area = LEDGE_AREA
     patches = surface_planes(
         points,
         normals,
@@ -99,9 +109,8 @@ def load_entity(
         normal_weight=parameters.normal_weight,
         plane_share=parameters.plane_share,
         horizontal_threshold=parameters.horizontal_threshold,
-        minimum_support_area=None
-        if parameters.method == "thesis" or semantic.is_layout
-        else parameters.minimum_support_area,
+        minimum_support_area=least_area,
+        split_distance=LEDGE_GAP if semantic.is_layout else None,
         spacing=parameters.point_spacing,
         random=context.random(PLANES, entry.instance),
     )

@@ -12,7 +12,7 @@ from schemas.base import as_vector
 from schemas.scene_parts import Box, SurfacePlane
 from stages.kit.geometry.boxes import bottom, convex_hull, minimum_box, polygon_area, top
 from stages.kit.geometry.planes import PlaneFit, plane_rectangle, ransac_plane, ransac_planes
-from stages.kit.geometry.point_clouds import without_strays
+from stages.kit.geometry.point_clouds import clusters, without_strays
 
 GRAVITY = np.array([0.0, 0.0, -1.0])
 CONTAINER_CLASSES = frozenset(
@@ -112,12 +112,15 @@ def surface_planes(
     plane_share: float,
     horizontal_threshold: float,
     minimum_support_area: float | None,
+    split_distance: float | None,
     spacing: float,
     random: np.random.Generator,
 ) -> tuple[Patch, ...]:
     """Return the surface planes Pi of points (N, 3) with outward unit normals (N, 3) (Han 2024, section 2.2.2).
 
-    `minimum_support_area` [m^2]: see `small_support_planes`; None leaves the thesis's planes alone.
+    `minimum_support_area` [m^2]: see `small_support_planes`; None leaves the thesis's planes alone. `split_distance`
+    [m]: horizontal planes fall into their clusters (a wall entity goes around the room; ledges on opposite sides are
+    not one surface).
     """
     fits = ransac_planes(
         points,
@@ -137,6 +140,8 @@ def surface_planes(
         found = small_support_planes(points[rest], normals[rest], distance, horizontal_threshold, least, random)
         fits += [PlaneFit(fit.normal, fit.offset, rest[fit.inliers]) for fit in found]
         fits = merge_levels(points, fits, horizontal_threshold)
+        if split_distance is not None:
+            fits = split_levels(points, fits, horizontal_threshold, split_distance, least)
     return tuple(patch_from_fit(points, fit, horizontal_threshold) for fit in fits)
 
 
@@ -192,6 +197,23 @@ def merge_levels(points: np.ndarray, fits: list[PlaneFit], horizontal_threshold:
                 result.append(fit)
         else:
             result.append(fit)
+    return result
+
+
+def split_levels(
+    points: np.ndarray, fits: list[PlaneFit], horizontal_threshold: float, distance: float, minimum_count: int
+) -> list[PlaneFit]:
+    """Split horizontal planes into clusters of inliers `distance` [m] apart; smaller ones than `minimum_count` go."""
+    result: list[PlaneFit] = []
+    for fit in fits:
+        if not is_horizontal(fit.normal, horizontal_threshold):
+            result.append(fit)
+            continue
+        label = clusters(points[fit.inliers], distance)
+        for k in range(int(label.max()) + 1):
+            members = fit.inliers[label == k]
+            if len(members) >= minimum_count:
+                result.append(PlaneFit(fit.normal, fit.offset, members))
     return result
 
 

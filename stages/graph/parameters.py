@@ -58,6 +58,9 @@ class GraphParameters(Parameters):
         description="ours: classes that rather hang on a near wall than float above a plane",
     )
     floating_gap: float = Field(0.15, ge=0.0, description="ours: gap above which `wall_classes` count as floating [m]")
+    movable_gap: float = Field(
+        0.3, ge=0.0, description="ours: movable things farther above a plane than this do not stand on it [m]"
+    )
     minimum_points: int = Field(
         30, ge=1, description="Entities with fewer points on the thinning grid are dropped (small-entity filter)"
     )

@@ -63,7 +63,10 @@ def contact_graph(
         if candidate is None or candidate.patch is None:
             boxes[entity.name] = entity.box
         else:
-            boxes[entity.name] = refined_box(entity.box, candidate.height, parameters.maximum_extension)
+            most = parameters.maximum_extension
+            if parameters.method == "ours" and entity.movable:
+                most = min(most, parameters.movable_gap)
+            boxes[entity.name] = refined_box(entity.box, candidate.height, most)
 
     nodes = [GraphNode(id=SCENE_NODE, instance=0, class_name=SCENE_NODE, node_type="scene")]
     links = []

@@ -152,6 +152,9 @@ def _seen(child: Entity, parent: Entity, k: int, parameters: GraphParameters) ->
             return None
         if child.class_name in parameters.wall_classes and gap > parameters.floating_gap:
             return None
+        # Legs are missed, so furniture may seem to float; a cup or a keyboard does not lose its lower half metre.
+        if child.movable and gap > parameters.movable_gap:
+            return None
         overlap = effective = hull_overlap(patch.hull, child.box)
         if parent.class_name == "floor":
             # The floor goes on under furniture and outside the camera's view.
