@@ -26,8 +26,11 @@ def draw_contact_graph(graph: ContactGraph, canvas: Canvas) -> None:
                 canvas.mesh(f"meshes/{node.id}", load_mesh(panoptic_map.path(node.mesh)), front_only=True)
 
 
-def draw_graph(graph: ContactGraphFile, canvas: Canvas) -> None:
-    """Draw boxes, supporting planes, edges between box centres, and the graph in a view of its own."""
+def draw_graph(graph: ContactGraphFile, canvas: Canvas, *hidden: str) -> None:
+    """Draw boxes, supporting planes, edges between box centres, and the graph in a view of its own.
+
+    What lies under the `hidden` paths, too, is not shown until somebody asks for it.
+    """
     boxed = [node for node in graph.nodes if node.box is not None]
     for path, group in (
         ("boxes", [node for node in boxed if node.node_type != "layout"]),
@@ -39,7 +42,7 @@ def draw_graph(graph: ContactGraphFile, canvas: Canvas) -> None:
         if node.box is not None:
             corners = box_corners(node.box)
             canvas.enclose(corners.min(axis=0), corners.max(axis=0))
-    canvas.view("world", *HIDDEN)
+    canvas.view("world", *HIDDEN, *hidden)
     observed = [node for node in boxed if node.box_observed is not None and node.box_observed != node.box]
     canvas.boxes(
         "boxes_before_refinement",

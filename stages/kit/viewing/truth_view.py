@@ -21,7 +21,7 @@ def draw_ground_truth(truth: GroundTruth, canvas: Canvas) -> None:
     if (truth.path("room") / "scene.json").exists():
         draw_scene_folder(truth.path("room"), canvas, prefix="room")
     objects = description.objects
-    draw_graph(truth.graph, canvas)
+    draw_graph(truth.graph, canvas, "visible", "camera/depth")
     points, instances = _visible(truth)
     canvas.points("visible", points, instance_colors(instances), radius=0.006)
     canvas.view("what was seen", *HIDDEN, "room", "boxes")
