@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import trimesh
@@ -17,6 +18,7 @@ from stages.synthesize.recipes import CLUTTER_FACTOR, Place, Recipe
 from stages.synthesize.shell import Room, build_room
 from stages.synthesize.support import SupportSurfaces
 
+Hanging = Literal["supports", "contains", "carries_on_wall"]
 ATTEMPTS = 160
 """Poses tried for one object."""
 RESTARTS = 24
@@ -37,8 +39,7 @@ class PlacedObject:
     furnishing: Furnishing
     world_from_model: np.ndarray
     parent: str
-    relation: str
-    """`supports`, `contains` or `carries_on_wall`."""
+    relation: Hanging
     plane: int | None = None
     """Index of the supporting plane in the parent's planes."""
 
@@ -65,7 +66,7 @@ class _Pose:
 
     world_from_model: np.ndarray
     parent: str
-    relation: str = "supports"
+    relation: Hanging = "supports"
     plane: int | None = None
     at: str = ""
     """Object whose free floor it may stand in (a chair at its desk) or over (a handle past the edge of its cabinet)."""
@@ -253,7 +254,7 @@ class _Arranger:
         if found is None:
             return None
         pose, plane, inside = found
-        relation = "contains" if inside and target.furnishing.model.contains else "supports"
+        relation: Hanging = "contains" if inside and target.furnishing.model.contains else "supports"
         return _Pose(pose, target.name, relation, plane, at=target.name)
 
     # Whether a pose is good.

@@ -161,6 +161,6 @@ def _write_truth(
     ).write(out / "ground_truth.json")
     points, instance = seen.result()
     np.savez(out / "visible.npz", points=points, instance=instance)
-    (out / "mesh.ply").write_bytes(true_mesh(arrangement).export(file_type="ply"))
+    true_mesh(arrangement).export(out / "mesh.ply")
     (out / "room").mkdir()
     write_scene_bundle(out / "room", scene_bodies(arrangement, boxes, graph), graph)

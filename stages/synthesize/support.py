@@ -44,8 +44,8 @@ class SupportSurfaces:
             scene = o3d.t.geometry.RaycastingScene()
             mesh = furnishing.mesh
             scene.add_triangles(
-                o3d.core.Tensor(np.asarray(mesh.vertices, dtype=np.float32)),
-                o3d.core.Tensor(np.asarray(mesh.faces, dtype=np.uint32)),
+                o3d.core.Tensor.from_numpy(np.asarray(mesh.vertices, dtype=np.float32)),
+                o3d.core.Tensor.from_numpy(np.asarray(mesh.faces, dtype=np.uint32)),
             )
             self._scenes[key] = scene
             self._held.append(furnishing)
@@ -113,7 +113,7 @@ class SupportSurfaces:
         starts = np.array([middle, middle - side, middle, middle + side])
         directions = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [0.0, -1.0, 0.0], [0.0, -1.0, 0.0]])
         rays = np.concatenate([starts, directions], axis=1).astype(np.float32)
-        free = ~np.isfinite(self._scene(target).cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy())
+        free = ~np.isfinite(self._scene(target).cast_rays(o3d.core.Tensor.from_numpy(rays))["t_hit"].numpy())
         return bool(free[0] or free[1:].all())
 
     def _rest(self, target: Furnishing, contacts: np.ndarray, target_from_item: np.ndarray) -> float | None:
@@ -121,7 +121,7 @@ class SupportSurfaces:
         points = apply(target_from_item, contacts)
         start = points + np.array([0.0, 0.0, 0.01])
         rays = np.concatenate([start, np.tile([0.0, 0.0, -1.0], (len(points), 1))], axis=1).astype(np.float32)
-        distance = self._scene(target).cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy().astype(np.float64)
+        distance = self._scene(target).cast_rays(o3d.core.Tensor.from_numpy(rays))["t_hit"].numpy().astype(np.float64)
         drop = distance - 0.01
         if not np.isfinite(drop).all() or np.abs(drop).max() > 0.01 or np.ptp(drop) > CONTACT_TOLERANCE:
             return None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import trimesh
 
@@ -202,10 +204,10 @@ def true_mesh(arrangement: Arrangement) -> trimesh.Trimesh:
     meshes = [(k, layout.mesh) for k, layout in enumerate(arrangement.room.layouts, start=1)]
     meshes += [(thing.instance, thing.world_mesh()) for thing in arrangement.objects]
     for instance, mesh in meshes:
-        visual = mesh.visual
+        visual: Any = mesh.visual
         colors = np.asarray(visual.to_color().vertex_colors if visual.kind == "texture" else visual.vertex_colors)
         parts.append(trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=colors, process=False))
         labels.append(np.full(len(mesh.vertices), instance, dtype=np.int32))
-    whole = trimesh.util.concatenate(parts)
+    whole: Any = trimesh.util.concatenate(parts)
     whole.vertex_attributes["instance"] = np.concatenate(labels)
     return whole

@@ -22,7 +22,7 @@ EYE_HEIGHT = 1.5
 CANDIDATES, SAMPLES = 260, 5000
 NEAR, FAR, STEEPEST = 0.6, 3.5, 0.25
 """A sample counts as seen between these depths [m] and with at least this cosine of incidence."""
-LAYOUT_WEIGHT = {"floor": 1.0, "wall": 0.5, "ceiling": 0.0}
+LAYOUT_WEIGHT = {"floor": 1.0, "wall": 0.3, "ceiling": 0.0}
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def choose_views(
     for _ in range(extra):
         gain = (seen & missing) @ weight
         best = int(np.argmax(gain))
-        if gain[best] < 0.004 * weight.sum():
+        if gain[best] < 0.006 * weight.sum():
             break
         chosen.append(candidates[best])
         missing &= ~seen[best]

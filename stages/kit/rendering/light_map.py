@@ -15,6 +15,8 @@ from numba import njit, prange
 from stages.kit.rendering.surfaces import TriangleSoup
 
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
+BURIED_SHARE = 0.5
+"""A sample from which this share of directions meets back faces lies inside a solid."""
 
 
 @dataclass(frozen=True)
@@ -196,20 +198,31 @@ def _gather_rays(positions: np.ndarray, normals: np.ndarray, start: int, end: in
 @njit(cache=True, parallel=True)
 def _add_bounce(
     total: np.ndarray,
+    inside: np.ndarray,
     start: int,
+    rays: np.ndarray,
     primitive: np.ndarray,
     uvs: np.ndarray,
     direct: np.ndarray,
     offset: np.ndarray,
     subdivisions: np.ndarray,
+    face_normals: np.ndarray,
     albedo: np.ndarray,
     sky: np.ndarray,
     ambient: np.ndarray,
-    triangles: int,
     weight: float,
 ) -> None:
+    """Add one gathered direction to `total` in place; `inside` (S,) sums the weight of rays that met a back face."""
+    triangles = len(offset)
     for k in prange(len(primitive)):
         t = np.int64(primitive[k])
+        if t < triangles:
+            along = 0.0
+            for axis in range(3):
+                along += rays[k, 3 + axis] * face_normals[t, axis]
+            if along > 0.0:
+                inside[start + k] += weight
+                continue
         for channel in range(3):
             if t >= triangles:
                 value = sky[channel]
@@ -217,6 +230,42 @@ def _add_bounce(
                 here = lookup(direct, offset[t], subdivisions[t], uvs[k, 0], uvs[k, 1], channel)
                 value = albedo[t, channel] * (here + ambient[channel])
             total[start + k, channel] += weight * value
+
+
+@njit(cache=True, parallel=True)
+def _fill_buried(light: np.ndarray, buried: np.ndarray, offset: np.ndarray, subdivisions: np.ndarray) -> None:
+    """Give samples inside another solid the mean of their neighbours, ring by ring: what stands on a surface must not
+    darken it beyond its own outline by interpolation. Triangles that are buried whole stay dark."""
+    di = np.array([1, -1, 0, 0, 1, -1])
+    dj = np.array([0, 0, 1, -1, -1, 1])
+    for t in prange(len(offset)):
+        n, first = subdivisions[t], offset[t]
+        for _ in range(3):
+            filled = np.zeros((n + 1) * (n + 2) // 2, dtype=np.bool_)
+            for i in range(n + 1):
+                for j in range(n + 1 - i):
+                    row = i * (n + 1) - i * (i - 1) // 2 + j
+                    if not buried[first + row]:
+                        continue
+                    count, red, green, blue = 0, 0.0, 0.0, 0.0
+                    for k in range(6):
+                        a, b = i + di[k], j + dj[k]
+                        if a < 0 or b < 0 or a + b > n:
+                            continue
+                        other = first + a * (n + 1) - a * (a - 1) // 2 + b
+                        if not buried[other]:
+                            count += 1
+                            red += light[other, 0]
+                            green += light[other, 1]
+                            blue += light[other, 2]
+                    if count > 0:
+                        light[first + row, 0] = red / count
+                        light[first + row, 1] = green / count
+                        light[first + row, 2] = blue / count
+                        filled[row] = True
+            for row in range(len(filled)):
+                if filled[row]:
+                    buried[first + row] = False
 
 
 def bake(
@@ -251,30 +300,35 @@ def bake(
             factor = _form_factor(positions, normals, point, light.normal.astype(np.float32), patch)
             rows = np.flatnonzero(factor)
             rays = _rays_to(positions, rows, point)
-            blocked = scene.test_occlusions(o3d.core.Tensor(rays), 1e-4, 0.999).numpy() != 0
+            blocked = scene.test_occlusions(o3d.core.Tensor.from_numpy(rays), 1e-4, 0.999).numpy() != 0
             lit = rows[~blocked]
             direct[lit] += factor[lit, None] * np.asarray(light.color, dtype=np.float32)
     albedo = soup.corner_colors.mean(axis=1)
     light_map = direct.copy()
+    inside = np.zeros(total, dtype=np.float32)
     chunk = 1 << 19
     for k in range(directions):
         radius, angle = np.sqrt((k + 0.5) / directions), k * GOLDEN_ANGLE
         x, y = float(radius * np.cos(angle)), float(radius * np.sin(angle))
         for start in range(0, total, chunk):
             end = min(total, start + chunk)
-            hits = scene.cast_rays(o3d.core.Tensor(_gather_rays(positions, normals, start, end, x, y)))
+            rays = _gather_rays(positions, normals, start, end, x, y)
+            hits = scene.cast_rays(o3d.core.Tensor.from_numpy(rays))
             _add_bounce(
                 light_map,
+                inside,
                 start,
+                rays,
                 hits["primitive_ids"].numpy(),
                 hits["primitive_uvs"].numpy(),
                 direct,
                 offset,
                 subdivisions,
+                soup.face_normals,
                 albedo,
                 np.asarray(sky, dtype=np.float32),
                 np.asarray(ambient, dtype=np.float32),
-                soup.triangles,
                 1.0 / directions,
             )
+    _fill_buried(light_map, inside > BURIED_SHARE, offset, subdivisions)
     return LightMap(offset, subdivisions, light_map)

@@ -162,7 +162,7 @@ def pattern_factor(row: np.ndarray, x: float, y: float, z: float, footprint: flo
     elif kind == 6:  # woven fabric
         weave = np.sin(6.2831853 * px / period) * np.sin(6.2831853 * (py + pz) / period)
         broad = value_noise(px * 8.0, py * 8.0, pz * 8.0, seed)
-        factor = 0.16 * weave * _visible_detail(0.5 * period, footprint) + 0.06 * broad
+        factor = 0.16 * weave * _visible_detail(0.3 * period, footprint) + 0.06 * broad
     elif kind == 7:  # cardboard, stone: speckle
         fine = value_noise(px / period, py / period, pz / period, seed) * _visible_detail(period, footprint)
         broad = value_noise(px * 7.0, py * 7.0, pz * 7.0, seed + 1)

@@ -86,8 +86,8 @@ class SceneRenderer:
         self.scene = o3d.t.geometry.RaycastingScene()
         triangles = self.soup.triangles
         self.scene.add_triangles(
-            o3d.core.Tensor(np.ascontiguousarray(self.soup.corners.reshape(-1, 3))),
-            o3d.core.Tensor(np.arange(3 * triangles, dtype=np.uint32).reshape(-1, 3)),
+            o3d.core.Tensor.from_numpy(np.ascontiguousarray(self.soup.corners.reshape(-1, 3))),
+            o3d.core.Tensor.from_numpy(np.arange(3 * triangles, dtype=np.uint32).reshape(-1, 3)),
         )
         points = self.soup.corners.reshape(-1, 3)
         self.lights = tuple(lights) if lights is not None else default_lights(points.min(axis=0), points.max(axis=0))
@@ -126,17 +126,19 @@ class SceneRenderer:
 
     def distance(self, points: np.ndarray) -> np.ndarray:
         """Return the distance (N,) [m] from points (N, 3) to the nearest surface."""
-        return self.scene.compute_distance(o3d.core.Tensor(np.ascontiguousarray(points, dtype=np.float32))).numpy()
+        return self.scene.compute_distance(
+            o3d.core.Tensor.from_numpy(np.ascontiguousarray(points, dtype=np.float32))
+        ).numpy()
 
     def occluded(self, origins: np.ndarray, targets: np.ndarray) -> np.ndarray:
         """Return whether something stands between origins (N, 3) and targets (N, 3) [m], as (N,) bool."""
         rays = np.concatenate([origins, targets - origins], axis=1).astype(np.float32)
-        return self.scene.test_occlusions(o3d.core.Tensor(rays), 1e-4, 0.995).numpy() != 0
+        return self.scene.test_occlusions(o3d.core.Tensor.from_numpy(rays), 1e-4, 0.995).numpy() != 0
 
     def _cast(self, camera: Camera, world_from_camera: np.ndarray, pixels: np.ndarray) -> _Hits:
         pose = np.ascontiguousarray(world_from_camera, dtype=np.float64)
         rays = shading.camera_rays(pixels, camera.fx, camera.fy, camera.cx, camera.cy, pose)
-        answer = self.scene.cast_rays(o3d.core.Tensor(rays))
+        answer = self.scene.cast_rays(o3d.core.Tensor.from_numpy(rays))
         primitive = answer["primitive_ids"].numpy()
         uvs = answer["primitive_uvs"].numpy()
         normals, cosine = shading.surface_at(rays, primitive, uvs, self.soup.corner_normals, self.soup.face_normals)
@@ -217,7 +219,7 @@ class SceneRenderer:
         t = np.where(hits.found, hits.t, 0.0)[:, None]
         origin = hits.rays[:, :3] + t * hits.rays[:, 3:] + 2e-3 * hits.normals
         rays = np.concatenate([origin, point - origin], axis=1).astype(np.float32)
-        return self.scene.test_occlusions(o3d.core.Tensor(rays), 1e-4, 1.0).numpy() != 0
+        return self.scene.test_occlusions(o3d.core.Tensor.from_numpy(rays), 1e-4, 1.0).numpy() != 0
 
     def _refine(self, light: np.ndarray, edges: np.ndarray, camera: Camera, world_from_camera: np.ndarray) -> None:
         """Average four rays in the pixels on edges (rotated grid), after the tone curve's knee is applied."""

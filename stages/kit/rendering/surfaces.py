@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -55,7 +56,7 @@ def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
 
 def _corner_colors(mesh: trimesh.Trimesh) -> np.ndarray:
     """Return (F, 3, 3) sRGB in 0..1 from face, vertex or texture colours; grey where there are none."""
-    visual = mesh.visual
+    visual: Any = mesh.visual
     if visual.kind == "texture":
         visual = visual.to_color()
     if visual.kind == "face":
@@ -161,4 +162,6 @@ def build_soup(
     if not parts:
         raise BadInput("nothing to render: the meshes hold no triangle with an area")
     joined = [np.concatenate(columns) for columns in zip(*parts, strict=True)]
-    return TriangleSoup(*joined, material_table=np.stack([material.row() for material in table]))
+    corners, normals, smooth, colors, instances, rows = joined
+    rows_of_table = np.stack([material.row() for material in table])
+    return TriangleSoup(corners, normals, smooth, colors, instances, rows, rows_of_table)

@@ -61,7 +61,10 @@ def test_depth_of_a_sphere_is_the_sphere() -> None:
 
 
 def test_instances_and_background() -> None:
-    meshes = [(3, painted_box((-1, 0, -1), (0, 0.1, 1), (255, 0, 0))), (9, painted_box((0, 0, -1), (1, 0.1, 1), (0, 255, 0)))]
+    meshes = [
+        (3, painted_box((-1, 0, -1), (0, 0.1, 1), (255, 0, 0))),
+        (9, painted_box((0, 0, -1), (1, 0.1, 1), (0, 255, 0))),
+    ]
     pose = look_at(np.array([0.0, -3.0, 0.0]), np.zeros(3))
     view = SceneRenderer(meshes, background=(0.2, 0.4, 0.6)).render(CAMERA, pose)
     assert set(np.unique(view.instance)) == {0, 3, 9}
@@ -74,7 +77,10 @@ def test_instances_and_background() -> None:
 
 
 def test_nearer_thing_hides_the_farther() -> None:
-    meshes = [(1, painted_box((-2, 2, -2), (2, 2.1, 2), (200, 200, 200))), (2, painted_box((-0.2, 1, -0.2), (0.2, 1.1, 0.2), (9, 9, 9)))]
+    meshes = [
+        (1, painted_box((-2, 2, -2), (2, 2.1, 2), (200, 200, 200))),
+        (2, painted_box((-0.2, 1, -0.2), (0.2, 1.1, 0.2), (9, 9, 9))),
+    ]
     view = SceneRenderer(meshes).render(CAMERA, look_at(np.zeros(3), np.array([0.0, 1.0, 0.0])))
     assert view.instance[30, 40] == 2 and view.depth[30, 40] == pytest.approx(1.0, abs=1e-5)
     assert view.instance[5, 5] == 1 and view.depth[5, 5] == pytest.approx(2.0, abs=1e-5)
@@ -120,7 +126,9 @@ def test_color_reflects_between_surfaces() -> None:
     """One bounce: on a grey floor before a lit red wall lies red light; far from it the light is the lamp's."""
     red = painted_box((0.5, -2, 0.0), (0.6, 2, 2.0), (255, 0, 0))
     lamp = AreaLight((-1.0, 0.0, 1.5), (0, 0.5, 0), (0, 0, 0.5), (20.0,) * 3)  # shines along +x
-    renderer = SceneRenderer([(1, floor()), (2, red)], lights=[lamp], ambient=(0.0,) * 3, sky=(0.0,) * 3, light_map=True)
+    renderer = SceneRenderer(
+        [(1, floor()), (2, red)], lights=[lamp], ambient=(0.0,) * 3, sky=(0.0,) * 3, light_map=True
+    )
     assert renderer.light_map is not None
     soup, light = renderer.soup, renderer.light_map
     points, colors = [], []
