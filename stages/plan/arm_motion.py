@@ -48,10 +48,10 @@ class Tally:
         `no_inverse_kinematics` (nothing was within reach), `goal_in_collision` (a body was in the way most often) or
         the kind of the last path query.
         """
-        numbers = {"tried": self.tried, "unreachable": self.unreachable}
-        if not self.blockers:
-            if np.isfinite(self.nearest):
-                numbers["nearest_distance"] = self.nearest
+        numbers: dict[str, float] = {"tried": self.tried, "unreachable": self.unreachable}
+        if np.isfinite(self.nearest):
+            numbers["nearest_distance"] = self.nearest
+        if not self.blockers or self.unreachable == self.tried > 0:
             raise MotionFailed(
                 "no_inverse_kinematics",
                 f"{what}: no joint values reach any of {self.tried} tool poses (nearest {self.nearest:.3f} m)",
@@ -82,7 +82,9 @@ class ArmPlanner:
         self.space = SearchSpace(model.chain.lower, model.chain.upper, ARM_RESOLUTION)
         self.reach = reach(model.chain)
 
-    def reachable(self, base: np.ndarray, world_from_tool: np.ndarray, tally: Tally, starts: int = 6) -> np.ndarray | None:
+    def reachable(
+        self, base: np.ndarray, world_from_tool: np.ndarray, tally: Tally, starts: int = 6
+    ) -> np.ndarray | None:
         """Return arm values (7,) for a tool pose, or None (counted in the tally)."""
         tally.tried += 1
         distance = shoulder_distance(base, world_from_tool, self.model.description)
@@ -90,7 +92,9 @@ class ArmPlanner:
             tally.unreachable += 1
             tally.nearest = min(tally.nearest, distance - self.reach)
             return None
-        guesses = np.concatenate([self.model.description.carry[None], random_starts(self.model.chain, starts, self.random)])
+        guesses = np.concatenate(
+            [self.model.description.carry[None], random_starts(self.model.chain, starts, self.random)]
+        )
         target = in_arm_frame(base, world_from_tool, self.model.description)
         solution = inverse_kinematics(self.model.chain, target, guesses)
         if not solution.found:
@@ -106,9 +110,7 @@ class ArmPlanner:
             tally.collided(collision)
         return collision is None
 
-    def line(
-        self, base: np.ndarray, start: np.ndarray, world_from_goal: np.ndarray, tally: Tally
-    ) -> np.ndarray | None:
+    def line(self, base: np.ndarray, start: np.ndarray, world_from_goal: np.ndarray, tally: Tally) -> np.ndarray | None:
         """Return arm values (K, 7) from `start` (7,) included along a straight line of the tool; None if not free."""
         here = base_pose(base, self.model.description) @ forward(self.model.chain, start)
         return self.along(base, start, straight_poses(here, world_from_goal), tally)
@@ -141,7 +143,7 @@ class ArmPlanner:
         )
 
     def folded(self, base: np.ndarray, arm: np.ndarray, tally: Tally) -> np.ndarray | None:
-        """Return arm values (7,) with the tool drawn in over the pedestal, its tilt kept: what is held stays upright."""
+        """Return arm values (7,) with the tool drawn in over the pedestal; what is held stays upright."""
         world_from_tool = base_pose(base, self.model.description) @ forward(self.model.chain, arm)
         approach = world_from_tool[:3, 2]
         heading = np.arctan2(approach[1], approach[0])

@@ -52,9 +52,7 @@ def check_joints(world: PhysicsWorld, literal: str, body: str, joints: list[str]
     detail = ", ".join(
         f"{name} at {value:.3f} {'rad' if kinds[name].type == 'revolute' else 'm'}" for name, value in values.items()
     )
-    return Check(
-        condition=literal, holds=not wrong, detail=detail, numbers={k: round(v, 6) for k, v in values.items()}
-    )
+    return Check(condition=literal, holds=not wrong, detail=detail, numbers={k: round(v, 6) for k, v in values.items()})
 
 
 def check_in(world: PhysicsWorld, literal: str, item: str, container: str) -> Check:

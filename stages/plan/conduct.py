@@ -244,7 +244,7 @@ def joint_pairs(
     planned: dict[str, SceneBody], room: dict[str, SceneBody], matches: dict[str, BodyMatch]
 ) -> dict[str, str]:
     """Return which joint of the room each planned joint is; joints without a counterpart are left out."""
-    pairs = {}
+    pairs: dict[str, str] = {}
     for name, record in planned.items():
         there = matches[name].matched
         if there is None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from schemas.interactive_scene import SceneBody
 from schemas.plan import BodyMatch
+from schemas.scene_parts import Joint
 from stages.kit.simulation.urdf_split import PART_SEPARATOR
 
 ALIKE = ({"table", "desk"}, {"cabinet", "wall_cabinet"})
@@ -19,9 +20,7 @@ def _alike(first: str, second: str) -> bool:
     return first == second or any({first, second} <= group for group in ALIKE)
 
 
-def match_bodies(
-    planned: dict[str, SceneBody], true: dict[str, SceneBody], radius: float
-) -> dict[str, BodyMatch]:
+def match_bodies(planned: dict[str, SceneBody], true: dict[str, SceneBody], radius: float) -> dict[str, BodyMatch]:
     """Return a match per planned body: greedily by the distance of box centres, within `radius` [m], one to one."""
     pairs = []
     for name, record in planned.items():
@@ -53,7 +52,7 @@ def match_joint(planned: SceneBody, joint: str, true: SceneBody) -> str | None:
     return None if best is None else best[1]
 
 
-def _anchor(body: SceneBody, joint) -> np.ndarray:  # noqa: ANN001 (a schemas Joint)
+def _anchor(body: SceneBody, joint: Joint) -> np.ndarray:
     pose = np.array(body.world_from_body)
     return pose[:3, :3] @ np.array(joint.handle or joint.origin) + pose[:3, 3]
 

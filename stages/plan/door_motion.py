@@ -59,9 +59,7 @@ class Arc:
         """Return world_from_tool (4, 4) at all joint values, or at some rows of them."""
         values = self.values if rows is None else self.values[rows]
         tilt = self.tilt if rows is None else self.tilt[rows]
-        return tool_poses(
-            self.joint, self.contact, world_from_body, values, tilt=tilt, roll=self.roll, gap=self.gap
-        )
+        return tool_poses(self.joint, self.contact, world_from_body, values, tilt=tilt, roll=self.roll, gap=self.gap)
 
 
 def is_closed(joint: Joint, value: float) -> bool:
@@ -143,7 +141,12 @@ def _tilts(count: int) -> Iterator[np.ndarray]:
 
 
 def _candidate_bases(
-    model: WorldModel, state: RobotState, points: np.ndarray, budgets: Budgets, random: np.random.Generator, tally: Tally
+    model: WorldModel,
+    state: RobotState,
+    points: np.ndarray,
+    budgets: Budgets,
+    random: np.random.Generator,
+    tally: Tally,
 ) -> np.ndarray:
     """Return free bases (K, 3) from which all points (N, 3) lie within the arm's length."""
     planner_reach = 0.98 * ArmPlanner(model, random, 1).reach

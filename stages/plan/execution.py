@@ -1,4 +1,4 @@
-"""Drive the robot through a plan in a physics world: position control, a closing gripper, and a look at what came of it."""
+"""Drive the robot along motions in a physics world: position control, a closing gripper, what it holds and hits."""
 
 from __future__ import annotations
 
@@ -85,7 +85,8 @@ class PhysicalRobot:
             self._opening = opening
             self.wait(0.5)
         self._follow_rows(segment.path, speed * segment.pace, acceleration * segment.pace, opening)
-        self._check_arrival(segment.path[-1])
+        if segment.label not in ("push", "pull"):  # pressed against a door, the arm is not where it was sent
+            self._check_arrival(segment.path[-1])
         if self.held is not None:
             self.check_hold()
         if segment.event == "grasp" and item is not None:
@@ -127,7 +128,7 @@ class PhysicalRobot:
         """Return (N, 10) rows that go back along the commanded targets to where the base came to rest."""
         rows = np.array(self._trail[::-1])
         keep = np.concatenate([[True], np.abs(np.diff(rows, axis=0)).max(axis=1) > 1e-9])
-        return rows[keep][:: 4] if keep.sum() > 8 else rows[keep]
+        return rows[keep][::4] if keep.sum() > 8 else rows[keep]
 
     # --- gripper ----------------------------------------------------------------------------------------------
 
@@ -159,9 +160,7 @@ class PhysicalRobot:
         slip = float(np.linalg.norm((self.held_pose() - self._tool_from_held)[:3, 3]))
         if slip > SLIP or not self.robot.grasps(self.held):
             item, self.held = self.held, None
-            raise MotionFailed(
-                "grasp_lost", f"{item} moved {slip:.3f} m in the hand", (item,), {"slip": slip}
-            )
+            raise MotionFailed("grasp_lost", f"{item} moved {slip:.3f} m in the hand", (item,), {"slip": slip})
 
     def release(self) -> None:
         """Open the fingers and let the item come to rest."""

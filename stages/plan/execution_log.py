@@ -1,4 +1,4 @@
-"""execution.mcap: where every body and link was, and what a camera saw, in Foxglove's schemas; the same bytes always."""
+"""execution.mcap: where every body and link was and what a camera saw, in Foxglove's schemas; always the same bytes."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from google.protobuf.message import Message
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import build_file_descriptor_set
@@ -18,7 +19,7 @@ from stages.kit.formats import foxglove
 from stages.plan.recording import Snapshot
 
 COLOR, CALIBRATION, TRANSFORMS = "/camera/color", "/camera/calibration", "/tf"
-_KINDS = {COLOR: CompressedImage, CALIBRATION: CameraCalibration, TRANSFORMS: FrameTransforms}
+_KINDS: dict[str, type[Message]] = {COLOR: CompressedImage, CALIBRATION: CameraCalibration, TRANSFORMS: FrameTransforms}
 
 
 def write_execution(
@@ -65,5 +66,5 @@ def _differs(first: np.ndarray, second: np.ndarray) -> bool:
     return bool(np.abs(first - second).max() > 1e-4)
 
 
-def _add(writer: McapWriter, channel: int, stamp: int, message) -> None:  # noqa: ANN001 (a protobuf message)
+def _add(writer: McapWriter, channel: int, stamp: int, message: Message) -> None:
     writer.add_message(channel, stamp, message.SerializeToString(deterministic=True), publish_time=stamp)

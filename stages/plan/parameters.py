@@ -32,6 +32,10 @@ class PlanParameters(Parameters):
         0.5, gt=0, le=5, description="A body is the nearest of its class in the true room within this [m]"
     )
     clearance: float = Field(0.004, ge=0, le=0.05, description="Distance kept from obstacles [m]")
+    size_uncertainty: float = Field(
+        0.02, ge=0, le=0.2, description="Items are planned to be up to this much thinner than reconstructed, as voxels "
+        "widen thin things [m]; what was looked at is taken as it is",
+    )  # fmt: skip
     base_samples: int = Field(240, ge=16, le=20000, description="Base poses drawn per query")
     pair_samples: int = Field(2500, ge=16, le=1_000_000, description="Pairs of base and tool pose tried per query")
     path_samples: int = Field(800, ge=16, le=1_000_000, description="Samples of one RRT-Connect search")

@@ -111,7 +111,7 @@ def parse_domain(text: str) -> Domain:
     sections = _sections(expression)
     types = {name: "" if parent in ("object", "") else parent for name, parent in _pairs(sections.get(":types", []))}
     predicates = {
-        str(entry[0]): tuple(kind for _, kind in _pairs(entry[1:], "object")) for entry in sections[":predicates"]
+        str(entry[0]): tuple(kind for _, kind in _pairs(list(entry[1:]), "object")) for entry in sections[":predicates"]
     }
     schemas = []
     for part in expression[1:]:

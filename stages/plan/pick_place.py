@@ -11,6 +11,7 @@ import numpy as np
 from schemas.scene_parts import SurfacePlane
 from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from stages.kit.motion.base_placement import free_bases, sample_bases
+from stages.kit.motion.collision import RESTING_DEPTH
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.grasps import Grasp, narrowest_width, sample_grasps
 from stages.kit.simulation.robot import Configuration
@@ -36,6 +37,8 @@ class Budgets:
     path_samples: int
     paths: int
     """Joint-space path searches per query."""
+    size_uncertainty: float = 0.0
+    """How much thinner than believed items may be [m]; 0 for what was looked at from near by."""
 
 
 def _pairs(bases: np.ndarray, others: int, random: np.random.Generator, most: int) -> Iterator[tuple[int, int]]:
@@ -64,7 +67,8 @@ def _shifted(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
 
 
 def _bases_around(
-    model: WorldModel, state: RobotState, target: np.ndarray, budgets: Budgets, random: np.random.Generator, tally: Tally,
+    model: WorldModel, state: RobotState, target: np.ndarray, budgets: Budgets, random: np.random.Generator,
+    tally: Tally,
     fixed: np.ndarray | None,
 ) -> np.ndarray:  # fmt: skip
     if fixed is not None:
@@ -89,14 +93,17 @@ def plan_pick(
     """
     world_from_item = model.pose(item)
     points, normals = model.surface(item)
-    grasps = sample_grasps(points, normals, world_from_item, opening=model.description.opening, random=random)
+    # Fingers may touch the item, so that its believed shape, a little too wide, does not stop them.
+    widest = model.description.opening + budgets.size_uncertainty
+    grasps = sample_grasps(points, normals, world_from_item, opening=widest, random=random)
     if not grasps:
         width = narrowest_width(apply(world_from_item, points))
         raise MotionFailed(
             "no_grasp",
-            f"{item} is {width:.3f} m wide at its narrowest, the gripper opens {model.description.opening:.3f} m",
+            f"{item} is {width:.3f} m wide at its narrowest, the gripper opens {model.description.opening:.3f} m"
+            + (f" (taken to be up to {budgets.size_uncertainty:.3f} m thinner)" if budgets.size_uncertainty else ""),
             (item,),
-            {"width": width, "opening": model.description.opening},
+            {"width": width, "opening": model.description.opening, "size_uncertainty": budgets.size_uncertainty},
         )
     tally = Tally()
     checker = model.checker
@@ -143,7 +150,12 @@ def _try_pick(
     approach = approach[::-1]
     # With the item in hand: up a little, then back out the way the hand came, or further up.
     tool_from_item = inverse(world_from_tool) @ world_from_item
-    rest = (*model.links(source), *_supports(model, item))
+    # What overlaps the item where it is believed to be is an error of belief: it may overlap as much on the way out.
+    within = {link: depth + 0.003 for link, depth in checker.overlaps(item).items()}
+    rest = {link: RESTING_DEPTH for link in (*model.links(source), *_supports(model, item))}
+    rest = {link: max(within.get(link, 0.0), depth) for link, depth in rest.items()} | {
+        link: depth for link, depth in within.items() if link not in rest
+    }
     lifted = None
     checker.carry(item, tool_from_item)
     checker.allow(touch=model.links(item), rest_on=rest)
@@ -152,7 +164,7 @@ def _try_pick(
             up = arm_planner.line(base, arm, _shifted(world_from_tool, np.array([0, 0, lift])), tally)
             if up is None:
                 continue
-            checker.allow(touch=model.links(item))
+            checker.allow(touch=model.links(item), rest_on=within)
             steep = grasp.pitch > 1.2
             for distance in (0.25, 0.15):
                 goal = _shifted(world_from_tool, np.array([0.0, 0.0, lift]))
@@ -302,7 +314,7 @@ def _try_place(
     item_from_tool = inverse(state.tool_from_item)
     model.robot.set(_open(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
-    touch, rest = model.links(item), model.links(surface)
+    touch, rest = model.links(item), {link: RESTING_DEPTH for link in model.links(surface)}
     checker.allow(touch=touch, rest_on=rest)
     # The yaw in which the hand points away from the base is the one an arm likes; the sampled yaw varies it.
     outward = np.arctan2(*(place[:2, 3] - base[:2])[::-1])

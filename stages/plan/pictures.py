@@ -14,7 +14,7 @@ from stages.kit.rendering.light_map import AreaLight
 from stages.kit.rendering.ray_casting import SceneRenderer
 from stages.kit.rendering.surfaces import TriangleSoup, build_soup
 from stages.kit.simulation.robot_description import PEDESTAL_LINK, RobotDescription, mobile_robot_urdf
-from stages.kit.simulation.shapes import link_shapes
+from stages.kit.simulation.shapes import has_colors, link_shapes, paint
 from stages.kit.simulation.world import PhysicsWorld
 from stages.plan.recording import Snapshot
 
@@ -40,7 +40,7 @@ def _joined(soups: list[TriangleSoup]) -> TriangleSoup:
 
 def _painted(mesh: trimesh.Trimesh, color: tuple[int, int, int]) -> trimesh.Trimesh:
     plain = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    plain.visual.face_colors = np.tile(np.array([*color, 255], dtype=np.uint8), (len(mesh.faces), 1))
+    paint(plain, np.array([*color, 255], dtype=np.uint8))
     return plain
 
 
@@ -59,7 +59,9 @@ class RoomPictures:
             shapes = link_shapes(texts[name], "visual")
             parts = {joint.part for joint in record.joints}
             for link, meshes in shapes.items():
-                colored = [mesh if mesh.visual.kind else _painted(mesh, PALETTE[number % len(PALETTE)]) for mesh in meshes]
+                colored = [
+                    mesh if has_colors(mesh) else _painted(mesh, PALETTE[number % len(PALETTE)]) for mesh in meshes
+                ]
                 if not any(len(mesh.faces) for mesh in colored):
                     continue
                 soup = build_soup([(number, mesh) for mesh in colored])
@@ -88,9 +90,7 @@ class RoomPictures:
             AreaLight((x + 0.8, y - 0.6, 9.0), (0.5, 0.0, 0.0), (0.0, -0.5, 0.0), (0.62, 0.60, 0.57)),
             AreaLight((x - 0.9, y + 0.9, 8.0), (0.5, 0.0, 0.0), (0.0, -0.5, 0.0), (0.18, 0.19, 0.21)),
         )
-        return SceneRenderer(
-            _joined([*self._still, *self._shell, *moving]), lights=lights, ambient=(0.46, 0.47, 0.49)
-        )
+        return SceneRenderer(_joined([*self._still, *self._shell, *moving]), lights=lights, ambient=(0.46, 0.47, 0.49))
 
     def overview(self, snapshot: Snapshot, camera: Camera) -> np.ndarray:
         """Return (H, W, 3) uint8: the whole room from above and aside, without walls and ceiling."""
@@ -119,7 +119,9 @@ class RoomPictures:
                     eye = np.array([*(middle[:2] + distance * np.array([np.cos(angle), np.sin(angle)])), height])
                     if np.any(eye[:2] < self.low[:2] + 0.15) or np.any(eye[:2] > self.high[:2] - 0.15):
                         continue
-                    hidden = renderer.occluded(points + 0.08 * (eye - points) / distance, np.tile(eye, (len(points), 1)))
+                    hidden = renderer.occluded(
+                        points + 0.08 * (eye - points) / distance, np.tile(eye, (len(points), 1))
+                    )
                     close = float(renderer.distance(eye[None])[0])
                     score = float(np.mean(~hidden)) + min(close, 0.3) - 0.05 * abs(distance - 2.0)
                     if best is None or score > best[0] + 1e-6:

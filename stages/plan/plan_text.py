@@ -29,8 +29,8 @@ def plan_text(plan: PlanFile, steps: list[Step]) -> str:
     if plan.failures:
         lines += ["", "failures on the way:"]
         for failure in plan.failures:
-            action = f" in {failure.action}" if failure.action else ""
-            lines.append(f"  {failure.kind}{action}: {failure.message}")
+            place = f" in {failure.action}" if failure.action else ""
+            lines.append(f"  {failure.kind}{place}: {failure.message}")
     if plan.assumptions:
         lines += ["", "what the execution was allowed to know:"]
         lines += [f"  - {text}" for text in plan.assumptions]

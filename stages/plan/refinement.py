@@ -19,6 +19,9 @@ from stages.plan.world_model import RobotState, WorldModel
 
 PLAIN_NAMES = {"take_out": "pick", "put_in": "place"}
 
+FINAL = ("no_grasp",)
+"""Failures that no other draw of the random choices can avoid."""
+
 
 @dataclass(frozen=True)
 class Step:
@@ -86,7 +89,13 @@ def refine_action(
             target = arguments[1] if name == "place" else arguments[0]
             hold_for_checks(model, state)
             path = plan_drive(
-                state.base, manipulation.base, state.arm, model.checker, model.room, random, samples=budgets.path_samples
+                state.base,
+                manipulation.base,
+                state.arm,
+                model.checker,
+                model.room,
+                random,
+                samples=budgets.path_samples,
             )
             manipulation, path = _same_turns(manipulation, path)
             rows = np.concatenate([path, np.tile(state.arm, (len(path), 1))], axis=1)
@@ -213,6 +222,8 @@ def plan_and_refine(
             except RefinementFailed as failed:
                 failures.append(failed.failure)
                 worst = failed.action
+                if failed.failure.kind in FINAL:
+                    break
         assert worst is not None
         blocked.append(worst)
     return Attempt(None, None, failures)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -36,6 +37,7 @@ from stages.plan.trajectories import executed_rows, planned_rows, write_trajecto
 from stages.plan.updated_graph import update_graph
 from stages.plan.world_model import RobotState, WorldModel, body_planes
 
+Status = Literal["executed", "planned", "infeasible", "execution_failed"]
 RECORD_RATE = 10.0
 SETTLE_SECONDS = 1.0
 START, SEARCH, EXECUTION = 1, 2, 3
@@ -66,15 +68,20 @@ def run(
     """Plan in `scene`; execute in the true room of `ground_truth`, or in `scene` itself when there is none."""
     robot = load_robot(parameters.robot)
     budgets = Budgets(
-        parameters.base_samples, parameters.pair_samples, parameters.path_samples, parameters.path_searches
-    )
+        parameters.base_samples, parameters.pair_samples, parameters.path_samples, parameters.path_searches,
+        parameters.size_uncertainty,
+    )  # fmt: skip
     graph = scene.graph
     with context.progress.step("load the scene"):
         model = WorldModel(scene.root, graph, robot, parameters.clearance)
     try:
         objects, initial = symbolic_state(model, graph)
         failures: list[Failure] = []
-        candidates = [parameters.goal] if parameters.goal else default_goals(model, initial)
+        candidates = (
+            [parameters.goal]
+            if parameters.goal
+            else default_goals(model, initial, robot.opening + parameters.size_uncertainty)
+        )
         goals = [parse_goal(literals, objects) for literals in candidates]
         try:
             base = start_base(model, robot.carry, context.random(START))
@@ -160,8 +167,8 @@ def _execute(
         poses = {name: world.pose(name) for name, record in records.items() if record.movable}
         physical.recording.keyframe(-1, "start")
         conduct = Conduct(
-            model, Room(records, texts, planes), physical, matches, joint_names, budgets, context.random(EXECUTION),
-            parameters.relocalize, parameters.execution_attempts,
+            model, Room(records, texts, planes), physical, matches, joint_names, replace(budgets, size_uncertainty=0.0),
+            context.random(EXECUTION), parameters.relocalize, parameters.execution_attempts,
         )  # fmt: skip
         carried_out = conduct.run(state, steps)
         world.wake()
@@ -248,6 +255,7 @@ def _write(
         for step, (start, end) in zip(steps or [], ranges, strict=True)
     )
     reached = bool(outcome.checks) and all(check.holds for check in outcome.checks)
+    status: Status
     if steps is None:
         status = "infeasible"
     elif outcome.executed_in is None:

@@ -17,6 +17,9 @@ from stages.plan.world_model import WorldModel
 START = "start"
 SURFACE_CLASSES = ("table", "desk", "shelf", "cabinet", "bench")
 
+BEHIND = 0.3
+"""An item inside furniture counts as behind a part when its centre is at most this far beside the part [m]."""
+
 DOMAIN = Domain(
     name="mobile_manipulation",
     types={
@@ -68,8 +71,8 @@ DOMAIN = Domain(
 def guarding_door(model: WorldModel, item: str, container: str) -> str | None:
     """Return the joint of a container behind whose closed part an item lies, None for an open compartment.
 
-    The part that covers the item's centre, seen against the direction in which the part closes, and lies nearest to
-    it; for drawers, the part whose box holds the centre.
+    The part that covers the item's centre, seen against the direction in which the part closes (for drawers: whose box
+    holds the centre), or comes nearest to doing so: reconstructed items are not always where they should be.
     """
     centre = apply(inverse(model.pose(container)), _centre(model, item))
     best: tuple[float, str] | None = None
@@ -82,7 +85,7 @@ def guarding_door(model: WorldModel, item: str, container: str) -> str | None:
             thin = int(np.argmin(high - low))
             others = [axis for axis in range(3) if axis != thin]
             outside = float(np.maximum(low - centre, centre - high)[others].max())
-        if outside < 0.03 and (best is None or outside < best[0]):
+        if outside < BEHIND and (best is None or outside < best[0]):
             best = (outside, joint.name)
     return None if best is None else best[1]
 
@@ -143,7 +146,9 @@ def parse_goal(literals: tuple[str, ...], objects: dict[str, str]) -> tuple[froz
     """
     atoms: set[Atom] = set()
     normal = []
-    allowed = {name: kinds for name, kinds in DOMAIN.predicates.items() if name in ("on", "in", "holding", "open", "closed")}
+    allowed = {
+        name: kinds for name, kinds in DOMAIN.predicates.items() if name in ("on", "in", "holding", "open", "closed")
+    }
     for literal in literals:
         match = _LITERAL.match(literal)
         if match is None:
@@ -157,7 +162,9 @@ def parse_goal(literals: tuple[str, ...], objects: dict[str, str]) -> tuple[froz
         for name in arguments:
             if name not in objects:
                 near = difflib.get_close_matches(name, objects, n=3, cutoff=0.4)
-                raise UsageError(f"goal {literal!r}: the scene has no {name!r}", hint=f"near: {', '.join(near) or 'none'}")
+                raise UsageError(
+                    f"goal {literal!r}: the scene has no {name!r}", hint=f"near: {', '.join(near) or 'none'}"
+                )
         normal.append(atom_text((predicate, *arguments)))
         doors = [name for name in objects if name.startswith(f"{arguments[0]}__")]
         if predicate in ("open", "closed") and objects[arguments[0]] == "container":

@@ -47,8 +47,8 @@ def planned_rows(steps: list[Step], robot: RobotDescription) -> tuple[dict[str, 
         ranges.append((start, count))
     if not bodies:
         return _arrays(np.zeros(0), np.zeros((0, 10)), np.zeros(0), np.zeros(0, dtype=np.int32)), ranges
-    body, opening = np.concatenate(bodies), np.concatenate(openings)
-    return _arrays(np.concatenate(times), body, opening, np.concatenate(actions)), ranges
+    columns = [np.concatenate(parts) for parts in (times, bodies, openings, actions)]
+    return _arrays(*columns), ranges
 
 
 def executed_rows(snapshots: list[Snapshot]) -> dict[str, np.ndarray]:

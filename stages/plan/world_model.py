@@ -21,7 +21,7 @@ from stages.kit.motion.doors import body_from_moved
 from stages.kit.motion.kinematics import ArmChain, arm_chain
 from stages.kit.simulation.robot import Configuration, Robot
 from stages.kit.simulation.robot_description import RobotDescription
-from stages.kit.simulation.shapes import link_shapes, surface_points
+from stages.kit.simulation.shapes import joined, link_shapes, surface_points
 from stages.kit.simulation.world import PhysicsWorld, read_scene_bodies
 from stages.plan.support_planes import top_planes
 
@@ -169,7 +169,7 @@ class WorldModel:
         meshes = link_shapes(self._texts[name])[link]
         with self.joints_at(name, {joint: 0.0 for joint in self.world.bodies[name].joints}):
             body_from_link = inverse(self.pose(name)) @ self.world.link_pose(name, link)
-        mesh = trimesh.util.concatenate([trimesh.Trimesh(part.vertices, part.faces, process=False) for part in meshes])
+        mesh = joined(meshes)
         mesh.apply_transform(body_from_link)
         return mesh
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,7 +44,7 @@ class CollisionChecker:
         self.carried: str | None = None
         self._tool_from_carried = np.eye(4)
         self._touchable: frozenset[str] = frozenset()
-        self._rest_on: frozenset[str] = frozenset()
+        self._rest_on: dict[str, float] = {}
         self._touching = frozenset({robot.hand, *robot.fingers})
         for name in world.bodies:
             self.add_body(name)
@@ -86,9 +86,27 @@ class CollisionChecker:
             self._group(body.body_id, index, _SCENE, _ROBOT | _CARRIED)
         self.carried = None
 
-    def allow(self, touch: Iterable[str] = (), rest_on: Iterable[str] = ()) -> None:
-        """Say which links hand and fingers may touch, and which links the carried body may rest on (link names)."""
-        self._touchable, self._rest_on = frozenset(touch), frozenset(rest_on)
+    def allow(self, touch: Iterable[str] = (), rest_on: Mapping[str, float] | None = None) -> None:
+        """Say which links (by name) hand and fingers may touch, and how deep [m] the carried body may be in which."""
+        self._touchable, self._rest_on = frozenset(touch), dict(rest_on or {})
+
+    def overlaps(self, name: str) -> dict[str, float]:
+        """Return the links that touch a scene body where it is now, with the deepest penetration [m] of each.
+
+        The robot and scene bodies do not count; clearances up to that of the checker do.
+        """
+        body = self.world.bodies[name]
+        for index in body.links.values():
+            self._group(body.body_id, index, _CARRIED, _SCENE)
+        engine.performCollisionDetection(physicsClientId=self.world.client)
+        found: dict[str, float] = {}
+        for contact in self.world.contacts(body.body_id):
+            if contact.other_body not in (body.body_id, self.robot.body_id) and contact.depth > -self.clearance:
+                other = self.world.link_name(contact.other_body, contact.other_link)
+                found[other] = max(contact.depth, found.get(other, -np.inf))
+        for index in body.links.values():
+            self._group(body.body_id, index, _SCENE, _ROBOT | _CARRIED)
+        return found
 
     # --- queries ----------------------------------------------------------------------------------------------
 
@@ -132,7 +150,7 @@ class CollisionChecker:
         if contact.depth <= -self.clearance:
             return None
         other = self.world.link_name(contact.other_body, contact.other_link)
-        if other in self._rest_on and contact.depth < RESTING_DEPTH:
+        if contact.depth < self._rest_on.get(other, -np.inf):
             return None
         return Collision(self.carried or "", other, contact.depth)
 

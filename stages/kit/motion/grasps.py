@@ -44,8 +44,8 @@ def sample_grasps(
 ) -> list[Grasp]:
     """Return the grasps whose width fits the gripper and whose fingers meet the surface squarely, narrow ones first.
 
-    `points`, `normals` (N, 3) are of the item's surface, body frame. `opening` [m] is the widest distance of the fingers. The
-    list is empty when the item is too wide everywhere.
+    `points`, `normals` (N, 3) are of the item's surface, body frame. `opening` [m] is the widest distance of the
+    fingers. The list is empty when the item is too wide everywhere.
     """
     world_points = apply(world_from_body, points)
     world_normals = normals @ world_from_body[:3, :3].T
@@ -87,7 +87,7 @@ def _grasp_at(
     points: np.ndarray, normals: np.ndarray, low: np.ndarray, high: np.ndarray, heading: float, pitch: float,
     height: float, opening: float,
 ) -> tuple[np.ndarray, float] | None:  # fmt: skip
-    """Return world_from_tool (4, 4) and the width, or None when the item is too wide there or the fingers would slip."""
+    """Return world_from_tool (4, 4) and the width, or None where the item is too wide or fingers would slip."""
     approach = np.array([np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)])
     closing = np.array([-np.sin(heading), np.cos(heading), 0.0])
     across = np.cross(closing, approach)
@@ -106,7 +106,10 @@ def _grasp_at(
     if width > opening - MARGIN:
         return None
     facing = normals[between] @ closing
-    if facing[along > along.max() - CONTACT_BAND].mean() < SQUARE or facing[along < along.min() + CONTACT_BAND].mean() > -SQUARE:
+    if (
+        facing[along > along.max() - CONTACT_BAND].mean() < SQUARE
+        or facing[along < along.min() + CONTACT_BAND].mean() > -SQUARE
+    ):
         return None
     pose = np.eye(4)
     pose[:3, :3] = np.column_stack([across, closing, approach])

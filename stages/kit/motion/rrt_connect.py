@@ -150,7 +150,8 @@ def rrt_connect(
     worst, hits = blockers.most_common(1)[0] if blockers else ("", 0)
     raise MotionFailed(
         "no_path",
-        f"no path within {samples} samples; {worst or 'nothing'} blocked most ({hits} of {blockers.total()} collisions)",
+        f"no path within {samples} samples; {worst or 'nothing'} blocked most "
+        f"({hits} of {blockers.total()} collisions)",
         (worst,) if worst else (),
         {"samples": samples, "nodes": len(trees[0].parents) + len(trees[1].parents), "hits": hits},
     )

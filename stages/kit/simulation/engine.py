@@ -1,4 +1,4 @@
-"""Import pybullet quietly: the library prints its build time and its warnings to standard output, where our data goes."""
+"""Import pybullet quietly: the library prints its build time and warnings to standard output, where data goes."""
 
 from __future__ import annotations
 

@@ -108,9 +108,7 @@ class Robot:
 
     def link_pose(self, index: int) -> np.ndarray:
         """Return world_from_link (4, 4)."""
-        state = engine.getLinkState(
-            self.body_id, index, computeForwardKinematics=1, physicsClientId=self.world.client
-        )
+        state = engine.getLinkState(self.body_id, index, computeForwardKinematics=1, physicsClientId=self.world.client)
         return transform_from_quaternion(np.array(state[5]), np.array(state[4]))
 
     def tool_pose(self) -> np.ndarray:
@@ -163,7 +161,9 @@ class Robot:
         world_from_hand = transform_from_quaternion(np.array(hand[1]), np.array(hand[0]))
         body_id = self.world.bodies[name].body_id
         position, quaternion = engine.getBasePositionAndOrientation(body_id, physicsClientId=self.world.client)
-        hand_from_object = inverse(world_from_hand) @ transform_from_quaternion(np.array(quaternion), np.array(position))
+        hand_from_object = inverse(world_from_hand) @ transform_from_quaternion(
+            np.array(quaternion), np.array(position)
+        )
         self.grip = engine.createConstraint(
             self.body_id, self.hand, body_id, -1, engine.JOINT_FIXED, [0, 0, 0],
             hand_from_object[:3, 3].tolist(), [0, 0, 0], quaternion_of(hand_from_object).tolist(), [0, 0, 0, 1],

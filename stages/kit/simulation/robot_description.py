@@ -6,6 +6,7 @@ import tomllib
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -59,9 +60,10 @@ def load_robot(name: str) -> RobotDescription:
     urdf = Path(pybullet_data.getDataPath()) / values.pop("urdf")
     if not urdf.is_file():
         raise MissingDependency(f"{urdf}: the robot's URDF is missing", hint="install pybullet again")
-    arrays = {key: np.array(values.pop(key), dtype=float) for key in ("lower", "upper", "carry")}
-    names = {key: tuple(values.pop(key)) for key in ("arm_joints", "finger_joints", "finger_links")}
-    return RobotDescription(urdf=urdf, **arrays, **names, **values)
+    fields: dict[str, Any] = {"urdf": urdf, **values}
+    fields |= {key: np.array(fields[key], dtype=float) for key in ("lower", "upper", "carry")}
+    fields |= {key: tuple(fields[key]) for key in ("arm_joints", "finger_joints", "finger_links")}
+    return RobotDescription(**fields)
 
 
 def _joint(name: str, kind: str, parent: str, child: str, axis: str, origin: str = "0 0 0") -> str:

@@ -69,17 +69,35 @@ def link_shapes(text: str, tag: Literal["collision", "visual"] = "collision") ->
             mesh.apply_transform(_placement(element))
             material = element.find("material")
             rgba = None if material is None else colors.get(material.get("name"))
-            if rgba is not None and mesh.visual.kind is None:
-                mesh.visual.face_colors = np.round(255 * np.array(_numbers(rgba, "1 1 1 1"))).astype(np.uint8)
+            if rgba is not None and not has_colors(mesh):
+                paint(mesh, np.round(255 * np.array(_numbers(rgba, "1 1 1 1"))).astype(np.uint8))
             entries.append(mesh)
     return shapes
+
+
+def has_colors(mesh: trimesh.Trimesh) -> bool:
+    """Whether a mesh has face, vertex or texture colours of its own."""
+    return getattr(mesh.visual, "kind", None) is not None
+
+
+def paint(mesh: trimesh.Trimesh, rgba: np.ndarray) -> None:
+    """Give all faces of a mesh one colour (4,) uint8."""
+    mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=np.tile(rgba, (len(mesh.faces), 1)))
+
+
+def joined(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """Return one mesh of the vertices and faces of several, without colours."""
+    plain = [trimesh.Trimesh(part.vertices, part.faces, process=False) for part in meshes]
+    mesh = trimesh.util.concatenate(plain)
+    assert isinstance(mesh, trimesh.Trimesh)
+    return mesh
 
 
 def surface_points(
     meshes: list[trimesh.Trimesh], count: int, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (count, 3) points drawn uniformly from the surfaces of meshes of one frame [m], and their normals."""
-    mesh = trimesh.util.concatenate([trimesh.Trimesh(part.vertices, part.faces, process=False) for part in meshes])
+    mesh = joined(meshes)
     weights = mesh.area_faces / mesh.area_faces.sum()
     faces = random.choice(len(mesh.faces), size=count, p=weights)
     u, v = random.random((2, count))

@@ -208,13 +208,13 @@ def fridge(x: float, y: float, yaw: float = 0.0, door_value: float = 1.6, name: 
     )  # fmt: skip
 
 
-def bottle(x: float, y: float, z: float, parent: str, relation: str = "contains", name: str = "bottle_7") -> HandmadeBody:
+def bottle(
+    x: float, y: float, z: float, parent: str, relation: str = "contains", name: str = "bottle_7"
+) -> HandmadeBody:
     """A square bottle 6 cm wide, 20 cm high; its origin is the centre of its bottom."""
     pose = transform_from_yaw(0.0, np.array([x, y, z]))
     boxes: Boxes = [((0, 0, 0.1), (0.06, 0.06, 0.2))]
-    return HandmadeBody(
-        name, "bottle", pose, boxes, parent, relation, movable=True, mass=0.3, grasp_width=0.06
-    )
+    return HandmadeBody(name, "bottle", pose, boxes, parent, relation, movable=True, mass=0.3, grasp_width=0.06)
 
 
 def kitchen(door_value: float = 1.6) -> list[HandmadeBody]:

@@ -1,0 +1,134 @@
+"""RRT-Connect, collision checks and their typed failures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stages.kit.motion.base_placement import plan_drive, sample_bases
+from stages.kit.motion.collision import Collision, CollisionChecker
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
+from stages.kit.motion.timing import sample_times, time_path
+from stages.kit.simulation.robot_description import load_robot
+
+PANDA = load_robot("panda")
+SQUARE = SearchSpace(np.zeros(2), np.ones(2), np.full(2, 0.01))
+ROOM = (np.array([-2.5, -2.5]), np.array([2.5, 2.5]))
+
+
+def wall_with_gap(point: np.ndarray) -> Collision | None:
+    """A wall at x = 0.5 with a gap at y > 0.85."""
+    if abs(point[0] - 0.5) < 0.05 and point[1] < 0.85:
+        return Collision("point", "wall_1", 0.05 - abs(point[0] - 0.5))
+    return None
+
+
+def closed_wall(point: np.ndarray) -> Collision | None:
+    return Collision("point", "wall_1", 0.01) if abs(point[0] - 0.5) < 0.05 else None
+
+
+def test_rrt_goes_around_a_wall_and_every_point_is_free() -> None:
+    start, goal = np.array([0.1, 0.1]), np.array([0.9, 0.1])
+    path = rrt_connect(start, goal, wall_with_gap, SQUARE, np.random.default_rng(0))
+    np.testing.assert_array_equal(path[0], start)
+    np.testing.assert_array_equal(path[-1], goal)
+    assert first_collision(densify(path, np.full(2, 0.003)), wall_with_gap) is None
+    length = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
+    assert length < 2.6  # the shortest way is about 1.8; smoothing must have worked
+
+
+def test_rrt_is_the_same_for_the_same_seed() -> None:
+    paths = [
+        rrt_connect(np.array([0.1, 0.1]), np.array([0.9, 0.1]), wall_with_gap, SQUARE, np.random.default_rng(5))
+        for _ in range(2)
+    ]
+    np.testing.assert_array_equal(paths[0], paths[1])
+
+
+def test_typed_failures() -> None:
+    random = np.random.default_rng(0)
+    with pytest.raises(MotionFailed) as raised:
+        rrt_connect(np.array([0.1, 0.1]), np.array([0.9, 0.1]), closed_wall, SQUARE, random, samples=50)
+    failure = raised.value.failure
+    assert (failure.kind, failure.objects, failure.numbers["samples"]) == ("no_path", ("wall_1",), 50)
+    with pytest.raises(MotionFailed) as raised:
+        rrt_connect(np.array([0.5, 0.1]), np.array([0.9, 0.1]), wall_with_gap, SQUARE, random)
+    failure = raised.value.failure
+    assert failure.kind == "start_in_collision"
+    assert failure.objects == ("point", "wall_1")
+    assert failure.numbers["depth"] == pytest.approx(0.05)
+    with pytest.raises(MotionFailed) as raised:
+        rrt_connect(np.array([0.1, 0.1]), np.array([0.5, 0.1]), wall_with_gap, SQUARE, random)
+    assert raised.value.failure.kind == "goal_in_collision"
+    with pytest.raises(MotionFailed) as raised:
+        rrt_connect(np.array([0.1, 0.1]), np.array([0.5, 1.2]), wall_with_gap, SQUARE, random)
+    failure = raised.value.failure
+    assert failure.kind == "joint_limit"
+    assert failure.numbers["outside"] == pytest.approx(0.2)
+
+
+def test_the_checker_names_what_is_hit(checker: CollisionChecker) -> None:
+    assert checker.check(np.concatenate([[0.0, 0.0, 0.0], PANDA.carry])) is None
+    at_table_leg = checker.check(np.concatenate([[-1.85, -0.7, 0.0], PANDA.carry]))
+    assert at_table_leg is not None
+    assert at_table_leg.other == "table_3"
+    in_door = checker.check(np.concatenate([[0.69, 0.9, 0.0], PANDA.carry]))
+    assert in_door is not None
+    assert in_door.other == "fridge_2__door"
+    assert in_door.depth > 0.05
+
+
+def test_the_arm_does_not_go_through_itself(checker: CollisionChecker) -> None:
+    into_pedestal = np.array([0.0, -1.7, 0.0, -3.05, 0.0, 1.0, 0.0])
+    hit = checker.check(np.concatenate([[0.0, 0.0, 0.0], into_pedestal]))
+    assert hit is not None
+    links = set(checker.robot.links)
+    assert {hit.part, hit.other} <= links
+
+
+def test_what_is_carried_collides_too(checker: CollisionChecker) -> None:
+    body = np.concatenate([[-1.3, -0.2, -np.pi / 2], PANDA.carry])
+    checker.robot.set_body(body)
+    assert checker.check(body) is None
+    home = checker.world.pose("bottle_7")
+    low = np.eye(4)
+    low[:3, 3] = [0.0, 0.0, 0.25]  # a bottle stuck out along the approach, down into the table
+    checker.carry("bottle_7", low)
+    try:
+        collision = checker.check(body)
+        assert collision is not None
+        assert (collision.part, collision.other) == ("bottle_7", "table_3")
+    finally:
+        checker.put_down(home)
+
+
+def test_driving_around_the_furniture(checker: CollisionChecker) -> None:
+    start, goal = np.array([-1.3, 0.0, 0.0]), np.array([-1.3, -2.0, 1.0])
+    path = plan_drive(start, goal, PANDA.carry, checker, ROOM, np.random.default_rng(0))
+    dense = densify(path, np.array([0.02, 0.02, 0.04]))
+    found = first_collision(dense, lambda base: checker.check(np.concatenate([base, PANDA.carry])))
+    assert found is None
+    assert np.allclose(path[-1][:2], goal[:2])
+    assert np.cos(path[-1][2] - goal[2]) == pytest.approx(1.0)
+
+
+def test_bases_face_their_target_within_the_room() -> None:
+    bases = sample_bases(np.array([2.0, 0.0]), ROOM, 300, np.random.default_rng(0), heading=0.5)
+    assert 50 < len(bases) < 300
+    assert bases[:, 0].max() < 2.5
+    toward = np.arctan2(-bases[:, 1], 2.0 - bases[:, 0])
+    assert np.abs(np.angle(np.exp(1j * (bases[:, 2] - toward)))).max() <= 0.5 + 1e-9
+
+
+def test_times_keep_the_speed_and_acceleration_limits() -> None:
+    path = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    speed, acceleration = np.array([0.5, 0.25]), np.array([1.0, 1.0])
+    times, points = time_path(path, speed, acceleration)
+    assert np.all(np.diff(times) > 0)
+    rows = sample_times(times, points, 0.01)
+    velocity = np.diff(rows, axis=0) / 0.01
+    assert np.abs(velocity[:-1]).max(axis=0) == pytest.approx(speed, rel=0.05)
+    np.testing.assert_array_equal(rows[-1], path[-1])
+    assert times[-1] > 1.0 / 0.5 + 1.0 / 0.25
+    assert np.abs(velocity[0]).max() < 0.1  # it starts from rest
