@@ -60,16 +60,23 @@ def penetration(a: Solid, b: Solid) -> Penetration:
         return deepest
     meet = np.all(a.low[:, None] < b.high[None], axis=2) & np.all(b.low[None] < a.high[:, None], axis=2)
     for i, j in np.argwhere(meet):
-        # No piece goes deeper into another than the boxes around them overlap.
-        bound = float(np.min(np.minimum(a.high[i], b.high[j]) - np.maximum(a.low[i], b.low[j])))
-        if bound <= deepest.depth:
+        # How far b's box has to go to leave a's along each axis, forwards or backwards: no pair is deeper than that.
+        forwards, backwards = a.high[i] - b.low[j], b.high[j] - a.low[i]
+        away = np.minimum(forwards, backwards)
+        axis = int(np.argmin(away))
+        if away[axis] <= deepest.depth:
             continue
         result = fcl.CollisionResult()
         request = fcl.CollisionRequest(num_max_contacts=CONTACTS, enable_contact=True)
         if fcl.collide(a.objects[i], b.objects[j], request, result):
-            for contact in result.contacts:
-                if contact.penetration_depth > deepest.depth:
-                    deepest = Penetration(float(contact.penetration_depth), np.array(contact.normal, dtype=float))
+            contact = max(result.contacts, key=lambda c: c.penetration_depth)
+            depth, direction = float(contact.penetration_depth), np.array(contact.normal, dtype=float)
+            if depth > away[axis]:
+                # EPA stops early on deep contacts and overestimates.
+                depth = float(away[axis])
+                direction = np.eye(3)[axis] * (1.0 if forwards[axis] <= backwards[axis] else -1.0)
+            if depth > deepest.depth:
+                deepest = Penetration(depth, direction)
     return deepest
 
 

@@ -186,12 +186,16 @@ def joint_values_to_try(shape: Shape) -> list[dict[str, float]]:
 def plane_owners(surface: ModelSurface, shape: Shape) -> list[str | None]:
     """Return for each plane of a shape the moving part that it lies on, or None for the body."""
     part_from_model = {part: inverse(t) for part, t in part_transforms(surface.model, shape.joints).items()}
-    moving = [joint.part for joint in surface.model.joints]
+    body, moving = surface.model.parts[0], {joint.part for joint in surface.model.joints}
     owners: list[str | None] = []
     for plane in shape.surfaces:
-        probe = np.array([plane.center, *plane.corners])
-        near = (p for p in moving if surface.part_distances(apply(part_from_model[p], probe), p).max() < SAME_PART)
-        owners.append(next(near, None))
+        probe, normal = np.array([plane.center, *plane.corners]), np.asarray(plane.normal)
+        distance = {
+            part: surface.part_distance(apply(t, probe), t[:3, :3] @ normal, part)
+            for part, t in part_from_model.items()
+        }
+        nearest = min(surface.model.parts, key=lambda part: (round(distance[part], 4), part != body))
+        owners.append(nearest if nearest in moving and distance[nearest] < SAME_PART else None)
     return owners
 
 

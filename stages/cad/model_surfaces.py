@@ -84,14 +84,13 @@ class ModelSurface:
                 normal[chosen] = facing @ model_from_part[:3, :3].T
         return Nearest(distance, nearest, normal, part_index)
 
-    def part_distances(self, points: np.ndarray, part: str) -> np.ndarray:
-        """Return distances (N,) of points (N, 3) in the part's frame to that part."""
-        return (
-            self.scenes[part]
-            .compute_distance(o3d.core.Tensor.from_numpy(points.astype(np.float32)))
-            .numpy()
-            .astype(float)
-        )
+    def part_distance(self, points: np.ndarray, normal: np.ndarray, part: str) -> float:
+        """Return the largest distance of points (N, 3), in the part's frame, to triangles of the part that face the
+        way of `normal` (3,); inf when it has none."""
+        scene = self.sides[part].get(int(facing_side(normal[None])[0]))
+        if scene is None:
+            return float("inf")
+        return float(scene.compute_distance(o3d.core.Tensor.from_numpy(points.astype(np.float32))).numpy().max())
 
     def hull_points(self, joints: dict[str, float]) -> np.ndarray:
         """Return points (K, 3) in the model frame at scale 1 whose bounds are those of the posed model."""
