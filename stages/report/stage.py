@@ -55,6 +55,8 @@ class DrawnView:
     width: int
     height: int
     caption: str
+    font_size: float = 13.0
+    """Of the labels [px of the picture]."""
     of_masks: bool = True
     """Whether the segmentation masks have to do with it: then their label stands beside it."""
 
@@ -172,7 +174,7 @@ def _add_frames(
 ) -> None:
     info = sequence.info
     views, legend = frame_views(sequence, segments, parameters.frames, parameters.frame_width)
-    dropped = ", ".join(f"{count} {reason}" for reason, count in sorted(info.drops.items()) if count)
+    dropped = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in sorted(info.drops.items()) if count)
     text = f"{info.frame_count} of {info.frames_in_log} frames of the log were used"
     text += f" ({dropped} left out). " if dropped else ". "
     gravity = info.gravity.method.replace("_", " ")
@@ -204,8 +206,8 @@ def _add_views(
         coloured = scanned.by_instance()
         oblique = oblique_view(coloured, width, height)
         values["map_views"] = {
-            "oblique": _draw(coloured, oblique, "The map, every instance in its colour", labelled=True),
-            "top": _draw(coloured, top_view(coloured, round(0.75 * width)), "From above, y up", labelled=True),
+            "oblique": _draw(coloured, oblique, "The map, every instance in its colour", 13.5 * width / 960),
+            "top": _draw(coloured, top_view(coloured, round(0.75 * width)), "From above, y up", 15.5 * width / 960),
             "color": _draw(scanned, oblique, "In the colours of the images"),
         }
     if cad_scene is None:
@@ -214,7 +216,7 @@ def _add_views(
     if model is None:
         return
     view = oblique or oblique_view(model, width, height)
-    pictures = [_draw(model, view, "CAD scene", labelled=True)]
+    pictures = [_draw(model, view, "CAD scene", 20.0 * width / 960)]
     if values["map_views"] is not None:
         pictures.append(replace(values["map_views"]["color"], caption="The map from the same place."))
     if ground_truth is not None:
@@ -223,7 +225,7 @@ def _add_views(
         if truth is not None:
             pictures.append(replace(_draw(truth, view, "The true room from the same place"), of_masks=False))
     pictures.append(
-        _draw(model, top_view(scanned or model, round(0.75 * width)), "CAD scene from above", labelled=True)
+        _draw(model, top_view(scanned or model, round(0.75 * width)), "CAD scene from above", 15.5 * width / 960)
     )
     scene = cad_scene.scene
     decisions = [r.decision for r in scene.replacements]
@@ -236,11 +238,13 @@ def _add_views(
     )
 
 
-def _draw(model: Model, view: View, caption: str, labelled: bool = False) -> DrawnView:
+def _draw(model: Model, view: View, caption: str, font_size: float | None = None) -> DrawnView:
+    """Draw a model; with names on it where a font size is given (larger for pictures that are shown small)."""
     drawn: Rendering = render(model, view)
-    labels = tuple(place_labels(drawn.instance, model.names)) if labelled else ()
+    labels = tuple(place_labels(drawn.instance, model.names, font_size)) if font_size else ()
     camera = view.camera
-    return DrawnView(jpeg(drawn.color, caption, camera.width), labels, camera.width, camera.height, caption + ".")
+    picture = jpeg(drawn.color, caption, camera.width)
+    return DrawnView(picture, labels, camera.width, camera.height, caption + ".", font_size or 0.0)
 
 
 def _replacement_row(replacement: Replacement) -> dict[str, str]:

@@ -158,7 +158,9 @@ class Label:
     title: str
 
 
-def place_labels(instance: np.ndarray, names: dict[int, str], minimum_pixels: int = 120) -> list[Label]:
+def place_labels(
+    instance: np.ndarray, names: dict[int, str], font_size: float = 13.0, minimum_pixels: int = 120
+) -> list[Label]:
     """Put names on (H, W) instance images: in the middle of what is seen, large things first, none over another."""
     values, counts = np.unique(instance, return_counts=True)
     taken: list[tuple[float, float, float, float]] = []
@@ -169,9 +171,9 @@ def place_labels(instance: np.ndarray, names: dict[int, str], minimum_pixels: in
         rows, columns = np.nonzero(instance == value)
         nearest = int(np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2))
         x, y = int(columns[nearest]), int(rows[nearest])
-        half = 3.6 * len(names[value]) + 4
+        half, high = 0.28 * font_size * len(names[value]) + 4, 0.68 * font_size
         x = int(np.clip(x, half, instance.shape[1] - half)) if instance.shape[1] > 2 * half else x
-        box = (x - half, y - 9, x + half, y + 9)
+        box = (x - half, y - high, x + half, y + high)
         if any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in taken):
             continue
         taken.append(box)

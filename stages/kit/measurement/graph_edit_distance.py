@@ -8,7 +8,6 @@ total = 2 x wrong supports + missing + wrong detections.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -215,8 +214,3 @@ def describe_mapping(
     extra = tuple(name for j, name in enumerate(predicted.names) if j not in used)
     total = WRONG_SUPPORT_COST * len(wrong) + len(missing) + len(extra) + len(substituted)
     return EditDistance(total, wrong, missing, extra, substituted, pairs, exact)
-
-
-def rename_classes(tree: SupportTree, names: Mapping[str, str]) -> SupportTree:
-    """Return the tree with classes replaced where `names` has them (to count synonyms as one class)."""
-    return SupportTree(tree.names, tuple(names.get(c, c) for c in tree.classes), tree.parents, tree.optional)
