@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from stages.fuse.counts import TripleCounts
+from stages.fuse.parts import absorb_specks, drop_far_parts
 from stages.fuse.surface import Surface
 from stages.kit.formats.ply_files import ColoredMesh
 
@@ -58,56 +58,6 @@ def confidence_of(counts: TripleCounts, segments: tuple[int, ...], class_id: int
     return sum(row.get((class_id, instance), 0) for row in rows) / total if total else 0.0
 
 
-@njit(cache=True)
-def connected_parts(labels: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return for every vertex (V,) the smallest vertex that edges between equal labels (V,) connect it with."""
-    parents = np.arange(labels.shape[0])
-    for face in range(faces.shape[0]):
-        for corner in range(3):
-            first, second = faces[face, corner], faces[face, (corner + 1) % 3]
-            if labels[first] != labels[second]:
-                continue
-            while parents[first] != first:
-                parents[first] = parents[parents[first]]
-                first = parents[first]
-            while parents[second] != second:
-                parents[second] = parents[parents[second]]
-                second = parents[second]
-            parents[max(first, second)] = min(first, second)
-    for vertex in range(parents.shape[0]):
-        parents[vertex] = parents[parents[vertex]]
-    return parents
-
-
-def absorb_specks(
-    labels: np.ndarray, faces: np.ndarray, *, whole: frozenset[int], minimum_size: int, minimum_share: float
-) -> np.ndarray:
-    """Return labels (V,) in which small connected parts have taken the label of most of their neighbours.
-
-    A part is a set of vertices of one label > 0 that triangles (F, 3) connect. It is small under `minimum_size`
-    vertices, or, unless its label is in `whole`, under `minimum_share` of the label's largest part. The neighbours of a
-    small part are the parts that are not small; a part without such becomes 0. Ties go to the smaller label.
-    """
-    if len(labels) == 0:
-        return labels.copy()
-    part = connected_parts(labels, faces)
-    sizes = np.bincount(part, minlength=len(labels))
-    largest = np.zeros(int(labels.max()) + 1, dtype=np.int64)
-    np.maximum.at(largest, labels[part], sizes[part])
-    divisible = ~np.isin(labels, sorted(whole))
-    size = sizes[part]
-    small = (labels > 0) & ((size < minimum_size) | (divisible & (size < minimum_share * largest[labels])))
-    # Every edge from a small part to another one is a vote for the label behind it (inner edges count for both faces).
-    edges = np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 0], [1, 2], [2, 1], [2, 0], [0, 2])])
-    edges = edges[small[edges[:, 0]] & ~small[edges[:, 1]]]
-    replacement = np.zeros(len(labels), dtype=labels.dtype)
-    width = int(labels.max()) + 1
-    keys, votes = np.unique(part[edges[:, 0]] * width + labels[edges[:, 1]], return_counts=True)
-    order = np.lexsort((-keys, votes))
-    replacement[keys[order] // width] = (keys % width)[order]
-    return np.where(small, replacement[part], labels)
-
-
 def face_labels(labels: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Return the label (F,) of every face: that of two of its vertices, or of the first when all three differ."""
     corners = labels[faces]
@@ -133,6 +83,7 @@ def extract_entities(
     minimum_voxels: int,
     minimum_observations: int,
     speck_share: float,
+    part_distance: float,
 ) -> tuple[list[ExtractedEntity], LabelledSurface]:
     """Return the entities, ascending by instance, and the labels of the whole surface.
 
@@ -147,6 +98,7 @@ def extract_entities(
     instance = absorb_specks(
         instance_of[segment], surface.faces, whole=stuff, minimum_size=minimum_voxels, minimum_share=speck_share
     )
+    instance = drop_far_parts(instance, surface.vertices, surface.faces, whole=stuff, distance=part_distance)
     of_face = face_labels(instance, surface.faces)
     by_label = np.argsort(of_face, kind="stable")
     sorted_labels = of_face[by_label]

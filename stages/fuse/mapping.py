@@ -29,6 +29,7 @@ from stages.fuse.regularization import (
     merge_evident_instances,
     merge_instances,
     merge_segments,
+    merge_stuff,
 )
 from stages.fuse.voxel_blocks import COORDINATE_LIMIT, SIDE, VoxelBlocks
 
@@ -74,9 +75,17 @@ class PanopticMapper:
         """Fuse one frame: depth (H, W) float32 [m], colour (H, W, 3) uint8 or None, world_from_camera (4, 4).
 
         ids (H, W) int32: the frame's panoptic image, whose values `listing` explains; None fuses geometry alone. Raises
-        BadInput for an id that is not listed, and for a camera too far from the origin for the voxel grid.
+        BadInput for images of different sizes, for an id that is not listed, and for a camera too far from the origin
+        for the voxel grid.
         """
         options = self.parameters
+        expected = (self.camera.height, self.camera.width)
+        for name, image in (("depth", depth), ("colour", color), ("segments", ids)):
+            if image is not None and image.shape[:2] != expected:
+                raise BadInput(
+                    f"{name} of the frame is {image.shape[1]}x{image.shape[0]}, the camera {expected[1]}x{expected[0]}",
+                    hint="make the artifact again",
+                )
         reach = COORDINATE_LIMIT * options.voxel_size - options.maximum_depth - SIDE * self.truncation_distance
         if not (np.abs(world_from_camera[:3, 3]) < reach).all():
             raise BadInput(
@@ -97,10 +106,12 @@ class PanopticMapper:
             self.regularize()
 
     def regularize(self) -> None:
-        """Merge instance labels that are one instance (eq. 2.5; in `ours` also those that frames saw as one)."""
+        """Merge instance labels that are one instance (eq. 2.5; in `ours` also all of a stuff class, and those that
+        frames saw as one)."""
         options = self.parameters
         done: list[tuple[int, int]] = []
         if options.merging == "ours":
+            done += merge_stuff(self.counts, self.things)
             done += merge_evident_instances(
                 self.instance_evidence, self.counts, minimum_frames=options.instance_minimum_frames
             )

@@ -20,7 +20,7 @@ class FuseParameters(Parameters):
     truncation_voxels: float = Field(4.0, ge=1, le=32, description="Truncation distance [voxels]")
     minimum_depth: float = Field(0.1, ge=0.01, description="Nearer depth is not used [m]")
     maximum_depth: float = Field(4.0, gt=0.01, description="Farther depth is not used [m]")
-    maximum_weight: float = Field(1000.0, gt=0, description="Weight at which a voxel starts to forget")
+    maximum_weight: float = Field(1000.0, gt=0, le=60000, description="Weight at which a voxel starts to forget")
     every: int = Field(1, ge=1, description="Integrate every how many-th frame")
     block_stride: int = Field(4, ge=1, le=16, description="Every how many-th pixel looks for voxel blocks")
     pose_tolerance: float = Field(
@@ -41,7 +41,8 @@ class FuseParameters(Parameters):
     merging: Literal["ours", "thesis"] = Field(
         "ours",
         description="`thesis` merges segment labels that lie in one frame segment, whatever they are; `ours` only when "
-        "they are of that segment's class, and lie together more often than apart",
+        "they are of that segment's class and more often together than apart; it also merges instances that frames saw "
+        "as one, and makes every stuff class one instance",
     )
     merge_overlap_share: float = Field(
         0.2, gt=0, le=1, description="Two segment labels share a frame segment when each fills this share of it"
@@ -59,16 +60,23 @@ class FuseParameters(Parameters):
     )
     minimum_entity_voxels: int = Field(20, ge=1, description="Entities of fewer surface voxels are dropped")
     minimum_observations: int = Field(
-        3, ge=1, description="Entities that fewer frames voted for are dropped; a tenth of the frames where that is less"
+        3,
+        ge=1,
+        description="Entities that fewer frames voted for are dropped; a tenth of the frames where that is less",
     )
     minimum_prediction_share: float = Field(
         0.15, ge=0, le=1, description="Segments that are background in more than the rest of their frames stay "
         "unlabelled (0: the thesis, in which the background has no vote)"
     )  # fmt: skip
     speck_share: float = Field(
-        0.05, ge=0, lt=1, description="Parts of a thing smaller than this share of its largest part take the label of "
-        "what surrounds them"
-    )  # fmt: skip
+        0.05,
+        ge=0,
+        lt=1,
+        description="Parts of a thing under this share of its largest part take the label of what surrounds them",
+    )
+    part_distance: float = Field(
+        0.2, gt=0, description="Parts of a thing farther than this from its largest part are left unlabelled [m]"
+    )
 
 
 STAGE = Stage(
@@ -78,7 +86,7 @@ STAGE = Stage(
     parameters=FuseParameters,
     reads={"sequence": Sequence, "segments": Segments, "trajectory": Optionally(Trajectory)},
     writes=PanopticMap,
-    libraries=("numpy", "numba"),
+    libraries=("numpy", "numba", "scipy"),
     example="scenewright fuse --sequence outputs/demo/sequence --segments outputs/demo/segments "
     "--out outputs/demo/panoptic_map",
 )

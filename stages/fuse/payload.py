@@ -62,7 +62,7 @@ def volume_arrays(blocks: VoxelBlocks, merged: np.ndarray) -> dict[str, np.ndarr
         "tsdf": blocks.tsdf[order].astype(np.float16),
         "weight": blocks.weight[order].astype(np.float16),
         "segment": merged[blocks.segment[order]],
-        "color": ((blocks.color[order].astype(np.uint32) + FIXED_POINT // 2) // FIXED_POINT).clip(0, 255).astype(np.uint8),
+        "color": np.minimum(blocks.color[order] // FIXED_POINT, 255).astype(np.uint8),
     }
 
 

@@ -140,7 +140,29 @@ def merge_instances(
     return done
 
 
-def merge_evident_instances(evidence: PairEvidence, counts: TripleCounts, *, minimum_frames: int) -> list[tuple[int, int]]:
+def merge_stuff(counts: TripleCounts, things: frozenset[int]) -> list[tuple[int, int]]:
+    """Merge all instance labels of every class that is not countable; return the (removed, kept) pairs.
+
+    Ours: within a frame a stuff class has one instance only (section 2.3.1), so the map has one too, although pieces of
+    floor on both sides of a table never share a segment label.
+    """
+    by_class: dict[int, set[int]] = {}
+    for row in counts.by_segment.values():
+        for class_id, instance in row:
+            if class_id not in things:
+                by_class.setdefault(class_id, set()).add(instance)
+    done = []
+    for class_id in sorted(by_class):
+        kept, *others = sorted(by_class[class_id])
+        for removed in others:
+            counts.merge_instances(removed, kept)
+            done.append((removed, kept))
+    return done
+
+
+def merge_evident_instances(
+    evidence: PairEvidence, counts: TripleCounts, *, minimum_frames: int
+) -> list[tuple[int, int]]:
     """Merge instance labels that frames saw as one instance at least `minimum_frames` times, and less often as two.
 
     Ours, beside eq. 2.5: an object whose parts were first seen in different frames gets a label for each part; eq. 2.5

@@ -48,7 +48,7 @@ def run(
             surface, merged[surface.segment], mapper.counts, mapper.seen_in, mapper.sightings, mapper.things,
             minimum_share=parameters.minimum_prediction_share, minimum_voxels=parameters.minimum_entity_voxels,
             minimum_observations=min(parameters.minimum_observations, max(1, mapper.labelled_frames // 10)),
-            speck_share=parameters.speck_share,
+            speck_share=parameters.speck_share, part_distance=parameters.part_distance,
         )  # fmt: skip
     with context.progress.step("write the map"):
         file = EntitiesFile(

@@ -209,9 +209,7 @@ def _neighbours(order: np.ndarray, coordinates: np.ndarray, keys: np.ndarray, sl
     for rank in range(order.shape[0]):
         x, y, z = coordinates[order[rank]]
         for side in range(27):
-            result[rank, side] = find(
-                keys, slots, pack(x + side % 3 - 1, y + (side // 3) % 3 - 1, z + side // 9 - 1)
-            )
+            result[rank, side] = find(keys, slots, pack(x + side % 3 - 1, y + (side // 3) % 3 - 1, z + side // 9 - 1))
     return result
 
 
@@ -258,4 +256,11 @@ def extract_surface(blocks: VoxelBlocks, *, minimum_weight: float, jump: float =
     offsets = np.zeros(len(order), dtype=np.int64)
     face_pass(False, offsets, 0)
     faces = face_pass(True, *_starts(offsets))
-    return Surface(surface.vertices, faces, surface.colors, surface.segment)
+    return _without_lone_vertices(Surface(surface.vertices, faces, surface.colors, surface.segment))
+
+
+def _without_lone_vertices(surface: Surface) -> Surface:
+    used = np.zeros(len(surface.vertices), dtype=bool)
+    used[surface.faces] = True
+    place = np.cumsum(used, dtype=np.int32) - np.int32(1)
+    return Surface(surface.vertices[used], place[surface.faces], surface.colors[used], surface.segment[used])

@@ -37,10 +37,8 @@ def pack(x: int, y: int, z: int) -> int:
 @njit(cache=True, inline="always")
 def mix(key: int, mask: int) -> int:
     """Return the first place to look for `key` in a table of mask + 1 (a power of two) entries."""
-    key ^= key >> 31
-    key *= 0x1D8E4E27C47D124F
-    key ^= key >> 32
-    return key & mask
+    mixed = (key ^ (key >> 31)) * 0x1D8E4E27C47D124F
+    return (mixed ^ (mixed >> 32)) & mask
 
 
 @njit(cache=True)
@@ -94,7 +92,7 @@ def _touch(
     fx, fy, cx, cy = intrinsics
     capacity = coordinates.shape[0]
     touched_count = 0
-    last_key = np.int64(-1)
+    last_key = -1
     for row in range(stride // 2, height, stride):
         for column in range(stride // 2, width, stride):
             distance = depth[row, column]
@@ -211,7 +209,7 @@ class VoxelBlocks:
     def _grow(self, capacity: int) -> None:
         """Make room, one array after the other, so that no more than one is held twice at a time."""
         for name, (kind, shape) in FIELDS.items():
-            larger = np.zeros((capacity, *shape), dtype=kind)
+            larger: np.ndarray = np.zeros((capacity, *shape), dtype=kind)
             larger[: self.count] = getattr(self, name)[: self.count]
             setattr(self, name, larger)
         self._make_table(capacity)

@@ -1,0 +1,92 @@
+"""Connected parts of labels on a surface: small ones go to their surroundings, far ones are not of the thing."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from scipy.spatial import cKDTree
+
+
+@njit(cache=True)
+def connected_parts(labels: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return for every vertex (V,) the smallest vertex that edges between equal labels (V,) connect it with."""
+    parents = np.arange(labels.shape[0])
+    for face in range(faces.shape[0]):
+        for corner in range(3):
+            first, second = faces[face, corner], faces[face, (corner + 1) % 3]
+            if labels[first] != labels[second]:
+                continue
+            while parents[first] != first:
+                parents[first] = parents[parents[first]]
+                first = parents[first]
+            while parents[second] != second:
+                parents[second] = parents[parents[second]]
+                second = parents[second]
+            parents[max(first, second)] = min(first, second)
+    for vertex in range(parents.shape[0]):
+        parents[vertex] = parents[parents[vertex]]
+    return parents
+
+
+def absorb_specks(
+    labels: np.ndarray, faces: np.ndarray, *, whole: frozenset[int], minimum_size: int, minimum_share: float
+) -> np.ndarray:
+    """Return labels (V,) in which small connected parts have taken the label of most of their neighbours.
+
+    A part is a set of vertices of one label > 0 that triangles (F, 3) connect. It is small under `minimum_size`
+    vertices, or, unless its label is in `whole`, under `minimum_share` of the label's largest part. The neighbours of a
+    small part are the parts that are not small; a part without such becomes 0. Ties go to the smaller label.
+    """
+    if len(labels) == 0:
+        return labels.copy()
+    part = connected_parts(labels, faces)
+    sizes = np.bincount(part, minlength=len(labels))
+    largest = np.zeros(int(labels.max()) + 1, dtype=np.int64)
+    np.maximum.at(largest, labels[part], sizes[part])
+    divisible = ~np.isin(labels, sorted(whole))
+    size = sizes[part]
+    small = (labels > 0) & ((size < minimum_size) | (divisible & (size < minimum_share * largest[labels])))
+    # Every edge from a small part to another one is a vote for the label behind it (inner edges count for both faces).
+    edges = np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 0], [1, 2], [2, 1], [2, 0], [0, 2])])
+    edges = edges[small[edges[:, 0]] & ~small[edges[:, 1]]]
+    replacement = np.zeros(len(labels), dtype=labels.dtype)
+    width = int(labels.max()) + 1
+    keys, votes = np.unique(part[edges[:, 0]] * width + labels[edges[:, 1]], return_counts=True)
+    order = np.lexsort((-keys, votes))
+    replacement[keys[order] // width] = (keys % width)[order]
+    return np.where(small, replacement[part], labels)
+
+
+def drop_far_parts(
+    labels: np.ndarray, vertices: np.ndarray, faces: np.ndarray, *, whole: frozenset[int], distance: float
+) -> np.ndarray:
+    """Return labels (V,) without the parts of things that lie apart from their largest part; those become 0.
+
+    Euclidean clustering of the parts, as section 2.3.1 does within a frame: what is within `distance` [m] of the
+    largest part, or of a part that is, belongs to the thing. A piece of floor that was segmented with a chair in every
+    frame goes. Labels in `whole` (stuff) keep all their parts.
+    """
+    result = labels.copy()
+    part = connected_parts(labels, faces)
+    for label in np.unique(labels[~np.isin(labels, [0, *whole])]):
+        members = np.flatnonzero(labels == label)
+        names, inverse, sizes = np.unique(part[members], return_inverse=True, return_counts=True)
+        if len(names) == 1:
+            continue
+        trees = [cKDTree(vertices[members[inverse == k]]) for k in range(len(names))]
+        reached = {int(np.argmax(sizes))}
+        frontier = sorted(reached)
+        while frontier:
+            current = frontier.pop()
+            for other in range(len(names)):
+                if other not in reached and _within(trees[current], trees[other], distance):
+                    reached.add(other)
+                    frontier.append(other)
+        result[members[~np.isin(inverse, sorted(reached))]] = 0
+    return result
+
+
+def _within(first: cKDTree, second: cKDTree, distance: float) -> bool:
+    small, large = (first, second) if first.n < second.n else (second, first)
+    nearest, _ = large.query(small.data, distance_upper_bound=distance)
+    return bool(np.isfinite(nearest).any())

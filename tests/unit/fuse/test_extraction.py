@@ -1,0 +1,103 @@
+"""Entities from labels (2.6): ties, background, specks, far parts, cut meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stages.fuse.extraction import confidence_of, extract_entities, face_labels, label_of_segments
+from stages.fuse.parts import absorb_specks, connected_parts, drop_far_parts
+from stages.fuse.surface import Surface
+from tests.unit.fuse.test_association import CHAIR, TABLE, counted
+
+THINGS = frozenset({CHAIR, TABLE})
+
+
+def strip(length: int, spacing: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
+    """A ribbon of 2 x length vertices: vertices (2 length, 3) and its triangles."""
+    x = np.repeat(np.arange(length), 2) * spacing
+    vertices = np.stack([x, np.tile([0, spacing], length), 0 * x], axis=1).astype(np.float32)
+    first = np.arange(2 * length - 2)
+    return vertices, np.stack([first, first + 1, first + 2], axis=1).astype(np.int32)
+
+
+def test_labels_of_segments() -> None:
+    counts = counted((1, CHAIR, 1, 3), (2, TABLE, 5, 1), (4, TABLE, 5, 2))
+    classes, instances = label_of_segments(counts, {1: 3, 2: 10, 4: 10}, 5, 0.15)
+    assert classes.tolist() == [0, CHAIR, 0, 0, TABLE, 0] and instances.tolist() == [0, 1, 0, 0, 5, 0]
+    _, instances = label_of_segments(counts, {1: 3, 2: 10, 4: 10}, 5, 0.0)
+    assert instances.tolist() == [0, 1, 5, 0, 5, 0], "the rule of the thesis: the background has no vote"
+
+
+def test_confidence_is_the_agreeing_share() -> None:
+    counts = counted((1, CHAIR, 1, 3), (1, CHAIR, 2, 1), (2, CHAIR, 1, 4), (2, TABLE, 9, 2))
+    assert confidence_of(counts, (1, 2), CHAIR, 1) == pytest.approx(0.7)
+    assert confidence_of(counts, (), CHAIR, 1) == 0.0
+
+
+def test_faces_go_to_the_majority() -> None:
+    labels = np.array([1, 1, 2, 3])
+    assert face_labels(labels, np.array([[0, 1, 2], [2, 0, 1], [0, 2, 1], [2, 3, 0]])).tolist() == [1, 1, 1, 2]
+
+
+def test_parts_are_connected_by_equal_labels() -> None:
+    _, faces = strip(4)
+    parts = connected_parts(np.array([1, 1, 1, 2, 2, 2, 1, 1]), faces)
+    assert parts.tolist() == [0, 0, 0, 3, 3, 3, 6, 6]
+
+
+def test_specks_take_the_label_of_their_surroundings() -> None:
+    _, faces = strip(20)
+    labels = np.array([1] * 18 + [2] * 2 + [1] * 10 + [3] * 10)
+    absorbed = absorb_specks(labels, faces, whole=frozenset(), minimum_size=3, minimum_share=0.0)
+    assert absorbed.tolist() == [1] * 30 + [3] * 10
+    # By share: the second part of 1 is under 60 % of its first; it lies between 2 and 3, which are not small.
+    labels = np.array([1] * 18 + [2] * 10 + [1] * 4 + [3] * 8)
+    assert absorb_specks(labels, faces, whole=frozenset({1}), minimum_size=3, minimum_share=0.6).tolist() == list(
+        labels
+    )
+    shared = absorb_specks(labels, faces, whole=frozenset(), minimum_size=3, minimum_share=0.6)
+    assert shared.tolist() == [1] * 18 + [2] * 14 + [3] * 8, "a tie goes to the smaller label"
+
+
+def test_lone_specks_become_unlabelled() -> None:
+    faces = np.array([[0, 1, 2], [3, 4, 5]])
+    labels = np.array([1, 1, 1, 2, 2, 2])
+    assert absorb_specks(labels, faces, whole=frozenset(), minimum_size=4, minimum_share=0).tolist() == [0] * 6
+
+
+def test_far_parts_are_not_of_the_thing() -> None:
+    vertices, faces = strip(30, spacing=0.1)
+    gap = 2 * 12  # faces across the gap are taken out
+    faces = faces[~((faces >= gap).any(axis=1) & (faces < gap + 8).any(axis=1))]
+    labels = np.full(60, 7)
+    labels[gap : gap + 8] = 0
+    kept = drop_far_parts(labels, vertices, faces, whole=frozenset(), distance=0.6)
+    assert kept.tolist() == labels.tolist(), "0.5 m of gap"
+    near = drop_far_parts(labels, vertices, faces, whole=frozenset(), distance=0.4)
+    assert near.tolist() == [0] * (gap + 8) + [7] * (60 - gap - 8), "the larger part stays"
+    assert drop_far_parts(labels, vertices, faces, whole=frozenset({7}), distance=0.4).tolist() == labels.tolist()
+
+
+def test_entities_partition_the_surface() -> None:
+    vertices, faces = strip(20)
+    surface = Surface(vertices, faces, np.full((40, 3), 9, np.uint8), np.zeros(40, np.int32))
+    segment = np.array([1] * 16 + [2] * 12 + [3] * 12, dtype=np.int32)
+    counts = counted((1, CHAIR, 4, 5), (2, CHAIR, 4, 5), (3, TABLE, 2, 5))
+    seen = {4: 0b111, 2: 0b1}
+    entities, labels = extract_entities(
+        surface, segment, counts, seen, {1: 5, 2: 5, 3: 5}, THINGS,
+        minimum_share=0.15, minimum_voxels=3, minimum_observations=1, speck_share=0.0, part_distance=1.0,
+    )  # fmt: skip
+    assert [(e.instance, e.class_id, e.segments, e.observations) for e in entities] == [
+        (2, TABLE, (3,), 1),
+        (4, CHAIR, (1, 2), 3),
+    ]
+    assert sum(len(e.mesh.faces) for e in entities) == len(faces)
+    assert labels.instance.tolist() == [4] * 28 + [2] * 12
+    assert labels.class_id.tolist() == [CHAIR] * 28 + [TABLE] * 12
+    entities, labels = extract_entities(
+        surface, segment, counts, seen, {1: 5, 2: 5, 3: 5}, THINGS,
+        minimum_share=0.15, minimum_voxels=3, minimum_observations=2, speck_share=0.0, part_distance=1.0,
+    )  # fmt: skip
+    assert [e.instance for e in entities] == [4] and labels.instance.tolist() == [4] * 28 + [0] * 12

@@ -1,0 +1,208 @@
+"""The whole step on a scene of known blocks: exactly the right entities, the same bytes, what is refused."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from schemas.errors import BadInput
+from schemas.panoptic_map import PanopticMap
+from schemas.segments import FrameSegments, Segments
+from schemas.sequence import Sequence
+from schemas.trajectory import Trajectory
+from stages.fuse.parameters import FuseParameters
+from stages.fuse.stage import run
+from stages.kit.formats.masks import write_panoptic_zip
+from stages.kit.formats.ply_files import read_ply
+from stages.kit.formats.trajectories import write_tum
+from stages.kit.progress import SilentProgress
+from stages.kit.stage import Context
+from tests.unit.fuse.scenes import CUP, SCENE, TABLE, class_id, orbit, write_scene
+
+
+def fuse(
+    output: Path, sequence: Sequence, segments: Segments, trajectory: Trajectory | None = None, **options: object
+) -> PanopticMap:
+    output.mkdir(parents=True)
+    context = Context(output=output, seed=0, device="cpu", progress=SilentProgress())
+    return run(sequence, segments, trajectory, parameters=FuseParameters(**options), context=context)
+
+
+def digest(root: Path) -> str:
+    lines = [f"{p.relative_to(root)} {hashlib.sha256(p.read_bytes()).hexdigest()}" for p in sorted(root.rglob("*.*"))]
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> tuple[Sequence, Segments]:
+    return write_scene(tmp_path_factory.mktemp("scene"))
+
+
+@pytest.fixture(scope="module")
+def panoptic_map(scene: tuple[Sequence, Segments], tmp_path_factory: pytest.TempPathFactory) -> PanopticMap:
+    return fuse(tmp_path_factory.mktemp("map") / "map", *scene)
+
+
+def test_exactly_the_right_entities(panoptic_map: PanopticMap) -> None:
+    info = panoptic_map.info
+    assert panoptic_map.outcome == "ok"
+    assert sorted(e.class_name for e in info.entities) == ["cup", "cup", "floor", "table"]
+    assert info.frames_integrated == 12 and info.segmentation == "true blocks"
+    for block in SCENE[1:]:
+        (entity,) = [
+            e
+            for e in info.entities
+            if e.class_name == block.class_name
+            and np.all(
+                np.abs(np.add(e.box_minimum, e.box_maximum) / 2 - np.add(block.minimum, block.maximum) / 2) < 0.06
+            )
+        ]
+        assert np.abs(np.array(entity.box_maximum) - block.maximum).max() < 0.045
+        assert np.abs(np.array(entity.box_minimum)[:2] - np.array(block.minimum)[:2]).max() < 0.045
+        assert entity.observations == 12 and entity.confidence > 0.95
+    table = next(e for e in info.entities if e.class_name == "table")
+    assert table.box_minimum[2] < 0.05, "down to the floor"
+
+
+def test_files_agree(panoptic_map: PanopticMap) -> None:
+    mesh = read_ply(panoptic_map.path("mesh.ply"))
+    with np.load(panoptic_map.path("mesh_labels.npz"), allow_pickle=False) as labels:
+        instance, class_ids, segment = labels["instance"], labels["class_id"], labels["segment"]
+    assert len(mesh.vertices) == len(instance) == len(class_ids) == len(segment)
+    assert {a.dtype for a in (instance, class_ids, segment)} == {np.dtype(np.int32)}
+    entities = {e.instance: e for e in panoptic_map.info.entities}
+    assert set(np.unique(instance)) - {0} == set(entities)
+    for label, entity in entities.items():
+        part = read_ply(panoptic_map.path(entity.mesh))
+        assert (len(part.vertices), len(part.faces)) == (entity.vertices, entity.triangles)
+        assert np.allclose(part.vertices.min(axis=0), entity.box_minimum, atol=1e-6)
+        assert set(class_ids[instance == label]) == {class_id(entity.class_name)}
+        assert set(np.unique(segment[instance == label])) & set(entity.segments)
+    faces = mesh.faces[(instance[mesh.faces] == instance[mesh.faces][:, :1]).all(axis=1)]
+    assert sum(e.triangles for e in entities.values()) >= len(faces[instance[faces[:, 0]] > 0])
+    with np.load(panoptic_map.path("counts.npz"), allow_pickle=False) as counts:
+        assert (counts["count"] > 0).all() and len(set(counts["instance"].tolist())) == 4
+        cup = counts["class_id"] == class_id("cup")
+        assert counts["count"][cup].sum() == 24, "two cups in twelve frames"
+    with np.load(panoptic_map.path("volume.npz"), allow_pickle=False) as volume:
+        blocks = volume["block_coordinates"]
+        assert volume["tsdf"].shape == volume["weight"].shape == volume["segment"].shape == (len(blocks), 512)
+        assert volume["color"].shape == (len(blocks), 512, 3)
+        assert blocks.tolist() == sorted(blocks.tolist(), key=lambda c: c[::-1])
+        assert set(np.unique(volume["segment"])) <= {0, *np.unique(segment), *range(1, 50)}
+
+
+def test_labels_lie_where_the_blocks_are(panoptic_map: PanopticMap) -> None:
+    mesh = read_ply(panoptic_map.path("mesh.ply"))
+    with np.load(panoptic_map.path("mesh_labels.npz"), allow_pickle=False) as labels:
+        class_ids = labels["class_id"]
+    top = (np.abs(mesh.vertices[:, 2] - TABLE.maximum[2]) < 0.005) & (np.abs(mesh.vertices[:, 0]) > 0.45)
+    assert top.sum() > 200 and (class_ids[top] == class_id("table")).mean() > 0.97
+    lid = np.abs(mesh.vertices[:, 2] - CUP.maximum[2]) < 0.005
+    assert lid.sum() > 20 and (class_ids[lid] == class_id("cup")).mean() > 0.97
+
+
+def test_same_bytes_twice_and_with_another_number_of_threads(
+    scene: tuple[Sequence, Segments], panoptic_map: PanopticMap, tmp_path: Path
+) -> None:
+    fuse(tmp_path / "again", *scene)
+    assert digest(tmp_path / "again") == digest(panoptic_map.root)
+    (tmp_path / "one").mkdir()
+    program = (
+        "from pathlib import Path; from schemas.sequence import Sequence; from schemas.segments import Segments;"
+        "from stages.fuse.parameters import FuseParameters; from stages.fuse.stage import run;"
+        "from stages.kit.progress import SilentProgress; from stages.kit.stage import Context; import sys;"
+        "run(Sequence(root=Path(sys.argv[1])), Segments(root=Path(sys.argv[2])), None, parameters=FuseParameters(),"
+        "context=Context(output=Path(sys.argv[3]), seed=0, device='cpu', progress=SilentProgress()))"
+    )
+    arguments = [str(scene[0].root), str(scene[1].root), str(tmp_path / "one")]
+    environment = {**os.environ, "NUMBA_NUM_THREADS": "1", "PYTHONHASHSEED": "7"}
+    subprocess.run(
+        [sys.executable, "-c", program, *arguments], check=True, env=environment, cwd=Path(__file__).parents[3]
+    )
+    assert digest(tmp_path / "one") == digest(panoptic_map.root)
+
+
+def test_background_frames_cast_no_vote(tmp_path: Path) -> None:
+    # In half of the frames the first cup is not predicted: it stays one cup with six observations.
+    scene = write_scene(tmp_path / "s", background={index: (3,) for index in range(0, 12, 2)})
+    info = fuse(tmp_path / "map", *scene).info
+    cups = sorted(e.observations for e in info.entities if e.class_name == "cup")
+    assert cups == [6, 12]
+    # Never predicted: no entity, and its surface is nobody's.
+    scene = write_scene(tmp_path / "n", background={index: (3,) for index in range(12)})
+    info = fuse(tmp_path / "none", *scene).info
+    assert sorted(e.class_name for e in info.entities) == ["cup", "floor", "table"]
+
+
+def test_frames_without_pose_or_depth_are_skipped_and_counted(tmp_path: Path) -> None:
+    no_pose = write_scene(tmp_path / "a", frames=3, with_pose=False)
+    result = fuse(tmp_path / "a_map", *no_pose)
+    assert result.outcome == "empty" and result.summary["skipped_no_pose"] == 3
+    assert result.info.entities == () and len(read_ply(result.path("mesh.ply")).vertices) == 0
+    no_depth = write_scene(tmp_path / "b", frames=2, with_depth=False)
+    result = fuse(tmp_path / "b_map", *no_depth)
+    assert result.outcome == "empty" and result.summary["skipped_no_depth"] == 2
+
+
+def test_trajectory_overrides_and_its_gaps_are_counted(tmp_path: Path) -> None:
+    sequence, segments = write_scene(tmp_path / "s", frames=6, with_pose=False)
+    folder = tmp_path / "trajectory"
+    folder.mkdir()
+    poses = np.array(orbit(6))
+    write_tum(folder / "trajectory.tum", 0.1 * np.arange(6)[:5] + 0.004, poses[:5])
+    result = fuse(tmp_path / "map", sequence, segments, Trajectory(root=folder))
+    assert result.summary["frames"] == 5 and result.summary["skipped_no_pose"] == 1
+    assert sorted(e.class_name for e in result.info.entities) == ["cup", "cup", "floor", "table"]
+
+
+def test_every_second_frame(scene: tuple[Sequence, Segments], tmp_path: Path) -> None:
+    assert fuse(tmp_path / "map", *scene, every=2).info.frames_integrated == 6
+
+
+def test_frames_without_segments_add_geometry(tmp_path: Path) -> None:
+    sequence, segments = write_scene(tmp_path / "s", frames=4)
+    info = segments.info
+    info.model_copy(update={"frames": info.frames[:2]}).write(segments.path("segments.json"))
+    result = fuse(tmp_path / "map", sequence, segments)
+    assert result.summary["frames"] == 4 and result.summary["skipped_no_segments"] == 2
+
+
+def test_refusals(tmp_path: Path) -> None:
+    sequence, segments = write_scene(tmp_path / "s", frames=3)
+    info, path = segments.info, segments.path("segments.json")
+
+    def refused(message: str, **changes: object) -> None:
+        info.model_copy(update=changes).write(path)
+        with pytest.raises(BadInput, match=message):
+            fuse(tmp_path / f"map{len(list(tmp_path.iterdir()))}", sequence, segments)
+        info.write(path)
+
+    refused("80x60, frames are 160x120", width=80, height=60)
+    refused("frame 9 does not exist", frames=(*info.frames, FrameSegments(frame=9, segments=())))
+    refused("lists frame 0 twice", frames=(*info.frames, info.frames[0]))
+    bad_class = info.frames[0].segments[0].model_copy(update={"category_id": 999})
+    refused("class id 999", frames=(FrameSegments(frame=0, segments=(bad_class,)),))
+    double = FrameSegments(frame=0, segments=(info.frames[0].segments[0],) * 2)
+    refused("ids of frame 0", frames=(double,))
+    missing = FrameSegments(frame=0, segments=info.frames[0].segments[1:])
+    refused("is in the panoptic image but not in segments.json", frames=(missing,))
+    write_panoptic_zip(segments.path("panoptic.zip"), [(0, np.zeros((60, 80), np.int32))])
+    refused("segments of the frame is 80x60")
+
+
+def test_camera_outside_of_the_grid_is_refused(tmp_path: Path) -> None:
+    sequence, segments = write_scene(tmp_path / "s", frames=2)
+    folder = tmp_path / "trajectory"
+    folder.mkdir()
+    far = np.array(orbit(2))
+    far[:, 0, 3] += 1e6
+    write_tum(folder / "trajectory.tum", 0.1 * np.arange(2), far)
+    with pytest.raises(BadInput, match="outside of the voxel grid"):
+        fuse(tmp_path / "map", sequence, segments, Trajectory(root=folder))
