@@ -100,6 +100,7 @@ class SceneRenderer:
         if light_map:
             self.light_map = bake(self.scene, self.soup, self.lights, sky=sky, ambient=ambient, texel=texel)
             self.exposure = self._exposure()
+            self.usual_light = np.maximum(np.median(self.light_map.light, axis=0), 1e-6)
 
     def render(self, camera: Camera, world_from_camera: np.ndarray) -> Rendering:
         """Render one view. `world_from_camera` (4, 4), OpenCV camera frame."""
@@ -165,8 +166,10 @@ class SceneRenderer:
         else:
             light = np.broadcast_to(self.ambient, albedo.shape).copy()
         for lamp in self.lights:
-            point = np.asarray(lamp.center, dtype=np.float32)
-            self._add_lamp(light, highlight, hits, lamp, point)
+            self._add_lamp(light, highlight, hits, lamp)
+        if self.light_map is not None:
+            # The map already knows what lies in shadow: dark places get no highlight.
+            highlight *= np.minimum(1.0, light / self.usual_light)
         result = albedo * light + highlight
         missed = ~hits.found
         if missed.any():
@@ -180,22 +183,18 @@ class SceneRenderer:
             )
         return albedo, result
 
-    def _add_lamp(
-        self, light: np.ndarray, highlight: np.ndarray, hits: _Hits, lamp: AreaLight, point: np.ndarray
-    ) -> None:
-        baked = self.light_map is not None
+    def _add_lamp(self, light: np.ndarray, highlight: np.ndarray, hits: _Hits, lamp: AreaLight) -> None:
+        """Add one lamp in place; with a light map its highlight alone."""
         color = np.asarray(lamp.color, dtype=np.float32)
-        if baked:
+        point = np.asarray(lamp.center, dtype=np.float32)
+        if self.light_map is not None:
             if self.soup.material_table[:, 3].max() <= 0.0:
                 return
             # A highlight mirrors the lamp; its solid angle from mid-room stands in for the exact reflection.
             color = color * np.float32(lamp.area / 6.0)
             blocked = np.zeros(len(light), dtype=np.bool_)
-            # The map already knows what lies in shadow: dark places get no highlight.
-            highlight_scale = np.minimum(1.0, light / np.maximum(np.median(light, axis=0), 1e-6))
         else:
             blocked = self._blocked(hits, point)
-            highlight_scale = None
         shading.add_light(
             light,
             highlight,
@@ -208,10 +207,8 @@ class SceneRenderer:
             blocked,
             point,
             color,
-            not baked,
+            self.light_map is None,
         )
-        if highlight_scale is not None:
-            highlight *= highlight_scale
 
     def _blocked(self, hits: _Hits, point: np.ndarray) -> np.ndarray:
         if not self.shadows:

@@ -140,6 +140,9 @@ def add_light(
         if primitive[k] == MISS or blocked[k]:
             continue
         t = np.int64(primitive[k])
+        row = table[material[t]]
+        if not diffuse and row[3] <= 0.0:
+            continue
         length, view, cosine = 0.0, 0.0, 0.0
         for axis in range(3):
             d = point[axis] - (rays[k, axis] + t_hit[k] * rays[k, 3 + axis])
@@ -155,7 +158,6 @@ def add_light(
             square += h * h
         if cosine <= 0.0:
             continue
-        row = table[material[t]]
         shine = row[3] * max(0.0, half / np.sqrt(square)) ** row[4] if row[3] > 0.0 else 0.0
         for channel in range(3):
             if diffuse:
