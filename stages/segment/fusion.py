@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from stages.segment.claims import claim_unlabelled
 from stages.segment.clustering import largest_cluster
 from stages.segment.geometric import pixels_at, relabel
 from stages.segment.panoptic import PanopticFrame
@@ -175,6 +176,13 @@ def fuse(geometric: np.ndarray, panoptic: PanopticFrame, points: np.ndarray, set
         minimum_pixels=pixels_at(settings.minimum_pixels, geometric.shape),
         keep_claimed=None if thesis else pixels_at(settings.small_object_pixels, geometric.shape),
     )
+    if not thesis:
+        labels = claim_unlabelled(
+            labels,
+            panoptic.ids,
+            points[..., 2],
+            minimum_pixels=pixels_at(settings.small_object_pixels // 2, labels.shape),
+        )
     labels = split_contained(
         labels, panoptic.ids, contained_share=settings.contained_share, largest_part=settings.largest_part
     )

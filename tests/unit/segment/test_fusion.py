@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from stages.segment.claims import claim_unlabelled
 from stages.segment.clustering import clouds_touch, largest_cluster
 from stages.segment.fusion import (
     FusionSettings,
@@ -162,11 +163,34 @@ def test_small_segments() -> None:
 
 
 def test_two_things_without_a_crease() -> None:
-    geometric = image((1, 100, 100, 300, 500))
+    geometric = image((1, 100, 100, 300, 500), (2, 100, 500, 300, 560))
     panoptic = PanopticFrame(image((1, 100, 100, 300, 320), (2, 100, 320, 300, 560)), {1: THING, 2: OTHER})
     thesis, ours = (fuse(geometric, panoptic, points(), settings) for settings in (THESIS, OURS))
-    assert by_category(thesis, 17).sum() == 200 * 400, "the second mask leaves the segment: it is not contained"
-    assert by_category(ours, 17).sum() == 200 * 220 and by_category(ours, 5).sum() == 200 * 180
+    assert by_category(thesis, 17).sum() == 200 * 400, "three quarters of the second mask are not contained"
+    assert by_category(ours, 17).sum() == 200 * 220 and by_category(ours, 5).sum() == 200 * 240
+
+
+def test_ours_gives_a_mask_the_pixels_that_no_segment_holds() -> None:
+    """A cup too small for a geometric segment, and the far background that its mask took along."""
+    geometric = image((1, 200, 100, 400, 500))
+    panoptic = PanopticFrame(image((1, 200, 100, 400, 500), (2, 170, 200, 200, 230)), {1: OTHER, 2: THING})
+    depth = np.where(image((1, 170, 222, 200, 230)) == 1, 3.0, 1.0)
+    ours, thesis = (fuse(geometric, panoptic, points(depth), settings) for settings in (OURS, THESIS))
+    assert not by_category(thesis, 17).any()
+    assert np.array_equal(by_category(ours, 17), image((1, 170, 200, 200, 222)) == 1)
+    assert by_category(ours, 0)[170:200, 222:230].all(), "the far part is background"
+
+
+def test_claims_follow_masks_and_jumps() -> None:
+    claims = np.array([[1, 1, 2, 2, 1], [1, 1, 2, 2, 1]], dtype=np.int32)
+    geometric = np.zeros_like(claims)
+    flat = np.ones(claims.shape, dtype=np.float32)
+    assert claim_unlabelled(geometric, claims, flat, minimum_pixels=2).tolist() == [[1, 1, 2, 2, 3]] * 2
+    assert claim_unlabelled(geometric, claims, flat, minimum_pixels=3).tolist() == [[1, 1, 2, 2, 0]] * 2
+    step = flat + np.array([0, 0.5, 0, 0, 0], dtype=np.float32)
+    assert claim_unlabelled(geometric, claims, step, minimum_pixels=2).tolist() == [[1, 2, 3, 3, 4]] * 2
+    held = np.array([[5, 0, 0, 0, 0]] * 2, dtype=np.int32)
+    assert claim_unlabelled(held, claims, flat, minimum_pixels=2).tolist() == [[5, 6, 7, 7, 8]] * 2
 
 
 def test_mask_pixels_without_depth_do_not_count() -> None:
