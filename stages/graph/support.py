@@ -37,6 +37,8 @@ SAME_TOP = 0.01
 """Tops and planes nearer than this are at the same height [m]."""
 SINKING_OF_A_TIE = 0.02
 """The highest plane of a tie may be this much above the child's bottom [m]."""
+LEDGE_FACTOR = 0.7
+"""A level surface labelled wall is a sill, or floor or furniture that was mislabelled: all else equal, the latter."""
 HIDDEN_TOP_DISTANCE = 0.15
 """A hidden supporting plane is looked for this close to the top of a box [m]."""
 
@@ -167,6 +169,8 @@ def _seen(child: Entity, parent: Entity, k: int, parameters: GraphParameters) ->
     score = support_score(gap, effective)
     if parameters.method == "ours" and parent.movable and not child.movable:
         score *= MOVABLE_FACTOR
+    if parameters.method == "ours" and parent.node_type == "layout" and parent.class_name != "floor":
+        score *= LEDGE_FACTOR
     if score < parameters.minimum_score:
         return None
     relation: Literal["supports", "contains"] = "contains" if inside else "supports"

@@ -13,6 +13,8 @@ from stages.graph.walls import wall_candidate
 FLOOR_CONFIDENCE = 0.1
 """Of a relation to the floor that only says: it has to stand on something."""
 SCENE_CONFIDENCE = 0.05
+MOVABLE_REACH = 1 / 3
+"""Movable things have to be this much nearer to a wall to hang on it."""
 UPRIGHT_LAYOUT = ("wall", "door", "window", "curtain", "ceiling")
 
 
@@ -28,7 +30,11 @@ def ranked_candidates(entities: list[Entity], parameters: GraphParameters) -> di
     ranked: dict[str, list[Candidate]] = {}
     for child in objects:
         choices = candidates_for(child, entities, parameters)
-        wall = wall_candidate(child, walls, parameters.wall_distance, trees)
+        reach = parameters.wall_distance
+        if parameters.method == "ours" and child.movable:
+            # A cup does not hang on the wall that the desk, which the map lacks, stands at.
+            reach *= MOVABLE_REACH
+        wall = wall_candidate(child, walls, reach, trees)
         if wall is not None:
             choices.append(wall)
         choices += fallback_candidates(child, floors)
