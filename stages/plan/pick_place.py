@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
 
 import numpy as np
 
@@ -41,16 +39,10 @@ class Budgets:
     """How much thinner than believed items may be [m]; 0 for what was looked at from near by."""
 
 
-def _pairs(bases: np.ndarray, others: int, random: np.random.Generator, most: int) -> Iterator[tuple[int, int]]:
-    """Yield (base, other) index pairs, each once: early ones favour the first of the others (they are ranked)."""
-    if len(bases) == 0 or others == 0:
-        return
-    window = 24
-    pairs = [(base, other) for start in range(0, others, window) for other in range(start, min(start + window, others))
-             for base in range(len(bases))]  # fmt: skip
-    keys = [pair[1] // window + random.random() for pair in pairs]
-    for index in islice(np.argsort(keys, kind="stable").tolist(), most):
-        yield pairs[index]
+def _pairs(bases: np.ndarray, others: int, random: np.random.Generator, most: int) -> list[tuple[int, int]]:
+    """Return at most `most` (base, other) index pairs in random order, each once."""
+    order = random.permutation(len(bases) * others)[:most]
+    return [(int(index) // others, int(index) % others) for index in order]
 
 
 def _retreat(world_from_tool: np.ndarray, distance: float) -> np.ndarray:

@@ -23,7 +23,7 @@ from stages.plan.conduct import Conduct, Room, joint_pairs
 from stages.plan.correspondence import match_bodies
 from stages.plan.execution import PhysicalRobot
 from stages.plan.execution_log import write_execution
-from stages.plan.goals import default_goals
+from stages.plan.goals import TABLE_CLASSES, default_goals
 from stages.plan.parameters import PlanParameters
 from stages.plan.pddl import domain_text, problem_text
 from stages.plan.pick_place import Budgets
@@ -94,7 +94,7 @@ def run(
                 model, state, goals if not failures else [], objects, initial, budgets, parameters, context, failures
             )
         if not goals:
-            failures.append(_nothing_to_do(model, initial))
+            failures.append(_nothing_to_do(model, graph, initial))
         problem = task_problem(objects, initial, goal)
         context.output.joinpath("domain.pddl").write_text(domain_text(DOMAIN), encoding="utf-8")
         context.output.joinpath("problem.pddl").write_text(problem_text(problem, DOMAIN.name), encoding="utf-8")
@@ -131,14 +131,22 @@ def _first_feasible(
     return (*goals[0], None) if goals else (frozenset(), (), None)
 
 
-def _nothing_to_do(model: WorldModel, initial: frozenset[Atom]) -> Failure:
+def _nothing_to_do(model: WorldModel, graph: ContactGraphFile, initial: frozenset[Atom]) -> Failure:
+    """Say which part of the demo's goal is missing: an item behind a door, or a table."""
     inside = sum(atom[0] == "in" for atom in initial)
-    tables = sum(record.class_name in ("table", "desk") for record in model.records.values())
+    tables = sum(record.class_name in TABLE_CLASSES for record in model.records.values())
+    rigid = sorted(
+        {link.source for link in graph.links
+         if link.relation == "contains" and graph.node(link.source).node_type == "articulated"
+         and link.source in model.records and not model.records[link.source].joints}
+    )  # fmt: skip
+    message = f"the scene has {inside} items behind doors and {tables} tables: the demo's goal needs one of each"
+    if rigid:
+        message += f"; {', '.join(rigid)} contain things but have no CAD model with moving parts"
     return Failure(
-        kind="no_goal",
-        message=f"the scene has {inside} items behind doors and {tables} tables: the demo's goal needs one of each",
+        kind="no_goal", message=message, objects=tuple(rigid),
         numbers={"items_inside": float(inside), "tables": float(tables)},
-    )
+    )  # fmt: skip
 
 
 def _execute(

@@ -18,6 +18,8 @@ CONTACT_BAND = 0.003
 """Points this near the outermost one are where a finger touches [m]."""
 SQUARE = 0.85
 """Least mean cosine between the surface normals there and the closing direction: at a corner fingers slip off."""
+ALIGNED = 0.004
+"""Headings are as good as the narrowest one when the item is at most this much wider there [m]."""
 
 
 @dataclass(frozen=True)
@@ -42,33 +44,31 @@ def sample_grasps(
     pitches: tuple[float, ...] = (0.0, 0.35, 0.7, 1.1, np.pi / 2),
     heights: tuple[float, ...] = (0.35, 0.5, 0.65, 0.8),
 ) -> list[Grasp]:
-    """Return the grasps whose width fits the gripper and whose fingers meet the surface squarely, narrow ones first.
+    """Return the grasps whose width fits the gripper and whose fingers meet the surface squarely, in random order.
 
     `points`, `normals` (N, 3) are of the item's surface, body frame. `opening` [m] is the widest distance of the
-    fingers. The list is empty when the item is too wide everywhere.
+    fingers. At each height and tilt those headings are kept where the item is narrowest: on a box they lie flat on its
+    faces, on a round item they are all. The list is empty when the item is too wide everywhere.
     """
     world_points = apply(world_from_body, points)
     world_normals = normals @ world_from_body[:3, :3].T
     low, high = world_points.min(axis=0), world_points.max(axis=0)
     offset = random.uniform(0, 2 * np.pi / angles)
     headings = np.concatenate([_aligned_headings(world_from_body), offset + 2 * np.pi * np.arange(angles) / angles])
-    found = []
+    found: list[Grasp] = []
     for pitch in pitches:
-        for heading in headings:
-            for height in heights if pitch < 1.2 else heights[:1]:
-                grasp = _grasp_at(world_points, world_normals, low, high, float(heading), pitch, height, opening)
-                if grasp is None:
-                    continue
-                pose, width = grasp
-                for flip in (False, True):
-                    turned = pose @ np.diag([-1.0, -1.0, 1.0, 1.0]) if flip else pose
-                    found.append(Grasp(inverse(world_from_body) @ turned, width, pitch))
-    if not found:
-        return []
-    narrowest = min(grasp.width for grasp in found)
-    order = random.permutation(len(found))
-    ranked = sorted(order.tolist(), key=lambda index: round((found[index].width - narrowest) / 0.004))
-    return [found[index] for index in ranked]
+        for height in heights if pitch < 1.2 else heights[:1]:
+            tried = [
+                _grasp_at(world_points, world_normals, low, high, float(heading), pitch, height, opening)
+                for heading in headings
+            ]
+            fitting = [grasp for grasp in tried if grasp is not None]
+            narrowest = min((width for _, width in fitting), default=0.0)
+            for pose, width in fitting:
+                if width < narrowest + ALIGNED:
+                    for turned in (pose, pose @ np.diag([-1.0, -1.0, 1.0, 1.0])):
+                        found.append(Grasp(inverse(world_from_body) @ turned, width, pitch))
+    return [found[index] for index in random.permutation(len(found)).tolist()]
 
 
 def narrowest_width(points: np.ndarray) -> float:
