@@ -49,9 +49,8 @@ def test_make_runs_the_same_commands_in_the_same_order(name: str, tmp_path: Path
         log = tmp_path / "room"
         log.write_text("x")
         given["log"] = str(log)
-        expected = [
-            step_arguments(step, f"{tmp_path}/outputs/run", resolve_variables(pipeline, given)) for step in pipeline.step
-        ]
+        values = resolve_variables(pipeline, given)
+        expected = [step_arguments(step, f"{tmp_path}/outputs/run", values) for step in pipeline.step]
     done = subprocess.run(
         ["make", "-n", "-f", f"data/pipelines/{name}.mk", "PYTHON=python", f"OUTPUTS={tmp_path}/outputs", "RUN=run"]
         + [f"{variable.upper()}={value}" for variable, value in given.items()],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 
@@ -68,7 +69,7 @@ def is_rigid(matrix: np.ndarray, tolerance: float = 1e-3) -> bool:
     )
 
 
-def look_at(eye: np.ndarray, target: np.ndarray, up: np.ndarray = (0.0, 0.0, 1.0)) -> np.ndarray:
+def look_at(eye: np.ndarray, target: np.ndarray, up: ArrayLike = (0.0, 0.0, 1.0)) -> np.ndarray:
     """Return world_from_camera (4, 4) of an OpenCV camera at `eye` that looks at `target` [m], image up along `up`."""
     forward = np.asarray(target, dtype=float) - eye
     forward = forward / np.linalg.norm(forward)
