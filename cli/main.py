@@ -13,6 +13,8 @@ import typer
 from typer.exceptions import TyperException
 
 REPOSITORY = Path(__file__).resolve().parent.parent
+INTERRUPTED = 130
+INTERRUPTED_TEXT = "interrupted; every finished artifact is as it was"
 
 
 def _refuse_foreign_packages() -> None:
@@ -53,17 +55,17 @@ def run(arguments: list[str]) -> int:
         from cli.application import build_application
 
         result = build_application()(args=arguments, prog_name="scenewright", standalone_mode=False)
+        if result == INTERRUPTED:  # typer's own translation of KeyboardInterrupt
+            _say_error(INTERRUPTED_TEXT)
         return result if isinstance(result, int) else 0
     except ScenewrightError as error:
         if debug:
             raise
         _say_error(str(error))
         return error.exit_code
-    except typer.Exit as error:
-        return error.exit_code
     except (KeyboardInterrupt, typer.Abort):
-        _say_error("interrupted; every finished artifact is as it was")
-        return 130
+        _say_error(INTERRUPTED_TEXT)
+        return INTERRUPTED
     except TyperException as error:
         context = getattr(error, "ctx", None)
         where = f"{context.command_path}: " if context is not None else ""

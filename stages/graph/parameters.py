@@ -74,7 +74,7 @@ class GraphParameters(Parameters):
 STAGE = Stage(
     name="graph",
     version=1,
-    summary="contact graph (who supports, contains, carries whom) from a panoptic map",
+    summary="Build the contact graph (who supports, contains, carries whom) from a panoptic map",
     parameters=GraphParameters,
     reads={"panoptic_map": PanopticMap},
     writes=ContactGraph,

@@ -86,7 +86,7 @@ inputs = { log = "$log" }
         (BASE.replace('inputs = { log = "$log" }', ""), "missing"),
         (BASE + BASE[BASE.index("[[step]]") :], "two steps"),
         (BASE.replace('name = "sequence"', 'name = "../x"'), "not a name"),
-        (BASE.replace("summary", "nonsense"), "nonsense"),
+        (BASE.replace("summary", "nonsense"), "summary: Field required"),
         ("not toml", "TOML"),
     ],
 )
