@@ -28,7 +28,11 @@ class FuseParameters(Parameters):
     )
 
     label_band: float = Field(
-        1.0, gt=0, le=1, description="Voxels within this share of the truncation distance take part in the label vote"
+        0.4,
+        gt=0,
+        le=1,
+        description="Voxels within this share of the truncation distance vote (1 in the thesis's code, which widens flat "
+        "things by it)",
     )
     overlap_stride: int = Field(2, ge=1, le=16, description="Every how many-th pixel measures overlap with the map")
     minimum_overlap_voxels: int = Field(

@@ -1,4 +1,4 @@
-"""Tiny scenes with a known surface: boxes and spheres on a floor, ray cast in numpy, written as sequence and segments."""
+"""Tiny scenes with a known surface: boxes on a floor, ray cast in numpy, written as sequence and segments."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def write_scene(
     with_depth: bool = True,
     background: dict[int, tuple[int, ...]] | None = None,
 ) -> tuple[Sequence, Segments]:
-    """Write a sequence and true segments of the blocks under `root`. `background`: frame -> blocks without prediction."""
+    """Write a sequence and true segments under `root`. `background`: frame -> blocks without prediction."""
     sequence, segments = Sequence(root=root / "sequence"), Segments(root=root / "segments")
     for folder in (sequence.root, segments.root):
         folder.mkdir(parents=True)
