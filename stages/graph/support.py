@@ -124,7 +124,7 @@ def candidates_for(child: Entity, entities: list[Entity], parameters: GraphParam
     for parent in entities:
         if parent.name == child.name or parent.class_name == "ceiling":
             continue
-        if not parent.bottom < child.bottom + (ORDER_TOLERANCE if ours else 0.0):
+        if not parent.bottom < child.bottom + ORDER_TOLERANCE:
             continue
         seen = [_seen(child, parent, k, parameters) for k in parent.supporting]
         accepted = [candidate for candidate in seen if candidate is not None]

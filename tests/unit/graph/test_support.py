@@ -96,7 +96,9 @@ def test_best_parent_maximises_the_score():
     floor = solid("floor_1", (-3, -3, -0.01), (3, 3, 0), class_name="floor", node_type="layout")
     table = solid("table_2", (0, 0, 0), (1, 1, 0.75), class_name="table", movable=False)
     cup = solid("cup_3", (0.4, 0.4, 0.76), (0.5, 0.5, 0.86), class_name="cup")
-    ranked = candidates_for(cup, [floor, table, cup], GraphParameters(tie_margin=0.0))
+    # A cup 0.76 m above the floor does not stand on it.
+    assert [c.parent for c in candidates_for(cup, [floor, table, cup], GraphParameters())] == ["table_2"]
+    ranked = candidates_for(cup, [floor, table, cup], GraphParameters(tie_margin=0.0, movable_gap=1.0))
     assert [c.parent for c in ranked] == ["table_2", "floor_1"]
     assert ranked[0].score == pytest.approx(0.99)
     assert ranked[0].gap == pytest.approx(0.01) and ranked[0].overlap == pytest.approx(1.0)
