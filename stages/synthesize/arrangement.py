@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -60,6 +60,12 @@ class Arrangement:
     """Instances below this are layout: 1 the floor, then walls and ceiling."""
 
 
+def world_meshes(arrangement: Arrangement) -> list[tuple[int, trimesh.Trimesh]]:
+    """Return (instance, mesh in the world frame) of layout and objects."""
+    layout = [(k, entry.mesh) for k, entry in enumerate(arrangement.room.layouts, start=1)]
+    return layout + [(thing.instance, thing.world_mesh()) for thing in arrangement.objects]
+
+
 @dataclass(frozen=True)
 class _Pose:
     """A pose under trial and what it would hang on."""
@@ -76,10 +82,17 @@ class _Impossible(Exception):
     """This start of a room cannot be finished."""
 
 
-def arrange(recipe: Recipe, catalogue: Catalogue, clutter: str, seed: int) -> Arrangement:
+def arrange(
+    recipe: Recipe,
+    catalogue: Catalogue,
+    clutter: str,
+    seed: int,
+    objection: Callable[[Arrangement], str | None] = lambda arrangement: None,
+) -> Arrangement:
     """Furnish a room. The same recipe, library, clutter and seed give the same room.
 
-    Raises BadInput when a class is missing from the library, or when no start satisfies the recipe's least counts.
+    `objection` may refuse a finished room by returning why; another is begun then. Raises BadInput when a class is
+    missing from the library, or when no start satisfies the recipe's least counts and the objection.
     """
     for place in recipe.place:
         if place.count[0] > 0 and not catalogue.by_class.get(place.class_name):
@@ -91,7 +104,11 @@ def arrange(recipe: Recipe, catalogue: Catalogue, clutter: str, seed: int) -> Ar
     for start in range(RESTARTS):
         random = np.random.default_rng([seed, 11, start])
         try:
-            return _Arranger(recipe, catalogue, clutter, random).run()
+            arrangement = _Arranger(recipe, catalogue, clutter, random).run()
+            refused = objection(arrangement)
+            if refused is None:
+                return arrangement
+            reasons.append(refused)
         except _Impossible as reason:
             reasons.append(str(reason))
     raise BadInput(

@@ -16,8 +16,8 @@ CELL = 0.05
 """[m]"""
 BODY_HEIGHTS = (0.12, 0.35, 0.6, 0.85, 1.1, 1.35, 1.6)
 """Heights at which the clearance is measured; its minimum counts [m]."""
-BODY_RADIUS = 0.33
-"""Clearance that walking needs [m]; more than the 0.3 m that the camera keeps."""
+BODY_RADIUS = 0.36
+"""Clearance that walking needs [m]; more than what the camera keeps."""
 
 
 @dataclass(frozen=True)

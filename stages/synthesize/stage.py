@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 
 from schemas.cad_library import CadLibrary
 from schemas.ground_truth import GroundTruth, GroundTruthFile
@@ -17,7 +16,7 @@ from stages.kit.formats.trajectories import write_tum
 from stages.kit.rendering.ray_casting import SceneRenderer
 from stages.kit.stage import Context
 from stages.synthesize.appearance import AMBIENT, SKY, gloss_table, lamps, layout_materials, object_material
-from stages.synthesize.arrangement import Arrangement, arrange
+from stages.synthesize.arrangement import Arrangement, arrange, world_meshes
 from stages.synthesize.depth_noise import DepthCamera, disturb_depth
 from stages.synthesize.free_space import find_free_space
 from stages.synthesize.furniture import Catalogue
@@ -25,7 +24,7 @@ from stages.synthesize.parameters import SynthesizeParameters
 from stages.synthesize.recipes import Recipe, load_recipe
 from stages.synthesize.seen_surface import SeenSurface
 from stages.synthesize.truth import object_boxes, scene_bodies, true_graph, true_mesh, true_objects
-from stages.synthesize.viewpoints import choose_views
+from stages.synthesize.viewpoints import blocked_floor, choose_views
 from stages.synthesize.walk import Walk, frame_times, plan_walk
 
 VIEW_STREAM, TREMOR_STREAM, NOISE_STREAM = 1, 2, 3
@@ -49,9 +48,9 @@ def run(library: CadLibrary, *, parameters: SynthesizeParameters, context: Conte
     recipe = load_recipe(parameters.recipe)
     camera = make_camera(parameters)
     with context.progress.step("furnish"):
-        arrangement = arrange(recipe, Catalogue(library), parameters.clutter, context.seed)
+        arrangement = arrange(recipe, Catalogue(library), parameters.clutter, context.seed, blocked_floor)
     with context.progress.step("light"):
-        renderer = make_renderer(arrangement, recipe)
+        renderer = make_renderer(arrangement, recipe, texel=float(np.clip(32.0 / parameters.width, 0.05, 0.2)))
     with context.progress.step("walk"):
         space = find_free_space(renderer, arrangement.room.size)
         views = choose_views(renderer, arrangement, space, camera, context.random(VIEW_STREAM))
@@ -83,21 +82,18 @@ def make_camera(parameters: SynthesizeParameters) -> Camera:
     )  # fmt: skip
 
 
-def make_renderer(arrangement: Arrangement, recipe: Recipe) -> SceneRenderer:
-    """Return the renderer of a furnished room with its light map."""
-    meshes: list[tuple[int, trimesh.Trimesh]] = [
-        (k, layout.mesh) for k, layout in enumerate(arrangement.room.layouts, start=1)
-    ]
-    meshes += [(thing.instance, thing.world_mesh()) for thing in arrangement.objects]
+def make_renderer(arrangement: Arrangement, recipe: Recipe, texel: float = 0.05) -> SceneRenderer:
+    """Return the renderer of a furnished room with its light map; `texel` is the distance of its samples [m]."""
     materials = layout_materials(arrangement.room, recipe.shell)
     materials |= {thing.instance: object_material(thing) for thing in arrangement.objects}
     return SceneRenderer(
-        meshes,
+        world_meshes(arrangement),
         lights=lamps(arrangement.room, recipe.shell),
         ambient=AMBIENT,
         sky=SKY,
         materials=materials,
         light_map=True,
+        texel=texel,
     )
 
 

@@ -22,7 +22,7 @@ from stages.kit.geometry.boxes import (
     minimum_box,
     polygon_area,
 )
-from stages.synthesize.arrangement import Arrangement, PlacedObject
+from stages.synthesize.arrangement import Arrangement, PlacedObject, world_meshes
 from stages.synthesize.furniture import plane_in_world
 from stages.synthesize.shell import Layout
 
@@ -201,9 +201,7 @@ def scene_bodies(arrangement: Arrangement, boxes: dict[str, Box], graph: Contact
 def true_mesh(arrangement: Arrangement) -> trimesh.Trimesh:
     """Return the whole surface in the world frame with vertex colours and the vertex attribute `instance`."""
     parts, labels = [], []
-    meshes = [(k, layout.mesh) for k, layout in enumerate(arrangement.room.layouts, start=1)]
-    meshes += [(thing.instance, thing.world_mesh()) for thing in arrangement.objects]
-    for instance, mesh in meshes:
+    for instance, mesh in world_meshes(arrangement):
         visual: Any = mesh.visual
         colors = np.asarray(visual.to_color().vertex_colors if visual.kind == "texture" else visual.vertex_colors)
         parts.append(trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=colors, process=False))

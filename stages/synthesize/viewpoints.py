@@ -14,14 +14,16 @@ from schemas.scene_parts import Camera
 from stages.kit.geometry.cameras import project
 from stages.kit.geometry.transforms import apply, inverse, look_at
 from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.synthesize.arrangement import Arrangement, PlacedObject
-from stages.synthesize.free_space import FreeSpace
+from stages.synthesize.arrangement import Arrangement, PlacedObject, world_meshes
+from stages.synthesize.free_space import CELL, FreeSpace, find_free_space
 
 EYE_HEIGHT = 1.5
 """[m]"""
 CANDIDATES, SAMPLES = 260, 5000
 NEAR, FAR, STEEPEST = 0.6, 3.5, 0.25
 """A sample counts as seen between these depths [m] and with at least this cosine of incidence."""
+LEAST_FLOOR = 3.0
+"""[m^2]"""
 LAYOUT_WEIGHT = {"floor": 1.0, "wall": 0.3, "ceiling": 0.0}
 
 
@@ -53,6 +55,22 @@ def required_views(arrangement: Arrangement, space: FreeSpace) -> list[View]:
         elif thing.class_name in ("table", "desk"):
             views += _onto(thing, space)
     return views
+
+
+def blocked_floor(arrangement: Arrangement) -> str | None:
+    """Return why nobody could work in a room, or None: the floor before every open piece of furniture, and beside
+    every table, must belong to one walkable region of at least LEAST_FLOOR."""
+    renderer = SceneRenderer(world_meshes(arrangement))
+    space = find_free_space(renderer, arrangement.room.size)
+    area = float(space.walkable.sum()) * CELL**2
+    if area < LEAST_FLOOR:
+        return f"only {area:.1f} m2 to walk on"
+    for thing in arrangement.objects:
+        if any(value > 0 for value in thing.furnishing.joints.values()) and len(_into(thing, space)) < 3:
+            return f"the floor before {thing.name} cannot be walked to"
+        if thing.class_name == "table" and not _onto(thing, space):
+            return f"{thing.name} cannot be walked to"
+    return None
 
 
 def _into(thing: PlacedObject, space: FreeSpace) -> list[View]:

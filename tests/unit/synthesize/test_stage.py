@@ -20,6 +20,7 @@ from stages.kit.geometry.boxes import boxes_overlap_volume, points_in_box
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import apply
 from stages.kit.progress import SilentProgress
+from stages.kit.simulation.world import load_scene
 from stages.kit.stage import Context
 from stages.synthesize.depth_noise import DepthCamera
 from stages.synthesize.parameters import SynthesizeParameters
@@ -164,3 +165,11 @@ def test_same_seed_same_bytes(library: CadLibrary, truth: GroundTruth, tmp_path:
         return {str(path.relative_to(root)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
     assert digests(again.root) == digests(truth.root)
+
+
+def test_true_room_stands_still_in_a_physics_engine(truth: GroundTruth) -> None:
+    """Nothing falls, slides or is thrown out: the collision margins of the engine alone move things, by millimetres."""
+    with load_scene(truth.path("room")) as world:
+        moved = world.settle(1.0)
+    assert len(moved) >= 5
+    assert max(moved.values()) < 0.01, {name: value for name, value in moved.items() if value >= 0.01}
