@@ -209,8 +209,8 @@ class Conduct:
             except MotionFailed as failed:
                 self._note(failed, step.name, step.arguments)
                 return False
-            last = number + 1 == len(steps) or steps[number + 1].arguments != step.arguments
-            if last and step.manipulation is not None:
+            later = any((step.name, step.arguments) == (other.name, other.arguments) for other in steps[number + 1 :])
+            if step.manipulation is not None and not later:
                 try:
                     self._check_effect(step.name, step.arguments)
                 except MotionFailed as failed:
