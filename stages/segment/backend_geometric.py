@@ -10,7 +10,7 @@ import numpy as np
 
 from schemas.vocabulary import Vocabulary
 from stages.kit.formats.frames import Frame
-from stages.segment.geometric import GeometricFrame
+from stages.segment.geometric import GeometricFrame, pixels_at
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
 
@@ -21,11 +21,15 @@ class GeometricBackend:
     label = "geometric segments, class-agnostic"
     streams: tuple[str, ...] = ("depth",)
 
-    def __init__(self, vocabulary: Vocabulary) -> None:
+    def __init__(self, vocabulary: Vocabulary, *, minimum_pixels: int) -> None:
+        self._minimum_pixels = minimum_pixels
         semantic = vocabulary.by_name("object")
         self._mask = PanopticMask(semantic.id, semantic.kind == "thing")
 
     def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
-        """Return a mask per geometric segment."""
-        count = int(geometric.labels.max(initial=0))
-        return PanopticFrame(ids=geometric.labels, masks=dict.fromkeys(range(1, count + 1), self._mask))
+        """Return a mask per geometric segment of at least `minimum_pixels` (at 640x480): nobody has recognised
+        anything in the smaller ones, and most of them are noise."""
+        large = np.bincount(geometric.labels.ravel()) >= pixels_at(self._minimum_pixels, geometric.labels.shape)
+        large[0] = False
+        ids = np.where(large[geometric.labels], geometric.labels, 0).astype(np.int32)
+        return PanopticFrame(ids=ids, masks=dict.fromkeys(np.flatnonzero(large).tolist(), self._mask))

@@ -83,7 +83,7 @@ def choose_backend(
     if parameters.corruption > 0 and parameters.backend != "ground-truth":
         raise UsageError("--corruption is for --backend ground-truth alone")
     if parameters.backend == "geometric":
-        return GeometricBackend(vocabulary)
+        return GeometricBackend(vocabulary, minimum_pixels=parameters.fusion_minimum)
     if parameters.backend == "detector":
         return _detector_backend(sequence, reader, weights, parameters)
     return GroundTruthBackend(sequence.info, vocabulary, parameters.corruption)
