@@ -68,6 +68,8 @@ class PlanFile(Model):
     status: Literal["executed", "planned", "infeasible", "execution_failed"]
     matches: tuple[BodyMatch, ...] = ()
     """Bodies that the plan names, and what they are in the room of execution."""
+    bumps: dict[str, float] = {}
+    """Bodies of the room that something other than hand and fingers touched during execution -> largest force [N]."""
     assumptions: tuple[str, ...] = ()
     """What the execution was allowed to know beyond the planned scene, in words."""
 

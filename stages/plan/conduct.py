@@ -194,7 +194,6 @@ class Conduct:
             self.physical.release()
         self.physical.recording.keyframe(self.physical.action, "failed")
         self.physical.follow(Segment(rows, self.model.description.opening, 0.5), None)
-        self.physical.bumps.clear()
         base, arm = rows[-1, :3], rows[-1, 3:]
         return self._perceived(RobotState(base, arm, state.holding, state.tool_from_item, state.body_from_tool))
 

@@ -42,6 +42,8 @@ class PhysicalRobot:
         self._trail: list[np.ndarray] = [start.body]
         self.bumps: dict[str, float] = {}
         """Bodies that something other than hand and fingers touched -> largest force [N]."""
+        self._touched: dict[str, float] = {}
+        """The same, since the last motion that failed."""
 
     # --- control ----------------------------------------------------------------------------------------------
 
@@ -69,6 +71,7 @@ class PhysicalRobot:
             name = self.world.name_of(contact.other_body)
             if name is not None:
                 self.bumps[name] = max(contact.force, self.bumps.get(name, 0.0))
+                self._touched[name] = max(contact.force, self._touched.get(name, 0.0))
 
     def follow(self, segment: Segment, item: str | None) -> None:
         """Go along a segment's path, then do its event. `item` is the body's name in this world.
@@ -115,11 +118,12 @@ class PhysicalRobot:
         """Raises MotionFailed `path_blocked` when the joints are far from where they were sent."""
         off = np.abs(self.robot.configuration().body - goal)
         if off[:2].max() > 0.1 or off[2:].max() > 0.35:
-            worst = max(self.bumps, key=lambda name: self.bumps[name], default="")
+            touched, self._touched = self._touched, {}
+            worst = max(touched, key=lambda name: touched[name], default="")
             raise MotionFailed(
                 "path_blocked",
                 f"the robot stands {off[:2].max():.3f} m and {off[2:].max():.2f} rad from where it was sent"
-                + (f"; it touched {worst} with {self.bumps[worst]:.0f} N" if worst else ""),
+                + (f"; it touched {worst} with {touched[worst]:.0f} N" if worst else ""),
                 (worst,) if worst else (),
                 {"base_error": off[:2].max(), "joint_error": off[2:].max()},
             )

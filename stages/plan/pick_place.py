@@ -270,13 +270,17 @@ def sample_placements(
 ) -> list[np.ndarray]:
     """Return poses world_from_item (4, 4), upright, a hair above the horizontal planes of `surface`.
 
-    The planes with the largest area come first; the item's footprint circle stays `EDGE_MARGIN` inside the rectangle.
+    The planes with the largest area come first; in furniture with doors, only those that leave room for the item below
+    its top; the item's footprint circle stays `EDGE_MARGIN` inside the rectangle.
     """
     points = model.points(item)
     radius = float(np.linalg.norm(points[:, :2], axis=1).max())
     bottom = float(points[:, 2].min())
     places = []
     planes = [plane for plane in model.planes[surface] if plane.horizontal and len(plane.corners) == 4]
+    if model.records[surface].joints:  # inside, not on top
+        top = model.world.bounds(surface)[1][2] - float(np.ptp(points[:, 2]))
+        planes = [plane for plane in planes if plane.center[2] < top]
     for plane in sorted(planes, key=lambda entry: -entry.area):
         corners = np.array(plane.corners)
         origin, along, across = corners[0], corners[1] - corners[0], corners[3] - corners[0]

@@ -106,11 +106,12 @@ class RoomPictures:
         return look_at(eye, np.array([middle[0], middle[1], 0.4]))
 
     def near(self, snapshot: Snapshot, camera: Camera) -> np.ndarray:
-        """Return (H, W, 3) uint8: the robot at work, from the place in the room where most of it can be seen."""
+        """Return (H, W, 3) uint8: the robot at work, from where most of it and of its fingers can be seen."""
         renderer = self._renderer(snapshot, True)
         robot = np.array([snapshot.links[f"robot/{name}"][:3, 3] for name in sorted(_shown(snapshot))])
         hand = snapshot.links["robot/panda_hand"] if "robot/panda_hand" in snapshot.links else np.eye(4)
-        points = np.concatenate([robot, apply(hand, np.array([[0, 0, 0.05], [0, 0, 0.1], [0, 0, 0.12]]))])
+        points = np.concatenate([robot, apply(hand, np.array([[0, 0, 0.08], [0, 0, 0.11], [0, 0, 0.13]]))])
+        weights = np.concatenate([np.full(len(robot), 0.5 / len(robot)), np.full(3, 0.5 / 3)])
         middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
         best: tuple[float, np.ndarray] | None = None
         for height in (1.7, 2.15):
@@ -123,7 +124,7 @@ class RoomPictures:
                         points + 0.08 * (eye - points) / distance, np.tile(eye, (len(points), 1))
                     )
                     close = float(renderer.distance(eye[None])[0])
-                    score = float(np.mean(~hidden)) + min(close, 0.3) - 0.05 * abs(distance - 2.0)
+                    score = float(weights @ ~hidden) + min(close, 0.3) - 0.05 * abs(distance - 2.0)
                     if best is None or score > best[0] + 1e-6:
                         best = (score, eye)
         eye = best[1] if best is not None else middle + np.array([0.0, 0.0, 2.5])

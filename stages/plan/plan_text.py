@@ -26,6 +26,9 @@ def plan_text(plan: PlanFile, steps: list[Step]) -> str:
         for match in plan.matches:
             away = "" if match.distance is None else f" ({match.distance:.3f} m apart)"
             lines.append(f"  {match.body} is {match.matched or 'nowhere'}{away}")
+    if plan.bumps:
+        lines += ["", "touched by something other than hand and fingers:"]
+        lines += [f"  {name}: {force:.0f} N" for name, force in plan.bumps.items()]
     if plan.failures:
         lines += ["", "failures on the way:"]
         for failure in plan.failures:

@@ -60,6 +60,7 @@ class Outcome:
     matches: tuple[BodyMatch, ...]
     assumptions: tuple[str, ...]
     failures: tuple[Failure, ...]
+    bumps: dict[str, float]
 
 
 def run(
@@ -100,7 +101,7 @@ def run(
         context.output.joinpath("problem.pddl").write_text(problem_text(problem, DOMAIN.name), encoding="utf-8")
         steps = attempt.steps if attempt is not None else None
         rows, ranges = planned_rows(steps or [], robot)
-        outcome = Outcome(None, False, (), (), (), ())
+        outcome = Outcome(None, False, (), (), (), (), {})
         arrays = dict(rows)
         updated = graph
         if steps is not None and parameters.execute:
@@ -193,6 +194,7 @@ def _execute(
     outcome = Outcome(
         "reconstructed" if ground_truth is None else "ground_truth", carried_out, checks,
         tuple(match for name, match in matches.items() if name in named), assumptions, tuple(conduct.failures),
+        {name: round(force, 3) for name, force in sorted(physical.bumps.items())},
     )  # fmt: skip
     return outcome, executed_rows(physical.recording.snapshots), updated
 
@@ -278,7 +280,7 @@ def _write(
     plan = PlanFile(
         goal=literals, planned_in="reconstructed", executed_in=outcome.executed_in, actions=actions,
         failures=(*failures, *outcome.failures, *unmet), checks=outcome.checks, status=status,
-        matches=outcome.matches, assumptions=outcome.assumptions,
+        matches=outcome.matches, assumptions=outcome.assumptions, bumps=outcome.bumps,
     )  # fmt: skip
     plan.write(context.output / "plan.json")
     graph.write(context.output / "graph.json")
