@@ -79,3 +79,7 @@ real: setup ## The chain on real logs, one table; fails unless it finds what the
 bench: setup ## Speed beside named peers, medians (QUICK=1: fewer runs)
 	$(PYTHON) -m benchmarks.speed.fusion $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-fusion
 	$(PYTHON) -m benchmarks.speed.segmentation $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-segmentation
+
+.PHONY: pictures
+pictures: setup ## Take the README's pictures out of the demo run
+	$(PYTHON) docs/pictures.py $(OUTPUTS)/demo

@@ -70,6 +70,8 @@ class Manifest(Model):
     parameters: dict[str, Any] = {}
     seed: int = 0
     libraries: dict[str, str] = {}
+    data_files: dict[str, str] = {}
+    """Files of data/ that decided the output -> sha256."""
     device_kind: str = "cpu"
     conventions: dict[str, str] = CONVENTIONS
     outcome: str = "ok"

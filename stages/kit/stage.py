@@ -97,6 +97,9 @@ class Stage:
     libraries: tuple[str, ...] = ("numpy",)
     module: str = "stage"
     example: str = ""
+    data_files: Callable[[Any], tuple[str, ...]] | None = None
+    """Parameters -> files of `data/` that the step reads; their content is part of the key. The class vocabulary
+    always is."""
     check: Callable[[Any, Mapping[str, Any]], None] | None = None
     """Optional check of parameters against the inputs given (role -> path), raising UsageError before work starts."""
 

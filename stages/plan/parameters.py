@@ -55,6 +55,7 @@ STAGE = Stage(
     reads={"scene": InteractiveScene, "ground_truth": Optionally(GroundTruth)},
     writes=Plan,
     libraries=("numpy", "scipy", "numba", "pybullet", "open3d", "trimesh"),
+    data_files=lambda parameters: (f"robots/{parameters.robot}.toml",),
     example="scenewright plan --scene outputs/demo/interactive_scene --ground-truth outputs/demo/ground_truth "
     "--out outputs/demo/plan",
 )

@@ -33,5 +33,6 @@ STAGE = Stage(
     reads={"library": CadLibrary},
     writes=GroundTruth,
     libraries=("open3d", "numba", "numpy", "opencv-python-headless", "trimesh", "python-fcl", "scipy"),
+    data_files=lambda parameters: (f"recipes/{parameters.recipe}.toml",),
     example="scenewright synthesize --library outputs/demo/cad_library --out outputs/demo/ground_truth --frames 300",
 )

@@ -10,12 +10,14 @@ import resource
 import shutil
 import signal
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from schemas.errors import BadInput, MachineFailure, UsageError
 from schemas.manifest import MANIFEST_NAME, Manifest
+from schemas.vocabulary import VOCABULARY_FILE
 from stages.kit.running import store
 from stages.kit.running.runner import RunResult, run_stage
 from stages.kit.running.verification import verify
@@ -302,3 +304,20 @@ def test_links_in_artifacts_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a" / "file-0.txt").symlink_to(tmp_path / "secret")
     with pytest.raises(BadInput, match="outside"):
         make(tmp_path / "down", {"upstream": tmp_path / "a"})
+
+
+def test_key_covers_the_content_of_data_files(tmp_path: Path) -> None:
+    """A recipe edited under the same name makes another artifact; a missing one is a usage error."""
+    recipe = VOCABULARY_FILE.parent / "recipes" / "contract_test.toml"
+    stage = replace(PROBE, data_files=lambda parameters: ("recipes/contract_test.toml",))
+    with pytest.raises(UsageError, match=r"contract_test\.toml"):
+        run_stage(stage, {}, tmp_path / "a", ProbeParameters())
+    try:
+        recipe.write_text("a = 1\n")
+        first = run_stage(stage, {}, tmp_path / "a", ProbeParameters())
+        assert run_stage(stage, {}, tmp_path / "a", ProbeParameters()).status == "up to date"
+        recipe.write_text("a = 2\n")
+        again = run_stage(stage, {}, tmp_path / "a", ProbeParameters())
+    finally:
+        recipe.unlink(missing_ok=True)
+    assert again.key != first.key and "data file recipes/contract_test.toml" in again.reason

@@ -73,7 +73,7 @@ def look_at(eye: np.ndarray, target: np.ndarray, up: ArrayLike = (0.0, 0.0, 1.0)
     """Return world_from_camera (4, 4) of an OpenCV camera at `eye` that looks at `target` [m], image up along `up`."""
     forward = np.asarray(target, dtype=float) - eye
     forward = forward / np.linalg.norm(forward)
-    right = np.cross(forward, up)
+    right = np.cross(forward, np.asarray(up, dtype=float))
     right = right / np.linalg.norm(right)
     down = np.cross(forward, right)
     return transform_from(np.column_stack([right, down, forward]), np.asarray(eye, dtype=float))

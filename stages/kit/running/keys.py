@@ -9,7 +9,9 @@ from importlib import metadata
 from typing import Any
 
 from schemas.base import canonical_json
-from stages.kit.running.digests import sha256_of_text
+from schemas.errors import UsageError
+from schemas.vocabulary import VOCABULARY_FILE
+from stages.kit.running.digests import sha256_of_file, sha256_of_text
 from stages.kit.stage import Parameters, Stage
 
 KEY_FORMAT = 1
@@ -28,6 +30,15 @@ def library_version(distribution: str) -> str:
 def library_versions(stage: Stage) -> dict[str, str]:
     """Return the versions of the libraries that decide the step's output."""
     return {name: library_version(name) for name in sorted(stage.libraries)}
+
+
+def data_file_digests(stage: Stage, parameters: Parameters) -> dict[str, str]:
+    """Return name -> sha256 of the files of data/ that the step reads. Raises UsageError for a missing one."""
+    names = (VOCABULARY_FILE.name, *(stage.data_files(parameters) if stage.data_files else ()))
+    for name in names:
+        if not (VOCABULARY_FILE.parent / name).is_file():
+            raise UsageError(f"{stage.name}: data/{name} does not exist", hint="see the files of data/")
+    return {name: sha256_of_file(VOCABULARY_FILE.parent / name) for name in names}
 
 
 def parameters_as_json(parameters: Parameters) -> dict[str, Any]:
@@ -52,6 +63,7 @@ def artifact_key(stage: Stage, parameters: Parameters, inputs: Mapping[str, str]
                 "inputs": dict(inputs),
                 "seed": seed,
                 "libraries": library_versions(stage),
+                "data_files": data_file_digests(stage, parameters),
                 "device_kind": device_kind,
             }
         )

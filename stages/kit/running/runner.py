@@ -20,7 +20,7 @@ from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
 from stages.kit.progress import SilentProgress
 from stages.kit.running import store
 from stages.kit.running.digests import content_digest, external_digest, record_files
-from stages.kit.running.keys import artifact_key, library_versions, parameters_as_json
+from stages.kit.running.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
 from stages.kit.running.provenance import provenance_now
 from stages.kit.running.reading import check_sizes, open_artifact, read_manifest
 from stages.kit.stage import Context, External, Optionally, Parameters, Stage
@@ -114,11 +114,12 @@ def _what_changed(old: Manifest, new: dict[str, Any]) -> list[str]:
     for group, before, after in (
         ("parameter", old.parameters, new["parameters"]),
         ("library", old.libraries, new["libraries"]),
+        ("data file", old.data_files, new["data_files"]),
         ("input", {record.role: record.digest for record in old.inputs}, new["inputs"]),
     ):
         for name in sorted(set(before) | set(after)):
             if before.get(name) != after.get(name):
-                detail = "" if group == "input" else f" {before.get(name)!r} -> {after.get(name)!r}"
+                detail = "" if group in ("input", "data file") else f" {before.get(name)!r} -> {after.get(name)!r}"
                 changed.append(f"{group} {name}{detail}")
     return changed
 
@@ -168,6 +169,7 @@ def run_stage(
         "device_kind": device,
         "parameters": parameters_as_json(parameters),
         "libraries": library_versions(stage),
+        "data_files": data_file_digests(stage, parameters),
         "inputs": digests,
     }
 
@@ -211,6 +213,7 @@ def run_stage(
                 parameters=facts["parameters"],
                 seed=seed,
                 libraries=facts["libraries"],
+                data_files=facts["data_files"],
                 device_kind=device,
                 outcome=made.outcome,
                 summary=made.summary,
