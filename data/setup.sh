@@ -39,5 +39,5 @@ else
     "${pip[@]}" "$(grep '^torch==' requirements.lock)"
 fi
 "${pip[@]}" -r requirements.lock
-"${pip[@]}" --no-deps --no-build-isolation -e .
+"${pip[@]}" --no-deps --no-build-isolation -e . 2>/dev/null
 "$venv/bin/python" -c 'import importlib.util as u; assert u.find_spec("torchvision") is None, "torchvision must not be installed"'
