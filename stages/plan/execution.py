@@ -8,6 +8,7 @@ from schemas.interactive_scene import SceneBody
 from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.timing import sample_times, time_path
+from stages.kit.simulation.engine import engine
 from stages.kit.simulation.robot import Configuration, Robot
 from stages.kit.simulation.robot_description import RobotDescription
 from stages.kit.simulation.world import PhysicsWorld
@@ -44,6 +45,21 @@ class PhysicalRobot:
         """Bodies that something other than hand and fingers touched -> largest force [N]."""
         self._touched: dict[str, float] = {}
         """The same, since the last motion that failed."""
+
+    def check_start(self) -> None:
+        """Raises MotionFailed `start_in_collision` when the robot stands in a body of this room other than the floor."""
+        engine.performCollisionDetection(physicsClientId=self.world.client)
+        for contact in self.world.contacts(self.robot.body_id):
+            name = self.world.name_of(contact.other_body)
+            if name is None or self.world.bodies[name].record.class_name == "floor" or contact.depth < 0.005:
+                continue
+            raise MotionFailed(
+                "start_in_collision",
+                f"in this room the robot starts {1000 * contact.depth:.0f} mm deep in {name}, which the planned scene "
+                "does not show there",
+                (name,),
+                {"depth": contact.depth},
+            )
 
     # --- control ----------------------------------------------------------------------------------------------
 

@@ -107,7 +107,17 @@ def run(
         if steps is not None and parameters.execute:
             with context.progress.step("execute"):
                 outcome, snapshots, updated = _execute(
-                    model, scene, ground_truth, graph, state, steps, literals, budgets, parameters, context
+                    model,
+                    scene,
+                    ground_truth,
+                    graph,
+                    state,
+                    steps,
+                    literals,
+                    budgets,
+                    parameters,
+                    context,
+                    failures,
                 )
             arrays |= snapshots
         return _write(parameters, context, literals, steps, ranges, failures, outcome, arrays, updated)
@@ -153,7 +163,7 @@ def _nothing_to_do(model: WorldModel, graph: ContactGraphFile, initial: frozense
 def _execute(
     model: WorldModel, scene: InteractiveScene, ground_truth: GroundTruth | None, graph: ContactGraphFile,
     state: RobotState, steps: list[Step], literals: tuple[str, ...], budgets: Budgets, parameters: PlanParameters,
-    context: Context,
+    context: Context, failures: list[Failure],
 ) -> tuple[Outcome, dict[str, np.ndarray], ContactGraphFile]:  # fmt: skip
     """Carry out the steps in the room, write pictures and log, and return what came of it."""
     root = scene.root if ground_truth is None else ground_truth.path("room")
@@ -172,6 +182,7 @@ def _execute(
     with load_scene(root) as world:
         start = Configuration(state.base, state.arm, model.description.opening)
         physical = PhysicalRobot(world, model.description, start, RECORD_RATE)
+        free = _starts_free(physical, failures)
         physical.wait(SETTLE_SECONDS)
         poses = {name: world.pose(name) for name, record in records.items() if record.movable}
         physical.recording.keyframe(-1, "start")
@@ -179,7 +190,7 @@ def _execute(
             model, Room(records, texts, planes), physical, matches, joint_names, replace(budgets, size_uncertainty=0.0),
             context.random(EXECUTION), parameters.relocalize, parameters.execution_attempts,
         )  # fmt: skip
-        carried_out = conduct.run(state, steps)
+        carried_out = free and conduct.run(state, steps)
         world.wake()
         physical.wait(SETTLE_SECONDS)
         physical.recording.keyframe(len(steps) - 1, "end")
@@ -197,6 +208,15 @@ def _execute(
         {name: round(force, 3) for name, force in sorted(physical.bumps.items())},
     )  # fmt: skip
     return outcome, executed_rows(physical.recording.snapshots), updated
+
+
+def _starts_free(physical: PhysicalRobot, failures: list[Failure]) -> bool:
+    try:
+        physical.check_start()
+    except MotionFailed as failed:
+        failures.append(failed.failure)
+        return False
+    return True
 
 
 def _updated(

@@ -165,3 +165,16 @@ def test_an_item_that_is_not_there_fails_the_execution_by_name(tmp_path: Path) -
     missing = next(failure for failure in result.plan.failures if failure.kind == "not_found")
     assert missing.objects == ("bottle_7",)
     assert not result.plan.checks[0].holds
+
+
+def test_a_robot_that_would_start_inside_something_unseen_does_not_start(tmp_path: Path) -> None:
+    """The true room is full of a crate that the planned scene does not show."""
+    write_scene(tmp_path / "scene", kitchen())
+    crate = HandmadeBody("bin_9", "bin", np.eye(4), [((0.0, 0.0, 0.2), (4.9, 4.9, 0.4))], "floor_1")
+    write_scene(tmp_path / "truth" / "room", [kitchen()[0], crate])
+    (tmp_path / "truth" / "graph.json").write_bytes((tmp_path / "truth" / "room" / "graph.json").read_bytes())
+    result = plan(tmp_path, tmp_path / "scene", tmp_path / "truth", video_rate=0)
+    assert result.outcome == "execution_failed"
+    failure = next(entry for entry in result.plan.failures if entry.kind == "start_in_collision")
+    assert failure.objects == ("bin_9",)
+    assert failure.numbers["depth"] > 0.005
