@@ -23,6 +23,10 @@ from stages.segment.yolox import Detections, Detector
 LARGE_FACED = frozenset({"table", "desk", "bed", "sofa", "bench", "monitor", "fridge"})
 """A box around a part of these is still a detection of the whole: one face fills most of the box."""
 FLAT_TOPPED = frozenset({"table", "desk"})
+UNNAMED = "object"
+LARGEST_UNNAMED = 0.8
+"""A detection of impossible size still points at some item when that is small; at furniture size it says nothing, and
+its votes would drown those of the frames in which the thing was recognised [m]."""
 SAMPLED_FRAMES = 25
 DUPLICATE_OVERLAP = 0.5
 """Two masks of one class that share this much of the smaller one are the same thing."""
@@ -65,7 +69,7 @@ class DetectorBackend:
         self.minimum_pixels = minimum_pixels
         self._detector = detector
         self._classes = [vocabulary.by_alias(name, "coco") for name in COCO_NAMES]
-        self._anything = vocabulary.by_name("object")
+        self._anything = vocabulary.by_name(UNNAMED)
         self._layout = {name: vocabulary.by_name(name) for name in ("floor", "wall", "ceiling")}
         self.room: Room = find_room(
             _surface_samples(reader, geometric),
@@ -104,7 +108,10 @@ class DetectorBackend:
                 continue
             height, width = mask.shape
             cut_off = bool(box[0] < 4 or box[1] < 4 or box[2] > width - 4 or box[3] > height - 4)
-            if not is_plausible(semantic.name, extent_of(geometric.points[mask]), cut_off=cut_off):
+            extent = extent_of(geometric.points[mask])
+            if not is_plausible(semantic.name, extent, cut_off=cut_off):
+                if extent > LARGEST_UNNAMED:
+                    continue
                 semantic = self._anything
             found.append(Found(semantic, float(score), mask))
         return merge_duplicates(found)
@@ -123,10 +130,11 @@ def merge_duplicates(found: list[Found]) -> list[Found]:
     """Return the things with those merged that are the same, best score first.
 
     Two masks that share half of the smaller one are one thing when they have the same class (a chair and its back,
-    boxed twice): it gets the union. Of two classes for nearly the same mask the better scored stays.
+    boxed twice): it gets the union. Of two classes for nearly the same mask the better scored stays, but any class
+    goes before `object`, which is what is left of a detection of impossible size.
     """
     kept: list[Found] = []
-    for item in sorted(found, key=lambda thing: -thing.score):
+    for item in sorted(found, key=lambda thing: (thing.semantic.name == UNNAMED, -thing.score)):
         for index, other in enumerate(kept):
             shared = int((item.mask & other.mask).sum())
             smaller, union = min(item.mask.sum(), other.mask.sum()), (item.mask | other.mask).sum()

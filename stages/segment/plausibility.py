@@ -44,7 +44,7 @@ SMALLEST_EXTENT = {
     "toilet": 0.3,
     "chair": 0.3,
     "table": 0.4,
-    "bed": 1.3,
+    "bed": 1.6,
     "sofa": 0.9,
     "bench": 0.4,
     "person": 0.3,

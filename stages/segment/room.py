@@ -13,6 +13,9 @@ AZIMUTH_BIN = np.radians(3.0)
 MINIMUM_WALL_HEIGHT = 1.0
 MINIMUM_WALL_TOP = 1.25
 """A wall is seen up to here over the floor [m]: kitchen units and desks end below."""
+MINIMUM_HIGH_SHARE = 0.3
+"""Share of a wall's points that lie a metre over the floor or higher: the front of a kitchen unit that runs into a
+pillar has few."""
 MINIMUM_WALL_LENGTH = 1.0
 """Narrower upright planes are sides of tall furniture [m]."""
 
@@ -174,6 +177,8 @@ def _bounds_room(inliers: np.ndarray, points: np.ndarray, plane: WallPlane, floo
     left, right = np.percentile(position, [2, 98])
     bottom, top = np.percentile(inliers[:, 2], [2, 98])
     if right - left < MINIMUM_WALL_LENGTH or top - bottom < MINIMUM_WALL_HEIGHT or top < floor + MINIMUM_WALL_TOP:
+        return False
+    if np.mean(inliers[:, 2] > floor + 1.0) < MINIMUM_HIGH_SHARE:
         return False
     within = (points @ along > left) & (points @ along < right) & (points[:, 2] > bottom) & (points[:, 2] < top)
     behind = within & (points @ plane.normal + plane.offset < -0.2)

@@ -192,6 +192,8 @@ def test_duplicates_are_merged_and_small_things_painted_on_top() -> None:
     assert len(apart) == 2
     contest = merge_duplicates([Found(cup, 0.4, back), Found(chair, 0.6, back)])
     assert [item.semantic.name for item in contest] == ["chair"]
+    unnamed = Found(VOCABULARY.by_name("object"), 0.9, back)
+    assert [item.semantic.name for item in merge_duplicates([unnamed, Found(chair, 0.4, back)])] == ["chair"]
     small, large = rectangle(20, 20, 30, 30), rectangle(0, 0, 100, 100)
     layout = {"floor": rectangle(50, 0, 120, 160)}
     frame = paint(
