@@ -11,6 +11,8 @@ import numpy as np
 from stages.kit.motion.collision import Collision
 from stages.kit.motion.failures import MotionFailed
 
+FINER = 3
+"""A path is accepted when it is free at this many times the resolution of the search."""
 Check = Callable[[np.ndarray], Collision | None]
 
 
@@ -108,6 +110,40 @@ def rrt_connect(
                 {"depth": collision.depth},
             )
     blockers: Counter[str] = Counter()
+    used = 0
+    while used < samples:
+        path, spent = _grow(start, goal, check, space, random, samples - used, step, blockers)
+        used += spent
+        if path is None:
+            break
+        path = shortcut(path, check, space, random, smoothing) if len(path) > 2 else path
+        # What lies between two checks was not looked at: look closer, and start again when it is not free.
+        found = first_collision(densify(path, space.resolution / FINER), check)
+        if found is None:
+            return path
+        blockers[found[1].other] += 1
+        used += 1
+    worst, hits = blockers.most_common(1)[0] if blockers else ("", 0)
+    raise MotionFailed(
+        "no_path",
+        f"no path within {samples} samples; {worst or 'nothing'} blocked most "
+        f"({hits} of {blockers.total()} collisions)",
+        (worst,) if worst else (),
+        {"samples": samples, "hits": hits},
+    )
+
+
+def _grow(
+    start: np.ndarray,
+    goal: np.ndarray,
+    check: Check,
+    space: SearchSpace,
+    random: np.random.Generator,
+    samples: int,
+    step: float,
+    blockers: Counter[str],
+) -> tuple[np.ndarray | None, int]:
+    """Grow two trees until they meet; return the path (N, D) or None, and the samples used."""
 
     def advance(tree: _Tree, near: int, target: np.ndarray, once: bool) -> tuple[int, bool]:
         """Extend from a node towards the target; return the last node and whether the target was reached."""
@@ -126,13 +162,11 @@ def rrt_connect(
                 last = tree.add(point, last)
         return last, bool(np.array_equal(tree.points[last], target))
 
-    scale = space.resolution
-    trees = (_Tree(start, scale, 256), _Tree(goal, scale, 256))
-    node, reached = advance(trees[0], 0, goal, once=False)
-    used = 0
+    trees = (_Tree(start, space.resolution, 256), _Tree(goal, space.resolution, 256))
+    if not blockers and advance(trees[0], 0, goal, once=False)[1]:
+        return np.array([start, goal]), 0
     active = 0
-    while not reached and used < samples:
-        used += 1
+    for used in range(1, samples + 1):
         grow, other = trees[active], trees[1 - active]
         sample = random.uniform(space.lower, space.upper)
         before = grow.nearest(sample)
@@ -142,19 +176,9 @@ def rrt_connect(
             end, reached = advance(other, other.nearest(target), target, once=False)
             if reached:
                 first, second = (node, end) if active == 0 else (end, node)
-                path = np.array([*reversed(trees[0].branch(first)), *trees[1].branch(second)[1:]])
-                return shortcut(path, check, space, random, smoothing)
+                return np.array([*reversed(trees[0].branch(first)), *trees[1].branch(second)[1:]]), used
         active = 1 - active
-    if reached:
-        return np.array([start, goal])
-    worst, hits = blockers.most_common(1)[0] if blockers else ("", 0)
-    raise MotionFailed(
-        "no_path",
-        f"no path within {samples} samples; {worst or 'nothing'} blocked most "
-        f"({hits} of {blockers.total()} collisions)",
-        (worst,) if worst else (),
-        {"samples": samples, "nodes": len(trees[0].parents) + len(trees[1].parents), "hits": hits},
-    )
+    return None, samples
 
 
 def shortcut(
@@ -174,7 +198,7 @@ def shortcut(
             continue
         first = path[i] + (path[i + 1] - path[i]) * (low - ends[i]) / lengths[i]
         second = path[j] + (path[j + 1] - path[j]) * (high - ends[j]) / lengths[j]
-        if first_collision(interpolate(first, second, space.resolution), check) is None:
+        if first_collision(interpolate(first, second, space.resolution / 2), check) is None:
             path = _without_repeats(np.concatenate([path[: i + 1], [first, second], path[j + 1 :]]))
     return path
 
