@@ -75,28 +75,32 @@ def _sample_voxels(
     fx, fy, cx, cy = intrinsics
     samples = ((height + stride - 1) // stride) * ((width + stride - 1) // stride)
     size = 16
-    while size < 2 * samples:
+    while 2 * size < 3 * samples:  # neighbouring samples share voxels: it never gets near full
         size *= 2
     seen_key = np.full(size, -1, dtype=np.int64)
     seen_row = np.zeros(size, dtype=np.uint16)
     rows = np.empty(samples, dtype=np.int64)
     labels = np.empty(samples, dtype=np.int64)
     count = 0
+    last_key, last_index, last_block, slot = -1, 0, -1, -1
+    # A pixel's point in voxels is z * (column * step + start) + eye.
+    eye = world_from_camera[:3, 3] / voxel_size
+    step = world_from_camera[:3, 0] / (fx * voxel_size)
     for row in range(stride // 2, height, stride):
+        start = world_from_camera[:3, 1] * ((row - cy) / (fy * voxel_size)) + world_from_camera[:3, 2] / voxel_size
+        start -= step * cx
         for column in range(stride // 2, width, stride):
             index = index_image[row, column]
             z = depth[row, column]
             if index == 0 or not (near <= z <= far):
                 continue
-            x = (column - cx) / fx * z
-            y = (row - cy) / fy * z
-            i = int(np.floor((world_from_camera[0, 0] * x + world_from_camera[0, 1] * y + world_from_camera[0, 2] * z
-                              + world_from_camera[0, 3]) / voxel_size))  # fmt: skip
-            j = int(np.floor((world_from_camera[1, 0] * x + world_from_camera[1, 1] * y + world_from_camera[1, 2] * z
-                              + world_from_camera[1, 3]) / voxel_size))  # fmt: skip
-            k = int(np.floor((world_from_camera[2, 0] * x + world_from_camera[2, 1] * y + world_from_camera[2, 2] * z
-                              + world_from_camera[2, 3]) / voxel_size))  # fmt: skip
+            i = int(np.floor(z * (column * step[0] + start[0]) + eye[0]))
+            j = int(np.floor(z * (column * step[1] + start[1]) + eye[1]))
+            k = int(np.floor(z * (column * step[2] + start[2]) + eye[2]))
             key = pack(i, j, k)
+            if key == last_key and index == last_index:
+                continue
+            last_key, last_index = key, index
             place = mix(key, size - 1)
             known = False
             while seen_key[place] != -1:
@@ -108,7 +112,10 @@ def _sample_voxels(
                 continue
             seen_key[place] = key
             seen_row[place] = index
-            slot = find(keys, slots, pack(i // SIDE, j // SIDE, k // SIDE))
+            block = pack(i // SIDE, j // SIDE, k // SIDE)
+            if block != last_block:
+                last_block = block
+                slot = find(keys, slots, block)
             rows[count] = index - 1
             labels[count] = 0
             if slot >= 0:
@@ -142,9 +149,10 @@ def measure_overlap(
     )  # fmt: skip
     sizes = np.bincount(rows, minlength=segment_count)
     width = len(canonical)
-    mapped = labels > 0
-    pairs, counts = np.unique(rows[mapped] * width + labels[mapped], return_counts=True)
-    return Overlap(sizes, pairs // width, pairs % width, counts)
+    table = np.bincount(rows * width + labels, minlength=segment_count * width).reshape(segment_count, width)
+    table[:, 0] = 0  # voxels without a label
+    pair_rows, pair_labels = np.nonzero(table)
+    return Overlap(sizes, pair_rows, pair_labels, table[pair_rows, pair_labels])
 
 
 def match_segments(overlap: Overlap, *, minimum_voxels: int, minimum_share: float) -> list[int]:

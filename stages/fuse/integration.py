@@ -8,12 +8,14 @@ is a guess; thin boards seen from both sides survive that way.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit, parallel_chunksize, prange
 
 from schemas.scene_parts import Camera
 from stages.fuse.voxel_blocks import FIXED_POINT, SIDE, VoxelBlocks
 
 LARGEST_VOTE = 32000
+CHUNK = 64
+"""Blocks that a thread takes at a time: blocks differ in how much of them is seen, threads in what else they do."""
 
 
 def intrinsics_of(camera: Camera) -> np.ndarray:
@@ -154,10 +156,12 @@ def integrate(
     touched = blocks.touch(
         depth, intrinsics, world_from_camera, truncation=truncation, near=near, far=far, stride=stride
     )
-    _integrate(
-        touched, blocks.coordinates, blocks.tsdf, blocks.weight, blocks.color, blocks.segment, blocks.votes, depth,
-        NO_IMAGE if color is None else np.ascontiguousarray(color), NO_INDEX if index_image is None else index_image,
-        label_of_index, canonical, np.ascontiguousarray(np.linalg.inv(world_from_camera)), intrinsics,
-        blocks.voxel_size, truncation, truncation if label_band is None else label_band, near, far, maximum_weight,
-    )  # fmt: skip
+    with parallel_chunksize(CHUNK):
+        _integrate(
+            touched, blocks.coordinates, blocks.tsdf, blocks.weight, blocks.color, blocks.segment, blocks.votes, depth,
+            NO_IMAGE if color is None else np.ascontiguousarray(color),
+            NO_INDEX if index_image is None else index_image, label_of_index, canonical,
+            np.ascontiguousarray(np.linalg.inv(world_from_camera)), intrinsics, blocks.voxel_size, truncation,
+            truncation if label_band is None else label_band, near, far, maximum_weight,
+        )  # fmt: skip
     return len(touched)

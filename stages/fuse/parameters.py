@@ -31,8 +31,8 @@ class FuseParameters(Parameters):
         0.4,
         gt=0,
         le=1,
-        description="Voxels within this share of the truncation distance vote (1 in the thesis's code, which widens flat "
-        "things by it)",
+        description="Voxels within this share of the truncation distance vote (1 in the thesis's code, which widens "
+        "flat things by it)",
     )
     overlap_stride: int = Field(2, ge=1, le=16, description="Every how many-th pixel measures overlap with the map")
     minimum_overlap_voxels: int = Field(
@@ -61,6 +61,11 @@ class FuseParameters(Parameters):
 
     minimum_weight: float = Field(
         0.1, ge=0, description="Surfaces are drawn through voxels of at least this weight (a frame at depth z: 1/z^2)"
+    )
+    smoothing: float = Field(
+        0.2,
+        ge=0,
+        description="Weight of a voxel's neighbours when surfaces are drawn; well observed voxels keep theirs",
     )
     minimum_entity_voxels: int = Field(20, ge=1, description="Entities of fewer surface voxels are dropped")
     minimum_observations: int = Field(

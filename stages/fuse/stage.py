@@ -14,6 +14,7 @@ from stages.fuse.inputs import check_segments, listings, poses_at
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.payload import describe, write_payload
+from stages.fuse.smoothing import smoothed_tsdf
 from stages.fuse.surface import extract_surface
 from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.masks import PanopticReader
@@ -41,7 +42,8 @@ def run(
     with context.progress.step("merge instances"):
         mapper.regularize()
     with context.progress.step("extract surface"):
-        surface = extract_surface(mapper.blocks, minimum_weight=parameters.minimum_weight)
+        tsdf = smoothed_tsdf(mapper.blocks, parameters.smoothing)
+        surface = extract_surface(mapper.blocks, minimum_weight=parameters.minimum_weight, tsdf=tsdf)
     with context.progress.step("extract entities"):
         merged = mapper.labels.table()
         entities, labelled = extract_entities(

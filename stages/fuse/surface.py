@@ -28,7 +28,7 @@ class Surface:
 
 
 @njit(cache=True, inline="always")
-def _voxel(neighbours: np.ndarray, rank: int, x: int, y: int, z: int) -> int:
+def voxel_at(neighbours: np.ndarray, rank: int, x: int, y: int, z: int) -> int:
     """Return slot * 512 + index of a voxel at -8 <= x, y, z < 16 relative to a block, or -1 where there is no block."""
     slot = neighbours[rank, (x // SIDE + 1) + 3 * (y // SIDE + 1) + 9 * (z // SIDE + 1)]
     if slot < 0:
@@ -72,7 +72,7 @@ def _vertices(
             below = 0
             above = 0
             for corner in range(8):
-                voxel = _voxel(neighbours, rank, x + (corner & 1), y + ((corner >> 1) & 1), z + (corner >> 2))
+                voxel = voxel_at(neighbours, rank, x + (corner & 1), y + ((corner >> 1) & 1), z + (corner >> 2))
                 if voxel >= 0 and weight[voxel] < minimum_weight:
                     voxel = -1
                 voxels[corner] = voxel
@@ -157,7 +157,7 @@ def _faces(
             if weight[here] < minimum_weight:
                 continue
             for axis in range(3):
-                there = _voxel(neighbours, rank, x + (axis == 0), y + (axis == 1), z + (axis == 2))
+                there = voxel_at(neighbours, rank, x + (axis == 0), y + (axis == 1), z + (axis == 2))
                 if there < 0 or weight[there] < minimum_weight or not _crosses(tsdf[here], tsdf[there], jump):
                     continue
                 # The four cells around the edge, counter-clockwise seen from its far end.
@@ -172,7 +172,7 @@ def _faces(
                         c, a = z - 1 + second, x - 1 + third
                     else:
                         a, b = x - 1 + second, y - 1 + third
-                    around = _voxel(neighbours, rank, a, b, c)
+                    around = voxel_at(neighbours, rank, a, b, c)
                     if around < 0:
                         complete = False
                         break
@@ -213,23 +213,30 @@ def _neighbours(order: np.ndarray, coordinates: np.ndarray, keys: np.ndarray, sl
     return result
 
 
+def find_neighbours(order: np.ndarray, blocks: VoxelBlocks) -> np.ndarray:
+    """Return the slots (B, 27) int32 of the blocks around every block of `order`, x fastest; -1: no block."""
+    return _neighbours(order, blocks.coordinates, blocks.keys, blocks.slots)
+
+
 def _starts(counts: np.ndarray) -> tuple[np.ndarray, int]:
     ends = np.cumsum(counts)
     return ends - counts, int(ends[-1]) if len(ends) else 0
 
 
-def extract_surface(blocks: VoxelBlocks, *, minimum_weight: float, jump: float = 0.75) -> Surface:
-    """Return the zero surface of the map.
+def extract_surface(
+    blocks: VoxelBlocks, *, minimum_weight: float, jump: float = 0.75, tsdf: np.ndarray | None = None
+) -> Surface:
+    """Return the zero surface of the map, or of other values `tsdf` (C, 512) float32 for its voxels.
 
     Voxels under `minimum_weight` count as unobserved. Neighbouring voxels whose values [truncation distances] differ by
     more than `jump` do not make a surface: such steps stand between what lies behind a silhouette and the free space
     beside it, not on anything that was measured.
     """
     order = blocks.canonical_order()
-    neighbours = _neighbours(order, blocks.coordinates, blocks.keys, blocks.slots)
+    neighbours = find_neighbours(order, blocks)
     rank_of_slot = np.empty(len(order), dtype=np.int32)
     rank_of_slot[order] = np.arange(len(order), dtype=np.int32)
-    tsdf, weight = blocks.tsdf.reshape(-1), blocks.weight.reshape(-1)
+    tsdf, weight = (blocks.tsdf if tsdf is None else tsdf).reshape(-1), blocks.weight.reshape(-1)
     fields = (blocks.color.reshape(-1, 3), blocks.segment.reshape(-1))
     index = np.full(len(order) * VOXELS, -1, dtype=np.int32)
 

@@ -1,0 +1,331 @@
+"""Labelled fusion beside Open3D's VoxelBlockGrid without labels: frames/s, peak memory, surface error.
+
+    python -m benchmarks.speed.fusion [--out FOLDER] [--quick]
+
+A room of boxes, whose surface is known, is seen by a walking depth camera with the axial noise of Nguyen, Izadi &
+Lovell (2012), millimetre steps and a range of 4 m. Every arm runs in a process of its own on the same decoded frames,
+the arms in turn, several times over; the table shows medians. Memory is the growth of the process's peak over what
+it held before the first frame (libraries loaded, kernels compiled, frames in memory).
+
+Arms: `ours` is everything that fuse does with a frame: overlap with the map, association, integration of depth and
+colour, label vote, counts, merges. `ours-vote` integrates depth and colour and votes, with labels given. `open3d`
+integrates depth alone, `open3d-color` depth and colour; both with truncation 4 voxels and float32.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from schemas.scene_parts import Camera
+from schemas.segments import FrameSegment
+from schemas.vocabulary import load_vocabulary
+from stages.kit.geometry.cameras import back_project, intrinsic_matrix
+from stages.kit.geometry.transforms import look_at
+from stages.kit.measurement.tables import Table, as_markdown
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+CAMERA = Camera(width=640, height=480, fx=525.0, fy=525.0, cx=319.5, cy=239.5)
+RANGE = 4.0
+TRUNCATION_VOXELS = 4.0
+ARMS = ("ours", "ours-vote", "open3d", "open3d-color")
+CASES = {"2cm": 0.02, "1cm": 0.01}
+ERROR_CASE = "2cm"
+AIM_SHARE, AIM_ERROR = 0.5, 0.002
+"""Aims: share of Open3D's rate, mean surface error at 2 cm [m]."""
+
+
+def room() -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Return the boxes (class, minimum (3,), maximum (3,)) of the room; the first is the room itself, seen from inside.
+
+    Thin boards and legs are there on purpose: they are what a truncation distance breaks.
+    """
+    parts = [("wall", (-2.5, -2.0, 0.0), (2.5, 2.0, 2.6))]
+    for x, y, length, width, height in ((0.0, 0.0, 1.4, 0.8, 0.75), (-1.9, 1.2, 1.0, 0.7, 0.45)):
+        parts.append(("table", (x - length / 2, y - width / 2, height - 0.04), (x + length / 2, y + width / 2, height)))
+        for side_x in (-1, 1):
+            for side_y in (-1, 1):
+                leg_x, leg_y = x + side_x * (length / 2 - 0.05), y + side_y * (width / 2 - 0.05)
+                parts.append(
+                    ("table", (leg_x - 0.025, leg_y - 0.025, 0.0), (leg_x + 0.025, leg_y + 0.025, height - 0.04))
+                )
+    parts += [
+        ("cabinet", (1.6, 1.2, 0.0), (2.4, 1.9, 1.8)),
+        ("sofa", (-2.4, -1.9, 0.0), (-1.5, -1.0, 0.45)),
+        ("box", (-0.2, -0.1, 0.75), (0.1, 0.1, 1.0)),
+        ("cup", (0.3, 0.1, 0.75), (0.4, 0.2, 0.87)),
+    ]
+    return [(name, np.array(low), np.array(high)) for name, low, high in parts]
+
+
+def true_scene():  # type: ignore[no-untyped-def]  # open3d has no types
+    """Return the room as an open3d RaycastingScene; geometry ids follow `room()`."""
+    import open3d as o3d
+    import trimesh
+
+    scene = o3d.t.geometry.RaycastingScene()
+    for _, low, high in room():
+        mesh = trimesh.creation.box(
+            extents=high - low, transform=trimesh.transformations.translation_matrix((low + high) / 2)
+        )
+        scene.add_triangles(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32))
+    return scene
+
+
+def render_frames(count: int) -> dict[str, np.ndarray]:
+    """Return depth (N, H, W) float32 [m], color (N, H, W, 3) uint8, ids (N, H, W) uint16, poses (N, 4, 4)."""
+    import open3d as o3d
+
+    scene, random = true_scene(), np.random.default_rng(0)
+    palette = random.integers(30, 226, (len(room()), 3)).astype(np.uint8)
+    frames: dict[str, list[np.ndarray]] = {"depth": [], "color": [], "ids": [], "poses": []}
+    for angle in 2 * np.pi * np.arange(count) / count:
+        eye = np.array([1.7 * np.cos(angle), 1.3 * np.sin(angle), 1.5 + 0.2 * np.sin(3 * angle)])
+        pose = look_at(eye, np.array([-0.9 * np.cos(angle), -0.7 * np.sin(angle), 0.5]))
+        directions = back_project(np.ones((CAMERA.height, CAMERA.width), dtype=np.float32), CAMERA) @ pose[:3, :3].T
+        rays = np.concatenate([np.broadcast_to(eye, directions.shape), directions], axis=-1)
+        hit = scene.cast_rays(o3d.core.Tensor(rays.astype(np.float32)))
+        depth = hit["t_hit"].numpy()
+        depth = depth + (0.0012 + 0.0019 * (depth - 0.4) ** 2) * random.standard_normal(depth.shape)
+        ids = hit["geometry_ids"].numpy().astype(np.int64)
+        frames["depth"].append(np.where(depth <= RANGE, np.round(depth * 1000) / 1000, 0).astype(np.float32))
+        frames["color"].append(palette[ids])
+        frames["ids"].append((ids + 1).astype(np.uint16))
+        frames["poses"].append(pose)
+    return {name: np.array(images) for name, images in frames.items()}
+
+
+Step = Callable[[int], None]
+Mesh = Callable[[], tuple[np.ndarray, np.ndarray]]
+
+
+def ours(frames: dict[str, np.ndarray], voxel_size: float, whole: bool) -> tuple[Step, Mesh]:
+    """Return what integrates frame k, and what gives the mesh. `whole`: with association, counts and merges."""
+    from stages.fuse.integration import integrate
+    from stages.fuse.mapping import PanopticMapper
+    from stages.fuse.parameters import FuseParameters
+    from stages.fuse.smoothing import smoothed_tsdf
+    from stages.fuse.surface import extract_surface
+
+    options = FuseParameters(voxel_size=voxel_size, truncation_voxels=TRUNCATION_VOXELS, maximum_depth=RANGE)
+    vocabulary = load_vocabulary()
+    things = frozenset(entry.id for entry in vocabulary.classes if entry.kind == "thing")
+    mapper = PanopticMapper(options, CAMERA, things)
+    classes = [vocabulary.by_name(name) for name, _, _ in room()]
+    listings = []
+    for image in frames["ids"]:
+        numbers = np.unique(image).tolist()
+        listings.append(
+            [
+                FrameSegment(
+                    id=number, category_id=classes[number - 1].id, instance=number, score=1.0, area=1,
+                    is_thing=classes[number - 1].kind == "thing",
+                )
+                for number in numbers
+            ]
+        )  # fmt: skip
+    ids = frames["ids"].astype(np.int32)
+    labels = np.arange(len(classes) + 1, dtype=np.int32)
+
+    def with_everything(k: int) -> None:
+        mapper.add_frame(frames["depth"][k], frames["color"][k], frames["poses"][k], ids[k], listings[k])
+
+    def vote_only(k: int) -> None:
+        integrate(
+            mapper.blocks, frames["depth"][k], CAMERA, frames["poses"][k], truncation=mapper.truncation_distance,
+            near=options.minimum_depth, far=RANGE, color=frames["color"][k], index_image=frames["ids"][k],
+            label_of_index=labels, canonical=labels, label_band=options.label_band * mapper.truncation_distance,
+        )  # fmt: skip
+
+    def mesh() -> tuple[np.ndarray, np.ndarray]:
+        tsdf = smoothed_tsdf(mapper.blocks, options.smoothing)
+        surface = extract_surface(mapper.blocks, minimum_weight=options.minimum_weight, tsdf=tsdf)
+        return surface.vertices, surface.faces
+
+    return (with_everything if whole else vote_only), mesh
+
+
+def open3d(frames: dict[str, np.ndarray], voxel_size: float, color: bool) -> tuple[Step, Mesh]:
+    """The same for Open3D's VoxelBlockGrid on the processor (8^3 blocks, capacity as large as the room needs)."""
+    import open3d as o3d
+
+    core, geometry = o3d.core, o3d.t.geometry
+    names = ("tsdf", "weight", "color") if color else ("tsdf", "weight")
+    grid = geometry.VoxelBlockGrid(
+        names, (core.float32,) * len(names), ((1), (1), (3))[: len(names)], voxel_size, 8,
+        40_000 if voxel_size < 0.015 else 10_000, core.Device("CPU:0"),
+    )  # fmt: skip
+    # Its pixels begin at integer coordinates, ours are centred there: without the shift it would be half a pixel off.
+    shifted = CAMERA.model_copy(update={"cx": CAMERA.cx + 0.5, "cy": CAMERA.cy + 0.5})
+    intrinsic = core.Tensor(intrinsic_matrix(shifted))
+    options = (1.0, RANGE, TRUNCATION_VOXELS)
+
+    def step(k: int) -> None:
+        depth = geometry.Image(core.Tensor(frames["depth"][k]))
+        extrinsic = core.Tensor(np.linalg.inv(frames["poses"][k]))
+        blocks = grid.compute_unique_block_coordinates(depth, intrinsic, extrinsic, *options)
+        if color:
+            image = geometry.Image(core.Tensor(frames["color"][k]).to(core.float32))
+            grid.integrate(blocks, depth, image, intrinsic, extrinsic, *options)
+        else:
+            grid.integrate(blocks, depth, intrinsic, extrinsic, *options)
+
+    def mesh() -> tuple[np.ndarray, np.ndarray]:
+        result = grid.extract_triangle_mesh(1.0)
+        return result.vertex.positions.numpy().astype(np.float32), result.triangle.indices.numpy()
+
+    return step, mesh
+
+
+def build(arm: str, frames: dict[str, np.ndarray], voxel_size: float) -> tuple[Step, Mesh]:
+    """Return the steps of an arm."""
+    if arm.startswith("ours"):
+        return ours(frames, voxel_size, whole=arm == "ours")
+    return open3d(frames, voxel_size, color=arm == "open3d-color")
+
+
+def surface_error(vertices: np.ndarray, faces: np.ndarray) -> dict[str, float]:
+    """Distances [m] from points spread evenly over a mesh to the true surface, and the mesh's area [m^2]."""
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    points, _ = trimesh.sample.sample_surface(mesh, 100_000, seed=0)
+    distance = true_scene().compute_distance(points.astype(np.float32)).numpy()
+    return {
+        "error_mean": float(distance.mean()), "error_p95": float(np.percentile(distance, 95)), "area": float(mesh.area),
+    }  # fmt: skip
+
+
+def memory(field: str) -> float:
+    """Return `VmRSS` (resident now) or `VmHWM` (the most since the peak was reset) of this process [MB]."""
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith(field + ":"):
+            return int(line.split()[1]) / 1024
+    raise RuntimeError(f"/proc/self/status has no {field}")
+
+
+def reset_peak() -> None:
+    """Make VmHWM start again from what is resident now."""
+    Path("/proc/self/clear_refs").write_text("5")
+
+
+def work(arm: str, case: str, frames_file: Path) -> dict[str, float]:
+    """Run one arm once on the frames of a file; this is what a subprocess does."""
+    frames = {name: np.load(frames_file / f"{name}.npy") for name in ("depth", "color", "ids", "poses")}
+    step, mesh = build(arm, {name: images[:2] for name, images in frames.items()}, 0.05)
+    step(0)
+    step(1)
+    mesh()  # kernels compiled, libraries loaded, threads started
+    step, mesh = build(arm, frames, CASES[case])
+    reset_peak()
+    before = memory("VmRSS")
+    seconds, processor = [], []
+    for k in range(len(frames["depth"])):
+        started, started_processor = time.perf_counter(), time.process_time()
+        step(k)
+        seconds.append(time.perf_counter() - started)
+        processor.append(time.process_time() - started_processor)
+    started = time.perf_counter()
+    vertices, faces = mesh()
+    measures = {
+        "frames_per_second": 1 / float(np.median(seconds)),
+        "mean_frames_per_second": len(seconds) / sum(seconds),
+        "mesh_seconds": time.perf_counter() - started,
+        "processor_ms": 1000 * float(np.median(processor)),
+        "peak_memory_mb": memory("VmHWM") - before,
+    }
+    if case == ERROR_CASE:
+        measures |= surface_error(vertices, faces)
+    return measures
+
+
+def measure(frame_count: int, runs: int) -> dict[str, float]:
+    """Return the medians over the runs: `<arm>/<case>/<measure>`, and ours as a share of Open3D's rate."""
+    collected: dict[str, list[float]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name, images in render_frames(frame_count).items():
+            np.save(Path(folder) / f"{name}.npy", images)
+        for run in range(runs):
+            for case in CASES:
+                for arm in ARMS:
+                    print(f"run {run + 1}/{runs}: {arm}, {case}", file=sys.stderr, flush=True)
+                    command = [sys.executable, "-m", "benchmarks.speed.fusion", "--worker", arm, case, folder]
+                    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, cwd=REPOSITORY)
+                    for name, value in json.loads(done.stdout.splitlines()[-1]).items():
+                        collected.setdefault(f"{arm}/{case}/{name}", []).append(value)
+    metrics = {name: float(np.median(values)) for name, values in collected.items()}
+    for arm in ("ours", "ours-vote"):
+        for case in CASES:
+            share = metrics[f"{arm}/{case}/frames_per_second"] / metrics[f"open3d/{case}/frames_per_second"]
+            metrics[f"{arm}/{case}/share_of_open3d"] = share
+    return metrics | {"all/all/runs": float(runs), "all/all/frames": float(frame_count)}
+
+
+def as_table(metrics: dict[str, float]) -> Table:
+    """Return the figures as a table, a row for each arm and case."""
+    rows = []
+    for case in CASES:
+        for arm in ARMS:
+
+            def get(name: str, scale: float = 1.0, arm: str = arm, case: str = case) -> float | None:
+                value = metrics.get(f"{arm}/{case}/{name}")
+                return None if value is None else scale * value
+
+            rows.append(
+                (
+                    case, arm, get("frames_per_second"), get("mean_frames_per_second"), get("share_of_open3d"),
+                    get("processor_ms"),
+                    get("peak_memory_mb"), get("mesh_seconds"), get("error_mean", 1000), get("error_p95", 1000),
+                    get("area"),
+                )
+            )  # fmt: skip
+    share = min(metrics[f"ours/{case}/share_of_open3d"] for case in CASES)
+    error = metrics[f"ours/{ERROR_CASE}/error_mean"]
+    note = (
+        f"Medians of {metrics['all/all/runs']:.0f} runs on {metrics['all/all/frames']:.0f} frames of 640x480, "
+        f"{os.cpu_count()} processors, {platform.machine()}, Python {platform.python_version()}, load average "
+        f"{os.getloadavg()[0]:.1f} at the end. frames/s: 1 / median time of a frame; all: frames / total time. Aims: "
+        f"at least {AIM_SHARE} of open3d's rate ({share:.2f}: {'met' if share >= AIM_SHARE else 'missed'}), mean error "
+        f"at 2 cm at most {1000 * AIM_ERROR:g} mm ({1000 * error:.2f}: {'met' if error <= AIM_ERROR else 'missed'})."
+    )
+    columns = (
+        "voxel", "arm", "frames/s", "frames/s (all)", "share of open3d", "processor ms", "peak MB", "mesh s",
+        "error mean mm", "error p95 mm", "area m2",
+    )  # fmt: skip
+    return Table("table", "Labelled fusion beside Open3D without labels", columns, tuple(rows), note)
+
+
+def main() -> None:
+    """Measure, print the table, write metrics.json and table.md."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=Path("outputs/experiments/bench-speed-fusion"))
+    parser.add_argument("--quick", action="store_true", help="20 frames once instead of 100 frames five times")
+    parser.add_argument("--worker", nargs=3, metavar=("ARM", "CASE", "FRAMES"), help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.worker:
+        import numba
+
+        numba.config.THREADING_LAYER = "omp"  # as the command line does: the default probes TBB and warns
+        arm, case, folder = arguments.worker
+        print(json.dumps(work(arm, case, Path(folder))))
+        return
+    metrics = measure(frame_count=20, runs=1) if arguments.quick else measure(frame_count=100, runs=5)
+    text = as_markdown(as_table(metrics))
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    (arguments.out / "metrics.json").write_text(json.dumps(metrics, sort_keys=True, indent=1) + "\n")
+    (arguments.out / "table.md").write_text(text)
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
