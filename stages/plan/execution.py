@@ -47,7 +47,7 @@ class PhysicalRobot:
         """The same, since the last motion that failed."""
 
     def check_start(self) -> None:
-        """Raises MotionFailed `start_in_collision` when the robot stands in a body of this room other than the floor."""
+        """Raises MotionFailed `start_in_collision` when the robot stands in a body of this room (floors aside)."""
         engine.performCollisionDetection(physicsClientId=self.world.client)
         for contact in self.world.contacts(self.robot.body_id):
             name = self.world.name_of(contact.other_body)
