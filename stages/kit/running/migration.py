@@ -6,8 +6,8 @@ import shutil
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from schemas.artifact import KINDS
 from schemas.errors import BadInput, UsageError
+from schemas.kinds import KINDS
 from schemas.manifest import MANIFEST_NAME, Manifest
 from schemas.migrations import MIGRATIONS
 from stages.kit.running import store

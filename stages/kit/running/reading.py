@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from schemas.artifact import KINDS, Artifact
 from schemas.errors import BadInput
+from schemas.kinds import KINDS, Artifact
 from schemas.manifest import FORMAT_VERSION, MANIFEST_NAME, Manifest
 from stages.kit.running.store import complete_interrupted
 
