@@ -44,7 +44,8 @@ class PanopticMap(Artifact):
     """`mesh.ply` (whole map, colour), `mesh_labels.npz` (`instance`, `segment`, `class_id`: (V,) int32 per vertex
     of mesh.ply, 0 = unlabelled), `entities/<instance>.ply`, `entities.json`, `counts.npz` (the triple-wise
     count: `segment`, `class_id`, `instance`, `count`, each (K,)), `volume.npz` (`block_coordinates` (B, 3) int32,
-    `tsdf`, `weight`, `segment`, `color` over 8^3 voxels a block)."""
+    blocks sorted by z, y, x; over the 8^3 voxels of a block, x fastest: `tsdf` (B, 512) float16 in truncation
+    distances, `weight` (B, 512) float16, `segment` (B, 512) int32, `color` (B, 512, 3) uint8)."""
 
     kind: ClassVar[str] = "panoptic_map"
     description: ClassVar[str] = "labelled TSDF map: whole mesh, a mesh per entity, counts"

@@ -6,7 +6,8 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
-from schemas.segments import FrameSegment, SegmentsFile
+from schemas.segments import FrameSegment, Segments, SegmentsFile
+from schemas.sequence import Sequence
 from schemas.vocabulary import Vocabulary
 
 
@@ -38,6 +39,22 @@ def check_segments(segments: SegmentsFile, camera: Camera, frame_count: int, voc
                     "vocabulary",
                     hint=remake,
                 )
+
+
+def check_origin(sequence: Sequence, segments: Segments) -> None:
+    """Raise BadInput when the manifests say that the segments were made from another sequence.
+
+    Handles without a manifest (not read from a finished artifact) pass.
+    """
+    if sequence.manifest is None or segments.manifest is None:
+        return
+    sources = [entry for entry in segments.manifest.inputs if entry.role == "sequence"]
+    if sources and sources[0].digest != sequence.manifest.content_digest:
+        raise BadInput(
+            f"the segments were made from another sequence ({sources[0].path}, digest {sources[0].digest[:12]}) than "
+            f"this one ({sequence.manifest.content_digest[:12]})",
+            hint="run `scenewright segment` on this sequence",
+        )
 
 
 def listings(segments: SegmentsFile) -> dict[int, tuple[FrameSegment, ...]]:

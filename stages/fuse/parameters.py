@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from pydantic import Field
 
+from schemas.errors import UsageError
 from schemas.panoptic_map import PanopticMap
 from schemas.segments import Segments
 from schemas.sequence import Sequence
@@ -88,6 +90,14 @@ class FuseParameters(Parameters):
     )
 
 
+def check(parameters: FuseParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError unless the depth range holds something."""
+    if parameters.minimum_depth >= parameters.maximum_depth:
+        raise UsageError(
+            f"--minimum-depth {parameters.minimum_depth} is not below --maximum-depth {parameters.maximum_depth}"
+        )
+
+
 STAGE = Stage(
     name="fuse",
     version=1,
@@ -96,6 +106,7 @@ STAGE = Stage(
     reads={"sequence": Sequence, "segments": Segments, "trajectory": Optionally(Trajectory)},
     writes=PanopticMap,
     libraries=("numpy", "numba", "scipy"),
+    check=check,
     example="scenewright fuse --sequence outputs/demo/sequence --segments outputs/demo/segments "
     "--out outputs/demo/panoptic_map",
 )

@@ -10,7 +10,7 @@ from schemas.sequence import Sequence
 from schemas.trajectory import Trajectory
 from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.fuse.extraction import extract_entities
-from stages.fuse.inputs import check_segments, listings, poses_at
+from stages.fuse.inputs import check_origin, check_segments, listings, poses_at
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.payload import describe, write_payload
@@ -35,6 +35,7 @@ def run(
     Frames without depth or pose are skipped and counted; frames without segments add geometry only. With nothing to
     integrate the outcome is `empty`. Raises BadInput when the segments do not belong to the sequence.
     """
+    check_origin(sequence, segments)
     vocabulary = load_vocabulary()
     info = segments.info
     with context.progress.step("integrate frames"):
@@ -64,6 +65,7 @@ def run(
     summary = {
         "frames": mapper.frames_integrated,
         **{f"skipped_{reason}": count for reason, count in sorted(skipped.items())},
+        "frames_without_segments": mapper.frames_integrated - mapper.labelled_frames,
         "entities": len(entities),
         "segments": int(len(set(merged.tolist())) - 1),
         "segment_merges": mapper.segment_merges,
@@ -103,6 +105,5 @@ def _integrate_frames(
             else:
                 listing = listed.get(frame.index)
                 ids = None if listing is None else masks.read(frame.index)
-                skipped["no_segments"] += listing is None
                 mapper.add_frame(frame.depth, frame.color, pose, ids, listing or ())
-    return mapper, +skipped
+    return mapper, skipped

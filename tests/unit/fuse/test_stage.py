@@ -6,17 +6,20 @@ import hashlib
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from schemas.errors import BadInput
+from schemas.errors import BadInput, UsageError
+from schemas.manifest import InputRecord, Manifest
 from schemas.panoptic_map import PanopticMap
 from schemas.segments import FrameSegments, Segments
 from schemas.sequence import Sequence
 from schemas.trajectory import Trajectory
-from stages.fuse.parameters import FuseParameters
+from stages.fuse.inputs import check_origin
+from stages.fuse.parameters import STAGE, FuseParameters
 from stages.fuse.stage import run
 from stages.kit.formats.masks import write_panoptic_zip
 from stages.kit.formats.ply_files import read_ply
@@ -116,7 +119,7 @@ def test_same_bytes_twice_and_with_another_number_of_threads(
     (tmp_path / "one").mkdir()
     program = (
         "from pathlib import Path; from schemas.sequence import Sequence; from schemas.segments import Segments;"
-        "from stages.fuse.parameters import FuseParameters; from stages.fuse.stage import run;"
+        "from stages.fuse.parameters import STAGE, FuseParameters; from stages.fuse.stage import run;"
         "from stages.kit.progress import SilentProgress; from stages.kit.stage import Context; import sys;"
         "run(Sequence(root=Path(sys.argv[1])), Segments(root=Path(sys.argv[2])), None, parameters=FuseParameters(),"
         "context=Context(output=Path(sys.argv[3]), seed=0, device='cpu', progress=SilentProgress()))"
@@ -171,7 +174,7 @@ def test_frames_without_segments_add_geometry(tmp_path: Path) -> None:
     info = segments.info
     info.model_copy(update={"frames": info.frames[:2]}).write(segments.path("segments.json"))
     result = fuse(tmp_path / "map", sequence, segments)
-    assert result.summary["frames"] == 4 and result.summary["skipped_no_segments"] == 2
+    assert result.summary["frames"] == 4 and result.summary["frames_without_segments"] == 2
 
 
 def test_refusals(tmp_path: Path) -> None:
@@ -206,3 +209,25 @@ def test_camera_outside_of_the_grid_is_refused(tmp_path: Path) -> None:
     write_tum(folder / "trajectory.tum", 0.1 * np.arange(2), far)
     with pytest.raises(BadInput, match="outside of the voxel grid"):
         fuse(tmp_path / "map", sequence, segments, Trajectory(root=folder))
+
+
+def test_depth_range_must_hold_something() -> None:
+    assert STAGE.check is not None
+    with pytest.raises(UsageError, match="minimum-depth 3.0 is not below"):
+        STAGE.check(FuseParameters(minimum_depth=3.0, maximum_depth=2.0), {})
+    STAGE.check(FuseParameters(), {})
+
+
+def test_segments_of_another_sequence_are_refused(scene: tuple[Sequence, Segments]) -> None:
+    def manifest(kind: str, digest: str, source: str = "") -> Manifest:
+        inputs = (InputRecord(role="sequence", kind="sequence", digest=source, path="../x"),) if source else ()
+        return Manifest(
+            kind=kind, schema_version=1, stage="x", stage_version=1, key="k", content_digest=digest, files=(),
+            inputs=inputs,
+        )  # fmt: skip
+
+    sequence = replace(scene[0], manifest=manifest("sequence", "aaa"))
+    check_origin(sequence, replace(scene[1], manifest=manifest("segments", "bbb", "aaa")))
+    check_origin(sequence, scene[1])
+    with pytest.raises(BadInput, match="another sequence"):
+        check_origin(sequence, replace(scene[1], manifest=manifest("segments", "bbb", "ccc")))
