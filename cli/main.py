@@ -104,6 +104,7 @@ def main() -> None:
     _keep_standard_output_for_data()
     _refuse_foreign_packages()
     os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the default probes TBB first and warns about its version
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads sleep: spinning halves the rate on busy machines
     signal.signal(signal.SIGTERM, _interrupt)
     code = run(sys.argv[1:])
     sys.stdout.flush()

@@ -252,6 +252,8 @@ def work(arm: str, case: str, frames_file: Path) -> dict[str, float]:
 def measure(frame_count: int, runs: int) -> dict[str, float]:
     """Return the medians over the runs: `<arm>/<case>/<measure>`, and ours as a share of Open3D's rate."""
     collected: dict[str, list[float]] = {}
+    # Ours as the command line runs it (cli/main.py): TBB is not probed, idle threads of OpenMP sleep.
+    settings = {"NUMBA_THREADING_LAYER": "omp", "OMP_WAIT_POLICY": "passive"}
     with tempfile.TemporaryDirectory() as folder:
         for name, images in render_frames(frame_count).items():
             np.save(Path(folder) / f"{name}.npy", images)
@@ -259,8 +261,11 @@ def measure(frame_count: int, runs: int) -> dict[str, float]:
             for case in CASES:
                 for arm in ARMS:
                     print(f"run {run + 1}/{runs}: {arm}, {case}", file=sys.stderr, flush=True)
+                    environment = {**os.environ, **(settings if arm.startswith("ours") else {})}
                     command = [sys.executable, "-m", "benchmarks.speed.fusion", "--worker", arm, case, folder]
-                    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, cwd=REPOSITORY)
+                    done = subprocess.run(
+                        command, check=True, stdout=subprocess.PIPE, text=True, cwd=REPOSITORY, env=environment
+                    )
                     for name, value in json.loads(done.stdout.splitlines()[-1]).items():
                         collected.setdefault(f"{arm}/{case}/{name}", []).append(value)
     metrics = {name: float(np.median(values)) for name, values in collected.items()}
@@ -313,9 +318,6 @@ def main() -> None:
     parser.add_argument("--worker", nargs=3, metavar=("ARM", "CASE", "FRAMES"), help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.worker:
-        import numba
-
-        numba.config.THREADING_LAYER = "omp"  # as the command line does: the default probes TBB and warns
         arm, case, folder = arguments.worker
         print(json.dumps(work(arm, case, Path(folder))))
         return
