@@ -23,6 +23,8 @@ THINNEST_DISTANCE = 0.005
 """RANSAC distance never falls below half a centimetre: surfaces of a fused map are not more exact than that."""
 SAME_HEIGHT = 0.02
 """Horizontal patches of one entity nearer than this in height are one plane."""
+MAXIMUM_TILT = math.radians(10.0)
+"""ours: planes that tilt by more are no supporting planes, although a_th lets 25 degrees pass [rad]."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +134,7 @@ def surface_planes(
         minimum_share=plane_share,
     )
     if minimum_support_area is not None:
+        fits = [fit for fit in fits if not is_slanted(fit.normal, horizontal_threshold)]
         free = np.ones(len(points), dtype=bool)
         for fit in fits:
             free[fit.inliers] = False
@@ -143,6 +146,12 @@ def surface_planes(
         if split_distance is not None:
             fits = split_levels(points, fits, horizontal_threshold, split_distance, least)
     return tuple(patch_from_fit(points, fit, horizontal_threshold) for fit in fits)
+
+
+def is_slanted(normal: np.ndarray, horizontal_threshold: float) -> bool:
+    """Whether a plane passes a_th but tilts by more than MAXIMUM_TILT: in noisy insides of furniture RANSAC lays such
+    planes through the edge of one board and the back of another, and nothing would rest on one."""
+    return is_horizontal(normal, horizontal_threshold) and float(-normal @ GRAVITY) < math.cos(MAXIMUM_TILT)
 
 
 def small_support_planes(
@@ -169,7 +178,7 @@ def small_support_planes(
             normals=normals[upward],
             normal_weight=0.0,
             direction=-GRAVITY,
-            maximum_angle=math.acos(-horizontal_threshold),
+            maximum_angle=min(math.acos(-horizontal_threshold), MAXIMUM_TILT),
         )
         if fit is None or len(fit.inliers) < minimum_count:
             break

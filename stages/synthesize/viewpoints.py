@@ -46,12 +46,15 @@ def _reachable(space: FreeSpace, wanted: np.ndarray, radius: float) -> np.ndarra
 
 
 def required_views(arrangement: Arrangement, space: FreeSpace) -> list[View]:
-    """Return the looks that must not be missing: into open furniture from the front (three angles, two heights), and
-    on every table and desk from several sides."""
+    """Return the looks that must not be missing: into open furniture from the front (three angles, two heights) and
+    closely at what stands in it, and on every table and desk from several sides."""
     views = []
     for thing in arrangement.objects:
         if thing.furnishing.joints:
             views += _into(thing, space)
+            for item in arrangement.objects:
+                if item.parent == thing.name and item.relation == "contains" and _stands_open(thing):
+                    views += _closely_at(item, thing, space)
         elif thing.class_name in ("table", "desk"):
             views += _onto(thing, space)
     return views
@@ -66,7 +69,7 @@ def blocked_floor(arrangement: Arrangement) -> str | None:
     if area < LEAST_FLOOR:
         return f"only {area:.1f} m2 to walk on"
     for thing in arrangement.objects:
-        if any(value > 0 for value in thing.furnishing.joints.values()) and len(_into(thing, space)) < 3:
+        if _stands_open(thing) and len(_into(thing, space)) < 3:
             return f"the floor before {thing.name} cannot be walked to"
         if thing.class_name == "table" and not _onto(thing, space):
             return f"{thing.name} cannot be walked to"
@@ -86,6 +89,22 @@ def _into(thing: PlacedObject, space: FreeSpace) -> list[View]:
         spot = _reachable(space, apply(pose, local)[:2], 0.35)
         if spot is not None:
             views.append(View(np.array([*spot, height]), apply(pose, np.array([0.0, 0.0, aim * size[2]]))))
+    return views
+
+
+def _stands_open(thing: PlacedObject) -> bool:
+    return any(value > 0 for value in thing.furnishing.joints.values())
+
+
+def _closely_at(item: PlacedObject, container: PlacedObject, space: FreeSpace) -> list[View]:
+    """Small things behind a door are a few dozen pixels from across the room: two looks from a step before it."""
+    pose, size = container.world_from_model, container.furnishing.closed_size
+    target = item.world_from_model[:3, 3] + np.array([0.0, 0.0, item.furnishing.closed_size[2] / 2])
+    views = []
+    for side in (-0.15, 0.15):
+        spot = _reachable(space, apply(pose, np.array([side, -size[1] / 2 - 0.65, 0.0]))[:2], 0.35)
+        if spot is not None:
+            views.append(View(np.array([*spot, np.clip(target[2] + 0.25, 0.8, EYE_HEIGHT)]), target))
     return views
 
 
