@@ -58,6 +58,8 @@ rules: setup ## Generate data/pipelines/*.mk and schemas/json from their declara
 .PHONY: $(PIPELINES)
 $(PIPELINES): setup
 	@$(MAKE) --no-print-directory -f data/pipelines/$@.mk PYTHON=$(PYTHON) OUTPUTS=$(OUTPUTS) $(if $(RUN),RUN=$(RUN))
+	@echo "report: $(OUTPUTS)/$(or $(RUN),$@)/report/report.html"
+	@folder=$(OUTPUTS)/$(or $(RUN),$@)/plan; if [ -d $$folder ]; then cat $$folder/plan.txt; $(PYTHON) -m cli inspect $$folder --expect ok > /dev/null; fi
 
 .PHONY: batch
 batch: setup ## Run a pipeline over a data set: make batch SPEC=batch.toml RUN=folder
