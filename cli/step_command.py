@@ -78,7 +78,7 @@ def _input_options(stage: Stage) -> list[inspect.Parameter]:
     for role, declared in stage.reads.items():
         optional = isinstance(declared, Optionally)
         what = declared.what if isinstance(declared, Optionally) else declared
-        text = what.description if isinstance(what, External) else f"Artifact: {what.kind}"
+        text = what.description if isinstance(what, External) else f"Artifact {what.kind}: {what.description}"
         flag = "--" + role.replace("_", "-")
         annotation = Optional[Path] if optional else Path  # noqa: UP045
         default = None if optional else ...
