@@ -1,11 +1,13 @@
 """Steps from one schema version of a kind to the next. All are kept; each writes into a new folder.
 
 A migration is a pure function `(old_folder, new_folder) -> None` that writes the payload of version n + 1 from that
-of version n. Every kind is at version 1 today, so the table is empty; the machinery is tested with a kind of its own.
+of version n.
 """
 
 from __future__ import annotations
 
+import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,3 +25,14 @@ def migration(kind: str, from_version: int) -> Callable[[Migration], Migration]:
         return function
 
     return register
+
+
+@migration("sequence", 1)
+def sequence_of_several_cameras(old: Path, new: Path) -> None:
+    """Version 2 lists its cameras; those of version 1 had one, called `camera`."""
+    shutil.copytree(old, new, dirs_exist_ok=True, ignore=shutil.ignore_patterns("manifest.json"))
+    document = json.loads((old / "sequence.json").read_text(encoding="utf-8"))
+    document["cameras"] = [
+        {"name": "camera", "camera": document["camera"], "baseline": None, "frame_count": document["frame_count"]}
+    ]
+    (new / "sequence.json").write_text(json.dumps(document, sort_keys=True, indent=1) + "\n", encoding="utf-8")

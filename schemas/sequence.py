@@ -12,7 +12,7 @@ from schemas.scene_parts import Camera
 class Gravity(Model):
     """How the world frame was made upright."""
 
-    method: Literal["given", "floor_plane", "mean_camera_up", "none"]
+    method: Literal["given", "floor_plane", "mean_camera_up", "imu", "none"]
     world_from_log: Transform
     """What ingest applied to the log's world frame."""
     inlier_count: int = 0
@@ -27,6 +27,16 @@ class LabelEntry(Model):
     class_name: str
 
 
+class SequenceCamera(Model):
+    """One camera of a sequence."""
+
+    name: str
+    camera: Camera
+    baseline: float | None = None
+    """Distance of the right eye along +x of the camera [m], when there is a right stream."""
+    frame_count: int = 0
+
+
 class SequenceFile(Model):
     """sequence.json."""
 
@@ -37,11 +47,18 @@ class SequenceFile(Model):
     notes: tuple[str, ...] = ()
     """What was assumed (intrinsics, depth unit, times, pose convention) and what looked odd."""
     camera: Camera
+    """The main camera, which is the first of `cameras`."""
+    cameras: tuple[SequenceCamera, ...]
+    """Every camera of the frames."""
     streams: tuple[Literal["color", "depth", "right", "labels", "pose"], ...]
     frame_count: int
     frames_in_log: int
     drops: dict[str, int] = {}
     """Reason -> number of frames left out."""
+    damage: tuple[str, ...] = ()
+    """What of the log could not be read at all, one line each."""
+    other_cameras: tuple[str, ...] = ()
+    """Cameras of the log that were not asked for."""
     gravity: Gravity
     depth_unit: str = "millimetre, 16UC1, 0 invalid"
     label_table: tuple[LabelEntry, ...] = ()
@@ -54,6 +71,7 @@ class Sequence(Artifact):
     """`frames.mcap` (stages/kit/formats/frames.py reads and writes it), `sequence.json`, `trajectory.tum`."""
 
     kind: ClassVar[str] = "sequence"
+    schema_version: ClassVar[int] = 2
     description: ClassVar[str] = "RGB-D frames with calibration and poses, gravity aligned"
     json_files: ClassVar[dict[str, type[Model]]] = {"sequence.json": SequenceFile}
 

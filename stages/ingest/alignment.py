@@ -33,13 +33,14 @@ def align(
     poses: np.ndarray,
     cloud: CLOUD,
     random: np.random.Generator,
+    measured_up: np.ndarray | None = None,
 ) -> Gravity:
     """Return what makes the world upright.
 
     `method` and `up_axis` are the options `gravity` and `up`; `stated` says where the log states that its z is up
     (None: it does not); `poses` (N, 4, 4) are log_from_camera; `cloud` returns surface points and normals in the
-    log's world, and is called only when the floor is looked for. Raises BadInput when the floor was demanded and
-    there is none.
+    log's world, and is called only when the floor is looked for; `measured_up` (3,) is what an IMU says of the log's
+    world. Raises BadInput when the floor, or an IMU, was demanded and there is none.
     """
     if method == "none":
         return _gravity("none", np.eye(4), "not asked for")
@@ -49,9 +50,13 @@ def align(
         return _gravity("given", np.eye(4), stated)
     if len(poses) == 0:
         return _gravity("none", np.eye(4), "the log has no poses")
-    up = mean_camera_up(poses)
+    if method == "imu" and measured_up is None:
+        raise BadInput("no IMU of the log says where up is", hint="--gravity auto")
+    measured = measured_up is not None and method in ("auto", "imu")
+    up = measured_up if measured else mean_camera_up(poses)
     if up is None:
         return _gravity("none", np.eye(4), "the cameras' up directions cancel out")
+    source = "the IMU's up" if measured else "the cameras' mean up"
     points, normals = grid_samples(*cloud(), GRID)
     floor = find_floor(points, normals, up, random) if method in ("auto", "floor") else None
     if floor is not None:
@@ -61,12 +66,15 @@ def align(
         detail = (
             f"lowest supported plane: {floor.inlier_count} of {len(points)} grid points within 3 cm, rms "
             f"{floor.residual * 1000:.1f} mm, {100 * floor.below_share:.1f} % of the points below, "
-            f"{tilt:.1f} deg from the cameras' mean up; {turned}"
+            f"{tilt:.1f} deg from {source}; {turned}"
         )
         return _gravity("floor_plane", upright, detail, floor.inlier_count)
     if method == "floor":
         raise BadInput("no floor was seen: no supported plane near the cameras' mean up", hint="--gravity camera-up")
     upright, turned = _turned_to_walls(upright_from_direction(up, points), normals)
+    if measured:
+        detail = f"mean of the IMU's acceleration, lowest percentile of the points at z = 0; {turned}"
+        return _gravity("imu", upright, detail)
     why = "asked for" if method == "camera-up" else "no floor was seen"
     detail = f"mean of the cameras' up ({why}), lowest percentile of the points at z = 0; {turned}"
     return _gravity("mean_camera_up", upright, detail)
@@ -80,7 +88,7 @@ def _turned_to_walls(upright: np.ndarray, normals: np.ndarray) -> tuple[np.ndarr
 
 
 def _gravity(
-    method: Literal["given", "floor_plane", "mean_camera_up", "none"],
+    method: Literal["given", "floor_plane", "mean_camera_up", "imu", "none"],
     world_from_log: np.ndarray,
     detail: str,
     inlier_count: int = 0,

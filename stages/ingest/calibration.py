@@ -11,7 +11,7 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
-from stages.ingest.folders import camera_from_options, overridden
+from stages.ingest.layouts.files import camera_from_options, overridden
 from stages.ingest.parameters import IngestParameters
 from stages.kit.geometry.cameras import intrinsic_matrix, scaled
 

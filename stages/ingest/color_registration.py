@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -20,12 +21,14 @@ def registered_loader(
 
     def registered() -> LoadedFrame:
         frame = load()
+        if frame.color is None or frame.depth is None:
+            return frame
         color = decode_color(frame.color) if isinstance(frame.color, bytes) else frame.color
         if color is None:
             raise Unusable("undecodable_color")
         depth = millimetres_to_depth(frame.depth)
         seen = color_in_depth_camera(color, depth, depth_camera, color_camera, color_from_depth)
-        return LoadedFrame(color=seen, depth=frame.depth, labels=frame.labels)
+        return replace(frame, color=seen)
 
     return registered
 

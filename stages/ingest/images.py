@@ -7,22 +7,27 @@ import numpy as np
 
 from schemas.scene_parts import Camera
 from stages.ingest.source import Unusable
-from stages.kit.formats.foxglove import JPEG_START, decode_color, depth_to_millimetres
+from stages.kit.formats.foxglove import JPEG_START, PNG_START, decode_color, depth_to_millimetres
 
 INVALID_DEPTH = 65535
 
 
 def usable_color(data: bytes, camera: Camera) -> np.ndarray | bytes:
-    """Return colour of the camera's size: JPEG bytes as they are, anything else as (H, W, 3) uint8 RGB.
+    """Return colour of the camera's size: JPEG and 8-bit PNG bytes as they are, anything else as (H, W, 3) uint8 RGB.
 
     A picture of another size and the same aspect ratio is resized. Raises Unusable.
     """
     image = decode_color(data)
     if image is None:
         raise Unusable("undecodable_color", f"{len(data)} bytes")
-    if data.startswith(JPEG_START) and image.shape[:2] == (camera.height, camera.width):
+    if image.shape[:2] == (camera.height, camera.width) and _is_plain(data):
         return data
     return fitted_color(image, camera)
+
+
+def _is_plain(data: bytes) -> bool:
+    """Whether every viewer shows these bytes as the same picture: JPEG, or PNG of 8-bit RGB (header, colour type 2)."""
+    return data.startswith(JPEG_START) or (data.startswith(PNG_START) and data[24:26] == b"\x08\x02")
 
 
 def fitted_color(image: np.ndarray, camera: Camera) -> np.ndarray:

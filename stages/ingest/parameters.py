@@ -14,9 +14,10 @@ from stages.kit.stage import External, Parameters, Stage
 class IngestParameters(Parameters):
     """Options of `ingest`."""
 
-    format: Literal["auto", "foxglove-mcap", "7scenes", "redwood", "posed-images"] = Field(
-        "auto", description="Layout of the log; auto tries each and records the rule that matched"
-    )
+    format: Literal[
+        "auto", "mcap", "rosbag1", "rosbag2", "tum", "scenenn", "scannet", "nerfstudio", "colmap", "7scenes", "redwood",
+        "posed-images", "images",
+    ] = Field("auto", description="Layout of the log; auto tries each and records the rule that matched")  # fmt: skip
     fx: float | None = Field(None, gt=0, description="Focal length along x [pixel], overrides the log")
     fy: float | None = Field(None, gt=0, description="Focal length along y [pixel], overrides the log")
     cx: float | None = Field(None, description="Principal point x [pixel], overrides the log")
@@ -41,15 +42,29 @@ class IngestParameters(Parameters):
         description="Resample the colour of 7-Scenes Kinect logs (640x480, focal length 585) into the depth camera, "
         "from which it was recorded 3 cm apart",
     )
-    gravity: Literal["auto", "given", "floor", "camera-up", "none"] = Field(
+    gravity: Literal["auto", "given", "floor", "imu", "camera-up", "none"] = Field(
         "auto",
-        description="How the world is made upright: auto takes what the log says, else the floor, else the mean "
-        "camera up; given takes the axis named by up",
+        description="How the world is made upright: auto takes what the log says, else the floor, else what an IMU "
+        "measured, else the mean camera up; given takes the axis named by up",
     )
     up: Literal["x", "-x", "y", "-y", "z", "-z"] = Field("z", description="Up axis of the log's world, with given")
+    camera: tuple[str, ...] = Field(
+        (), description="Camera of the log to use, by name, for logs with several; 'all' takes every one"
+    )
     color_topic: str | None = Field(None, description="Topic of the colour images, for logs with several")
     depth_topic: str | None = Field(None, description="Topic of the depth images, for logs with several")
+    right_topic: str | None = Field(None, description="Topic of the right images of a stereo pair")
+    pose_topic: str | None = Field(
+        None, description="Topic of odometry or poses to use for the camera instead of the tree of transforms"
+    )
     world_frame: str | None = Field(None, description="Frame that poses are wanted in; default: root of the tree")
+    register_depth: bool = Field(
+        True, description="Carry depth into the colour camera where the log says how the two stand to each other"
+    )
+    damage: Literal["salvage", "refuse"] = Field(
+        "salvage",
+        description="Logs that are torn or damaged: salvage uses what is whole and says what was lost; refuse stops",
+    )
 
 
 def check(parameters: IngestParameters, inputs: Any) -> None:
@@ -60,10 +75,10 @@ def check(parameters: IngestParameters, inputs: Any) -> None:
 
 STAGE = Stage(
     name="ingest",
-    version=1,
-    summary="Turn an RGB-D log into a sequence: calibrated, posed, gravity-aligned frames",
+    version=2,
+    summary="Turn a camera log into a sequence: calibrated, posed, gravity-aligned frames",
     parameters=IngestParameters,
-    reads={"log": External("log file or folder")},
+    reads={"log": External("log: a file (MCAP, bag) or a folder")},
     writes=Sequence,
     libraries=(
         "numpy",
@@ -73,6 +88,7 @@ STAGE = Stage(
         "protobuf",
         "foxglove-schemas-protobuf",
         "zstandard",
+        "rosbags",
     ),
     example="scenewright ingest --log recording.mcap --out outputs/kitchen/sequence",
     check=check,

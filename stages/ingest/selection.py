@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,25 +24,31 @@ def select(
 ) -> tuple[list[Entry], Counter[str]]:
     """Return the frames worth loading, with checked poses, and the others counted by reason.
 
-    A frame without a pose is left out only when other frames of the log have one.
+    A frame without a pose is left out only when other frames of the log have one. Selection by number counts the
+    frames of every camera for itself, so that cameras which were triggered together stay together.
     """
     kept: list[Entry] = []
     drops: Counter[str] = Counter()
-    last_time = -1.0
-    for index, entry in enumerate(entries):
+    last_times: dict[str, int] = {}
+    counts: Counter[str] = Counter()
+    for entry in entries:
+        index = counts[entry.camera_name]
+        counts[entry.camera_name] += 1
         stop = len(entries) if parameters.stop is None else parameters.stop
         if not parameters.start <= index < stop or (index - parameters.start) % parameters.every:
             drops[NOT_SELECTED] += 1
             continue
         pose, problem = checked_pose(entry.world_from_camera, has_poses)
         problem = entry.problem or problem
-        if problem is None and not (entry.time >= 0 and round(entry.time * 1e9) > round(last_time * 1e9)):
-            problem = "duplicate_stamp" if entry.time == last_time else "time_not_ascending"
+        last_time = last_times.get(entry.camera_name, -1)
+        time = round(entry.time * 1e9) if math.isfinite(entry.time) else -1
+        if problem is None and not (time >= 0 and time > last_time):
+            problem = "duplicate_stamp" if time == last_time and time >= 0 else "time_not_ascending"
         if problem is not None:
             drops[problem] += 1
             continue
-        last_time = entry.time
-        kept.append(Entry(entry.name, entry.time, pose, entry.load))
+        last_times[entry.camera_name] = time
+        kept.append(replace(entry, world_from_camera=pose))
     return kept, drops
 
 

@@ -11,6 +11,10 @@ import numpy as np
 from schemas.scene_parts import Camera
 from schemas.sequence import LabelEntry
 
+Role = Literal[
+    "color", "depth", "right", "labels", "calibration", "transforms", "pose", "imu", "points", "other", "unreadable"
+]
+
 
 class Unusable(Exception):
     """One frame that cannot be used. `reason` is counted in the sequence's drops, `detail` is logged."""
@@ -23,13 +27,30 @@ class Unusable(Exception):
 
 @dataclass(frozen=True)
 class LoadedFrame:
-    """The images of one frame, at the size of the source's camera."""
+    """The images of one frame, at the size of its camera. At least one of colour and depth is there."""
 
-    color: np.ndarray | bytes
-    """(H, W, 3) uint8 RGB, or the log's own JPEG bytes where these can be kept as they are."""
-    depth: np.ndarray
+    color: np.ndarray | bytes | None
+    """(H, W, 3) uint8 RGB, or the log's own JPEG or PNG bytes where these can be kept as they are. Left eye of a
+    stereo pair."""
+    depth: np.ndarray | None
     """(H, W) uint16 [mm], 0 = invalid."""
     labels: np.ndarray | None = None
+    """(H, W) uint16 instance ids."""
+    right: np.ndarray | bytes | None = None
+    """Right eye of a rectified stereo pair, like `color`."""
+
+
+@dataclass(frozen=True)
+class SourceCamera:
+    """One camera of the log, as its frames come out of `load`: without distortion, rectified."""
+
+    name: str
+    """`camera` where a log has one; else unique in the log, of letters, digits and underscores."""
+    camera: Camera
+    baseline: float | None = None
+    """Distance of the right eye along +x [m], when frames have a right image."""
+    registered: bool = True
+    """Whether depth pixels and colour pixels see the same ray, as far as the log says."""
 
 
 @dataclass(frozen=True)
@@ -45,15 +66,33 @@ class Entry:
     """Raises Unusable."""
     problem: str | None = None
     """Reason for which the frame is known to be unusable without loading it."""
+    camera_name: str = "camera"
+
+
+@dataclass(frozen=True)
+class StreamInfo:
+    """One stream of the log as it was recorded, for `inspect` and for people."""
+
+    name: str
+    """Topic, folder or file."""
+    role: Role
+    detail: str = ""
+    """Type and encoding, for people."""
+    stamps: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    """(N,) int64 header stamps [ns] in file order; empty when the stream carries none."""
+    count: int = 0
+    log_delay: float | None = None
+    """Median of log time minus header stamp [s]."""
 
 
 @dataclass(frozen=True)
 class LogSource:
-    """A log that was recognised."""
+    """A log that was recognised. Entries and cameras are those that the options chose."""
 
     format: str
     rule: str
-    camera: Camera
+    cameras: tuple[SourceCamera, ...]
+    """The first is the main one."""
     entries: tuple[Entry, ...]
     """Every frame of the log in time order, usable or not."""
     notes: tuple[str, ...] = ()
@@ -61,11 +100,22 @@ class LogSource:
     world_up: Literal["z", "unknown"] = "unknown"
     """`z` when the log itself says that z of its world is up."""
     world_up_detail: str = ""
+    up_in_log: np.ndarray | None = None
+    """(3,) up in the log's world as measured by an IMU, where the log has one."""
     label_table: tuple[LabelEntry, ...] = ()
     has_labels: bool = False
-    registered: bool = True
-    """Whether depth pixels and colour pixels see the same ray, as far as the log says."""
+    damage: tuple[str, ...] = ()
+    """What of the log could not be read at all (torn end, damaged chunks, messages that do not decode): one line each,
+    with counts and places."""
+    streams: tuple[StreamInfo, ...] = ()
+    other_cameras: tuple[str, ...] = ()
+    """Cameras of the log that were not asked for."""
     close: Callable[[], None] = field(default=lambda: None)
+
+    @property
+    def camera(self) -> Camera:
+        """The main camera."""
+        return self.cameras[0].camera
 
     @property
     def has_poses(self) -> bool:

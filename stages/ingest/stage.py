@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from schemas.errors import BadInput
-from schemas.sequence import Gravity, Sequence, SequenceFile
+from schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
 from stages.ingest.alignment import align
 from stages.ingest.detection import open_log
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.selection import NOT_SELECTED, largest_step, select
 from stages.ingest.source import Entry, LoadedFrame, LogSource, Unusable
 from stages.ingest.surface_samples import surface_samples
-from stages.kit.formats.foxglove import millimetres_to_depth
+from stages.kit.formats.foxglove import millimetres_to_depth, nanoseconds
 from stages.kit.formats.frames import FrameWriter
 from stages.kit.formats.trajectories import write_tum
 from stages.kit.stage import Context
@@ -33,40 +34,64 @@ def run(log: Path, *, parameters: IngestParameters, context: Context) -> Sequenc
     with context.progress.step("read the log"):
         source = open_log(Path(log), parameters)
     try:
-        _check_camera(source, log)
+        check_cameras(source, log)
         context.logger.info("%s: %s", log, source.rule)
+        for line in source.damage:
+            context.logger.warning("lost: %s", line)
         entries, drops = select(source.entries, parameters, source.has_poses)
         with context.progress.step("find gravity"):
             gravity = _find_gravity(source, entries, parameters, context)
         context.logger.info("gravity %s: %s", gravity.method, gravity.detail)
         with context.progress.step("write frames"):
-            times, poses, median_depth = _write_frames(source, entries, gravity, drops, parameters, context)
+            written = _write_frames(source, entries, gravity, drops, parameters, context)
     finally:
         source.close()
-    return _finish(source, gravity, drops, times, poses, median_depth, context)
+    return _finish(source, gravity, drops, written, context)
 
 
-def _check_camera(source: LogSource, log: Path) -> None:
-    """Refuse intrinsics of no camera: they would only show up as a room of nonsense."""
-    camera = source.camera
-    if camera.width == 0:
-        return  # no image could be decoded, so there will be no frame either
-    for name, focal, center, size in (
-        ("x", camera.fx, camera.cx, camera.width),
-        ("y", camera.fy, camera.cy, camera.height),
-    ):
-        if not (0.1 * size <= focal <= 100 * size and -size <= center <= 2 * size):
-            raise BadInput(
-                f"{log}: focal length {focal:g} and centre {center:g} pixels along {name} cannot be those of an image "
-                f"of {size} pixels",
-                hint="give --fx --fy --cx --cy",
-            )
+@dataclass
+class _Written:
+    """What was written, as far as the summary needs it."""
+
+    times: list[float] = field(default_factory=list)
+    posed_times: list[float] = field(default_factory=list)
+    poses: list[np.ndarray] = field(default_factory=list)
+    cameras: list[str] = field(default_factory=list)
+    """Camera of each frame."""
+    pose_cameras: list[str] = field(default_factory=list)
+    """Camera of each frame that has a pose."""
+    median_depths: list[float] = field(default_factory=list)
+    streams: set[StreamName] = field(default_factory=set)
+
+    @property
+    def median_depth(self) -> float:
+        """Median of the frames' median depths [m], 0 without depth."""
+        return float(np.median(self.median_depths)) if self.median_depths else 0.0
+
+
+def check_cameras(source: LogSource, log: Path) -> None:
+    """Refuse intrinsics of no camera: they would only show up as a room of nonsense. Raises BadInput."""
+    for known in source.cameras:
+        camera = known.camera
+        if camera.width == 0:
+            continue  # no image could be decoded, so there will be no frame either
+        for name, focal, center, size in (
+            ("x", camera.fx, camera.cx, camera.width),
+            ("y", camera.fy, camera.cy, camera.height),
+        ):
+            if not (0.1 * size <= focal <= 100 * size and -size <= center <= 2 * size):
+                raise BadInput(
+                    f"{log}: focal length {focal:g} and centre {center:g} pixels along {name} cannot be those of an "
+                    f"image of {size} pixels",
+                    hint="give --fx --fy --cx --cy",
+                )
 
 
 def _find_gravity(source: LogSource, entries: list[Entry], parameters: IngestParameters, context: Context) -> Gravity:
     posed = [entry for entry in entries if entry.world_from_camera is not None]
     chosen = [posed[i] for i in np.unique(np.linspace(0, len(posed) - 1, min(len(posed), GRAVITY_FRAMES)).astype(int))]
     poses = np.array([entry.world_from_camera for entry in posed]).reshape(-1, 4, 4)
+    cameras = {known.name: known.camera for known in source.cameras}
 
     def cloud() -> tuple[np.ndarray, np.ndarray]:
         samples = [(np.zeros((0, 3)), np.zeros((0, 3)))]
@@ -75,12 +100,13 @@ def _find_gravity(source: LogSource, entries: list[Entry], parameters: IngestPar
                 loaded = entry.load()
             except Unusable:
                 continue  # counted when the frames are written
-            depth = millimetres_to_depth(loaded.depth)
-            samples.append(surface_samples(depth, source.camera, entry.world_from_camera))
+            if loaded.depth is not None:
+                depth = millimetres_to_depth(loaded.depth)
+                samples.append(surface_samples(depth, cameras[entry.camera_name], entry.world_from_camera))
         return np.concatenate([points for points, _ in samples]), np.concatenate([normals for _, normals in samples])
 
     stated = source.world_up_detail if source.world_up == "z" else None
-    return align(parameters.gravity, parameters.up, stated, poses, cloud, context.random(0))
+    return align(parameters.gravity, parameters.up, stated, poses, cloud, context.random(0), source.up_in_log)
 
 
 def _write_frames(
@@ -90,20 +116,21 @@ def _write_frames(
     drops: Counter[str],
     parameters: IngestParameters,
     context: Context,
-) -> tuple[list[float], list[np.ndarray], float]:
-    """Write frames.mcap; returns times, poses and the median of the frames' median depths [m]."""
+) -> _Written:
+    """Write frames.mcap."""
     world_from_log = np.array(gravity.world_from_log)
     unchanged = np.array_equal(world_from_log, np.eye(4))
-    times: list[float] = []
-    poses: list[np.ndarray] = []
-    medians: list[float] = []
+    written = _Written()
+    last_stamp = -1
     with FrameWriter(
         context.output / "frames.mcap",
         source.camera,
         labels=source.has_labels,
         world_up="unknown" if gravity.method == "none" else "z",
-        registered=source.registered,
+        registered=all(known.registered for known in source.cameras),
         label_table=source.label_table,
+        cameras={known.name: known.camera for known in source.cameras},
+        baselines={known.name: known.baseline for known in source.cameras if known.baseline is not None},
     ) as writer:
         for entry in context.progress.track(entries, total=len(entries), description="frames"):
             if parameters.max_frames is not None and writer.frame_count >= parameters.max_frames:
@@ -118,73 +145,106 @@ def _write_frames(
             pose = entry.world_from_camera
             if pose is not None and not unchanged:
                 pose = world_from_log @ pose
-            writer.write(entry.time, loaded.color, loaded.depth, pose, loaded.labels)
-            times.append(entry.time)
-            medians.append(float(np.median(loaded.depth[loaded.depth > 0])) / 1000)
-            if pose is not None:
-                poses.append(pose)
-    return times, poses, float(np.median(medians)) if medians else 0.0
+            stamp = nanoseconds(entry.time)
+            # Cameras that were triggered together share a stamp, frames of a sequence do not: a microsecond apart,
+            # which is what float seconds since 1970 resolve.
+            last_stamp = stamp if stamp > last_stamp else last_stamp + 1000
+            time = last_stamp * 1e-9
+            writer.write(
+                time, loaded.color, loaded.depth, pose, loaded.labels, right=loaded.right, camera_name=entry.camera_name
+            )
+            _note(written, time, entry.camera_name, loaded, pose)
+    return written
+
+
+def _note(written: _Written, time: float, camera_name: str, loaded: LoadedFrame, pose: np.ndarray | None) -> None:
+    written.times.append(time)
+    written.cameras.append(camera_name)
+    streams: dict[StreamName, object] = {
+        "color": loaded.color, "depth": loaded.depth, "right": loaded.right, "labels": loaded.labels, "pose": pose
+    }  # fmt: skip
+    written.streams |= {name for name, value in streams.items() if value is not None}
+    if loaded.depth is not None:
+        written.median_depths.append(float(np.median(loaded.depth[loaded.depth > 0])) / 1000)
+    if pose is not None:
+        written.posed_times.append(time)
+        written.poses.append(pose)
+        written.pose_cameras.append(camera_name)
 
 
 def _within(loaded: LoadedFrame, maximum_depth: float | None) -> LoadedFrame:
-    if maximum_depth is None:
+    if maximum_depth is None or loaded.depth is None:
         return loaded
     depth = np.where(loaded.depth <= maximum_depth * 1000, loaded.depth, np.uint16(0))
     if not depth.any():
         raise Unusable("no_valid_depth", f"nothing within {maximum_depth:g} m")
-    return LoadedFrame(loaded.color, depth, loaded.labels)
+    return replace(loaded, depth=depth)
 
 
-def _finish(
-    source: LogSource,
-    gravity: Gravity,
-    drops: Counter[str],
-    times: list[float],
-    poses: list[np.ndarray],
-    median_depth: float,
-    context: Context,
-) -> Sequence:
-    notes = list(source.notes)
-    low, high = PLAUSIBLE_MEDIAN_DEPTH
-    if times and not low <= median_depth <= high:
-        notes.append(f"WARNING: median depth is {median_depth:.3g} m; is the depth unit right (depth_scale)?")
-    step = largest_step(np.array(poses).reshape(-1, 4, 4))
-    if step > LARGE_STEP:
-        notes.append(f"WARNING: the camera jumps {step:.2f} m between two frames")
-    if times and not poses:
-        notes.append("frames have no poses")
+def _finish(source: LogSource, gravity: Gravity, drops: Counter[str], written: _Written, context: Context) -> Sequence:
+    notes = [*source.notes, *_warnings(source, written)]
     for note in notes:
         (context.logger.warning if note.startswith("WARNING") else context.logger.info)("%s", note)
-    write_tum(context.output / "trajectory.tum", np.array(times[: len(poses)]), np.array(poses).reshape(-1, 4, 4))
-    streams: list[StreamName] = ["color", "depth"] if times else []
-    if times and source.has_labels:
-        streams.append("labels")
-    if poses:
-        streams.append("pose")
+    write_tum(
+        context.output / "trajectory.tum", np.array(written.posed_times), np.array(written.poses).reshape(-1, 4, 4)
+    )
+    counts = Counter(written.cameras)
     SequenceFile(
         source_format=source.format,
         rule=source.rule,
         notes=tuple(notes),
         camera=source.camera,
-        streams=tuple(streams),
-        frame_count=len(times),
+        cameras=tuple(
+            SequenceCamera(
+                name=known.name, camera=known.camera, baseline=known.baseline, frame_count=counts[known.name]
+            )
+            for known in source.cameras
+        ),
+        streams=tuple(stream for stream in get_args(StreamName) if stream in written.streams),
+        frame_count=len(written.times),
         frames_in_log=len(source.entries),
         drops=dict(sorted(drops.items())),
+        damage=source.damage,
+        other_cameras=source.other_cameras,
         gravity=gravity,
         label_table=source.label_table,
-        color_depth_registered=source.registered,
-        start_time=times[0] if times else 0.0,
-        end_time=times[-1] if times else 0.0,
+        color_depth_registered=all(known.registered for known in source.cameras),
+        start_time=written.times[0] if written.times else 0.0,
+        end_time=written.times[-1] if written.times else 0.0,
     ).write(context.output / "sequence.json")
     summary: dict[str, Any] = {
-        "frames": len(times),
+        "frames": len(written.times),
         "frames_in_log": len(source.entries),
         "dropped": sum(count for reason, count in drops.items() if reason != NOT_SELECTED),
         "gravity": gravity.method,
-        "median_depth": round(median_depth, 3),
+        "median_depth": round(written.median_depth, 3),
     }
-    if not times:
+    if len(source.cameras) > 1:
+        summary["cameras"] = len(source.cameras)
+    if source.damage:
+        summary["damage"] = len(source.damage)
+    if not written.times:
         worst = ", ".join(f"{reason} {count}" for reason, count in drops.most_common()) or "no frames in the log"
         summary["reason"] = f"no usable frame: {worst}"
         context.logger.warning("%s", summary["reason"])
-    return Sequence(context.output, outcome="ok" if times else "empty", summary=summary)
+    return Sequence(context.output, outcome="ok" if written.times else "empty", summary=summary)
+
+
+def _warnings(source: LogSource, written: _Written) -> list[str]:
+    """What looks odd about the frames that were written."""
+    notes = []
+    low, high = PLAUSIBLE_MEDIAN_DEPTH
+    if written.median_depths and not low <= written.median_depth <= high:
+        notes.append(f"WARNING: median depth is {written.median_depth:.3g} m; is the depth unit right (depth_scale)?")
+    poses = np.array(written.poses).reshape(-1, 4, 4)
+    names = np.array(written.pose_cameras, dtype=str)
+    step = max((largest_step(poses[names == name]) for name in sorted(set(written.pose_cameras))), default=0.0)
+    if step > LARGE_STEP:
+        notes.append(f"WARNING: the camera jumps {step:.2f} m between two frames")
+    if written.times and not written.poses:
+        notes.append("frames have no poses")
+    if written.times and "depth" not in written.streams:
+        notes.append("frames have no depth")
+    if source.other_cameras:
+        notes.append(f"other cameras of the log: {', '.join(source.other_cameras)} (--camera NAME, --camera all)")
+    return notes

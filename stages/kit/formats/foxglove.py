@@ -17,6 +17,7 @@ from stages.kit.geometry.transforms import quaternion_of, transform_from_quatern
 
 JPEG_QUALITY = 95
 JPEG_START = b"\xff\xd8\xff"
+PNG_START = b"\x89PNG\r\n\x1a\n"
 RAW_TYPES: dict[str, tuple[np.dtype[Any], int]] = {
     "mono8": (np.dtype("u1"), 1),
     "8UC1": (np.dtype("u1"), 1),
@@ -75,9 +76,10 @@ def millimetres_to_depth(millimetres: np.ndarray) -> np.ndarray:
     return depth
 
 
-def color_message(time: int, jpeg: bytes, frame_id: str) -> CompressedImage:
-    """Return a CompressedImage stamped `time` [ns]."""
-    message = CompressedImage(frame_id=frame_id, data=jpeg, format="jpeg")
+def color_message(time: int, encoded: bytes, frame_id: str) -> CompressedImage:
+    """Return a CompressedImage of JPEG or PNG bytes, stamped `time` [ns]."""
+    kind = "png" if encoded.startswith(PNG_START) else "jpeg"
+    message = CompressedImage(frame_id=frame_id, data=encoded, format=kind)
     message.timestamp.FromNanoseconds(time)
     return message
 
@@ -119,8 +121,11 @@ def raw_array(message: Any) -> np.ndarray:
     return image if channels == 1 else image.reshape(message.height, message.width, channels)
 
 
-def calibration_message(time: int, camera: Camera, frame_id: str) -> CameraCalibration:
-    """Return the CameraCalibration of an undistorted pinhole camera."""
+def calibration_message(time: int, camera: Camera, frame_id: str, *, baseline: float = 0.0) -> CameraCalibration:
+    """Return the CameraCalibration of an undistorted pinhole camera.
+
+    With a `baseline` [m] it is that of the right eye of a rectified pair: P[3] = -fx baseline (ROS CameraInfo).
+    """
     matrix = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
     message = CameraCalibration(
         frame_id=frame_id,
@@ -130,7 +135,7 @@ def calibration_message(time: int, camera: Camera, frame_id: str) -> CameraCalib
         D=[0.0] * 5,
         K=matrix,
         R=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        P=[camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+        P=[camera.fx, 0.0, camera.cx, -camera.fx * baseline, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0],
     )
     message.timestamp.FromNanoseconds(time)
     return message

@@ -1,14 +1,17 @@
 """The frames of a sequence: one MCAP file with Foxglove messages, the same bytes for the same frames.
 
-Topics: `/camera/color` CompressedImage (JPEG), `/camera/depth` RawImage 16UC1 [mm], `/camera/labels` RawImage mono16,
-`/camera/calibration` CameraCalibration, `/tf` FrameTransforms world -> camera. All messages of a frame carry the
-frame's time as log time and header stamp. Metadata record `scenewright`: what is known of the world frame;
-metadata record `labels`: instance -> class name.
+Topics of a camera called `camera`: `/camera/color` CompressedImage (JPEG or PNG), `/camera/depth` RawImage 16UC1 [mm],
+`/camera/labels` RawImage mono16, `/camera/calibration` CameraCalibration, and of a rectified stereo pair
+`/camera/right` CompressedImage with `/camera/right_calibration`, whose P holds the baseline; other cameras have topics
+under their own name. `/tf` FrameTransforms world -> camera. All messages of a frame carry the frame's time as log time
+and header stamp, which no other frame has. Metadata record `scenewright`: what is known of the world frame; metadata
+record `labels`: instance -> class name.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -30,18 +33,21 @@ from stages.kit.formats import foxglove
 from stages.kit.formats.mcap_log import Location, McapLog
 from stages.kit.geometry.transforms import is_rigid
 
-COLOR, DEPTH, LABELS = "/camera/color", "/camera/depth", "/camera/labels"
-CALIBRATION, TRANSFORMS = "/camera/calibration", "/tf"
+TRANSFORMS = "/tf"
 WORLD_FRAME, CAMERA_FRAME = "world", "camera"
 WORLD_METADATA, LABELS_METADATA = "scenewright", "labels"
-STREAM_TOPICS = {"color": COLOR, "depth": DEPTH, "labels": LABELS}
 MESSAGE_TYPES: dict[str, Any] = {
-    COLOR: CompressedImage,
-    DEPTH: RawImage,
-    LABELS: RawImage,
-    CALIBRATION: CameraCalibration,
-    TRANSFORMS: FrameTransforms,
+    "color": CompressedImage,
+    "right": CompressedImage,
+    "depth": RawImage,
+    "labels": RawImage,
+    "calibration": CameraCalibration,
+    "right_calibration": CameraCalibration,
 }
+"""Last part of the topic -> message type; the first part is the camera."""
+CAMERA_NAME = re.compile(r"[A-Za-z0-9_]+")
+_TOPIC = re.compile(rf"/({CAMERA_NAME.pattern})/({'|'.join(MESSAGE_TYPES)})")
+PIXEL_STREAMS = ("color", "depth", "labels", "right")
 
 
 @dataclass(frozen=True)
@@ -58,14 +64,18 @@ class Frame:
     """(H, W) uint16 instance ids, 0 = none."""
     world_from_camera: np.ndarray | None
     """(4, 4), OpenCV camera frame."""
+    camera_name: str = CAMERA_FRAME
+    right: np.ndarray | None = None
+    """(H, W, 3) uint8 RGB: right eye of a rectified stereo pair."""
 
 
 class FrameWriter:
     """Writes frames in time order. Used as a context manager; a file that was left by an exception stays unfinished.
 
-    `labels` announces a label stream. `world_up="z"` records that z of the poses' world is up (what our generated
-    logs know); `"unknown"` records that it is not known. `registered` records whether colour and depth pixels see the
-    same ray. `label_table` says what the labels mean.
+    `camera` is the camera of frames that name none; `cameras` (name -> camera) are those of frames that do, and
+    `baselines` (name -> metres) those of stereo pairs. `labels` announces a label stream. `world_up="z"` records that
+    z of the poses' world is up (what our generated logs know); `"unknown"` records that it is not known. `registered`
+    records whether colour and depth pixels see the same ray. `label_table` says what the labels mean.
     """
 
     def __init__(
@@ -77,26 +87,30 @@ class FrameWriter:
         world_up: Literal["z", "unknown"] = "z",
         registered: bool = True,
         label_table: Iterable[LabelEntry] = (),
+        cameras: Mapping[str, Camera] | None = None,
+        baselines: Mapping[str, float] | None = None,
     ) -> None:
         self.camera = camera
+        self.cameras = dict(cameras) if cameras else {CAMERA_FRAME: camera}
+        self.baselines = dict(baselines or {})
+        for name in self.cameras:
+            if not CAMERA_NAME.fullmatch(name):
+                raise ValueError(f"camera name {name!r} is not made of letters, digits and underscores")
         self.frame_count = 0
         self._labels = labels
         self._last_time = -1
         self._file = Path(path).open("wb")  # noqa: SIM115 (closed in __exit__)
         self._writer = McapWriter(self._file, chunk_size=1 << 20, compression=CompressionType.ZSTD)
         self._writer.start(profile="", library="scenewright")
-        topics = [COLOR, DEPTH, LABELS, CALIBRATION, TRANSFORMS] if labels else [COLOR, DEPTH, CALIBRATION, TRANSFORMS]
-        schemas: dict[Any, int] = {}
+        self._schemas: dict[Any, int] = {}
         self._channels: dict[str, int] = {}
-        for topic in topics:
-            kind = MESSAGE_TYPES[topic]
-            if kind not in schemas:
-                schemas[kind] = self._writer.register_schema(
-                    name=kind.DESCRIPTOR.full_name,
-                    encoding="protobuf",
-                    data=build_file_descriptor_set(kind).SerializeToString(deterministic=True),
-                )
-            self._channels[topic] = self._writer.register_channel(topic, "protobuf", schemas[kind])
+        for name in self.cameras:
+            for stream in ("color", "depth", *(("labels",) if labels else ()), "calibration"):
+                self._register(f"/{name}/{stream}", MESSAGE_TYPES[stream])
+            if name in self.baselines:
+                self._register(f"/{name}/right", CompressedImage)
+                self._register(f"/{name}/right_calibration", CameraCalibration)
+        self._register(TRANSFORMS, FrameTransforms)
         known = {"world_frame": WORLD_FRAME, "world_up": world_up, "registered": "yes" if registered else "no"}
         self._writer.add_metadata(WORLD_METADATA, known)
         table = {str(entry.instance): entry.class_name for entry in sorted(label_table, key=lambda e: e.instance)}
@@ -111,6 +125,15 @@ class FrameWriter:
             self._writer.finish()
         self._file.close()
 
+    def _register(self, topic: str, kind: Any) -> None:
+        if kind not in self._schemas:
+            self._schemas[kind] = self._writer.register_schema(
+                name=kind.DESCRIPTOR.full_name,
+                encoding="protobuf",
+                data=build_file_descriptor_set(kind).SerializeToString(deterministic=True),
+            )
+        self._channels[topic] = self._writer.register_channel(topic, "protobuf", self._schemas[kind])
+
     def write(
         self,
         time: float,
@@ -118,43 +141,60 @@ class FrameWriter:
         depth: np.ndarray | None,
         world_from_camera: np.ndarray | None = None,
         labels: np.ndarray | None = None,
+        *,
+        right: np.ndarray | bytes | None = None,
+        camera_name: str | None = None,
     ) -> None:
-        """Append a frame at `time` [s].
+        """Append a frame at `time` [s] of the camera called `camera_name` (default: the first).
 
-        `color` is (H, W, 3) uint8 RGB, or JPEG bytes that are stored as they are; `depth` is (H, W) float [m]
-        (0, NaN, infinite and over 65.534 m are invalid) or uint16 [mm]; `labels` is (H, W) integer < 65536;
-        `world_from_camera` is (4, 4) rigid. Raises ValueError for a wrong shape, time or pose.
+        `color` and `right` are (H, W, 3) uint8 RGB, or JPEG or PNG bytes that are stored as they are; `depth` is
+        (H, W) float [m] (0, NaN, infinite and over 65.534 m are invalid) or uint16 [mm]; `labels` is (H, W) integer
+        < 65536; `world_from_camera` is (4, 4) rigid. Raises ValueError for a wrong shape, time, camera or pose.
         """
+        name = camera_name or next(iter(self.cameras))
+        if name not in self.cameras:
+            raise ValueError(f"camera {name!r} was not announced: FrameWriter(..., cameras=...)")
+        camera = self.cameras[name]
         stamp = foxglove.nanoseconds(time)
         if stamp <= self._last_time:
             raise ValueError(f"frame at {time} s does not come after the one before ({self._last_time * 1e-9} s)")
         if world_from_camera is not None and not is_rigid(world_from_camera):
             raise ValueError(f"world_from_camera of the frame at {time} s is not rigid")
         self._last_time = stamp
-        self._add(CALIBRATION, stamp, foxglove.calibration_message(stamp, self.camera, CAMERA_FRAME))
+        self._add(f"/{name}/calibration", stamp, foxglove.calibration_message(stamp, camera, name))
         if world_from_camera is not None:
-            message = foxglove.transforms_message(stamp, WORLD_FRAME, CAMERA_FRAME, np.asarray(world_from_camera))
+            message = foxglove.transforms_message(stamp, WORLD_FRAME, name, np.asarray(world_from_camera))
             self._add(TRANSFORMS, stamp, message)
         if color is not None:
-            if not isinstance(color, bytes):
-                self._check(color, "colour", (3,), np.uint8)
-            jpeg = color if isinstance(color, bytes) else foxglove.encode_jpeg(color)
-            self._add(COLOR, stamp, foxglove.color_message(stamp, jpeg, CAMERA_FRAME))
+            self._add_picture(f"/{name}/color", stamp, color, camera, name)
+        if right is not None:
+            if name not in self.baselines:
+                raise ValueError(f"camera {name!r} has no baseline: FrameWriter(..., baselines=...)")
+            message = foxglove.calibration_message(stamp, camera, name, baseline=self.baselines[name])
+            self._add(f"/{name}/right_calibration", stamp, message)
+            self._add_picture(f"/{name}/right", stamp, right, camera, name)
         if depth is not None:
-            self._check(depth, "depth", (), None)
+            self._check(depth, camera, "depth", (), None)
             millimetres = depth if depth.dtype == np.uint16 else foxglove.depth_to_millimetres(depth)
-            self._add(DEPTH, stamp, foxglove.raw_message(stamp, millimetres, "16UC1", CAMERA_FRAME))
+            self._add(f"/{name}/depth", stamp, foxglove.raw_message(stamp, millimetres, "16UC1", name))
         if labels is not None:
             if not self._labels:
                 raise ValueError("labels were not announced: FrameWriter(..., labels=True)")
-            self._check(labels, "labels", (), None)
+            self._check(labels, camera, "labels", (), None)
             if labels.size and (labels.min() < 0 or labels.max() > 65535):
                 raise ValueError("labels are not within 0..65535")
-            self._add(LABELS, stamp, foxglove.raw_message(stamp, labels, "mono16", CAMERA_FRAME))
+            self._add(f"/{name}/labels", stamp, foxglove.raw_message(stamp, labels, "mono16", name))
         self.frame_count += 1
 
-    def _check(self, image: np.ndarray, name: str, channels: tuple[int, ...], kind: Any) -> None:
-        expected = (self.camera.height, self.camera.width, *channels)
+    def _add_picture(self, topic: str, stamp: int, picture: np.ndarray | bytes, camera: Camera, name: str) -> None:
+        if not isinstance(picture, bytes):
+            self._check(picture, camera, "colour", (3,), np.uint8)
+            picture = foxglove.encode_jpeg(picture)
+        self._add(topic, stamp, foxglove.color_message(stamp, picture, name))
+
+    @staticmethod
+    def _check(image: np.ndarray, camera: Camera, name: str, channels: tuple[int, ...], kind: Any) -> None:
+        expected = (camera.height, camera.width, *channels)
         if image.shape != expected:
             raise ValueError(f"{name} has shape {image.shape}, expected {expected}")
         if kind is not None and image.dtype != kind:
@@ -178,7 +218,8 @@ class FrameReader:
             self.world_up: str = metadata.get(WORLD_METADATA, {}).get("world_up", "unknown")
             """`z`, or `unknown`."""
             self.label_table = _label_table(metadata.get(LABELS_METADATA, {}), self.path)
-            self._camera: Camera | None = None
+            self._cameras: dict[str, Camera] | None = None
+            self._baselines: dict[str, float] | None = None
         except BaseException:
             self._log.close()
             raise
@@ -199,26 +240,44 @@ class FrameReader:
     @property
     def times(self) -> np.ndarray:
         """Times (N,) of all frames [s]."""
-        return np.array([stamp * 1e-9 for stamp, _ in self._index])
+        return np.array([stamp * 1e-9 for stamp, _, _ in self._index])
 
     @property
     def streams(self) -> tuple[str, ...]:
         """Which of color, depth, labels, pose some frame has."""
-        have = {topic for _, places in self._index for topic in places}
-        names = [name for name, topic in STREAM_TOPICS.items() if topic in have]
-        return (*names, "pose") if TRANSFORMS in have else tuple(names)
+        have = {stream for _, _, places in self._index for stream in places}
+        return tuple(stream for stream in (*PIXEL_STREAMS, "pose") if stream in have)
+
+    @property
+    def cameras(self) -> dict[str, Camera]:
+        """Every camera by name, in order of first appearance. Raises BadInput when the file holds no calibration."""
+        if self._cameras is None:
+            found: dict[str, Camera] = {}
+            for _, name, places in self._index:
+                if name not in found and "calibration" in places:
+                    found[name] = _camera_of(self._decode("calibration", places["calibration"]), self.path)
+            if not found:
+                raise BadInput(f"{self.path}: holds no camera calibration")
+            self._cameras = found
+        return self._cameras
 
     @property
     def camera(self) -> Camera:
-        """The camera. Raises BadInput when the file holds no calibration."""
-        if self._camera is None:
-            for _, places in self._index:
-                if CALIBRATION in places:
-                    self._camera = _camera_of(self._decode(CALIBRATION, places[CALIBRATION]), self.path)
-                    break
-            else:
-                raise BadInput(f"{self.path}: holds no camera calibration")
-        return self._camera
+        """The camera of the first frame. Raises BadInput when the file holds no calibration."""
+        return next(iter(self.cameras.values()))
+
+    @property
+    def baselines(self) -> dict[str, float]:
+        """Camera -> distance of its right eye along +x [m], of the cameras that are stereo pairs."""
+        if self._baselines is None:
+            self._baselines = {}
+            for _, name, places in self._index:
+                if name not in self._baselines and "right_calibration" in places:
+                    message = self._decode("right_calibration", places["right_calibration"])
+                    if len(message.P) != 12 or not message.P[0] > 0:
+                        raise BadInput(f"{self.path}: calibration of the right eye has no projection matrix")
+                    self._baselines[name] = -message.P[3] / message.P[0]
+        return self._baselines
 
     def frames(self, streams: Iterable[str] = ("color", "depth", "labels"), every: int = 1) -> Iterator[Frame]:
         """Yield every `every`-th frame in time order, decoding only the streams that are asked for."""
@@ -233,29 +292,40 @@ class FrameReader:
         return np.array([i for i, _ in kept], dtype=int), np.array([p for _, p in kept]).reshape(-1, 4, 4)
 
     def read(self, index: int, streams: Iterable[str] = ("color", "depth", "labels")) -> Frame:
-        """Return one frame. Raises IndexError outside of the sequence, BadInput when it cannot be decoded."""
+        """Return one frame with the pixel streams asked for (color, depth, labels, right).
+
+        Raises IndexError outside of the sequence, BadInput when it cannot be decoded.
+        """
         if not 0 <= index < len(self._index):
             raise IndexError(f"frame {index} of {len(self._index)}")
-        stamp, places = self._index[index]
-        arrays: dict[str, np.ndarray | None] = {"color": None, "depth": None, "labels": None}
+        stamp, name, places = self._index[index]
+        arrays: dict[str, np.ndarray | None] = dict.fromkeys(PIXEL_STREAMS)
         for stream in streams:
-            topic = STREAM_TOPICS[stream]
-            if topic in places:
-                arrays[stream] = self._array(index, stream, self._decode(topic, places[topic]))
+            if stream not in PIXEL_STREAMS:
+                raise ValueError(f"no stream {stream!r}; streams are {', '.join(PIXEL_STREAMS)}")
+            if stream in places:
+                arrays[stream] = self._array(index, stream, self._decode(stream, places[stream]))
         pose = None
-        if TRANSFORMS in places:
-            transform = self._decode(TRANSFORMS, places[TRANSFORMS]).transforms[0]
-            pose = foxglove.transform_matrix(transform.translation, transform.rotation)
-        return Frame(index, stamp * 1e-9, arrays["color"], arrays["depth"], arrays["labels"], pose)
+        if "pose" in places:
+            transforms = self._decode("pose", places["pose"]).transforms
+            if not transforms:
+                raise BadInput(f"{self.path}: frame {index} has an empty list of transforms")
+            try:
+                pose = foxglove.transform_matrix(transforms[0].translation, transforms[0].rotation)
+            except ValueError as error:
+                raise BadInput(f"{self.path}: pose of frame {index}: {error}") from None
+        return Frame(
+            index, stamp * 1e-9, arrays["color"], arrays["depth"], arrays["labels"], pose, name, arrays["right"]
+        )
 
-    def encoded_color(self, index: int) -> bytes | None:
-        """Return the stored JPEG of a frame, or None when it has no colour."""
-        places = self._index[index][1]
-        return bytes(self._decode(COLOR, places[COLOR]).data) if COLOR in places else None
+    def encoded(self, index: int, stream: Literal["color", "right"] = "color") -> bytes | None:
+        """Return the stored JPEG or PNG of a frame, or None when it has none."""
+        places = self._index[index][2]
+        return bytes(self._decode(stream, places[stream]).data) if stream in places else None
 
     def _array(self, index: int, stream: str, message: Any) -> np.ndarray:
         try:
-            if stream == "color":
+            if stream in ("color", "right"):
                 image = foxglove.decode_color(message.data)
                 if image is None:
                     raise ValueError("image cannot be decoded")
@@ -265,28 +335,44 @@ class FrameReader:
         except ValueError as error:
             raise BadInput(f"{self.path}: {stream} of frame {index}: {error}") from None
 
-    def _find_topics(self) -> dict[int, str]:
-        topics = {c.id: c.topic for c in self._log.channels.values() if c.topic in MESSAGE_TYPES}
-        for channel_id, topic in topics.items():
-            schema = self._log.schemas.get(self._log.channels[channel_id].schema_id)
-            expected = MESSAGE_TYPES[topic].DESCRIPTOR.full_name
+    def _find_topics(self) -> dict[int, tuple[str, str]]:
+        """Return channel -> (camera, stream); the camera of `/tf` is empty."""
+        found: dict[int, tuple[str, str]] = {}
+        for channel in self._log.channels.values():
+            match = _TOPIC.fullmatch(channel.topic)
+            if match is None and channel.topic != TRANSFORMS:
+                continue
+            found[channel.id] = (match[1], match[2]) if match else ("", "pose")
+            schema = self._log.schemas.get(channel.schema_id)
+            expected = (MESSAGE_TYPES[match[2]] if match else FrameTransforms).DESCRIPTOR.full_name
             if schema is None or schema.name != expected:
-                raise BadInput(f"{self.path}: topic {topic} is not {expected}", hint="run `scenewright ingest` first")
-        return topics
+                raise BadInput(
+                    f"{self.path}: topic {channel.topic} is not {expected}", hint="run `scenewright ingest` first"
+                )
+        return found
 
-    def _build_index(self) -> list[tuple[int, dict[str, Location]]]:
+    def _build_index(self) -> list[tuple[int, str, dict[str, Location]]]:
+        """Return (stamp [ns], camera, stream -> place) of every frame, in time order."""
         frames: dict[int, dict[str, Location]] = {}
+        names: dict[int, str] = {}
         for channel_id, entries in self._log.message_index.items():
             if channel_id in self._topics:
+                name, stream = self._topics[channel_id]
                 for stamp, location in entries:
-                    frames.setdefault(stamp, {})[self._topics[channel_id]] = location
-        return sorted(frames.items())
+                    frames.setdefault(stamp, {})[stream] = location
+                    if name and names.setdefault(stamp, name) != name:
+                        raise BadInput(
+                            f"{self.path}: cameras {names[stamp]!r} and {name!r} share the stamp {stamp}",
+                            hint="run `scenewright ingest` first",
+                        )
+        return [(stamp, names.get(stamp, CAMERA_FRAME), places) for stamp, places in sorted(frames.items())]
 
-    def _decode(self, topic: str, location: Location) -> Any:
+    def _decode(self, stream: str, location: Location) -> Any:
         try:
-            return MESSAGE_TYPES[topic].FromString(self._log.fetch(location).data)
+            kind = FrameTransforms if stream == "pose" else MESSAGE_TYPES[stream]
+            return kind.FromString(self._log.fetch(location).data)
         except DecodeError:
-            raise BadInput(f"{self.path}: a message of {topic} cannot be decoded") from None
+            raise BadInput(f"{self.path}: a message of stream {stream} cannot be decoded") from None
 
 
 def _camera_of(message: Any, path: Path) -> Camera:

@@ -37,7 +37,7 @@ def draw_segments(segments: Segments, canvas: Canvas) -> None:
 
 
 def _draw_frame(canvas: Canvas, frame: FrameSegments, ids: np.ndarray, reader: FrameReader | None) -> None:
-    color = reader.encoded_color(frame.frame) if reader is not None else None
+    color = reader.encoded(frame.frame) if reader is not None else None
     for path, values in segment_images(frame, ids).items():
         if color is not None:
             canvas.jpeg(f"{path}/color", color)

@@ -52,7 +52,7 @@ def draw_frames(canvas: Canvas, reader: FrameReader) -> None:
         canvas.time(frame.time)
         if frame.world_from_camera is not None:
             canvas.transform("camera", frame.world_from_camera)
-        color = reader.encoded_color(frame.index)
+        color = reader.encoded(frame.index)
         if color is not None:
             canvas.jpeg("camera/color", color)
         if frame.depth is not None:

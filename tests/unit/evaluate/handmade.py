@@ -18,7 +18,7 @@ from schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
 from schemas.plan import Check, Failure, Plan, PlanFile, PlannedAction
 from schemas.scene_parts import Box, Camera, Joint, Relation
 from schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
-from schemas.sequence import Gravity, LabelEntry, Sequence, SequenceFile
+from schemas.sequence import Gravity, LabelEntry, Sequence, SequenceCamera, SequenceFile
 from stages.kit.formats.frames import FrameWriter
 from stages.kit.formats.masks import write_panoptic_zip
 from stages.kit.formats.trajectories import write_tum
@@ -239,7 +239,7 @@ def make_sequence(root: Path) -> Sequence:
             writer.write(0.1 * k, color, np.full((48, 64), 1.5, dtype=np.float32), pose)
     write_tum(root / "trajectory.tum", np.arange(6) * 0.1, poses())
     SequenceFile(
-        source_format="generated", rule="handmade", camera=CAMERA, streams=("color", "depth", "pose"), frame_count=6,
+        source_format="generated", rule="handmade", camera=CAMERA, cameras=(SequenceCamera(name="camera", camera=CAMERA),), streams=("color", "depth", "pose"), frame_count=6,
         frames_in_log=7, drops={"no depth": 1}, gravity=Gravity(method="given", world_from_log=as_transform(np.eye(4))),
         label_table=(LabelEntry(instance=1, class_name="floor"),), end_time=0.5,
     ).write(root / "sequence.json")  # fmt: skip

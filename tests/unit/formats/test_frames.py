@@ -94,11 +94,11 @@ def test_other_readers_understand_it(tmp_path: Path) -> None:
 
 def test_stored_jpeg_is_kept_as_it_is(tmp_path: Path) -> None:
     with FrameReader(_write(tmp_path / "a")) as reader:
-        jpeg = reader.encoded_color(1)
+        jpeg = reader.encoded(1)
     with FrameWriter(tmp_path / "b", CAMERA) as writer:
         writer.write(0.0, jpeg, None)
     with FrameReader(tmp_path / "b") as reader:
-        assert reader.encoded_color(0) == jpeg
+        assert reader.encoded(0) == jpeg
         frame = reader.read(0)
         assert frame.depth is None and frame.labels is None and frame.world_from_camera is None
 

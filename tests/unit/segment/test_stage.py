@@ -12,10 +12,10 @@ from schemas.base import as_transform
 from schemas.errors import BadInput, MissingDependency, UsageError
 from schemas.scene_parts import Camera
 from schemas.segments import Segments
-from schemas.sequence import Gravity, LabelEntry, Sequence, SequenceFile
+from schemas.sequence import Gravity, LabelEntry, Sequence, SequenceCamera, SequenceFile
 from schemas.vocabulary import load_vocabulary
 from stages.ingest.color_registration import color_in_depth_camera
-from stages.ingest.seven_scenes import COLOR_CAMERA, COLOR_FROM_DEPTH
+from stages.ingest.layouts.seven_scenes import COLOR_CAMERA, COLOR_FROM_DEPTH
 from stages.kit.formats.frames import FrameReader, FrameWriter
 from stages.kit.formats.masks import PanopticReader
 from stages.kit.geometry.transforms import look_at, transform_from_quaternion
@@ -56,6 +56,7 @@ def write_sequence(root: Path, *, labels: bool = True, depth: bool = True, frame
             source_format="test",
             rule="test",
             camera=reader.camera,
+            cameras=(SequenceCamera(name="camera", camera=reader.camera),),
             streams=reader.streams,
             frame_count=len(reader),
             frames_in_log=len(reader),
@@ -170,6 +171,7 @@ def test_nothing_found_is_an_outcome(tmp_path: Path) -> None:
         source_format="test",
         rule="test",
         camera=camera,
+        cameras=(SequenceCamera(name="camera", camera=camera),),
         streams=("color", "depth"),
         frame_count=1,
         frames_in_log=1,
@@ -199,6 +201,7 @@ def test_detector_on_the_kitchen(tmp_path: Path) -> None:
         source_format="test",
         rule="test",
         camera=camera,
+        cameras=(SequenceCamera(name="camera", camera=camera),),
         streams=("color", "depth"),
         frame_count=1,
         frames_in_log=1,

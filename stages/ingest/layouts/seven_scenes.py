@@ -10,9 +10,9 @@ import numpy as np
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from stages.ingest.color_registration import registered_loader
-from stages.ingest.folders import depth_image_size, depth_units, image_loader, overridden
+from stages.ingest.layouts.files import depth_image_size, depth_units, image_loader, overridden
 from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LogSource
+from stages.ingest.source import Entry, LogSource, SourceCamera
 from stages.kit.formats.trajectories import read_matrix
 from stages.kit.geometry.transforms import transform_from
 
@@ -69,7 +69,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         f"times assumed: frame number / {parameters.frame_rate:g} per second",
         REGISTERED_NOTE if register else "colour and depth of 7-Scenes are not registered (other lens, 3 cm apart)",
     )
-    return LogSource("7scenes", rule, camera, tuple(entries), notes, registered=register)
+    cameras = (SourceCamera("camera", camera, registered=register),)
+    return LogSource("7scenes", rule, cameras, tuple(entries), notes)
 
 
 def _is_seven_scenes_kinect(camera: Camera) -> bool:

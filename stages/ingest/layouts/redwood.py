@@ -8,7 +8,7 @@ from pathlib import Path
 
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
-from stages.ingest.folders import (
+from stages.ingest.layouts.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     depth_image_size,
@@ -19,7 +19,7 @@ from stages.ingest.folders import (
     overridden,
 )
 from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LogSource
+from stages.ingest.source import Entry, LogSource, SourceCamera
 from stages.kit.formats.trajectories import read_open3d_log, read_text
 
 COLOR_FOLDERS = ("image", "color", "rgb")
@@ -64,7 +64,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         for index, (color, depth) in enumerate(zip(colors, depths, strict=True))
     )
     notes = (*notes, *given, unit_note, f"times assumed: {parameters.frame_rate:g} frames per second")
-    return LogSource("redwood", rule, camera, entries, notes)
+    return LogSource("redwood", rule, (SourceCamera("camera", camera),), entries, notes)
 
 
 def _camera(root: Path, size: tuple[int, int] | None) -> tuple[Camera, tuple[str, ...]]:

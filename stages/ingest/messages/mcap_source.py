@@ -14,7 +14,8 @@ from schemas.scene_parts import Camera
 from schemas.sequence import LabelEntry
 from stages.ingest.association import mutual_nearest
 from stages.ingest.calibration import Calibration, choose_calibration
-from stages.ingest.foxglove_topics import (
+from stages.ingest.images import decode_image, depth_millimetres, fitted_color, usable_color
+from stages.ingest.messages.survey import (
     TYPES,
     ImageMessage,
     LogContent,
@@ -23,9 +24,8 @@ from stages.ingest.foxglove_topics import (
     readable_topics,
     survey,
 )
-from stages.ingest.images import decode_image, depth_millimetres, fitted_color, usable_color
 from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LoadedFrame, LogSource, Unusable
+from stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
 from stages.kit.formats.foxglove import decode_color, raw_array
 from stages.kit.formats.frames import LABELS_METADATA, WORLD_METADATA
 from stages.kit.formats.mcap_log import MAGIC, McapLog
@@ -78,16 +78,15 @@ def _source(log: McapLog, parameters: IngestParameters, rule: str) -> LogSource:
     registered = registered and stated.get("registered") != "no"
     given = stated.get("world_up") == "z" and stated.get("world_frame") == world
     return LogSource(
-        format="foxglove-mcap",
+        format="mcap",
         rule=f"{rule}; colour from {color_topic}, depth from {depth_topic} ({depths.encoding}), poses in {world!r}",
-        camera=calibration.camera,
+        cameras=(SourceCamera("camera", calibration.camera, registered=registered),),
         entries=tuple(entries),
         notes=(*notes, *registration_note),
         world_up="z" if given else "unknown",
         world_up_detail=f"metadata record {WORLD_METADATA!r} of the log says that z of frame {world!r} is up",
         label_table=_label_table(metadata.get(LABELS_METADATA, {}), where),
         has_labels=labels is not None,
-        registered=registered,
         close=log.close,
     )
 
@@ -98,7 +97,9 @@ def _without_frames(log: McapLog, content: LogContent, color_topic: str | None, 
         what = "depth" if color_topic else "colour"
         raise BadInput(f"{log.path}: no {what} images; topics: {described_topics(log)}", hint=TYPE_HINT)
     camera = Camera(width=0, height=0, fx=1, fy=1, cx=0, cy=0)
-    return LogSource("foxglove-mcap", rule, camera, (), ("the log holds no image messages",), close=log.close)
+    return LogSource(
+        "mcap", rule, (SourceCamera("camera", camera),), (), ("the log holds no image messages",), close=log.close
+    )
 
 
 def _choose(content: LogContent, role: str, wanted: str | None, words: tuple[str, ...], log: McapLog) -> str | None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.ingest.folders import (
+from stages.ingest.layouts.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     camera_from_options,
@@ -22,7 +22,7 @@ from stages.ingest.folders import (
     natural_key,
 )
 from stages.ingest.parameters import IngestParameters
-from stages.ingest.source import Entry, LogSource
+from stages.ingest.source import Entry, LogSource, SourceCamera
 from stages.kit.formats.trajectories import number_rows, transform_from_numbers
 
 COLOR_FOLDERS = ("color", "rgb", "image")
@@ -62,7 +62,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         f"times assumed: {parameters.frame_rate:g} frames per second",
         "poses assumed: tx ty tz qx qy qz qw, world_from_camera",
     )
-    return LogSource("posed-images", rule, camera, tuple(entries), notes)
+    return LogSource("posed-images", rule, (SourceCamera("camera", camera),), tuple(entries), notes)
 
 
 def _pose(numbers: np.ndarray, where: str) -> tuple[np.ndarray | None, str | None]:

@@ -1,0 +1,1 @@
+"""Logs that are folders of files: one file per layout."""

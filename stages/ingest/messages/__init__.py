@@ -1,0 +1,1 @@
+"""Logs that are streams of messages: containers, decoders, and what becomes frames."""
