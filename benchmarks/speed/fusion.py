@@ -120,7 +120,7 @@ def ours(frames: dict[str, np.ndarray], voxel_size: float, whole: bool) -> tuple
     options = FuseParameters(voxel_size=voxel_size, truncation_voxels=TRUNCATION_VOXELS, maximum_depth=RANGE)
     vocabulary = load_vocabulary()
     things = frozenset(entry.id for entry in vocabulary.classes if entry.kind == "thing")
-    mapper = PanopticMapper(options, CAMERA, things)
+    mapper = PanopticMapper(options, things)
     classes = [vocabulary.by_name(name) for name, _, _ in room()]
     listings = []
     for image in frames["ids"]:
@@ -138,7 +138,7 @@ def ours(frames: dict[str, np.ndarray], voxel_size: float, whole: bool) -> tuple
     labels = np.arange(len(classes) + 1, dtype=np.int32)
 
     def with_everything(k: int) -> None:
-        mapper.add_frame(frames["depth"][k], frames["color"][k], frames["poses"][k], ids[k], listings[k])
+        mapper.add_frame(CAMERA, frames["depth"][k], frames["color"][k], frames["poses"][k], ids[k], listings[k])
 
     def vote_only(k: int) -> None:
         integrate(

@@ -40,9 +40,8 @@ class PanopticMapper:
     `things`: class ids of countable objects; all other classes are stuff.
     """
 
-    def __init__(self, parameters: FuseParameters, camera: Camera, things: frozenset[int]) -> None:
+    def __init__(self, parameters: FuseParameters, things: frozenset[int]) -> None:
         self.parameters = parameters
-        self.camera = camera
         self.things = things
         self.blocks = VoxelBlocks(parameters.voxel_size)
         self.labels = MergedLabels()
@@ -66,6 +65,7 @@ class PanopticMapper:
 
     def add_frame(
         self,
+        camera: Camera,
         depth: np.ndarray,
         color: np.ndarray | None,
         world_from_camera: np.ndarray,
@@ -79,7 +79,7 @@ class PanopticMapper:
         for the voxel grid.
         """
         options = self.parameters
-        expected = (self.camera.height, self.camera.width)
+        expected = (camera.height, camera.width)
         for name, image in (("depth", depth), ("colour", color), ("segments", ids)):
             if image is not None and image.shape[:2] != expected:
                 raise BadInput(
@@ -94,9 +94,9 @@ class PanopticMapper:
             )
         index_image, frame_labels = None, np.zeros(1, dtype=np.int32)
         if ids is not None:
-            index_image, frame_labels = self._associate(depth, world_from_camera, ids, listing)
+            index_image, frame_labels = self._associate(camera, depth, world_from_camera, ids, listing)
         integrate(
-            self.blocks, depth, self.camera, world_from_camera, truncation=self.truncation_distance,
+            self.blocks, depth, camera, world_from_camera, truncation=self.truncation_distance,
             near=options.minimum_depth, far=options.maximum_depth, color=color, index_image=index_image,
             label_of_index=frame_labels, canonical=self.labels.table(), maximum_weight=options.maximum_weight,
             label_band=options.label_band * self.truncation_distance, stride=options.block_stride,
@@ -125,7 +125,12 @@ class PanopticMapper:
             self.instance_merges += 1
 
     def _associate(
-        self, depth: np.ndarray, world_from_camera: np.ndarray, ids: np.ndarray, listing: Sequence[FrameSegment]
+        self,
+        camera: Camera,
+        depth: np.ndarray,
+        world_from_camera: np.ndarray,
+        ids: np.ndarray,
+        listing: Sequence[FrameSegment],
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the frame's index image and the global label of every index; count the predictions (eq. 2.4)."""
         options = self.parameters
@@ -138,7 +143,7 @@ class PanopticMapper:
                 hint="run `scenewright segment` again",
             )
         overlap = measure_overlap(
-            self.blocks, depth, index_image, len(segments), self.camera, world_from_camera,
+            self.blocks, depth, index_image, len(segments), camera, world_from_camera,
             canonical=self.labels.table(), near=options.minimum_depth, far=options.maximum_depth,
             stride=options.overlap_stride,
         )  # fmt: skip

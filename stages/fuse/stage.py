@@ -16,7 +16,7 @@ from stages.fuse.parameters import FuseParameters
 from stages.fuse.payload import describe, write_payload
 from stages.fuse.smoothing import smoothed_tsdf
 from stages.fuse.surface import extract_surface
-from stages.kit.formats.frames import FrameReader
+from stages.kit.formats.frames import FrameReader, require_depth
 from stages.kit.formats.masks import PanopticReader
 from stages.kit.formats.trajectories import read_tum
 from stages.kit.stage import Context
@@ -87,13 +87,14 @@ def _integrate_frames(
     """Return the map of all frames, and how many frames were skipped by reason."""
     things = frozenset(entry.id for entry in vocabulary.classes if entry.kind == "thing")
     skipped: Counter[str] = Counter()
+    require_depth(sequence)
     with FrameReader(sequence.path("frames.mcap")) as reader, PanopticReader(segments.path("panoptic.zip")) as masks:
         check_segments(segments.info, reader.camera, len(reader), vocabulary)
         listed = listings(segments.info)
         poses = None
         if trajectory is not None:
             poses = poses_at(reader.times, *read_tum(trajectory.path("trajectory.tum")), parameters.pose_tolerance)
-        mapper = PanopticMapper(parameters, reader.camera, things)
+        mapper = PanopticMapper(parameters, things)
         total = -(-len(reader) // parameters.every)
         frames = reader.frames(streams=("color", "depth"), every=parameters.every)
         for frame in context.progress.track(frames, total=total, description="fuse"):
@@ -105,5 +106,6 @@ def _integrate_frames(
             else:
                 listing = listed.get(frame.index)
                 ids = None if listing is None else masks.read(frame.index)
-                mapper.add_frame(frame.depth, frame.color, pose, ids, listing or ())
+                camera = reader.cameras[frame.camera_name]
+                mapper.add_frame(camera, frame.depth, frame.color, pose, ids, listing or ())
     return mapper, skipped

@@ -122,7 +122,7 @@ def _surface_samples(reader: FrameReader, settings: GeometricSettings) -> Iterat
     for index in range(0, len(reader), every):
         frame = reader.read(index, streams=("depth",))
         if frame.depth is not None and frame.world_from_camera is not None:
-            geometric = segment_depth(frame.depth, reader.camera, settings)
+            geometric = segment_depth(frame.depth, reader.cameras[frame.camera_name], settings)
             yield sample_surface(geometric.points, geometric.normals, frame.world_from_camera)
 
 

@@ -12,7 +12,7 @@ from schemas.errors import BadInput, MissingDependency, UsageError
 from schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
 from schemas.sequence import Sequence
 from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.frames import Frame, FrameReader
+from stages.kit.formats.frames import Frame, FrameReader, require_depth
 from stages.kit.formats.masks import write_panoptic_zip
 from stages.kit.stage import Context
 from stages.segment.backend_geometric import GeometricBackend
@@ -42,6 +42,7 @@ def run(sequence: Sequence, weights: Path | None, *, parameters: SegmentParamete
     info = sequence.info
     if "depth" not in info.streams:
         raise BadInput("this sequence has no depth", hint="compute it first: `scenewright disparity`")
+    require_depth(sequence)
     with FrameReader(sequence.path("frames.mcap")) as reader:
         with context.progress.step("prepare the backend"):
             backend = choose_backend(sequence, reader, weights, parameters)
@@ -122,9 +123,10 @@ def segment_frame(
     frame: Frame, reader: FrameReader, backend: Backend, parameters: SegmentParameters, random: np.random.Generator
 ) -> FusedFrame:
     """Return the fused segments of one frame; a frame without depth has none."""
-    shape = (reader.camera.height, reader.camera.width)
+    camera = reader.cameras[frame.camera_name]
+    shape = (camera.height, camera.width)
     depth = frame.depth if frame.depth is not None else np.zeros(shape, dtype=np.float32)
-    geometric = segment_depth(depth, reader.camera, geometric_settings(parameters))
+    geometric = segment_depth(depth, camera, geometric_settings(parameters))
     panoptic = backend(frame, geometric, random)
     return fuse(geometric.labels, panoptic, geometric.points, fusion_settings(parameters))
 

@@ -28,7 +28,7 @@ from mcap_protobuf.schema import build_file_descriptor_set
 
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
-from schemas.sequence import LabelEntry
+from schemas.sequence import LabelEntry, Sequence
 from stages.kit.formats import foxglove
 from stages.kit.formats.mcap_log import Location, McapLog
 from stages.kit.geometry.transforms import is_rigid
@@ -373,6 +373,18 @@ class FrameReader:
             return kind.FromString(self._log.fetch(location).data)
         except DecodeError:
             raise BadInput(f"{self.path}: a message of stream {stream} cannot be decoded") from None
+
+
+def require_depth(sequence: Sequence) -> None:
+    """Raise BadInput when the sequence has frames and none of them has depth."""
+    streams = sequence.info.streams
+    if streams and "depth" not in streams:
+        raise BadInput(
+            f"{sequence.root}: its frames have no depth ({', '.join(streams)})",
+            hint="compute depth from the stereo pairs first"
+            if "right" in streams
+            else "record depth, or a stereo pair",
+        )
 
 
 def _camera_of(message: Any, path: Path) -> Camera:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from schemas.errors import BadInput, MissingDependency
 from schemas.scene_parts import Box, Camera
+from stages.kit.formats.foxglove import PNG_START
 from stages.kit.geometry.cameras import intrinsic_matrix
 from stages.kit.geometry.transforms import quaternion_of
 from stages.kit.viewing.arrangement import Arrangement
@@ -178,15 +179,11 @@ class Canvas:
             ),
         )
 
-    def jpeg(self, path: str, data: bytes) -> None:
-        """Show a JPEG as it is, in the 2D view of the path above."""
+    def picture(self, path: str, data: bytes) -> None:
+        """Show a JPEG or PNG as it is, in the 2D view of the path above."""
         self._picture(path)
-        self._log(f"{WORLD}/{path}", self._rerun.EncodedImage(contents=data, media_type="image/jpeg"))
-
-    def png(self, path: str, data: bytes) -> None:
-        """Show a PNG as it is, in the 2D view of the path above."""
-        self._picture(path)
-        self._log(f"{WORLD}/{path}", self._rerun.EncodedImage(contents=data, media_type="image/png"))
+        kind = "image/png" if data.startswith(PNG_START) else "image/jpeg"
+        self._log(f"{WORLD}/{path}", self._rerun.EncodedImage(contents=data, media_type=kind))
 
     def depth(self, path: str, depth: np.ndarray) -> None:
         """Show depth (H, W) float [m], 0 = invalid; under a camera Rerun draws it as points."""

@@ -17,7 +17,7 @@ def draw_evaluation(evaluation: Evaluation, canvas: Canvas) -> None:
     for table in sorted(evaluation.path("tables").glob("*.md")):
         canvas.document(f"tables/{table.stem}", table.read_text(encoding="utf-8"))
     for plot in sorted(evaluation.path("plots").glob("*.png")):
-        canvas.png(f"plots/{plot.stem}", plot.read_bytes())
+        canvas.picture(f"plots/{plot.stem}", plot.read_bytes())
 
 
 def draw_report(report: Report, canvas: Canvas) -> None:

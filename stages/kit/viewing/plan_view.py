@@ -78,7 +78,7 @@ def _animate(log: McapLog, canvas: Canvas) -> None:
                 image = CompressedImage.FromString(message.data)
                 canvas.time(stamp_nanoseconds(image) * 1e-9)
                 if image.data.startswith(JPEG_START):
-                    canvas.jpeg("execution", bytes(image.data))
+                    canvas.picture("execution", bytes(image.data))
     except (DecodeError, ValueError) as error:
         raise BadInput(f"{log.path}: {error}", hint="make the plan again") from None
 

@@ -40,7 +40,7 @@ def _draw_frame(canvas: Canvas, frame: FrameSegments, ids: np.ndarray, reader: F
     color = reader.encoded(frame.frame) if reader is not None else None
     for path, values in segment_images(frame, ids).items():
         if color is not None:
-            canvas.jpeg(f"{path}/color", color)
+            canvas.picture(f"{path}/color", color)
         canvas.labels(f"{path}/labels", values)
 
 

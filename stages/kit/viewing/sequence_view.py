@@ -46,19 +46,23 @@ def draw_sequence(sequence: Sequence, canvas: Canvas) -> None:
 
 def draw_frames(canvas: Canvas, reader: FrameReader) -> None:
     """Draw picture, depth and labels of the frames at their times, the camera at its pose."""
-    canvas.camera("camera", reader.camera)
+    for name, camera in reader.cameras.items() if len(reader) else ():
+        canvas.camera(name, camera)
     every = -(-len(reader) // MAXIMUM_FRAMES)
     for frame in reader.frames(("depth", "labels"), every=every):
         canvas.time(frame.time)
         if frame.world_from_camera is not None:
-            canvas.transform("camera", frame.world_from_camera)
+            canvas.transform(frame.camera_name, frame.world_from_camera)
         color = reader.encoded(frame.index)
         if color is not None:
-            canvas.jpeg("camera/color", color)
+            canvas.picture(f"{frame.camera_name}/color", color)
+        right = reader.encoded(frame.index, "right")
+        if right is not None:
+            canvas.picture(f"{frame.camera_name}/right", right)
         if frame.depth is not None:
-            canvas.depth("camera/depth", frame.depth)
+            canvas.depth(f"{frame.camera_name}/depth", frame.depth)
         if frame.labels is not None:
-            canvas.labels("camera/labels", frame.labels)
+            canvas.labels(f"{frame.camera_name}/labels", frame.labels)
 
 
 def draw_trajectory(trajectory: Trajectory, canvas: Canvas) -> None:
@@ -79,7 +83,7 @@ def accumulated_cloud(reader: FrameReader) -> tuple[np.ndarray, np.ndarray] | No
     for frame in reader.frames(("color", "depth"), every=every):
         if frame.world_from_camera is None or frame.depth is None or frame.color is None:
             continue
-        seen = back_project(frame.depth, reader.camera)[::4, ::4].reshape(-1, 3)
+        seen = back_project(frame.depth, reader.cameras[frame.camera_name])[::4, ::4].reshape(-1, 3)
         valid = (seen[:, 2] > 0) & (seen[:, 2] < CLOUD_DEPTH)
         points.append(apply(frame.world_from_camera, seen[valid]))
         colors.append(frame.color[::4, ::4].reshape(-1, 3)[valid])

@@ -239,7 +239,8 @@ def make_sequence(root: Path) -> Sequence:
             writer.write(0.1 * k, color, np.full((48, 64), 1.5, dtype=np.float32), pose)
     write_tum(root / "trajectory.tum", np.arange(6) * 0.1, poses())
     SequenceFile(
-        source_format="generated", rule="handmade", camera=CAMERA, cameras=(SequenceCamera(name="camera", camera=CAMERA),), streams=("color", "depth", "pose"), frame_count=6,
+        source_format="generated", rule="handmade", camera=CAMERA,
+        cameras=(SequenceCamera(name="camera", camera=CAMERA),), streams=("color", "depth", "pose"), frame_count=6,
         frames_in_log=7, drops={"no depth": 1}, gravity=Gravity(method="given", world_from_log=as_transform(np.eye(4))),
         label_table=(LabelEntry(instance=1, class_name="floor"),), end_time=0.5,
     ).write(root / "sequence.json")  # fmt: skip

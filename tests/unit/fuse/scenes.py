@@ -136,7 +136,8 @@ def write_scene(
             listings.append(FrameSegments(frame=index, segments=tuple(frame_segments(blocks, image, lost))))
     write_tum(sequence.path("trajectory.tum"), 0.1 * np.arange(frames), np.array(poses))
     SequenceFile(
-        source_format="test", rule="test", camera=CAMERA, cameras=(SequenceCamera(name="camera", camera=CAMERA),), streams=("color", "depth", "pose"), frame_count=frames,
+        source_format="test", rule="test", camera=CAMERA,
+        cameras=(SequenceCamera(name="camera", camera=CAMERA),), streams=("color", "depth", "pose"), frame_count=frames,
         frames_in_log=frames, gravity=Gravity(method="given", world_from_log=as_transform(np.eye(4))),
     ).write(sequence.path("sequence.json"))  # fmt: skip
     write_panoptic_zip(segments.path("panoptic.zip"), images)
