@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -152,3 +153,36 @@ def test_depth_is_within_half_a_millimetre_or_invalid(depth: np.ndarray) -> None
     assert (np.abs(stored[kept] - depth[kept]) <= 0.00051 + 1e-6 * depth[kept]).all()
     sensible = np.isfinite(depth) & (depth > 0.001) & (depth < 65.5)
     assert kept[sensible].all()
+
+
+def test_several_cameras_and_stereo_pairs(tmp_path: Path) -> None:
+    wide = Camera(width=20, height=10, fx=9.0, fy=9.5, cx=9.5, cy=4.5)
+    path = tmp_path / "frames.mcap"
+    left = cv2.imencode(".png", np.full((30, 40, 3), 7, np.uint8))[1].tobytes()
+    with FrameWriter(path, CAMERA, cameras={"front": CAMERA, "wrist": wide}, baselines={"front": 0.12}) as writer:
+        for index in range(3):
+            pose = transform_from_yaw(0.1 * index, np.array([index, 0, 1]))
+            right = np.full((30, 40, 3), 50 * index, np.uint8)
+            writer.write(1.0 + index, left, None, pose, right=right, camera_name="front")
+            writer.write(1.5 + index, None, np.full((10, 20), 2.0, np.float32), None, camera_name="wrist")
+        with pytest.raises(ValueError, match="not announced"):
+            writer.write(9.0, left, None, camera_name="rear")
+        with pytest.raises(ValueError, match="no baseline"):
+            writer.write(9.0, None, None, right=np.zeros((10, 20, 3), np.uint8), camera_name="wrist")
+    with FrameReader(path) as reader:
+        assert reader.cameras == {"front": CAMERA, "wrist": wide} and reader.camera == CAMERA
+        assert reader.baselines == {"front": pytest.approx(0.12)}
+        assert reader.streams == ("color", "depth", "right", "pose")
+        frames = list(reader.frames(("color", "depth", "right")))
+        assert [frame.camera_name for frame in frames] == ["front", "wrist"] * 3
+        assert reader.encoded(0) == left and reader.encoded(1, "right") is None
+        assert frames[0].depth is None and frames[1].color is None and frames[1].depth.shape == (10, 20)
+        np.testing.assert_array_equal(frames[0].color, 7)
+        assert frames[2].right.mean() == pytest.approx(50, abs=2)
+        with pytest.raises(ValueError, match="no stream"):
+            reader.read(0, ("colour",))
+
+
+def test_cameras_need_plain_names(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="letters"):
+        FrameWriter(tmp_path / "a", CAMERA, cameras={"../x": CAMERA})
