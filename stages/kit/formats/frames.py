@@ -160,37 +160,39 @@ class FrameWriter:
             raise ValueError(f"frame at {time} s does not come after the one before ({self._last_time * 1e-9} s)")
         if world_from_camera is not None and not is_rigid(world_from_camera):
             raise ValueError(f"world_from_camera of the frame at {time} s is not rigid")
-        self._last_time = stamp
-        self._add(f"/{name}/calibration", stamp, foxglove.calibration_message(stamp, camera, name))
+        messages: list[tuple[str, Any]] = [(f"/{name}/calibration", foxglove.calibration_message(stamp, camera, name))]
         if world_from_camera is not None:
-            message = foxglove.transforms_message(stamp, WORLD_FRAME, name, np.asarray(world_from_camera))
-            self._add(TRANSFORMS, stamp, message)
+            pose = np.asarray(world_from_camera)
+            messages.append((TRANSFORMS, foxglove.transforms_message(stamp, WORLD_FRAME, name, pose)))
         if color is not None:
-            self._add_picture(f"/{name}/color", stamp, color, camera, name)
+            messages.append((f"/{name}/color", self._picture(stamp, color, camera, name)))
         if right is not None:
             if name not in self.baselines:
                 raise ValueError(f"camera {name!r} has no baseline: FrameWriter(..., baselines=...)")
-            message = foxglove.calibration_message(stamp, camera, name, baseline=self.baselines[name])
-            self._add(f"/{name}/right_calibration", stamp, message)
-            self._add_picture(f"/{name}/right", stamp, right, camera, name)
+            calibration = foxglove.calibration_message(stamp, camera, name, baseline=self.baselines[name])
+            messages.append((f"/{name}/right_calibration", calibration))
+            messages.append((f"/{name}/right", self._picture(stamp, right, camera, name)))
         if depth is not None:
             self._check(depth, camera, "depth", (), None)
             millimetres = depth if depth.dtype == np.uint16 else foxglove.depth_to_millimetres(depth)
-            self._add(f"/{name}/depth", stamp, foxglove.raw_message(stamp, millimetres, "16UC1", name))
+            messages.append((f"/{name}/depth", foxglove.raw_message(stamp, millimetres, "16UC1", name)))
         if labels is not None:
             if not self._labels:
                 raise ValueError("labels were not announced: FrameWriter(..., labels=True)")
             self._check(labels, camera, "labels", (), None)
             if labels.size and (labels.min() < 0 or labels.max() > 65535):
                 raise ValueError("labels are not within 0..65535")
-            self._add(f"/{name}/labels", stamp, foxglove.raw_message(stamp, labels, "mono16", name))
+            messages.append((f"/{name}/labels", foxglove.raw_message(stamp, labels, "mono16", name)))
+        for topic, message in messages:  # nothing of a frame that was refused is in the file
+            self._add(topic, stamp, message)
+        self._last_time = stamp
         self.frame_count += 1
 
-    def _add_picture(self, topic: str, stamp: int, picture: np.ndarray | bytes, camera: Camera, name: str) -> None:
+    def _picture(self, stamp: int, picture: np.ndarray | bytes, camera: Camera, name: str) -> CompressedImage:
         if not isinstance(picture, bytes):
             self._check(picture, camera, "colour", (3,), np.uint8)
             picture = foxglove.encode_jpeg(picture)
-        self._add(topic, stamp, foxglove.color_message(stamp, picture, name))
+        return foxglove.color_message(stamp, picture, name)
 
     @staticmethod
     def _check(image: np.ndarray, camera: Camera, name: str, channels: tuple[int, ...], kind: Any) -> None:
