@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
-
-import typer
-from typer.exceptions import TyperException
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 INTERRUPTED = 130
@@ -36,6 +35,11 @@ def _interrupt(signum: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
+def _on_signals(handler: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, handler)
+
+
 def _set_up_logging(level: int) -> None:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(logging.Formatter("%(message)s"))
@@ -47,6 +51,9 @@ def _set_up_logging(level: int) -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command line and return its exit code."""
+    import typer
+    from typer.exceptions import TyperException
+
     from schemas.errors import ScenewrightError
 
     debug = "--debug" in arguments
@@ -73,8 +80,7 @@ def run(arguments: list[str]) -> int:
         _say_error(f"{where}{message} (see --help)")
         return 2
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+        return _reader_left()
     except ImportError as error:
         if debug:
             raise
@@ -88,7 +94,16 @@ def run(arguments: list[str]) -> int:
 
 
 def _say_error(text: str) -> None:
-    sys.stderr.write("error: " + " ".join(text.split()) + "\n")
+    with contextlib.suppress(BrokenPipeError):
+        sys.stderr.write("error: " + " ".join(text.split()) + "\n")
+
+
+def _reader_left() -> int:
+    """Nobody reads our output any more (`| head`): an interruption, and the exit must not stumble over it again."""
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    for stream in (sys.stdout, sys.stderr):
+        os.dup2(nothing, stream.fileno())
+    return INTERRUPTED
 
 
 def _keep_standard_output_for_data() -> None:
@@ -101,11 +116,19 @@ def _keep_standard_output_for_data() -> None:
 
 def main() -> None:
     """Run the command line of this process."""
-    _keep_standard_output_for_data()
-    _refuse_foreign_packages()
-    os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the default probes TBB first and warns about its version
-    os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads sleep: spinning halves the rate on busy machines
-    signal.signal(signal.SIGTERM, _interrupt)
-    code = run(sys.argv[1:])
-    sys.stdout.flush()
+    try:
+        _on_signals(_interrupt)
+        _keep_standard_output_for_data()
+        _refuse_foreign_packages()
+        os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the default probes TBB first, warns about its version
+        os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads sleep: spinning halves the rate when busy
+        code = run(sys.argv[1:])
+        _on_signals(signal.SIG_IGN)  # all is said and done: only the exit itself is left to interrupt
+        sys.stdout.flush()
+    except KeyboardInterrupt:  # before `run` could catch it, or a second one while it did
+        _on_signals(signal.SIG_IGN)
+        _say_error(INTERRUPTED_TEXT)
+        code = INTERRUPTED
+    except BrokenPipeError:
+        code = _reader_left()
     sys.exit(code)

@@ -56,6 +56,8 @@ class Model(BaseModel):
             return cls.model_validate_json(Path(path).read_bytes())
         except FileNotFoundError:
             raise BadInput(f"{path}: file is missing", hint="make the artifact again") from None
+        except OSError as error:
+            raise BadInput(f"{path}: {error.strerror}", hint="make the artifact again") from None
         except ValidationError as error:
             first = error.errors()[0]
             where = ".".join(str(part) for part in first["loc"]) or "document"

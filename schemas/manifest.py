@@ -8,6 +8,8 @@ from schemas.base import Model
 
 MANIFEST_NAME = "manifest.json"
 FORMAT_VERSION = 1
+LARGEST_MANIFEST = 64 * 2**20
+"""A manifest over this size [bytes] is no manifest: 64 MiB list about 300,000 files."""
 
 CONVENTIONS: dict[str, str] = {
     "length": "metre",

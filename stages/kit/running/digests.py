@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -12,14 +13,19 @@ from schemas.manifest import MANIFEST_NAME, FileRecord
 
 
 def sha256_of_file(path: Path) -> str:
-    """Return the hexadecimal sha256 of a file's bytes."""
-    with Path(path).open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    """Return the hexadecimal sha256 of a file's bytes. Raises BadInput when it cannot be read."""
+    try:
+        with Path(path).open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        if error.errno == errno.EIO:
+            raise  # the disk's fault, not the file's
+        raise BadInput(f"{path}: {error.strerror}", hint="check the file and its permissions") from None
 
 
 def sha256_of_text(text: str) -> str:
-    """Return the hexadecimal sha256 of a text's UTF-8 bytes."""
-    return hashlib.sha256(text.encode()).hexdigest()
+    """Return the hexadecimal sha256 of a text's UTF-8 bytes; file names that are no UTF-8 keep their own bytes."""
+    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
 def payload_files(root: Path) -> list[Path]:
@@ -55,13 +61,26 @@ def content_digest(records: Iterable[FileRecord]) -> str:
 def external_digest(path: Path) -> str:
     """Return the digest of a raw file, or of a folder's sorted files (hidden ones left out). Raises BadInput."""
     path = Path(path)
-    if path.is_file():
+    try:
+        is_file, is_folder = path.is_file(), path.is_dir()
+    except (OSError, ValueError) as error:  # no permission, a name too long or with a zero byte
+        raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}", hint="check the path") from None
+    if is_file:
         return sha256_of_file(path)
-    if not path.is_dir():
+    if not is_folder:
         raise BadInput(f"{path}: no such file or folder", hint="check the path")
-    rows = []
-    for file in sorted(path.rglob("*"), key=lambda p: p.relative_to(path).as_posix()):
-        relative = file.relative_to(path)
-        if file.is_file() and not any(part.startswith(".") for part in relative.parts):
-            rows.append([relative.as_posix(), file.stat().st_size, sha256_of_file(file)])
+    rows = [
+        [file.relative_to(path).as_posix(), file.stat().st_size, sha256_of_file(file)] for file in external_files(path)
+    ]
     return sha256_of_text(canonical_json(rows))
+
+
+def external_files(path: Path) -> list[Path]:
+    """Return the files of a raw input: itself, or a folder's sorted files without hidden ones."""
+    if not path.is_dir():
+        return [path]
+    return [
+        file
+        for file in sorted(path.rglob("*"), key=lambda p: p.relative_to(path).as_posix())
+        if file.is_file() and not any(part.startswith(".") for part in file.relative_to(path).parts)
+    ]

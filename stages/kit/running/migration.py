@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from schemas.errors import BadInput, UsageError
 from schemas.kinds import KINDS
@@ -34,7 +33,7 @@ def migrate(source: Path, out: Path) -> Manifest:
     if out == source:
         raise UsageError("--out is the artifact itself", hint="migrations write into a new folder")
     store.check_target(out, manifest.kind)
-    with store.locked(out), store.partial_folder(out) as partial, TemporaryDirectory(dir=out.parent) as scratch:
+    with store.locked(out), store.partial_folder(out) as partial, store.partial_folder(out) as scratch:
         current = source
         for version in range(manifest.schema_version, kind.schema_version):
             step = MIGRATIONS.get((manifest.kind, version))
@@ -42,7 +41,7 @@ def migrate(source: Path, out: Path) -> Manifest:
                 raise BadInput(
                     f"{source}: no migration of {manifest.kind} from version {version}", hint="make it again"
                 )
-            following = Path(scratch) / str(version + 1)
+            following = scratch / str(version + 1)
             following.mkdir()
             step(current, following)
             current = following

@@ -8,7 +8,7 @@ import json
 import logging
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,10 +19,10 @@ from schemas.errors import BadInput, MachineFailure, MissingDependency, UsageErr
 from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
 from stages.kit.progress import SilentProgress
 from stages.kit.running import store
-from stages.kit.running.digests import content_digest, external_digest, record_files
+from stages.kit.running.digests import content_digest, external_digest, external_files, record_files
 from stages.kit.running.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
 from stages.kit.running.provenance import provenance_now
-from stages.kit.running.reading import check_sizes, open_artifact, read_manifest
+from stages.kit.running.reading import check_hashes, check_sizes, open_artifact, read_manifest
 from stages.kit.stage import Context, External, Optionally, Parameters, Stage
 
 logger = logging.getLogger("scenewright")
@@ -47,6 +47,17 @@ class RunResult:
         return self.manifest.outcome if self.manifest else "unknown"
 
 
+MACHINE_ERRORS = (
+    *(errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO, errno.EACCES, errno.EPERM, errno.ENAMETOOLONG),
+    *(errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENXIO, errno.ENODEV, errno.ESTALE, errno.ETIMEDOUT, errno.EMLINK),
+)
+"""What the system says when the fault is neither the input's nor ours."""
+
+
+Stamp = tuple[tuple[str, int, int, int], ...]
+"""Path, inode, time of change [ns] and size of files: what differs once one is replaced or written to."""
+
+
 @dataclass(frozen=True)
 class _OpenInput:
     role: str
@@ -54,6 +65,66 @@ class _OpenInput:
     digest: str
     path: Path
     value: Artifact | Path
+    stamp: Stamp
+    """Taken before anything was read."""
+
+    def check(self) -> None:
+        """Raise BadInput unless its bytes are those its manifest lists (the digest of a raw file was just taken)."""
+        if isinstance(self.value, Artifact) and self.value.manifest is not None:
+            check_hashes(self.path, self.value.manifest)
+
+    def was_written(self) -> bool:
+        """Whether it holds something else than when it was opened."""
+        if _stamp(self.path, isinstance(self.value, Artifact)) == self.stamp:
+            return False
+        if not isinstance(self.value, Artifact):
+            return True
+        found = _previous_manifest(self.path)
+        return found is None or found.content_digest != self.digest
+
+
+def _stamp(path: Path, is_artifact: bool) -> Stamp:
+    files = [path / MANIFEST_NAME] if is_artifact else external_files(path)
+    rows = []
+    for file in files:
+        with suppress(OSError):
+            found = file.stat()
+            rows.append((str(file), found.st_ino, found.st_mtime_ns, found.st_size))
+    return tuple(rows)
+
+
+@contextmanager
+def _inputs_stay(opened: list[_OpenInput]) -> Iterator[None]:
+    """Raise MachineFailure when an input is made again while the step reads it: what it read is then a mixture."""
+    failed: Exception | None = None
+    try:
+        yield
+    except Exception as error:
+        failed = error
+    for item in opened:
+        if item.was_written():
+            raise MachineFailure(
+                f"{item.path}: was written while this step read it", hint="run the step again once that is finished"
+            ) from failed
+    if failed is not None:
+        raise failed
+
+
+def _resolved(out: Path) -> Path:
+    """Return the absolute path without symbolic links: the folder a link stands for is replaced, not the link.
+
+    Raises UsageError for names that cannot be written down, MachineFailure when it cannot be looked at.
+    """
+    _check_name(out, "--out")
+    try:
+        resolved = Path(os.path.realpath(out))
+        if resolved.is_symlink():
+            raise UsageError(f"{out}: links that lead in a circle", hint="choose another --out")
+    except ValueError as error:
+        raise UsageError(f"--out {str(out)!r}: {error}", hint="choose another --out") from None
+    except OSError as error:
+        raise MachineFailure(f"{str(out):.200}: {error.strerror}", hint="choose another --out") from None
+    return resolved
 
 
 def choose_device(wanted: str) -> str:
@@ -69,6 +140,14 @@ def choose_device(wanted: str) -> str:
     return "cpu"
 
 
+def _check_name(path: Path, option: str) -> None:
+    """Raise UsageError for a path that no manifest can hold."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise UsageError(f"{option} {os.fsencode(path)!r}: no UTF-8 name", hint="rename it") from None
+
+
 def _open_inputs(stage: Stage, paths: Mapping[str, Path]) -> list[_OpenInput]:
     unknown = set(paths) - set(stage.reads)
     if unknown:
@@ -78,16 +157,19 @@ def _open_inputs(stage: Stage, paths: Mapping[str, Path]) -> list[_OpenInput]:
         raise UsageError(f"{stage.name}: --{missing[0].replace('_', '-')} is missing", hint="see --help")
     opened = []
     for role, path in paths.items():
+        _check_name(path, f"--{role.replace('_', '-')}")
         declared = stage.reads[role]
         what = declared.what if isinstance(declared, Optionally) else declared
         if isinstance(what, External):
             if what.weights and not Path(path).is_file():
                 raise MissingDependency(f"{path}: no such weight file", hint="see: scenewright models")
-            opened.append(_OpenInput(role, "external", external_digest(path), Path(path), Path(path)))
+            stamp = _stamp(Path(path), False) if Path(path).exists() else ()
+            opened.append(_OpenInput(role, "external", external_digest(path), Path(path), Path(path), stamp))
         else:
+            stamp = _stamp(Path(path), True)
             artifact = open_artifact(path, what)
             assert artifact.manifest is not None
-            opened.append(_OpenInput(role, what.kind, artifact.manifest.content_digest, Path(path), artifact))
+            opened.append(_OpenInput(role, what.kind, artifact.manifest.content_digest, Path(path), artifact, stamp))
     return opened
 
 
@@ -126,12 +208,14 @@ def _what_changed(old: Manifest, new: dict[str, Any]) -> list[str]:
 
 @contextmanager
 def _machine_errors(out: Path) -> Iterator[None]:
-    """Turn a full or read-only disk and exhausted memory into MachineFailure."""
+    """Turn a full or read-only disk, a forbidden file and exhausted memory into MachineFailure."""
     try:
         yield
     except OSError as error:
-        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO):
-            raise MachineFailure(f"{out}: {error.strerror}", hint="free space or choose another --out") from error
+        if error.errno in MACHINE_ERRORS:
+            raise MachineFailure(
+                f"{error.filename or out}: {error.strerror}", hint="free space or choose another --out"
+            ) from error
         raise
     except MemoryError as error:
         raise MachineFailure(f"{out}: out of memory", hint="use fewer frames or larger voxels") from error
@@ -154,14 +238,15 @@ def run_stage(
 
     Raises BadInput, UsageError, MissingDependency or MachineFailure; whatever stood at `out` is then untouched.
     """
-    out = Path(os.path.abspath(out))
+    out = _resolved(out)
     if stage.check is not None:
         stage.check(parameters, inputs)
     opened = _open_inputs(stage, inputs)
     device = choose_device(device) if device != "cpu" else device
     digests = {item.role: item.digest for item in opened}
     key = artifact_key(stage, parameters, digests, seed, device)
-    store.check_target(out, stage.writes.kind)
+    with _machine_errors(out):
+        store.check_target(out, stage.writes.kind)
     facts: dict[str, Any] = {
         "stage_version": stage.version,
         "schema_version": stage.writes.schema_version,
@@ -189,12 +274,10 @@ def run_stage(
         progress = progress or SilentProgress()
         with store.partial_folder(out) as partial:
             context = Context(output=partial, seed=seed, device=device, progress=progress)
-            run = importlib.import_module(f"stages.{stage.folder}.{stage.module}").run
-            values: dict[str, Artifact | Path | None] = dict.fromkeys(stage.reads)
-            values.update({item.role: item.value for item in opened})
-            made = run(**values, parameters=parameters, context=context)
+            with _inputs_stay(opened):
+                made = _work(stage, opened, parameters, context)
             _check_payload(stage, made, partial)
-            (partial / "timings.json").write_text(
+            (partial / store.TIMINGS_NAME).write_text(
                 json.dumps({name: round(value, 3) for name, value in sorted(progress.seconds.items())}, indent=1)
             )
             records = record_files(partial, stage.writes.undigested)
@@ -227,6 +310,15 @@ def run_stage(
     if nondeterministic:
         logger.warning("%s: the same key gave other bytes than before: this step is not deterministic", stage.name)
     return RunResult("made", reason, out, key, manifest, nondeterministic)
+
+
+def _work(stage: Stage, opened: list[_OpenInput], parameters: Parameters, context: Context) -> Artifact:
+    for item in opened:
+        item.check()
+    run = importlib.import_module(f"stages.{stage.folder}.{stage.module}").run
+    values: dict[str, Artifact | Path | None] = dict.fromkeys(stage.reads)
+    values.update({item.role: item.value for item in opened})
+    return run(**values, parameters=parameters, context=context)
 
 
 def _previous_manifest(out: Path) -> Manifest | None:

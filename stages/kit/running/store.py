@@ -14,16 +14,19 @@ import errno
 import fcntl
 import json
 import os
+import re
 import secrets
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 from schemas.errors import MachineFailure, UsageError
-from schemas.manifest import MANIFEST_NAME
+from schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME
 
 AT_FDCWD = -100
 RENAME_EXCHANGE = 2
+TIMINGS_NAME = "timings.json"
+"""The runner writes it into every artifact."""
 
 
 def _beside(target: Path, suffix: str) -> Path:
@@ -86,12 +89,12 @@ def recover(target: Path) -> None:
     journal = _beside(target, "journal")
     try:
         plan = json.loads(journal.read_text())
+        partial, old = (target.with_name(plan[role]) for role in ("partial", "old"))
     except FileNotFoundError:
         return
-    except json.JSONDecodeError:
+    except (ValueError, TypeError, KeyError, RecursionError):
         journal.unlink()  # killed while writing it: nothing had been renamed yet
         return
-    partial, old = target.with_name(plan["partial"]), target.with_name(plan["old"])
     if not target.exists():
         if (partial / MANIFEST_NAME).exists():
             os.rename(partial, target)
@@ -101,11 +104,13 @@ def recover(target: Path) -> None:
     journal.unlink()
 
 
-def _sweep(target: Path) -> None:
-    for leftover in target.parent.glob(f".{target.name}.partial-*"):
-        shutil.rmtree(leftover, ignore_errors=True)
-    for leftover in target.parent.glob(f".{target.name}.old-*"):
-        shutil.rmtree(leftover, ignore_errors=True)
+def sweep(target: Path) -> None:
+    """Remove what killed runs left beside `target`. Call with the lock held: only its holder owns such folders."""
+    # Compared letter by letter instead of by glob: a target may be called `run[1]` or `*`.
+    ours = re.compile(re.escape(f".{target.name}.") + r"(partial-\d+|old)-[0-9a-f]{8}")
+    with contextlib.suppress(OSError):
+        for leftover in [entry.path for entry in os.scandir(target.parent) if ours.fullmatch(entry.name)]:
+            shutil.rmtree(leftover, ignore_errors=True)
 
 
 @contextlib.contextmanager
@@ -115,7 +120,8 @@ def locked(target: Path) -> Iterator[None]:
         target.parent.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(_beside(target, "lock"), os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:
-        raise MachineFailure(f"{target}: {error.strerror}", hint="choose a writable --out") from None
+        reason = "a file stands in its path" if isinstance(error, NotADirectoryError | FileExistsError) else ""
+        raise MachineFailure(f"{target}: {reason or error.strerror}", hint="choose a writable --out") from None
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -124,6 +130,7 @@ def locked(target: Path) -> Iterator[None]:
                 f"{target}: another run is writing it", hint="wait for it to end, or choose another --out"
             ) from None
         recover(target)
+        sweep(target)
         yield
     finally:
         os.close(descriptor)
@@ -132,7 +139,7 @@ def locked(target: Path) -> Iterator[None]:
 def complete_interrupted(target: Path) -> None:
     """For readers: complete an interrupted replacement, if there is one and nobody is at it."""
     if _beside(target, "journal").exists():
-        with contextlib.suppress(MachineFailure), locked(target):
+        with contextlib.suppress(MachineFailure, OSError), locked(target):  # a reader may not be allowed to
             pass
 
 
@@ -144,22 +151,36 @@ def check_target(target: Path, kind: str) -> None:
         raise UsageError(f"{target}: a file stands there", hint="choose another --out")
     manifest = target / MANIFEST_NAME
     if manifest.exists():
-        try:
-            found = json.loads(manifest.read_text()).get("kind")
-        except (ValueError, AttributeError):
-            found = kind  # a torn manifest: not an artifact any more, ours to replace
-        if found != kind:
+        found = _kind_on_disk(manifest)
+        if found is None and not (target / TIMINGS_NAME).exists():
+            raise UsageError(f"{target}: its {MANIFEST_NAME} is not one that a step wrote", hint="choose another --out")
+        if found not in (None, kind):
             raise UsageError(f"{target}: holds a {found!r} artifact, not {kind!r}", hint="choose another --out")
     elif any(target.iterdir()):
         raise UsageError(f"{target}: holds files that no step wrote", hint="choose another --out; nothing was changed")
 
 
+def _kind_on_disk(manifest: Path) -> str | None:
+    """Return the kind that a manifest states, or None when it is torn."""
+    if manifest.stat().st_size > LARGEST_MANIFEST:
+        return None
+    try:
+        return str(json.loads(manifest.read_bytes())["kind"])
+    except (ValueError, TypeError, KeyError, RecursionError):
+        return None
+
+
 @contextlib.contextmanager
 def partial_folder(target: Path) -> Iterator[Path]:
-    """Yield a new partial folder beside `target` (lock held by the caller); whatever is left of it is removed."""
-    _sweep(target)
+    """Yield a new partial folder beside `target` (lock held by the caller); whatever is left of it is removed.
+
+    Raises MachineFailure when it cannot be made.
+    """
     partial = _beside(target, f"partial-{os.getpid()}-{secrets.token_hex(4)}")
-    partial.mkdir()
+    try:
+        partial.mkdir()
+    except OSError as error:
+        raise MachineFailure(f"{target}: {error.strerror}", hint="choose a writable --out") from None
     try:
         yield partial
     finally:
