@@ -8,6 +8,7 @@ import numpy as np
 from schemas.scene_parts import Camera
 from stages.ingest.source import Unusable
 from stages.kit.formats.foxglove import JPEG_START, PNG_START, decode_color, depth_to_millimetres
+from stages.kit.formats.image_headers import may_be_decoded
 
 INVALID_DEPTH = 65535
 
@@ -45,8 +46,8 @@ def fitted_color(image: np.ndarray, camera: Camera) -> np.ndarray:
 
 
 def decode_image(data: bytes) -> np.ndarray | None:
-    """Decode image bytes without any conversion; None when that is impossible."""
-    if not data:
+    """Decode image bytes without any conversion; None when that is impossible, or when they declare too many pixels."""
+    if not may_be_decoded(data):
         return None
     try:
         return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)

@@ -13,6 +13,7 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from schemas.scene_parts import Camera
+from stages.kit.formats.image_headers import may_be_decoded
 from stages.kit.geometry.transforms import quaternion_of, transform_from_quaternion
 
 JPEG_QUALITY = 95
@@ -51,8 +52,11 @@ def encode_jpeg(color: np.ndarray) -> bytes:
 
 
 def decode_color(data: bytes) -> np.ndarray | None:
-    """Decode JPEG or PNG bytes to (H, W, 3) uint8 RGB, as stored (EXIF rotation ignored); None if undecodable."""
-    if not data:
+    """Decode JPEG, PNG, ... bytes to (H, W, 3) uint8 RGB, as stored (EXIF rotation ignored).
+
+    None when that is impossible, or when they declare too many pixels.
+    """
+    if not may_be_decoded(data):
         return None
     try:
         flags = cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION

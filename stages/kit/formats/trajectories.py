@@ -10,6 +10,8 @@ from scipy.spatial.transform import Rotation
 from schemas.errors import BadInput
 from stages.kit.geometry.transforms import is_rigid
 
+LARGEST_TEXT = 200_000_000
+"""Bytes of a text file that are read: trajectories of days stay far below."""
 QUATERNION_TOLERANCE = 0.02
 """How far the norm of a quaternion may be from 1: files that print four decimals stay well within."""
 
@@ -125,12 +127,18 @@ def write_open3d_log(path: Path, world_from_camera: np.ndarray) -> None:
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a file. Raises BadInput when it is missing or no text."""
+    """Return the text of a file. Raises BadInput when it is missing, no text, or larger than LARGEST_TEXT bytes."""
     try:
-        return Path(path).read_text(encoding="utf-8")
+        with Path(path).open("rb") as file:
+            data = file.read(LARGEST_TEXT + 1)
+        if len(data) > LARGEST_TEXT:
+            raise BadInput(f"{path}: text file of more than {LARGEST_TEXT // 1_000_000} MB")
+        return data.decode("utf-8-sig")
     except FileNotFoundError:
         raise BadInput(f"{path}: file is missing") from None
-    except (UnicodeDecodeError, IsADirectoryError):
+    except PermissionError:
+        raise BadInput(f"{path}: file may not be read", hint="check its permissions") from None
+    except (UnicodeDecodeError, IsADirectoryError, NotADirectoryError):
         raise BadInput(f"{path}: not a text file") from None
 
 
