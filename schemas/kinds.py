@@ -5,6 +5,7 @@ from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene
 from schemas.contact_graph import ContactGraph
 from schemas.evaluation import Evaluation, Report
+from schemas.exported_sequence import ExportedSequence
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
 from schemas.panoptic_map import PanopticMap
@@ -21,6 +22,7 @@ __all__ = [
     "ContactGraph",
     "Depth",
     "Evaluation",
+    "ExportedSequence",
     "GroundTruth",
     "InteractiveScene",
     "PanopticMap",

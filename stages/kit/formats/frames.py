@@ -240,6 +240,11 @@ class FrameReader:
         return len(self._index)
 
     @property
+    def stamps(self) -> np.ndarray:
+        """Times (N,) int64 of all frames [ns]: exact where float seconds are not."""
+        return np.array([stamp for stamp, _, _ in self._index], dtype=np.int64)
+
+    @property
     def times(self) -> np.ndarray:
         """Times (N,) of all frames [s]."""
         return np.array([stamp * 1e-9 for stamp, _, _ in self._index])

@@ -1,0 +1,45 @@
+"""Kind `exported_sequence`: a sequence written back as a log that other tools read."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from schemas.artifact import Artifact
+from schemas.base import Model
+
+
+class ExportFile(Model):
+    """export.json: what was written, and what the layout could not hold."""
+
+    layout: Literal["tum", "nerfstudio", "mcap"]
+    dialect: Literal["foxglove", "ros2"] | None = None
+    """Message types of the `mcap` layout."""
+    log: str
+    """What to open, relative to this folder: `.` or a file."""
+    cameras: tuple[str, ...]
+    streams: tuple[str, ...]
+    """Streams that some frame has in the export."""
+    frame_count: int
+    frames_in_sequence: int
+    left_out: dict[str, int] = {}
+    """Reason -> frames of the sequence that are not in the export."""
+    depth_pixels_zeroed: int = 0
+    """Pixels whose depth is too large for the layout's unit; they are 0 = invalid."""
+    depth_limit: float | None = None
+    """Largest depth that the layout holds [m]."""
+    notes: tuple[str, ...] = ()
+    """What a reader has to know (conventions, units, streams that the layout has no place for)."""
+
+
+class ExportedSequence(Artifact):
+    """`export.json` and the layout's own files: TUM `rgb/ depth/ rgb.txt depth.txt groundtruth.txt calibration.txt`,
+    nerfstudio `images/ depth/ transforms.json`, or `log.mcap`."""
+
+    kind: ClassVar[str] = "exported_sequence"
+    description: ClassVar[str] = "a sequence written back as TUM, nerfstudio or MCAP"
+    json_files: ClassVar[dict[str, type[Model]]] = {"export.json": ExportFile}
+
+    @property
+    def info(self) -> ExportFile:
+        """The parsed export.json."""
+        return ExportFile.read(self.path("export.json"))

@@ -1,0 +1,1 @@
+"""`export`: a sequence written back in the layouts of other tools."""

@@ -1,0 +1,75 @@
+"""The frames of a sequence as every layout gets them: encoded pictures, millimetres, one at a time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stages.kit.formats.foxglove import depth_to_millimetres
+from stages.kit.formats.frames import FrameReader
+
+
+@dataclass(frozen=True)
+class ExportFrame:
+    """One frame. Streams that it lacks, or that were not asked for, are None."""
+
+    stamp: int
+    """Time [ns]."""
+    camera_name: str
+    color: bytes | None
+    """The sequence's own JPEG or PNG."""
+    depth: np.ndarray | None
+    """(H, W) uint16 [mm], 0 = invalid."""
+    labels: np.ndarray | None
+    """(H, W) uint16 instance ids."""
+    right: bytes | None
+    """Right eye of a rectified stereo pair, like `color`."""
+    world_from_camera: np.ndarray | None
+    """(4, 4), OpenCV camera."""
+
+
+@dataclass
+class Tally:
+    """What a layout wrote."""
+
+    frames: int = 0
+    streams: set[str] = field(default_factory=set)
+    left_out: Counter[str] = field(default_factory=Counter)
+    """Reason -> frames."""
+    depth_pixels_zeroed: int = 0
+
+
+def export_frames(
+    reader: FrameReader,
+    numbers: Iterable[int],
+    every: int,
+    streams: Collection[str],
+    cameras: Collection[str],
+    tally: Tally,
+) -> Iterator[ExportFrame]:
+    """Yield every `every`-th of the numbered frames with the streams asked for, if it is of one of the cameras.
+
+    The others are counted in `tally`.
+    """
+    pixels = tuple(stream for stream in ("depth", "labels") if stream in streams)
+    stamps = reader.stamps
+    for index in numbers:
+        if index % every:
+            tally.left_out["not_selected"] += 1
+            continue
+        frame = reader.read(index, pixels)
+        if frame.camera_name not in cameras:
+            tally.left_out["other_camera"] += 1
+            continue
+        yield ExportFrame(
+            stamp=int(stamps[index]),
+            camera_name=frame.camera_name,
+            color=reader.encoded(index, "color") if "color" in streams else None,
+            depth=None if frame.depth is None else depth_to_millimetres(frame.depth),
+            labels=frame.labels,
+            right=reader.encoded(index, "right") if "right" in streams else None,
+            world_from_camera=frame.world_from_camera if "pose" in streams else None,
+        )
