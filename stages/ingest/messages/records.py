@@ -8,7 +8,14 @@ import numpy as np
 
 
 class Undecodable(Exception):
-    """A message that does not hold what its type promises. The text is the reason, for people."""
+    """A message that does not hold what its type promises. The text is the reason, for people.
+
+    Of a list of transforms some may hold all the same: `records` has these.
+    """
+
+    def __init__(self, reason: str, records: tuple[Record, ...] = ()) -> None:
+        super().__init__(reason)
+        self.records = records
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,60 @@
+"""Foxglove messages in JSON -> records."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+from stages.ingest.messages.foxglove_messages import CONVERTERS, type_of
+from stages.ingest.messages.records import Record, Undecodable
+
+LARGEST_MESSAGE = 1 << 27
+"""Bytes of one JSON message that are parsed: parsing takes up to twenty times as much memory."""
+
+
+def json_decoder(type_name: str) -> Callable[[bytes], tuple[Record, ...]] | None:
+    """Return what decodes messages of a Foxglove type, raising Undecodable; None for types without a record."""
+    name = type_of(type_name)
+    if name not in CONVERTERS:
+        return None
+    convert = CONVERTERS[name]
+
+    def decode(data: bytes) -> tuple[Record, ...]:
+        fields = _lowered(parse_object(data))
+        if isinstance(fields.get("data"), str):
+            fields["data"] = _unpacked(fields["data"])
+        return convert(fields)
+
+    return decode
+
+
+def parse_object(data: bytes) -> dict[str, Any]:
+    """Parse a JSON object. Raises Undecodable, also for NaN and infinity, which JSON does not have."""
+    if len(data) > LARGEST_MESSAGE:
+        raise Undecodable(f"a JSON message of {len(data)} bytes, more than {LARGEST_MESSAGE}")
+    try:
+        parsed = json.loads(data.decode("utf-8"), parse_constant=_refuse)
+    except (ValueError, RecursionError) as error:  # JSONDecodeError and UnicodeDecodeError are ValueErrors
+        raise Undecodable(f"no JSON: {error!s:.120}") from None
+    if not isinstance(parsed, dict):
+        raise Undecodable("the JSON is no object")
+    return parsed
+
+
+def _refuse(constant: str) -> NoReturn:
+    raise ValueError(f"{constant} is no number")
+
+
+def _lowered(fields: dict[str, Any]) -> dict[str, Any]:
+    """D, K, R, P are upper case in some writers; what is nested has lower-case names in all of them."""
+    return {name.lower(): value for name, value in fields.items()}
+
+
+def _unpacked(text: str) -> bytes:
+    try:
+        return base64.b64decode(text, validate=True)
+    except (binascii.Error, ValueError):
+        raise Undecodable("field 'data' is no base64") from None

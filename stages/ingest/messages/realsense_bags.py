@@ -1,0 +1,40 @@
+"""Bags that the RealSense SDK records: the topic says which stream a message belongs to, its frames say nothing.
+
+Every image has frame `0`, and extrinsics are bare transforms on `.../tf/<reference>`. They carry points of the
+reference into the stream (librealsense, `rs2_extrinsics` from the reference to the stream).
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+from stages.ingest.messages.records import Record, TransformRecord
+from stages.kit.geometry.transforms import inverse
+
+_TOPIC = re.compile(
+    r"/(?P<device>device_\d+)/(?P<sensor>sensor_\d+)/(?P<stream>\w+)/"
+    r"(?:info/camera_info|image/data|imu/data|tf/(?P<reference>\d+))"
+)
+
+
+def is_stream_transform(topic: str) -> bool:
+    """Whether a topic carries the extrinsics of a RealSense stream."""
+    match = _TOPIC.fullmatch(topic)
+    return match is not None and match["reference"] is not None
+
+
+def with_stream_frames(topic: str, records: tuple[Record, ...]) -> tuple[Record, ...]:
+    """Return the records with the stream's name as their frame; those of other topics as they are."""
+    match = _TOPIC.fullmatch(topic)
+    if match is None:
+        return records
+    frame = f"{match['device']}/{match['sensor']}/{match['stream']}"
+    found: list[Record] = []
+    for record in records:
+        if isinstance(record, TransformRecord):
+            reference = f"{match['device']}/reference_{match['reference']}"
+            found.append(TransformRecord(record.stamp, reference, frame, inverse(record.parent_from_child)))
+        else:
+            found.append(replace(record, frame_id=frame))
+    return tuple(found)
