@@ -8,6 +8,7 @@ from pydantic import Field
 
 from schemas.errors import UsageError
 from schemas.sequence import Sequence
+from stages.ingest.pose_convention_names import PoseConvention
 from stages.kit.stage import External, Parameters, Stage
 
 
@@ -56,6 +57,12 @@ class IngestParameters(Parameters):
     right_topic: str | None = Field(None, description="Topic of the right images of a stereo pair")
     pose_topic: str | None = Field(
         None, description="Topic of odometry or poses to use for the camera instead of the tree of transforms"
+    )
+    pose_convention: PoseConvention = Field(
+        "as-is", description="What the poses of the log are, where they are not world_from_camera with OpenCV axes"
+    )
+    pose_scale: float = Field(
+        1.0, gt=0, description="Factor that turns positions of the log into metres (0.001 where they are millimetres)"
     )
     world_frame: str | None = Field(None, description="Frame that poses are wanted in; default: root of the tree")
     register_depth: bool = Field(

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from stages.ingest.parameters import IngestParameters
+from stages.ingest.pose_conventions import converted
 from stages.ingest.source import Entry
 from stages.kit.geometry.transforms import is_rigid
 
@@ -22,7 +23,7 @@ LARGEST_POSITION = 1e6
 def select(
     entries: tuple[Entry, ...], parameters: IngestParameters, has_poses: bool
 ) -> tuple[list[Entry], Counter[str]]:
-    """Return the frames worth loading, with checked poses, and the others counted by reason.
+    """Return the frames worth loading, with checked poses in our convention, and the others counted by reason.
 
     A frame without a pose is left out only when other frames of the log have one. Selection by number counts the
     frames of every camera for itself, so that cameras which were triggered together stay together.
@@ -39,6 +40,8 @@ def select(
             drops[NOT_SELECTED] += 1
             continue
         pose, problem = checked_pose(entry.world_from_camera, has_poses)
+        if pose is not None:
+            pose = converted(pose, parameters.pose_convention, parameters.pose_scale)[0]
         problem = entry.problem or problem
         last_time = last_times.get(entry.camera_name, -1)
         time = round(entry.time * 1e9) if math.isfinite(entry.time) else -1

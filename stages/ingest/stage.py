@@ -14,6 +14,7 @@ from schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
 from stages.ingest.alignment import align
 from stages.ingest.detection import open_log
 from stages.ingest.parameters import IngestParameters
+from stages.ingest.pose_convention_names import CONVENTION_WORDS
 from stages.ingest.selection import NOT_SELECTED, largest_step, select
 from stages.ingest.source import Entry, LoadedFrame, LogSource, Unusable
 from stages.ingest.surface_samples import surface_samples
@@ -46,7 +47,7 @@ def run(log: Path, *, parameters: IngestParameters, context: Context) -> Sequenc
             written = _write_frames(source, entries, gravity, drops, parameters, context)
     finally:
         source.close()
-    return _finish(source, gravity, drops, written, context)
+    return _finish(source, gravity, drops, written, parameters, context)
 
 
 @dataclass
@@ -105,8 +106,10 @@ def _find_gravity(source: LogSource, entries: list[Entry], parameters: IngestPar
                 samples.append(surface_samples(depth, cameras[entry.camera_name], entry.world_from_camera))
         return np.concatenate([points for points, _ in samples]), np.concatenate([normals for _, normals in samples])
 
-    stated = source.world_up_detail if source.world_up == "z" else None
-    return align(parameters.gravity, parameters.up, stated, poses, cloud, context.random(0), source.up_in_log)
+    untouched = parameters.pose_convention == "as-is"  # another reading of the poses is another world
+    stated = source.world_up_detail if source.world_up == "z" and untouched else None
+    measured = source.up_in_log if untouched else None
+    return align(parameters.gravity, parameters.up, stated, poses, cloud, context.random(0), measured)
 
 
 def _write_frames(
@@ -181,8 +184,15 @@ def _within(loaded: LoadedFrame, maximum_depth: float | None) -> LoadedFrame:
     return replace(loaded, depth=depth)
 
 
-def _finish(source: LogSource, gravity: Gravity, drops: Counter[str], written: _Written, context: Context) -> Sequence:
-    notes = [*source.notes, *_warnings(source, written)]
+def _finish(
+    source: LogSource,
+    gravity: Gravity,
+    drops: Counter[str],
+    written: _Written,
+    parameters: IngestParameters,
+    context: Context,
+) -> Sequence:
+    notes = [*source.notes, *_pose_notes(parameters), *_warnings(source, written)]
     for note in notes:
         (context.logger.warning if note.startswith("WARNING") else context.logger.info)("%s", note)
     write_tum(
@@ -228,6 +238,17 @@ def _finish(source: LogSource, gravity: Gravity, drops: Counter[str], written: _
         summary["reason"] = f"no usable frame: {worst}"
         context.logger.warning("%s", summary["reason"])
     return Sequence(context.output, outcome="ok" if written.times else "empty", summary=summary)
+
+
+def _pose_notes(parameters: IngestParameters) -> list[str]:
+    """What the options made of the log's poses."""
+    notes = []
+    if parameters.pose_convention != "as-is":
+        words = CONVENTION_WORDS[parameters.pose_convention]
+        notes.append(f"poses given by option as {parameters.pose_convention}: {words}")
+    if parameters.pose_scale != 1:
+        notes.append(f"positions of the log multiplied by {parameters.pose_scale:g}, by option")
+    return notes
 
 
 def _warnings(source: LogSource, written: _Written) -> list[str]:
