@@ -8,6 +8,8 @@ $(if $(LOG),,$(error reconstruct needs LOG=... (log file or folder)))
 BACKEND ?= geometric
 VOXEL_SIZE ?= 0.02
 EVERY ?= 1
+FORMAT ?= auto
+POSE_CONVENTION ?= as-is
 SEED ?= 0
 .PHONY: all
 all: $(FOLDER)/cad_library/manifest.json $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
@@ -16,7 +18,7 @@ $(FOLDER)/cad_library/manifest.json: data/pipelines/reconstruct.toml
 	$(PYTHON) -m cli library build --seed 1 --out $(FOLDER)/cad_library
 
 $(FOLDER)/sequence/manifest.json: data/pipelines/reconstruct.toml $(LOG)
-	$(PYTHON) -m cli ingest --log '$(LOG)' --every '$(EVERY)' $(if $(FX),--fx '$(FX)') $(if $(FY),--fy '$(FY)') $(if $(CX),--cx '$(CX)') $(if $(CY),--cy '$(CY)') --out $(FOLDER)/sequence
+	$(PYTHON) -m cli ingest --log '$(LOG)' --format '$(FORMAT)' $(if $(CAMERA),--camera '$(CAMERA)') --every '$(EVERY)' $(if $(MAX_FRAMES),--max-frames '$(MAX_FRAMES)') $(if $(DEPTH_SCALE),--depth-scale '$(DEPTH_SCALE)') --pose-convention '$(POSE_CONVENTION)' $(if $(FX),--fx '$(FX)') $(if $(FY),--fy '$(FY)') $(if $(CX),--cx '$(CX)') $(if $(CY),--cy '$(CY)') --out $(FOLDER)/sequence
 
 $(FOLDER)/segments/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/sequence/manifest.json $(WEIGHTS)
 	$(PYTHON) -m cli segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments
