@@ -1,0 +1,138 @@
+"""Stereo pairs: which rotation and intrinsics put both eyes in rows, and how far apart they are."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.scene_parts import Camera
+from stages.ingest.lenses import Lens, has_projection, lens_of, scaled_matrix, turned_lens
+from stages.ingest.messages.records import CalibrationRecord
+
+SMALLEST_BASELINE = 1e-3
+"""Eyes nearer to each other than this [m] are one camera."""
+PARALLEL = math.radians(20)
+"""Eyes that look further apart than this are two cameras, not a pair."""
+
+
+def projected_baseline(left: CalibrationRecord, right: CalibrationRecord) -> float | None:
+    """Return how far along +x [m] the right eye stands by the projections P, None when they say nothing of it.
+
+    P[3] is -fx times the distance from the left eye, so the left eye has 0 there, and so have cameras that are no pair.
+    """
+    if not has_projection(left) or not has_projection(right) or (left.P[3] == 0 and right.P[3] == 0):
+        return None
+    return left.P[3] / left.P[0] - right.P[3] / right.P[0]
+
+
+def is_pair(left: CalibrationRecord, right: CalibrationRecord, left_from_right: np.ndarray | None) -> bool:
+    """Whether two calibrated cameras look like a stereo pair: by their projections, or because they stand apart and
+    look the same way. The order of the two does not matter."""
+    if projected_baseline(left, right) is not None:
+        return True
+    if left_from_right is None or np.linalg.norm(left_from_right[:3, 3]) < SMALLEST_BASELINE:
+        return False
+    offset = left_from_right[:3, 3] / np.linalg.norm(left_from_right[:3, 3])
+    return bool(left_from_right[2, 2] > math.cos(PARALLEL) and abs(offset[0]) > math.cos(PARALLEL))
+
+
+def stereo_lenses(
+    calibrations: tuple[CalibrationRecord, CalibrationRecord],
+    sizes: tuple[tuple[int, int], tuple[int, int]],
+    rectified: tuple[bool, bool],
+    left_from_right: np.ndarray | None,
+    names: tuple[str, str],
+    where: str,
+) -> tuple[Lens, Lens, float]:
+    """Return the lenses of the left and the right eye, whose images then differ along rows alone, and the baseline [m].
+
+    Taken from the projections P and rotations R of the calibrations, else from `left_from_right` (4, 4). `names` are
+    the topics. Raises BadInput for eyes that are swapped, at one place or one above the other, and when the log does
+    not say how they stand to each other.
+    """
+    left, right = calibrations
+    baseline = projected_baseline(left, right)
+    if baseline is None:
+        if left_from_right is None:
+            raise BadInput(
+                f"{where}: nothing says how {names[0]} and {names[1]} stand to each other",
+                hint="record their CameraInfo with P[3], or tf_static",
+            )
+        return _from_transform(calibrations, sizes, rectified, left_from_right, names, where)
+    _check_baseline(baseline, names, where)
+    if abs(right.P[7] - left.P[7]) > abs(right.P[3] - left.P[3]):
+        raise _one_above_the_other(names, where)
+    matrix, _ = scaled_matrix(left, tuple(left.P[i] for i in (0, 1, 2, 4, 5, 6, 8, 9, 10)), sizes[0], where, names[0])
+    camera = _pinhole(matrix, sizes[0], left)
+    lenses = []
+    for calibration, size, flat, name in zip(calibrations, sizes, rectified, names, strict=True):
+        turn = np.eye(3) if flat or len(calibration.R) != 9 else np.array(calibration.R, dtype=float).reshape(3, 3)
+        if np.abs(turn @ turn.T - np.eye(3)).max() > 1e-3:
+            raise BadInput(f"{where}: R of the calibration of {name} is no rotation", hint="calibrate the pair again")
+        lenses.append(turned_lens(calibration, size, flat, camera, turn, where, name))
+    return lenses[0], lenses[1], baseline
+
+
+def _from_transform(
+    calibrations: tuple[CalibrationRecord, CalibrationRecord],
+    sizes: tuple[tuple[int, int], tuple[int, int]],
+    rectified: tuple[bool, bool],
+    left_from_right: np.ndarray,
+    names: tuple[str, str],
+    where: str,
+) -> tuple[Lens, Lens, float]:
+    """Rectify by turning both eyes so that their common x axis runs through both centres."""
+    offset = left_from_right[:3, 3]
+    baseline = float(np.linalg.norm(offset))
+    if abs(offset[1]) > abs(offset[0]) and baseline >= SMALLEST_BASELINE:
+        raise _one_above_the_other(names, where)
+    _check_baseline(math.copysign(baseline, offset[0]), names, where)
+    turn = rectifying_rotation(left_from_right)
+    plain = lens_of(calibrations[0], sizes[0], rectified[0], where, names[0])
+    right_turn = turn @ left_from_right[:3, :3]
+    lenses = [
+        turned_lens(calibration, size, flat, plain.camera, rotation, where, name)
+        for calibration, size, flat, rotation, name in zip(
+            calibrations, sizes, rectified, (turn, right_turn), names, strict=True
+        )
+    ]
+    left = replace(lenses[0], notes=(*lenses[0].notes, "stereo pair rectified by the transforms between its frames"))
+    return left, lenses[1], baseline
+
+
+def rectifying_rotation(left_from_right: np.ndarray) -> np.ndarray:
+    """Return the (3, 3) rotation from the left eye's frame to the common one: x towards the right eye, z as near to
+    the mean of both viewing directions as that allows."""
+    x = left_from_right[:3, 3] / np.linalg.norm(left_from_right[:3, 3])
+    forward = np.array([0.0, 0.0, 1.0]) + left_from_right[:3, 2]
+    z = forward - (forward @ x) * x
+    z = z / np.linalg.norm(z)
+    return np.stack([x, np.cross(z, x), z])
+
+
+def _pinhole(matrix: np.ndarray, size: tuple[int, int], record: CalibrationRecord) -> Camera:
+    width, height = size if size != (0, 0) else (record.width, record.height)
+    fx, fy, cx, cy = (float(matrix[i]) for i in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    return Camera(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)
+
+
+def _check_baseline(baseline: float, names: tuple[str, str], where: str) -> None:
+    if abs(baseline) < SMALLEST_BASELINE or not math.isfinite(baseline):
+        raise BadInput(
+            f"{where}: {names[0]} and {names[1]} have no baseline ({baseline:g} m), so they are no stereo pair",
+            hint="choose the right topic, or correct P[3] of its calibration",
+        )
+    if baseline < 0:
+        raise BadInput(
+            f"{where}: left and right are swapped: {names[1]} stands {-baseline:.4g} m to the left of {names[0]}",
+            hint=f"--color-topic {names[1]} --right-topic {names[0]}",
+        )
+
+
+def _one_above_the_other(names: tuple[str, str], where: str) -> BadInput:
+    return BadInput(
+        f"{where}: {names[0]} and {names[1]} stand one above the other", hint="only pairs in a row are read"
+    )
