@@ -8,11 +8,11 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.panoptic_map import EntitiesFile, PanopticMap
-from stages.evaluate.arrays import read_arrays
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.results import Part
 from stages.evaluate.surfaces import Surface, read_surface
 from stages.evaluate.truth import TrueRoom, stuff_classes
+from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.measurement.average_precision import (
     ClassPrecision,
     class_precision,

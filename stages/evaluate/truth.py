@@ -12,8 +12,8 @@ from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth, TrueObject
 from schemas.scene_parts import Box
 from schemas.vocabulary import load_vocabulary
-from stages.evaluate.arrays import read_arrays
 from stages.evaluate.surfaces import Surface, read_surface
+from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.geometry.boxes import box_yaw, gravity_aligned_box
 from stages.kit.geometry.transforms import apply
 from stages.kit.measurement.pose_error import yaw_of

@@ -10,6 +10,7 @@ import numpy as np
 from schemas.contact_graph import SCENE_NODE
 from schemas.interactive_scene import InteractiveScene
 from schemas.plan import Check, Failure, Plan
+from stages.kit.formats.numpy_files import read_arrays
 from stages.report.images import Picture, from_file
 
 
@@ -127,8 +128,8 @@ def _times(plan: Plan) -> np.ndarray | None:
     path = plan.path("trajectory.npz")
     if not path.is_file():
         return None
-    with np.load(path, allow_pickle=False) as archive:
-        return np.asarray(archive["time"], dtype=float) if "time" in archive else None
+    (times,) = read_arrays(path, "time")
+    return times.astype(float)
 
 
 def _leading_number(stem: str) -> int:

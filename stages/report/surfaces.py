@@ -15,6 +15,8 @@ from schemas.ground_truth import GroundTruth
 from schemas.panoptic_map import PanopticMap
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.cad_models import posed_mesh, read_model
+from stages.kit.formats.mesh_files import read_mesh
+from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.measurement.palette import LAYOUT_COLORS, UNLABELLED, entity_color
 from stages.kit.rendering.surfaces import TriangleSoup, build_soup, srgb_to_linear
 
@@ -86,11 +88,8 @@ def map_model(panoptic_map: PanopticMap) -> Model | None:
     mesh = _load(panoptic_map, "mesh.ply")
     if mesh is None:
         return None
-    try:
-        with np.load(panoptic_map.path("mesh_labels.npz"), allow_pickle=False) as archive:
-            labels = archive["instance"].astype(np.int64)
-    except (OSError, ValueError, KeyError) as error:
-        raise BadInput(f"{panoptic_map.path('mesh_labels.npz')}: {error}", hint="make the map again") from None
+    (labels,) = read_arrays(panoptic_map.path("mesh_labels.npz"), "instance", hint="make the map again")
+    labels = labels.astype(np.int64)
     if len(labels) != len(mesh.vertices):
         raise BadInput(f"{panoptic_map.root.name}: {len(labels)} labels for {len(mesh.vertices)} vertices")
     a, b, c = labels[mesh.faces].T
@@ -163,10 +162,5 @@ def _load(artifact: PanopticMap | CadScene | GroundTruth, name: str) -> trimesh.
     path = artifact.path(name)
     if not path.is_file():
         return None
-    try:
-        mesh = trimesh.load(path, process=False)
-    except Exception as error:  # trimesh raises whatever its parser stumbled over
-        raise BadInput(f"{path}: {error}", hint="make the artifact again") from None
-    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
-        return None
-    return mesh
+    mesh = read_mesh(path, may_be_empty=True)
+    return mesh if len(mesh.faces) else None

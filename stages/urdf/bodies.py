@@ -13,6 +13,7 @@ from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from schemas.errors import BadInput
 from schemas.scene_parts import Box
 from stages.kit.formats.cad_models import read_model
+from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.scene_bundle import BundleBody
 from stages.kit.geometry.boxes import box_from_bounds
 
@@ -76,15 +77,8 @@ def _mesh(cad_scene: CadScene, node: GraphNode) -> trimesh.Trimesh | None:
     file: Path = cad_scene.path(folder) / f"{node.id}.ply"
     if not file.is_file():
         return None
-    try:
-        mesh = trimesh.load(file, force="mesh", process=False)
-    except Exception as error:  # trimesh raises whatever its parsers raise
-        raise BadInput(f"{file}: cannot be read as a mesh: {error}") from None
-    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
-        return None
-    if not np.isfinite(mesh.vertices).all():
-        raise BadInput(f"{file}: vertices hold NaN or infinity", hint="run `cad` again")
-    return mesh
+    mesh = read_mesh(file, may_be_empty=True, hint="run `cad` again")
+    return mesh if len(mesh.faces) else None
 
 
 def _box(node: GraphNode, mesh: trimesh.Trimesh | None, cad_scene: CadScene) -> Box:

@@ -16,17 +16,19 @@ from scipy.spatial.transform import Rotation
 
 from schemas.cad_library import CadLibrary, CadModel
 from schemas.errors import BadInput
+from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.geometry.transforms import transform_from
 
 MODEL_FILE = "model.json"
 URDF_FILE = "model.urdf"
+REBUILD = "build the CAD library again"
 
 
 def model_folder(library: CadLibrary, model_id: str) -> Path:
     """Return the folder of a model of the library. Raises BadInput when it is not there."""
     folder = library.path("models") / model_id
     if not folder.is_dir():
-        raise BadInput(f"{library.root}: no model {model_id!r}", hint="build the CAD library again")
+        raise BadInput(f"{library.root}: no model {model_id!r}", hint=REBUILD)
     return folder
 
 
@@ -58,8 +60,8 @@ def load_visual_parts(folder: Path) -> dict[str, trimesh.Trimesh]:
     """Return part -> visual mesh in the part frame [m], with the vertex colours of the file. Raises BadInput."""
     files = sorted((Path(folder) / "visual").glob("*.glb"))
     if not files:
-        raise BadInput(f"{folder}: no visual/<part>.glb", hint="build the CAD library again")
-    return {file.stem: _load_mesh(file) for file in files}
+        raise BadInput(f"{folder}: no visual/<part>.glb", hint=REBUILD)
+    return {file.stem: read_mesh(file, hint=REBUILD) for file in files}
 
 
 def load_collision_parts(folder: Path) -> dict[str, list[trimesh.Trimesh]]:
@@ -71,8 +73,8 @@ def load_collision_parts(folder: Path) -> dict[str, list[trimesh.Trimesh]]:
             raise BadInput(f"{file}: not named <part>_<number>.obj")
         numbered.setdefault(match[1], []).append((int(match[2]), file))
     if not numbered:
-        raise BadInput(f"{folder}: no collision/<part>_<number>.obj", hint="build the CAD library again")
-    return {part: [_load_mesh(file) for _, file in sorted(numbered[part])] for part in sorted(numbered)}
+        raise BadInput(f"{folder}: no collision/<part>_<number>.obj", hint=REBUILD)
+    return {part: [read_mesh(file, hint=REBUILD) for _, file in sorted(numbered[part])] for part in sorted(numbered)}
 
 
 def posed_mesh(folder: Path, model: CadModel, joints: dict[str, float], scale: float = 1.0) -> trimesh.Trimesh:
@@ -105,13 +107,3 @@ def posed_collision(
             piece.apply_scale(scale)
             placed.append(piece)
     return placed
-
-
-def _load_mesh(file: Path) -> trimesh.Trimesh:
-    try:
-        mesh = trimesh.load(file, force="mesh", process=False)
-    except Exception as error:  # trimesh raises whatever its parsers raise
-        raise BadInput(f"{file}: cannot be read as a mesh: {error}") from None
-    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
-        raise BadInput(f"{file}: holds no triangles")
-    return mesh

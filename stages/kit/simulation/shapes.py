@@ -11,6 +11,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from schemas.errors import BadInput
+from stages.kit.formats.mesh_files import read_mesh
 
 
 def _numbers(text: str | None, default: str) -> list[float]:
@@ -37,11 +38,7 @@ def _mesh_of(geometry: ElementTree.Element) -> trimesh.Trimesh:
     if shape.tag == "sphere":
         return trimesh.creation.icosphere(subdivisions=2, radius=float(shape.get("radius", 1)))
     if shape.tag == "mesh":
-        path = Path(shape.get("filename", ""))
-        if not path.is_file():
-            raise BadInput(f"{path}: mesh is missing", hint="make the scene again")
-        mesh = trimesh.load(path, force="mesh", process=False)
-        assert isinstance(mesh, trimesh.Trimesh)
+        mesh = read_mesh(Path(shape.get("filename", "")), hint="make the scene again")
         mesh.apply_scale(_numbers(shape.get("scale"), "1 1 1"))
         return mesh
     raise BadInput(f"URDF geometry <{shape.tag}> is not known", hint="box, cylinder, sphere and mesh are")

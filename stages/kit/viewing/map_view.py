@@ -6,6 +6,7 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.panoptic_map import PanopticMap
+from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.geometry.boxes import box_from_bounds
 from stages.kit.measurement.palette import instance_color
 from stages.kit.viewing.canvas import Canvas, bytes_of
@@ -44,11 +45,7 @@ def instance_colors(instances: np.ndarray) -> np.ndarray:
 
 def _vertex_instances(panoptic_map: PanopticMap, count: int) -> np.ndarray:
     path = panoptic_map.path("mesh_labels.npz")
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            labels = archive["instance"]
-    except (OSError, ValueError, KeyError) as error:
-        raise BadInput(f"{path}: {error}", hint="make the map again") from None
+    (labels,) = read_arrays(path, "instance", hint="make the map again")
     if labels.shape != (count,):
         raise BadInput(f"{path}: {labels.shape} labels for {count} vertices", hint="make the map again")
     return labels

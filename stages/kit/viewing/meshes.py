@@ -8,19 +8,13 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from schemas.errors import BadInput
+from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.urdf_file import Shape
 
 
 def load_mesh(path: Path) -> trimesh.Trimesh:
     """Return the mesh in a file, in file order. Raises BadInput."""
-    try:
-        mesh = trimesh.load(path, force="mesh", process=False)
-    except Exception as error:  # trimesh raises whatever its parsers raise
-        raise BadInput(f"{path}: cannot be read as a mesh: {error}") from None
-    if not isinstance(mesh, trimesh.Trimesh):
-        raise BadInput(f"{path}: holds no mesh")
-    return mesh
+    return read_mesh(path, may_be_empty=True)
 
 
 def merged(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:

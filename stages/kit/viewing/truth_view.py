@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth
 from stages.kit.formats.frames import FrameReader
+from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.measurement.palette import instance_color
 from stages.kit.viewing.canvas import Canvas
 from stages.kit.viewing.graph_view import HIDDEN, draw_graph
@@ -33,9 +33,5 @@ def draw_ground_truth(truth: GroundTruth, canvas: Canvas) -> None:
 
 
 def _visible(truth: GroundTruth) -> tuple[np.ndarray, np.ndarray]:
-    path = truth.path("visible.npz")
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            return archive["points"], archive["instance"]
-    except (OSError, ValueError, KeyError) as error:
-        raise BadInput(f"{path}: {error}", hint="make the ground truth again") from None
+    points, instances = read_arrays(truth.path("visible.npz"), "points", "instance", hint="make the ground truth again")
+    return points, instances

@@ -1,0 +1,79 @@
+"""Arrays out of NPZ files that nobody vouches for: sizes are checked before memory is taken, objects are refused."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+import zlib
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+
+from schemas.errors import BadInput
+
+LARGEST_ARRAY = 8 * 2**30
+"""Bytes. A map of ten million voxel blocks does not fit; nothing that the steps write comes near."""
+LARGEST_HEADER = 10_000
+DEFLATE_LIMIT = 1032
+"""Deflate never packs more than this many bytes into one."""
+PLAIN_KINDS = "biufUS"
+
+
+def read_arrays(path: Path, *names: str, hint: str = "make the artifact again") -> tuple[np.ndarray, ...]:
+    """Return the named arrays of an NPZ file.
+
+    Raises BadInput when the file is missing, is no NPZ, lacks an array or has it twice, or when an entry is encrypted,
+    damaged, holds objects, or declares another size than it has (numpy would reserve memory for it first).
+    """
+    path = Path(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = path.stat().st_size
+            return tuple(_read_entry(archive, f"{name}.npy", size) for name in names)
+    except FileNotFoundError:
+        raise BadInput(f"{path}: file is missing", hint=hint) from None
+    except BadInput as error:
+        raise BadInput(f"{path}: {error.message}", hint=hint) from None
+    # NotImplementedError: a compression or zip version that Python lacks; RuntimeError: encrypted.
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError) as error:
+        raise BadInput(f"{path}: {error}", hint=hint) from None
+
+
+def _read_entry(archive: zipfile.ZipFile, name: str, file_size: int) -> np.ndarray:
+    entries = [entry for entry in archive.infolist() if entry.filename == name]
+    if len(entries) != 1:
+        raise BadInput(f"holds {name!r} {len(entries)} times, expected once")
+    entry = entries[0]
+    if entry.compress_size > file_size or entry.file_size > DEFLATE_LIMIT * entry.compress_size + 1024:
+        raise BadInput(f"{name}: {entry.file_size} bytes cannot come out of {entry.compress_size}")
+    with archive.open(entry) as file:
+        shape, fortran_order, kind = _read_header(file, name)
+        expected = math.prod(shape) * kind.itemsize
+        if expected > LARGEST_ARRAY or expected > entry.file_size:
+            raise BadInput(f"{name}: shape {shape} of {kind} needs {expected} bytes, there are {entry.file_size}")
+        data = bytearray(expected)
+        filled = file.readinto(memoryview(data)) if expected else 0
+        while 0 < filled < expected:
+            more = file.readinto(memoryview(data)[filled:])
+            if not more:
+                break
+            filled += more
+        if filled != expected or file.read(1):
+            raise BadInput(f"{name}: {filled} bytes or more, shape {shape} of {kind} needs {expected}")
+    return np.frombuffer(data, dtype=kind).reshape(shape, order="F" if fortran_order else "C")
+
+
+def _read_header(file: IO[bytes], name: str) -> tuple[tuple[int, ...], bool, np.dtype]:
+    readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+    try:
+        version = np.lib.format.read_magic(file)
+        shape, fortran_order, kind = readers[version](file, max_header_size=LARGEST_HEADER)
+    # numpy evaluates the header as a Python literal: whatever that parser stumbles over is a bad header.
+    except (ValueError, KeyError, SyntaxError, TypeError, MemoryError, RecursionError) as error:
+        raise BadInput(f"{name}: no array header: {str(error) or type(error).__name__:.80}") from None
+    if kind.hasobject or kind.kind not in PLAIN_KINDS or kind.subdtype is not None:
+        raise BadInput(f"{name}: holds {kind}, expected plain numbers or text")
+    if len(shape) > 8 or any(length < 0 for length in shape):
+        raise BadInput(f"{name}: shape {shape}")
+    return shape, bool(fortran_order), kind
