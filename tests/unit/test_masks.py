@@ -66,7 +66,7 @@ def test_bad_files(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="missing"):
         PanopticReader(tmp_path / "none.zip")
     (tmp_path / "text.zip").write_text("no zip")
-    with pytest.raises(BadInput, match="no zip"):
+    with pytest.raises(BadInput, match="not a zip"):
         PanopticReader(tmp_path / "text.zip")
     with pytest.raises(BadInput, match="panoptic PNG"):
         decode_panoptic_png(b"")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import struct
 import zipfile
 from collections.abc import Iterable
 from pathlib import Path
@@ -11,9 +13,15 @@ import cv2
 import numpy as np
 
 from schemas.errors import BadInput
+from stages.kit.formats.zip_files import find_entry, zip_errors
 
 LARGEST_ID = (1 << 24) - 1
 REMAKE = "run `scenewright segment` again"
+PNG_BEGINNING = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"
+LARGEST_IMAGE = 1 << 26
+"""Pixels. A PNG of zeros packs a thousand to one: its size is checked before it is unpacked."""
+LARGEST_FILE = 4 * LARGEST_IMAGE
+FRAME_NAME = re.compile(r"(\d{6,9})\.png", re.ASCII)
 FIXED_TIMESTAMP = (1980, 1, 1, 0, 0, 0)
 """Every zip entry bears the earliest date the format knows, so that the same images give the same bytes."""
 
@@ -39,8 +47,19 @@ def encode_panoptic_png(ids: np.ndarray) -> bytes:
 
 
 def decode_panoptic_png(data: bytes) -> np.ndarray:
-    """Return the id image (H, W) int32 of a COCO panoptic PNG. Raises BadInput when it is no 8-bit colour PNG."""
-    image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+    """Return the id image (H, W) int32 of a COCO panoptic PNG.
+
+    Raises BadInput when it is no 8-bit colour PNG, or larger than LARGEST_IMAGE.
+    """
+    if not data.startswith(PNG_BEGINNING) or len(data) < 33:
+        raise BadInput("not a COCO panoptic PNG", hint="ids are R + 256 G + 65536 B")
+    width, height = struct.unpack_from(">II", data, 16)
+    if not 0 < width * height <= LARGEST_IMAGE:
+        raise BadInput(f"panoptic PNG declares {width}x{height} pixels, at most {LARGEST_IMAGE} are read")
+    try:
+        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error as error:
+        raise BadInput(f"panoptic PNG cannot be decoded: {error.err}") from None
     if image is None or image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
         raise BadInput("not a COCO panoptic PNG (8 bits, three channels)", hint="ids are R + 256 G + 65536 B")
     # Widen before multiplying: 256 * uint8 overflows.
@@ -75,12 +94,8 @@ class PanopticReader:
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
-        try:
+        with zip_errors(self.path, REMAKE):
             self._archive = zipfile.ZipFile(self.path)
-        except FileNotFoundError as error:
-            raise BadInput(f"{self.path.name} is missing", hint=REMAKE) from error
-        except (zipfile.BadZipFile, OSError) as error:
-            raise BadInput(f"{self.path.name} is no zip file: {error}", hint=REMAKE) from error
 
     def __enter__(self) -> PanopticReader:
         return self
@@ -96,18 +111,21 @@ class PanopticReader:
 
     def frame_indices(self) -> list[int]:
         """Return the indices of the frames that have an image, ascending."""
-        stems = (name.removesuffix(".png") for name in self._archive.namelist() if name.endswith(".png"))
-        return sorted(int(stem) for stem in stems if stem.isdigit())
+        found = {FRAME_NAME.fullmatch(name) for name in self._archive.namelist()}
+        return sorted(int(match[1]) for match in found if match)
 
     def read(self, frame_index: int) -> np.ndarray:
         """Return the ids (H, W) int32 of a frame; 0 is void.
 
-        Raises BadInput when the frame has no image, its checksum is wrong, or it is no panoptic PNG.
+        Raises BadInput when the frame has no image or two, its checksum is wrong, or it is no panoptic PNG.
         """
-        try:
-            data = self._archive.read(panoptic_name(frame_index))
-        except KeyError as error:
-            raise BadInput(f"{self.path.name} has no image for frame {frame_index}", hint=REMAKE) from error
-        except zipfile.BadZipFile as error:
-            raise BadInput(f"{self.path.name}: frame {frame_index} is damaged: {error}") from error
-        return decode_panoptic_png(data)
+        with zip_errors(self.path, REMAKE):
+            try:
+                entry = find_entry(self._archive, panoptic_name(frame_index), LARGEST_FILE)
+            except KeyError:
+                raise BadInput(f"has no image for frame {frame_index}") from None
+            try:
+                data = self._archive.read(entry)
+            except zipfile.BadZipFile as error:
+                raise BadInput(f"frame {frame_index} is damaged: {error}") from None
+            return decode_panoptic_png(data)

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 import zipfile
-import zlib
 from pathlib import Path
 from typing import IO
 
 import numpy as np
 
 from schemas.errors import BadInput
+from stages.kit.formats.zip_files import find_entry, zip_errors
 
 LARGEST_ARRAY = 8 * 2**30
 """Bytes. A map of ten million voxel blocks does not fit; nothing that the steps write comes near."""
 LARGEST_HEADER = 10_000
-DEFLATE_LIMIT = 1032
-"""Deflate never packs more than this many bytes into one."""
 PLAIN_KINDS = "biufUS"
 
 
@@ -27,30 +25,19 @@ def read_arrays(path: Path, *names: str, hint: str = "make the artifact again") 
     damaged, holds objects, or declares another size than it has (numpy would reserve memory for it first).
     """
     path = Path(path)
+    with zip_errors(path, hint), zipfile.ZipFile(path) as archive:
+        return tuple(_read_entry(archive, f"{name}.npy") for name in names)
+
+
+def _read_entry(archive: zipfile.ZipFile, name: str) -> np.ndarray:
     try:
-        with zipfile.ZipFile(path) as archive:
-            size = path.stat().st_size
-            return tuple(_read_entry(archive, f"{name}.npy", size) for name in names)
-    except FileNotFoundError:
-        raise BadInput(f"{path}: file is missing", hint=hint) from None
-    except BadInput as error:
-        raise BadInput(f"{path}: {error.message}", hint=hint) from None
-    # NotImplementedError: a compression or zip version that Python lacks; RuntimeError: encrypted.
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError) as error:
-        raise BadInput(f"{path}: {error}", hint=hint) from None
-
-
-def _read_entry(archive: zipfile.ZipFile, name: str, file_size: int) -> np.ndarray:
-    entries = [entry for entry in archive.infolist() if entry.filename == name]
-    if len(entries) != 1:
-        raise BadInput(f"holds {name!r} {len(entries)} times, expected once")
-    entry = entries[0]
-    if entry.compress_size > file_size or entry.file_size > DEFLATE_LIMIT * entry.compress_size + 1024:
-        raise BadInput(f"{name}: {entry.file_size} bytes cannot come out of {entry.compress_size}")
+        entry = find_entry(archive, name, LARGEST_ARRAY)
+    except KeyError:
+        raise BadInput(f"has no array {name.removesuffix('.npy')!r}") from None
     with archive.open(entry) as file:
         shape, fortran_order, kind = _read_header(file, name)
         expected = math.prod(shape) * kind.itemsize
-        if expected > LARGEST_ARRAY or expected > entry.file_size:
+        if expected > entry.file_size:
             raise BadInput(f"{name}: shape {shape} of {kind} needs {expected} bytes, there are {entry.file_size}")
         data = bytearray(expected)
         filled = file.readinto(memoryview(data)) if expected else 0
