@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from cli.batch_command import batch
 from schemas.errors import BadInput, UsageError
 
 Paths = Annotated[list[Path], typer.Argument(help="Artifact folders.")]
@@ -88,35 +89,6 @@ def run(
     else:
         _out(str(out))
     return reports[-1].exit_code if reports else 0
-
-
-def batch(
-    spec: Annotated[Path, typer.Argument(help="Batch file (TOML): pipeline, set, scene.")],
-    out: Annotated[Path, typer.Option("--out", help="Folder; one run folder per scene in it.")],
-    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Scenes at once.")] = 1,
-    force: Annotated[bool, typer.Option("--force", help="Make every artifact again.")] = False,
-    json_output: Json = False,
-    debug: Debug = False,
-) -> int:
-    """Run a pipeline over a data set; exits with the gravest code of its scenes."""
-    from stages.kit.running.batch import read_batch, run_batch, worst_exit_code
-
-    parsed, pipeline = read_batch(spec)
-    reports = run_batch(
-        parsed, pipeline, out, jobs=jobs, extra=("--quiet", *(("--force",) if force else ())), announce=_say
-    )
-    codes = {}
-    for name, steps in reports.items():
-        codes[name] = steps[-1].exit_code if steps else 0
-        _say(f"{name:24} exit {codes[name]}  {len(steps)}/{len(pipeline.step)} steps, last: {steps[-1].name}")
-    if json_output:
-        table = {
-            name: [{"step": s.name, "exit_code": s.exit_code, **s.facts} for s in r] for name, r in reports.items()
-        }
-        _out(json.dumps(table, sort_keys=True))
-    else:
-        _out(str(out))
-    return worst_exit_code(list(codes.values()))
 
 
 def verify(paths: Paths, json_output: Json = False, debug: Debug = False) -> int:

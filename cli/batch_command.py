@@ -1,0 +1,74 @@
+"""The command `batch`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from schemas.errors import UsageError
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(text + "\n")
+
+
+def batch(
+    spec: Annotated[Path, typer.Argument(help="Batch file (TOML): pipeline, scenes or data, parameters, seeds.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder; one run folder per scene in it.")],
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", min=1, help="Scenes at once [default: the file's, or 1].")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Make every artifact again.")] = False,
+    retry: Annotated[
+        str, typer.Option("--retry", help="Scenes to run again besides those that have not run: failed, none or all.")
+    ] = "failed",
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say which scenes would run and why.")] = False,
+    task: Annotated[
+        str | None, typer.Option("--task", help="INDEX/COUNT: run this part; the scripts of a job array do.")
+    ] = None,
+    collect: Annotated[bool, typer.Option("--collect", help="Join the results of a job array's tasks.")] = False,
+    json_output: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Warnings only.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+) -> int:
+    """Run a pipeline over a data set; exits with the gravest code of its scenes (docs/BATCH.md)."""
+    from stages.kit.running.batch import session
+    from stages.kit.running.batch.expansion import read_batch
+    from stages.kit.running.batch.resuming import RETRY
+    from stages.kit.running.batch.slurm_executor import parse_task
+
+    if retry not in RETRY:
+        raise UsageError(f"--retry {retry!r}: not one of {', '.join(RETRY)}", hint="see --help")
+    silent = quiet or json_output
+    say = (lambda text: None) if silent else _say
+    read = read_batch(spec)
+    if dry_run:
+        planned = session.plan_batch(read, out, retry=retry, force=force)
+        for job, reason in planned:
+            say(f"{'would run' if reason else 'up to date':11} {job.name:32} {reason or ''}")
+        return _report({"batch": str(out), "scenes": {job.name: reason for job, reason in planned}}, json_output, 0)
+    if task is not None:
+        index, count = parse_task(task)
+        end = session.run_task(read, out, index, count, force=force, retry=retry, say=say, quiet=silent)
+    elif collect:
+        end = session.collect_tasks(read, out)
+    elif read.spec.executor.kind == "slurm":
+        scripts = session.write_array(read, out, jobs=jobs, force=force, retry=retry)
+        say(f"{scripts.scenes} scenes in {scripts.tasks} array tasks; submit them with: {scripts.submit}")
+        return _report({"batch": str(out), "submit": str(scripts.submit)}, json_output, 0)
+    else:
+        end = session.run_batch(
+            read, out, jobs=jobs, force=force, retry=retry, say=say, terminal=sys.stderr.isatty(), quiet=silent
+        )
+    say(", ".join(f"{count} {name}" for name, count in end.counts().items()))
+    scenes = {job.name: end.latest[job.name].model_dump(mode="json") for job in end.jobs if job.name in end.latest}
+    return _report({"batch": str(out), "counts": end.counts(), "scenes": scenes}, json_output, end.exit_code)
+
+
+def _report(facts: dict[str, object], json_output: bool, code: int) -> int:
+    sys.stdout.write((json.dumps(facts, sort_keys=True) if json_output else str(facts["batch"])) + "\n")
+    return code
