@@ -5,11 +5,8 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from types import FrameType
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 INTERRUPTED = 130
@@ -29,15 +26,6 @@ def _refuse_foreign_packages() -> None:
                 "(run from another folder, or clear PYTHONPATH)\n"
             )
             raise SystemExit(5)
-
-
-def _interrupt(signum: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
-
-
-def _on_signals(handler: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, handler)
 
 
 def _set_up_logging(level: int) -> None:
@@ -116,17 +104,19 @@ def _keep_standard_output_for_data() -> None:
 
 def main() -> None:
     """Run the command line of this process."""
+    _refuse_foreign_packages()
+    from stages.kit.running import interruption
+
     try:
-        _on_signals(_interrupt)
+        interruption.install()
         _keep_standard_output_for_data()
-        _refuse_foreign_packages()
         os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the default probes TBB first, warns about its version
         os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads sleep: spinning halves the rate when busy
         code = run(sys.argv[1:])
-        _on_signals(signal.SIG_IGN)  # all is said and done: only the exit itself is left to interrupt
+        interruption.ignore()
         sys.stdout.flush()
     except KeyboardInterrupt:  # before `run` could catch it, or a second one while it did
-        _on_signals(signal.SIG_IGN)
+        interruption.ignore()
         _say_error(INTERRUPTED_TEXT)
         code = INTERRUPTED
     except BrokenPipeError:

@@ -18,7 +18,7 @@ from schemas.artifact import Artifact
 from schemas.errors import BadInput, MachineFailure, MissingDependency, UsageError
 from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
 from stages.kit.progress import SilentProgress
-from stages.kit.running import store
+from stages.kit.running import interruption, store
 from stages.kit.running.digests import content_digest, external_digest, external_files, record_files
 from stages.kit.running.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
 from stages.kit.running.provenance import provenance_now
@@ -303,6 +303,7 @@ def run_stage(
                 provenance=provenance_now(command, device, started),
             )
             manifest.write(partial / MANIFEST_NAME)
+            interruption.raise_if_requested()
             store.take_place(partial, out)
     nondeterministic = (
         previous is not None and previous.key == key and previous.content_digest != manifest.content_digest
