@@ -49,6 +49,8 @@ class MessageLog(Protocol):
     """Metadata records by name (MCAP); empty elsewhere."""
     damage: list[str]
     """What could not be read, one line each; complete after `messages` has been read to its end once."""
+    notes: list[str]
+    """What cannot be known of the log, for people: parts without checksums, a metadata.yaml that is missing."""
 
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
         """Yield messages of the channels (None: all) in file order. Damaged parts are skipped and noted in `damage`

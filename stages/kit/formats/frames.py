@@ -362,16 +362,14 @@ class FrameReader:
         """Return (stamp [ns], camera, stream -> place) of every frame, in time order."""
         frames: dict[int, dict[str, Location]] = {}
         names: dict[int, str] = {}
-        for channel_id, entries in self._log.message_index.items():
-            if channel_id in self._topics:
-                name, stream = self._topics[channel_id]
-                for stamp, location in entries:
-                    frames.setdefault(stamp, {})[stream] = location
-                    if name and names.setdefault(stamp, name) != name:
-                        raise BadInput(
-                            f"{self.path}: cameras {names[stamp]!r} and {name!r} share the stamp {stamp}",
-                            hint="run `scenewright ingest` first",
-                        )
+        for channel_id, (name, stream) in self._topics.items():
+            for stamp, location in self._log.indexed(channel_id):
+                frames.setdefault(stamp, {})[stream] = location
+                if name and names.setdefault(stamp, name) != name:
+                    raise BadInput(
+                        f"{self.path}: cameras {names[stamp]!r} and {name!r} share the stamp {stamp}",
+                        hint="run `scenewright ingest` first",
+                    )
         return [(stamp, names.get(stamp, CAMERA_FRAME), places) for stamp, places in sorted(frames.items())]
 
     def _decode(self, stream: str, location: Location) -> Any:

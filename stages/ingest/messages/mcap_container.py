@@ -1,0 +1,66 @@
+"""MCAP logs as a container of messages."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Hashable, Iterator
+from pathlib import Path
+
+from schemas.errors import BadInput
+from stages.ingest.messages.container import Channel, StoredMessage
+from stages.kit.formats.mcap_log import Location, LogMessage, McapLog
+
+
+class McapMessages:
+    """An MCAP log that is open for reading; see MessageLog."""
+
+    format = "mcap"
+
+    def __init__(self, path: Path, *, salvage: bool) -> None:
+        self.path = path
+        self._log = McapLog(path, salvage=salvage)
+        self.damage: list[str] = self._log.damage
+        self.notes: list[str] = self._log.notes
+        self.metadata: dict[str, dict[str, str]] = {}
+        for name, table in self._log.metadata:
+            self.metadata.setdefault(name, table)
+        self._channels = {number: self._channel(number) for number in sorted(self._log.channels)}
+        self.channels = tuple(self._channels.values())
+
+    def _channel(self, number: int) -> Channel:
+        channel = self._log.channels[number]
+        schema = self._log.schemas.get(channel.schema_id)
+        counts = self._log.message_counts
+        return Channel(
+            id=number,
+            topic=channel.topic,
+            type_name=schema.name if schema else "",
+            message_encoding=channel.message_encoding,
+            schema_encoding=schema.encoding if schema else "",
+            schema=schema.data if schema else b"",
+            count=None if counts is None else counts.get(number, 0),
+        )
+
+    def _stored(self, message: LogMessage) -> StoredMessage:
+        number = message.channel.id
+        if number not in self._channels:  # defined late, in a chunk that a wrong summary leaves out
+            self._channels[number] = self._channel(number)
+        return StoredMessage(self._channels[number], message.log_time, message.data, message.location)
+
+    def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
+        """Yield messages of the channels (None: all) in file order."""
+        return map(self._stored, self._log.messages(channel_ids))
+
+    def fetch(self, location: Hashable) -> StoredMessage:
+        """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
+        if not isinstance(location, Location):
+            raise BadInput(f"{self.path}: {location!r} is no place in an MCAP file")
+        return self._stored(self._log.fetch(location))
+
+    def close(self) -> None:
+        """Close the file."""
+        self._log.close()
+
+
+def open_mcap(path: Path, *, salvage: bool) -> McapMessages:
+    """Open an MCAP log. Raises BadInput when it is none; without `salvage` also when it is torn or damaged."""
+    return McapMessages(path, salvage=salvage)

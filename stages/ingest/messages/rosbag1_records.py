@@ -1,0 +1,139 @@
+"""Records of ROS 1 bags, version 2.0: parsed within their bounds, and found again after a damaged place.
+
+A record is the length of its header, the header (fields `length name=value`), the length of its data, the data. Source
+of the layout: https://wiki.ros.org/Bags/Format/2.0
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import BinaryIO
+
+MAGIC = b"#ROSBAG V2.0\n"
+MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07
+COMPRESSIONS = (b"none", b"bz2", b"lz4")
+LARGEST_HEADER = 1 << 20
+"""Bytes of a record's header that are accepted."""
+LONGEST_CHUNK_HEADER = 128
+_LENGTH = struct.Struct("<I")
+_WINDOW = 4 << 20
+_MARK = b"op=" + bytes([CHUNK])
+
+
+class Damaged(Exception):
+    """A record that is not what it says. The text follows the words "the record"."""
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One record, its data not read yet."""
+
+    op: int
+    fields: dict[bytes, bytes]
+    start: int
+    """Offset of the data."""
+    length: int
+    """Bytes of the data."""
+
+    @property
+    def end(self) -> int:
+        """Offset of what follows."""
+        return self.start + self.length
+
+    def number(self, name: bytes, size: int = 4) -> int:
+        """Return a field as an unsigned number of `size` bytes. Raises Damaged when it is missing or has another."""
+        value = self.fields.get(name)
+        if value is None or len(value) != size:
+            raise Damaged(f"has no field {name.decode()!r} of {size} bytes")
+        return int.from_bytes(value, "little")
+
+    def time(self, name: bytes) -> int:
+        """Return a field that holds seconds and nanoseconds [ns]. Raises Damaged."""
+        both = self.number(name, 8)
+        return (both & 0xFFFFFFFF) * 1_000_000_000 + (both >> 32)
+
+
+def read_fields(header: bytes) -> dict[bytes, bytes]:
+    """Return the fields of a header. Raises Damaged when they do not fill it exactly."""
+    fields, place = {}, 0
+    while place < len(header):
+        if place + 4 > len(header):
+            raise Damaged("has a header that ends within a field")
+        (length,) = _LENGTH.unpack_from(header, place)
+        place += 4 + length
+        if place > len(header):
+            raise Damaged("has a header that ends within a field")
+        name, mark, value = header[place - length : place].partition(b"=")
+        if not mark:
+            raise Damaged("has a header field without a value")
+        fields[name] = value
+    return fields
+
+
+def read_record(file: BinaryIO, offset: int, size: int) -> Record:
+    """Return the record at `offset` of a file of `size` bytes. Raises Damaged when it is none, or is cut."""
+    file.seek(offset)
+    head = file.read(4)
+    if len(head) < 4:
+        raise Damaged("ends within it")
+    (length,) = _LENGTH.unpack(head)
+    if offset + 4 + length + 4 > size:
+        raise Damaged("ends within it")
+    if length > LARGEST_HEADER:
+        raise Damaged(f"has a header of {length} bytes")
+    header = file.read(length + 4)
+    if len(header) != length + 4:
+        raise Damaged("ends within it")
+    fields = read_fields(header[:length])
+    record = Record(_op(fields), fields, offset + 4 + length + 4, _LENGTH.unpack_from(header, length)[0])
+    if record.end > size:
+        raise Damaged("ends within it")
+    return record
+
+
+def record_within(data: bytes, offset: int) -> Record:
+    """Return the record at `offset` of an unpacked chunk. Raises Damaged when it is none, or is cut."""
+    if offset + 4 > len(data):
+        raise Damaged("ends within a record")
+    start = offset + 4 + _LENGTH.unpack_from(data, offset)[0]
+    if start + 4 > len(data):
+        raise Damaged("ends within a record")
+    fields = read_fields(data[offset + 4 : start])
+    record = Record(_op(fields), fields, start + 4, _LENGTH.unpack_from(data, start)[0])
+    if record.end > len(data):
+        raise Damaged("ends within a record")
+    return record
+
+
+def _op(fields: dict[bytes, bytes]) -> int:
+    value = fields.get(b"op", b"")
+    if len(value) != 1 or not MESSAGE <= value[0] <= CONNECTION:
+        raise Damaged("is of no known kind")
+    return value[0]
+
+
+def find_chunk(file: BinaryIO, start: int, size: int) -> int | None:
+    """Return the offset of the first thing from `start` on that can only be a whole chunk record, or None."""
+    for begin in range(start, size, _WINDOW):
+        file.seek(begin)
+        window = file.read(_WINDOW + len(_MARK) - 1)
+        place = window.find(_MARK)
+        while place >= 0:
+            for offset in range(max(start, begin + place - LONGEST_CHUNK_HEADER), begin + place - 7):
+                if _is_chunk(file, offset, size):
+                    return offset
+            place = window.find(_MARK, place + 1)
+    return None
+
+
+def _is_chunk(file: BinaryIO, offset: int, size: int) -> bool:
+    file.seek(offset)
+    if int.from_bytes(file.read(4), "little") > LONGEST_CHUNK_HEADER:
+        return False
+    try:
+        record = read_record(file, offset, size)
+        record.number(b"size")
+    except Damaged:
+        return False
+    return record.op == CHUNK and record.fields.get(b"compression") in COMPRESSIONS

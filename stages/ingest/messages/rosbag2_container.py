@@ -1,0 +1,238 @@
+"""rosbag2 as a container of messages: a folder of `.db3` or `.mcap` parts, or one `.db3` file."""
+
+from __future__ import annotations
+
+import errno
+import tempfile
+from collections.abc import Collection, Hashable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from schemas.errors import BadInput, MachineFailure
+from stages.ingest.messages.container import Channel, StoredMessage
+from stages.ingest.messages.mcap_container import McapMessages
+from stages.ingest.messages.rosbag2_metadata import NAME, BagMetadata, listed_parts, read_bag_metadata
+from stages.ingest.messages.sqlite_container import LARGEST_MESSAGE, SqliteMessages
+from stages.ingest.messages.sqlite_container import MAGIC as SQLITE_MAGIC
+from stages.kit.formats.bounded_unpacking import stated_size, unpack_file, unpacked_within
+from stages.kit.formats.damage_lines import HINT, DamageLines
+from stages.kit.formats.mcap_records import MAGIC as MCAP_MAGIC
+
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+GREATEST_RATIO = 100
+"""Unpacked over packed bytes of a part that states no size; 64 MiB are always accepted."""
+GREATEST_STATED_RATIO = 1000
+ALWAYS_ACCEPTED = 64 << 20
+MOST_OPEN = 8
+"""Parts that are open at a time."""
+Part = McapMessages | SqliteMessages
+
+
+class Place(NamedTuple):
+    """Where a message stands: in which part, and where in that."""
+
+    part: int
+    inside: Hashable
+
+
+class Rosbag2Messages:
+    """A rosbag2 recording that is open for reading; see MessageLog. Its parts are read one after the other."""
+
+    format = "rosbag2"
+
+    def __init__(self, path: Path, *, salvage: bool) -> None:
+        self.path = path
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.damage: list[str] = []
+        self.notes: list[str] = []
+        self._salvage = salvage
+        self._own = DamageLines(path, salvage=salvage)
+        self._of_parts: dict[int, list[str]] = {}
+        self._open: dict[int, Part] = {}
+        self._in_use: list[int] = []
+        self._unpacked: dict[int, tempfile.TemporaryDirectory[str]] = {}
+        self._numbers: dict[tuple[int, int], int] = {}
+        """(part, channel in the part) -> channel of the bag."""
+        try:
+            self._bag = self._describe()
+            self._survey()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close the files and remove what was unpacked."""
+        for index in list(self._open):
+            self._close_part(index)
+
+    def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
+        """Yield messages of the channels (None: all), part by part in the order in which they were stored."""
+        wanted = None if channel_ids is None else set(channel_ids)
+        for index in self._readable:
+            inside = {own: number for (part, own), number in self._numbers.items() if part == index}
+            chosen = [own for own, number in inside.items() if wanted is None or number in wanted]
+            if not chosen:
+                continue
+            part = self._part(index)
+            self._in_use.append(index)
+            try:
+                for message in part.messages(None if wanted is None else chosen):
+                    try:
+                        yield self._stored(index, message)
+                    except ValueError as error:
+                        self._own.found(f"{self._name(index)}: a packed message {error}", 1)
+            finally:
+                self._in_use.remove(index)
+            self._of_parts[index] = list(part.damage)
+            self._refresh()
+        self._refresh()
+
+    def fetch(self, location: Hashable) -> StoredMessage:
+        """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
+        if not isinstance(location, Place) or location.part not in self._readable:
+            raise BadInput(f"{self.path}: {location!r} is no place in the bag")
+        try:
+            return self._stored(location.part, self._part(location.part).fetch(location.inside))
+        except ValueError as error:
+            raise BadInput(f"{self.path}: {self._name(location.part)}: a packed message {error}", hint=HINT) from None
+
+    def _stored(self, index: int, message: StoredMessage) -> StoredMessage:
+        channel = self.channels[self._numbers[index, message.channel.id]]
+        data = unpacked_within(message.data, LARGEST_MESSAGE) if self._bag.packed_messages else message.data
+        return StoredMessage(channel, message.log_time, data, Place(index, message.location))
+
+    # --- parts -----------------------------------------------------------------------------------------------
+
+    def _describe(self) -> BagMetadata:
+        if not self.path.is_dir():
+            return BagMetadata((self.path,))
+        if not (self.path / NAME).exists():
+            self.notes.append(f"no {NAME}, as after a power failure: the parts are taken in the order of their names")
+            return BagMetadata(listed_parts(self.path))
+        try:
+            return read_bag_metadata(self.path)
+        except BadInput as error:
+            if not self._salvage or "outside of the folder" in error.message:
+                raise
+            self._own.note(f"{error.message}: the parts are taken in the order of their names")
+            return BagMetadata(listed_parts(self.path))
+
+    def _survey(self) -> None:
+        """Open every part once, and give the channels of all of them common numbers."""
+        self._readable: list[int] = []
+        channels: dict[tuple[str, str, str, str, bytes], list[int | None]] = {}
+        reasons = []
+        for index, path in enumerate(self._bag.parts):
+            try:
+                if not path.exists():
+                    raise BadInput(f"{path}: part is missing")
+                part = self._part(index)
+            except BadInput as error:
+                reasons.append(error.message)
+                self._own.found(f"part cannot be read: {error.message}")
+                continue
+            self._readable.append(index)
+            self._of_parts[index] = list(part.damage)
+            for channel in part.channels:
+                key = (
+                    channel.topic,
+                    channel.type_name,
+                    channel.message_encoding,
+                    channel.schema_encoding,
+                    channel.schema,
+                )
+                counts = channels.setdefault(key, [])
+                counts.append(channel.count)
+                self._numbers[index, channel.id] = list(channels).index(key)
+            for note in part.notes:
+                if note not in self.notes:
+                    self.notes.append(note)
+        if not self._readable:
+            reason = reasons[0] if reasons else "there are none"
+            raise BadInput(f"{self.path}: no part of the bag can be read: {reason}", hint=HINT)
+        self.channels = tuple(
+            Channel(number, *key, None if None in counts else sum(count or 0 for count in counts))
+            for number, (key, counts) in enumerate(channels.items())
+        )
+        self._compare_counts()
+        self._refresh()
+
+    def _compare_counts(self) -> None:
+        counts = [channel.count for channel in self.channels]
+        stated = self._bag.message_count
+        if stated is None or None in counts or any(self._of_parts.values()) or self._own:
+            return
+        held = sum(count or 0 for count in counts)
+        if held < stated:
+            self._own.found(f"{NAME} counts {stated} messages, the parts hold {held}")
+
+    def _refresh(self) -> None:
+        lines = list(self._own)
+        for index, of_part in sorted(self._of_parts.items()):
+            prefix = f"{self._name(index)}: " if self.path.is_dir() else ""
+            lines += [prefix + line for line in of_part]
+        self.damage[:] = lines
+
+    def _name(self, index: int) -> str:
+        return self._bag.parts[index].name
+
+    def _part(self, index: int) -> Part:
+        """Return a part, opened; the one that was used longest ago is closed when many are open."""
+        part = self._open.pop(index, None)
+        if part is None:
+            idle = [other for other in self._open if other not in self._in_use]
+            if len(self._open) >= MOST_OPEN and idle:
+                self._close_part(idle[0])
+            part = self._opened(index)
+        self._open[index] = part
+        return part
+
+    def _close_part(self, index: int) -> None:
+        self._open.pop(index).close()
+        if index in self._unpacked:
+            self._unpacked.pop(index).cleanup()
+
+    def _opened(self, index: int) -> Part:
+        path = self._bag.parts[index]
+        try:
+            with path.open("rb") as file:
+                packed = file.read(len(ZSTD_MAGIC)) == ZSTD_MAGIC
+        except OSError as error:
+            raise BadInput(f"{path}: cannot be opened: {error.strerror}") from None
+        if packed:
+            path = self._unpack(index, path)
+        with path.open("rb") as file:
+            head = file.read(max(len(MCAP_MAGIC), len(SQLITE_MAGIC)))
+        if head.startswith(MCAP_MAGIC):
+            return McapMessages(path, salvage=self._salvage)
+        if head.startswith(SQLITE_MAGIC):
+            return SqliteMessages(path, salvage=self._salvage)
+        raise BadInput(f"{path}: is empty" if not head else f"{path}: is neither MCAP nor SQLite (wrong first bytes)")
+
+    def _unpack(self, index: int, path: Path) -> Path:
+        """Unpack a part into a temporary file, within a bound that follows from its size."""
+        folder = tempfile.TemporaryDirectory(prefix="scenewright-")
+        self._unpacked[index] = folder
+        target = Path(folder.name) / path.stem
+        try:
+            with path.open("rb") as packed, target.open("wb") as file:
+                size = path.stat().st_size
+                stated = stated_size(packed.read(64))
+                packed.seek(0)
+                limit = max(ALWAYS_ACCEPTED, (GREATEST_STATED_RATIO if stated else GREATEST_RATIO) * size)
+                unpack_file(packed, file, min(limit, stated) if stated else limit)
+        except ValueError as error:
+            self._own.found(f"{path.name}: {error}")
+        except OSError as error:
+            if error.errno == errno.ENOSPC:
+                raise MachineFailure(f"{folder.name}: no room to unpack {path}", hint="set TMPDIR") from None
+            raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
+        return target
+
+
+def open_rosbag2(path: Path, *, salvage: bool) -> Rosbag2Messages:
+    """Open a rosbag2 folder or `.db3` file.
+
+    Raises BadInput when no part of it can be read; without `salvage` also when a part is missing or damaged.
+    """
+    return Rosbag2Messages(path, salvage=salvage)
