@@ -11,6 +11,8 @@ from typing import Annotated, Any
 import typer
 
 from cli.batch_command import batch
+from cli.collection_command import gc
+from cli.comparison_command import diff
 from schemas.errors import BadInput, UsageError
 
 Paths = Annotated[list[Path], typer.Argument(help="Artifact folders.")]
@@ -240,6 +242,8 @@ COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (inspect, "Artifacts"),
     (verify, "Artifacts"),
     (migrate, "Artifacts"),
+    (diff, "Artifacts"),
+    (gc, "Artifacts"),
     (models, "Installation"),
     (doctor, "Installation"),
     (schemas, "Installation"),

@@ -35,7 +35,10 @@ def intrinsics(camera: Camera) -> dict[str, float | int]:
 def write_nerfstudio_folder(
     root: Path, frames: Iterable[ExportFrame], cameras: Mapping[str, Camera], tally: Tally
 ) -> None:
-    """Write the frames into `root`. Frames without colour or pose have no place in the format and are counted."""
+    """Write the frames into `root`. Frames without colour or pose have no place in the format and are counted.
+
+    `timestamp` [s] and `camera_name` are ours; other readers pass over them.
+    """
     for name in ("images", "depth"):
         (root / name).mkdir()
     rows = []
@@ -46,7 +49,7 @@ def write_nerfstudio_folder(
         row: dict[str, Any] = {
             "file_path": f"images/frame_{tally.frames:06d}{picture_suffix(frame.color)}",
             "transform_matrix": (frame.world_from_camera @ OPENCV_FROM_OPENGL).tolist(),
-            "time": frame.stamp * 1e-9,
+            "timestamp": frame.stamp * 1e-9,
         }
         (root / row["file_path"]).write_bytes(frame.color)
         tally.streams |= {"color", "pose"}

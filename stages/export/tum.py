@@ -42,7 +42,7 @@ def pose_line(stamp: int, world_from_camera: np.ndarray) -> str:
 
 
 def write_tum_folder(root: Path, frames: Iterable[ExportFrame], camera: Camera, tally: Tally) -> None:
-    """Write the frames of one camera into `root`; `calibration.txt` is `fx fy cx cy width height`."""
+    """Write the frames of one camera into `root`; `calibration.txt` is `fx fy cx cy`, as ETH3D has it."""
     color_lines = ["# color images", "# timestamp filename"]
     depth_lines = ["# depth maps, 5000 units per metre, 0 invalid", "# timestamp filename"]
     pose_lines = ["# ground truth trajectory: world_from_camera, OpenCV camera", "# timestamp tx ty tz qx qy qz qw"]
@@ -67,5 +67,5 @@ def write_tum_folder(root: Path, frames: Iterable[ExportFrame], camera: Camera, 
         tally.frames += 1
     for name, lines in (("rgb.txt", color_lines), ("depth.txt", depth_lines), ("groundtruth.txt", pose_lines)):
         (root / name).write_text("\n".join(lines) + "\n", encoding="ascii")
-    numbers = (camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height)
+    numbers = (camera.fx, camera.fy, camera.cx, camera.cy)
     (root / "calibration.txt").write_text(" ".join(repr(number) for number in numbers) + "\n", encoding="ascii")

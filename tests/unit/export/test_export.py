@@ -45,7 +45,7 @@ def test_tum_by_its_published_format(tmp_path: Path) -> None:
             np.testing.assert_allclose(numbers[:3], poses[index][:3, 3], atol=1e-9)
             np.testing.assert_allclose(Rotation.from_quat(numbers[3:]).as_matrix(), poses[index][:3, :3], atol=1e-9)
     numbers = [float(word) for word in (root / "calibration.txt").read_text().split()]
-    assert numbers == [CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy, CAMERA.width, CAMERA.height]
+    assert numbers == [CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy]
     assert done.info.depth_pixels_zeroed == 2 and done.summary["depth_pixels_zeroed"] == 2
     assert done.info.depth_limit == 13.106 and any("13.106 m" in note for note in done.info.notes)
 
@@ -146,7 +146,7 @@ def test_what_a_layout_cannot_hold_is_counted(tmp_path: Path) -> None:
     assert any("cameras not written: left" in note for note in done.info.notes)
     left = export(two, tmp_path / "left", layout="tum", camera="left")
     assert left.info.frame_count == 2
-    assert (left.root / "calibration.txt").read_text().startswith("60.0 61.0 31.0 24.5")
+    assert (left.root / "calibration.txt").read_text() == "60.0 61.0 31.0 24.5\n"
     lacking = write_sequence(tmp_path / "lacking", without={1: ("pose",), 2: ("color",), 3: ("depth",)})
     done = export(lacking, tmp_path / "nerf", layout="nerfstudio")
     assert done.info.left_out == {"missing_pose": 1, "missing_color": 1} and done.info.frame_count == 3
