@@ -17,6 +17,7 @@ from pydantic_core import PydanticUndefined
 
 from stages.kit.progress import progress_for
 from stages.kit.running.configuration import parameters_for, read_config
+from stages.kit.running.memory_limit import parse_limit
 from stages.kit.running.runner import RunResult, run_stage
 from stages.kit.stage import External, Optionally, Stage
 
@@ -115,6 +116,11 @@ def _common_options(stage: Stage) -> list[inspect.Parameter]:
             Optional[Path],  # noqa: UP045
             typer.Option(None, "--config", help="TOML file of parameters; flags win.", **panel),
         ),
+        _parameter(
+            "max_memory",
+            Optional[str],  # noqa: UP045
+            typer.Option(None, "--max-memory", help="Stop with exit code 6 when the step uses more: 4GiB.", **panel),
+        ),
         flag("force", "Make it again even when it is up to date."),
         flag("dry_run", "Say what would run and why; write nothing."),
         _parameter(
@@ -184,6 +190,7 @@ def make_command(stage: Stage) -> Callable[..., int]:
             dry_run=options["dry_run"],
             progress=progress_for(sys.stderr.isatty(), quiet=options["quiet"] or options["json_output"]),
             command=("scenewright", *sys.argv[1:]),
+            max_memory=parse_limit(options["max_memory"]) if options["max_memory"] is not None else None,
         )
         return report_result(result, stage, tuple(options["accept"] or ()), options["json_output"])
 

@@ -18,7 +18,7 @@ from schemas.artifact import Artifact
 from schemas.errors import BadInput, MachineFailure, MissingDependency, UsageError
 from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
 from stages.kit.progress import SilentProgress
-from stages.kit.running import interruption, store
+from stages.kit.running import interruption, memory_limit, store
 from stages.kit.running.digests import content_digest, external_digest, external_files, record_files
 from stages.kit.running.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
 from stages.kit.running.provenance import provenance_now
@@ -233,9 +233,11 @@ def run_stage(
     dry_run: bool = False,
     progress: SilentProgress | None = None,
     command: tuple[str, ...] = (),
+    max_memory: int | None = None,
 ) -> RunResult:
     """Make the artifact at `out`, unless it is there already (docs/ARCHITECTURE.md, the stage contract).
 
+    The step is stopped when its resident memory passes `max_memory` [bytes], in the main thread only.
     Raises BadInput, UsageError, MissingDependency or MachineFailure; whatever stood at `out` is then untouched.
     """
     out = _resolved(out)
@@ -274,7 +276,7 @@ def run_stage(
         progress = progress or SilentProgress()
         with store.partial_folder(out) as partial:
             context = Context(output=partial, seed=seed, device=device, progress=progress)
-            with _inputs_stay(opened):
+            with _inputs_stay(opened), memory_limit.limited(max_memory, out):
                 made = _work(stage, opened, parameters, context)
             _check_payload(stage, made, partial)
             (partial / store.TIMINGS_NAME).write_text(
