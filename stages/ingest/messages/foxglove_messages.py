@@ -1,4 +1,4 @@
-"""Foxglove messages as mappings of fields -> records: the same for protobuf, JSON and ROS 2."""
+"""Foxglove messages as dictionaries of fields -> records: the same for protobuf, JSON and ROS 2."""
 
 from __future__ import annotations
 

@@ -25,6 +25,8 @@ PRIMITIVES = {
 """Name in `.msg` or `.idl` -> code of the struct module."""
 TEXT = "string"
 SEQUENCE = -1
+EMPTY_STRUCT_MEMBER = "structure_needs_at_least_one_member"
+"""The one byte that ROS 2 gives a struct without fields, as C has no empty structs; ROS 1 gives it none."""
 
 
 class UnreadableDefinition(Exception):
@@ -111,10 +113,12 @@ def bundled_definitions(version: str) -> Definitions:
             return Field(name, PRIMITIVES.get(detail[0], detail[0]))
         return Field(name, short_name(detail))
 
-    found = {}
+    transforms = (Field("transforms", "geometry_msgs/TransformStamped", SEQUENCE),)
+    found: Definitions = {"tf2_msgs/TFMessage": transforms, "tf/tfMessage": transforms}
     for type_name, (_, fields) in FIELDDEFS.items():
-        found[short_name(type_name)] = tuple(field(name.lower(), description) for name, description in fields)
-    found["tf/tfMessage"] = found["tf2_msgs/TFMessage"]
+        found[short_name(type_name)] = tuple(
+            field(name.lower(), description) for name, description in fields if name != EMPTY_STRUCT_MEMBER
+        )
     if version == "ros1":
         found |= {"builtin_interfaces/Time": ROS1_TIME, "builtin_interfaces/Duration": ROS1_TIME}
     return found

@@ -91,7 +91,8 @@ def _imu(fields: Fields) -> tuple[Record, ...]:
     stamp, frame = _stamp_and_frame(fields)
     acceleration = vector_of(nested(fields, "linear_acceleration"))
     covariance = part(fields, "linear_acceleration_covariance")
-    if not np.any(acceleration) or (len(covariance) and covariance[0] == -1):
+    absent = isinstance(covariance, np.ndarray) and covariance.size > 0 and covariance[0] == -1
+    if absent or not acceleration.any():
         return ()
     return (ImuRecord(stamp, frame, acceleration),)
 

@@ -14,7 +14,14 @@ from typing import Any
 import numpy as np
 
 from stages.ingest.messages.records import Undecodable
-from stages.ingest.messages.ros_definitions import SEQUENCE, TEXT, Definitions, Field, UnreadableDefinition
+from stages.ingest.messages.ros_definitions import (
+    EMPTY_STRUCT_MEMBER,
+    SEQUENCE,
+    TEXT,
+    Definitions,
+    Field,
+    UnreadableDefinition,
+)
 
 MOST_VALUES = 500_000
 """Fields that one message may hold, an array of numbers counted as one."""
@@ -114,8 +121,8 @@ def _plan(definitions: Definitions, order: str, aligned: bool) -> dict[str, tupl
 
 def _parts(fields: tuple[Field, ...], order: str, aligned: bool) -> list[_Part]:
     parts: list[_Part] = []
-    if aligned and not fields:  # rosidl gives an empty struct one byte, as C has no empty structs
-        fields = (Field("structure_needs_at_least_one_member", "B"),)
+    if aligned and not fields:
+        fields = (Field(EMPTY_STRUCT_MEMBER, "B"),)
     run: list[Field] = []
 
     def end_run() -> None:
@@ -191,7 +198,7 @@ class _Cursor:
         if end > len(self._view):
             raise self._short()
         self.position = end
-        if size == 1:
+        if part.dtype == np.uint8:
             return self._view[start:end]
         return np.frombuffer(self._view[start:end], part.dtype)
 
