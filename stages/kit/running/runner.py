@@ -84,10 +84,9 @@ class _OpenInput:
 
 
 def _stamp(path: Path, is_artifact: bool) -> Stamp:
-    files = [path / MANIFEST_NAME] if is_artifact else external_files(path)
     rows = []
-    for file in files:
-        with suppress(OSError):
+    with suppress(OSError, ValueError):  # what cannot be looked at is refused where it is opened
+        for file in [path / MANIFEST_NAME] if is_artifact else external_files(path):
             found = file.stat()
             rows.append((str(file), found.st_ino, found.st_mtime_ns, found.st_size))
     return tuple(rows)
@@ -163,7 +162,7 @@ def _open_inputs(stage: Stage, paths: Mapping[str, Path]) -> list[_OpenInput]:
         if isinstance(what, External):
             if what.weights and not Path(path).is_file():
                 raise MissingDependency(f"{path}: no such weight file", hint="see: scenewright models")
-            stamp = _stamp(Path(path), False) if Path(path).exists() else ()
+            stamp = _stamp(Path(path), False)
             opened.append(_OpenInput(role, "external", external_digest(path), Path(path), Path(path), stamp))
         else:
             stamp = _stamp(Path(path), True)
