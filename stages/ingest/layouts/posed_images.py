@@ -1,6 +1,7 @@
 """Folders of posed images: color|rgb|image/, depth/, pose.txt with a line `tx ty tz qx qy qz qw` an image.
 
-The poses are world_from_camera (as in slambook2's diningroom); intrinsics come from options.
+The poses are world_from_camera (as in slambook2's diningroom); intrinsics come from options. Folders with a
+calibration file, or with other pose lines, are the plain images of image_folder.py.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from schemas.errors import BadInput
+from stages.ingest.layouts.calibration_files import calibration_file
 from stages.ingest.layouts.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
@@ -20,7 +22,10 @@ from stages.ingest.layouts.files import (
     image_loader,
     images_by_stem,
     natural_key,
+    stream,
+    text_stream,
 )
+from stages.ingest.layouts.pose_files import columns_of
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import Entry, LogSource, SourceCamera
 from stages.kit.formats.trajectories import number_rows, transform_from_numbers
@@ -34,6 +39,8 @@ def matches(root: Path) -> str | None:
     color = first_subfolder(root, COLOR_FOLDERS)
     poses = next((name for name in POSES if (root / name).is_file()), None)
     if color is None or poses is None or not (root / "depth").is_dir():
+        return None
+    if calibration_file(root) is not None or columns_of(root / poses) in (8, 12, 16):
         return None
     return f"folder with {color.name}/, depth/ and {poses}: posed images"
 
@@ -62,7 +69,12 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         f"times assumed: {parameters.frame_rate:g} frames per second",
         "poses assumed: tx ty tz qx qy qz qw, world_from_camera",
     )
-    return LogSource("posed-images", rule, (SourceCamera("camera", camera),), tuple(entries), notes)
+    streams = (
+        stream(color_folder.name, "color", colors.values()),
+        stream("depth", "depth", depths.values()),
+        text_stream(pose_file.name, "pose", len(rows)),
+    )
+    return LogSource("posed-images", rule, (SourceCamera("camera", camera),), tuple(entries), notes, streams=streams)
 
 
 def _pose(numbers: np.ndarray, where: str) -> tuple[np.ndarray | None, str | None]:

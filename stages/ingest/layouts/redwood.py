@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
@@ -17,10 +16,13 @@ from stages.ingest.layouts.files import (
     image_loader,
     images_by_stem,
     overridden,
+    read_json,
+    stream,
+    text_stream,
 )
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import Entry, LogSource, SourceCamera
-from stages.kit.formats.trajectories import read_open3d_log, read_text
+from stages.kit.formats.trajectories import read_open3d_log
 
 COLOR_FOLDERS = ("image", "color", "rgb")
 TRAJECTORY = "trajectory.log"
@@ -64,7 +66,12 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         for index, (color, depth) in enumerate(zip(colors, depths, strict=True))
     )
     notes = (*notes, *given, unit_note, f"times assumed: {parameters.frame_rate:g} frames per second")
-    return LogSource("redwood", rule, (SourceCamera("camera", camera),), entries, notes)
+    streams = (
+        stream(color_folder.name, "color", colors),
+        stream("depth", "depth", depths),
+        text_stream(TRAJECTORY, "pose", len(poses)),
+    )
+    return LogSource("redwood", rule, (SourceCamera("camera", camera),), entries, notes, streams=streams)
 
 
 def _camera(root: Path, size: tuple[int, int] | None) -> tuple[Camera, tuple[str, ...]]:
@@ -83,13 +90,13 @@ def _camera(root: Path, size: tuple[int, int] | None) -> tuple[Camera, tuple[str
 
 def _read_intrinsics(path: Path, size: tuple[int, int] | None) -> Camera:
     try:
-        document = json.loads(read_text(path))
+        document = read_json(path)
         matrix = [float(value) for value in document["intrinsic_matrix"]]  # column major
         width, height = int(document["width"]), int(document["height"])
         fx, fy, cx, cy = matrix[0], matrix[4], matrix[6], matrix[7]
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, OverflowError) as error:
         raise BadInput(f"{path}: no Open3D intrinsics ({type(error).__name__}: {error})") from None
-    if not all(map(math.isfinite, matrix)) or fx <= 0 or fy <= 0:
+    if not all(map(math.isfinite, matrix)) or fx <= 0 or fy <= 0 or min(width, height) < 1:
         raise BadInput(f"{path}: focal lengths {fx:g}, {fy:g} are not positive")
     if size is not None and size != (width, height):
         raise BadInput(f"{path}: is for {width}x{height}, the depth images are {size[0]}x{size[1]}")

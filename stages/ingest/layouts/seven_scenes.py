@@ -10,7 +10,7 @@ import numpy as np
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from stages.ingest.color_registration import registered_loader
-from stages.ingest.layouts.files import depth_image_size, depth_units, image_loader, overridden
+from stages.ingest.layouts.files import depth_image_size, depth_units, image_loader, overridden, stream
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import Entry, LogSource, SourceCamera
 from stages.kit.formats.trajectories import read_matrix
@@ -70,7 +70,12 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         REGISTERED_NOTE if register else "colour and depth of 7-Scenes are not registered (other lens, 3 cm apart)",
     )
     cameras = (SourceCamera("camera", camera, registered=register),)
-    return LogSource("7scenes", rule, cameras, tuple(entries), notes)
+    streams = (
+        stream("*.color", "color", [found["color"] for found in files.values() if "color" in found]),
+        stream("*.depth", "depth", [found["depth"] for found in files.values() if "depth" in found]),
+        stream("*.pose.txt", "pose", [found["pose"] for found in files.values() if "pose" in found]),
+    )
+    return LogSource("7scenes", rule, cameras, tuple(entries), notes, streams=streams)
 
 
 def _is_seven_scenes_kinect(camera: Camera) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from schemas.errors import BadInput
 from stages.kit.geometry.transforms import is_rigid
 
+INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 LARGEST_TEXT = 200_000_000
 """Bytes of a text file that are read: trajectories of days stay far below."""
 QUATERNION_TOLERANCE = 0.02
@@ -99,6 +101,14 @@ def read_matrix(path: Path, rows: int = 4, columns: int = 4) -> np.ndarray:
 def read_open3d_log(path: Path) -> list[np.ndarray]:
     """Return the (4, 4) world_from_camera matrices of an Open3D / Redwood `trajectory.log`, in file order.
 
+    Raises BadInput naming the line.
+    """
+    return [pose for _, pose in read_numbered_open3d_log(path)]
+
+
+def read_numbered_open3d_log(path: Path) -> list[tuple[int, np.ndarray]]:
+    """Return (first integer of the header, (4, 4) world_from_camera) of the entries of a `trajectory.log`.
+
     Each entry is a line of three integers followed by four lines of four numbers
     (open3d.io.write_pinhole_camera_trajectory). Raises BadInput naming the line.
     """
@@ -108,12 +118,13 @@ def read_open3d_log(path: Path) -> list[np.ndarray]:
     poses = []
     for start in range(0, len(lines), 5):
         header = lines[start].split()
-        if len(header) != 3 or not all(field.lstrip("+-").isdecimal() for field in header):
+        if len(header) != 3 or not all(INTEGER.fullmatch(field) for field in header):
             raise BadInput(f"{path}: entry {start // 5}: header {lines[start]!r:.60} is not three integers")
         rows = [line.split() for line in lines[start + 1 : start + 5]]
         if any(len(row) != 4 for row in rows):
             raise BadInput(f"{path}: entry {start // 5}: matrix is not 4x4")
-        poses.append(_numbers([field for row in rows for field in row], f"{path}: entry {start // 5}").reshape(4, 4))
+        matrix = _numbers([field for row in rows for field in row], f"{path}: entry {start // 5}").reshape(4, 4)
+        poses.append((int(header[0]), matrix))
     return poses
 
 
