@@ -177,21 +177,36 @@ def view(
 
 
 def models(
+    add: Annotated[Path | None, typer.Option("--add", help="Copy this weight file into the cache.")] = None,
     check: Annotated[Path | None, typer.Option("--check", help="Tell which known network this file is.")] = None,
     json_output: Json = False,
     debug: Debug = False,
 ) -> int:
-    """List the networks that steps can use: source, licence, checksum."""
+    """List the networks that steps can use (source, licence, checksum) and the weight files in the cache."""
     from stages.kit.running.known_models import identify, known_models
+    from stages.kit.running.model_cache import add_model, cache_folder, cached_models
 
     if check is not None:
         _out(identify(check).name)
         return 0
+    if add is not None:
+        _out(str(add_model(add).path))
+        return 0
+    cached = cached_models()
+    if json_output:
+        files = [
+            {"path": str(c.path), "name": c.name, "bytes": c.bytes, "known": c.known.name if c.known else None}
+            for c in cached
+        ]
+        listed = [model.model_dump() for model in known_models()]
+        _out(json.dumps({"models": listed, "cache": str(cache_folder()), "files": files}, sort_keys=True))
+        return 0
     for model in known_models():
-        if json_output:
-            _out(model.model_dump_json())
-        else:
-            _out(f"{model.name}: {model.purpose}\n  {model.file}, {model.licence}, {model.source}\n  {model.sha256}")
+        _out(f"{model.name}: {model.purpose}\n  {model.file}, {model.licence}, {model.source}\n  {model.sha256}")
+    _out(f"cache {cache_folder()}: {len(cached)} files, {sum(c.bytes for c in cached) / 1e6:.1f} MB")
+    for entry in cached:
+        what = entry.known.name if entry.known else "not listed in data/models.toml"
+        _out(f"  {entry.name} ({what}), {entry.bytes / 1e6:.1f} MB, {entry.path.name}")
     return 0
 
 

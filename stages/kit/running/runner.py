@@ -21,6 +21,7 @@ from stages.kit.progress import SilentProgress
 from stages.kit.running import interruption, memory_limit, store
 from stages.kit.running.digests import content_digest, external_digest, external_files, record_files
 from stages.kit.running.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
+from stages.kit.running.model_cache import resolve_weights
 from stages.kit.running.provenance import provenance_now
 from stages.kit.running.reading import check_hashes, check_sizes, open_artifact, read_manifest
 from stages.kit.stage import Context, External, Optionally, Parameters, Stage
@@ -160,8 +161,7 @@ def _open_inputs(stage: Stage, paths: Mapping[str, Path]) -> list[_OpenInput]:
         declared = stage.reads[role]
         what = declared.what if isinstance(declared, Optionally) else declared
         if isinstance(what, External):
-            if what.weights and not Path(path).is_file():
-                raise MissingDependency(f"{path}: no such weight file", hint="see: scenewright models")
+            path = resolve_weights(path) if what.weights else path
             stamp = _stamp(Path(path), False)
             opened.append(_OpenInput(role, "external", external_digest(path), Path(path), Path(path), stamp))
         else:
