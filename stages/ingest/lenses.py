@@ -62,6 +62,14 @@ def is_calibrated(record: CalibrationRecord) -> bool:
     return len(record.K) == 9 and all(map(math.isfinite, record.K)) and record.K[0] > 0 and record.K[4] > 0
 
 
+def check_calibrated(record: CalibrationRecord, where: str) -> None:
+    """Raise BadInput for a calibration without focal lengths."""
+    if not is_calibrated(record):
+        raise BadInput(
+            f"{where}: K = {list(record.K)} has no positive focal lengths: the camera is uncalibrated", hint=HINT
+        )
+
+
 def lens_of(record: CalibrationRecord, size: tuple[int, int], rectified: bool, where: str, what: str) -> Lens:
     """Return the lens of images of `size` (width, height) with the calibration `record`.
 
@@ -126,10 +134,7 @@ def scaled_matrix(
 
     Raises BadInput when there are no focal lengths, or the calibration is for images of another shape.
     """
-    if not is_calibrated(record):
-        raise BadInput(
-            f"{where}: K = {list(record.K)} has no positive focal lengths: the camera is uncalibrated", hint=HINT
-        )
+    check_calibrated(record, where)
     if record.width <= 0 or record.height <= 0:
         raise BadInput(f"{where}: calibration is for images of {record.width}x{record.height}", hint=HINT)
     matrix = np.array([[numbers[0], 0, numbers[2]], [0, numbers[4], numbers[5]], [0, 0, 1]], dtype=float)

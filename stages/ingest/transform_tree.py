@@ -126,6 +126,11 @@ class TransformTree:
             return parents[0] if parents else None
         return next((parent for parent in parents if self._leads_to(parent, self._preferred)), parents[0])
 
+    def is_preferred(self, frame: str) -> bool:
+        """Whether the parent that counts is known to lead to the preferred frame."""
+        parent = self.parent(frame)
+        return self._preferred is not None and parent is not None and self._leads_to(parent, self._preferred)
+
     def _leads_to(self, frame: str, target: str) -> bool:
         seen, open_frames = {frame}, [frame]
         while open_frames:

@@ -1,18 +1,20 @@
-"""Not written yet."""
+"""ROS 1 bags."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from stages.ingest.messages.message_source import open_messages
+from stages.ingest.messages.opening import container_of
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import LogSource
 
 
 def matches(path: Path) -> str | None:
     """Return the rule that matched, or None."""
-    return None
+    return "file with the magic of ROS bags: ROS 1 bag" if container_of(path) == "rosbag1" else None
 
 
 def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSource:
-    """Not written yet."""
-    raise NotImplementedError
+    """Survey a ROS 1 bag and list its frames. Raises BadInput as `open_messages` does."""
+    return open_messages(path, parameters, rule)

@@ -1,180 +1,318 @@
-"""What is in an MCAP log with Foxglove protobuf messages: images by topic, calibrations, transforms. One pass."""
+"""What is in a log of messages: images by topic, calibrations, transforms, poses, inertial samples. One pass."""
 
 from __future__ import annotations
 
+from array import array
 from collections import Counter
+from collections.abc import Hashable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
-from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
-from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
-from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
-from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
-from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-from google.protobuf.message import DecodeError
 
-from schemas.errors import BadInput
-from stages.ingest.images import decode_image
-from stages.ingest.transform_tree import TransformTree
-from stages.kit.formats.foxglove import stamp_nanoseconds, transform_matrix
-from stages.kit.formats.mcap_log import Location, McapLog
+from stages.ingest.lenses import is_calibrated
+from stages.ingest.messages.container import Channel, MessageLog
+from stages.ingest.messages.decoding import decoder_for, why_unreadable
+from stages.ingest.messages.pixels import color_pixels, depth_pixels, label_pixels, role_of, why_other
+from stages.ingest.messages.realsense_bags import is_stream_transform
+from stages.ingest.messages.records import (
+    CalibrationRecord,
+    ImageRecord,
+    ImuRecord,
+    PointsRecord,
+    PoseRecord,
+    Record,
+    TransformRecord,
+    Undecodable,
+)
+from stages.ingest.source import Role, StreamInfo, Unusable
+from stages.ingest.transform_tree import Track, TransformTree
+from stages.kit.formats.image_headers import image_size as size_in_header
 
-TYPES: dict[str, Any] = {
-    "foxglove.CompressedImage": CompressedImage,
-    "foxglove.RawImage": RawImage,
-    "foxglove.CameraCalibration": CameraCalibration,
-    "foxglove.FrameTransforms": FrameTransforms,
-    "foxglove.FrameTransform": FrameTransform,
-    "foxglove.PoseInFrame": PoseInFrame,
-}
-COLOR_ENCODINGS = ("rgb8", "bgr8", "8UC3", "rgba8", "bgra8")
-DEPTH_ENCODINGS = ("16UC1", "32FC1", "mono16")
-LABEL_WORDS = ("label", "instance", "segment", "mask")
-
-
-@dataclass(frozen=True)
-class ImageMessage:
-    """Where an image stands in the log."""
-
-    stamp: int
-    location: Location
-    frame_id: str
+IMU_STEP = 50_000_000
+"""Inertial samples nearer to the last one kept than this [ns] are not kept: up is a mean."""
+SIZE_ATTEMPTS = 20
+"""Compressed images of a topic that are decoded to learn their size."""
+STATIC = "tf_static"
+UNUSED = "not used"
+"""How the reason of topics ends that are well understood and have nothing to do with cameras."""
 
 
 @dataclass
-class TopicImages:
-    """The images of one topic."""
+class Topic:
+    """What was recorded under one topic."""
 
-    role: str
-    """`color`, `depth`, `labels` or `other`."""
+    name: str
+    kinds: dict[str, None] = field(default_factory=dict)
+    """Types with encodings, in order of appearance."""
+    role: Role = "other"
+    count: int = 0
+    stamps: array[int] = field(default_factory=lambda: array("q"))
+    """Header stamps [ns] in file order; of messages without one, the log time."""
+    delays: array[int] = field(default_factory=lambda: array("q"))
+    """Log time minus stamp [ns], for each of `stamps`."""
+    without_stamp: int = 0
+    unreadable: str = ""
+    undecodable: Counter[str] = field(default_factory=Counter)
+    """Reason -> number of messages."""
+
+    def described(self) -> str:
+        """Type and encoding, for people."""
+        return ", ".join(self.kinds)
+
+
+@dataclass
+class Images:
+    """The images of one topic. Places, not pixels, are kept."""
+
+    topic: str
+    role: Role
     encoding: str
-    size: tuple[int, int]
-    """(width, height) of the first depth image that has a size; (0, 0) where none has, and for colour."""
-    messages: list[ImageMessage] = field(default_factory=list)
+    compressed: bool
+    frame_id: str
+    size: tuple[int, int] = (0, 0)
+    """(width, height) of the first image that has one."""
+    stamps: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    """(N,) int64 [ns], ascending; filled when the survey is done, as is the order of `locations`."""
+    locations: list[Hashable] = field(default_factory=list)
+    other_frames: int = 0
+    """Images that name another frame than the first did."""
+
+
+@dataclass
+class Poses:
+    """The poses of one topic."""
+
+    topic: str
+    frame_id: str
+    child_frame_id: str
+    """Empty where the messages do not say whose pose it is."""
+    track: Track = field(default_factory=Track)
+    other_frames: int = 0
+    """Poses between other frames than those of the first, not kept."""
+
+
+@dataclass
+class Inertial:
+    """The inertial samples of one topic, thinned out."""
+
+    topic: str
+    frame_id: str
+    samples: list[tuple[int, np.ndarray]] = field(default_factory=list)
 
 
 @dataclass
 class LogContent:
     """Everything but the pixels."""
 
-    images: dict[str, TopicImages] = field(default_factory=dict)
-    calibrations: dict[str, Any] = field(default_factory=dict)
-    """Topic -> first CameraCalibration message."""
+    topics: dict[str, Topic] = field(default_factory=dict)
+    images: dict[str, Images] = field(default_factory=dict)
+    calibrations: dict[str, CalibrationRecord] = field(default_factory=dict)
+    """Topic -> first calibration that has focal lengths, else the first."""
     changed_calibrations: set[str] = field(default_factory=set)
     tree: TransformTree = field(default_factory=TransformTree)
-    poses: dict[str, list[tuple[int, str, np.ndarray]]] = field(default_factory=dict)
-    """Topic -> (stamp, frame, frame_from_posed) of PoseInFrame messages."""
-    bad: Counter[str] = field(default_factory=Counter)
-    """Reason -> number of messages that could not be used."""
+    transform_topics: dict[str, None] = field(default_factory=dict)
+    poses: dict[str, Poses] = field(default_factory=dict)
+    inertial: dict[str, Inertial] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def damage(self) -> list[str]:
+        """Return a line for every topic with messages that do not decode."""
+        lines = []
+        for name, topic in sorted(self.topics.items()):
+            if topic.undecodable:
+                reason = topic.undecodable.most_common(1)[0][0]
+                lines.append(f"{topic.undecodable.total()} of {topic.count} messages of {name} do not decode: {reason}")
+        return lines
+
+    def described_topics(self) -> str:
+        """Return the topics with their types, for error messages."""
+        rows = [f"{name} ({topic.described()})" for name, topic in sorted(self.topics.items())]
+        return ", ".join(rows[:12]) + (f", ... ({len(rows)} topics)" if len(rows) > 12 else "") or "none"
+
+    def streams(self) -> tuple[StreamInfo, ...]:
+        """Return every topic of the log, unreadable ones with the reason."""
+        return tuple(_stream(topic) for _, topic in sorted(self.topics.items()))
 
 
-def readable_topics(log: McapLog) -> dict[int, str]:
-    """Return channel id -> schema name of the channels that can be read here."""
-    found = {}
-    for channel in log.channels.values():
-        schema = log.schemas.get(channel.schema_id)
-        if (
-            schema is not None
-            and channel.message_encoding == "protobuf"
-            and schema.encoding == "protobuf"
-            and schema.name in TYPES
-        ):
-            found[channel.id] = schema.name
-    return found
-
-
-def described_topics(log: McapLog) -> str:
-    """Return the topics of a log with their types, for error messages."""
-    rows = set()
-    for channel in log.channels.values():
-        schema = log.schemas.get(channel.schema_id)
-        rows.add(f"{channel.topic} ({schema.name if schema else 'no schema'}, {channel.message_encoding})")
-    return ", ".join(sorted(rows)[:12]) or "none"
-
-
-def survey(log: McapLog) -> LogContent:
-    """Read a log once, keeping stamps, places, calibrations and transforms; pixels are not kept."""
+def survey(log: MessageLog) -> LogContent:
+    """Read a log once. Raises BadInput when it is damaged and was opened to refuse that."""
     content = LogContent()
-    names = readable_topics(log)
-    for message in log.messages(names):
-        name = names[message.channel.id]
-        try:
-            body = TYPES[name].FromString(message.data)
-        except DecodeError:
-            content.bad[f"undecodable_message {message.channel.topic}"] += 1
-            continue
-        topic = message.channel.topic
-        if name in ("foxglove.CompressedImage", "foxglove.RawImage"):
-            _add_image(content, topic, body, message.log_time, message.location)
-        elif name == "foxglove.CameraCalibration":
-            first = content.calibrations.setdefault(topic, body)
-            if (first.K, first.D, first.width, first.height) != (body.K, body.D, body.width, body.height):
-                content.changed_calibrations.add(topic)
-        elif name == "foxglove.PoseInFrame":
-            _add_pose(content, topic, body, message.log_time)
+    decoders = {}
+    for channel in log.channels:
+        topic = content.topics.setdefault(channel.topic, Topic(channel.topic))
+        topic.kinds[f"{channel.type_name or 'no type'}, {channel.message_encoding}"] = None
+        decoder = decoder_for(channel)
+        if decoder is None:
+            topic.unreadable = why_unreadable(channel)
+            topic.count += channel.count or 0
         else:
-            transforms = body.transforms if name == "foxglove.FrameTransforms" else (body,)
-            for transform in transforms:
-                _add_transform(content, topic, transform, message.log_time)
-    for images in content.images.values():
-        images.messages.sort(key=lambda image: image.stamp)
+            decoders[channel.id] = decoder
+    reader = _Reader(content)
+    for message in log.messages(decoders):
+        topic = content.topics[message.channel.topic]
+        topic.count += 1
+        try:
+            records = decoders[message.channel.id](message.data)
+        except Undecodable as problem:
+            topic.undecodable[str(problem)] += 1
+            records = problem.records
+        for position, record in enumerate(records):
+            reader.add(record, topic, message.channel, message.log_time, message.location, position == 0)
+    _finish(content)
     return content
 
 
-def _stamp(body: Any, log_time: int, content: LogContent) -> int:
-    """Header stamp; messages without one are placed at the time they were logged, and counted."""
-    stamp = stamp_nanoseconds(body) if body.HasField("timestamp") else 0
-    if stamp == 0 and log_time != 0:
-        content.bad["message without header stamp, log time used"] += 1
-        return log_time
-    return stamp
+class _Reader:
+    """Sorts records into a LogContent."""
+
+    def __init__(self, content: LogContent) -> None:
+        self._content = content
+        self._attempts: Counter[str] = Counter()
+        self._last_kept: dict[str, int] = {}
+
+    def add(
+        self, record: Record, topic: Topic, channel: Channel, log_time: int, location: Hashable, first: bool
+    ) -> None:
+        """Keep what is needed of a record; `first` is that of its message."""
+        static = topic.name.endswith(STATIC) or is_stream_transform(topic.name)
+        stamp = record.stamp
+        if stamp == 0 and log_time != 0:
+            topic.without_stamp += first and not static and not isinstance(record, CalibrationRecord)
+            stamp = log_time
+        if first:
+            topic.stamps.append(stamp)
+            topic.delays.append(log_time - stamp)
+        if isinstance(record, ImageRecord):
+            self._add_image(record, topic, location)
+        elif isinstance(record, TransformRecord):
+            self._add_transform(record, topic, stamp, static)
+        elif isinstance(record, CalibrationRecord):
+            self._add_calibration(record, topic)
+        elif isinstance(record, PoseRecord):
+            self._add_pose(record, topic, stamp)
+        elif isinstance(record, ImuRecord):
+            self._add_inertial(record, topic, stamp)
+        elif isinstance(record, PointsRecord):
+            topic.role = "points"
+
+    def _add_image(self, record: ImageRecord, topic: Topic, location: Hashable) -> None:
+        images = self._content.images.get(topic.name)
+        if images is None:
+            images = Images(topic.name, "other", record.encoding, record.compressed, record.frame_id)
+            self._content.images[topic.name] = images
+        if images.role == "other":  # what the first image that can be told shows
+            images.role, images.encoding = role_of(record, topic.name), record.encoding
+            topic.role, topic.unreadable = images.role, why_other(record, topic.name)
+        if images.role != "other" and images.size == (0, 0) and self._attempts[topic.name] < SIZE_ATTEMPTS:
+            self._attempts[topic.name] += 1
+            images.size = image_size(record, images.role)
+        images.other_frames += record.frame_id != images.frame_id
+        images.locations.append(location)
+
+    def _add_transform(self, record: TransformRecord, topic: Topic, stamp: int, static: bool) -> None:
+        topic.role = "transforms"
+        if record.parent == record.child or not record.child or not record.parent:
+            topic.undecodable[f"a transform from frame {record.parent!r} to {record.child!r} is none"] += 1
+            return
+        self._content.transform_topics[topic.name] = None
+        self._content.tree.add(record.parent, record.child, stamp, record.parent_from_child, static)
+
+    def _add_calibration(self, record: CalibrationRecord, topic: Topic) -> None:
+        topic.role = "calibration"
+        known = self._content.calibrations.get(topic.name)
+        if known is None or (is_calibrated(record) and not is_calibrated(known)):
+            self._content.calibrations[topic.name] = record
+        elif is_calibrated(record) and _numbers(record) != _numbers(known):
+            self._content.changed_calibrations.add(topic.name)
+
+    def _add_pose(self, record: PoseRecord, topic: Topic, stamp: int) -> None:
+        topic.role = "pose"
+        poses = self._content.poses.setdefault(topic.name, Poses(topic.name, record.frame_id, record.child_frame_id))
+        if (poses.frame_id, poses.child_frame_id) != (record.frame_id, record.child_frame_id):
+            poses.other_frames += 1
+            return
+        poses.track.add(stamp, record.parent_from_child)
+
+    def _add_inertial(self, record: ImuRecord, topic: Topic, stamp: int) -> None:
+        topic.role = "imu"
+        inertial = self._content.inertial.setdefault(topic.name, Inertial(topic.name, record.frame_id))
+        last = self._last_kept.get(topic.name)
+        if last is None or stamp >= last + IMU_STEP or stamp < last:
+            self._last_kept[topic.name] = stamp
+            inertial.samples.append((stamp, record.acceleration))
 
 
-def _add_image(content: LogContent, topic: str, body: Any, log_time: int, location: Location) -> None:
-    if topic not in content.images:
-        content.images[topic] = _describe(topic, body)
-    elif content.images[topic].size == (0, 0) and content.images[topic].role == "depth":
-        content.images[topic].size = _describe(topic, body).size
-    stamp = _stamp(body, log_time, content)
-    content.images[topic].messages.append(ImageMessage(stamp, location, body.frame_id))
-
-
-def _describe(topic: str, body: Any) -> TopicImages:
-    lowered = topic.lower()
-    labelled = any(word in lowered for word in LABEL_WORDS)
-    if isinstance(body, RawImage):
-        size = (body.width, body.height)
-        if body.encoding in COLOR_ENCODINGS:
-            return TopicImages("color", body.encoding, size)
-        if body.encoding in DEPTH_ENCODINGS:
-            return TopicImages("labels" if labelled else "depth", body.encoding, size)
-        return TopicImages("other", body.encoding, size)
-    if "depth" not in lowered and not labelled:
-        return TopicImages("color", body.format, (0, 0))
-    image = decode_image(body.data)
-    size = (image.shape[1], image.shape[0]) if image is not None else (0, 0)
-    return TopicImages("labels" if labelled else "depth", body.format, size)
-
-
-def _add_pose(content: LogContent, topic: str, body: Any, log_time: int) -> None:
+def image_size(record: ImageRecord, role: str) -> tuple[int, int]:
+    """Return (width, height) of an image; (0, 0) when it cannot be decoded."""
+    if not record.compressed:
+        return record.width, record.height
     try:
-        matrix = transform_matrix(body.pose.position, body.pose.orientation)
-    except ValueError:
-        content.bad[f"non_rigid_transform {topic}"] += 1
-        return
-    content.poses.setdefault(topic, []).append((_stamp(body, log_time, content), body.frame_id, matrix))
+        if role == "depth":
+            pixels: np.ndarray | bytes = depth_pixels(record)
+        else:
+            pixels = label_pixels(record) if role == "labels" else color_pixels(record)
+    except Unusable:
+        return 0, 0
+    if isinstance(pixels, bytes):
+        return size_in_header(pixels) or (0, 0)
+    return pixels.shape[1], pixels.shape[0]
 
 
-def _add_transform(content: LogContent, topic: str, transform: Any, log_time: int) -> None:
-    try:
-        matrix = transform_matrix(transform.translation, transform.rotation)
-    except ValueError:
-        content.bad[f"non_rigid_transform {topic}"] += 1
-        return
-    parent, child = transform.parent_frame_id, transform.child_frame_id
-    if not child or parent == child:
-        raise BadInput(f"topic {topic}: transform from frame {parent!r} to {child!r} makes no tree")
-    static = topic.endswith("tf_static")
-    content.tree.add(parent, child, _stamp(transform, log_time, content), matrix, static)
+def _numbers(record: CalibrationRecord) -> tuple[object, ...]:
+    return record.width, record.height, record.K, record.D, record.R, record.P
+
+
+def _finish(content: LogContent) -> None:
+    """Sort images by stamp, and note what is odd."""
+    for name, images in content.images.items():
+        topic = content.topics[name]
+        stamps = np.array(topic.stamps, dtype=np.int64)
+        log_times = stamps + np.array(topic.delays, dtype=np.int64)
+        if len(stamps) >= 3 and (stamps == stamps[0]).all() and not (log_times == log_times[0]).all():
+            content.notes.append(f"WARNING: all {len(stamps)} stamps of {name} are the same: its log times are used")
+            stamps = log_times
+        order = np.argsort(stamps, kind="stable")
+        images.stamps = stamps[order]
+        images.locations = [images.locations[i] for i in order]
+        if images.other_frames:
+            content.notes.append(
+                f"{images.other_frames} images of {name} name another frame than {images.frame_id!r}: taken as the same"
+            )
+    for name, topic in content.topics.items():
+        if topic.without_stamp:
+            content.notes.append(f"{topic.without_stamp} messages of {name} have no header stamp: log time used")
+        if topic.role in ("color", "depth", "labels", "pose") and len(topic.stamps) > 1:
+            back = int((np.diff(np.array(topic.stamps, dtype=np.int64)) < 0).sum())
+            if back:
+                content.notes.append(f"stamps of {name} go back {back} times: sorted by stamp")
+    for name, poses in content.poses.items():
+        if poses.other_frames:
+            content.notes.append(
+                f"{poses.other_frames} poses of {name} are not between {poses.frame_id!r} and "
+                f"{poses.child_frame_id!r}: left out"
+            )
+    for frame in content.tree.frames:
+        parents = content.tree.parents(frame)
+        if len(parents) > 1:
+            named = " and ".join(repr(parent) for parent in parents)
+            content.notes.append(f"WARNING: frame {frame!r} has {len(parents)} parents: {named}")
+    for frame in content.tree.changes_though_static():
+        content.notes.append(
+            f"WARNING: the static transform of {frame!r} changes within the log: the first one is used"
+        )
+
+
+def _stream(topic: Topic) -> StreamInfo:
+    role: Role = topic.role
+    if role == "other" and topic.unreadable and not topic.unreadable.endswith(UNUSED):
+        role = "unreadable"
+    detail = topic.described() + (f": {topic.unreadable}" if topic.unreadable else "")
+    delays = np.array(topic.delays, dtype=np.int64)
+    return StreamInfo(
+        name=topic.name,
+        role=role,
+        detail=detail,
+        stamps=np.array(topic.stamps, dtype=np.int64),
+        count=topic.count,
+        log_delay=float(np.median(delays)) * 1e-9 if len(delays) else None,
+    )

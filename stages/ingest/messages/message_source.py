@@ -1,0 +1,184 @@
+"""A log of messages, whatever its container, as frames."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.scene_parts import Camera
+from schemas.sequence import LabelEntry
+from stages.ingest.inertial import measured_up
+from stages.ingest.messages.camera_frames import depth_note, frame_entries
+from stages.ingest.messages.camera_geometry import CameraGeometry, geometry_of
+from stages.ingest.messages.cameras import (
+    CameraTopics,
+    alternatives,
+    calibration_topic,
+    chosen_cameras,
+    find_cameras,
+)
+from stages.ingest.messages.container import MessageLog
+from stages.ingest.messages.opening import open_message_log
+from stages.ingest.messages.pose_source import PoseSource, find_poses
+from stages.ingest.messages.survey import LogContent, survey
+from stages.ingest.parameters import IngestParameters
+from stages.ingest.source import Entry, LogSource, SourceCamera
+from stages.kit.formats.frames import LABELS_METADATA, WORLD_METADATA
+
+REFUSE_HINT = "leave out --damage refuse to use what is whole"
+
+
+def open_messages(path: Path, parameters: IngestParameters, rule: str) -> LogSource:
+    """Survey a log of messages and list its frames.
+
+    Raises BadInput when it cannot be read, holds images but no calibration, or does not hold what the options ask for;
+    with `damage="refuse"` also when anything of it is damaged.
+    """
+    log = open_message_log(path, salvage=parameters.damage == "salvage")
+    try:
+        content = survey(log)
+        damage = (*log.damage, *content.damage())
+        if damage and parameters.damage == "refuse":
+            raise BadInput(f"{path}: {damage[0]}", hint=REFUSE_HINT)
+        return _source(log, content, damage, parameters, rule)
+    except BaseException:
+        log.close()
+        raise
+
+
+def _source(
+    log: MessageLog, content: LogContent, damage: tuple[str, ...], parameters: IngestParameters, rule: str
+) -> LogSource:
+    where = str(log.path)
+    cameras = find_cameras(content)
+    if not cameras:
+        return _without_frames(log, content, damage, rule)
+    chosen, others = chosen_cameras(cameras, content, parameters, where)
+    built = [_Built(log, content, topics, parameters, where) for topics in chosen]
+    main = built[0]
+    stated = log.metadata.get(WORLD_METADATA, {})
+    world = None if main.poses is None else main.poses.world
+    up, up_note = _up(content, main.poses)
+    worlds = {one.poses.world for one in built if one.poses is not None}
+    if len(worlds) > 1:
+        raise BadInput(
+            f"{where}: the cameras have poses in different worlds, {' and '.join(sorted(worlds))}",
+            hint="give --world-frame, or choose one with --camera",
+        )
+    entries = [entry for one in built for entry in one.entries]
+    entries.sort(key=lambda entry: entry.time)
+    notes = [note for one in built for note in one.notes(len(built) > 1)] + content.notes + up_note + log.notes
+    return LogSource(
+        format=log.format,
+        rule="; ".join([rule, *(one.rule(len(built) > 1) for one in built)]),
+        cameras=tuple(one.camera(stated.get("registered") != "no") for one in built),
+        entries=tuple(entries),
+        notes=tuple(dict.fromkeys(notes)),
+        world_up="z" if stated.get("world_up") == "z" and stated.get("world_frame") == world else "unknown",
+        world_up_detail=f"metadata record {WORLD_METADATA!r} of the log says that z of frame {world!r} is up",
+        up_in_log=up,
+        label_table=_label_table(log.metadata.get(LABELS_METADATA, {}), where),
+        has_labels=any(one.topics.labels is not None for one in built),
+        damage=damage,
+        streams=content.streams(),
+        other_cameras=tuple(camera.name for camera in others),
+        close=log.close,
+    )
+
+
+class _Built:
+    """One camera with its frames."""
+
+    def __init__(
+        self, log: MessageLog, content: LogContent, topics: CameraTopics, parameters: IngestParameters, where: str
+    ) -> None:
+        self.topics = topics
+        self._content = content
+        self._geometry: CameraGeometry = geometry_of(topics, content, parameters, where)
+        self.poses, pose_notes = find_poses(content, self._geometry.frame, parameters, where)
+        self.entries: list[Entry]
+        self.entries, frame_notes = frame_entries(log, content, topics, self._geometry, self.poses, parameters)
+        depth_notes = [] if topics.depth is None else [depth_note(log, topics.depth, content, parameters)]
+        unused = alternatives(topics, content)
+        if unused:
+            frame_notes.append(f"not used: {', '.join(unused)} (--color-topic, --depth-topic)")
+        self._notes = [*self._geometry.notes, *pose_notes, *depth_notes, *frame_notes]
+
+    def camera(self, registered: bool) -> SourceCamera:
+        """Return the camera; `registered` is what the log says itself."""
+        geometry = self._geometry
+        return SourceCamera(self.topics.name, geometry.camera, geometry.baseline, geometry.registered and registered)
+
+    def notes(self, named: bool) -> list[str]:
+        """Return what was assumed, with the camera's name in front when there are several."""
+        return [f"{self.topics.name}: {note}" for note in self._notes] if named else self._notes
+
+    def rule(self, named: bool) -> str:
+        """Return in words which topics were used."""
+        geometry, topics = self._geometry, self.topics
+        parts = []
+        if geometry.color is not None:
+            parts.append(f"{'left' if geometry.right is not None else 'colour'} from {topics.color}")
+        if geometry.right is not None:
+            parts.append(f"right from {topics.right}")
+        if geometry.depth is not None and topics.depth is not None:
+            parts.append(f"depth from {topics.depth} ({self._content.images[topics.depth].encoding})")
+        if topics.labels is not None:
+            parts.append(f"labels from {topics.labels}")
+        calibration = calibration_topic(topics.main, self._content)
+        if calibration is not None:
+            parts.append(f"calibration from {calibration}")
+        parts.append("no poses" if self.poses is None else self.poses.rule)
+        return (f"{topics.name}: " if named else "") + ", ".join(parts)
+
+
+def _without_frames(log: MessageLog, content: LogContent, damage: tuple[str, ...], rule: str) -> LogSource:
+    """A log without any image is empty; one with images of which none can be used is bad input."""
+    if content.images:
+        reasons = [f"{name}: {content.topics[name].unreadable}" for name in sorted(content.images)]
+        raise BadInput(f"{log.path}: no images that can be used ({'; '.join(reasons)[:400]})", hint="docs/LOGS.md")
+    videos = [f"{name}: {topic.unreadable}" for name, topic in sorted(content.topics.items()) if topic.unreadable]
+    notes = [
+        f"the log holds no image messages; topics: {content.described_topics()}",
+        *content.notes,
+        *videos[:5],
+        *log.notes,
+    ]
+    camera = Camera(width=0, height=0, fx=1, fy=1, cx=0, cy=0)
+    return LogSource(
+        log.format,
+        rule,
+        (SourceCamera("camera", camera),),
+        (),
+        tuple(notes),
+        damage=damage,
+        streams=content.streams(),
+        close=log.close,
+    )
+
+
+def _up(content: LogContent, poses: PoseSource | None) -> tuple[np.ndarray | None, list[str]]:
+    """Return up in the world of the poses by the first IMU whose frame they reach, and what was found."""
+    notes: list[str] = []
+    for _, inertial in sorted(content.inertial.items()):
+        if poses is None:
+            return None, ["IMU not used for up: there are no poses"]
+        try:
+            up, note = measured_up(inertial.samples, partial(poses.at, inertial.frame_id))
+        except BadInput as problem:
+            notes.append(f"IMU not used for up: {problem.message}")
+            continue
+        notes.append(f"{note} ({inertial.topic})")
+        if up is not None:
+            return up, notes
+    return None, notes
+
+
+def _label_table(table: dict[str, str], where: str) -> tuple[LabelEntry, ...]:
+    try:
+        return tuple(LabelEntry(instance=int(key), class_name=table[key]) for key in sorted(table, key=int))
+    except ValueError:
+        raise BadInput(f"{where}: metadata record {LABELS_METADATA!r} has a key that is no number") from None
