@@ -70,9 +70,9 @@ def test_torn_file_says_what_was_found(tmp_path: Path, whole: bytes) -> None:
     chunks = [record for record in _records(whole) if record[0] == Opcode.CHUNK]
     cut = chunks[-1][1] + 100
     (tmp_path / "torn.mcap").write_bytes(whole[:cut])
-    expected = rf"byte {chunks[-1][1]} of {cut}: {len(chunks) - 1} whole chunks with \d+ indexed messages"
+    expected = rf"byte {chunks[-1][1]}, of {cut} bytes: {len(chunks) - 1} whole chunks with \d+ indexed messages"
     with pytest.raises(BadInput, match=expected) as caught:
-        ingest(tmp_path / "torn.mcap", tmp_path / "out")
+        _read_everything(tmp_path / "torn.mcap")
     assert "--damage salvage" in str(caught.value)
 
 

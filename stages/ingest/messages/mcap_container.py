@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Hashable, Iterator
 from pathlib import Path
 
@@ -25,6 +26,7 @@ class McapMessages:
             self.metadata.setdefault(name, table)
         self._channels = {number: self._channel(number) for number in sorted(self._log.channels)}
         self.channels = tuple(self._channels.values())
+        self._left_out: Counter[str] = Counter()
 
     def _channel(self, number: int) -> Channel:
         channel = self._log.channels[number]
@@ -41,14 +43,20 @@ class McapMessages:
         )
 
     def _stored(self, message: LogMessage) -> StoredMessage:
-        number = message.channel.id
-        if number not in self._channels:  # defined late, in a chunk that a wrong summary leaves out
-            self._channels[number] = self._channel(number)
-        return StoredMessage(self._channels[number], message.log_time, message.data, message.location)
+        return StoredMessage(self._channels[message.channel.id], message.log_time, message.data, message.location)
 
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
         """Yield messages of the channels (None: all) in file order."""
-        return map(self._stored, self._log.messages(channel_ids))
+        left_out: Counter[str] = Counter()
+        for message in self._log.messages(channel_ids):
+            if message.channel.id in self._channels:
+                yield self._stored(message)
+            else:  # defined in a chunk, and left out of a summary that has others
+                left_out[message.channel.topic] += 1
+        if channel_ids is None and not self._left_out:
+            self._left_out = left_out
+            for topic, number in sorted(left_out.items()):
+                self._log.damage.found(f"a message belongs to {topic!r}, which the summary leaves out", number)
 
     def fetch(self, location: Hashable) -> StoredMessage:
         """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""

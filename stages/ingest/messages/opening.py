@@ -41,6 +41,8 @@ def open_message_log(path: Path, *, salvage: bool) -> MessageLog:
 
 
 def _file_container(path: Path) -> str | None:
+    if not path.is_file():
+        return None
     with path.open("rb") as file:
         head = file.read(len(SQLITE_MAGIC))
     if head.startswith(MCAP_MAGIC):
@@ -60,5 +62,5 @@ def _folder_container(path: Path) -> str | None:
                 return "rosbag2"
     if any(entry.is_dir() for entry in path.iterdir()):
         return None
-    kinds = {_file_container(part) for part in listed_parts(path) if part.is_file()}
+    kinds = {_file_container(part) for part in listed_parts(path)}
     return "rosbag2" if kinds & {"mcap", "rosbag2"} else None

@@ -10,7 +10,7 @@ from array import array
 from collections import Counter
 from collections.abc import Collection, Hashable, Iterator
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import NamedTuple
 
 from schemas.errors import BadInput
 from stages.ingest.messages.container import Channel, StoredMessage
@@ -18,11 +18,11 @@ from stages.ingest.messages.rosbag1_records import (
     BAG_HEADER,
     CHUNK,
     CHUNK_INFO,
+    COMPRESSIONS,
     CONNECTION,
     INDEX,
     MAGIC,
     MESSAGE,
-    Damaged,
     Record,
     find_chunk,
     read_fields,
@@ -32,6 +32,7 @@ from stages.ingest.messages.rosbag1_records import (
 from stages.kit.formats.bounded_unpacking import unpacked
 from stages.kit.formats.chunk_cache import ChunkCache
 from stages.kit.formats.damage_lines import HINT, DamageLines
+from stages.kit.formats.log_file import Damaged, LogFile
 
 LARGEST_CHUNK = 1 << 30
 """Unpacked bytes of one chunk that are accepted; what claims more is taken for a bomb."""
@@ -66,16 +67,20 @@ class Rosbag1Messages:
         self._stated: Counter[int] = Counter()
         """Connection -> messages, as the index at the end of the bag says."""
         self._stated_chunks: list[int] = []
+        self._indexed_chunk = -1
+        """Chunk that index records belong to at this place of the walk; -1 after a damaged one."""
+        self._orphans = 0
+        """Messages that indexes of damaged chunks name."""
         self._plain_chunks = 0
         self._examined: set[int] = set()
         self._cache = ChunkCache()
+        self._file = LogFile(path, "a ROS 1 bag")
+        self._size = self._file.size
         try:
-            self._file: BinaryIO = path.open("rb")
-        except OSError as error:
-            raise BadInput(f"{path}: cannot be opened: {error.strerror}") from None
-        try:
-            self._size = path.stat().st_size
             self._open()
+        except Damaged as fault:
+            self._file.close()
+            raise self._bad(str(fault)) from None
         except BaseException:
             self._file.close()
             raise
@@ -108,7 +113,7 @@ class Rosbag1Messages:
     # --- structure -------------------------------------------------------------------------------------------
 
     def _open(self) -> None:
-        magic = self._file.read(len(MAGIC))
+        magic = self._file.read(0, len(MAGIC))
         if magic != MAGIC:
             if magic.startswith(b"#ROSBAG V") and len(magic) == len(MAGIC):
                 version = magic[9:].split(b"\n")[0].decode("ascii", "replace")
@@ -135,15 +140,13 @@ class Rosbag1Messages:
         torn = False
         while offset < self._size:
             try:
-                record = read_record(self._file, offset, self._size)
+                record = read_record(self._file, offset)
                 if offset == len(MAGIC):
                     header = self._bag_header(record)
                 elif record.op == CHUNK:
                     self._chunk(record, offset)
                 elif record.op == INDEX:
-                    if self._chunks:
-                        counts = self._indexed.setdefault(len(self._chunks) - 1, Counter())
-                        counts[record.number(b"conn")] += record.number(b"count")
+                    self._index(record)
                 elif record.op == CONNECTION:
                     indexed_connections += 1
                     self._define(record, self._data(record))
@@ -160,6 +163,8 @@ class Rosbag1Messages:
                 continue
             scan_from = record.end if record.op == CHUNK else offset + 1
             offset = record.end
+        if self._orphans:
+            self._lines.found(f"indexes of lost chunks name {self._orphans} messages")
         if header is None or torn:
             return False
         if header.number(b"index_pos", 8) == 0:
@@ -193,7 +198,15 @@ class Rosbag1Messages:
             raise Damaged(f"is a chunk that claims {size} bytes and holds {record.length}")
         if size:
             self._chunks.append(offset)
+            self._indexed_chunk = len(self._chunks) - 1
             self._plain_chunks += compression == b"none"
+
+    def _index(self, record: Record) -> None:
+        connection, count = record.number(b"conn"), record.number(b"count")
+        if self._indexed_chunk < 0:
+            self._orphans += count
+        else:
+            self._indexed.setdefault(self._indexed_chunk, Counter())[connection] += count
 
     def _chunk_info(self, record: Record) -> None:
         self._stated_chunks.append(record.number(b"chunk_pos", 8))
@@ -206,9 +219,10 @@ class Rosbag1Messages:
 
     def _skip(self, offset: int, scan_from: int, fault: Damaged) -> int | None:
         """Return where reading goes on after a damaged record, and note what is lost; None: nothing follows."""
+        self._indexed_chunk = -1
         following = self._own_end(offset)
         if following is None:
-            following = find_chunk(self._file, scan_from, self._size)
+            following = find_chunk(self._file, scan_from)
         lost = (self._size if following is None else following) - offset
         what = f"record at byte {offset} of {self._size} {fault}"
         if str(fault) == "ends within it":
@@ -222,9 +236,9 @@ class Rosbag1Messages:
     def _own_end(self, offset: int) -> int | None:
         """Return the end that a damaged record claims when another record begins there, or the file ends."""
         try:
-            end = read_record(self._file, offset, self._size).end
+            end = read_record(self._file, offset).end
             if end < self._size:
-                read_record(self._file, end, self._size)
+                read_record(self._file, end)
         except Damaged:
             return None
         return end
@@ -236,7 +250,7 @@ class Rosbag1Messages:
             if offset in met:
                 continue
             try:
-                record = read_record(self._file, offset, self._size)
+                record = read_record(self._file, offset)
                 if record.op != CHUNK:
                     raise Damaged("is no chunk")
                 self._chunk(record, offset)
@@ -249,6 +263,7 @@ class Rosbag1Messages:
         """Collect the connections from the chunks of a bag without a whole index."""
         self._stated = Counter()
         for index in range(len(self._chunks)):
+            found: Counter[int] = Counter()
             try:
                 data, offset = self._unpack(index), 0
                 while offset < len(data):
@@ -256,10 +271,11 @@ class Rosbag1Messages:
                     if record.op == CONNECTION:
                         self._define(record, data[record.start : record.end])
                     elif record.op == MESSAGE:
-                        self._stated[record.number(b"conn")] += 1
+                        found[record.number(b"conn")] += 1
                     offset = record.end
             except Damaged as fault:
-                self._chunk_damage(index, fault, Counter())
+                self._chunk_damage(index, fault, found)
+            self._stated.update(found)
 
     def _define(self, record: Record, data: bytes) -> None:
         """Take in a connection; one that contradicts an earlier one is damage, and the earlier one stays."""
@@ -273,7 +289,7 @@ class Rosbag1Messages:
             raise Damaged(f"is one connection more than the {MOST_CONNECTIONS} that are accepted")
         channel = Channel(number, topic, type_name, "ros1", "ros1msg", schema)
         known = self._connections.setdefault(number, channel)
-        if known != channel:
+        if (known.topic, known.type_name, known.schema) != (topic, type_name, schema):
             self._lines.found(
                 f"connection {number} is defined twice, as {known.topic!r} and as {topic!r}: the first is used"
             )
@@ -301,6 +317,8 @@ class Rosbag1Messages:
                     if channel is not None and (wanted is None or number in wanted):
                         place = Place(index, offset)
                         yield StoredMessage(channel, time, data[record.start : record.end], place)
+                elif record.op == CONNECTION:
+                    self._define(record, data[record.start : record.end])
                 offset = record.end
         except Damaged as fault:
             self._chunk_damage(index, fault, found)
@@ -323,30 +341,22 @@ class Rosbag1Messages:
         self._lines.found(f"chunk at byte {self._chunks[index]} ({count}) {fault}: {rest}")
 
     def _unpack(self, index: int) -> bytes:
-        record = read_record(self._file, self._chunks[index], self._size)
+        record = read_record(self._file, self._chunks[index])
         size = record.number(b"size")
         if max(size, record.length) > LARGEST_CHUNK:
             raise Damaged(f"claims {max(size, record.length)} bytes, more than {LARGEST_CHUNK}")
         compression = record.fields.get(b"compression", b"").decode("ascii", "replace")
         try:
-            return unpacked(self._read(record), compression if compression != "zstd" else "zstd in a bag", size)
+            if record.fields.get(b"compression") not in COMPRESSIONS:
+                raise ValueError(f"uses unknown compression {compression!r:.40}")
+            return unpacked(self._file.exactly(record.start, record.length), compression, size)
         except ValueError as error:
             raise Damaged(str(error)) from None
 
     def _data(self, record: Record) -> bytes:
         if record.length > LARGEST_CONNECTION:
             raise Damaged(f"has {record.length} bytes, more than the {LARGEST_CONNECTION} that are accepted")
-        return self._read(record)
-
-    def _read(self, record: Record) -> bytes:
-        try:
-            self._file.seek(record.start)
-            data = self._file.read(record.length)
-        except OSError as error:
-            raise Damaged(f"cannot be read from the disk ({error.strerror})") from None
-        if len(data) != record.length:
-            raise Damaged("ends early")
-        return data
+        return self._file.exactly(record.start, record.length)
 
     def _bad(self, what: str) -> BadInput:
         return BadInput(f"{self.path}: {what}", hint=HINT)

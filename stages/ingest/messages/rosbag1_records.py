@@ -6,23 +6,22 @@ of the layout: https://wiki.ros.org/Bags/Format/2.0
 
 from __future__ import annotations
 
+import re
 import struct
 from dataclasses import dataclass
-from typing import BinaryIO
+
+from stages.kit.formats.log_file import Damaged, LogFile
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07
 COMPRESSIONS = (b"none", b"bz2", b"lz4")
 LARGEST_HEADER = 1 << 20
 """Bytes of a record's header that are accepted."""
-LONGEST_CHUNK_HEADER = 128
+_USUAL_HEADER = 256
 _LENGTH = struct.Struct("<I")
 _WINDOW = 4 << 20
-_MARK = b"op=" + bytes([CHUNK])
-
-
-class Damaged(Exception):
-    """A record that is not what it says. The text follows the words "the record"."""
+_CHUNK_START = re.compile(rb"[\x10-\x80]\0{3}[\x04-\x40]\0{3}(?:op=\x05|size=|compression=)", re.DOTALL)
+_LONGEST_START = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,23 +70,20 @@ def read_fields(header: bytes) -> dict[bytes, bytes]:
     return fields
 
 
-def read_record(file: BinaryIO, offset: int, size: int) -> Record:
-    """Return the record at `offset` of a file of `size` bytes. Raises Damaged when it is none, or is cut."""
-    file.seek(offset)
-    head = file.read(4)
-    if len(head) < 4:
-        raise Damaged("ends within it")
-    (length,) = _LENGTH.unpack(head)
-    if offset + 4 + length + 4 > size:
+def read_record(file: LogFile, offset: int) -> Record:
+    """Return the record at `offset` of a file. Raises Damaged when it is none, or is cut."""
+    head = file.read(offset, _USUAL_HEADER)
+    length = _LENGTH.unpack_from(head)[0] if len(head) >= 4 else 0
+    start = offset + 4 + length + 4
+    if len(head) < 4 or start > file.size:
         raise Damaged("ends within it")
     if length > LARGEST_HEADER:
         raise Damaged(f"has a header of {length} bytes")
-    header = file.read(length + 4)
-    if len(header) != length + 4:
-        raise Damaged("ends within it")
-    fields = read_fields(header[:length])
-    record = Record(_op(fields), fields, offset + 4 + length + 4, _LENGTH.unpack_from(header, length)[0])
-    if record.end > size:
+    if len(head) < start - offset:
+        head = file.exactly(offset, start - offset)
+    fields = read_fields(head[4 : 4 + length])
+    record = Record(_op(fields), fields, start, _LENGTH.unpack_from(head, 4 + length)[0])
+    if record.end > file.size:
         raise Damaged("ends within it")
     return record
 
@@ -113,26 +109,22 @@ def _op(fields: dict[bytes, bytes]) -> int:
     return value[0]
 
 
-def find_chunk(file: BinaryIO, start: int, size: int) -> int | None:
+def find_chunk(file: LogFile, start: int) -> int | None:
     """Return the offset of the first thing from `start` on that can only be a whole chunk record, or None."""
-    for begin in range(start, size, _WINDOW):
-        file.seek(begin)
-        window = file.read(_WINDOW + len(_MARK) - 1)
-        place = window.find(_MARK)
-        while place >= 0:
-            for offset in range(max(start, begin + place - LONGEST_CHUNK_HEADER), begin + place - 7):
-                if _is_chunk(file, offset, size):
-                    return offset
-            place = window.find(_MARK, place + 1)
+    for begin in range(start, file.size, _WINDOW):
+        try:
+            window = file.read(begin, _WINDOW + _LONGEST_START)
+        except Damaged:  # a part of the disk that cannot be read
+            continue
+        for match in _CHUNK_START.finditer(window):
+            if _is_chunk(file, begin + match.start()):
+                return begin + match.start()
     return None
 
 
-def _is_chunk(file: BinaryIO, offset: int, size: int) -> bool:
-    file.seek(offset)
-    if int.from_bytes(file.read(4), "little") > LONGEST_CHUNK_HEADER:
-        return False
+def _is_chunk(file: LogFile, offset: int) -> bool:
     try:
-        record = read_record(file, offset, size)
+        record = read_record(file, offset)
         record.number(b"size")
     except Damaged:
         return False

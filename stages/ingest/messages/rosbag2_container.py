@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import errno
 import tempfile
+from collections import Counter
 from collections.abc import Collection, Hashable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +16,7 @@ from stages.ingest.messages.sqlite_container import LARGEST_MESSAGE, SqliteMessa
 from stages.ingest.messages.sqlite_container import MAGIC as SQLITE_MAGIC
 from stages.kit.formats.bounded_unpacking import stated_size, unpack_file, unpacked_within
 from stages.kit.formats.damage_lines import HINT, DamageLines
+from stages.kit.formats.log_file import Damaged, LogFile
 from stages.kit.formats.mcap_records import MAGIC as MCAP_MAGIC
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
@@ -62,7 +63,7 @@ class Rosbag2Messages:
 
     def close(self) -> None:
         """Close the files and remove what was unpacked."""
-        for index in list(self._open):
+        for index in {*self._open, *self._unpacked}:
             self._close_part(index)
 
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
@@ -71,21 +72,28 @@ class Rosbag2Messages:
         for index in self._readable:
             inside = {own: number for (part, own), number in self._numbers.items() if part == index}
             chosen = [own for own, number in inside.items() if wanted is None or number in wanted]
-            if not chosen:
+            if wanted is not None and not chosen:
                 continue
             part = self._part(index)
             self._in_use.append(index)
+            faults: Counter[str] = Counter()
             try:
                 for message in part.messages(None if wanted is None else chosen):
                     try:
-                        yield self._stored(index, message)
+                        stored = self._stored(index, message)
                     except ValueError as error:
-                        self._own.found(f"{self._name(index)}: a packed message {error}", 1)
+                        faults[f"a packed message {error}"] += 1
+                        continue
+                    yield stored
+            except BadInput as error:
+                raise self._named(index, error) from None
             finally:
                 self._in_use.remove(index)
-            self._of_parts[index] = list(part.damage)
+            packed = [f"{number} times: {what}" for what, number in sorted(faults.items())]
+            if packed and not self._salvage:
+                raise BadInput(f"{self.path}: {self._name(index)}: {packed[0]}", hint=HINT)
+            self._of_parts[index] = [*part.damage, *packed]
             self._refresh()
-        self._refresh()
 
     def fetch(self, location: Hashable) -> StoredMessage:
         """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
@@ -93,6 +101,8 @@ class Rosbag2Messages:
             raise BadInput(f"{self.path}: {location!r} is no place in the bag")
         try:
             return self._stored(location.part, self._part(location.part).fetch(location.inside))
+        except BadInput as error:
+            raise self._named(location.part, error) from None
         except ValueError as error:
             raise BadInput(f"{self.path}: {self._name(location.part)}: a packed message {error}", hint=HINT) from None
 
@@ -120,16 +130,14 @@ class Rosbag2Messages:
     def _survey(self) -> None:
         """Open every part once, and give the channels of all of them common numbers."""
         self._readable: list[int] = []
-        channels: dict[tuple[str, str, str, str, bytes], list[int | None]] = {}
+        channels: dict[tuple[str, str, str, str, bytes], tuple[int, list[int | None]]] = {}
         reasons = []
         for index, path in enumerate(self._bag.parts):
             try:
-                if not path.exists():
-                    raise BadInput(f"{path}: part is missing")
                 part = self._part(index)
             except BadInput as error:
-                reasons.append(error.message)
-                self._own.found(f"part cannot be read: {error.message}")
+                reasons.append(f"{path.name}: {error.message.removeprefix(f'{path}: ')}")
+                self._own.found(f"part {reasons[-1]}")
                 continue
             self._readable.append(index)
             self._of_parts[index] = list(part.damage)
@@ -141,9 +149,9 @@ class Rosbag2Messages:
                     channel.schema_encoding,
                     channel.schema,
                 )
-                counts = channels.setdefault(key, [])
+                number, counts = channels.setdefault(key, (len(channels), []))
                 counts.append(channel.count)
-                self._numbers[index, channel.id] = list(channels).index(key)
+                self._numbers[index, channel.id] = number
             for note in part.notes:
                 if note not in self.notes:
                     self.notes.append(note)
@@ -152,7 +160,7 @@ class Rosbag2Messages:
             raise BadInput(f"{self.path}: no part of the bag can be read: {reason}", hint=HINT)
         self.channels = tuple(
             Channel(number, *key, None if None in counts else sum(count or 0 for count in counts))
-            for number, (key, counts) in enumerate(channels.items())
+            for key, (number, counts) in channels.items()
         )
         self._compare_counts()
         self._refresh()
@@ -188,26 +196,39 @@ class Rosbag2Messages:
         return part
 
     def _close_part(self, index: int) -> None:
-        self._open.pop(index).close()
+        if index in self._open:
+            self._open.pop(index).close()
         if index in self._unpacked:
             self._unpacked.pop(index).cleanup()
 
     def _opened(self, index: int) -> Part:
+        """Open a part; one that is packed as a whole is unpacked into a temporary folder first."""
         path = self._bag.parts[index]
+        opened = path
         try:
-            with path.open("rb") as file:
-                packed = file.read(len(ZSTD_MAGIC)) == ZSTD_MAGIC
-        except OSError as error:
-            raise BadInput(f"{path}: cannot be opened: {error.strerror}") from None
-        if packed:
-            path = self._unpack(index, path)
-        with path.open("rb") as file:
-            head = file.read(max(len(MCAP_MAGIC), len(SQLITE_MAGIC)))
-        if head.startswith(MCAP_MAGIC):
-            return McapMessages(path, salvage=self._salvage)
-        if head.startswith(SQLITE_MAGIC):
-            return SqliteMessages(path, salvage=self._salvage)
-        raise BadInput(f"{path}: is empty" if not head else f"{path}: is neither MCAP nor SQLite (wrong first bytes)")
+            if _head(path).startswith(ZSTD_MAGIC):
+                opened = self._unpack(index, path)
+            head = _head(opened)
+            if head.startswith(MCAP_MAGIC):
+                return McapMessages(opened, salvage=self._salvage)
+            if head.startswith(SQLITE_MAGIC):
+                return SqliteMessages(opened, salvage=self._salvage)
+            what = "is neither MCAP nor SQLite (wrong first bytes)" if head else "is empty"
+            raise BadInput(f"{path}: {what}", hint=HINT)
+        except BadInput as error:
+            error = self._named(index, error)
+            self._close_part(index)
+            raise error from None
+        except BaseException:
+            self._close_part(index)
+            raise
+
+    def _named(self, index: int, error: BadInput) -> BadInput:
+        """Return an error with the name of the part, where it has that of the unpacked file."""
+        if index not in self._unpacked:
+            return error
+        path = self._bag.parts[index]
+        return BadInput(error.message.replace(f"{self._unpacked[index].name}/{path.stem}", str(path)), hint=error.hint)
 
     def _unpack(self, index: int, path: Path) -> Path:
         """Unpack a part into a temporary file, within a bound that follows from its size."""
@@ -216,18 +237,29 @@ class Rosbag2Messages:
         target = Path(folder.name) / path.stem
         try:
             with path.open("rb") as packed, target.open("wb") as file:
-                size = path.stat().st_size
                 stated = stated_size(packed.read(64))
                 packed.seek(0)
-                limit = max(ALWAYS_ACCEPTED, (GREATEST_STATED_RATIO if stated else GREATEST_RATIO) * size)
-                unpack_file(packed, file, min(limit, stated) if stated else limit)
+                ratio = GREATEST_RATIO if stated is None else GREATEST_STATED_RATIO
+                limit = max(ALWAYS_ACCEPTED, ratio * path.stat().st_size)
+                unpack_file(packed, file, limit if stated is None else min(limit, stated))
         except ValueError as error:
-            self._own.found(f"{path.name}: {error}")
+            self._own.found(f"part {path.name} {error}")
         except OSError as error:
-            if error.errno == errno.ENOSPC:
-                raise MachineFailure(f"{folder.name}: no room to unpack {path}", hint="set TMPDIR") from None
-            raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
+            raise MachineFailure(
+                f"{path}: cannot be unpacked into {folder.name}: {error.strerror}", hint="free space, or set TMPDIR"
+            ) from None
         return target
+
+
+def _head(path: Path) -> bytes:
+    """Return the first bytes of a part. Raises BadInput when it is missing or no file."""
+    file = LogFile(path, "a part of a bag")
+    try:
+        return file.read(0, max(len(MCAP_MAGIC), len(SQLITE_MAGIC)))
+    except Damaged as fault:
+        raise BadInput(f"{path}: {fault}") from None
+    finally:
+        file.close()
 
 
 def open_rosbag2(path: Path, *, salvage: bool) -> Rosbag2Messages:

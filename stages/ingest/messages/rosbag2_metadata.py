@@ -14,7 +14,7 @@ from schemas.errors import BadInput
 
 NAME = "metadata.yaml"
 KEY = "rosbag2_bagfile_information"
-LARGEST = 4 << 20
+LARGEST = 2 << 20
 """Bytes of a metadata.yaml that are accepted; a bag of 1,000 parts has about a tenth of it."""
 PART_SUFFIXES = (".db3", ".mcap")
 PACKED_SUFFIXES = (".zstd", ".zst")
@@ -38,9 +38,10 @@ def read_bag_metadata(folder: Path) -> BagMetadata:
         size = path.stat().st_size
         if size > LARGEST:
             raise BadInput(f"{path}: has {size} bytes, more than the {LARGEST} that are accepted")
-        loaded = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
-        information = loaded[KEY]
-        return _described(folder, information)
+        text = path.read_text(encoding="utf-8")
+        if "<<" in text:  # merged keys multiply; no recorder writes them
+            raise ValueError("merges keys (<<)")
+        return _described(folder, YAML(typ="safe", pure=True).load(text)[KEY])
     except (OSError, UnicodeDecodeError, YAMLError, ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise BadInput(f"{path}: cannot be read: {reason:.200}", hint="`ros2 bag reindex` writes it anew") from None

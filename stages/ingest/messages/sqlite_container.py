@@ -18,11 +18,13 @@ from urllib.parse import quote
 from schemas.errors import BadInput, MachineFailure
 from stages.ingest.messages.container import Channel, StoredMessage
 from stages.kit.formats.damage_lines import HINT, DamageLines
+from stages.kit.formats.log_file import Damaged, LogFile
 
 MAGIC = b"SQLite format 3\x00"
 LARGEST_MESSAGE = 512 << 20
 """Bytes of one message that are accepted."""
-_COMPANIONS = ("-wal", "-journal")
+_JOURNAL_MAGIC = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
+_WAL_MAGICS = (b"\x37\x7f\x06\x82", b"\x37\x7f\x06\x83")
 _ROWS = "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ?"
 
 
@@ -38,26 +40,28 @@ class SqliteMessages:
         self._lines = DamageLines(path, salvage=salvage)
         self.damage: list[str] = self._lines
         self._counted = False
+        self._topics: dict[Any, Channel] = {}
         self._copy: tempfile.TemporaryDirectory[str] | None = None
         self._check_magic()
+        self._database = sqlite3.connect(":memory:")
         try:
-            self._database = self._connect()
-            try:
-                self._open()
-            except BaseException:
-                self._database.close()
-                raise
+            self._database = self._connect(path.resolve(), "mode=ro&immutable=1")
+            journals = self._journals()
+            if journals:
+                self._take_in(journals)
+            self._open()
         except sqlite3.Error as error:
-            self._remove_copy()
+            self.close()
             raise BadInput(f"{path}: cannot be read as a bag: {error}", hint=HINT) from None
         except BaseException:
-            self._remove_copy()
+            self.close()
             raise
 
     def close(self) -> None:
         """Close the file."""
         self._database.close()
-        self._remove_copy()
+        if self._copy is not None:
+            self._copy.cleanup()
 
     def messages(self, channel_ids: Collection[int] | None = None) -> Iterator[StoredMessage]:
         """Yield messages of the channels (None: all) in the order in which they were stored."""
@@ -65,7 +69,7 @@ class SqliteMessages:
         for number, topic, time, data in self._rows(channel_ids):
             if topic not in self._topics:
                 faults[f"a message belongs to topic {topic!r:.40}, which the bag does not define"] += 1
-            elif not isinstance(time, int) or not isinstance(data, bytes):
+            elif not _is_message(time, data):
                 faults["a message holds no bytes or no time"] += 1
             else:
                 yield StoredMessage(self._topics[topic], time, data, number)
@@ -80,7 +84,7 @@ class SqliteMessages:
             rows = self._database.execute(_ROWS + " AND id = ?", (-1, location)).fetchall()
         except (sqlite3.Error, OverflowError) as error:
             raise BadInput(f"{self.path}: message {location!r} cannot be read: {error}", hint=HINT) from None
-        if not rows or rows[0][1] not in self._topics:
+        if not rows or rows[0][1] not in self._topics or not _is_message(*rows[0][2:]):
             raise BadInput(f"{self.path}: {location!r} is no place in the bag")
         _, topic, time, data = rows[0]
         return StoredMessage(self._topics[topic], time, data, location)
@@ -88,36 +92,60 @@ class SqliteMessages:
     # --- structure -------------------------------------------------------------------------------------------
 
     def _check_magic(self) -> None:
+        file = LogFile(self.path, "a .db3 file")
         try:
-            with self.path.open("rb") as file:
-                head = file.read(len(MAGIC))
-        except OSError as error:
-            raise BadInput(f"{self.path}: cannot be opened: {error.strerror}") from None
+            head = file.read(0, len(MAGIC))
+        except Damaged as fault:
+            raise BadInput(f"{self.path}: {fault}") from None
+        finally:
+            file.close()
         if head != MAGIC:
             raise BadInput(f"{self.path}: is empty" if not head else f"{self.path}: is no SQLite file", hint=HINT)
 
-    def _connect(self) -> sqlite3.Connection:
-        """Open without ever writing beside the file; what a crash left in its journal is taken in from a copy."""
-        path, mode = self.path.resolve(), "mode=ro&immutable=1"
-        companions = [path.with_name(path.name + suffix) for suffix in _COMPANIONS]
-        companions = [file for file in companions if file.is_file() and file.stat().st_size > 0]
-        if companions:
-            try:
-                self._copy = tempfile.TemporaryDirectory(prefix="scenewright-")
-                for file in (path, *companions):
-                    shutil.copyfile(file, Path(self._copy.name) / file.name)
-            except OSError as error:
-                raise MachineFailure(
-                    f"{self.path}: has a journal, and the copy to take it in cannot be made: {error}"
-                ) from None
-            path, mode = Path(self._copy.name) / path.name, "mode=rw"
-            self.notes.append("the recording ended without closing the bag; its journal was taken in")
+    @staticmethod
+    def _connect(path: Path, mode: str) -> sqlite3.Connection:
         connection = sqlite3.connect(f"file:{quote(str(path))}?{mode}", uri=True, check_same_thread=False)
         connection.text_factory = lambda text: text.decode("utf-8", "replace")
         connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_MESSAGE)
         connection.execute("PRAGMA trusted_schema=OFF")
         connection.execute("PRAGMA cell_size_check=ON")
         return connection
+
+    def _journals(self) -> list[Path]:
+        """Return the journals beside the file that hold what a recorder, cut short, had not moved into it."""
+        found = []
+        path = self.path.resolve()
+        for suffix, magics in (("-wal", _WAL_MAGICS), ("-journal", (_JOURNAL_MAGIC,))):
+            journal = path.with_name(path.name + suffix)
+            try:
+                with journal.open("rb") as file:
+                    if file.read(len(_JOURNAL_MAGIC)).startswith(magics):
+                        found.append(journal)
+            except OSError:
+                continue
+        return found
+
+    def _take_in(self, journals: list[Path]) -> None:
+        """Open a copy, into which SQLite takes the journals in; the file itself is never written."""
+        path = self.path.resolve()
+        try:
+            self._copy = tempfile.TemporaryDirectory(prefix="scenewright-")
+            for file in (path, *journals):
+                shutil.copyfile(file, Path(self._copy.name) / file.name)
+        except OSError as error:
+            raise MachineFailure(
+                f"{self.path}: its journal can only be taken in from a copy, which cannot be made: {error.strerror}",
+                hint="free space, or set TMPDIR",
+            ) from None
+        try:
+            taken_in = self._connect(Path(self._copy.name) / path.name, "mode=rw")
+            taken_in.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()
+        except sqlite3.Error as error:
+            self._lines.found(f"journal beside it cannot be taken in: {error}")
+            return
+        self._database.close()
+        self._database = taken_in
+        self.notes.append("the recording ended without closing the bag; its journal was taken in")
 
     def _open(self) -> None:
         tables = self._tables()
@@ -132,7 +160,6 @@ class SqliteMessages:
                 self._lines.found(f"structure is damaged: {' '.join(line.split()):.200}")
         definitions = self._definitions() if "message_definitions" in tables else {}
         counts = self._counts()
-        self._topics: dict[Any, Channel] = {}
         try:
             rows = self._database.execute("SELECT id, name, type, serialization_format FROM topics ORDER BY id")
             for number, name, kind, encoding in rows:
@@ -171,10 +198,6 @@ class SqliteMessages:
             return dict(self._database.execute("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id"))
         except sqlite3.Error:
             return None
-
-    def _remove_copy(self) -> None:
-        if self._copy is not None:
-            self._copy.cleanup()
 
     # --- reading ---------------------------------------------------------------------------------------------
 
@@ -221,3 +244,7 @@ class SqliteMessages:
         except sqlite3.Error:
             return False
         return True
+
+
+def _is_message(time: Any, data: Any) -> bool:
+    return isinstance(time, int) and isinstance(data, bytes)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
-from typing import BinaryIO
 
 import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Footer, Schema
+
+from stages.kit.formats.log_file import Damaged, LogFile
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")
@@ -23,11 +24,8 @@ FOOTER_SIZE = 20
 DATA_END_SIZE = 4
 COMPRESSIONS = ("", "lz4", "zstd")
 _CHUNK = struct.Struct("<QQQI")
+_LONGEST_CHUNK_HEAD = _CHUNK.size + 4 + 64 + 8
 _WINDOW = 4 << 20
-
-
-class Damaged(Exception):
-    """A record that is not what it says. The text follows the words "the record"."""
 
 
 class _Fields:
@@ -127,12 +125,11 @@ class ChunkHead:
     compression: str
 
 
-def read_chunk_head(file: BinaryIO, offset: int, length: int) -> ChunkHead:
+def read_chunk_head(file: LogFile, offset: int, length: int) -> ChunkHead:
     """Return the head of the Chunk record at `offset` whose body has `length` bytes. Raises Damaged."""
-    file.seek(offset + HEAD.size)
-    fields = _Fields(file.read(min(length, _CHUNK.size + 4 + 64 + 8)))
+    fields = _Fields(file.exactly(offset + HEAD.size, min(length, _LONGEST_CHUNK_HEAD)))
     _, _, size, checksum = _CHUNK.unpack(fields.take(_CHUNK.size))
-    name = fields.take(fields.number(4)) if length > _CHUNK.size + 4 else b""
+    name = fields.take(fields.number(4))
     packed_size = fields.number(8)
     head = _CHUNK.size + 4 + len(name) + 8
     if head + packed_size != length:
@@ -140,24 +137,26 @@ def read_chunk_head(file: BinaryIO, offset: int, length: int) -> ChunkHead:
     return ChunkHead(offset + HEAD.size + head, packed_size, size, checksum, name.decode("ascii", "replace"))
 
 
-def find_chunk(file: BinaryIO, start: int, stop: int) -> int | None:
-    """Return the offset of the first thing in [start, stop) that can only be a whole Chunk record, or None.
+def find_chunk(file: LogFile, start: int) -> int | None:
+    """Return the offset of the first thing from `start` on that can only be a whole Chunk record, or None.
 
     A chunk states its length three times (record, packed bytes, name of the compression), which no other bytes do by
     chance.
     """
     head = HEAD.size + _CHUNK.size
     overlap = head + 4 + 4 + 8
-    for begin in range(start, stop, _WINDOW):
-        file.seek(begin)
-        window = np.frombuffer(file.read(min(_WINDOW + overlap, stop - begin)), np.uint8)
+    for begin in range(start, file.size, _WINDOW):
+        try:
+            window = np.frombuffer(file.read(begin, _WINDOW + overlap), np.uint8)
+        except Damaged:  # a part of the disk that cannot be read
+            continue
         last = len(window) - head - 4
         if last <= 0:
             return None
         places = np.flatnonzero(window[:last] == Opcode.CHUNK)
         plausible = (window[places + head] <= 4) & (window[places + head + 1] == 0) & (window[places + 8] == 0)
         for place in places[plausible]:
-            if place < _WINDOW and _is_chunk(window[place : place + overlap].tobytes(), begin + int(place), stop):
+            if place < _WINDOW and _is_chunk(window[place : place + overlap].tobytes(), begin + int(place), file.size):
                 return begin + int(place)
     return None
 
@@ -174,19 +173,16 @@ def _is_chunk(head: bytes, offset: int, stop: int) -> bool:
     return name in COMPRESSIONS and length == described and offset + HEAD.size + length <= stop
 
 
-def find_data_end(file: BinaryIO, size: int) -> int | None:
-    """Return the offset of the DataEnd record, found from the end of a file of `size` bytes; None where that is cut."""
-    footer = size - len(MAGIC) - FOOTER_SIZE - HEAD.size
+def find_data_end(file: LogFile) -> int | None:
+    """Return the offset of the DataEnd record, found from the end of the file; None where that is cut."""
+    footer = file.size - len(MAGIC) - FOOTER_SIZE - HEAD.size
     if footer < len(MAGIC):
         return None
-    file.seek(footer)
-    tail = file.read(HEAD.size + FOOTER_SIZE + len(MAGIC))
+    tail = file.exactly(footer, HEAD.size + FOOTER_SIZE + len(MAGIC))
     if not tail.endswith(MAGIC) or HEAD.unpack_from(tail) != (Opcode.FOOTER, FOOTER_SIZE):
         return None
     start = read_footer(tail[HEAD.size : HEAD.size + FOOTER_SIZE]).summary_start or footer
     offset = start - HEAD.size - DATA_END_SIZE
     if not len(MAGIC) <= offset < footer:
         return None
-    file.seek(offset)
-    head = file.read(HEAD.size)
-    return offset if len(head) == HEAD.size and HEAD.unpack(head) == (Opcode.DATA_END, DATA_END_SIZE) else None
+    return offset if HEAD.unpack(file.exactly(offset, HEAD.size)) == (Opcode.DATA_END, DATA_END_SIZE) else None
