@@ -67,7 +67,10 @@ ONE_CHANNEL = ("mono8", "8uc1", "mono16")
 LABELS = {"mono8": "u1", "8uc1": "u1", "mono16": "u2", "16uc1": "u2", "32sc1": "i4"}
 VIDEO = ("h264", "h265", "hevc", "av1", "vp9", "mpeg4", "theora")
 
-LABEL_WORDS = frozenset({"label", "labels", "instance", "instances", "segmentation", "semantic", "mask", "masks"})
+LABEL_WORDS = frozenset(
+    {"label", "labels", "instance", "instances", "segment", "segments", "segmentation", "semantic", "semantics"}
+    | {"panoptic", "mask", "masks"}
+)
 DEPTH_WORDS = frozenset({"depth"})
 COLOR_WORDS = frozenset({"color", "colour", "rgb", "bgr", "left", "right", "mono", "gray", "grey", "fisheye"})
 INFRARED_WORDS = frozenset({"ir", "infra", "infrared", "amplitude", "confidence", "thermal", "intensity"})
