@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from importlib import import_module
 from pathlib import Path
 
 from pydantic import Field
@@ -18,7 +19,9 @@ class ProbeParameters(Parameters):
     text: str = Field("a", description="content of every file")
     files: int = Field(8, ge=1, description="number of files")
     pause: float = Field(0.0, ge=0, description="pause after each file [s]")
-    behaviour: str = Field("write", description="write, raise, empty or random")
+    behaviour: str = Field(
+        "write", description="write, raise, empty, random, fill memory, import nonsense or swallow interrupts"
+    )
 
 
 PROBE = Stage(
@@ -34,10 +37,18 @@ def run(upstream: Trajectory | None, log: Path | None, *, parameters: ProbeParam
         text += upstream.path("file-0.txt").read_text()
     if parameters.behaviour == "random":
         text += str(time.perf_counter_ns())
+    if parameters.behaviour == "fill memory":
+        text = " " * (1 << 40)
+    if parameters.behaviour == "import nonsense":
+        import_module("nonsense")
     (context.output / "trajectory.tum").write_text("")
     for number in range(parameters.files):
         (context.output / f"file-{number}.txt").write_text(text * 1000)
-        time.sleep(parameters.pause)
+        try:
+            time.sleep(parameters.pause)
+        except KeyboardInterrupt:
+            if parameters.behaviour != "swallow interrupts":
+                raise
         if parameters.behaviour == "raise" and number == 1:
             raise RuntimeError("the probe was told to fail")
     if parameters.behaviour == "empty":

@@ -166,7 +166,7 @@ def _kind_on_disk(manifest: Path) -> str | None:
         return None
     try:
         return str(json.loads(manifest.read_bytes())["kind"])
-    except (ValueError, TypeError, KeyError, RecursionError):
+    except (ValueError, TypeError, KeyError, RecursionError, IsADirectoryError):
         return None
 
 
