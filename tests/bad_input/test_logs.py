@@ -14,8 +14,11 @@ from hypothesis import strategies as st
 from mcap.opcode import Opcode
 
 from schemas.errors import BadInput
+from stages.ingest.detection import open_log
+from stages.ingest.parameters import IngestParameters
 from stages.kit.formats.frames import FrameReader, FrameWriter
 from stages.kit.formats.mcap_log import MAGIC, McapLog
+from stages.kit.geometry.transforms import transform_from_yaw
 from tests.real_data import real_data
 from tests.unit.ingest.foxglove_logs import (
     CompressionType,
@@ -212,15 +215,16 @@ def _log(path: Path, **replaced) -> Path:
 BAD_CALIBRATIONS = {
     "missing": (None, "no camera calibration"),
     "zero focal length": (calibration(0, K=[0.0] * 9), "no positive focal lengths"),
-    "no K": (calibration(0, K=[]), "no positive focal lengths"),
-    "NaN": (calibration(0, K=[float("nan")] * 9), "no positive focal lengths"),
+    "no K": (calibration(0, K=[]), "no camera calibration.*1 of 1 messages of /info do not decode.*'k' has 0 numbers"),
+    "NaN": (calibration(0, K=[float("nan")] * 9), "no camera calibration.*'k' is not finite"),
     "negative": (calibration(0, K=[-80.0, 0, 40, 0, 80, 30, 0, 0, 1]), "no positive focal lengths"),
     "zero size": (calibration(0, width=0, height=0), "0x0"),
     "wrong shape": (calibration(0, width=100, height=100), "100x100, depth images are 96x72"),
-    "fisheye": (calibration(0, distortion_model="kannala_brandt", D=[0.1] * 4), "kannala_brandt"),
+    "unknown lens": (calibration(0, distortion_model="CylinderCamera", D=[0.1] * 4), "CylinderCamera"),
+    "fisheye of five": (calibration(0, distortion_model="equidistant", D=[0.1] * 5), "'equidistant' with 5 coeff"),
     "tiny focal length": (calibration(0, K=[1e-9, 0, 40, 0, 80, 30, 0, 0, 1]), "focal length 1e-09"),
     "centre far away": (calibration(0, K=[80, 0, 4e9, 0, 80, 30, 0, 0, 1]), "centre 4e"),
-    "endless distortion": (calibration(0, D=[float("inf")] * 5), "not finite"),
+    "endless distortion": (calibration(0, D=[float("inf")] * 5), "'d' is not finite"),
 }
 
 
@@ -287,11 +291,18 @@ def test_depth_of_another_size_within_a_log(tmp_path: Path) -> None:
     assert info.frame_count == 1 and info.drops == {"size_mismatch": 1}
 
 
-def test_unknown_encoding_and_missing_depth_name_the_topics(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"no depth images.*/depth \(foxglove.RawImage"):
-        ingest(_log(tmp_path / "a.mcap", depth=raw(SECOND, DEPTH, "yuv422")), tmp_path / "a")
-    with pytest.raises(BadInput, match="no colour images"):
-        ingest(_log(tmp_path / "b.mcap", color=None), tmp_path / "b")
+def test_topics_of_unknown_encoding_are_listed_and_the_others_used(tmp_path: Path) -> None:
+    path = _log(tmp_path / "a.mcap", depth=raw(SECOND, DEPTH, "16UC7"))
+    assert ingest(path, tmp_path / "a").info.streams == ("color", "pose")
+    source = open_log(path, IngestParameters())
+    stream = next(stream for stream in source.streams if stream.name == "/depth")
+    source.close()
+    assert stream.role == "unreadable" and "unknown encoding '16UC7'" in stream.detail
+    with pytest.raises(BadInput, match=r"no images that can be used \(/depth: unknown encoding"):
+        ingest(_log(tmp_path / "b.mcap", depth=raw(SECOND, DEPTH, "16UC7"), color=None), tmp_path / "b")
+    assert ingest(_log(tmp_path / "c.mcap", color=None), tmp_path / "c").info.streams == ("depth", "pose")
+    with pytest.raises(BadInput, match=r"no depth images on topic '/deep'.*/depth"):
+        ingest(_log(tmp_path / "d.mcap"), tmp_path / "d", depth_topic="/deep")
 
 
 def test_log_without_any_message_is_empty(tmp_path: Path) -> None:
@@ -305,12 +316,28 @@ def test_trees_that_are_none(tmp_path: Path) -> None:
     loop = [transform(SECOND, "a", "optical", np.eye(4)), transform(SECOND, "optical", "a", np.eye(4))]
     with pytest.raises(BadInput, match="loop"):
         ingest(_log(tmp_path / "a.mcap", tf=loop), tmp_path / "a")
-    parents = [transform(SECOND, "a", "optical", np.eye(4)), transform(SECOND, "b", "optical", np.eye(4))]
-    with pytest.raises(BadInput, match="two parents"):
-        ingest(_log(tmp_path / "b.mcap", tf=parents), tmp_path / "b")
     own = transform(SECOND, "optical", "optical", np.eye(4))
-    with pytest.raises(BadInput, match="no tree"):
-        ingest(_log(tmp_path / "c.mcap", tf=own), tmp_path / "c")
+    info = ingest(_log(tmp_path / "b.mcap", tf=own), tmp_path / "b").info
+    assert "pose" not in info.streams and "from frame 'optical' to 'optical' is none" in info.damage[0]
+
+
+def test_two_parents_of_the_camera_are_refused_until_one_is_chosen(tmp_path: Path) -> None:
+    first, second = transform_from_yaw(0.1, np.ones(3)), transform_from_yaw(0.2, np.zeros(3))
+    parents = [transform(SECOND, "a", "optical", first), transform(SECOND, "b", "optical", second)]
+    log = _log(tmp_path / "log.mcap", tf=parents)
+    with pytest.raises(BadInput, match="'optical', above the camera, has two parents, 'a' and 'b'.*--world-frame"):
+        ingest(log, tmp_path / "refused")
+    for world, pose in (("a", first), ("b", second)):
+        sequence = ingest(log, tmp_path / world, world_frame=world, gravity="none")
+        with FrameReader(sequence.path("frames.mcap")) as reader:
+            np.testing.assert_allclose(reader.read(0).world_from_camera, pose, atol=1e-9)
+    elsewhere = [
+        transform(SECOND, "a", "gripper", first),
+        transform(SECOND, "b", "gripper", second),
+        transform(SECOND, "map", "optical", first),
+    ]
+    info = ingest(_log(tmp_path / "arm.mcap", tf=elsewhere), tmp_path / "arm").info
+    assert "pose" in info.streams and any("'gripper' has 2 parents: 'a' and 'b'" in note for note in info.notes)
 
 
 @pytest.mark.parametrize("quaternion", [(0, 0, 0, 0), (float("nan"), 0, 0, 1), (0, 0, 0, 5)])
@@ -320,7 +347,7 @@ def test_transforms_that_are_not_rigid_are_left_out(tmp_path: Path, quaternion: 
     bad.rotation.x, bad.rotation.y, bad.rotation.z, bad.rotation.w = quaternion
     info = ingest(_log(tmp_path / "log.mcap", tf=bad), tmp_path / "out").info
     assert "pose" not in info.streams
-    assert any("non_rigid_transform /tf" in note for note in info.notes)
+    assert "1 of 1 messages of /tf do not decode" in info.damage[0]
 
 
 def test_poses_beyond_the_horizon_are_left_out(tmp_path: Path) -> None:
@@ -339,7 +366,9 @@ def test_messages_that_are_no_protobuf_are_counted(tmp_path: Path) -> None:
         data[start + 9 + 24 : start + 9 + 28] = bytes(4)  # no checksum, as many recorders write
     path.write_bytes(data)
     info = ingest(path, tmp_path / "out").info
-    assert any("undecodable_message" in note for note in info.notes)
+    assert "1 of 1 messages of /tf do not decode" in info.damage[0] and "pose" not in info.streams
+    with pytest.raises(BadInput, match="1 of 1 messages of /tf do not decode.*--damage refuse"):
+        ingest(path, tmp_path / "refused", damage="refuse")
 
 
 def test_any_damage_inside_messages_is_survived(tmp_path: Path) -> None:
@@ -360,11 +389,11 @@ def test_any_damage_inside_messages_is_survived(tmp_path: Path) -> None:
         except BadInput as error:
             assert "damaged.mcap" in str(error) or "frame" in str(error)
             outcomes.add("bad input")
-    assert {"ok", "bad input"} <= outcomes
+    assert "ok" in outcomes
 
 
-@pytest.mark.parametrize("name", ["custom-camera-model.mcap", "example.mcap", "example.bag", "empty-file.bag"])
-def test_real_logs_that_are_not_rgbd_are_refused_by_name(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize("name", ["custom-camera-model.mcap", "empty-file.bag"])
+def test_real_logs_that_cannot_be_used_are_refused_by_name(tmp_path: Path, name: str) -> None:
     with pytest.raises(BadInput, match=name):
         ingest(real_data("logs") / name, tmp_path / "out")
 

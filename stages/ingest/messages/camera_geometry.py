@@ -95,7 +95,8 @@ def _lens(topic: str, content: LogContent, what: str, parameters: IngestParamete
         zeros = [other for other, record in sorted(content.calibrations.items()) if not is_calibrated(record)]
         if zeros:
             check_calibrated(content.calibrations[zeros[0]], f"{where}: topic {zeros[0]}")
-        return Lens(camera_from_options(size, parameters, f"{where}: no camera calibration for {topic}"), size)
+        why = f"{where}: no camera calibration for {topic}{content.undecodable_calibrations()}"
+        return Lens(camera_from_options(size, parameters, why), size)
     lens = lens_of(content.calibrations[name], size, is_rectified(topic), f"{where}: topic {name}", what)
     notes = [f"intrinsics of {topic} from topic {name}", *lens.notes]
     if name in content.changed_calibrations:

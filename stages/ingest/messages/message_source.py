@@ -136,7 +136,10 @@ class _Built:
 
 
 def _without_frames(log: MessageLog, content: LogContent, damage: tuple[str, ...], rule: str) -> LogSource:
-    """A log without any image is empty; one with images of which none can be used is bad input."""
+    """A log without any image is empty; one with images of which none can be used is bad input, as is one of which
+    nothing can be read."""
+    if not content.topics and damage:
+        raise BadInput(f"{log.path}: nothing in it can be read: {damage[0]}", hint="copy the log again")
     if content.images:
         reasons = [f"{name}: {content.topics[name].unreadable}" for name in sorted(content.images)]
         raise BadInput(f"{log.path}: no images that can be used ({'; '.join(reasons)[:400]})", hint="docs/LOGS.md")

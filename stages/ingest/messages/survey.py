@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stages.ingest.lenses import is_calibrated
-from stages.ingest.messages.container import Channel, MessageLog
+from stages.ingest.messages.container import MessageLog
 from stages.ingest.messages.decoding import decoder_for, why_unreadable
 from stages.ingest.messages.pixels import color_pixels, depth_pixels, label_pixels, role_of, why_other
 from stages.ingest.messages.realsense_bags import is_stream_transform
@@ -32,6 +32,8 @@ IMU_STEP = 50_000_000
 """Inertial samples nearer to the last one kept than this [ns] are not kept: up is a mean."""
 SIZE_ATTEMPTS = 20
 """Compressed images of a topic that are decoded to learn their size."""
+LATEST = 1 << 62
+"""Log times [ns] beyond this, in the year 2116, are damage and count as this."""
 STATIC = "tf_static"
 UNUSED = "not used"
 """How the reason of topics ends that are well understood and have nothing to do with cameras."""
@@ -117,12 +119,25 @@ class LogContent:
 
     def damage(self) -> list[str]:
         """Return a line for every topic with messages that do not decode."""
+        return [line for _, line in self._damage_by_topic()]
+
+    def _damage_by_topic(self) -> list[tuple[str, str]]:
         lines = []
         for name, topic in sorted(self.topics.items()):
             if topic.undecodable:
-                reason = topic.undecodable.most_common(1)[0][0]
-                lines.append(f"{topic.undecodable.total()} of {topic.count} messages of {name} do not decode: {reason}")
+                number, reason = topic.undecodable.total(), topic.undecodable.most_common(1)[0][0]
+                lines.append((name, f"{number} of {topic.count} messages of {name} do not decode: {reason}"))
         return lines
+
+    def undecodable_calibrations(self) -> str:
+        """Return which calibrations do not decode, to be put behind what is missing; empty when all do."""
+        kinds = ("CameraInfo", "CameraCalibration")
+        lines = [
+            line
+            for name, line in self._damage_by_topic()
+            if any(kind in self.topics[name].described() for kind in kinds)
+        ]
+        return f" ({'; '.join(lines)})" if lines else ""
 
     def described_topics(self) -> str:
         """Return the topics with their types, for error messages."""
@@ -157,7 +172,7 @@ def survey(log: MessageLog) -> LogContent:
             topic.undecodable[str(problem)] += 1
             records = problem.records
         for position, record in enumerate(records):
-            reader.add(record, topic, message.channel, message.log_time, message.location, position == 0)
+            reader.add(record, topic, min(message.log_time, LATEST), message.location, position == 0)
     _finish(content)
     return content
 
@@ -170,9 +185,7 @@ class _Reader:
         self._attempts: Counter[str] = Counter()
         self._last_kept: dict[str, int] = {}
 
-    def add(
-        self, record: Record, topic: Topic, channel: Channel, log_time: int, location: Hashable, first: bool
-    ) -> None:
+    def add(self, record: Record, topic: Topic, log_time: int, location: Hashable, first: bool) -> None:
         """Keep what is needed of a record; `first` is that of its message."""
         static = topic.name.endswith(STATIC) or is_stream_transform(topic.name)
         stamp = record.stamp
