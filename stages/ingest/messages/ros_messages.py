@@ -8,6 +8,7 @@ import numpy as np
 
 from stages.ingest.messages import foxglove_messages
 from stages.ingest.messages.foxglove_messages import calibration_record, every_transform
+from stages.ingest.messages.image_window import of_published_images
 from stages.ingest.messages.record_fields import (
     Fields,
     bytes_of,
@@ -82,7 +83,7 @@ def _compressed_image(fields: Fields) -> tuple[Record, ...]:
 
 
 def _camera_info(fields: Fields) -> tuple[Record, ...]:
-    return (calibration_record(*_stamp_and_frame(fields), fields),)
+    return (of_published_images(calibration_record(*_stamp_and_frame(fields), fields), fields),)
 
 
 def _imu(fields: Fields) -> tuple[Record, ...]:
