@@ -12,7 +12,7 @@ import numpy as np
 from schemas.errors import BadInput
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.transform_tree import TransformTree
-from stages.kit.formats.trajectories import number_rows, transform_from_numbers
+from stages.kit.formats.trajectories import number_rows, read_text, transform_from_numbers
 
 LATEST_STAMP = 9_000_000_000
 """Seconds since 1970: stamps in nanoseconds stay within 64 bits."""
@@ -42,16 +42,23 @@ def read_stamped_poses(path: Path, seconds_per_unit: float = 1.0) -> StampedPose
     """
     tree, stamps, problems = TransformTree(), [], Counter[str]()
     rows = number_rows(path, 8)
-    for line, row in rows:
-        if not np.isfinite(row).all() or not 0 <= row[0] * seconds_per_unit < LATEST_STAMP:
+    # Stamps since 1970 do not fit float64 to the nanosecond, so they are taken from the text.
+    texts = [line.split(None, 1)[0] for line in read_text(path).splitlines() if line.split("#", 1)[0].split()]
+    for (line, row), text in zip(rows, texts, strict=True):
+        where = f"{path}: line {line}"
+        try:
+            stamp = round(exact_stamp(text, where) * seconds_per_unit)
+        except BadInput:
+            problems["no time"] += 1
+            continue
+        if not np.isfinite(row).all():
             problems["not finite"] += 1
             continue
         try:
-            pose = transform_from_numbers(row[1:], f"{path}: line {line}")
+            pose = transform_from_numbers(row[1:], where)
         except BadInput:
             problems["quaternion not of length 1"] += 1
             continue
-        stamp = round(row[0] * seconds_per_unit * 1e9)
         stamps.append(stamp)
         tree.add("world", "camera", stamp, pose)
     notes: tuple[str, ...] = ()

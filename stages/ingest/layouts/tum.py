@@ -186,8 +186,6 @@ def _camera(
     path = next((root / name for name in CALIBRATIONS if (root / name).is_file()), None)
     if path is not None:
         return _read_calibration(path, size), (f"intrinsics read from {path.name}",)
-    if all_intrinsics_given(parameters):
-        return RecordedCamera(camera_from_options(size, parameters, str(root))), ()
     standard = size in (None, (640, 480))
     if icl_nuim and standard:
         return RecordedCamera(pinhole(ICL_NUIM, size, str(root))), (
@@ -200,6 +198,8 @@ def _camera(
         recorded = RecordedCamera(pinhole(numbers, size, str(root)), lens_of(coefficients, str(root)))
         undone = ", lens distortion undone in colour and depth" if coefficients else ""
         return recorded, (f"intrinsics assumed: freiburg{match[1]} colour camera, {listed}{undone}",)
+    if all_intrinsics_given(parameters):
+        return RecordedCamera(camera_from_options(size, parameters, str(root))), ()
     shape = f"images are {size[0]}x{size[1]}" if size else "no image can be decoded"
     raise BadInput(
         f"{root}: intrinsics are not known: there is no {CALIBRATIONS[0]}, and the folder's name and images ({shape}) "
