@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import sys
 from pathlib import Path
@@ -61,9 +62,10 @@ def batch(
         say(f"{scripts.scenes} scenes in {scripts.tasks} array tasks; submit them with: {scripts.submit}")
         return _report({"batch": str(out), "submit": str(scripts.submit)}, json_output, 0)
     else:
-        end = session.run_batch(
-            read, out, jobs=jobs, force=force, retry=retry, say=say, terminal=sys.stderr.isatty(), quiet=silent
-        )
+        with contextlib.redirect_stdout(sys.stderr):  # Ray prints what it notices about nodes; that is no data
+            end = session.run_batch(
+                read, out, jobs=jobs, force=force, retry=retry, say=say, terminal=sys.stderr.isatty(), quiet=silent
+            )
     say(", ".join(f"{count} {name}" for name, count in end.counts().items()))
     scenes = {job.name: end.latest[job.name].model_dump(mode="json") for job in end.jobs if job.name in end.latest}
     return _report({"batch": str(out), "counts": end.counts(), "scenes": scenes}, json_output, end.exit_code)

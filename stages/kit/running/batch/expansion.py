@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Protocol
 
 from schemas.errors import UsageError
 from stages.kit.running.batch.data_sets import find_scenes
@@ -60,7 +61,7 @@ def _pipeline_file(name: str, base: Path) -> Path:
 def _check_names(names: Sequence[str], what: str, where: str, refused: Sequence[str] = ()) -> None:
     seen: set[str] = set()
     for name in names:
-        if not is_folder_name(name) or name.casefold() in seen or name in refused or name.startswith("seed-"):
+        if not is_folder_name(name) or name.casefold() in seen or name in refused:
             raise UsageError(f"{where}: {what} {name!r}: not a unique folder name", hint="rename it")
         seen.add(name.casefold())
 
@@ -113,7 +114,9 @@ def read_batch(path: Path) -> Batch:
         _check_names([name for name, _, _ in scenes], "scene", where)
     if not scenes:
         raise UsageError(f"{where}: no scene", hint="give [[scene]] or [data]; see docs/BATCH.md")
-    _check_names([e.name for e in spec.parameters], "parameters", where, [step.name for step in pipeline.step])
+    # Beside the folders of parameter sets stand, after a change of the batch file, those of steps and seeds.
+    taken = [*(step.name for step in pipeline.step), *(f"seed-{seed}" for seed in spec.seeds)]
+    _check_names([entry.name for entry in spec.parameters], "parameters", where, taken)
     if len(set(spec.seeds)) < len(spec.seeds):
         raise UsageError(f"{where}: seeds: one is there twice", hint="each seed once")
     paths = input_variables(pipeline)
@@ -169,14 +172,22 @@ def shuffled(runs: Sequence[PlannedRun], seed: int) -> list[PlannedRun]:
     return sorted(runs, key=lambda run: hashlib.sha256(f"{seed}/{run.name}".encode()).digest())
 
 
-def scene_command(batch: Batch, run: PlannedRun, folder: Path, *, force: bool = False) -> tuple[str, ...]:
+class SceneCommand(Protocol):
+    """Returns the argument words that run a scene into a folder."""
+
+    def __call__(self, batch: Batch, run: PlannedRun, folder: Path, *, force: bool) -> tuple[str, ...]:
+        """See `scene_command`."""
+        ...
+
+
+def scene_command(batch: Batch, run: PlannedRun, folder: Path, *, force: bool) -> tuple[str, ...]:
     """Return the command line that runs a scene: what a person would type for this scene alone."""
     settings = [word for name, value in sorted(run.settings.items()) for word in ("--set", f"{name}={value}")]
     words = [sys.executable, "-m", "cli", "run", str(batch.pipeline_file), "--out", str(folder), *settings]
     return (*words, *(("--force",) if force else ()))
 
 
-def make_jobs(batch: Batch, out: Path, *, force: bool = False) -> list[Job]:
+def make_jobs(batch: Batch, out: Path, *, force: bool = False, command: SceneCommand = scene_command) -> list[Job]:
     """Return the jobs of a batch in order of execution; run folders lie under `out`, which is made absolute."""
     out = Path(os.path.abspath(out))
     facts, paths, limits = pipeline_facts(batch.pipeline), input_variables(batch.pipeline), batch.spec.limits
@@ -192,7 +203,7 @@ def make_jobs(batch: Batch, out: Path, *, force: bool = False) -> list[Job]:
                 parameters=run.parameters,
                 seed=run.seed,
                 folder=str(folder),
-                command=scene_command(batch, run, folder, force=force),
+                command=command(batch, run, folder, force=force),
                 steps=tuple(step.name for step in batch.pipeline.step),
                 fingerprint=fingerprint(facts, run.values, inputs),
                 time_limit=limits.time,

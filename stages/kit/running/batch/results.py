@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -124,7 +125,8 @@ class ResultsFile:
                 raise OSError(28, "no space left")
             os.fsync(self._descriptor)
         except OSError as error:
-            os.ftruncate(self._descriptor, size)
+            with suppress(OSError):  # otherwise the next opening cuts the torn line off
+                os.ftruncate(self._descriptor, size)
             raise MachineFailure(f"{self.path}: {error.strerror}", hint="free space, then run again") from None
 
     def close(self) -> None:

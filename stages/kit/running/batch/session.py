@@ -10,7 +10,7 @@ from pathlib import Path
 from schemas.errors import UsageError
 from stages.kit.running.batch.display import display_for
 from stages.kit.running.batch.executor import Executor
-from stages.kit.running.batch.expansion import Batch, make_jobs
+from stages.kit.running.batch.expansion import Batch, SceneCommand, make_jobs, scene_command
 from stages.kit.running.batch.folder_lock import folder_lock
 from stages.kit.running.batch.job import Job
 from stages.kit.running.batch.local_executor import LocalExecutor
@@ -112,6 +112,7 @@ def run_batch(
     terminal: bool = False,
     quiet: bool = False,
     executor: Executor | None = None,
+    command: SceneCommand = scene_command,
 ) -> BatchEnd:
     """Run what is missing and write the summary, also when it is interrupted (KeyboardInterrupt goes on).
 
@@ -123,7 +124,7 @@ def run_batch(
         if results.repaired:
             say(f"{RESULTS_NAME}: a torn last line of {results.repaired} bytes was cut off; its scene runs again")
         merge_parts(out, results)
-        all_jobs = make_jobs(batch, out, force=force)
+        all_jobs = make_jobs(batch, out, force=force, command=command)
         reasons = missing_jobs(all_jobs, latest_by_job(read_results(results.path)), "all" if force else retry)
         todo = [job for job in all_jobs if job.name in reasons]
         say(f"{len(all_jobs)} scenes: {len(todo)} to run, {len(all_jobs) - len(todo)} stand as they are")
@@ -173,11 +174,12 @@ def run_task(
     say: Say = lambda text: None,
     quiet: bool = False,
     executor: Executor | None = None,
+    command: SceneCommand = scene_command,
 ) -> BatchEnd:
     """Run one task of a job array: its part of the job list, with results of its own."""
     out = absolute(out)
     names = part_of(read_job_list(out), index, count)
-    by_name = {job.name: job for job in make_jobs(batch, out, force=force)}
+    by_name = {job.name: job for job in make_jobs(batch, out, force=force, command=command)}
     unknown = [name for name in names if name not in by_name]
     if unknown:
         raise UsageError(f"{batch.path}: has no scene {unknown[0]!r} any more", hint="write the scripts again")

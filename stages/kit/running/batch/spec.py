@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -30,14 +31,23 @@ def _one_line(text: str) -> str:
     return text
 
 
+def _quantity(parse: Callable[[str], float]) -> BeforeValidator:
+    def check(value: Any) -> float:
+        if not isinstance(value, str):
+            raise ValueError(f"{value!r} has no unit; write a text such as '20 min' or '4 GiB'")
+        return parse(value)
+
+    return BeforeValidator(check)
+
+
 def _seeds(value: Any) -> Any:
     return parse_seed_range(value) if isinstance(value, str) else value
 
 
 Value = Annotated[str, BeforeValidator(_as_text)]
 Line = Annotated[str, AfterValidator(_one_line)]
-Seconds = Annotated[float, BeforeValidator(parse_seconds)]
-Bytes = Annotated[int, BeforeValidator(parse_bytes)]
+Seconds = Annotated[float, _quantity(parse_seconds)]
+Bytes = Annotated[int, _quantity(parse_bytes)]
 Seed = Annotated[int, Field(ge=0)]
 
 
