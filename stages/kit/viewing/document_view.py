@@ -1,8 +1,9 @@
-"""Evaluations and reports: figures as a table, plots as pictures."""
+"""Evaluations, reports and exports: figures as a table, plots as pictures, notes as text."""
 
 from __future__ import annotations
 
 from schemas.evaluation import Evaluation, Report
+from schemas.exported_sequence import ExportedSequence
 from stages.kit.viewing.canvas import Canvas
 
 
@@ -23,3 +24,10 @@ def draw_evaluation(evaluation: Evaluation, canvas: Canvas) -> None:
 def draw_report(report: Report, canvas: Canvas) -> None:
     """Say where the page is: it is made for a browser."""
     canvas.document("report", f"Open `{report.path('report.html')}` in a browser.")
+
+
+def draw_export(export: ExportedSequence, canvas: Canvas) -> None:
+    """Say what was written: it is made for other tools."""
+    info = export.info
+    rows = [f"{info.frame_count} frames as {info.layout}: open `{export.path(info.log)}`", ""]
+    canvas.document("export", "\n".join([*rows, *(f"- {note}" for note in info.notes)]))

@@ -23,6 +23,7 @@ VIEWERS = {
     "cad_library": ("library_view", "draw_library"),
     "evaluation": ("document_view", "draw_evaluation"),
     "report": ("document_view", "draw_report"),
+    "exported_sequence": ("document_view", "draw_export"),
 }
 """Kind -> module and function; the function takes the typed artifact and the canvas."""
 

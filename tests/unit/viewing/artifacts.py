@@ -18,11 +18,13 @@ from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
 from schemas.panoptic_map import EntitiesFile, Entity
 from schemas.plan import PlanFile, PlannedAction
 from schemas.segments import FrameSegment, FrameSegments, SegmentsFile
+from schemas.sequence import Sequence
 from stages.kit.formats.frames import FrameWriter
 from stages.kit.formats.masks import write_panoptic_zip
 from stages.kit.formats.scene_bundle import write_scene_bundle
 from stages.kit.formats.trajectories import write_tum
 from stages.kit.running.digests import content_digest, record_files
+from tests.unit.export.sequences import export
 from tests.unit.ingest.foxglove_logs import LogWriter, compressed, transform
 from tests.unit.ingest.running import ingest
 from tests.unit.ingest.tiny_room import CAMERA, frames, jpeg, write_seven_scenes
@@ -243,6 +245,12 @@ def make_trajectory(run: Path) -> Path:
     root.mkdir()
     write_tum(root / "trajectory.tum", np.arange(3.0), np.array([pose for _, _, pose in frames(3)]))
     return seal(root, "trajectory")
+
+
+def make_export(run: Path) -> Path:
+    """The sequence as TUM."""
+    export(Sequence(run / "sequence"), run / "exported_sequence", layout="tum")
+    return seal(run / "exported_sequence", "exported_sequence", sequence=run / "sequence")
 
 
 __all__ = ["find"]

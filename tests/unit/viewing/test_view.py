@@ -37,6 +37,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     artifacts.make_evaluation(folder)
     artifacts.make_report(folder)
     artifacts.make_trajectory(folder)
+    artifacts.make_export(folder)
     return folder
 
 
@@ -59,6 +60,7 @@ EXPECTED = {
     "cad_library": {"/world/library/table/table_00/body", "/world/library/fridge/fridge_01/door"},
     "evaluation": {"/figures", "/tables/map", "/world/plots/map"},
     "report": {"/report"},
+    "exported_sequence": {"/export"},
 }
 
 

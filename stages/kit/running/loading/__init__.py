@@ -1,0 +1,37 @@
+"""Artifacts for people who write Python: `load(folder)` gives an object with the content, read when it is asked for."""
+
+from stages.kit.running.loading.artifact import LoadedArtifact
+from stages.kit.running.loading.opening import load, load_run
+from stages.kit.running.loading.perception import (
+    LoadedEntity,
+    LoadedGroundTruth,
+    LoadedMap,
+    LoadedSegments,
+    LoadedSequence,
+)
+from stages.kit.running.loading.results import LoadedEvaluation, LoadedExport, LoadedPlan, LoadedReport
+from stages.kit.running.loading.scenes import (
+    LoadedCadLibrary,
+    LoadedCadScene,
+    LoadedContactGraph,
+    LoadedInteractiveScene,
+)
+
+__all__ = [
+    "LoadedArtifact",
+    "LoadedCadLibrary",
+    "LoadedCadScene",
+    "LoadedContactGraph",
+    "LoadedEntity",
+    "LoadedEvaluation",
+    "LoadedExport",
+    "LoadedGroundTruth",
+    "LoadedInteractiveScene",
+    "LoadedMap",
+    "LoadedPlan",
+    "LoadedReport",
+    "LoadedSegments",
+    "LoadedSequence",
+    "load",
+    "load_run",
+]
