@@ -211,7 +211,7 @@ def _has_swapped_colors(encoding: str) -> bool:
     compressed_image_transport hands what it calls bgr to an encoder that takes bgr, which makes an ordinary file; what
     it calls rgb becomes a file with red and blue exchanged. Where it says nothing the file is taken for ordinary.
     """
-    return re.search(r";.*compressed rgb", encoding.lower()) is not None
+    return "compressed rgb" in encoding.lower().partition(";")[2]
 
 
 def _is_plain(data: bytes) -> bool:

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
-LARGEST_DEFINITION = 1 << 20
-"""Bytes of the definition of one type with all it refers to; the longest in use are a tenth of that."""
+LARGEST_DEFINITION = 1 << 18
+"""Bytes of the definition of one type with all it refers to; those of the types read here have under 10,000."""
 
 PRIMITIVES = {
     "bool": "B", "boolean": "B", "byte": "B", "octet": "B", "char": "B",
@@ -178,8 +178,9 @@ def _msg_count(match: re.Match[str]) -> int | None:
 # --- .idl ------------------------------------------------------------------------------------------------------
 
 _TOKEN = re.compile(
-    r"\s+|//[^\n]*|/\*.*?\*/|\#[^\n]*|={20,}\s*\n\s*IDL:[^\n]*"  # nothing
-    r"|(?P<token>(?:::)?[A-Za-z_]\w*(?:::[A-Za-z_]\w*)*|\d[\w.+]*|\"(?:[^\"\\]|\\.)*\"|'(?:[^'\\]|\\.)*'|[^\s])",
+    r"\s+|//[^\n]*|/\*(?:.*?\*/|.*)|\#[^\n]*|(?<!=)={20,}+\s*IDL:[^\n]*"  # nothing; what has no end goes to the end
+    r"|(?P<token>(?:::)?[A-Za-z_]\w*+(?:::[A-Za-z_]\w*+)*+|\d[\w.+]*"
+    r"|\"(?:[^\"\\]|\\.)*+(?:\"|\\?\Z)|'(?:[^'\\]|\\.)*+(?:'|\\?\Z)|[^\s])",
     re.DOTALL,
 )
 
