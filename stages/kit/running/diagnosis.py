@@ -10,14 +10,22 @@ import sys
 from dataclasses import dataclass
 
 from stages.kit.running.keys import library_version
+from stages.kit.running.model_cache import cache_folder, cached_models
 
 CORE = {
     "typer": "typer", "open3d": "open3d", "trimesh": "trimesh", "pycolmap": "pycolmap",
     "opencv-python-headless": "cv2", "numpy": "numpy", "scipy": "scipy", "torch": "torch", "mcap": "mcap",
     "pybullet": "pybullet", "pydantic": "pydantic", "numba": "numba", "python-fcl": "fcl", "embreex": "embreex",
     "shapely": "shapely", "networkx": "networkx", "yourdfpy": "yourdfpy", "matplotlib": "matplotlib",
+    "rosbags": "rosbags", "psutil": "psutil",
 }  # fmt: skip
-EXTRAS = {"rerun-sdk": ("rerun", "viewing artifacts: pip install rerun-sdk")}
+EXTRAS = {
+    "rerun-sdk": ("rerun", "viewing artifacts: pip install rerun-sdk"),
+    "ray": ("ray", "batches on a cluster: pip install ray"),
+    "mujoco": ("mujoco", "opening scene.mjcf.xml: pip install mujoco"),
+    "atheris": ("atheris", "make fuzz: pip install atheris"),
+}
+"""Distribution -> module, and what it is for."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +69,9 @@ def diagnose() -> list[Check]:
     checks += [_import_check(name, module, hint, False) for name, (module, hint) in EXTRAS.items()]
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     checks.append(Check("memory", f"{memory:.0f} GiB", "" if memory >= 4 else "4 GiB are needed", False))
+    cached = cached_models()
+    size = sum(model.bytes for model in cached) / 1e6
+    checks.append(Check("cached models", f"{len(cached)}, {size:.1f} MB in {cache_folder()}", required=False))
     free = shutil.disk_usage(".").free / 2**30
     checks.append(Check("free disk here", f"{free:.0f} GiB", "" if free >= 2 else "free 2 GiB", False))
     return checks
