@@ -9,7 +9,12 @@ from stages.ingest.messages import foxglove_messages, ros_messages
 from stages.ingest.messages.container import Channel
 from stages.ingest.messages.json_messages import json_decoder
 from stages.ingest.messages.protobuf_messages import protobuf_decoder
-from stages.ingest.messages.realsense_bags import is_stream_transform, with_stream_frames
+from stages.ingest.messages.realsense_bags import (
+    is_stream_transform,
+    may_state_depth_unit,
+    states_depth_unit,
+    with_stream_frames,
+)
 from stages.ingest.messages.records import Record
 from stages.ingest.messages.ros_definitions import UnreadableDefinition, short_name
 
@@ -67,7 +72,12 @@ def _ros(channel: Channel, encoding: str) -> Decoder | str:
         return f"messages of type {_shown(name)} cannot be read: {error}"
     if decoder is None:
         return f"messages of type {_shown(name)} are not used"
-    return lambda data: with_stream_frames(topic, decoder(data))
+    if encoding != "ros1" or not may_state_depth_unit(topic):
+        return lambda data: with_stream_frames(topic, decoder(data))
+    unit = (ros_messages.DEPTH_UNIT,)
+    longer = ros_messages.ros_decoder(name, encoding, channel.schema_encoding, channel.schema, unit)
+    assert longer is not None
+    return lambda data: with_stream_frames(topic, (longer if states_depth_unit(data) else decoder)(data))
 
 
 def _shown(name: str) -> str:

@@ -106,7 +106,7 @@ def every_transform(messages: object, convert: Callable[[Fields], Record]) -> tu
         except Undecodable as error:
             problems.append(str(error))
     if problems:
-        raise Undecodable(f"{len(problems)} of {len(messages)} transforms: {problems[0]}", tuple(good))
+        raise Undecodable(f"not every transform holds: {problems[0]}", tuple(good))
     return tuple(good)
 
 

@@ -34,18 +34,20 @@ def json_decoder(type_name: str) -> Callable[[bytes], tuple[Record, ...]] | None
 def parse_object(data: bytes) -> dict[str, Any]:
     """Parse a JSON object. Raises Undecodable, also for NaN and infinity, which JSON does not have."""
     if len(data) > LARGEST_MESSAGE:
-        raise Undecodable(f"a JSON message of {len(data)} bytes, more than {LARGEST_MESSAGE}")
+        raise Undecodable(f"a JSON message of more than {LARGEST_MESSAGE} bytes")
     try:
         parsed = json.loads(data.decode("utf-8"), parse_constant=_refuse)
-    except (ValueError, RecursionError) as error:  # JSONDecodeError and UnicodeDecodeError are ValueErrors
-        raise Undecodable(f"no JSON: {error!s:.120}") from None
+    except json.JSONDecodeError as error:
+        raise Undecodable(f"no JSON: {error.msg}") from None
+    except (ValueError, RecursionError):  # no UTF-8, a number of thousands of digits, nested too deep
+        raise Undecodable("no JSON: not to be read") from None
     if not isinstance(parsed, dict):
         raise Undecodable("the JSON is no object")
     return parsed
 
 
 def _refuse(constant: str) -> NoReturn:
-    raise ValueError(f"{constant} is no number")
+    raise Undecodable(f"no JSON: {constant} is no number")
 
 
 def _lowered(fields: dict[str, Any]) -> dict[str, Any]:

@@ -241,7 +241,9 @@ def depth_pixels(record: ImageRecord) -> np.ndarray:
 
 
 def depth_unit(record: ImageRecord) -> float:
-    """Return how many units of `depth_pixels` make a metre, by the encoding (REP-118)."""
+    """Return how many units of `depth_pixels` make a metre: as the message states, else by the encoding (REP-118)."""
+    if record.units_per_metre is not None:
+        return record.units_per_metre
     if record.compressed:
         compressed_depth = is_compressed_depth(record.encoding, record.data)
         is_float = compressed_depth and stored_as(record.encoding, record.data) == "32FC1"

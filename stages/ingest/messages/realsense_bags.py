@@ -1,7 +1,8 @@
 """Bags that the RealSense SDK records: the topic says which stream a message belongs to, its frames say nothing.
 
-Every image has frame `0`, and extrinsics are bare transforms on `.../tf/<reference>`. They carry points of the
-reference into the stream (librealsense, `rs2_extrinsics` from the reference to the stream).
+Every image has frame `0` or `1`, and extrinsics are bare transforms on `.../tf/<reference>`. They carry points of the
+reference into the stream (librealsense, `rs2_extrinsics` from the reference to the stream). Images with frame `1` end
+in a field that their definition does not have, the unit of depth.
 """
 
 from __future__ import annotations
@@ -22,6 +23,16 @@ def is_stream_transform(topic: str) -> bool:
     """Whether a topic carries the extrinsics of a RealSense stream."""
     match = _TOPIC.fullmatch(topic)
     return match is not None and match["reference"] is not None
+
+
+def may_state_depth_unit(topic: str) -> bool:
+    """Whether a topic carries the images of a RealSense stream."""
+    return _TOPIC.fullmatch(topic) is not None and topic.endswith("/image/data")
+
+
+def states_depth_unit(data: bytes) -> bool:
+    """Whether the bytes of such an image end in the unit of depth: by its frame, after a number and a stamp."""
+    return data[12:17] == b"\x01\0\0\x001"
 
 
 def with_stream_frames(topic: str, records: tuple[Record, ...]) -> tuple[Record, ...]:

@@ -49,7 +49,7 @@ def stamp_of(time: Any) -> int:
     seconds = _first(time, ("sec", "secs", "seconds"))
     nanoseconds = _first(time, ("nsec", "nanosec", "nsecs", "nanos", "nanoseconds"))
     if not 0 <= seconds < LARGEST_SECONDS or not 0 <= nanoseconds < 1_000_000_000:
-        raise Undecodable(f"stamp of {seconds} s and {nanoseconds} ns")
+        raise Undecodable("the stamp is negative, or its nanoseconds make a second and more")
     return seconds * 1_000_000_000 + nanoseconds
 
 
@@ -66,7 +66,7 @@ def name_of(fields: Fields, name: str) -> str:
     if not isinstance(value, str):
         raise Undecodable(f"field {name!r} is no text")
     if len(value) > LONGEST_NAME:
-        raise Undecodable(f"field {name!r} has {len(value)} characters")
+        raise Undecodable(f"field {name!r} has more than {LONGEST_NAME} characters")
     return value
 
 
@@ -79,7 +79,7 @@ def size_of(fields: Fields, name: str) -> int:
     """Return a field that is a whole number from 0 to 2^32 - 1."""
     value = part(fields, name)
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= LARGEST_SIZE:
-        raise Undecodable(f"field {name!r} is no size: {value!r:.40}")
+        raise Undecodable(f"field {name!r} is no size")
     return value
 
 
@@ -97,7 +97,7 @@ def numbers_of(fields: Fields, name: str, lengths: tuple[int, ...] | None = None
     if not isinstance(value, list | np.ndarray):
         raise Undecodable(f"field {name!r} is no list of numbers")
     if len(value) > MOST_NUMBERS or (lengths is not None and len(value) not in lengths):
-        raise Undecodable(f"field {name!r} has {len(value)} numbers")
+        raise Undecodable(f"field {name!r} has not as many numbers as it should")
     numbers = value.tolist() if isinstance(value, np.ndarray) else value
     return tuple(_finite(number, name) for number in numbers)
 
@@ -133,7 +133,7 @@ def rigid(translation: Fields, rotation: Fields) -> np.ndarray:
     i, j, k, r = (number_of(rotation, axis) for axis in "xyzw")
     norm = math.hypot(i, j, k, r)
     if abs(norm - 1) > NORM_TOLERANCE:
-        raise Undecodable(f"quaternion {i:.4g}, {j:.4g}, {k:.4g}, {r:.4g} of norm {norm:.4g} is no rigid transform")
+        raise Undecodable("the norm of a quaternion is not 1: no rigid transform")
     i, j, k, r = i / norm, j / norm, k / norm, r / norm
     return np.array(
         (

@@ -8,7 +8,8 @@ import numpy as np
 
 
 class Undecodable(Exception):
-    """A message that does not hold what its type promises. The text is the reason, for people.
+    """A message that does not hold what its type promises. The text is the reason, for people, without the values
+    that were found, so that messages can be counted by it.
 
     Of a list of transforms some may hold all the same: `records` has these.
     """
@@ -37,6 +38,8 @@ class ImageRecord:
     """Bytes of a row, raw images only."""
     big_endian: bool
     data: bytes
+    units_per_metre: float | None = None
+    """Of depth, where the message itself states it."""
 
 
 @dataclass(frozen=True)

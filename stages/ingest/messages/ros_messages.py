@@ -30,16 +30,20 @@ from stages.ingest.messages.records import (
     Record,
     TransformRecord,
 )
-from stages.ingest.messages.ros_definitions import definitions_of, short_name
+from stages.ingest.messages.ros_definitions import Field, definitions_of, short_name
 from stages.ingest.messages.ros_serialization import RosReader
+
+DEPTH_UNIT = Field("depth_units", "f")
+"""Metres per unit of depth, where an image states it."""
 
 
 def ros_decoder(
-    type_name: str, message_encoding: str, schema_encoding: str, schema: bytes
+    type_name: str, message_encoding: str, schema_encoding: str, schema: bytes, more: tuple[Field, ...] = ()
 ) -> Callable[[bytes], tuple[Record, ...]] | None:
     """Return what decodes messages of a type, raising Undecodable; None for types without a record.
 
-    `message_encoding` is `cdr` or `ros1`. Raises UnreadableDefinition.
+    `message_encoding` is `cdr` or `ros1`; `more` are fields that follow those of the definition. Raises
+    UnreadableDefinition.
     """
     convert = _converter(type_name)
     if convert is None:
@@ -47,7 +51,9 @@ def ros_decoder(
     if message_encoding == "ros1":
         schema_encoding = "ros1msg"
     name = short_name(type_name)
-    reader = RosReader(name, definitions_of(name, schema_encoding, schema), aligned=message_encoding == "cdr")
+    definitions = definitions_of(name, schema_encoding, schema)
+    definitions[name] += more
+    reader = RosReader(name, definitions, aligned=message_encoding == "cdr")
     return lambda data: convert(reader.read(data))
 
 
@@ -73,8 +79,15 @@ def _image(fields: Fields) -> tuple[Record, ...]:
         step=size_of(fields, "step"),
         big_endian=bool(size_of(fields, "is_bigendian")),
         data=bytes_of(fields, "data"),
+        units_per_metre=_units_per_metre(fields),
     )
     return (image,)
+
+
+def _units_per_metre(fields: Fields) -> float | None:
+    """Of the metres per unit that the RealSense SDK adds; they come as float32 of round numbers."""
+    unit = fields.get(DEPTH_UNIT.name)
+    return round(1 / unit, 3) if isinstance(unit, float) and 1e-6 < unit < 1e3 else None
 
 
 def _compressed_image(fields: Fields) -> tuple[Record, ...]:

@@ -88,14 +88,14 @@ class RosReader:
         view, order = memoryview(data), "<"
         if self._aligned:
             if len(view) < _ENCAPSULATION or view[0] != 0 or view[1] > 1:
-                raise Undecodable(f"starts with {bytes(view[:2]).hex()}, not with the mark of plain CDR")
+                raise Undecodable("does not start with the mark of plain CDR")
             order = "<" if view[1] == 1 else ">"
             view = view[_ENCAPSULATION:]
         cursor = _Cursor(view, self._plans[order], order, self._aligned)
         fields = cursor.message(self._type_name)
         left = len(view) - cursor.position
         if left > (_PADDING if self._aligned else 0):
-            raise Undecodable(f"{left} bytes are left over: the message does not fit its definition")
+            raise Undecodable("bytes are left over: the message does not fit its definition")
         return fields
 
 
@@ -231,4 +231,4 @@ class _Cursor:
         return self.position + -self.position % alignment if self._aligned else self.position
 
     def _short(self) -> Undecodable:
-        return Undecodable(f"ends too early: {len(self._view)} bytes")
+        return Undecodable("ends too early")

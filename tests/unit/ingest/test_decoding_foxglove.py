@@ -182,7 +182,7 @@ def test_a_transform_without_rotation_is_no_rigid_transform() -> None:
 def test_stamps_out_of_range(seconds: int, nanos: int) -> None:
     decoder = decoder_for(Channel(1, "/t", "foxglove.PointCloud", "protobuf", "protobuf", b""))
     assert decoder is not None
-    with pytest.raises(Undecodable, match="stamp of"):
+    with pytest.raises(Undecodable, match="the stamp is negative"):
         decoder(PointCloud(timestamp={"seconds": seconds, "nanos": nanos}).SerializeToString())
 
 
@@ -211,7 +211,7 @@ def _raw_json(**changes: Any) -> bytes:
         (_raw_json(width=True), "'width' is no size"),
         (_raw_json(height=2**32), "'height' is no size"),
         (_raw_json(encoding=None), "'encoding' is no text"),
-        (_raw_json(frame_id="x" * 5000), "5000 characters"),
+        (_raw_json(frame_id="x" * 5000), "more than 4096 characters"),
         (_raw_json(timestamp=5), "the stamp is no pair"),
         (_raw_json(timestamp={"sec": 1.5, "nsec": 0}), "no whole number 'sec'"),
         (_raw_json(timestamp={"sec": 1}), "no whole number 'nsec'"),
@@ -235,12 +235,12 @@ def test_json_that_is_too_large_is_not_parsed() -> None:
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"K": [1.0] * 8}, "'k' has 8 numbers"),
+        ({"K": [1.0] * 8}, "'k' has not as many"),
         ({"K": ["1"] * 9}, "'k' is no number"),
         ({"K": [1e999] * 9}, "not finite|no number"),
-        ({"D": [0.0] * 300}, "'d' has 300 numbers"),
+        ({"D": [0.0] * 300}, "'d' has not as many"),
         ({"D": 0.5}, "'d' is no list"),
-        ({"P": [1.0] * 9}, "'p' has 9 numbers"),
+        ({"P": [1.0] * 9}, "'p' has not as many"),
         ({"D": [10**400]}, "not finite"),
     ],
 )

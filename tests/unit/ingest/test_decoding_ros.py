@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from stages.ingest.messages.container import Channel
 from stages.ingest.messages.decoding import decoder_for, why_unreadable
+from stages.ingest.messages.pixels import depth_unit
 from stages.ingest.messages.records import (
     CalibrationRecord,
     ImageRecord,
@@ -173,7 +174,7 @@ def test_stamps_out_of_range_are_refused_and_zero_stays() -> None:
     assert decoder is not None
     for sec, nanosec in ((-1, 0), (0, 10**9), (5, 2**32 - 1)):
         head = {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": "f"}
-        with pytest.raises(Undecodable, match="stamp of"):
+        with pytest.raises(Undecodable, match="the stamp is negative"):
             decoder(serialized(ROS2, "sensor_msgs/CompressedImage", header=head, format="png"))
     (record,) = decoder(serialized(ROS2, "sensor_msgs/CompressedImage", format="png"))
     assert isinstance(record, ImageRecord) and record.stamp == 0
@@ -206,7 +207,7 @@ def test_one_bad_transform_of_several_does_not_cost_the_others() -> None:
         {"header": header(ROS2, STAMP, "world"), "child_frame_id": name, "transform": transform}
         for name, transform in (("a", TRANSFORM), ("b", bad), ("c", TRANSFORM))
     ]
-    with pytest.raises(Undecodable, match="1 of 3 transforms: field 'x' is not finite") as caught:
+    with pytest.raises(Undecodable, match="not every transform holds: field 'x' is not finite") as caught:
         decoded(ROS2, "tf2_msgs/TFMessage", transforms=transforms)
     assert [record.child for record in caught.value.records if isinstance(record, TransformRecord)] == ["a", "c"]
 
@@ -282,6 +283,25 @@ def test_realsense_bag() -> None:
     assert isinstance(transform, TransformRecord)
     assert (transform.parent, transform.child) == ("device_0/reference_0", color)
     assert transform.parent_from_child[0, 3] == pytest.approx(-0.0143, abs=2e-4)
+
+
+@pytest.mark.parametrize(("unit", "expected"), [(0.001, 1000.0), (0.00025, 4000.0), (0.0001, 10000.0), (0.0, None)])
+def test_newer_realsense_bags_end_images_in_the_unit_of_depth(unit: float, expected: float | None) -> None:
+    """Their definition does not say so, their frame does: `1`."""
+    topic = "/device_0/sensor_0/Depth_0/image/data"
+    decoder = decoder_for(channel(ROS1, "sensor_msgs/Image", topic))
+    assert decoder is not None
+    fields = {"height": 2, "width": 2, "encoding": "mono16", "step": 4, "data": np.arange(8, dtype=np.uint8)}
+    older = serialized(ROS1, "sensor_msgs/Image", header=header(ROS1, STAMP, "0"), **fields)
+    newer = serialized(ROS1, "sensor_msgs/Image", header=header(ROS1, STAMP, "1"), **fields)
+    (plain,), (stated,) = decoder(older), decoder(newer + np.float32(unit).tobytes())
+    assert isinstance(plain, ImageRecord) and plain.units_per_metre is None
+    assert stated == replace(plain, units_per_metre=expected)
+    assert isinstance(stated, ImageRecord) and depth_unit(stated) == (expected or 1000)
+    elsewhere = decoder_for(channel(ROS1, "sensor_msgs/Image", "/camera/depth"))
+    assert elsewhere is not None
+    with pytest.raises(Undecodable, match="left over"):
+        elsewhere(newer + np.float32(unit).tobytes())
 
 
 @pytest.mark.parametrize("name", ["watercan.bag", "example.bag"])
