@@ -80,6 +80,16 @@ class Track:
             return None
         return interpolated(_matrix(rows[after - 1]), _matrix(rows[after]), (stamp - before) / (then - before))
 
+    def why_not(self, stamp: int) -> str:
+        """Return in words why there may be nothing at `stamp` [ns]."""
+        stamps, _ = self.samples()
+        after = int(np.searchsorted(stamps, stamp))
+        if after == 0:
+            return f"begins {(int(stamps[0]) - stamp) * 1e-9:.3g} s later"
+        if after == len(stamps):
+            return f"ended {(stamp - int(stamps[-1])) * 1e-9:.3g} s before"
+        return f"has samples {(int(stamps[after]) - int(stamps[after - 1])) * 1e-9:.3g} s apart there"
+
 
 class TransformTree:
     """Edges parent -> child. A frame that was given several parents follows the first, or the one towards `prefer`."""
@@ -185,6 +195,13 @@ class TransformTree:
         if common_from_source is None or common_from_target is None:
             return None
         return inverse(common_from_target) @ common_from_source if down else common_from_source
+
+    def why_not(self, target: str, source: str, stamp: int, *, gap: int, tolerance: int) -> str:
+        """Return in words which transform `lookup` lacks at `stamp` [ns]; empty when it lacks none."""
+        for frame in self.between(target, source):
+            if not self.is_constant(frame) and self._track(frame).at(stamp, gap=gap, tolerance=tolerance) is None:
+                return f"{self.parent(frame)!r} -> {frame!r} {self._track(frame).why_not(stamp)}"
+        return ""
 
     def is_static(self, frame: str) -> bool:
         """Whether the edge above a frame was published as static."""

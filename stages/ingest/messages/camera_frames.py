@@ -54,7 +54,8 @@ def frame_entries(
         wanted["labels"] = topics.labels
     found = {stream: partners(stamps, content.images[topic].stamps, tolerance) for stream, topic in wanted.items()}
     needed = [stream for stream in ("depth", "right") if stream in wanted and not (stream == "right" and with_depth)]
-    entries = []
+    entries: list[Entry] = []
+    without_pose: list[int] = []
     for index in range(len(stamps)):
         places: dict[str, Hashable] = {"color" if with_color else "depth": main.locations[index]}
         stamp = int(stamps[index])
@@ -72,6 +73,8 @@ def frame_entries(
         pose = None if poses is None else poses.at(geometry.frame, stamp)
         if pose is not None:
             pose = pose @ geometry.frame_from_camera
+        elif poses is not None:
+            without_pose.append(stamp)
         load = _loader(log, places, geometry, parameters)
         entries.append(Entry(name, stamp * 1e-9, pose, load, None, topics.name))
     notes = []
@@ -79,6 +82,11 @@ def frame_entries(
         unused = len(content.images[wanted["depth"]].stamps) - sum(entry.problem is None for entry in entries)
         if unused > 0:
             notes.append(f"{unused} depth images without a colour image of their own were left")
+    if poses is not None and without_pose:
+        notes.append(
+            f"{len(without_pose)} of {len(entries)} frames have no pose, the first at {without_pose[0] * 1e-9:.3f} s: "
+            f"{poses.why_not(geometry.frame, without_pose[0])} (--maximum-transform-gap {poses.gap * 1e-9:g})"
+        )
     return entries, notes
 
 

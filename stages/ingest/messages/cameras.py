@@ -300,6 +300,20 @@ def _color_beside(cameras: list[CameraTopics], content: LogContent, depth: str |
     return colors[0] if colors else None
 
 
+def unpaired_side(camera: CameraTopics, content: LogContent) -> str | None:
+    """Return a note when the colour topic has a counterpart by name, but their calibrations make no pair."""
+    if camera.color is None or camera.right is not None:
+        return None
+    for left in (True, False):
+        for other in other_side(camera.color, left=left):
+            if other in content.images and content.images[other].role == "color":
+                return (
+                    f"{camera.color} and {other} look like a stereo pair by name, but neither P[3] of their "
+                    "calibrations nor transforms between their frames give a baseline"
+                )
+    return None
+
+
 def alternatives(camera: CameraTopics, content: LogContent) -> list[str]:
     """Return the image topics of a camera's device that are not used, but could be asked for."""
     here = place(camera.main)

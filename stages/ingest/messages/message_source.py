@@ -19,6 +19,7 @@ from stages.ingest.messages.cameras import (
     calibration_topic,
     chosen_cameras,
     find_cameras,
+    unpaired_side,
 )
 from stages.ingest.messages.container import MessageLog
 from stages.ingest.messages.opening import open_message_log
@@ -102,6 +103,9 @@ class _Built:
         self.entries: list[Entry]
         self.entries, frame_notes = frame_entries(log, content, topics, self._geometry, self.poses, parameters)
         depth_notes = [] if topics.depth is None else [depth_note(log, topics.depth, content, parameters)]
+        side = unpaired_side(topics, content)
+        if side is not None:
+            frame_notes.append(side)
         unused = alternatives(topics, content)
         if unused:
             frame_notes.append(f"not used: {', '.join(unused)} (--color-topic, --depth-topic)")

@@ -49,6 +49,19 @@ class PoseSource:
             return None
         return world_from_reference @ reference_from_child @ child_from_frame
 
+    def why_not(self, frame: str, stamp: int) -> str:
+        """Return in words why there is no pose of a frame at a stamp [ns]."""
+        limits = {"gap": self.gap, "tolerance": self.tolerance}
+        if self.poses is None:
+            return self.tree.why_not(self.world, frame, stamp, **limits)
+        if self.poses.track.at(stamp, **limits) is None:
+            return f"{self.poses.topic} {self.poses.track.why_not(stamp)}"
+        for target, source in ((self.child, frame), (self.world, self.poses.frame_id)):
+            reason = "" if target == source else self.tree.why_not(target, source, stamp, **limits)
+            if reason:
+                return reason
+        return ""
+
     def _between(self, target: str, source: str, stamp: int) -> np.ndarray | None:
         if target == source:
             return np.eye(4)
@@ -66,7 +79,8 @@ def find_poses(
     """
     content.tree.prefer(parameters.world_frame)
     if parameters.pose_topic is not None:
-        return _asked_for(content, frame, parameters, where), []
+        asked_for = _asked_for(content, frame, parameters, where)
+        return asked_for, list(asked_for.notes)
     notes: list[str] = []
     found = _from_tree(content, frame, parameters, where, notes)
     if found is None:
