@@ -35,7 +35,7 @@ def test_a_scene_that_ends_well(tmp_path: Path) -> None:
     found = run_scene(scene(tmp_path, "write"))
     assert found is not None
     assert (found.outcome, found.exit_code, found.reason, found.failed_step) == ("done", 0, "", None)
-    assert found.host == this_host() and found.seconds > 0 and found.peak_memory_bytes > 2**20
+    assert found.host == this_host() and found.seconds > 0 and found.peak_memory_bytes > 0
     assert set(found.artifacts) == {"sequence"} and found.measures == {"sequence/frames": 7.0}
     assert not (tmp_path / "run" / PROCESS_NAME).exists()
     text = (tmp_path / "run" / LOG_NAME).read_text()

@@ -134,10 +134,11 @@ class TableDisplay:
 
     def table(self, now: float) -> Any:
         """Return what is drawn at `now` (time.monotonic) [s]."""
+        from rich.console import Group
         from rich.table import Table
         from rich.text import Text
 
-        table = Table(title=self._count.as_text(), title_justify="left", box=None)
+        table = Table(box=None)
         for heading in ("scene", "step", "time"):
             table.add_column(heading, justify="right" if heading == "time" else "left")
         for name, (begun, follower) in list(self._running.items())[:LONGEST_TABLE]:
@@ -146,7 +147,7 @@ class TableDisplay:
         hidden = len(self._running) - LONGEST_TABLE
         if hidden > 0:
             table.add_row(f"and {hidden} more", "", "")
-        return table
+        return Group(Text(self._count.as_text()), table)
 
 
 class QuietDisplay(LineDisplay):

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import json
 import os
+import resource
+import select
 import shlex
 import signal
 import socket
@@ -14,7 +16,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -69,6 +71,31 @@ def end_leftover(folder: Path, grace: float) -> None:
     record.unlink(missing_ok=True)
 
 
+class _Pauses:
+    """Pauses that end early when a process of ours ends, where the kernel can tell (Linux)."""
+
+    def __init__(self, pid: int) -> None:
+        self._descriptor: int | None = None
+        self._seconds = 0.001
+        with suppress(OSError, AttributeError):
+            self._descriptor = os.pidfd_open(pid)
+            self._ended = select.poll()
+            self._ended.register(self._descriptor, select.POLLIN)
+
+    def pause(self) -> None:
+        """Wait a moment."""
+        if self._descriptor is not None:
+            self._ended.poll(1000 * LONGEST_PAUSE)
+        else:
+            time.sleep(self._seconds)
+            self._seconds = min(2 * self._seconds, LONGEST_PAUSE)
+
+    def close(self) -> None:
+        """Free the descriptor."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+
+
 def _has_exited(pid: int) -> bool:
     """Tell whether our child has ended, without taking its status: its group number stays taken until then."""
     return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
@@ -90,34 +117,36 @@ def _watch(job: Job, process: subprocess.Popen[bytes], cancelled: Callable[[], b
     """Wait for the end of a scene, and bring it about at a limit."""
     found = _Watched()
     begun = time.monotonic()
-    next_sample, kill_at, grace, pause = begun, None, job.grace, 0.001
-    while not _has_exited(process.pid):
-        now = time.monotonic()
-        if now >= next_sample:
-            memory = resident_memory(process.pid)
-            found.peak_memory = max(found.peak_memory, memory)
-            next_sample = time.monotonic() + SAMPLE_INTERVAL
-        else:
-            memory = 0
-        if kill_at is None:
-            if cancelled():
-                found.stopped_by = "interrupted"
-            elif job.time_limit is not None and now - begun > job.time_limit:
-                found.stopped_by = "time limit"
-            elif job.memory_limit is not None and memory > job.memory_limit:
-                found.stopped_by, grace = "memory limit", min(job.grace, MEMORY_GRACE)
-            if found.stopped_by is not None:
-                signal_group(process.pid, signal.SIGTERM)
-                kill_at = now + grace
-        elif now > kill_at:
-            signal_group(process.pid, signal.SIGKILL)
-        time.sleep(pause)
-        pause = min(2 * pause, LONGEST_PAUSE)
+    next_sample, kill_at, grace = begun, None, job.grace
+    with closing(_Pauses(process.pid)) as pauses:
+        while not _has_exited(process.pid):
+            now = time.monotonic()
+            if now >= next_sample:
+                memory = resident_memory(process.pid)
+                found.peak_memory = max(found.peak_memory, memory)
+                next_sample = now + min(SAMPLE_INTERVAL, now - begun)  # short scenes are looked at more often
+            else:
+                memory = 0
+            if kill_at is None:
+                if cancelled():
+                    found.stopped_by = "interrupted"
+                elif job.time_limit is not None and now - begun > job.time_limit:
+                    found.stopped_by = "time limit"
+                elif job.memory_limit is not None and memory > job.memory_limit:
+                    found.stopped_by, grace = "memory limit", min(job.grace, MEMORY_GRACE)
+                if found.stopped_by is not None:
+                    signal_group(process.pid, signal.SIGTERM)
+                    kill_at = now + grace
+            elif now > kill_at:
+                signal_group(process.pid, signal.SIGKILL)
+            pauses.pause()
     signal_group(process.pid, signal.SIGKILL)  # what it started and left behind
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = found.status = os.waitstatus_to_exitcode(status)
-    # A spike between two looks shows in the largest process at least. Linux counts it in KiB.
-    found.peak_memory = max(found.peak_memory, usage.ru_maxrss * 1024)
+    # A spike between two looks shows in the largest process at least [KiB]. The figure begins with what this process
+    # held when it forked, so it says something only above our own peak.
+    if usage.ru_maxrss > resource.getrusage(resource.RUSAGE_SELF).ru_maxrss:
+        found.peak_memory = max(found.peak_memory, usage.ru_maxrss * 1024)
     return found
 
 

@@ -69,7 +69,7 @@ def summary_texts(title: str, jobs: Sequence[Job], latest: Mapping[str, SceneRes
     tables += [t for t in (reason_table(jobs, latest), accepted_table(jobs, latest)) if t.rows]
     groups = group_table(jobs, latest)
     tables += [groups] if groups.rows else []
-    markdown = [f"# {title}", *(as_markdown(table) for table in (*tables, people))]
+    markdown = [f"# {title}\n", *(as_markdown(table) for table in (*tables, people))]
     page = [
         "<!doctype html>",
         '<html lang="en"><head><meta charset="utf-8">',
