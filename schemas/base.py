@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -31,6 +32,24 @@ Vector3 = tuple[float, float, float]
 QuaternionXYZW = tuple[float, float, float, float]
 Transform = Annotated[tuple[tuple[float, ...], ...], AfterValidator(_check_rows(4, 4))]
 """A 4x4 homogeneous `target_from_source` matrix, row major, metres."""
+
+
+def _check_name(value: str) -> str:
+    if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,199}", value):
+        raise ValueError(f"{value!r:.60} is no plain name (ASCII letters, digits, _ . -)")
+    return value
+
+
+def _check_relative_path(value: str) -> str:
+    for part in value.split("/"):
+        _check_name(part)
+    return value
+
+
+Name = Annotated[str, AfterValidator(_check_name)]
+"""Names that become file names and URDF links."""
+RelativePath = Annotated[str, AfterValidator(_check_relative_path)]
+"""A path below the artifact's folder, with /."""
 
 
 def as_transform(matrix: np.ndarray) -> tuple[tuple[float, ...], ...]:

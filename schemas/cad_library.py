@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from schemas.artifact import Artifact
-from schemas.base import Model, Vector3
+from schemas.base import Model, Name, Vector3
 from schemas.scene_parts import Joint, SurfacePlane
 
 
@@ -24,7 +24,7 @@ class CadModel(Model):
     """One CAD model. Model frame: metres, z up, front along -y, origin at the centre of the bottom
     of the closed (all joints 0) bounding box."""
 
-    id: str
+    id: Name
     class_name: str
     articulated: bool
     mass: float
@@ -37,7 +37,7 @@ class CadModel(Model):
     """Whether things can be put inside."""
     grasp_width: float | None = None
     """Horizontal extent that a two-finger gripper can close on [m], for movable models."""
-    parts: tuple[str, ...]
+    parts: tuple[Name, ...]
     """Link names; the first is the body."""
     recipe: dict[str, float | int | str] = {}
     """Generator and its parameters, or the source file of an import."""

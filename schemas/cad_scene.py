@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from schemas.artifact import Artifact
-from schemas.base import Model, Transform
+from schemas.base import Model, Name, Transform
 from schemas.contact_graph import ContactGraphFile
 
 
 class CadCandidate(Model):
     """One aligned candidate: CAD model, state and pose."""
 
-    model_id: str
+    model_id: Name
     joints: dict[str, float] = {}
     scale: float
     world_from_model: Transform
@@ -26,7 +26,7 @@ class CadCandidate(Model):
 class Replacement(Model):
     """What stands for one graph node."""
 
-    node: str
+    node: Name
     decision: Literal["cad", "mesh", "layout"]
     """`mesh`: no valid candidate, the reconstructed mesh stays; `layout`: never replaced."""
     reason: str = ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from schemas.artifact import Artifact
-from schemas.base import Model, Transform
+from schemas.base import Model, Name, RelativePath, Transform
 from schemas.scene_parts import Box, Relation, SurfacePlane
 
 SCENE_NODE = "scene"
@@ -14,13 +14,13 @@ SCENE_NODE = "scene"
 class GraphNode(Model):
     """A node <o, c, M, B, Pi>. The scene root has neither mesh nor box."""
 
-    id: str
+    id: Name
     """`<class>_<instance>`, unique; `scene` for the root."""
     instance: int
     """Instance label o in the panoptic map or ground truth; 0 for the scene root."""
     class_name: str
     node_type: Literal["scene", "layout", "rigid", "articulated"]
-    mesh: str | None = None
+    mesh: RelativePath | None = None
     """M: path inside the panoptic map artifact (`entities/<instance>.ply`), or None."""
     box: Box | None = None
     """B, gravity-aligned, world frame, after refinement."""
@@ -30,7 +30,7 @@ class GraphNode(Model):
     """Pi, world frame."""
     confidence: float = 1.0
     # What cg' adds (kind cad_scene): which model stands for the node.
-    model_id: str | None = None
+    model_id: Name | None = None
     world_from_model: Transform | None = None
     scale: float | None = None
     joints: dict[str, float] = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from schemas.artifact import Artifact
-from schemas.base import Model, Transform, Vector3
+from schemas.base import Model, Name, Transform, Vector3
 from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import Box, Camera
 
@@ -15,10 +15,10 @@ class TrueObject(Model):
 
     instance: int
     """Label in the log's `labels` stream."""
-    name: str
+    name: Name
     """`<class>_<instance>`; the node id in graph.json and the body name in room/."""
     class_name: str
-    model_id: str | None = None
+    model_id: Name | None = None
     """Model in the CAD library; None for layout entities."""
     scale: float = 1.0
     world_from_model: Transform

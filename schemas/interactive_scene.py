@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from schemas.artifact import Artifact
-from schemas.base import Model, Transform
+from schemas.base import Model, Name, RelativePath, Transform
 from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import Box, Joint
 
@@ -14,12 +14,12 @@ class SceneBody(Model):
     """One node of the scene as links: in scene.urdf and static.urdf all links are prefixed `<name>__<part>`,
     the body link is `<name>`."""
 
-    name: str
+    name: Name
     """Node id of the contact graph."""
     class_name: str
     movable: bool
     """Movable bodies hang on floating joints in scene.urdf and have a file of their own."""
-    file: str | None = None
+    file: RelativePath | None = None
     """`bodies/<name>.urdf` for movable bodies, None for those in static.urdf."""
     parent: str | None = None
     relation: str = "supports"
@@ -39,8 +39,8 @@ class InteractiveSceneFile(Model):
     """scene.json: how to load the scene. Physics engines that know no floating joints load `static_file` with a
     fixed base and then each movable body at world_from_body."""
 
-    combined_file: str = "scene.urdf"
-    static_file: str = "static.urdf"
+    combined_file: RelativePath = "scene.urdf"
+    static_file: RelativePath = "static.urdf"
     bodies: tuple[SceneBody, ...]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from schemas.artifact import Artifact
-from schemas.base import Model, Vector3
+from schemas.base import Model, RelativePath, Vector3
 
 
 class Entity(Model):
@@ -14,7 +14,7 @@ class Entity(Model):
     instance: int
     """Global instance label p, >= 1."""
     class_name: str
-    mesh: str
+    mesh: RelativePath
     """`entities/<instance>.ply`."""
     vertices: int
     triangles: int

@@ -34,7 +34,14 @@ def model_folder(library: CadLibrary, model_id: str) -> Path:
 
 def read_model(folder: Path) -> CadModel:
     """Return the description that lies inside a model folder (`model.json`). Raises BadInput."""
-    return CadModel.read(Path(folder) / MODEL_FILE)
+    path = Path(folder) / MODEL_FILE
+    model = CadModel.read(path)
+    if not model.parts or len(set(model.parts)) < len(model.parts):
+        raise BadInput(f"{path}: parts {model.parts} are none or not different", hint=REBUILD)
+    for joint in model.joints:
+        if joint.part not in model.parts:
+            raise BadInput(f"{path}: joint {joint.name!r} moves {joint.part!r}, which is no part", hint=REBUILD)
+    return model
 
 
 def part_transforms(model: CadModel, joints: dict[str, float]) -> dict[str, np.ndarray]:
@@ -86,6 +93,8 @@ def posed_mesh(folder: Path, model: CadModel, joints: dict[str, float], scale: f
     parts = load_visual_parts(folder)
     placed = []
     for part in model.parts:
+        if part not in parts:
+            raise BadInput(f"{folder}: no visual/{part}.glb", hint=REBUILD)
         mesh = parts[part]
         mesh.apply_transform(transforms[part])
         placed.append(mesh)

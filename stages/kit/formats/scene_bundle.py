@@ -95,7 +95,7 @@ def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraph
 def _checked(bodies: list[BundleBody]) -> list[BundleBody]:
     seen: set[str] = set()
     for body in bodies:
-        if not NAME.fullmatch(body.name) or body.name == WORLD:
+        if not NAME.fullmatch(body.name) or body.name == WORLD or body.name.startswith((".", "-")):
             raise BadInput(f"body name {body.name!r} is not usable in URDF", hint="use ASCII letters, digits and _")
         if body.name in seen:
             raise BadInput(f"two bodies are called {body.name!r}")
@@ -116,19 +116,18 @@ def _parents_first(bodies: list[BundleBody]) -> list[BundleBody]:
     by_name = {body.name: body for body in bodies}
     ordered: dict[str, BundleBody] = {}
 
-    def place(body: BundleBody, path: tuple[str, ...]) -> None:
-        if body.name in ordered:
-            return
-        if body.name in path:
-            raise BadInput(f"bodies carry each other in a circle: {' -> '.join((*path, body.name))}")
-        if body.parent not in (None, SCENE_NODE):
-            if body.parent not in by_name:
-                raise BadInput(f"body {body.name}: parent {body.parent!r} does not exist")
-            place(by_name[body.parent], (*path, body.name))
-        ordered[body.name] = body
-
     for body in bodies:
-        place(body, ())
+        path: dict[str, BundleBody] = {}
+        name: str | None = body.name
+        while name not in (None, SCENE_NODE) and name not in ordered:
+            if name in path:
+                raise BadInput(f"bodies carry each other in a circle: {' -> '.join((*list(path)[-9:], name))}")
+            if name not in by_name:
+                raise BadInput(f"body {list(path)[-1]}: parent {name!r} does not exist")
+            path[name] = by_name[name]
+            name = by_name[name].parent
+        for carried in reversed(path.values()):
+            ordered[carried.name] = carried
     return list(ordered.values())
 
 

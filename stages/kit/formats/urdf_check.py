@@ -32,14 +32,14 @@ def check_urdf(path: Path, root: Path | None = None) -> list[Problem]:
 
     Mesh files must lie inside `root` (the folder of the URDF when None).
     Kinds: `unreadable`, `name`, `duplicate`, `dangling`, `cycle`, `roots`, `not_finite`, `axis`, `limits`,
-    `joint_type`, `mass`, `inertia`, `no_inertia`, `mesh_missing`, `mesh_outside`, `geometry`.
+    `joint_type`, `mimic`, `mass`, `inertia`, `no_inertia`, `mesh_missing`, `mesh_outside`, `geometry`.
     """
     path = Path(path)
     try:
         urdf = parse_urdf(path)
     except BadInput as error:
-        return [Problem("unreadable", path.name, error.message)]
-    problems = _check_names(urdf) + _check_tree(urdf)
+        return [Problem("unreadable", path.name, error.message.removeprefix(f"{path}: "))]
+    problems = _check_names(urdf) + _check_tree(urdf) + _check_mimics(urdf)
     moving = {joint.child for joint in urdf.joints if joint.type != "fixed"}
     if not urdf.joints:
         moving |= {link.name for link in urdf.links if link.visuals or link.collisions}
@@ -87,13 +87,7 @@ def _check_tree(urdf: Urdf) -> list[Problem]:
         if joint.child in parents:
             problems.append(Problem("cycle", f"link {joint.child!r}", "has more than one parent joint"))
         parents[joint.child] = joint.parent
-    for start in sorted(parents):
-        seen, link = {start}, parents[start]
-        while link in parents and link not in seen:
-            seen.add(link)
-            link = parents[link]
-        if link == start:
-            problems.append(Problem("cycle", f"link {start!r}", "is its own ancestor"))
+    problems += [Problem("cycle", f"link {name!r}", "is its own ancestor") for name in _in_circles(parents)]
     if not names:
         problems.append(Problem("roots", "robot", "has no links"))
     elif len(urdf.roots()) != 1:
@@ -101,6 +95,34 @@ def _check_tree(urdf: Urdf) -> list[Problem]:
             Problem("roots", "robot", f"has {len(urdf.roots())} root links, expected 1: {urdf.roots()[:4]}")
         )
     return problems
+
+
+def _in_circles(following: dict[str, str]) -> list[str]:
+    """Return the keys from which following leads back to themselves, sorted. Every key is visited twice at most."""
+    circles: set[str] = set()
+    done: set[str] = set()
+    for start in following:
+        path: dict[str, None] = {}
+        name = start
+        while name in following and name not in done and name not in path:
+            path[name] = None
+            name = following[name]
+        if name in path:
+            walked = list(path)
+            circles.update(walked[walked.index(name) :])
+        done.update(path)
+    return sorted(circles)
+
+
+def _check_mimics(urdf: Urdf) -> list[Problem]:
+    driven = {joint.name: joint.mimics for joint in urdf.joints if joint.mimics is not None}
+    names = {joint.name for joint in urdf.joints}
+    problems = [
+        Problem("mimic", f"joint {name!r}", f"mimics joint {driver!r}, which does not exist")
+        for name, driver in driven.items()
+        if driver not in names
+    ]
+    return problems + [Problem("mimic", f"joint {name!r}", "mimics itself in a circle") for name in _in_circles(driven)]
 
 
 def _check_inertia(link: Link, must_have: bool) -> list[Problem]:
@@ -117,6 +139,8 @@ def _check_inertia(link: Link, must_have: bool) -> list[Problem]:
     problems = []
     if mass <= 0:
         problems.append(Problem("mass", element, f"mass is {mass:g} kg"))
+    if not np.isfinite(scale := float(np.abs(tensor).max())) or scale > 1e12:
+        return [*problems, Problem("inertia", element, f"inertia of {scale:g} kg m^2")]
     moments = np.linalg.eigvalsh(tensor)
     if moments[0] <= 0:
         problems.append(
@@ -144,11 +168,15 @@ def _check_shape(link: str, shape: Shape, folder: Path, root: Path) -> list[Prob
     name = shape.mesh or ""
     if shape.scale <= 0:
         return [Problem("geometry", element, f"mesh {name!r} has scale {shape.scale:g}")]
-    root = root.resolve()
-    target = (folder / name).resolve()
+    try:
+        root = root.resolve()
+        target = (folder / name).resolve()
+        found = target.is_file()
+    except (OSError, ValueError, RuntimeError) as error:  # too long, with a zero byte, links in a circle
+        return [Problem("mesh_outside", element, f"mesh {name!r:.80}: {getattr(error, 'strerror', None) or error}")]
     if "://" in name or PurePosixPath(name).is_absolute() or not target.is_relative_to(root) or target == root:
         return [Problem("mesh_outside", element, f"mesh {name!r} is not a path inside the folder of the model")]
-    if not target.is_file():
+    if not found:
         return [Problem("mesh_missing", element, f"mesh {name!r} does not exist")]
     return []
 

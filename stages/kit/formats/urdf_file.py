@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from schemas.errors import BadInput
+from stages.kit.formats.xml_files import parse_xml
 from stages.kit.geometry.solids import MassProperties
 from stages.kit.geometry.transforms import transform_from
 
@@ -58,6 +59,8 @@ class UrdfJoint:
     velocity: float = 2.0
     damping: float = 0.0
     friction: float = 0.0
+    mimics: str | None = None
+    """Name of the joint that drives this one. Read to be checked; scenes have none, and none is written."""
 
 
 @dataclass(frozen=True)
@@ -173,14 +176,11 @@ def parse_urdf(path: Path) -> Urdf:
         if path.stat().st_size > MAXIMUM_BYTES:
             raise BadInput(f"{path}: larger than {MAXIMUM_BYTES} bytes")
         text = path.read_bytes()
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}") from None
-    if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
-        raise BadInput(f"{path}: declares entities", hint="a URDF needs none; remove the DOCTYPE")
-    try:
-        robot = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise BadInput(f"{path}: no well-formed XML: {error}") from None
+    except FileNotFoundError:
+        raise BadInput(f"{path}: file is missing") from None
+    except (OSError, ValueError) as error:
+        raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+    robot = parse_xml(text, str(path))
     if robot.tag != "robot":
         raise BadInput(f"{path}: root element is <{robot.tag}>, expected <robot>")
     links = tuple(_parse_link(element, path) for element in robot.findall("link"))
@@ -280,4 +280,5 @@ def _parse_joint(element: ElementTree.Element, path: Path) -> UrdfJoint:
         velocity=value(limit, "velocity", "0"),
         damping=value(dynamics, "damping", "0"),
         friction=value(dynamics, "friction", "0"),
+        mimics=None if (mimic := element.find("mimic")) is None else mimic.get("joint", ""),
     )

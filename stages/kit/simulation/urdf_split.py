@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 from schemas.errors import BadInput
+from stages.kit.formats.xml_files import parse_xml
 
 PART_SEPARATOR = "__"
 
@@ -13,11 +14,12 @@ PART_SEPARATOR = "__"
 def read_urdf(path: Path) -> ElementTree.Element:
     """Parse a URDF file. Raises BadInput when it is missing or no URDF."""
     try:
-        root = ElementTree.parse(path).getroot()
+        data = path.read_bytes()
     except FileNotFoundError:
         raise BadInput(f"{path}: file is missing", hint="make the scene again") from None
-    except ElementTree.ParseError as error:
-        raise BadInput(f"{path}: no XML: {error}", hint="make the scene again") from None
+    except (OSError, ValueError) as error:
+        raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}", hint="make the scene again") from None
+    root = parse_xml(data, str(path))
     if root.tag != "robot":
         raise BadInput(f"{path}: root element is <{root.tag}>, expected <robot>", hint="make the scene again")
     return root

@@ -15,6 +15,7 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.interactive_scene import InteractiveSceneFile, SceneBody
+from stages.kit.formats.urdf_check import require_sound
 from stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion
 from stages.kit.simulation.engine import engine, native_output_to_stderr
 from stages.kit.simulation.urdf_split import read_urdf, split_body, with_absolute_meshes, without_visuals
@@ -238,9 +239,11 @@ class PhysicsWorld:
 def read_scene_bodies(root: Path) -> dict[str, tuple[SceneBody, str]]:
     """Return the bodies of an interactive scene folder: name -> (record, URDF text with absolute mesh paths).
 
-    Raises BadInput when a file is missing or a body has no links.
+    Raises BadInput when a file is missing or not sound, or a body has no links.
     """
     scene = InteractiveSceneFile.read(root / "scene.json")
+    for name in (scene.static_file, *(body.file for body in scene.bodies if body.file is not None)):
+        require_sound(root / name, root)
     static = read_urdf(root / scene.static_file)
     names = {body.name for body in scene.bodies}
     bodies = {}

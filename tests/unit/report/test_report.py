@@ -187,9 +187,8 @@ def test_pictures_decode_to_their_stated_size(whole):
 
 def test_hostile_names_are_text(tmp_path):
     graph = graph_of(ROOM)
-    nodes = tuple(n.model_copy(update={"id": HOSTILE}) if n.id == "cup_4" else n for n in graph.nodes)
-    links = tuple(r.model_copy(update={"target": HOSTILE}) if r.target == "cup_4" else r for r in graph.links)
-    graph = graph.model_copy(update={"nodes": nodes, "links": links})
+    nodes = tuple(n.model_copy(update={"class_name": HOSTILE}) if n.id == "cup_4" else n for n in graph.nodes)
+    graph = graph.model_copy(update={"nodes": nodes})
     sequence = make_sequence(tmp_path / "sequence")
     sequence.info.model_copy(update={"source_format": HOSTILE}).write(tmp_path / "sequence" / "sequence.json")
     report(

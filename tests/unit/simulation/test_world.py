@@ -93,5 +93,5 @@ def test_a_missing_file_or_link_is_named(scene: Path) -> None:
 
 def test_a_broken_urdf_is_refused(scene: Path) -> None:
     (scene / "static.urdf").write_text("<robot><link name=")
-    with pytest.raises(BadInput, match="no XML"):
+    with pytest.raises(BadInput, match="no well-formed XML"):
         load_scene(scene)
