@@ -82,9 +82,10 @@ def test_poses_refer_to_the_link_frame_not_to_the_centre_of_mass(tmp_path: Path)
 
 
 def test_a_missing_file_or_link_is_named(scene: Path) -> None:
-    (scene / "bodies" / "bottle_7.urdf").unlink()
+    bottle = (scene / "bodies" / "bottle_7.urdf").rename(scene / "bottle_7.urdf")
     with pytest.raises(BadInput, match=r"bottle_7\.urdf: file is missing"):
         load_scene(scene)
+    bottle.rename(scene / "bodies" / "bottle_7.urdf")
     text = (scene / "static.urdf").read_text().replace("table_3", "table_4")
     (scene / "static.urdf").write_text(text)
     with pytest.raises(BadInput, match="table_3"):
