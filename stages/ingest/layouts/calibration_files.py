@@ -212,23 +212,20 @@ def _first(document: Any, *names: str) -> Any:
 
 
 def _numbers(value: Any) -> list[float] | None:
-    """Return the numbers of a list, nested or not, or of an OpenCV matrix; None when they are none."""
+    """Return the numbers of a list, of a list of rows, or of an OpenCV matrix; None when they are none.
+
+    Rows hold numbers only: YAML can name one list many times over, so deeper nesting may be endless.
+    """
     if isinstance(value, dict):
         value = value.get("data")
     if not isinstance(value, list | tuple) or len(value) > 100:
         return None
-    flat: list[float] = []
-    for item in value:
-        if isinstance(item, list) and len(item) <= 100:
-            below = _numbers(item)
-            if below is None:
-                return None
-            flat += below
-        elif isinstance(item, int | float) and not isinstance(item, bool) and abs(item) < 1e12:
-            flat.append(float(item))
-        else:
-            return None
-    return flat
+    rows = value if all(isinstance(item, list) for item in value) else [value]
+    if any(len(row) > 100 for row in rows):
+        return None
+    flat = [item for row in rows for item in row]
+    plain = all(isinstance(item, int | float) and not isinstance(item, bool) and abs(item) < 1e12 for item in flat)
+    return [float(item) for item in flat] if plain else None
 
 
 def _matrix(value: Any, rows: int, columns: int) -> np.ndarray | None:
