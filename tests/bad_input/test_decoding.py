@@ -170,12 +170,12 @@ MEGABYTE = 1 << 20
 
 
 def _peak(work: Callable[[], object]) -> tuple[int, float]:
-    """Return (bytes, seconds) that some work took at most."""
+    """Return (bytes, seconds of this process) that some work took at most."""
     tracemalloc.start()
-    start = time.perf_counter()
+    start = time.process_time()
     try:
         work()
-        return tracemalloc.get_traced_memory()[1], time.perf_counter() - start
+        return tracemalloc.get_traced_memory()[1], time.process_time() - start
     finally:
         tracemalloc.stop()
 

@@ -31,24 +31,21 @@ class _Packing:
     dtype: str
     channels: int
     to_rgb: int | None = None
-    """Colour conversion of OpenCV; None where picking channels does."""
-    order: tuple[int, ...] = ()
-    """Which channels are red, green and blue."""
+    """Colour conversion of OpenCV; None where pixels are red, green, blue as they stand."""
 
 
-RGB, BGR, GREY = (0, 1, 2), (2, 1, 0), (0, 0, 0)
 COLORS: dict[str, _Packing] = {
-    "rgb8": _Packing("u1", 3, order=RGB),
-    "bgr8": _Packing("u1", 3, order=BGR),
-    "8uc3": _Packing("u1", 3, order=BGR),
-    "rgba8": _Packing("u1", 4, order=RGB),
-    "bgra8": _Packing("u1", 4, order=BGR),
-    "8uc4": _Packing("u1", 4, order=BGR),
-    "mono8": _Packing("u1", 1, order=GREY),
-    "8uc1": _Packing("u1", 1, order=GREY),
-    "mono16": _Packing("u2", 1, order=GREY),
-    "rgb16": _Packing("u2", 3, order=RGB),
-    "bgr16": _Packing("u2", 3, order=BGR),
+    "rgb8": _Packing("u1", 3),
+    "bgr8": _Packing("u1", 3, cv2.COLOR_BGR2RGB),
+    "8uc3": _Packing("u1", 3, cv2.COLOR_BGR2RGB),
+    "rgba8": _Packing("u1", 4, cv2.COLOR_RGBA2RGB),
+    "bgra8": _Packing("u1", 4, cv2.COLOR_BGRA2RGB),
+    "8uc4": _Packing("u1", 4, cv2.COLOR_BGRA2RGB),
+    "mono8": _Packing("u1", 1, cv2.COLOR_GRAY2RGB),
+    "8uc1": _Packing("u1", 1, cv2.COLOR_GRAY2RGB),
+    "mono16": _Packing("u2", 1, cv2.COLOR_GRAY2RGB),
+    "rgb16": _Packing("u2", 3),
+    "bgr16": _Packing("u2", 3, cv2.COLOR_BGR2RGB),
     "bayer_rggb8": _Packing("u1", 1, cv2.COLOR_BayerRGGB2RGB),
     "bayer_bggr8": _Packing("u1", 1, cv2.COLOR_BayerBGGR2RGB),
     "bayer_gbrg8": _Packing("u1", 1, cv2.COLOR_BayerGBRG2RGB),
@@ -167,11 +164,9 @@ def color_pixels(record: ImageRecord) -> np.ndarray | bytes:
     if packing is None:
         raise Unusable("unknown_encoding", f"{record.encoding!r:.40}")
     pixels = _raw(record, packing.dtype, packing.channels, "undecodable_color")
-    if packing.to_rgb is not None:
-        return _converted(pixels, packing.to_rgb)
     if pixels.dtype == np.uint16:
         pixels = (pixels >> 8).astype(np.uint8)
-    return np.ascontiguousarray(pixels.reshape(*pixels.shape[:2], -1)[..., list(packing.order)])
+    return pixels.copy() if packing.to_rgb is None else _converted(pixels, packing.to_rgb)
 
 
 def _converted(pixels: np.ndarray, conversion: int) -> np.ndarray:

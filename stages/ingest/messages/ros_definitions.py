@@ -50,22 +50,22 @@ Definitions = dict[str, tuple[Field, ...]]
 
 
 def short_name(type_name: str) -> str:
-    """Return `package/Type` of `package/Type` or `package/msg/Type`."""
-    return type_name.replace("/msg/", "/")
+    """Return `package/Type` of `package/Type`, `package/msg/Type` or `package::msg::Type`."""
+    return type_name.replace("::", "/").replace("/msg/", "/")
 
 
 def definitions_of(type_name: str, schema_encoding: str, schema: bytes) -> Definitions:
     """Return the definitions of a type and of what it refers to. Raises UnreadableDefinition.
 
-    `schema_encoding` is `ros1msg`, `ros2msg`, `ros2idl` or empty; types that the schema does not define are taken
-    from those that come with rosbags.
+    `schema_encoding` is `ros1msg`, `ros2msg`, `ros2idl`, `omgidl` or empty; types that the schema does not define are
+    taken from those that come with rosbags.
     """
     if len(schema) > LARGEST_DEFINITION:
         raise UnreadableDefinition(f"its definition has {len(schema)} bytes, more than {LARGEST_DEFINITION}")
     text = schema.decode("utf-8", "replace").replace("\r\n", "\n")
     found: Definitions = {}
     if text.strip():
-        found = parse_idl(text) if schema_encoding == "ros2idl" else parse_msg(text, type_name)
+        found = parse_idl(text) if schema_encoding in ("ros2idl", "omgidl") else parse_msg(text, type_name)
     name = short_name(type_name)
     if name in found and schema_encoding == "ros1msg":
         found |= {"builtin_interfaces/Time": ROS1_TIME, "builtin_interfaces/Duration": ROS1_TIME}

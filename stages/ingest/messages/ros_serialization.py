@@ -23,7 +23,7 @@ from stages.ingest.messages.ros_definitions import (
     UnreadableDefinition,
 )
 
-MOST_VALUES = 500_000
+MOST_VALUES = 250_000
 """Fields that one message may hold, an array of numbers counted as one."""
 DEEPEST = 24
 """Levels of messages within messages."""

@@ -166,7 +166,7 @@ def test_jpeg_after_the_header_is_refused() -> None:
 def test_rvl_is_decoded_fast_enough_for_recorded_logs() -> None:
     body = encode_rvl(_room(480, 640))
     decode_rvl(body)
-    start = time.perf_counter()
+    start = time.process_time()
     for _ in range(10):
         decode_rvl(body)
-    assert 10 / (time.perf_counter() - start) > 100
+    assert 10 / (time.process_time() - start) > 100

@@ -114,6 +114,9 @@ def test_idl_reads_as_its_msg() -> None:
     )
     header = "=" * 80 + "\nIDL: sensor_msgs/msg/CameraInfo\n"
     assert parse_idl(header + IDL) == parse_msg(msg, "sensor_msgs/msg/CameraInfo")
+    found = definitions_of("sensor_msgs::msg::CameraInfo", "omgidl", IDL.encode())
+    assert found["sensor_msgs/CameraInfo"] == parse_idl(IDL)["sensor_msgs/CameraInfo"]
+    assert _ours(found["std_msgs/Header"]) == [("stamp", "builtin_interfaces/Time", None), ("frame_id", "string", None)]
 
 
 def test_idl_reads_as_rosbags_reads_it() -> None:

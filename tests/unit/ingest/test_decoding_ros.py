@@ -247,10 +247,10 @@ def test_large_images_are_not_read_byte_by_byte() -> None:
     decoder = decoder_for(channel(ROS2, "sensor_msgs/Image"))
     assert decoder is not None
     decoder(message)
-    start = time.perf_counter()
+    start = time.process_time()
     for _ in range(50):
         decoder(message)
-    assert 50 / (time.perf_counter() - start) > 500
+    assert 50 / (time.process_time() - start) > 500
 
 
 # --- real logs ---------------------------------------------------------------------------------------------------
