@@ -62,32 +62,47 @@ def run(
     settings: Settings = None,
     only: Annotated[list[str] | None, typer.Option("--only", help="Only this step; may be repeated.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Make every artifact again.")] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would run and why.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would run, why, and what it costs.")] = False,
+    max_memory: Annotated[
+        str | None, typer.Option("--max-memory", help="Stop a step that uses more than this: 4GiB.")
+    ] = None,
     json_output: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> int:
     """Run a pipeline: the same commands that the Makefile chains."""
     from stages.kit.running.chain import run_pipeline
-    from stages.kit.running.pipelines import pipeline_path, read_pipeline
+    from stages.kit.running.memory_limit import parse_limit
+    from stages.kit.running.pipeline_estimation import warn_or_refuse
+    from stages.kit.running.pipelines import pipeline_path, read_pipeline, resolve_variables
 
     flags = {"--force": force, "--dry-run": dry_run, "--quiet": quiet, "--debug": debug}
     extra = tuple(flag for flag, given in flags.items() if given)
+    if max_memory is not None:
+        parse_limit(max_memory)
+        extra += ("--max-memory", max_memory)
+    chain = read_pipeline(pipeline_path(pipeline))
+    values = _settings(settings)
+    expected = warn_or_refuse(chain, out, resolve_variables(chain, values), tuple(only or ()))
+    if dry_run:
+        for line in expected.lines():
+            _say(line)
     reports = run_pipeline(
-        read_pipeline(pipeline_path(pipeline)),
+        chain,
         out,
-        _settings(settings),
+        values,
         extra=extra,
         only=tuple(only or ()),
         announce=(lambda text: None) if quiet else _say,
     )
     for report in reports:
-        facts = report.facts
-        _say(f"{report.name:24} {facts.get('status', f'exit {report.exit_code}'):11} {facts.get('outcome', '')}")
-        if dry_run and facts.get("reason"):
-            _say(f"{'':24} {facts['reason']}")
+        status = report.facts.get("status", f"exit {report.exit_code}")
+        _say(f"{report.name:24} {status:11} {report.facts.get('outcome', '')}")
+        if dry_run and report.facts.get("reason"):
+            _say(f"{'':24} {report.facts['reason']}")
     if json_output:
-        _out(json.dumps({"run": str(out), "steps": [r.facts for r in reports]}, sort_keys=True))
+        facts = {"run": str(out), "steps": [r.facts for r in reports], "estimate": expected.as_json()}
+        _out(json.dumps(facts, sort_keys=True))
     else:
         _out(str(out))
     return reports[-1].exit_code if reports else 0

@@ -151,6 +151,7 @@ def report_result(result: RunResult, stage: Stage, accept: tuple[str, ...], json
             "outcome": result.outcome,
             "summary": manifest.summary if manifest else {},
             "nondeterministic": result.nondeterministic,
+            "estimate": result.estimate.as_json() if result.estimate else None,
         }
         sys.stdout.write(json.dumps(facts, sort_keys=True) + "\n")
     else:
@@ -159,7 +160,8 @@ def report_result(result: RunResult, stage: Stage, accept: tuple[str, ...], json
             seconds = f" in {manifest.provenance.seconds:.1f} s" if result.status == "made" else ""
             sys.stderr.write(f"{stage.name}: {result.status}{seconds}: {result.outcome}. {summary}\n")
         else:
-            sys.stderr.write(f"{stage.name}: {result.status}: {result.reason}\n")
+            expected = f"; {result.estimate}" if result.estimate else ""
+            sys.stderr.write(f"{stage.name}: {result.status}: {result.reason}{expected}\n")
         sys.stdout.write(f"{result.path}\n")
     if manifest is not None and manifest.outcome != "ok" and manifest.outcome not in accept:
         sys.stderr.write(

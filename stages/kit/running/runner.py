@@ -18,7 +18,7 @@ from schemas.artifact import Artifact
 from schemas.errors import BadInput, MachineFailure, MissingDependency, UsageError
 from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
 from stages.kit.progress import SilentProgress
-from stages.kit.running import interruption, memory_limit, store
+from stages.kit.running import estimation, interruption, memory_limit, store
 from stages.kit.running.digests import content_digest, external_digest, external_files, record_files
 from stages.kit.running.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
 from stages.kit.running.model_cache import resolve_weights
@@ -41,6 +41,8 @@ class RunResult:
     manifest: Manifest | None
     nondeterministic: bool = False
     """The same key gave another content digest than before."""
+    estimate: estimation.Estimate | None = None
+    """What it would write and use, for a dry run."""
 
     @property
     def outcome(self) -> str:
@@ -263,7 +265,8 @@ def run_stage(
         previous = _previous_manifest(out)
         reason = _reason_to_run(out, key, previous, force, _what_changed(previous, facts) if previous else [])
         status: Literal["up to date", "would run"] = "up to date" if reason is None else "would run"
-        return RunResult(status, reason or "", out, key, previous if reason is None else None)
+        expected = estimation.estimate_step(stage.name, parameters, inputs) if reason is not None else None
+        return RunResult(status, reason or "", out, key, previous if reason is None else None, estimate=expected)
 
     with _machine_errors(out), store.locked(out):
         previous = _previous_manifest(out)
@@ -271,6 +274,7 @@ def run_stage(
         if reason is None:
             return RunResult("up to date", "", out, key, previous)
         logger.info("%s: %s", stage.name, reason)
+        estimation.warn_or_refuse(stage.name, parameters, inputs, out)
         started = datetime.now(UTC)
         progress = progress or SilentProgress()
         with store.partial_folder(out) as partial:

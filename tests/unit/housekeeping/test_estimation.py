@@ -1,0 +1,137 @@
+"""What a step is going to write: the table against measured runs, and what happens when it does not fit."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cli.main import run
+from schemas.errors import MachineFailure
+from stages.kit.running import estimation
+from stages.kit.running.discovery import all_stages
+from stages.kit.running.estimation import FORMULAS, Amount, Estimate, check, estimate, estimate_step, measured
+from stages.kit.running.pipeline_estimation import estimate_pipeline
+from stages.kit.running.pipelines import pipeline_path, read_pipeline, resolve_variables
+from tests.unit.export.sequences import write_sequence
+from tests.unit.housekeeping.artifacts import make_artifact
+from tests.unit.housekeeping.small_step import SMALL, SmallParameters
+
+DEMO = read_pipeline(pipeline_path("demo"))
+MEASURED = {
+    ("24", "240", "180", "0.04"): {
+        "cad_library": (4.62, 153), "ground_truth": (9.80, 648), "sequence": (0.87, 111), "segments": (0.41, 223),
+        "panoptic_map": (5.57, 269), "contact_graph": (0.08, 286), "cad_scene": (2.17, 489),
+        "interactive_scene": (3.26, 185), "evaluation": (0.30, 392), "report": (0.94, 863),
+    },
+    ("60", "320", "240", "0.01"): {
+        "ground_truth": (19.36, 556), "sequence": (3.88, 113), "segments": (1.07, 227), "panoptic_map": (134.23, 1043),
+        "contact_graph": (0.10, 673), "cad_scene": (38.51, 492), "interactive_scene": (85.49, 1037),
+    },
+    ("120", "640", "480", "0.02"): {
+        "ground_truth": (50.26, 830), "sequence": (32.28, 118), "segments": (3.56, 305), "panoptic_map": (31.47, 586),
+        "contact_graph": (0.12, 396), "cad_scene": (9.14, 505), "interactive_scene": (17.66, 303),
+        "plan": (2.14, 691), "evaluation": (0.37, 501), "report": (1.66, 1033),
+    },
+}  # fmt: skip
+"""Frames, width, height, voxel size of `scenewright run demo` -> step -> (megabytes written, peak memory [MiB])."""
+
+
+@pytest.mark.parametrize("settings", MEASURED, ids="-".join)
+def test_whole_runs_are_foreseen(settings: tuple[str, ...], tmp_path: Path) -> None:
+    """From the command line alone: disk within a factor of 1.9, memory within a factor of 1.6, lower bounds kept."""
+    names = ("frames", "width", "height", "voxel_size")
+    values = resolve_variables(DEMO, dict(zip(names, settings, strict=True)))
+    found = {step.name: step.estimate for step in estimate_pipeline(DEMO, tmp_path, values).steps}
+    for name, (megabytes, mebibytes) in MEASURED[settings].items():
+        expected = found[name]
+        assert expected is not None
+        assert megabytes / 1.9 < expected.output.megabytes < megabytes * 1.9, name
+        assert expected.output.lower <= megabytes, name
+        assert mebibytes / 1.6 < expected.memory / 2**20 < mebibytes * 1.6, name
+
+
+def test_the_table_is_about_steps_that_there_are() -> None:
+    assert set(FORMULAS) <= set(all_stages())
+
+
+@given(st.sampled_from(sorted(FORMULAS)), st.floats(0, 1e7), st.floats(0, 1e6), st.floats(0, 1e6))
+def test_estimates_are_sane_whatever_the_input(name: str, megabytes: float, frames: float, megapixels: float) -> None:
+    stage = all_stages()[name]
+    for amount in (Amount(megabytes, megabytes), Amount(megabytes, 0.0, frames, megapixels)):
+        expected = estimate(name, stage.parameters(), dict.fromkeys(stage.reads, amount))
+        assert expected is not None
+        assert 0 <= expected.disk_lower <= expected.disk and expected.memory > 0
+
+
+def test_what_is_on_the_disk_is_measured(tmp_path: Path) -> None:
+    sequence = write_sequence(tmp_path / "sequence")
+    files = {path.name: path.read_bytes() for path in sequence.root.iterdir()}
+    info = sequence.info
+    folder = make_artifact(tmp_path / "artifact", "sequence", {"sequence.json": files["sequence.json"].decode()})
+    amount = measured(folder)
+    size = info.camera.width * info.camera.height / 1e6
+    assert (amount.frames, amount.megapixels) == (5, pytest.approx(5 * size))
+    assert amount.frame_megapixels == pytest.approx(size)
+    (tmp_path / "log").mkdir()
+    (tmp_path / "log" / "a.bin").write_bytes(b"x" * 2_000_000)
+    assert measured(tmp_path / "log").megabytes == 2 and measured(tmp_path / "log" / "a.bin").megabytes == 2
+    assert estimate_step("ingest", all_stages()["ingest"].parameters(), {"log": tmp_path / "nowhere"}) is None
+    (folder / "manifest.json").write_text("{")
+    assert measured(folder).megabytes > 0  # whoever opens it says what is wrong
+
+
+def test_a_full_disk_is_known_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = Estimate(Amount(100.0, 10.0), 1e6)
+    monkeypatch.setattr(estimation, "free_bytes", lambda out: 5_000_000)
+    with pytest.raises(MachineFailure, match=r"at least 10.0 MB, and 5.0 MB are free") as caught:
+        check("fuse", expected, tmp_path)
+    assert caught.value.exit_code == 6
+    monkeypatch.setattr(estimation, "free_bytes", lambda out: 50_000_000)
+    assert "may fill the disk" in check("fuse", expected, tmp_path)[0]
+    monkeypatch.setattr(estimation, "free_bytes", lambda out: 500_000_000)
+    assert check("fuse", expected, tmp_path) == []
+    monkeypatch.setattr(estimation, "available_memory", lambda: 1000)
+    assert "may run out of memory" in check("fuse", expected, tmp_path)[0]
+
+
+def test_a_step_that_does_not_fit_does_not_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(estimation, "free_bytes", lambda out: 1000)
+    assert run(["library", "build", "--out", str(tmp_path / "library")]) == 6
+    assert "at least" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == [".library.lock"]
+    assert run(["run", "demo", "--out", str(tmp_path / "run")]) == 6
+    assert "pipeline demo writes at least" in capsys.readouterr().err and not (tmp_path / "run").exists()
+
+
+def test_dry_runs_say_what_it_costs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["library", "build", "--out", str(tmp_path / "library"), "--dry-run", "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["estimate"]["disk_bytes"] == pytest.approx(4.6e6)
+    assert run(["run", "demo", "--out", str(tmp_path / "run"), "--dry-run"]) == 0
+    assert "to write" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_steps_that_nobody_measured_just_run(tmp_path: Path) -> None:
+    from stages.kit.running.runner import run_stage
+
+    result = run_stage(SMALL, {}, tmp_path / "a", SmallParameters(), dry_run=True)
+    assert result.estimate is None
+    assert run_stage(SMALL, {}, tmp_path / "a", SmallParameters()).status == "made"
+
+
+def test_what_is_there_costs_nothing_more(tmp_path: Path) -> None:
+    values = resolve_variables(DEMO, {})
+    before = estimate_pipeline(DEMO, tmp_path, values).total
+    make_artifact(tmp_path / "ground_truth", "trajectory")
+    after = estimate_pipeline(DEMO, tmp_path, values)
+    assert next(step for step in after.steps if step.name == "ground_truth").there
+    assert after.total.disk < before.disk and "is there" in "\n".join(after.lines())
+    only = estimate_pipeline(DEMO, tmp_path, values, only=("segments",))
+    assert [step.name for step in only.steps] == ["segments"] and only.total.disk < 10e6
