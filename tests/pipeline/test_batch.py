@@ -19,6 +19,7 @@ import numpy as np
 import psutil
 import pytest
 
+from cli.batch_command import batch as batch_command
 from schemas.errors import MachineFailure, UsageError
 from stages.kit.running.batch.expansion import Batch, read_batch
 from stages.kit.running.batch.folder_lock import folder_lock
@@ -224,6 +225,13 @@ def test_a_job_array_run_by_hand_gives_what_the_batch_gives(tmp_path: Path) -> N
     with pytest.raises(UsageError, match="write the scripts again"):
         (out / "slurm" / "jobs.txt").write_text("a\n")
         run_task(read_batch(batch.path), out, 0, 1, command=program_command)
+
+
+@pytest.mark.parametrize(("options", "match"), [({"retry": "some"}, "--retry"), ({"task": "4"}, "INDEX/COUNT")])
+def test_wrong_options_are_usage_errors(tmp_path: Path, options: dict[str, str], match: str) -> None:
+    with pytest.raises(UsageError, match=match):
+        batch_command(write_batch(tmp_path, {"a": "write"}), tmp_path / "out", **options)
+    assert not (tmp_path / "out").exists()
 
 
 def write_log(folder: Path, frames: int) -> None:

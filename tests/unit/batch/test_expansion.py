@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import os
+import tomllib
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from schemas.errors import UsageError
 from stages.kit.running.batch.expansion import make_jobs, read_batch, shuffled
+from stages.kit.running.batch.spec import (
+    BatchSpec,
+    DataSpec,
+    Limits,
+    LocalOptions,
+    RayOptions,
+    SlurmOptions,
+    check_spec,
+)
 from tests.unit.batch.batches import batch_of, write_batch
 
 SETS = '[[parameters]]\nname = "fine"\nset = { every = 1 }\n[[parameters]]\nname = "coarse"\nset = { every = 5 }\n'
@@ -153,3 +165,49 @@ def test_the_fingerprint_follows_values_pipeline_and_inputs(tmp_path: Path) -> N
     os.utime(tmp_path / "logs" / "a.txt", ns=(2, 2))
     after = again()
     assert after["a"] != before["a"] and after["b"] == before["b"]
+
+
+def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = write_batch(tmp_path, {"a": "write"})
+    Path(os.fsdecode(os.fsencode(tmp_path) + b"/logs/\xff.txt")).write_text("write")
+    with pytest.raises(UsageError, match="not a printable name") as caught:
+        read_batch(path)
+    str(caught.value).encode()
+
+
+def test_a_bottomless_file_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "deep.toml").write_text("a = " + "[" * 100_000)
+    with pytest.raises(UsageError, match="deep.toml"):
+        read_batch(tmp_path / "deep.toml")
+
+
+KEYS = ("pipeline", "set", "scene", "data", "parameters", "seeds", "shuffle_seed", "limits", "executor", "time", "kind")
+VALUES = st.recursive(
+    st.sampled_from(["ray", "local", "slurm", "4 GiB", "1-3", "log", "", "x\0y"]) | st.integers(-2, 9) | st.booleans()
+    | st.floats() | st.datetimes(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(
+        st.sampled_from((*KEYS, "name", "variable", "glob", "memory", "jobs", "address")), inner, max_size=4
+    ),
+    max_leaves=12,
+)  # fmt: skip
+
+
+@given(st.dictionaries(st.sampled_from(KEYS), VALUES, max_size=8))
+def test_any_values_are_a_batch_or_a_usage_error(values: dict) -> None:
+    try:
+        check_spec({"pipeline": "reconstruct"} | values, "b.toml")
+    except UsageError as error:
+        assert str(error).startswith("b.toml: ")
+
+
+def test_the_examples_of_the_documentation_are_valid() -> None:
+    text = (Path(__file__).resolve().parents[3] / "docs" / "BATCH.md").read_text()
+    blocks = [tomllib.loads(block.split("```")[0]) for block in text.split("```toml\n")[1:]]
+    specs = [check_spec({"pipeline": "reconstruct"} | block, "docs") for block in blocks]
+    assert [spec.executor.kind for spec in specs] == ["local", "ray", "slurm"]
+    whole = blocks[0]
+    assert set(whole) == set(BatchSpec.model_fields), "the example shows every key"
+    for key, model in (("data", DataSpec), ("limits", Limits)):
+        assert set(whole[key]) == set(model.model_fields)
+    for block, options in zip(blocks, (LocalOptions, RayOptions, SlurmOptions), strict=True):
+        assert set(options.model_fields) - set(block["executor"]) <= {"jobs"}, "and every option"

@@ -55,6 +55,8 @@ def find_scenes(data: DataSpec, base: Path, where: str) -> list[tuple[str, Path]
     paths = [*named[: len(data.folders)], *found, *named[len(data.folders) :]]
     seen: dict[str, Path] = {}
     for path in paths:
+        if not str(path).isprintable():  # such names survive neither JSON nor a log of lines
+            raise UsageError(f"{where}: data: {str(path)!r}: not a printable name", hint="rename it")
         real = os.path.realpath(path)
         if real in seen:
             raise UsageError(f"{where}: data: {path} is named twice", hint="each scene once")

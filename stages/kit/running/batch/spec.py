@@ -66,9 +66,9 @@ class DataSpec(_Strict):
     """Scenes found on disk; every path becomes the value of one variable. Relative paths start at the batch file."""
 
     variable: str
-    folders: tuple[str, ...] = Field((), strict=False)
-    glob: str | None = None
-    list: str | None = None
+    folders: tuple[Line, ...] = Field((), strict=False)
+    glob: Line | None = None
+    list: Line | None = None
     """A text file with one path a line; empty lines and lines that begin with # are left out."""
 
 
@@ -139,7 +139,7 @@ class SlurmOptions(_Strict):
 class BatchSpec(_Strict):
     """A batch file."""
 
-    pipeline: str
+    pipeline: Line
     set: dict[str, Value] = {}
     scene: tuple[SceneSpec, ...] = Field((), strict=False)
     data: DataSpec | None = None
@@ -155,9 +155,18 @@ def read_spec(path: Path) -> BatchSpec:
     """Read a batch file. Raises UsageError naming the file and the first wrong field."""
     try:
         with Path(path).open("rb") as file:
-            return BatchSpec.model_validate(tomllib.load(file))
+            values = tomllib.load(file)
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise UsageError(f"{path}: {error}", hint="a batch is a TOML file") from None
+    except RecursionError:
+        raise UsageError(f"{path}: nested too deeply", hint=HINT) from None
+    return check_spec(values, str(path))
+
+
+def check_spec(values: dict[str, Any], path: str) -> BatchSpec:
+    """Check the values of a batch file. Raises UsageError naming `path` and the first wrong field."""
+    try:
+        return BatchSpec.model_validate(values)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "document"
