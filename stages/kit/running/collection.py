@@ -252,7 +252,7 @@ def _superseded_by(path: Path, artifacts: dict[Path, _Artifact], above: tuple[Pa
 def _digest_now(record: InputRecord, place: Path, owner: _Artifact) -> str | None:
     """Digest of an input as its artifact states it now; None when it is no longer there."""
     if place == owner.path:
-        return owner.manifest.content_digest
+        return owner.manifest.content_digest if record.kind != "external" else external_digest(place)
     name = place.relative_to(owner.path).as_posix()
     known = {file.path: file.sha256 for file in owner.manifest.files}
     return known.get(name, record.digest if place.is_dir() else None)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from schemas.base import canonical_json
 from schemas.errors import BadInput
-from schemas.manifest import MANIFEST_NAME, FileRecord
+from schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME, FileRecord, Manifest
 
 
 def sha256_of_file(path: Path) -> str:
@@ -76,11 +76,28 @@ def external_digest(path: Path) -> str:
 
 
 def external_files(path: Path) -> list[Path]:
-    """Return the files of a raw input: itself, or a folder's sorted files without hidden ones."""
+    """Return the files of a raw input: itself, or a folder's sorted files without hidden ones.
+
+    A folder that a step wrote (`export`) counts by its payload: its manifest and timings are new every time.
+    """
     if not path.is_dir():
         return [path]
+    passed_over = _bookkeeping(path)
     return [
         file
         for file in sorted(path.rglob("*"), key=lambda p: p.relative_to(path).as_posix())
-        if file.is_file() and not any(part.startswith(".") for part in file.relative_to(path).parts)
+        if file.is_file()
+        and not any(part.startswith(".") for part in file.relative_to(path).parts)
+        and file.relative_to(path).as_posix() not in passed_over
     ]
+
+
+def _bookkeeping(folder: Path) -> set[str]:
+    path = folder / MANIFEST_NAME
+    try:
+        if path.stat().st_size > LARGEST_MANIFEST:
+            return set()
+        manifest = Manifest.read(path)
+    except (OSError, BadInput):
+        return set()  # there is none, or it is not one of ours
+    return {MANIFEST_NAME, *(record.path for record in manifest.files if not record.digested)}

@@ -9,6 +9,7 @@ from schemas.errors import BadInput, ScenewrightError
 from schemas.manifest import MANIFEST_NAME, Manifest
 from stages.kit.running.digests import content_digest, external_digest, payload_files, sha256_of_file
 from stages.kit.running.reading import check_sizes, check_version, read_manifest
+from stages.kit.running.store import TIMINGS_NAME
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,8 @@ def verify(root: Path, seen: dict[Path, Finding] | None = None) -> list[Finding]
                 problems.append(f"input {record.role} ({source}) is not what the artifact was made from")
             elif (source.parent / MANIFEST_NAME).exists():  # a payload file of an artifact, such as a generated log
                 findings += verify(source.parent, seen)
+            elif (source / TIMINGS_NAME).exists() and (source / MANIFEST_NAME).exists():  # a log that `export` wrote
+                findings += verify(source, seen)
         else:
             try:
                 digest = read_manifest(source).content_digest

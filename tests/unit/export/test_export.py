@@ -16,9 +16,15 @@ from mcap_ros2.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 
 from schemas.errors import UsageError
+from schemas.manifest import MANIFEST_NAME, Manifest
+from schemas.sequence import Sequence
 from stages.export.parameters import ExportParameters, check
 from stages.export.tum import LARGEST_MILLIMETRES, depth_units, stamp_text
 from stages.kit.formats.frames import FrameReader
+from stages.kit.running.digests import content_digest, record_files
+from stages.kit.running.discovery import all_stages
+from stages.kit.running.runner import run_stage
+from stages.kit.running.verification import verify
 from tests.unit.export.sequences import CAMERA, OTHER, export, png, write_sequence
 from tests.unit.ingest.tiny_room import camera_poses
 
@@ -186,3 +192,25 @@ def test_options_that_cannot_work_are_refused(options: dict, words: str) -> None
 def test_an_unknown_camera_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="it has: camera"):
         export(write_sequence(tmp_path / "sequence"), tmp_path / "out", camera="rear")
+
+
+def test_an_export_is_a_log_by_its_payload(tmp_path: Path) -> None:
+    """Made again with the same bytes, it is the same log, though its manifest and timings are new."""
+    source = write_sequence(tmp_path / "sequence").root
+    records = record_files(source, ())
+    Manifest(
+        kind="sequence", schema_version=Sequence.schema_version, stage="test", stage_version=1, key="k",
+        content_digest=content_digest(records), files=records,
+    ).write(source / MANIFEST_NAME)  # fmt: skip
+    out, again = tmp_path / "tum", tmp_path / "again"
+    export_stage, ingest_stage = all_stages()["export"], all_stages()["ingest"]
+    parameters = ingest_stage.parameters(gravity="given")
+    run_stage(export_stage, {"sequence": source}, out, ExportParameters())
+    first = run_stage(ingest_stage, {"log": out}, again, parameters)
+    manifest = (out / MANIFEST_NAME).read_text()
+    run_stage(export_stage, {"sequence": source}, out, ExportParameters(), force=True, command=("another",))
+    assert (out / MANIFEST_NAME).read_text() != manifest
+    assert run_stage(ingest_stage, {"log": out}, again, parameters).status == "up to date"
+    assert [(f.path.name, f.problems) for f in verify(again)] == [("again", ()), ("tum", ()), ("sequence", ())]
+    (out / "groundtruth.txt").write_text("")
+    assert verify(again)[0].problems and first.status == "made"
