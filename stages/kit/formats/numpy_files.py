@@ -56,9 +56,9 @@ def _read_header(file: IO[bytes], name: str) -> tuple[tuple[int, ...], bool, np.
     try:
         version = np.lib.format.read_magic(file)
         shape, fortran_order, kind = readers[version](file, max_header_size=LARGEST_HEADER)
-    # numpy evaluates the header as a Python literal: whatever that parser stumbles over is a bad header.
-    except (ValueError, KeyError, SyntaxError, TypeError, MemoryError, RecursionError) as error:
-        raise BadInput(f"{name}: no array header: {str(error) or type(error).__name__:.80}") from None
+    except Exception as error:  # numpy parses the header as a Python literal and raises whatever that stumbles over
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise BadInput(f"{name}: no array header: {reason:.80}") from None
     if kind.hasobject or kind.kind not in PLAIN_KINDS or kind.subdtype is not None:
         raise BadInput(f"{name}: holds {kind}, expected plain numbers or text")
     if len(shape) > 8 or any(length < 0 for length in shape):
