@@ -215,7 +215,7 @@ def _log(path: Path, **replaced) -> Path:
 BAD_CALIBRATIONS = {
     "missing": (None, "no camera calibration"),
     "zero focal length": (calibration(0, K=[0.0] * 9), "no positive focal lengths"),
-    "no K": (calibration(0, K=[]), "no camera calibration.*1 of 1 messages of /info do not decode.*'k' has 0 numbers"),
+    "no K": (calibration(0, K=[]), "no camera calibration.*1 of 1 messages of /info do not decode.*'k' has "),
     "NaN": (calibration(0, K=[float("nan")] * 9), "no camera calibration.*'k' is not finite"),
     "negative": (calibration(0, K=[-80.0, 0, 40, 0, 80, 30, 0, 0, 1]), "no positive focal lengths"),
     "zero size": (calibration(0, width=0, height=0), "0x0"),

@@ -267,4 +267,9 @@ def _with_depth(
     same = np.abs(target_from_depth - np.eye(4)).max() < SAME_PLACE and same_rays(geometry.camera, depth.camera)
     if same and (depth.camera.width, depth.camera.height) == (geometry.camera.width, geometry.camera.height):
         return replace(geometry, depth=depth, notes=(*geometry.notes, *depth.notes))
+    if not parameters.register_depth:
+        note = (
+            f"WARNING: depth of {topics.depth} left out: it is not that of the left eye, and was not to be registered"
+        )
+        return replace(geometry, notes=(*geometry.notes, note))
     return replace(geometry, depth=depth, target_from_depth=target_from_depth, notes=(*geometry.notes, *depth.notes))

@@ -85,6 +85,11 @@ def find_poses(
     found = _from_tree(content, frame, parameters, where, notes)
     if found is None:
         found = _from_topics(content, frame, parameters, where, notes)
+    if found is None and parameters.world_frame is not None:
+        raise BadInput(
+            f"{where}: nothing leads from {parameters.world_frame!r} to the camera frame {frame!r}",
+            hint="leave out --world-frame, or record tf and tf_static",
+        )
     if found is None:
         return None, [*notes, "frames have no poses"] if notes else [
             f"no transforms lead to the camera frame {frame!r}: frames have no poses"
@@ -96,14 +101,13 @@ def _from_tree(
     content: LogContent, frame: str, parameters: IngestParameters, where: str, notes: list[str]
 ) -> PoseSource | None:
     tree, wanted = content.tree, parameters.world_frame
-    if not tree.has_parent(frame):
-        if wanted is not None and frame in tree.frames and wanted != frame:
-            _check_frame(wanted, content, where)
-        return None
-    chain = tree.chain(frame)
     if wanted is not None:
         _check_frame(wanted, content, where)
-    world = wanted or _world_of(chain)
+        if not (frame in tree.frames and wanted in tree.frames and tree.connected(wanted, frame)):
+            return None
+    elif not tree.has_parent(frame):
+        return None
+    world = wanted or _world_of(tree.chain(frame))
     edges = tree.between(world, frame)
     _check_parents(tree, edges, where)
     stands_still = f"all transforms from {world!r} to the camera {frame!r} are constant"

@@ -32,6 +32,7 @@ IMU_STEP = 50_000_000
 """Inertial samples nearer to the last one kept than this [ns] are not kept: up is a mean."""
 SIZE_ATTEMPTS = 20
 """Compressed images of a topic that are decoded to learn their size."""
+MOST_REASONS = 20
 LATEST = 1 << 62
 """Log times [ns] beyond this, in the year 2116, are damage and count as this."""
 STATIC = "tf_static"
@@ -56,6 +57,11 @@ class Topic:
     unreadable: str = ""
     undecodable: Counter[str] = field(default_factory=Counter)
     """Reason -> number of messages."""
+
+    def broken(self, reason: str) -> None:
+        """Count a message that does not decode. Reasons may name numbers, so that there can be one for each message."""
+        known = reason in self.undecodable or len(self.undecodable) < MOST_REASONS
+        self.undecodable[reason if known else "other reasons"] += 1
 
     def described(self) -> str:
         """Type and encoding, for people."""
@@ -169,7 +175,7 @@ def survey(log: MessageLog) -> LogContent:
         try:
             records = decoders[message.channel.id](message.data)
         except Undecodable as problem:
-            topic.undecodable[str(problem)] += 1
+            topic.broken(str(problem))
             records = problem.records
         for position, record in enumerate(records):
             reader.add(record, topic, min(message.log_time, LATEST), message.location, position == 0)
@@ -225,7 +231,7 @@ class _Reader:
     def _add_transform(self, record: TransformRecord, topic: Topic, stamp: int, static: bool) -> None:
         topic.role = "transforms"
         if record.parent == record.child or not record.child or not record.parent:
-            topic.undecodable[f"a transform from frame {record.parent!r} to {record.child!r} is none"] += 1
+            topic.broken(f"a transform from frame {record.parent!r} to {record.child!r} is none")
             return
         self._content.transform_topics[topic.name] = None
         self._content.tree.add(record.parent, record.child, stamp, record.parent_from_child, static)

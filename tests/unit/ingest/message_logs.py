@@ -335,6 +335,6 @@ def record_room(log: Any, recorded: list, start: int = FIRST, step: int = SECOND
         log.image(f"/{name}/aligned_depth_to_color/image_raw", stamp, millimetres(depth), "16UC1", frame)
 
 
-def compressed_depth_png(png: bytes) -> bytes:
-    """Return the data of a compressedDepth image of 16UC1 depth."""
-    return struct.pack("<iff", 0, 0.0, 0.0) + png
+def compressed_depth(packed: bytes) -> bytes:
+    """Return the data of a compressedDepth image of 16UC1 depth that is packed as PNG or RVL."""
+    return struct.pack("<iff", 0, 0.0, 0.0) + packed

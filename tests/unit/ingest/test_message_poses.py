@@ -127,6 +127,27 @@ def test_pose_topic_comes_before_the_tree_when_asked_for(tmp_path: Path) -> None
     assert any("does not say whose they are" in note for note in tracker.info.notes)
 
 
+def test_transforms_that_point_from_the_camera_to_the_world(tmp_path: Path) -> None:
+    """A tracker that publishes where the world is, seen from the camera, is read the other way round."""
+    with recorder(tmp_path) as log:
+        _images(log)
+        for index in range(4):
+            log.transform("/tf", FIRST + index * SECOND // 5, "optical", "marker", inverse(_moved(index)))
+    assert "pose" not in ingest(log.path, tmp_path / "out").info.streams
+    asked = ingest(log.path, tmp_path / "asked", gravity="none", world_frame="marker")
+    np.testing.assert_allclose(_poses(asked), [_moved(index) for index in range(4)], atol=1e-9)
+    with pytest.raises(BadInput, match="no frame 'map'.*frames: marker, optical"):
+        ingest(log.path, tmp_path / "wrong", world_frame="map")
+
+
+def test_world_that_nothing_connects_with_the_camera(tmp_path: Path) -> None:
+    with recorder(tmp_path) as log:
+        _images(log)
+        log.transform("/tf", FIRST, "map", "other", np.eye(4))
+    with pytest.raises(BadInput, match="nothing leads from 'map' to the camera frame 'optical'"):
+        ingest(log.path, tmp_path / "out", world_frame="map")
+
+
 def test_goals_are_not_taken_for_poses(tmp_path: Path) -> None:
     with recorder(tmp_path) as log:
         _images(log)

@@ -18,8 +18,9 @@ from stages.ingest.detection import open_log
 from stages.ingest.parameters import IngestParameters
 from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.trajectories import read_tum
-from tests.unit.ingest.message_logs import FIRST, SECOND, compressed_depth_png, recorder
+from tests.unit.ingest.message_logs import FIRST, SECOND, compressed_depth, recorder
 from tests.unit.ingest.running import ingest
+from tests.unit.ingest.rvl_writing import encode_rvl
 from tests.unit.ingest.tiny_room import CAMERA, frames, jpeg, millimetres, png
 
 COLOR, DEPTH = "/cam/color/image_raw/compressed", "/cam/aligned_depth_to_color/image_raw"
@@ -145,7 +146,7 @@ def test_images_that_do_not_decode_are_counted_by_reason(tmp_path: Path) -> None
 
 
 def test_depth_in_every_dress_is_the_same_depth(tmp_path: Path) -> None:
-    """Metres with NaN and infinity, big-endian millimetres, compressedDepth."""
+    """Metres with NaN and infinity, big-endian millimetres, compressedDepth as PNG and as RVL."""
     _, depth, _ = frames(1)[0]
     hole = depth.copy()
     hole[3, 4], hole[5, 6], hole[7, 8] = np.nan, np.inf, -np.inf
@@ -157,11 +158,18 @@ def test_depth_in_every_dress_is_the_same_depth(tmp_path: Path) -> None:
         "png": lambda log, stamp: log.compressed(
             "/cam/depth/image_raw/compressedDepth",
             stamp,
-            compressed_depth_png(png(whole)),
+            compressed_depth(png(whole)),
             "16UC1; compressedDepth png",
             "optical",
         ),
     }
+    writers["rvl"] = lambda log, stamp: log.compressed(
+        "/cam/depth/image_raw/compressedDepth",
+        stamp,
+        compressed_depth(encode_rvl(whole)),
+        "16UC1; compressedDepth rvl",
+        "optical",
+    )
     for name, write in writers.items():
         with recorder(tmp_path / name) as log:
             log.info("/cam/depth/camera_info", FIRST, "optical")
