@@ -77,7 +77,7 @@ def _change_text(change: Any) -> str:
 
 
 def _value_text(change: Any, value: Any) -> str:
-    if value is None:
+    if value in (None, ""):
         return "none"
     if change.group in ("input", "data file") or change.name in ("git_commit", "lock_digest"):
         return str(value)[:12]

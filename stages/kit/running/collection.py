@@ -199,7 +199,7 @@ def _leftover_item(target: Path, found: list[Path]) -> Item:
     size = sum(folder_bytes(path) for path in found)
     if is_locked(target):
         return Item(target, "leftover", "", size, "a run is writing it now")
-    reason = f"a run that was killed left {len(found)} of: partial folder, replaced artifact, journal"
+    reason = "left by a run that was killed"
     if any(path.name.endswith(".journal") for path in found):
         if not target.exists():
             size = 0  # one of them becomes the artifact

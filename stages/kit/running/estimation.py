@@ -26,6 +26,8 @@ logger = logging.getLogger("scenewright")
 MEGABYTE, MEBIBYTE = 1e6, 2**20
 LOG_MEGABYTES_PER_MEGAPIXEL = 0.87
 """JPEG colour and zstd-packed 16-bit depth, as ingest stores them; 0.84 to 0.88 on generated logs."""
+REPACKED = 1.2
+"""Size of a sequence beside its log: 1.0 for MCAP that is packed already, 1.4 for a folder of JPEG and depth PNG."""
 USUAL_FRAME = 0.3072
 """Megapixels of 640x480, where the size of the frames is not known yet."""
 
@@ -213,7 +215,7 @@ def _ingest(parameters: Any, inputs: Inputs) -> Estimate:
         megapixels = frames * log.frame_megapixels
         expected = LOG_MEGABYTES_PER_MEGAPIXEL * megapixels
         return Estimate(Amount(expected, 0.3 * expected, frames, megapixels), 120 * MEBIBYTE)
-    expected = log.megabytes * share
+    expected = REPACKED * log.megabytes * share
     cut = parameters.max_frames is not None or parameters.stop is not None or parameters.start > 0
     # Raw images shrink to a sixth. A part of the log may be any part of it.
     return Estimate(
@@ -255,9 +257,9 @@ FORMULAS: dict[str, Formula] = {
     "graph": _Linear("panoptic_map", 0.1, 0.0, 280, 3.0),
     "cad": _Linear("panoptic_map", 0.6, 0.28, 490, 0.0),
     "urdf": _Linear("cad_scene", 0.0, 2.1, 130, 23.0),
-    "plan": _Linear("scene", 2.2, 0.0, 600, 4.0),
+    "plan": _Linear("scene", 2.2, 0.0, 640, 0.0),
     "evaluate": _Linear("panoptic_map", 0.4, 0.0, 390, 3.5),
-    "report": _Linear("panoptic_map", 1.0, 0.02, 850, 6.0),
+    "report": _Linear("panoptic_map", 1.0, 0.02, 840, 9.5),
     "export": _export,
 }
 """Step -> formula. Outputs in megabytes, memory in MiB."""
