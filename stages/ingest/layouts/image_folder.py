@@ -319,7 +319,8 @@ def _poses(
     offset = calibration.posed_from_left
     if offset is not None and np.abs(offset - np.eye(4)).max() > 0:
         notes = (*notes, f"poses moved by {offset[0, 3]:.4g} m along x: KITTI states those of camera 0")
-        found = [(None if pose is None else pose @ offset, problem) for pose, problem in found]
+        with np.errstate(invalid="ignore"):  # poses that are not finite are counted later
+            found = [(None if pose is None else pose @ offset, problem) for pose, problem in found]
     return found, notes
 
 

@@ -40,7 +40,7 @@ from stages.ingest.source import Entry, LogSource, SourceCamera
 from stages.kit.geometry.transforms import inverse, is_rigid
 
 NAMES = ("transforms.json", "transforms_train.json")
-CV_FROM_GL = np.diag([1.0, -1.0, -1.0, 1.0])
+OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 DEFAULT_UNIT = 0.001
 """Metres per unit of depth when the file does not say: millimetres."""
 PERSPECTIVE = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL")
@@ -110,7 +110,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
             continue
         form = FrameFormat(recorded[index], group.camera, True, has_depth, units)
         load = frame_loader(FrameFiles(frame.color, frame.depth), form)
-        pose = None if frame.pose is None else world(frame.pose @ CV_FROM_GL)
+        pose = None if frame.pose is None else world(frame.pose)
         entries.append(Entry(frame.name, index / parameters.frame_rate, pose, load, frame.problem, group.name))
     cameras = [SourceCamera(group.name, group.camera) for group in groups if group.name in chosen]
     if not cameras:
@@ -193,7 +193,7 @@ def _pose(value: Any) -> tuple[np.ndarray | None, str | None]:
 
 def _number(fields: dict[str, Any], name: str, where: str, default: float | None = None) -> float:
     value = fields.get(name, default)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or abs(value) > 1e9:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 1e9:
         raise BadInput(f"{where}: {name} = {value!r:.40} is no number")
     return float(value)
 
@@ -271,7 +271,7 @@ def _first_places(recorded: list[RecordedCamera]) -> list[int]:
 def _world_from_saved(
     document: dict[str, Any], file: Path, has_depth: bool
 ) -> tuple[Callable[[np.ndarray], np.ndarray], tuple[str, ...]]:
-    """Return a function that undoes `applied_scale` and `applied_transform` of a pose, and notes."""
+    """Return a function from a pose in the file to world_from_camera in the original world, and notes."""
     scale = _number(document, "applied_scale", str(file), 1.0)
     if not scale > 0:
         raise BadInput(f"{file}: applied_scale {scale:g} is not positive")
@@ -293,8 +293,9 @@ def _world_from_saved(
         notes.append("WARNING: scale unknown: without depth nothing says that lengths in transforms.json are metres")
 
     def world(pose: np.ndarray) -> np.ndarray:
-        metric = pose.copy()
-        metric[:3, 3] /= scale
-        return original_from_saved @ metric
+        with np.errstate(invalid="ignore", over="ignore"):  # poses that are not finite are counted later
+            metric = pose @ OPENGL_FROM_OPENCV
+            metric[:3, 3] /= scale
+            return original_from_saved @ metric
 
     return world, tuple(notes)
