@@ -113,5 +113,5 @@ def load_recipe(name: str) -> Recipe:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         raise BadInput(f"{file.name}: {where}: {first['msg']}") from None
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise BadInput(f"{file.name}: {error}") from None

@@ -12,16 +12,28 @@ from pydantic import ValidationError
 from schemas.errors import UsageError
 from stages.kit.stage import Parameters, Stage
 
+LARGEST_TOML = 16 * 2**20
+"""Bytes."""
+
 
 def read_config(path: Path) -> dict[str, Any]:
     """Read a TOML file. Raises UsageError when it is missing or malformed."""
+    return read_toml(path, hint="a config file is TOML: name = value")
+
+
+def read_toml(path: Path, *, hint: str) -> dict[str, Any]:
+    """Return what a TOML file says. Raises UsageError, with `hint`, when it is missing, malformed or too large."""
     try:
+        if Path(path).stat().st_size > LARGEST_TOML:
+            raise UsageError(f"{path}: larger than {LARGEST_TOML} bytes", hint=hint)
         with Path(path).open("rb") as file:
             return tomllib.load(file)
     except OSError as error:
-        raise UsageError(f"{path}: {error.strerror}", hint="give a TOML file to --config") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: {error}", hint="a config file is TOML: name = value") from None
+        raise UsageError(f"{path}: {error.strerror}", hint=hint) from None
+    except RecursionError:
+        raise UsageError(f"{path}: nested too deeply", hint=hint) from None
+    except ValueError as error:  # malformed, no text, a number that Python does not convert
+        raise UsageError(f"{path}: {error}", hint=hint) from None
 
 
 def parameters_for(

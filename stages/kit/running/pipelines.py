@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from schemas.errors import UsageError
+from stages.kit.running.configuration import read_toml
 from stages.kit.running.discovery import all_stages, stage_by_name
 from stages.kit.stage import Stage
 
@@ -65,11 +65,9 @@ def pipeline_path(name_or_path: str) -> Path:
 
 def read_pipeline(path: Path) -> Pipeline:
     """Read and check a pipeline: known stages and parameters, inputs of the right kind. Raises UsageError."""
+    values = read_toml(path, hint="a pipeline is a TOML file")
     try:
-        with Path(path).open("rb") as file:
-            pipeline = Pipeline.model_validate(tomllib.load(file))
-    except (OSError, tomllib.TOMLDecodeError) as error:
-        raise UsageError(f"{path}: {error}", hint="a pipeline is a TOML file") from None
+        pipeline = Pipeline.model_validate(values)
     except ValidationError as error:
         first = error.errors()[0]
         raise UsageError(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}", hint="see docs") from None

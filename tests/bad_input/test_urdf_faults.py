@@ -1,0 +1,156 @@
+"""URDF and XML that cannot be, beyond tests/unit/urdf: size, circles, entities in any encoding, names as paths."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from schemas.errors import BadInput
+from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
+from stages.kit.formats.urdf_check import check_urdf, require_sound
+from stages.kit.formats.urdf_file import parse_urdf
+from stages.kit.formats.xml_files import parse_xml
+from stages.kit.geometry.boxes import box_from_bounds
+from stages.kit.simulation.urdf_split import read_urdf
+from tests.unit.urdf.test_urdf_file import HINGE, INERTIA, joint, robot
+
+LINK = f'<link name="%s">{INERTIA}</link>'
+
+
+def kinds(tmp_path: Path, text: str | bytes) -> set[str]:
+    path = tmp_path / "a.urdf"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return {problem.kind for problem in check_urdf(path)}
+
+
+def test_a_link_that_is_its_own_parent(tmp_path: Path) -> None:
+    alone = '<robot name="r"><link name="a"/>' + joint("", "fixed", "j", "a", "a") + "</robot>"
+    assert {"cycle", "roots"} <= kinds(tmp_path, alone)
+    assert "cycle" in kinds(tmp_path, robot("", joint() + joint("", "fixed", "k", "b", "b")))
+
+
+@pytest.mark.parametrize("shape", ["chain", "star", "circle"])
+def test_five_thousand_links(tmp_path: Path, shape: str) -> None:
+    """Checked in time that grows with the number of links, without running out of stack."""
+    count = 5000
+    text = ['<robot name="r"><link name="l0"/>'] + [LINK % f"l{k}" for k in range(1, count)]
+    for k in range(1, count):
+        text.append(joint("", "fixed", f"j{k}", "l0" if shape == "star" else f"l{k - 1}", f"l{k}"))
+    if shape == "circle":
+        text.append(joint("", "fixed", "back", f"l{count - 1}", "l1"))
+    started = time.process_time()
+    found = kinds(tmp_path, "".join(text) + "</robot>")
+    assert time.process_time() - started < 10
+    assert found == ({"cycle"} if shape == "circle" else set())
+
+
+@pytest.mark.parametrize(
+    ("drivers", "wrong"),
+    [
+        ({"j": "k"}, False),
+        ({"j": "j"}, True),
+        ({"j": "k", "k": "j"}, True),
+        ({"j": "nobody"}, True),
+        ({"j": ""}, True),
+    ],
+)
+def test_mimic(tmp_path: Path, drivers: dict[str, str], wrong: bool) -> None:
+    def hinge(name: str, parent: str, child: str) -> str:
+        mimic = f'<mimic joint="{drivers[name]}"/>' if name in drivers else ""
+        return joint(HINGE + mimic, name=name, parent=parent, child=child)
+
+    text = robot(LINK % "c", hinge("j", "a", "b") + hinge("k", "b", "c"))
+    assert kinds(tmp_path, text) == ({"mimic"} if wrong else set())
+
+
+@pytest.mark.parametrize("value", ["1e308", "1e200", "-1", "0", "inf"])
+def test_inertia_that_no_body_has(tmp_path: Path, value: str) -> None:
+    tensor = f'<inertia ixx="{value}" iyy="{value}" izz="{value}" ixy="0" ixz="0" iyz="0"/>'
+    text = robot(
+        f'<link name="c"><inertial><mass value="1"/>{tensor}</inertial></link>',
+        joint() + joint("", "fixed", "k", "b", "c"),
+    )  # noqa: E501
+    assert kinds(tmp_path, text) & {"inertia", "not_finite"}
+
+
+LAUGHS = '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa">' + "".join(
+    f'<!ENTITY {chr(98 + k)} "{f"&{chr(97 + k)};" * 10}">' for k in range(9)
+)
+DOCUMENTS = {
+    "billion laughs": f'{LAUGHS}]><robot name="&j;"/>'.encode(),
+    "external entity": b'<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot name="r"><link name="a">&x;</link></robot>',  # noqa: E501
+    "external type": b'<!DOCTYPE robot SYSTEM "http://example.org/x.dtd"><robot name="r"/>',
+    "parameter entity": b'<!DOCTYPE r [<!ENTITY % p SYSTEM "file:///etc/passwd"> %p;]><robot name="r"/>',
+    "UTF-16": ('<?xml version="1.0" encoding="utf-16"?>' + LAUGHS + ']><robot name="&j;"/>').encode("utf-16"),
+    "another encoding": b'<?xml version="1.0" encoding="cp037"?>' + (LAUGHS + ']><robot name="&j;"/>').encode("cp037"),
+    "unknown encoding": b'<?xml version="1.0" encoding="nonsense"?><robot name="r"/>',
+    "wide encoding": b'<?xml version="1.0" encoding="utf-32"?><robot name="r"/>',
+    "deep": b"<robot>" + b"<a>" * 100_000 + b"</a>" * 100_000 + b"</robot>",
+    "torn": b'<robot name="r"><link name=',
+    "nothing": b"",
+    "zero bytes": b'<robot name="r\0"/>',
+    "two roots": b"<robot/><robot/>",
+    "bad UTF-8": b'<robot name="\xff\xfe"/>',
+}
+
+
+@pytest.mark.parametrize("case", DOCUMENTS)
+def test_documents_that_are_refused(tmp_path: Path, case: str) -> None:
+    path = tmp_path / "a.urdf"
+    path.write_bytes(DOCUMENTS[case])
+    started = time.process_time()
+    for read in (parse_urdf, read_urdf, require_sound):
+        with pytest.raises(BadInput, match=r"a\.urdf") as caught:
+            read(path)
+        assert "\n" not in str(caught.value)
+    assert kinds(tmp_path, DOCUMENTS[case]) == {"unreadable"}
+    assert time.process_time() - started < 3
+
+
+def test_other_encodings_without_entities_are_fine() -> None:
+    text = '<?xml version="1.0" encoding="{0}"?><robot name="t\u00fcr"/>'
+    for encoding in ("utf-8", "utf-16", "iso-8859-1"):
+        assert parse_xml(text.format(encoding).encode(encoding), "x").get("name") == "t\u00fcr"
+
+
+@pytest.mark.parametrize("name", ["a" * 5000 + ".obj", "a\tb.obj", "\u53f0.obj", "a b.obj", "file:///etc/passwd", "."])
+def test_odd_mesh_names(tmp_path: Path, name: str) -> None:
+    mesh = f'<visual><geometry><mesh filename="{name}"/></geometry></visual>'
+    text = f'<robot name="r"><link name="a">{INERTIA}{mesh}</link></robot>'
+    assert kinds(tmp_path, text) <= {"mesh_outside", "mesh_missing"} != set()
+    if name in ("\u53f0.obj", "a b.obj"):
+        (tmp_path / name).write_text("v 0 0 0\n")
+        assert kinds(tmp_path, text) == set()
+
+
+def test_case_collision_is_two_files(tmp_path: Path) -> None:
+    """Names that differ in case alone are different here; a URDF that means one of them finds that one."""
+    (tmp_path / "M.obj").write_text("v 0 0 0\n")
+    mesh = '<visual><geometry><mesh filename="m.obj"/></geometry></visual>'
+    assert kinds(tmp_path, f'<robot name="r"><link name="a">{INERTIA}{mesh}</link></robot>') == {"mesh_missing"}
+
+
+def body(name: str, parent: str | None) -> BundleBody:
+    return BundleBody(name, "box", parent, "supports", np.eye(4), False, box_from_bounds((0, 0, 0), (1, 1, 1)))
+
+
+@pytest.mark.parametrize("name", ["..", ".", "../up", "/etc/x", "a b", "", "-x", "world", "a\nb", "a/b"])
+def test_bodies_named_like_paths(tmp_path: Path, name: str) -> None:
+    from schemas.contact_graph import ContactGraphFile
+
+    (tmp_path / "scene").mkdir()
+    with pytest.raises(BadInput, match="not usable in URDF"):
+        write_scene_bundle(tmp_path / "scene", [body(name, None)], ContactGraphFile(nodes=(), links=()))
+    assert list((tmp_path / "scene").iterdir()) == []
+
+
+def test_a_tower_of_two_thousand_bodies_and_a_circle_of_as_many(tmp_path: Path) -> None:
+    from stages.kit.formats.scene_bundle import _parents_first
+
+    tower = [body(f"b{k}", f"b{k + 1}" if k < 1999 else None) for k in range(2000)]
+    assert [b.name for b in _parents_first(tower)] == [f"b{k}" for k in reversed(range(2000))]
+    with pytest.raises(BadInput, match="in a circle"):
+        _parents_first([body(f"b{k}", f"b{(k + 1) % 2000}") for k in range(2000)])
