@@ -1,0 +1,101 @@
+"""`scenewright inspect`: what an artifact is and how it was made; what a log, or a sequence, is worth to a chain."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from schemas.artifact import Artifact
+from schemas.errors import BadInput, UsageError
+from schemas.manifest import MANIFEST_NAME
+
+
+def inspect(
+    path: Annotated[Path, typer.Argument(help="Artifact folder, or a log: a file or a folder.")],
+    expect: Annotated[
+        str | None, typer.Option("--expect", help="Exit with 4 unless this is its outcome (of a log: its verdict).")
+    ] = None,
+    html: Annotated[Path | None, typer.Option("--html", help="Write a page of pictures (log or sequence).")] = None,
+    frames: Annotated[
+        int, typer.Option("--frames", min=0, help="Frames that are looked at; 0: only the manifest of a sequence.")
+    ] = 60,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", help="Option of ingest as name=value (depth_scale=5000); repeatable.")
+    ] = None,
+    json_output: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+) -> int:
+    """Say what an artifact is and how it was made; of a log or a sequence, whether a chain on it would be wasted.
+
+    Exits with 3 when it would be.
+    """
+    from schemas.sequence import Sequence
+    from stages.ingest.preflight.inspection import inspect_log, inspect_sequence
+    from stages.ingest.preflight.settings import ingest_parameters
+    from stages.kit.progress import progress_for
+    from stages.kit.running.reading import open_artifact
+
+    progress = progress_for(sys.stderr.isatty(), quiet=quiet or json_output)
+    if not (path / MANIFEST_NAME).exists():
+        if frames < 2:
+            raise UsageError(f"--frames {frames}: a log is judged by its frames", hint="give at least 2")
+        found = inspect_log(path, ingest_parameters(settings or ()), frames, progress, keep_pictures=html is not None)
+        _show(found, html, json_output, {})
+        return _exit_code(found.report, expect, found.report.verdict)
+    if settings:
+        raise UsageError("--set is for logs", hint="an artifact has the options it was made with")
+    artifact = open_artifact(path)
+    assert artifact.manifest is not None
+    if not isinstance(artifact, Sequence) or artifact.outcome == "empty" or frames == 0:
+        if html is not None:
+            raise UsageError("--html is for logs and sequences", hint="`scenewright report` makes a page of a run")
+        sys.stdout.write(artifact.manifest.model_dump_json() + "\n" if json_output else _manifest_text(artifact))
+        return 4 if expect is not None and artifact.outcome != expect else 0
+    found = inspect_sequence(artifact, frames, progress, keep_pictures=html is not None)
+    if not json_output:
+        sys.stdout.write(_manifest_text(artifact) + "\n")
+    _show(found, html, json_output, artifact.manifest.model_dump(mode="json"))
+    return _exit_code(found.report, expect, artifact.outcome)
+
+
+def _show(found: Any, html: Path | None, json_output: bool, manifest: dict[str, Any]) -> None:
+    from stages.ingest.preflight.text import as_text
+
+    if html is not None:
+        from stages.ingest.preflight.page import write_page
+
+        write_page(found, html)
+    report = found.report.model_dump(mode="json")
+    document = {**manifest, "preflight": report} if manifest else report
+    sys.stdout.write(json.dumps(document, sort_keys=True) + "\n" if json_output else as_text(found.report))
+    sys.stdout.flush()
+
+
+def _exit_code(report: Any, expect: str | None, outcome: str) -> int:
+    if report.verdict == "wasted" and expect != "wasted":
+        raise BadInput(f"{report.path}: {report.reason}", hint=report.fix)
+    return 4 if expect is not None and outcome != expect else 0
+
+
+def _manifest_text(artifact: Artifact) -> str:
+    manifest = artifact.manifest
+    assert manifest is not None
+    made = manifest.provenance
+    lines: list[tuple[str, Any]] = [
+        ("kind", f"{manifest.kind} version {manifest.schema_version}"),
+        ("outcome", manifest.outcome),
+        *(("summary", f"{name} = {value}") for name, value in manifest.summary.items()),
+        ("made by", f"{manifest.stage} version {manifest.stage_version}, seed {manifest.seed}"),
+        *(("input", f"{i.role}: {i.kind} {i.digest[:12]} {i.path}") for i in manifest.inputs),
+        *(("parameter", f"{name} = {value}") for name, value in manifest.parameters.items()),
+        ("content", manifest.content_digest),
+        ("files", f"{len(manifest.files)}, {sum(f.bytes for f in manifest.files) / 1e6:.1f} MB"),
+        ("took", f"{made.seconds:.1f} s, {made.peak_memory_bytes / 2**20:.0f} MiB, {made.started}"),
+        ("command", " ".join(made.command)),
+    ]
+    return "".join(f"{label:10} {value}\n" for label, value in lines)

@@ -1,0 +1,120 @@
+"""Is the depth depth: how much of it is valid, in which unit, how finely quantised, cut off where."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from stages.ingest.preflight.looking import Look
+from stages.ingest.preflight.report import DepthReport, Finding, exact
+
+PLAUSIBLE = (0.15, 15.0)
+"""Median depth [m] of what depth cameras record."""
+TYPICAL = (0.4, 6.0)
+"""Median depth [m] of rooms and tables; used to choose between explanations, never to refuse."""
+FACTORS = (0.001, 0.1, 0.2, 1 / 6.5535, 5.0, 6.5535, 10.0, 1000.0)
+"""What wrong units do to depth: metres, millimetres, 0.1 mm and the divisors 5000 and 6553.5, one for another."""
+LITTLE_VALID = 0.1
+SATURATED = 0.2
+"""Share of valid pixels at the largest value that suggests a cut-off."""
+COARSE_VALUES = 256
+"""Depth with fewer values in every frame was 8-bit once."""
+COARSE_STEP = 0.02
+"""... and steps of at least this at that [m]."""
+HISTOGRAM_BINS = 48
+
+
+def depth_report(looks: Iterable[Look]) -> DepthReport | None:
+    """Return what is to be said of the depth of the frames; None without any."""
+    frames = [look for look in looks if look.depth_values is not None and len(look.depth_values)]
+    if not frames:
+        return None
+    totals = np.zeros(65536, dtype=np.int64)
+    medians, distinct, steps = [], [], []
+    for look in frames:
+        assert look.depth_values is not None and look.depth_counts is not None
+        totals[look.depth_values] += look.depth_counts
+        medians.append(_weighted_quantile(look.depth_values, look.depth_counts, 0.5))
+        distinct.append(len(look.depth_values))
+        if len(look.depth_values) > 1:
+            steps.append(int(np.diff(look.depth_values.astype(int)).min()))
+    values = np.flatnonzero(totals)
+    counts = totals[values]
+    median = float(np.median(medians)) * 1e-3
+    low, high = (_weighted_quantile(values, counts, q) * 1e-3 for q in (0.05, 0.95))
+    end = 1.1 * _weighted_quantile(values, counts, 0.995) * 1e-3
+    histogram, _ = np.histogram(values * 1e-3, bins=HISTOGRAM_BINS, range=(0, end), weights=counts)
+    return DepthReport(
+        frames=len(frames),
+        valid_share=exact(counts.sum() / sum(look.depth_pixels for look in frames)),
+        median=exact(median),
+        low=exact(low),
+        high=exact(high),
+        plausible=PLAUSIBLE[0] <= median <= PLAUSIBLE[1],
+        factor=None,
+        step=exact(min(steps, default=0) * 1e-3),
+        distinct_values=int(np.median(distinct)),
+        saturated_share=exact(counts[-1] / counts.sum()),
+        saturated_value=exact(values[-1] * 1e-3),
+        histogram=tuple(exact(share, 3) for share in histogram / counts.sum()),
+        histogram_end=exact(end),
+    )
+
+
+def _weighted_quantile(values: np.ndarray, counts: np.ndarray, quantile: float) -> float:
+    total = np.cumsum(counts)
+    return float(values[np.searchsorted(total, quantile * total[-1])])
+
+
+def plausible_factors(median: float) -> list[float]:
+    """Return the unit factors that would make a median depth [m] typical of a room, the mildest first."""
+    fitting = [factor for factor in FACTORS if TYPICAL[0] <= median * factor <= TYPICAL[1]]
+    return sorted(fitting, key=lambda factor: abs(np.log(factor)))
+
+
+def factor_words(factor: float) -> str:
+    """Return `5 times too large` and the like for what depth must be multiplied by."""
+    return f"{1 / factor:.4g} times too large" if factor < 1 else f"{factor:.4g} times too small"
+
+
+def scale_advice(factor: float) -> str:
+    """Return how to apply a factor on depth with the option that ingest has."""
+    return (
+        f"ingest with --depth-scale {1000 / factor:.6g} if the log was read as millimetres (the depth units per metre "
+        f"that were used, times {1 / factor:.4g})"
+    )
+
+
+def depth_findings(report: DepthReport, camera: str) -> list[Finding]:
+    """Return what is odd about the depth itself. Whether it agrees with the poses is said with the poses."""
+    found = []
+
+    def add(severity: str, message: str, fix: str = "") -> None:
+        found.append(Finding(severity=severity, check="depth", message=message, fix=fix, camera=camera))  # type: ignore[arg-type]
+
+    if not report.plausible and report.factor_by != "poses":
+        factors = plausible_factors(report.median)
+        words = " or ".join(factor_words(factor) for factor in factors[:3]) or "no usual unit explains it"
+        add(
+            "wasted",
+            f"depth unit: the median depth is {report.median:.3g} m ({words})",
+            scale_advice(factors[0]) if factors else "find out the unit of the depth images and give --depth-scale",
+        )
+    if report.valid_share < LITTLE_VALID:
+        add("doubtful", f"only {100 * report.valid_share:.1f} % of the depth pixels are valid")
+    if report.saturated_share > SATURATED:
+        add(
+            "doubtful",
+            f"{100 * report.saturated_share:.0f} % of the depth is exactly {report.saturated_value:.3f} m: cut off, or "
+            "a value that means invalid",
+            f"ingest with --maximum-depth {0.999 * report.saturated_value:.4g}",
+        )
+    if report.distinct_values < COARSE_VALUES and report.step >= 0.004:
+        add(
+            "doubtful",
+            f"depth has {report.distinct_values} different values a frame, {1000 * report.step:.0f} mm apart: it was "
+            "8-bit once",
+            "record 16-bit depth",
+        )
+    return found

@@ -1,0 +1,158 @@
+"""Poses against colour alone: matched features must lie on each other's epipolar lines.
+
+For logs without depth. The length of the translations cannot be seen in this way, only their direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from schemas.scene_parts import Camera
+from stages.ingest.preflight.fits import Fit, as_fit, relative_pose
+from stages.ingest.preflight.looking import Look
+
+FEATURES = 1200
+MATCH_RATIO = 0.8
+INLIER_DISTANCE = 1.5
+"""Pixels from the epipolar line that a match may have to count as one."""
+LEAST_INLIERS = 30
+TRUNCATION_PIXELS = 4.0
+STILL_PIXELS = 1.5
+"""Median shift of matches under which two pictures count as taken from the same place."""
+
+
+@dataclass(frozen=True)
+class Matches:
+    """Matches of two frames that some essential matrix explains."""
+
+    first: np.ndarray
+    """(M, 2) pixels."""
+    second: np.ndarray
+
+    @property
+    def shift(self) -> float:
+        """Median length of the shifts [pixels]."""
+        return float(np.median(np.linalg.norm(self.second - self.first, axis=1)))
+
+
+class FeaturePairs:
+    """Matched pairs of frames of one camera, prepared once for many hypotheses about their poses."""
+
+    def __init__(self, looks: Mapping[int, Look], pairs: Sequence[tuple[int, int]]) -> None:
+        features = {}
+        for index in sorted({index for pair in pairs for index in pair}):
+            look = looks.get(index)
+            if look is not None and look.gray is not None:
+                features[index] = features_of(look.gray)
+        self.pairs: list[tuple[int, int]] = []
+        self.matches: list[Matches] = []
+        self._cameras: list[Camera] = []
+        for i, j in pairs:
+            if i in features and j in features:
+                found = _consistent(*matched(features[i], features[j]), looks[i].camera)
+                if found is not None and found.shift > STILL_PIXELS:
+                    self.pairs.append((i, j))
+                    self.matches.append(found)
+                    self._cameras.append(looks[i].camera)
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+    def fit(self, poses: np.ndarray, focal_factor: float = 1.0) -> Fit:
+        """Compare the pairs with world_from_camera (N, 4, 4) of all frames. Residuals are pixels.
+
+        `focal_factor` multiplies the focal lengths.
+        """
+        rows = []
+        for (i, j), found, known in zip(self.pairs, self.matches, self._cameras, strict=True):
+            camera = known.model_copy(update={"fx": focal_factor * known.fx, "fy": focal_factor * known.fy})
+            distances = epipolar_distances(found, relative_pose(poses[j], poses[i]), camera)
+            cost = float(np.minimum(distances / TRUNCATION_PIXELS, 1.0).mean())
+            rows.append((float(np.median(distances)), cost, 1.0))
+        return as_fit(rows)
+
+    def fit_motionless(self) -> Fit:
+        """Compare the pairs as if the camera had not moved."""
+        rows = []
+        for found in self.matches:
+            distances = np.linalg.norm(found.second - found.first, axis=1)
+            cost = float(np.minimum(distances / TRUNCATION_PIXELS, 1.0).mean())
+            rows.append((float(np.median(distances)), cost, 1.0))
+        return as_fit(rows)
+
+
+def features_of(gray: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return SIFT positions (N, 2) [pixels] and descriptors (N, 128) of a picture (H, W) uint8."""
+    points, descriptors = cv2.SIFT.create(nfeatures=FEATURES).detectAndCompute(gray, None)
+    if descriptors is None:
+        return np.zeros((0, 2)), np.zeros((0, 128), np.float32)
+    return np.array([point.pt for point in points]).reshape(-1, 2), descriptors
+
+
+def matched(
+    first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions (M, 2) and (M, 2) of features that are each other's nearest, and much nearer than the next."""
+    if min(len(first[0]), len(second[0])) < 2:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    matcher = cv2.BFMatcher(cv2.NORM_L2)
+    forward = matcher.knnMatch(first[1], second[1], k=2)
+    back = {m.queryIdx: m.trainIdx for m in matcher.match(second[1], first[1])}
+    good = [
+        (best.queryIdx, best.trainIdx)
+        for best, other in forward
+        if best.distance < MATCH_RATIO * other.distance and back.get(best.trainIdx) == best.queryIdx
+    ]
+    if not good:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    left, right = np.array(good).T
+    return first[0][left], second[0][right]
+
+
+def _consistent(first: np.ndarray, second: np.ndarray, camera: Camera) -> Matches | None:
+    """Keep the matches that one essential matrix explains; None when too few are left."""
+    if len(first) < LEAST_INLIERS:
+        return None
+    rays = [_normalised(points, camera) for points in (first, second)]
+    cv2.setRNGSeed(0)
+    focal = (camera.fx + camera.fy) / 2
+    essential, mask = cv2.findEssentialMat(
+        rays[0], rays[1], np.eye(3), method=cv2.RANSAC, prob=0.999, threshold=INLIER_DISTANCE / focal
+    )
+    if essential is None or mask is None:
+        return None
+    kept = mask.ravel().astype(bool)
+    if kept.sum() < max(LEAST_INLIERS, 0.3 * len(first)):
+        return None
+    return Matches(first[kept], second[kept])
+
+
+def _normalised(points: np.ndarray, camera: Camera) -> np.ndarray:
+    return (points - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
+
+
+def epipolar_distances(found: Matches, second_from_first: np.ndarray, camera: Camera) -> np.ndarray:
+    """Return the Sampson distance [pixels] of each match under a relative pose (4, 4).
+
+    A pose that does not move has no epipolar lines; the distance is then that to where the rotation takes the point.
+    """
+    focal = (camera.fx + camera.fy) / 2
+    first = np.column_stack([_normalised(found.first, camera), np.ones(len(found.first))])
+    second = np.column_stack([_normalised(found.second, camera), np.ones(len(found.second))])
+    rotation, translation = second_from_first[:3, :3], second_from_first[:3, 3]
+    length = float(np.linalg.norm(translation))
+    if length < 1e-9:
+        turned = first @ rotation.T
+        z = np.where(turned[:, 2] > 1e-6, turned[:, 2], np.inf)
+        expected = np.where(np.isfinite(z)[:, None], turned[:, :2] / z[:, None], 1e6)
+        return focal * np.linalg.norm(second[:, :2] - expected, axis=1)
+    x, y, z_axis = translation / length
+    essential = np.array([[0, -z_axis, y], [z_axis, 0, -x], [-y, x, 0]]) @ rotation
+    lines, back = first @ essential.T, second @ essential
+    error = np.einsum("ij,ij->i", second, lines)
+    gradient = lines[:, 0] ** 2 + lines[:, 1] ** 2 + back[:, 0] ** 2 + back[:, 1] ** 2
+    return focal * np.abs(error) / np.sqrt(np.maximum(gradient, 1e-18))

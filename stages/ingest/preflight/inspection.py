@@ -1,0 +1,407 @@
+"""The pre-flight: open a log, look at some of its frames, say what a chain on it would come to."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.manifest import MANIFEST_NAME
+from schemas.sequence import Sequence
+from stages.ingest.detection import MODULES, log_format, open_log
+from stages.ingest.parameters import IngestParameters
+from stages.ingest.pose_conventions import converted
+from stages.ingest.preflight.calibration import calibration_findings, calibration_report
+from stages.ingest.preflight.choice import Choice, choose
+from stages.ingest.preflight.depth import depth_findings, depth_report
+from stages.ingest.preflight.epipolar import FeaturePairs
+from stages.ingest.preflight.looking import Look, look_at_entry
+from stages.ingest.preflight.motion import motion_findings, motion_report
+from stages.ingest.preflight.pictures import picture_findings, picture_report
+from stages.ingest.preflight.pose_findings import depth_is_blamed, pose_findings, rigidity_words
+from stages.ingest.preflight.poses import BY_DEPTH, BY_FEATURES, LEAST_PAIRS, PoseOutcome, check_poses
+from stages.ingest.preflight.registration import check_registration, registration_findings
+from stages.ingest.preflight.report import (
+    CameraReport,
+    Finding,
+    FramesReport,
+    GravityReport,
+    InspectionReport,
+    PoseReport,
+    Severity,
+    Verdict,
+    exact,
+    significant,
+)
+from stages.ingest.preflight.reprojection import DepthPairs
+from stages.ingest.preflight.sequence_source import sequence_source
+from stages.ingest.preflight.settings import ingest_parameters
+from stages.ingest.preflight.steps import step_reports
+from stages.ingest.preflight.stereo import stereo_findings, stereo_report, with_stereo_depth
+from stages.ingest.preflight.streams import all_streams, clock_lines, stream_findings, stream_reports
+from stages.ingest.preflight.upright import gravity_findings, gravity_report
+from stages.ingest.selection import NOT_SELECTED, select
+from stages.ingest.source import Entry, LogSource, SourceCamera, Unusable
+from stages.ingest.stage import check_cameras
+from stages.kit.stage import Progress
+
+LEAST_FRAMES = 12
+"""Looked at per camera, however many cameras there are."""
+HEAVY_LOSS, LOSS = 0.5, 0.1
+"""Shares of the frames that are lost from which a log is wasted, and doubtful."""
+NO_POSES = PoseReport(verdict="none", method="none", detail="the frames have no poses")
+SEVERITIES = ("wasted", "doubtful", "note")
+
+
+@dataclass(frozen=True)
+class CameraMaterial:
+    """What the page draws from, for one camera."""
+
+    looks: Mapping[int, Look]
+    choice: Choice
+    poses: np.ndarray | None
+    """(N, 4, 4) of all selected frames."""
+    outcome: PoseOutcome
+    times: np.ndarray
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """The report, and what the page draws from."""
+
+    report: InspectionReport
+    cameras: tuple[CameraMaterial, ...]
+    streams: tuple[tuple[str, np.ndarray], ...] = ()
+    """(name, stamps [ns]) of the streams, for the time line."""
+
+
+def inspect_log(
+    path: Path, parameters: IngestParameters, count: int, progress: Progress, keep_pictures: bool = False
+) -> Inspection:
+    """Inspect a log, looking at about `count` of its frames. Raises BadInput when it cannot be opened at all."""
+    _refuse_what_is_nothing(path, parameters)
+    with progress.step("read the log"):
+        source = open_log(path, parameters)
+    try:
+        return inspect_source(source, path, parameters, count, progress, keep_pictures)
+    finally:
+        source.close()
+
+
+def _refuse_what_is_nothing(path: Path, parameters: IngestParameters) -> None:
+    """People who meant an artifact should hear of artifacts."""
+    if path.is_dir() and parameters.format == "auto" and not any(log_format(n).matches(path) for n in MODULES):
+        raise BadInput(
+            f"{path}: not an artifact (no {MANIFEST_NAME}), and no log in a format that is known",
+            hint="docs/LOGS.md describes the layouts",
+        )
+
+
+def inspect_sequence(sequence: Sequence, count: int, progress: Progress, keep_pictures: bool = False) -> Inspection:
+    """Inspect a sequence artifact, with what ingest noted when it wrote it."""
+    source = sequence_source(sequence)
+    try:
+        found = inspect_source(source, sequence.root, ingest_parameters(()), count, progress, keep_pictures)
+    finally:
+        source.close()
+    info = sequence.info
+    gravity = found.report.gravity.model_copy(update={"method": info.gravity.method, "detail": info.gravity.detail})
+    frames = found.report.frames.model_copy(update={"in_log": info.frames_in_log, "drops": dict(info.drops)})
+    return replace(found, report=found.report.model_copy(update={"gravity": gravity, "frames": frames}))
+
+
+def inspect_source(
+    source: LogSource,
+    path: Path,
+    parameters: IngestParameters,
+    count: int,
+    progress: Progress,
+    keep_pictures: bool = False,
+) -> Inspection:
+    """Inspect a source that is open already; `path` is for messages."""
+    findings: list[Finding] = []
+    try:
+        check_cameras(source, path)
+    except BadInput as error:
+        message = error.message.removeprefix(f"{path}: ")
+        findings.append(Finding(severity="wasted", check="calibration", message=message, fix=error.hint))
+    kept, drops = select(source.entries, parameters, source.has_poses)
+    kept = kept[: parameters.max_frames]
+    by_camera = {known.name: [e for e in kept if e.camera_name == known.name] for known in source.cameras}
+    each = max(LEAST_FRAMES, count // max(len(source.cameras), 1)) if len(source.cameras) > 1 else count
+    unusable: Counter[str] = Counter()
+    materials: list[CameraMaterial] = []
+    reports: list[CameraReport] = []
+    for known in source.cameras:
+        material = _look(by_camera[known.name], known, each, progress, unusable, keep_pictures)
+        with progress.step("compare the frames"):
+            judged, outcome, found = _judge_camera(known, by_camera[known.name], material, source, parameters)
+        materials.append(replace(material, outcome=outcome))
+        reports.append(judged)
+        findings += found
+    frames = _frames_report(source, kept, drops, materials, unusable)
+    streams = stream_reports(source)
+    gravity = _gravity(source, parameters, reports, materials)
+    has_poses = any(report.poses.verdict != "none" for report in reports)
+    findings = [
+        *_frame_findings(frames, source),
+        *_content_findings(reports, source),
+        *findings,
+        *stream_findings(streams),
+        *gravity_findings(gravity, has_poses),
+    ]
+    if len(source.cameras) == 1:
+        findings = [finding.model_copy(update={"camera": ""}) for finding in findings]
+    findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
+    verdict: Verdict = "ready"
+    if findings and findings[0].severity != "note":
+        verdict = "wasted" if findings[0].severity == "wasted" else "doubtful"
+    first = findings[0] if verdict != "ready" else None
+    report = InspectionReport(
+        path=str(path),
+        format=source.format,
+        rule=source.rule,
+        verdict=verdict,
+        reason=first.message if first else "",
+        fix=first.fix if first else "",
+        findings=tuple(findings),
+        frames=frames,
+        damage=source.damage,
+        notes=source.notes,
+        streams=streams,
+        clocks=clock_lines(source),
+        cameras=tuple(reports),
+        other_cameras=source.other_cameras,
+        gravity=gravity,
+        steps=step_reports(_having(reports, source)),
+    )
+    stamps = tuple((stream.name, np.asarray(stream.stamps)) for stream in all_streams(source))
+    return Inspection(report, tuple(materials), stamps)
+
+
+def _look(
+    entries: list[Entry],
+    known: SourceCamera,
+    count: int,
+    progress: Progress,
+    unusable: Counter[str],
+    keep_pictures: bool,
+) -> CameraMaterial:
+    """Choose frames of one camera and load them; what cannot be used is counted."""
+    times = np.array([entry.time for entry in entries], dtype=float)
+    posed = bool(entries) and all(entry.world_from_camera is not None for entry in entries)
+    poses = np.array([entry.world_from_camera for entry in entries]) if posed else None
+    choice = choose(times, poses, count)
+    looks: dict[int, Look] = {}
+    for index in progress.track(choice.frames, total=len(choice.frames), description=f"frames of {known.name}"):
+        try:
+            looks[index] = look_at_entry(entries[index], index, known.camera, keep_pictures)
+        except Unusable as problem:
+            unusable[problem.reason] += 1
+    return CameraMaterial(looks, choice, poses, PoseOutcome(NO_POSES), times)
+
+
+def _judge_camera(
+    known: SourceCamera, entries: list[Entry], material: CameraMaterial, source: LogSource, parameters: IngestParameters
+) -> tuple[CameraReport, PoseOutcome, list[Finding]]:
+    looks, choice, poses = material.looks, material.choice, material.poses
+    name, findings = known.name, []
+    interval = float(np.median(np.diff(material.times))) if len(material.times) > 1 else 0.0
+    depth = depth_report(looks.values())
+    stereo = stereo_report(looks, known.baseline)
+    outcome = _pose_outcome(known, material, depth is not None)
+    calibration = calibration_report(known.camera)
+    best = outcome.report.best
+    if best is not None and outcome.report.decisive:
+        if best.focal_factor != 1:
+            calibration = calibration.model_copy(update={"focal_fit": significant(best.focal_factor, 3)})
+        only_scale = best.convention == "as-is" and best.translation_scale != 1
+        if depth is not None and only_scale and depth_is_blamed(best.translation_scale, depth.median):
+            depth = depth.model_copy(update={"factor": exact(1 / best.translation_scale), "factor_by": "poses"})
+    registration = check_registration(looks, choice.runs, known.registered)
+    pictures = picture_report(looks, choice.runs)
+    motion = motion_report(poses, material.times, looks, choice.runs) if poses is not None else None
+    findings += calibration_findings(calibration, known.camera, name)
+    if depth is not None:
+        findings += depth_findings(depth, name)
+    if stereo is not None:
+        findings += stereo_findings(stereo, name)
+    if poses is not None:
+        findings += pose_findings(outcome.report, depth, known.camera, interval, name, _untouched(parameters))
+    if motion is not None:
+        findings += motion_findings(motion, outcome.report.verdict == "agree", name)
+    findings += registration_findings(registration, interval, name)
+    if pictures is not None:
+        findings += picture_findings(pictures, name)
+    have = {
+        "color": pictures is not None,
+        "depth": depth is not None,
+        "right": stereo is not None,
+        "labels": source.has_labels,
+        "pose": poses is not None,
+    }
+    report = CameraReport(
+        name=name,
+        camera=known.camera,
+        registered=known.registered,
+        frames=len(entries),
+        streams=tuple(stream for stream, there in have.items() if there),
+        calibration=calibration,
+        depth=depth,
+        poses=outcome.report,
+        registration=registration,
+        pictures=pictures,
+        motion=motion,
+        stereo=stereo,
+    )
+    return report, outcome, findings
+
+
+def _pose_outcome(known: SourceCamera, material: CameraMaterial, has_depth: bool) -> PoseOutcome:
+    """Check the poses by depth, else by depth from the stereo pair, else by colour."""
+    if material.poses is None:
+        return PoseOutcome(NO_POSES)
+    looks, pairs = material.looks, material.choice.pairs
+    if not has_depth and known.baseline is not None and known.baseline > 0:
+        looks = {index: with_stereo_depth(look, known.baseline) for index, look in looks.items()}
+    by_depth = DepthPairs(looks, pairs)
+    if len(by_depth) < LEAST_PAIRS:
+        return check_poses(FeaturePairs(looks, pairs), material.poses, material.times, BY_FEATURES)
+    outcome = check_poses(by_depth, material.poses, material.times, BY_DEPTH)
+    if outcome.report.verdict in ("agree", "not checked") or outcome.report.decisive:
+        return outcome
+    colour = check_poses(FeaturePairs(looks, pairs), material.poses, material.times, BY_FEATURES).report
+    told = {
+        "colour_verdict": colour.verdict,
+        "colour_residual": colour.hypotheses[0].residual if colour.hypotheses else None,
+    }
+    return replace(outcome, report=outcome.report.model_copy(update=told))
+
+
+def _untouched(parameters: IngestParameters) -> bool:
+    """Whether poses are taken as the log has them."""
+    return parameters.pose_convention == "as-is" and parameters.pose_scale == 1
+
+
+def _gravity(
+    source: LogSource, parameters: IngestParameters, reports: list[CameraReport], materials: list[CameraMaterial]
+) -> GravityReport:
+    """Try gravity with the poses as they are, or as they would agree."""
+    all_poses, posed, untouched = [np.zeros((0, 4, 4))], [], parameters.pose_convention == "as-is"
+    for report, material in zip(reports, materials, strict=True):
+        if material.poses is None:
+            continue
+        poses, best = material.poses, material.outcome.best
+        if report.poses.verdict == "contradict" and not report.poses.decisive:
+            return GravityReport(method="none", detail="not tried: the poses contradict the pictures")
+        if report.poses.decisive and best is not None:
+            poses = converted(poses, best.convention, best.scale)
+            untouched &= best.convention == "as-is"
+        all_poses.append(poses)
+        posed += [(look, poses[index]) for index, look in material.looks.items()]
+    return gravity_report(source, parameters, np.concatenate(all_poses), posed, untouched)
+
+
+def _frames_report(
+    source: LogSource,
+    kept: list[Entry],
+    drops: Counter[str],
+    materials: list[CameraMaterial],
+    unusable: Counter[str],
+) -> FramesReport:
+    times = [entry.time for entry in kept]
+    return FramesReport(
+        in_log=len(source.entries),
+        selected=len(kept),
+        looked_at=sum(len(material.choice.frames) for material in materials),
+        drops=dict(sorted(drops.items())),
+        unusable=dict(sorted(unusable.items())),
+        start=significant(min(times), 15) if times else None,
+        end=significant(max(times), 15) if times else None,
+    )
+
+
+def _frame_findings(frames: FramesReport, source: LogSource) -> list[Finding]:
+    found = []
+
+    def add(severity: str, message: str, fix: str = "") -> None:
+        found.append(Finding(severity=severity, check="frames", message=message, fix=fix))  # type: ignore[arg-type]
+
+    lost = {reason: count for reason, count in frames.drops.items() if reason != NOT_SELECTED}
+    listed = ", ".join(f"{reason} {count}" for reason, count in sorted(lost.items(), key=lambda item: -item[1]))
+    share = sum(lost.values()) / max(sum(lost.values()) + frames.selected, 1)
+    bad = ", ".join(f"{reason} {count}" for reason, count in frames.unusable.items())
+    bad_share = sum(frames.unusable.values()) / max(frames.looked_at, 1)
+    why = ""
+    if lost.get("non_rigid_pose", 0) > LOSS * frames.in_log:
+        why = "; the poses are not rigid: " + rigidity_words(_matrices(source))
+    if not frames.in_log:
+        add("wasted", "there are no frames in the log", "does it hold images of a camera? see the streams")
+    elif not frames.selected:
+        add("wasted", f"no usable frame: {listed or 'none is selected'}{why}")
+    elif frames.looked_at and bad_share == 1:
+        add("wasted", f"no usable frame among the {frames.looked_at} looked at: {bad}")
+    else:
+        if share > LOSS:
+            add(
+                "wasted" if share > HEAVY_LOSS else "doubtful",
+                f"{100 * share:.0f} % of the frames are lost: {listed}{why}",
+            )
+        elif lost:
+            add("note", f"frames left out: {listed}")
+        if bad_share > LOSS:
+            severity = "wasted" if bad_share > HEAVY_LOSS else "doubtful"
+            add(severity, f"{100 * bad_share:.0f} % of the frames looked at cannot be used: {bad}")
+        elif frames.unusable:
+            add("note", f"frames looked at that cannot be used: {bad}")
+    if source.damage:
+        more = f" (and {len(source.damage) - 1} more)" if len(source.damage) > 1 else ""
+        add("doubtful", f"the log is damaged: {source.damage[0]}{more}", "what is whole is used")
+    return found
+
+
+def _matrices(source: LogSource) -> np.ndarray:
+    found = [entry.world_from_camera for entry in source.entries if entry.world_from_camera is not None]
+    return np.array([matrix for matrix in found if matrix.shape == (4, 4)]).reshape(-1, 4, 4)
+
+
+def _content_findings(reports: list[CameraReport], source: LogSource) -> list[Finding]:
+    """What whole streams are missing."""
+    found: list[Finding] = []
+    looked = [report for report in reports if report.streams]
+    if not looked:
+        return found
+    streams = {stream for report in looked for stream in report.streams}
+    stereo = "right" in streams and any(report.stereo and report.stereo.baseline for report in looked)
+
+    def add(severity: Severity, check: str, message: str, fix: str = "") -> None:
+        found.append(Finding(severity=severity, check=check, message=message, fix=fix))
+
+    if "depth" not in streams and not stereo:
+        advice = "record depth; colour alone can only be looked at"
+        add("wasted", "depth", "there is no depth and no stereo pair with a baseline", advice)
+    elif "depth" not in streams:
+        add("doubtful", "depth", "there is no depth, but a stereo pair", "make depth with the step disparity")
+    if "color" not in streams:
+        add("doubtful", "pictures", "there is no colour: nothing can be recognised, only shapes")
+    if "pose" not in streams:
+        add("doubtful", "poses", "the frames have no poses: fuse needs them", "give fuse a --trajectory")
+    return found
+
+
+def _having(reports: list[CameraReport], source: LogSource) -> set[str]:
+    """Return what of NEEDS the log has."""
+    streams = {stream for report in reports for stream in report.streams}
+    words = {"color": "colour", "depth": "depth", "pose": "poses", "labels": "labels"}
+    have = {words[stream] for stream in streams if stream in words}
+    if streams & {"color", "depth"}:
+        have.add("usable frames")
+    if any(report.stereo is not None and report.stereo.baseline for report in reports):
+        have.add("a stereo pair with a baseline")
+    if not source.has_labels:
+        have.discard("labels")
+    return have
