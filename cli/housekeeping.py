@@ -13,6 +13,7 @@ import typer
 from cli.batch_command import batch
 from cli.collection_command import gc
 from cli.comparison_command import diff
+from cli.inspect_command import inspect
 from schemas.errors import BadInput, UsageError
 
 Paths = Annotated[list[Path], typer.Argument(help="Artifact folders.")]
@@ -130,38 +131,6 @@ def verify(paths: Paths, json_output: Json = False, debug: Debug = False) -> int
     if damaged:
         raise BadInput(f"{len(damaged)} of {len(seen)} artifacts are damaged", hint="make them again with --force")
     return 0
-
-
-def inspect(
-    path: Annotated[Path, typer.Argument(help="Artifact folder.")],
-    expect: Annotated[str | None, typer.Option("--expect", help="Exit with 4 unless this is its outcome.")] = None,
-    json_output: Json = False,
-    debug: Debug = False,
-) -> int:
-    """Say what an artifact is and how it was made."""
-    from stages.kit.running.reading import open_artifact
-
-    manifest = open_artifact(path).manifest
-    assert manifest is not None
-    if json_output:
-        _out(manifest.model_dump_json())
-    else:
-        made = manifest.provenance
-        lines: list[tuple[str, Any]] = [
-            ("kind", f"{manifest.kind} version {manifest.schema_version}"),
-            ("outcome", manifest.outcome),
-            *(("summary", f"{name} = {value}") for name, value in manifest.summary.items()),
-            ("made by", f"{manifest.stage} version {manifest.stage_version}, seed {manifest.seed}"),
-            *(("input", f"{i.role}: {i.kind} {i.digest[:12]} {i.path}") for i in manifest.inputs),
-            *(("parameter", f"{name} = {value}") for name, value in manifest.parameters.items()),
-            ("content", manifest.content_digest),
-            ("files", f"{len(manifest.files)}, {sum(f.bytes for f in manifest.files) / 1e6:.1f} MB"),
-            ("took", f"{made.seconds:.1f} s, {made.peak_memory_bytes / 2**20:.0f} MiB, {made.started}"),
-            ("command", " ".join(made.command)),
-        ]
-        for label, value in lines:
-            _out(f"{label:10} {value}")
-    return 4 if expect is not None and manifest.outcome != expect else 0
 
 
 def migrate(

@@ -107,9 +107,9 @@ def timeline(streams: Sequence[tuple[str, np.ndarray]]) -> Markup | None:
     end = max(int(stamps[-1]) for _, stamps in rows)
     plot = _Plot(BOTTOM + TOP + 26 * len(rows), (0.0, max((end - start) * 1e-9, 1e-3)), (0.0, 1.0), WIDE)
     plot.axes(ticks(0, plot.x1), [], "seconds from the first stamp")
-    cells = 280
     for row, (name, stamps) in enumerate(rows):
         seconds = (stamps - start) * 1e-9
+        cells = int(np.clip(len(stamps) // 2, 1, 280))
         counts, _ = np.histogram(seconds, bins=cells, range=(0, plot.x1))
         top = TOP + 26 * row
         plot.text(LEFT, top + 8, name, "start", "label")
