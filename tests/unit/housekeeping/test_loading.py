@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import json
 import os
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -47,7 +48,20 @@ def test_every_kind_has_a_class_and_opens_as_it(run: dict) -> None:
         assert artifact.kind == json.loads((artifact.path / MANIFEST_NAME).read_text())["kind"]
 
 
-def test_opening_reads_no_payload_and_using_writes_nothing(run_folder: Path, tmp_path: Path) -> None:
+def test_opening_reads_no_payload(run_folder: Path, tmp_path: Path) -> None:
+    """What is wrong inside shows when it is asked for, as bad input."""
+    shutil.copytree(run_folder / "evaluation", tmp_path / "evaluation")
+    payload = tmp_path / "evaluation" / "metrics.json"
+    payload.write_text("?" * payload.stat().st_size)
+    loaded = load(tmp_path / "evaluation")
+    with pytest.raises(BadInput, match="metrics.json"):
+        loaded.metrics  # noqa: B018
+    payload.write_text("?")
+    with pytest.raises(BadInput, match="the manifest says"):
+        load(tmp_path / "evaluation")
+
+
+def test_using_writes_nothing(run_folder: Path) -> None:
     before = snapshot(run_folder)
     for artifact in load_run(run_folder).values():
         for name in dir(artifact):
