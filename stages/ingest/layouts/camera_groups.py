@@ -31,11 +31,12 @@ def grouped(
 ) -> tuple[tuple[CameraGroup, ...], tuple[str, ...]]:
     """Return the cameras of frames with intrinsics `recorded` (N,), and notes.
 
-    `labels` (N,) name the cameras in the log; a single camera is called `camera`, others `camera_<label>`.
+    `labels` (N,) name the cameras in the log; a single camera is called `camera`, others by their label, or
+    `camera_<label>` where that is a number.
     """
     kinds = list(dict.fromkeys(zip(labels, recorded, strict=True)))
     if len(kinds) <= MOST_CAMERAS:
-        names = {kind: "camera" if len(kinds) == 1 else f"camera_{_plain(kind[0])}" for kind in kinds}
+        names = {kind: "camera" if len(kinds) == 1 else _plain(kind[0]) for kind in kinds}
         if len(set(names.values())) < len(kinds):
             names = {kind: f"camera_{index}" for index, kind in enumerate(kinds, start=1)}
         members: dict[tuple[str, RecordedCamera], list[int]] = {}
@@ -56,4 +57,5 @@ def grouped(
 
 
 def _plain(label: str) -> str:
-    return "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in label)
+    name = "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in label)
+    return f"camera_{name}" if not name or name[0] in "0123456789" else name

@@ -55,6 +55,8 @@ class _Frame:
     depth: Path | None
     pose: np.ndarray | None
     problem: str | None
+    time: float | None
+    """`timestamp` of the frame [s], which our own exports have."""
     fields: dict[str, Any]
     """Intrinsics of the frame over those of the file."""
 
@@ -91,6 +93,9 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     if not isinstance(document, dict) or not isinstance(document.get("frames"), list):
         raise BadInput(f"{file}: has no list of frames")
     frames = sorted(_frames(document, file), key=lambda frame: natural_key(frame.name))
+    stamped = all(frame.time is not None for frame in frames)
+    if stamped:
+        frames.sort(key=lambda frame: frame.time or 0.0)
     has_depth = any(frame.depth is not None for frame in frames)
     refuse_exr((frame.depth.name for frame in frames if frame.depth is not None), str(file))
     default_unit = _number(document, "depth_unit_scale_factor", str(file), DEFAULT_UNIT)
@@ -98,7 +103,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         raise BadInput(f"{file}: depth_unit_scale_factor {default_unit:g} is not positive")
     units, unit_note = depth_units(parameters, 1 / default_unit)
     recorded, given = _recorded(frames, has_depth, parameters)
-    groups, group_notes = grouped(recorded, [str(i) for i in _first_places(recorded)])
+    groups, group_notes = grouped(recorded, _labels(frames, recorded))
     counts = {group.name: len(group.members) for group in groups}
     chosen = chosen_cameras(counts, parameters, str(file)) if counts else ()
     world, world_notes = _world_from_saved(document, file, has_depth)
@@ -111,7 +116,8 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         form = FrameFormat(recorded[index], group.camera, True, has_depth, units)
         load = frame_loader(FrameFiles(frame.color, frame.depth), form)
         pose = None if frame.pose is None else world(frame.pose)
-        entries.append(Entry(frame.name, index / parameters.frame_rate, pose, load, frame.problem, group.name))
+        time = index / parameters.frame_rate if frame.time is None or not stamped else frame.time
+        entries.append(Entry(frame.name, time, pose, load, frame.problem, group.name))
     cameras = [SourceCamera(group.name, group.camera) for group in groups if group.name in chosen]
     if not cameras:
         raise BadInput(f"{file}: has no frames")
@@ -127,9 +133,12 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         ),
         *((unit_note,) if has_depth else ()),
         *world_notes,
-        f"times assumed: order of the names / {parameters.frame_rate:g} per second",
+        "times from timestamp"
+        if stamped
+        else f"times assumed: order of the names / {parameters.frame_rate:g} per second",
     )
-    streams = [stream("file_path", "color", [frame.color for frame in frames])]
+    stamps = np.array([round((frame.time or 0.0) * 1e9) for frame in frames if stamped], np.int64)
+    streams = [stream("file_path", "color", [frame.color for frame in frames], stamps)]
     if has_depth:
         streams.append(stream("depth_file_path", "depth", [frame.depth for frame in frames if frame.depth]))
     streams.append(text_stream("transform_matrix", "pose", sum(frame.pose is not None for frame in frames)))
@@ -167,6 +176,7 @@ def _frames(document: dict[str, Any], file: Path) -> list[_Frame]:
                 None if depth is None else named_file(root, depth, where),
                 pose,
                 problem,
+                None if fields.get("timestamp") is None else _number(fields, "timestamp", where, largest=9e9),
                 {**shared, **fields},
             )
         )
@@ -191,9 +201,9 @@ def _pose(value: Any) -> tuple[np.ndarray | None, str | None]:
     return (matrix, None) if matrix.shape == (4, 4) else (None, "unreadable_pose")
 
 
-def _number(fields: dict[str, Any], name: str, where: str, default: float | None = None) -> float:
+def _number(fields: dict[str, Any], name: str, where: str, default: float | None = None, largest: float = 1e9) -> float:
     value = fields.get(name, default)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 1e9:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= largest:
         raise BadInput(f"{where}: {name} = {value!r:.40} is no number")
     return float(value)
 
@@ -262,10 +272,15 @@ def _lens(fields: dict[str, Any], where: str) -> Lens:
     return PINHOLE if lens.is_pinhole else lens
 
 
-def _first_places(recorded: list[RecordedCamera]) -> list[int]:
-    """Return for each camera the number of its kind, counted from 1 in order of appearance."""
+def _labels(frames: list[_Frame], recorded: list[RecordedCamera]) -> list[str]:
+    """Return the name of each frame's camera: `camera_name`, else the number of its kind in order of appearance."""
     numbers: dict[RecordedCamera, int] = {}
-    return [numbers.setdefault(one, len(numbers) + 1) for one in recorded]
+    labels = []
+    for frame, one in zip(frames, recorded, strict=True):
+        name = frame.fields.get("camera_name")
+        number = numbers.setdefault(one, len(numbers) + 1)
+        labels.append(name if isinstance(name, str) and name else str(number))
+    return labels
 
 
 def _world_from_saved(

@@ -320,7 +320,7 @@ def test_nerfstudio_lenses_are_undone(tmp_path: Path, fisheye: bool) -> None:
 def test_nerfstudio_cameras_of_their_own(tmp_path: Path) -> None:
     log = write_nerfstudio(tmp_path / "log", frames(5))
     document = json.loads((log / "transforms.json").read_text())
-    document["frames"][0]["fl_x"] = document["frames"][0]["fl_y"] = 90.0  # frame_5: the list is written backwards
+    document["frames"][0] |= {"fl_x": 90.0, "fl_y": 90.0}  # frame_5: the list is written backwards
     (log / "transforms.json").write_text(json.dumps(document))
     source = open_log(log, IngestParameters())
     assert [known.name for known in source.cameras] == ["camera_1"] and len(source.entries) == 4
@@ -330,6 +330,12 @@ def test_nerfstudio_cameras_of_their_own(tmp_path: Path) -> None:
     assert [entry.camera_name for entry in both.entries] == ["camera_1"] * 4 + ["camera_2"]
     with pytest.raises(UsageError, match="camera_1, camera_2"):
         open_log(log, IngestParameters(camera=("left",)))
+    for index, frame in enumerate(document["frames"]):
+        frame |= {"camera_name": "tele" if index == 0 else "wide", "timestamp": 100.0 - index}
+    (log / "transforms.json").write_text(json.dumps(document))
+    named = open_log(log, IngestParameters(camera=("tele", "wide")))
+    assert [entry.camera_name for entry in named.entries] == ["wide"] * 4 + ["tele"]
+    assert [entry.time for entry in named.entries] == [96.0, 97.0, 98.0, 99.0, 100.0]
 
 
 def test_nerfstudio_intrinsics_of_every_frame_become_one_camera(tmp_path: Path) -> None:
