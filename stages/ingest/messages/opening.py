@@ -15,6 +15,7 @@ from stages.ingest.messages.sqlite_container import MAGIC as SQLITE_MAGIC
 from stages.kit.formats.mcap_records import MAGIC as MCAP_MAGIC
 
 _OPENERS: dict[str, Callable[..., MessageLog]] = {"mcap": open_mcap, "rosbag1": open_rosbag1, "rosbag2": open_rosbag2}
+_SUFFIXES = {".mcap": "mcap", ".bag": "rosbag1", ".db3": "rosbag2"}
 _ROSBAG1_MAGIC = b"#ROSBAG V"
 _METADATA_HEAD = 4096
 
@@ -33,6 +34,8 @@ def open_message_log(path: Path, *, salvage: bool) -> MessageLog:
     Raises BadInput when it is no such log; without `salvage` also when anything in it is torn or damaged.
     """
     container = container_of(path)
+    if container is None and path.is_file():
+        container = _SUFFIXES.get(path.suffix)  # says what is wrong with it
     if container is None:
         if not path.exists():
             raise BadInput(f"{path}: there is no such log", hint="check the path")

@@ -166,6 +166,8 @@ class Rosbag1Messages:
         if self._orphans:
             self._lines.found(f"indexes of lost chunks name {self._orphans} messages")
         if header is None or torn:
+            if not torn:
+                self._lines.found("ends before its header")
             return False
         if header.number(b"index_pos", 8) == 0:
             self._lines.found(
@@ -324,7 +326,7 @@ class Rosbag1Messages:
             self._chunk_damage(index, fault, found)
         else:
             stated = self._indexed.get(index)
-            if first and stated is not None and +stated != found:
+            if first and stated is not None and found.total() < stated.total():
                 self._lines.found(
                     f"chunk at byte {self._chunks[index]} holds {found.total()} messages, "
                     f"its index names {stated.total()}"

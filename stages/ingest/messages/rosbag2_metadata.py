@@ -9,6 +9,14 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
+from ruamel.yaml.events import (
+    AliasEvent,
+    MappingEndEvent,
+    MappingStartEvent,
+    ScalarEvent,
+    SequenceEndEvent,
+    SequenceStartEvent,
+)
 
 from schemas.errors import BadInput
 
@@ -16,6 +24,8 @@ NAME = "metadata.yaml"
 KEY = "rosbag2_bagfile_information"
 LARGEST = 2 << 20
 """Bytes of a metadata.yaml that are accepted; a bag of 1,000 parts has about a tenth of it."""
+DEEPEST = 20
+"""Maps and lists within each other that are accepted."""
 PART_SUFFIXES = (".db3", ".mcap")
 PACKED_SUFFIXES = (".zstd", ".zst")
 
@@ -37,28 +47,64 @@ def read_bag_metadata(folder: Path) -> BagMetadata:
     try:
         size = path.stat().st_size
         if size > LARGEST:
-            raise BadInput(f"{path}: has {size} bytes, more than the {LARGEST} that are accepted")
-        text = path.read_text(encoding="utf-8")
-        if "<<" in text:  # merged keys multiply; no recorder writes them
-            raise ValueError("merges keys (<<)")
-        return _described(folder, YAML(typ="safe", pure=True).load(text)[KEY])
-    except (OSError, UnicodeDecodeError, YAMLError, ValueError, RecursionError) as error:
+            raise ValueError(f"{size} bytes, more than the {LARGEST} that are accepted")
+        tree = _tree(path.read_text(encoding="utf-8"))
+        if not isinstance(tree, dict) or not isinstance(tree.get(KEY), dict):
+            raise ValueError("it does not describe a bag")
+        return _described(folder, tree[KEY])
+    except (OSError, ValueError, YAMLError) as error:
         reason = " ".join(str(error).split())
         raise BadInput(f"{path}: cannot be read: {reason:.200}", hint="`ros2 bag reindex` writes it anew") from None
-    except (KeyError, TypeError, AttributeError):
-        raise BadInput(f"{path}: does not describe a bag", hint="`ros2 bag reindex` writes it anew") from None
 
 
-def _described(folder: Path, information: Any) -> BagMetadata:
-    mode, packing = str(information.get("compression_mode") or "").lower(), information.get("compression_format") or ""
+def _tree(text: str) -> Any:
+    """Return the maps, lists and texts of a YAML document.
+
+    Built from the parser's events and not by its constructors, so that there are no aliases, merges, tags and depths
+    that multiply what stands in the file. Raises ValueError, YAMLError.
+    """
+    top: list[Any] = []
+    open_nodes: list[tuple[list[Any] | dict[str, Any], list[str]]] = [(top, [])]
+    """Every open list or map, the key that a map waits for a value of."""
+    for event in YAML(typ="safe", pure=True).parse(text):
+        node: Any
+        if isinstance(event, AliasEvent):
+            raise ValueError("it holds aliases, which no recorder writes")
+        if isinstance(event, SequenceEndEvent | MappingEndEvent):
+            open_nodes.pop()
+            continue
+        if isinstance(event, ScalarEvent):
+            node = event.value
+        elif isinstance(event, SequenceStartEvent | MappingStartEvent):
+            node = [] if isinstance(event, SequenceStartEvent) else {}
+        else:
+            continue
+        parent, key = open_nodes[-1]
+        if isinstance(parent, list):
+            parent.append(node)
+        elif key:
+            parent[key.pop()] = node
+        elif isinstance(node, str):
+            key.append(node)
+        else:
+            raise ValueError("it has a key that is no text")
+        if not isinstance(node, str):
+            open_nodes.append((node, []))
+        if len(open_nodes) > DEEPEST:
+            raise ValueError(f"it is nested more than {DEEPEST} deep")
+    return top[0] if top else None
+
+
+def _described(folder: Path, information: dict[str, Any]) -> BagMetadata:
+    mode, packing = str(information.get("compression_mode", "")).lower(), information.get("compression_format", "")
     if mode not in ("", "none") and packing != "zstd":
-        raise BadInput(f"{folder}: is packed with {packing!r:.40}, only zstd is read")
-    names = information["relative_file_paths"]
+        raise ValueError(f"messages are packed with {packing!r:.40}, only zstd is read")
+    names = information.get("relative_file_paths")
     if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
-        raise BadInput(f"{folder / NAME}: relative_file_paths is no list of names")
+        raise ValueError("relative_file_paths is no list of names")
     parts = tuple(dict.fromkeys(_inside(folder, name) for name in names))
-    count = information.get("message_count")
-    return BagMetadata(parts, mode == "message", count if isinstance(count, int) else None)
+    count = str(information.get("message_count"))
+    return BagMetadata(parts, mode == "message", int(count) if count.isdecimal() else None)
 
 
 def _inside(folder: Path, name: str) -> Path:

@@ -6,6 +6,7 @@ https://github.com/ros2/rosbag2 (rosbag2_storage_sqlite3), schema versions 1 to 
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
 import tempfile
@@ -21,11 +22,13 @@ from stages.kit.formats.damage_lines import HINT, DamageLines
 from stages.kit.formats.log_file import Damaged, LogFile
 
 MAGIC = b"SQLite format 3\x00"
+_HEAD_SIZE = 100
+_PAGE_SIZES = {1 << power for power in range(9, 17)}
 LARGEST_MESSAGE = 512 << 20
 """Bytes of one message that are accepted."""
 _JOURNAL_MAGIC = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
 _WAL_MAGICS = (b"\x37\x7f\x06\x82", b"\x37\x7f\x06\x83")
-_ROWS = "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ?"
+_ROWS = "SELECT rowid, topic_id, timestamp, data FROM messages WHERE rowid > ?"
 
 
 class SqliteMessages:
@@ -42,13 +45,15 @@ class SqliteMessages:
         self._counted = False
         self._topics: dict[Any, Channel] = {}
         self._copy: tempfile.TemporaryDirectory[str] | None = None
-        self._check_magic()
+        head, size = self._read_head()
         self._database = sqlite3.connect(":memory:")
         try:
             self._database = self._connect(path.resolve(), "mode=ro&immutable=1")
             journals = self._journals()
             if journals:
                 self._take_in(journals)
+            else:
+                self._check_size(head, size)
             self._open()
         except sqlite3.Error as error:
             self.close()
@@ -81,7 +86,7 @@ class SqliteMessages:
     def fetch(self, location: Hashable) -> StoredMessage:
         """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
         try:
-            rows = self._database.execute(_ROWS + " AND id = ?", (-1, location)).fetchall()
+            rows = self._database.execute(_ROWS + " AND rowid = ?", (-1, location)).fetchall()
         except (sqlite3.Error, OverflowError) as error:
             raise BadInput(f"{self.path}: message {location!r} cannot be read: {error}", hint=HINT) from None
         if not rows or rows[0][1] not in self._topics or not _is_message(*rows[0][2:]):
@@ -91,24 +96,44 @@ class SqliteMessages:
 
     # --- structure -------------------------------------------------------------------------------------------
 
-    def _check_magic(self) -> None:
+    def _read_head(self) -> tuple[bytes, int]:
+        """Return the head of the file and its size. Raises BadInput when it is no SQLite file."""
         file = LogFile(self.path, "a .db3 file")
         try:
-            head = file.read(0, len(MAGIC))
+            head = file.read(0, _HEAD_SIZE)
         except Damaged as fault:
             raise BadInput(f"{self.path}: {fault}") from None
         finally:
             file.close()
-        if head != MAGIC:
-            raise BadInput(f"{self.path}: is empty" if not head else f"{self.path}: is no SQLite file", hint=HINT)
+        if not head.startswith(MAGIC):
+            what = "is no SQLite file (wrong first bytes)" if head else "is empty"
+            raise BadInput(f"{self.path}: {what}", hint=HINT)
+        return head, file.size
 
-    @staticmethod
-    def _connect(path: Path, mode: str) -> sqlite3.Connection:
+    def _check_size(self, head: bytes, size: int) -> None:
+        """Leave out a last page that is cut, whose missing end SQLite would take for zeros."""
+        page, pages = int.from_bytes(head[16:18], "big"), int.from_bytes(head[28:32], "big")
+        page = 65536 if page == 1 else page
+        if len(head) < _HEAD_SIZE or page not in _PAGE_SIZES:
+            raise BadInput(f"{self.path}: has no whole SQLite header", hint=HINT)
+        current = head[24:28] == head[92:96]  # otherwise an old library wrote the file, and not the number of pages
+        missing = page * pages - size if current else -size % page
+        if missing > 0:
+            self._lines.found(f"is cut: {missing} bytes less than it should have, what stood there is lost")
+        if size % page:
+            copy = self._copied([])
+            os.truncate(copy, size - size % page)
+            self._database.close()
+            self._database = self._connect(copy, "mode=ro&immutable=1")
+
+    def _connect(self, path: Path, mode: str) -> sqlite3.Connection:
         connection = sqlite3.connect(f"file:{quote(str(path))}?{mode}", uri=True, check_same_thread=False)
         connection.text_factory = lambda text: text.decode("utf-8", "replace")
         connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_MESSAGE)
         connection.execute("PRAGMA trusted_schema=OFF")
         connection.execute("PRAGMA cell_size_check=ON")
+        if self._lines.salvage:  # nothing is written; a file that is shorter than it says is read all the same
+            connection.execute("PRAGMA writable_schema=ON")
         return connection
 
     def _journals(self) -> list[Path]:
@@ -118,27 +143,19 @@ class SqliteMessages:
         for suffix, magics in (("-wal", _WAL_MAGICS), ("-journal", (_JOURNAL_MAGIC,))):
             journal = path.with_name(path.name + suffix)
             try:
-                with journal.open("rb") as file:
-                    if file.read(len(_JOURNAL_MAGIC)).startswith(magics):
-                        found.append(journal)
+                if journal.is_file():
+                    with journal.open("rb") as file:
+                        if file.read(len(_JOURNAL_MAGIC)).startswith(magics):
+                            found.append(journal)
             except OSError:
                 continue
         return found
 
     def _take_in(self, journals: list[Path]) -> None:
         """Open a copy, into which SQLite takes the journals in; the file itself is never written."""
-        path = self.path.resolve()
+        copy = self._copied(journals)
         try:
-            self._copy = tempfile.TemporaryDirectory(prefix="scenewright-")
-            for file in (path, *journals):
-                shutil.copyfile(file, Path(self._copy.name) / file.name)
-        except OSError as error:
-            raise MachineFailure(
-                f"{self.path}: its journal can only be taken in from a copy, which cannot be made: {error.strerror}",
-                hint="free space, or set TMPDIR",
-            ) from None
-        try:
-            taken_in = self._connect(Path(self._copy.name) / path.name, "mode=rw")
+            taken_in = self._connect(copy, "mode=rw")
             taken_in.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()
         except sqlite3.Error as error:
             self._lines.found(f"journal beside it cannot be taken in: {error}")
@@ -146,6 +163,20 @@ class SqliteMessages:
         self._database.close()
         self._database = taken_in
         self.notes.append("the recording ended without closing the bag; its journal was taken in")
+
+    def _copied(self, journals: list[Path]) -> Path:
+        """Copy the file and its journals into a temporary folder; return the copy."""
+        path = self.path.resolve()
+        try:
+            self._copy = tempfile.TemporaryDirectory(prefix="scenewright-")
+            for file in (path, *journals):
+                shutil.copyfile(file, Path(self._copy.name) / file.name)
+        except OSError as error:
+            raise MachineFailure(
+                f"{self.path}: can only be read from a copy, which cannot be made: {error.strerror}",
+                hint="free space, or set TMPDIR",
+            ) from None
+        return Path(self._copy.name) / path.name
 
     def _open(self) -> None:
         tables = self._tables()
@@ -206,7 +237,7 @@ class SqliteMessages:
         query, wanted = _ROWS, tuple(channel_ids or ())
         if channel_ids is not None:
             query += f" AND topic_id IN ({','.join('?' * len(wanted))})"
-        query += " ORDER BY id"
+        query += " ORDER BY rowid"
         last = -1
         while True:
             try:
@@ -215,35 +246,44 @@ class SqliteMessages:
                     yield row
                 return
             except sqlite3.Error as error:
-                following = self._readable_after(last)
+                following = self._next_readable(query, last, wanted)
                 if following is None:
                     self._lines.found(f"messages after number {last} cannot be read ({error}): they are lost")
                     return
-                lost = following - last - 1
-                self._lines.found(f"messages {last + 1} to {following - 1} cannot be read ({error}): {lost} are lost")
-                last = following - 1
+                lost = following[0] - last - 1
+                if lost:
+                    span = f"messages {last + 1} to {following[0] - 1}"
+                    self._lines.found(f"{span} cannot be read ({error}): up to {lost} are lost")
+                last = following[0]
+                yield following
 
-    def _readable_after(self, last: int) -> int | None:
-        """Return the number of the next message that can be read: steps that double, then halves."""
+    def _next_readable(self, query: str, last: int, wanted: tuple[int, ...]) -> tuple[int, Any, Any, Any] | None:
+        """Return the next row after `last` that can be read, found in steps that double, then halve; None: no more.
+
+        sqlite3 reads one row ahead, so that the first may be the very next.
+        """
+
+        def first(number: int) -> Any:
+            """Return the first row from a number on, None at the end, False when it cannot be read."""
+            try:
+                return self._database.execute(query + " LIMIT 1", (number - 1, *wanted)).fetchone()
+            except sqlite3.Error:
+                return False
+
         bad, step = last, 1
-        while not self._readable(last + step):
+        while (row := first(last + step)) is False:
             bad, step = last + step, step * 2
-            if step > 1 << 62:
+            if last + step >= 1 << 62:
                 return None
         good = last + step
         while good - bad > 1:
             middle = (good + bad) // 2
-            good, bad = (middle, bad) if self._readable(middle) else (good, middle)
-        row = self._database.execute(_ROWS + " ORDER BY id LIMIT 1", (good - 1,)).fetchone()
-        return None if row is None else row[0]
-
-    def _readable(self, number: int) -> bool:
-        """Whether the first message from this number on can be read, or there is none."""
-        try:
-            self._database.execute(_ROWS + " ORDER BY id LIMIT 1", (number - 1,)).fetchone()
-        except sqlite3.Error:
-            return False
-        return True
+            between = first(middle)
+            if between is False:
+                bad = middle
+            else:
+                good, row = middle, between
+        return row
 
 
 def _is_message(time: Any, data: Any) -> bool:

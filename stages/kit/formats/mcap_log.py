@@ -236,7 +236,7 @@ class McapLog:
             self._lost_chunk(index, fault, found.total())
         else:
             indexed = self._structure.indexed_messages(index)
-            if indexed not in (None, found.total()):
+            if indexed is not None and found.total() < indexed:
                 where = f"chunk at byte {self._chunks[index]}"
                 self.damage.found(f"{where} holds {found.total()} messages, its index names {indexed}")
         if self._chunks[index] not in self._examined:

@@ -18,6 +18,7 @@ from schemas.errors import BadInput
 from stages.kit.formats.damage_lines import HINT, DamageLines
 from stages.kit.formats.log_file import Damaged, LogFile
 from stages.kit.formats.mcap_records import (
+    COMPRESSIONS,
     DATA_END_SIZE,
     HEAD,
     MAGIC,
@@ -42,6 +43,8 @@ _PER_DEFINITION = 500
 _INDEX_HEAD = 6
 _INDEX_ENTRY = 16
 _KNOWN = {int(code) for code in Opcode}
+_PARSED = {Opcode.MESSAGE, Opcode.MESSAGE_INDEX, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.ATTACHMENT}
+"""Opcodes whose records prove in another way that they are what they say, or are too many to look at twice."""
 _CUT = "ends within it"
 _UNFINISHED = "ends without a footer: it was not closed, as after a power failure"
 
@@ -159,6 +162,9 @@ class McapStructure:
             self.profile = read_header(self._definition(offset, length))
         elif opcode == Opcode.CHUNK:
             self._visit_chunk(offset, length)
+        elif opcode not in _PARSED and self._is_like_chunk(offset, length):
+            self.damage.found(f"record at byte {offset} has the opcode {opcode} and is built like a chunk: read as one")
+            self._visit_chunk(offset, length)
         elif opcode == Opcode.MESSAGE:
             self.loose.append(offset)
         elif opcode == Opcode.MESSAGE_INDEX:
@@ -183,9 +189,7 @@ class McapStructure:
         elif opcode == Opcode.CHUNK_INDEX:
             self._stated_chunks.append(read_chunk_index(self._body(offset, length)))
         elif opcode == Opcode.FOOTER:
-            if self._data_end is None and not self.damage:
-                raise Damaged("is a footer without an end of data before it")
-            return read_footer(self._body(offset, length))
+            return self._visit_footer(offset, length)
         elif opcode not in _KNOWN:
             self.unknown_records += 1
             self._indexed_chunk = -1  # may be a chunk with a changed opcode
@@ -197,6 +201,20 @@ class McapStructure:
             self.chunks.append(offset)
             self.unchecked_chunks += head.checksum == 0
             self._indexed_chunk = len(self.chunks) - 1
+
+    def _is_like_chunk(self, offset: int, length: int) -> bool:
+        try:
+            return read_chunk_head(self._file, offset, length).compression in COMPRESSIONS
+        except Damaged:
+            return False
+
+    def _visit_footer(self, offset: int, length: int) -> Footer:
+        rest = self._file.read(offset + HEAD.size + length, len(MAGIC))
+        if not MAGIC.startswith(rest):
+            raise Damaged("is a footer with something else than the end of the file behind it")
+        if self._data_end is None and not self.damage:
+            raise Damaged("is a footer without an end of data before it")
+        return read_footer(self._body(offset, length))
 
     def _visit_index(self, offset: int, length: int) -> None:
         head = self._file.exactly(offset + HEAD.size, min(length, _INDEX_HEAD))

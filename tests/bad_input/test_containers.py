@@ -1,0 +1,819 @@
+"""Damaged and lying containers: refused in words, or read as far as they are whole, with what was lost. Never more."""
+
+from __future__ import annotations
+
+import bz2
+import os
+import random
+import sqlite3
+import struct
+import tracemalloc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import lz4.frame
+import pytest
+import zstandard
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.opcode import Opcode
+
+from schemas.errors import BadInput
+from stages.ingest.messages.container import MessageLog
+from stages.ingest.messages.mcap_container import open_mcap
+from stages.ingest.messages.opening import open_message_log
+from stages.ingest.messages.rosbag1_container import open_rosbag1
+from stages.ingest.messages.rosbag2_container import open_rosbag2
+from stages.kit.formats.mcap_log import McapLog
+from stages.kit.formats.mcap_records import MAGIC
+from tests.unit.ingest.container_logs import (
+    CompressionMode,
+    CompressionType,
+    IndexType,
+    Message,
+    StoragePlugin,
+    bag1_records,
+    mcap_channel,
+    mcap_chunk,
+    mcap_file,
+    mcap_message,
+    mcap_record,
+    mcap_records,
+    read_messages,
+    some_messages,
+    write_bag1,
+    write_bag2,
+    write_mcap,
+)
+
+MESSAGES = some_messages()
+WITHOUT_SUMMARY = {
+    "index_types": IndexType.NONE,
+    "repeat_channels": False,
+    "repeat_schemas": False,
+    "use_statistics": False,
+    "use_summary_offsets": False,
+}
+
+
+def _salvaged(path: Path) -> tuple[list[Message], list[str]]:
+    """Return what can be read of a damaged log, and its damage."""
+    log = open_message_log(path, salvage=True)
+    try:
+        messages = read_messages(log)
+        damage = list(log.damage)
+        assert read_messages(log) == messages and list(log.damage) == damage, "a second reading differs"
+        return messages, damage
+    finally:
+        log.close()
+
+
+def _refused(path: Path) -> str:
+    """Return the words with which a damaged log is refused when nothing is to be salvaged."""
+    with pytest.raises(BadInput) as caught:
+        read_messages(open_message_log(path, salvage=False))
+    assert path.name in str(caught.value) and "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def _write(path: Path, data: bytes) -> Path:
+    path.write_bytes(data)
+    return path
+
+
+def _flipped(data: bytes, place: int, mask: int = 0x10) -> bytes:
+    return data[:place] + bytes([data[place] ^ mask]) + data[place + 1 :]
+
+
+@contextmanager
+def _at_most(peak: float) -> Iterator[None]:
+    """Fail when more bytes than this are allocated at any time."""
+    tracemalloc.start()
+    try:
+        yield
+        assert tracemalloc.get_traced_memory()[1] < peak
+    finally:
+        tracemalloc.stop()
+
+
+# --- MCAP: cuts ------------------------------------------------------------------------------------------------
+
+WRITERS: dict[str, dict[str, Any]] = {
+    "zstd": {},
+    "plain": {"compression": CompressionType.NONE},
+    "lz4, no summary": {"compression": CompressionType.LZ4, **WITHOUT_SUMMARY},
+    "no chunks": {"use_chunking": False},
+    "checksum of all data": {"enable_data_crcs": True, "enable_crcs": False},
+}
+
+
+def _ends(path: Path, records: list[tuple[int, int, int]]) -> list[int]:
+    """Return for every message the end of the chunk that holds it, or of itself."""
+    chunks = [end for opcode, _, end in records if opcode == Opcode.CHUNK]
+    loose = [end for opcode, _, end in records if opcode == Opcode.MESSAGE]
+    with McapLog(path) as log:
+        places = [message.location for message in log.messages()]
+    return [chunks[place.chunk] if place.chunk >= 0 else loose[k] for k, place in enumerate(places)]
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_mcap_cut_at_every_record_boundary(tmp_path: Path, name: str) -> None:
+    path = write_mcap(tmp_path / "log.mcap", MESSAGES, **WRITERS[name])
+    whole = path.read_bytes()
+    records = mcap_records(whole)
+    ends = _ends(path, records)
+    data_end = next(start for opcode, start, _ in records if opcode == Opcode.DATA_END)
+    cuts = {place + step for _, start, end in records for place in (start, end) for step in (-1, 0, 1)}
+    for cut in sorted({*cuts, len(whole) - 1, len(whole) - 4}):
+        _write(path, whole[:cut])
+        _refused(path)
+        if cut < len(MAGIC):
+            assert "wrong first bytes" in _refused(path)
+            continue
+        messages, damage = _salvaged(path)
+        assert messages == [message for message, end in zip(MESSAGES, ends, strict=True) if end <= cut], cut
+        assert len(damage) == 1, damage
+        if cut >= data_end + 13:
+            assert "no message is lost" in damage[0]
+        elif cut not in {start for _, start, _ in records}:
+            start = max(start for _, start, _ in records if start < cut)
+            assert f"byte {start}" in damage[0] and f"last {cut - start} bytes" in damage[0]
+
+
+def test_mcap_that_was_not_closed(tmp_path: Path) -> None:
+    """What a power failure leaves: the end of the file missing, or zeros in its place."""
+    path = write_mcap(tmp_path / "log.mcap", MESSAGES)
+    whole = path.read_bytes()
+    records = mcap_records(whole)
+    cut = [start for opcode, start, _ in records if opcode == Opcode.CHUNK][-1]
+    kept = [m for m, end in zip(MESSAGES, _ends(path, records), strict=True) if end <= cut]
+    for tail, complaint in ((b"", "was not closed"), (bytes(10_000), "last 10000 bytes are lost")):
+        messages, damage = _salvaged(_write(path, whole[:cut] + tail))
+        assert messages == kept and complaint in damage[0]
+        assert "whole chunks with" in _refused(path)
+
+
+# --- MCAP: changed bytes ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_mcap_with_a_changed_byte_in_every_record(tmp_path: Path, name: str) -> None:
+    """Refused or harmless; salvaged without what was changed; never anything that was not written."""
+    path = write_mcap(tmp_path / "log.mcap", MESSAGES, **WRITERS[name])
+    whole = path.read_bytes()
+    checked = "enable_crcs" not in WRITERS[name] and name != "no chunks"
+    for opcode, start, end in mcap_records(whole):
+        for place in {start, start + 1, start + 3, start + 8, start + 9, (start + 9 + end) // 2, end - 1}:
+            _write(path, _flipped(whole, place))
+            messages, damage = _salvaged(path)
+            if checked:
+                assert set(messages) <= set(MESSAGES)
+                assert damage or messages == MESSAGES, f"{Opcode(opcode).name} at {place - start} lost in silence"
+            try:
+                strict = read_messages(open_mcap(path, salvage=False))
+            except BadInput as error:
+                assert "log.mcap" in str(error) and damage
+            else:
+                assert not damage and (strict == MESSAGES or not checked)
+
+
+def test_mcap_changed_bytes_are_found_wherever_content_is(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / "log.mcap", MESSAGES)
+    whole = path.read_bytes()
+    in_summary = False
+    for opcode, start, end in mcap_records(whole):
+        if in_summary or opcode in (Opcode.CHUNK, Opcode.ATTACHMENT):
+            places = [end - 1, (start + end) // 2 + 20 if opcode == Opcode.CHUNK else (start + 9 + end) // 2]
+            for place in places:
+                _refused(_write(path, _flipped(whole, place)))
+        in_summary |= opcode == Opcode.DATA_END
+    whole = write_mcap(path, MESSAGES, enable_data_crcs=True).read_bytes()
+    for opcode, _, end in mcap_records(whole):
+        if opcode in (Opcode.METADATA, Opcode.MESSAGE_INDEX, Opcode.HEADER):
+            _refused(_write(path, _flipped(whole, end - 1)))
+
+
+def test_mcap_damage_costs_no_more_than_its_chunk(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / "log.mcap", MESSAGES)
+    whole = path.read_bytes()
+    records = mcap_records(whole)
+    chunk_of = _ends(path, records)
+    for opcode, start, end in records:
+        for place in (start, start + 1, start + 2, start + 7, start + 9):
+            if place >= end - 1:
+                continue
+            messages, damage = _salvaged(_write(path, _flipped(whole, place, 0x41)))
+            in_chunk = opcode == Opcode.CHUNK and place not in (start, start + 9)  # opcode, start time: no content
+            lost = [m for m, chunk in zip(MESSAGES, chunk_of, strict=True) if in_chunk and chunk == end]
+            assert messages == [m for m in MESSAGES if m not in lost], (Opcode(opcode).name, place - start)
+            assert (
+                damage
+                or place == start + 9
+                or any("unknown kinds" in note for note in open_mcap(path, salvage=True).notes)
+            )
+
+
+def test_mcap_says_how_many_messages_a_lost_chunk_had(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / "log.mcap", MESSAGES)
+    whole = path.read_bytes()
+    records = mcap_records(whole)
+    start, end = [(start, end) for opcode, start, end in records if opcode == Opcode.CHUNK][1]
+    lost = _ends(path, records).count(end)
+    _write(path, _flipped(whole, start + 9 + 28))  # the length of the compression's name
+    messages, damage = _salvaged(path)
+    assert len(messages) == len(MESSAGES) - lost
+    assert any(f"byte {start}" in line and f"{end - start} bytes are lost" in line for line in damage)
+    assert f"indexes of lost chunks name {lost} messages" in damage
+
+
+def test_mcap_chunk_with_a_wrong_checksum_is_skipped(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / "log.mcap", MESSAGES, compression=CompressionType.NONE)
+    whole = path.read_bytes()
+    chunks = [(start, end) for opcode, start, end in mcap_records(whole) if opcode == Opcode.CHUNK]
+    start, end = chunks[2]
+    lost = [m for m, chunk in zip(MESSAGES, _ends(path, mcap_records(whole)), strict=True) if chunk == end]
+    messages, damage = _salvaged(_write(path, _flipped(whole, end - 5)))
+    assert messages == [m for m in MESSAGES if m not in lost]
+    assert damage == [f"chunk at byte {start} ({len(lost)} messages by its index) has a wrong checksum: it is lost"]
+    log = open_mcap(path, salvage=True)
+    assert list(log.damage) == []  # found while reading, not before
+    assert "wrong checksum" in _refused(path)
+    places = [message.location for message in log.messages()]
+    assert [log.fetch(place).data for place in places] == [data for _, _, data in messages]
+    lost_place = type(places[0])(2, 9)
+    with pytest.raises(BadInput, match="wrong checksum"):
+        log.fetch(lost_place)
+
+
+def test_mcap_definitions_survive_a_damaged_summary(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / "log.mcap", MESSAGES)
+    whole = path.read_bytes()
+    place = whole.rindex(b"Type_a")
+    messages, damage = _salvaged(_write(path, _flipped(whole, place)))
+    assert messages == MESSAGES and len(damage) == 1 and "summary" in damage[0]
+    log = open_mcap(path, salvage=True)
+    assert {channel.type_name for channel in log.channels} == {"Type_a", "Type_b"}
+
+
+# --- MCAP: lies ------------------------------------------------------------------------------------------------
+
+HEADLESS = struct.pack("<BQ", Opcode.MESSAGE, 3) + b"abc"
+BAD_CHUNKS: dict[str, tuple[bytes, str]] = {
+    "expands": (mcap_chunk(zstandard.compress(bytes(10**8)), 1000, b"zstd"), "lies about its size"),
+    "claims much": (mcap_chunk(zstandard.compress(bytes(1000)), 1 << 40, b"zstd"), f"more than {1 << 30}"),
+    "claims more": (mcap_chunk(zstandard.compress(bytes(1000)), 1 << 29, b"zstd"), "holds 1000 bytes and claims"),
+    "claims less": (mcap_chunk(zstandard.compress(bytes(1000)), 999, b"zstd"), "holds more than 999 bytes"),
+    "nonsense": (mcap_chunk(b"nonsense", 100, b"zstd"), "cannot be unpacked"),
+    "lz4 nonsense": (mcap_chunk(b"nonsense", 100, b"lz4"), "cannot be unpacked"),
+    "lz4 expands": (mcap_chunk(lz4.frame.compress(bytes(10**8)), 1000, b"lz4"), "holds more than 1000 bytes"),
+    "lz4 claims more": (mcap_chunk(lz4.frame.compress(bytes(1000)), 1 << 29, b"lz4"), "holds 1000 bytes and claims"),
+    "lz4 cut": (mcap_chunk(lz4.frame.compress(os.urandom(1000))[:-200], 1000, b"lz4"), "claims 1000"),
+    "plain claims more": (mcap_chunk(bytes(50), 100), "holds 50 bytes and claims 100"),
+    "other packing": (mcap_chunk(bytes(50), 50, b"rar"), "unknown compression 'rar'"),
+    "ends within": (mcap_chunk(b"\x05\xff\xff\xff\xff\xff\xff\xff\x7f"), "ends within a record"),
+    "no checksum holds": (mcap_chunk(mcap_message(1, 0, b"."), None, b"", 77), "wrong checksum"),
+    "undefined": (mcap_chunk(mcap_message(9, 0, b".")), "channel 9, which the file does not define"),
+    "headless": (mcap_chunk(HEADLESS), "shorter than its header"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_CHUNKS)
+def test_mcap_chunks_that_lie(tmp_path: Path, case: str) -> None:
+    bad, complaint = BAD_CHUNKS[case]
+    good = mcap_chunk(mcap_message(1, 5, b"good"))
+    path = _write(tmp_path / "log.mcap", mcap_file(mcap_channel(1, "/x"), good, bad, good))
+    with _at_most(40e6):
+        assert complaint in _refused(path)
+        messages, damage = _salvaged(path)
+    assert messages == [("/x", 5, b"good")] * 2
+    assert any(complaint in line for line in damage)
+
+
+def test_mcap_records_that_claim_more_than_there_is(tmp_path: Path) -> None:
+    """A metadata record of 2 GiB in a file of a few bytes, and a true one that is larger than any we accept."""
+    path = tmp_path / "log.mcap"
+    whole = mcap_file(mcap_channel(1, "/x"), mcap_chunk(mcap_message(1, 5, b"good")))
+    body = whole[: whole.index(mcap_record(Opcode.DATA_END, bytes(4)))]
+    for opcode in (
+        Opcode.METADATA,
+        Opcode.SCHEMA,
+        Opcode.CHANNEL,
+        Opcode.ATTACHMENT,
+        Opcode.MESSAGE_INDEX,
+        Opcode.MESSAGE,
+    ):
+        path.write_bytes(body + struct.pack("<BQ", opcode, 2 << 30) + bytes(100))
+        with _at_most(20e6):
+            assert "ends within the record" in _refused(path)
+            assert _salvaged(path)[0] == [("/x", 5, b"good")]
+    path.write_bytes(body + struct.pack("<BQ", Opcode.METADATA, 100 << 20))
+    os.truncate(path, path.stat().st_size + (100 << 20))
+    with _at_most(20e6):
+        messages, damage = _salvaged(path)
+    assert messages == [("/x", 5, b"good")] and "more than the" in damage[0]
+
+
+def test_mcap_metadata_is_bounded_as_a_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stages.kit.formats.mcap_structure.MOST_DEFINITIONS", 10_000)
+    metadata = mcap_record(Opcode.METADATA, struct.pack("<I", 1) + b"n" + struct.pack("<I", 0))
+    path = _write(tmp_path / "log.mcap", mcap_file(mcap_channel(1, "/x"), *[metadata] * 100, mcap_message(1, 5, b"m")))
+    messages, damage = _salvaged(path)
+    assert len(messages) == 1 and "bytes of definitions" in damage[0]
+
+
+def test_mcap_fields_that_claim_more_than_their_record(tmp_path: Path) -> None:
+    for record in (
+        mcap_record(Opcode.CHANNEL, struct.pack("<HHI", 2, 0, 1 << 31) + b"/y"),
+        mcap_record(Opcode.SCHEMA, struct.pack("<HI", 2, 3) + b"abc" + struct.pack("<II", 0, 99)),
+        mcap_record(Opcode.METADATA, struct.pack("<I", 1) + b"n" + struct.pack("<I", 500)),
+        mcap_record(Opcode.CHANNEL, struct.pack("<HHI", 2, 0, 2) + b"\xff\xfe" + bytes(8)),
+        mcap_record(Opcode.MESSAGE_INDEX, struct.pack("<HI", 1, 160) + bytes(16)),
+        mcap_record(Opcode.CHUNK, bytes(10)),
+        mcap_record(Opcode.STATISTICS, bytes(3)),
+    ):
+        good = mcap_message(1, 5, b"good")
+        path = _write(tmp_path / "log.mcap", mcap_file(mcap_channel(1, "/x"), good, record, good))
+        _refused(path)
+        messages, damage = _salvaged(path)
+        assert messages == [("/x", 5, b"good")] * 2 and len(damage) == 1
+
+
+def test_mcap_channels_and_schemas_that_contradict(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    good = mcap_message(1, 5, b"good")
+    _write(path, mcap_file(mcap_channel(1, "/x"), good, mcap_channel(1, "/x"), good))
+    assert read_messages(open_mcap(path, salvage=False)) == [("/x", 5, b"good")] * 2
+    for records in (
+        (mcap_channel(1, "/x"), good, mcap_channel(1, "/y"), good),
+        (mcap_channel(1, "/x"), mcap_chunk(good + mcap_channel(1, "/y") + good)),
+    ):
+        _write(path, mcap_file(*records))
+        assert "channel 1 is defined twice, as '/x' and as '/y'" in _refused(path)
+        messages, damage = _salvaged(path)
+        assert messages == [("/x", 5, b"good")] * 2 and len(damage) == 1
+    _write(path, mcap_file(mcap_channel(1, "/x", schema=7), good))
+    assert "schema 7, which the file does not define" in _refused(path)
+    assert len(_salvaged(path)[0]) == 1
+    _write(path, mcap_file(mcap_channel(1, "/x"), *[mcap_message(3, 5, b"?")] * 4, good))
+    assert _salvaged(path) == (
+        [("/x", 5, b"good")],
+        ["4 times: a message belongs to channel 3, which the file does not define"],
+    )
+
+
+def test_mcap_statistics_that_count_more(tmp_path: Path) -> None:
+    statistics = struct.pack("<QHIIIIQQ", 3, 0, 1, 0, 0, 0, 0, 0) + struct.pack("<I", 10) + struct.pack("<HQ", 1, 3)
+    good = mcap_message(1, 5, b"good")
+    data = mcap_file(mcap_channel(1, "/x"), good, good)
+    end = data.index(mcap_record(Opcode.FOOTER, bytes(20)))
+    data = data[:end] + mcap_channel(1, "/x") + mcap_record(Opcode.STATISTICS, statistics) + data[end:]
+    path = _write(tmp_path / "log.mcap", data)
+    assert "states 3 messages and holds 2" in _refused(path)
+    assert _salvaged(path)[1] == ["states 3 messages and holds 2"]
+
+
+def test_mcap_without_header_and_with_more_behind_its_end(tmp_path: Path) -> None:
+    whole = mcap_file(mcap_channel(1, "/x"), mcap_message(1, 5, b"good"))
+    path = _write(tmp_path / "log.mcap", whole + b"more")
+    assert "more bytes after the footer" in _refused(path)
+    assert len(_salvaged(path)[0]) == 1
+    headless = MAGIC + whole[len(MAGIC) + 17 :]
+    assert "is no header" in _refused(_write(path, headless))
+    assert "is no header" in _salvaged(path)[1][0]
+
+
+@pytest.mark.parametrize("suffix", [".mcap", ".bag", ".db3"])
+def test_paths_that_are_no_files(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / ("log" + suffix)
+    opener: Callable[..., MessageLog] = {".mcap": open_mcap, ".bag": open_rosbag1, ".db3": open_rosbag2}[suffix]
+    with pytest.raises(BadInput, match="missing"):
+        opener(path, salvage=True)
+    for content, complaint in (
+        (b"", "is empty"),
+        (b"Nothing of the kind, but longer.", "wrong first bytes|is neither"),
+    ):
+        with pytest.raises(BadInput, match=complaint):
+            opener(_write(path, content), salvage=True)
+    path.unlink()
+    path.mkdir()
+    with pytest.raises(BadInput, match="is a folder|no part of the bag"):
+        opener(path, salvage=True)
+    path.rmdir()
+    os.mkfifo(path)
+    for open_it in (opener, open_message_log):
+        with pytest.raises(BadInput):
+            open_it(path, salvage=True)
+
+
+# --- ROS 1 bags ------------------------------------------------------------------------------------------------
+
+
+def _bag1_ends(data: bytes) -> list[int]:
+    """Return for every message the end of its chunk; chunks hold messages in the order of the list."""
+    ends: list[int] = []
+    chunk = 0
+    for op, start, end in bag1_records(data):
+        if op == 5:
+            chunk = end
+        elif op == 4:
+            (length,) = struct.unpack_from("<I", data, start)
+            ends += [chunk] * (struct.unpack_from("<I", data, start + 4 + length)[0] // 12)
+    return ends
+
+
+@pytest.mark.parametrize("packing", ["none", "bz2", "lz4"])
+def test_bag1_cut_at_every_record_boundary(tmp_path: Path, packing: str) -> None:
+    path = write_bag1(tmp_path / "log.bag", MESSAGES, packing=packing)
+    whole = path.read_bytes()
+    ends, records = _bag1_ends(whole), bag1_records(whole)
+    assert len(ends) == len(MESSAGES)
+    for cut in sorted({place + step for _, start, end in records for place in (start, end) for step in (-1, 0, 1)}):
+        if cut >= len(whole):
+            continue
+        _write(path, whole[:cut])
+        _refused(path)
+        if cut < 13:
+            continue
+        messages, damage = _salvaged(path)
+        assert messages == [message for message, end in zip(MESSAGES, ends, strict=True) if end <= cut], cut
+        assert len(damage) == 1, damage
+
+
+def test_bag1_that_was_not_closed(tmp_path: Path) -> None:
+    """As a power failure leaves it: the header has no place of an index, and there is none."""
+    path = write_bag1(tmp_path / "log.bag", MESSAGES)
+    whole = bytearray(path.read_bytes())
+    place = whole.index(b"index_pos=") + 10
+    (index,) = struct.unpack_from("<Q", whole, place)
+    whole[place : place + 8] = bytes(8)
+    messages, damage = _salvaged(_write(path, bytes(whole[:index])))
+    assert messages == MESSAGES and len(damage) == 1 and "was not closed" in damage[0]
+    assert "was not closed" in _refused(path)
+    assert _salvaged(_write(path, bytes(whole[: index - 40])))[0] == MESSAGES
+    assert _salvaged(_write(path, bytes(whole[:index]) + bytes(5000)))[0] == MESSAGES
+
+
+def test_bag1_with_a_changed_byte_in_every_record(tmp_path: Path) -> None:
+    path = write_bag1(tmp_path / "log.bag", MESSAGES, packing="bz2")
+    whole = path.read_bytes()
+    ends = _bag1_ends(whole)
+    for op, start, end in bag1_records(whole):
+        for place in {start, start + 1, start + 3, start + 5, start + 9, (start + end) // 2, end - 1}:
+            messages, damage = _salvaged(_write(path, _flipped(whole, place)))
+            lost = [m for m, chunk in zip(MESSAGES, ends, strict=True) if op == 5 and chunk == end]
+            if op != 7:  # a connection whose definition changed is told from the one in the chunks
+                assert messages in ([m for m in MESSAGES if m not in lost], MESSAGES)
+            if messages != MESSAGES:
+                assert damage
+                _refused(path)
+
+
+def test_bag1_definitions_that_contradict(tmp_path: Path) -> None:
+    path = write_bag1(tmp_path / "log.bag", MESSAGES)
+    whole = path.read_bytes()
+    place = whole.rindex(b"std_msgs/String")
+    assert "connection 1 is defined twice" in _refused(_write(path, _flipped(whole, place, 1)))
+
+
+def _bag1_header(**fields: bytes) -> bytes:
+    content = b"".join(
+        struct.pack("<I", len(name) + 1 + len(value)) + name.encode() + b"=" + value for name, value in fields.items()
+    )
+    return struct.pack("<I", len(content)) + content
+
+
+def _bag1_record(data: bytes, **fields: bytes) -> bytes:
+    return _bag1_header(**fields) + struct.pack("<I", len(data)) + data
+
+
+def _bag1(*records: bytes, **header: bytes) -> bytes:
+    fields = {"op": b"\x03", "index_pos": bytes(8), "conn_count": bytes(4), "chunk_count": bytes(4)} | header
+    return b"#ROSBAG V2.0\n" + _bag1_record(b" " * 10, **fields) + b"".join(records)
+
+
+def _bag1_chunk(content: bytes, claimed: int | None = None, compression: bytes = b"none") -> bytes:
+    size = struct.pack("<I", len(content) if claimed is None else claimed)
+    return _bag1_record(content, op=b"\x05", compression=compression, size=size)
+
+
+CONNECTION = _bag1_record(
+    _bag1_header(type=b"std_msgs/String", md5sum=b"0", message_definition=b"string data")[4:],
+    op=b"\x07",
+    conn=bytes(4),
+    topic=b"/x",
+)
+GOOD_MESSAGE = _bag1_record(b"good", op=b"\x02", conn=bytes(4), time=bytes(8))
+LOST_MESSAGE = _bag1_record(b"lost", op=b"\x02", conn=b"\x05\0\0\0", time=bytes(8))
+BAD_BAG1_CHUNKS = {
+    "bz2 expands": (_bag1_chunk(bz2.compress(bytes(10**8)), 1000, b"bz2"), "holds more than 1000 bytes"),
+    "lz4 expands": (_bag1_chunk(lz4.frame.compress(bytes(10**8)), 1000, b"lz4"), "holds more than 1000 bytes"),
+    "bz2 claims more": (_bag1_chunk(bz2.compress(bytes(1000)), 1 << 29, b"bz2"), "holds 1000 bytes and claims"),
+    "lz4 claims much": (_bag1_chunk(lz4.frame.compress(bytes(1000)), (1 << 32) - 1, b"lz4"), f"more than {1 << 30}"),
+    "nonsense": (_bag1_chunk(b"nonsense", 100, b"bz2"), "cannot be unpacked"),
+    "other packing": (_bag1_chunk(b"nonsense", 100, b"zstd"), "unknown compression 'zstd'"),
+    "plain claims more": (_bag1_chunk(bytes(50), 100), "claims 100 bytes and holds 50"),
+    "ends within": (_bag1_chunk(GOOD_MESSAGE[:-1]), "ends within a record"),
+    "endless header": (_bag1_chunk(b"\xff" * 50), "ends within a record"),
+    "undefined": (_bag1_chunk(LOST_MESSAGE), "connection 5, which the bag does not define"),
+    "fields missing": (_bag1_chunk(_bag1_record(b"x", op=b"\x02")), "has no field"),
+    "field cut": (_bag1_chunk(struct.pack("<III", 8, 99, 0) + bytes(4)), "within a field"),
+    "outside": (GOOD_MESSAGE, "stands outside of a chunk"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_BAG1_CHUNKS)
+def test_bag1_chunks_that_lie(tmp_path: Path, case: str) -> None:
+    bad, complaint = BAD_BAG1_CHUNKS[case]
+    good = _bag1_chunk(CONNECTION + GOOD_MESSAGE)
+    path = _write(tmp_path / "log.bag", _bag1(good, bad, good))
+    with _at_most(40e6):
+        _refused(path)
+        messages, damage = _salvaged(path)
+    assert messages == [("/x", 0, b"good")] * 2
+    assert any(complaint in line for line in damage)
+
+
+def test_bag1_refused_in_words(tmp_path: Path) -> None:
+    path = tmp_path / "log.bag"
+    for content, complaint in (
+        (b"#ROSBAG V1.2\n" + bytes(100), "version 1.2.*rosbag fix"),
+        (_bag1(encryptor=b"rosbag/AesCbcEncryptor"), "is encrypted .*rosbag decrypt"),
+    ):
+        _write(path, content)
+        for salvage in (False, True):
+            with pytest.raises(BadInput, match=complaint):
+                open_message_log(path, salvage=salvage)
+
+
+def test_bag1_index_that_contradicts(tmp_path: Path) -> None:
+    path = write_bag1(tmp_path / "log.bag", MESSAGES)
+    whole = path.read_bytes()
+    for field in (b"conn_count=", b"chunk_count="):
+        assert "states" in _refused(_write(path, _flipped(whole, whole.index(field) + len(field), 1)))
+        assert _salvaged(path)[0] == MESSAGES
+    place = whole.index(b"op=\x04") - 4
+    start = next(start for op, start, end in bag1_records(whole) if start < place < end)
+    count = whole.index(b"count=", start) + 6
+    assert "its index names" in _refused(_write(path, _flipped(whole, count)))
+    assert _salvaged(path)[0] == MESSAGES
+
+
+# --- rosbag2 ---------------------------------------------------------------------------------------------------
+
+
+def test_bag2_with_missing_and_damaged_parts(tmp_path: Path) -> None:
+    folder = tmp_path / "bag"
+    for index in range(3):
+        write_mcap(folder.with_name(f"{index}.mcap"), MESSAGES[index * 10 : index * 10 + 10])
+    folder.mkdir()
+    names = [f"{index}.mcap" for index in range(3)]
+    for name in names:
+        (tmp_path / name).rename(folder / name)
+    listed = "\n".join(f"  - {name}" for name in names)
+    metadata = f"rosbag2_bagfile_information:\n  message_count: 30\n  relative_file_paths:\n{listed}\n"
+    (folder / "metadata.yaml").write_text(metadata)
+    assert _salvaged(folder) == (MESSAGES[:30], [])
+    (folder / "1.mcap").write_bytes((folder / "1.mcap").read_bytes()[:-1])
+    messages, damage = _salvaged(folder)
+    assert messages == MESSAGES[:30] and len(damage) == 1 and damage[0].startswith("1.mcap: ")
+    _refused(folder / "1.mcap")
+    (folder / "1.mcap").write_bytes(b"")
+    assert _salvaged(folder) == (MESSAGES[:10] + MESSAGES[20:30], ["part 1.mcap: is empty"])
+    (folder / "1.mcap").unlink()
+    messages, damage = _salvaged(folder)
+    assert messages == MESSAGES[:10] + MESSAGES[20:30] and len(damage) == 1 and "1.mcap: file is missing" in damage[0]
+    with pytest.raises(BadInput, match="1.mcap: file is missing"):
+        open_message_log(folder, salvage=False)
+    for name in ("0.mcap", "2.mcap"):
+        (folder / name).unlink()
+    with pytest.raises(BadInput, match="no part of the bag can be read"):
+        open_message_log(folder, salvage=True)
+
+
+def test_bag2_that_states_more_messages_than_it_holds(tmp_path: Path) -> None:
+    folder = write_bag2(tmp_path / "bag", MESSAGES)
+    metadata = folder / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace("message_count: 40", "message_count: 50"))
+    assert _salvaged(folder) == (MESSAGES, ["metadata.yaml counts 50 messages, the parts hold 40"])
+    with pytest.raises(BadInput, match="counts 50"):
+        open_message_log(folder, salvage=False)
+
+
+@pytest.mark.parametrize(
+    "name", ["../outside.db3", "{tmp}/outside.db3", "link.db3", "a/../../outside.db3", "bag/../../x"]
+)
+def test_bag2_parts_outside_of_the_folder(tmp_path: Path, name: str) -> None:
+    folder = write_bag2(tmp_path / "bag", MESSAGES)
+    write_bag2(tmp_path / "outside", MESSAGES)
+    (tmp_path / "outside" / "outside.db3").rename(tmp_path / "outside.db3")
+    (folder / "link.db3").symlink_to(tmp_path / "outside.db3")
+    (folder / "a").mkdir()
+    metadata = folder / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace("- bag.db3", "- " + name.format(tmp=tmp_path)))
+    for salvage in (False, True):
+        with pytest.raises(BadInput, match="outside of the folder"):
+            open_message_log(folder, salvage=salvage)
+
+
+BAD_METADATA = {
+    "cut": ("rosbag2_bagfile_information:\n  relative_file_paths:\n  - [", "cannot be read"),
+    "no list": ("rosbag2_bagfile_information:\n  relative_file_paths: 7\n", "no list of names"),
+    "maps": ("rosbag2_bagfile_information:\n  relative_file_paths: [{1: 2}, '']\n", "no list of names"),
+    "no map": ("rosbag2_bagfile_information: []\n", "does not describe a bag"),
+    "other content": ("# rosbag2_bagfile_information\n- 1\n", "does not describe a bag"),
+    "deep": ("rosbag2_bagfile_information: " + "[" * 100_000, "nested more than"),
+    "deep lists": ("rosbag2_bagfile_information: " + "\n" + "- " * 10_000, "nested more than"),
+    "merges": ("rosbag2_bagfile_information: {a: &a {x: 1}, b: {<<: [*a, *a]}}", "aliases"),
+    "objects": ("rosbag2_bagfile_information: !!python/object/apply:os.system ['true']", "does not describe a bag"),
+    "lists as keys": ("rosbag2_bagfile_information: {[1]: 2}", "key that is no text"),
+    "zero byte": ('rosbag2_bagfile_information:\n  relative_file_paths: ["a\\0b.db3"]\n', "cannot be read"),
+    "long": ("rosbag2_bagfile_information:\n" + "# long\n" * 400_000, "more than the"),
+    "packed otherwise": (
+        "rosbag2_bagfile_information: {compression_mode: FILE, compression_format: rar, relative_file_paths: []}",
+        "packed with 'rar'",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD_METADATA)
+def test_bag2_metadata_that_lies(tmp_path: Path, case: str) -> None:
+    text, complaint = BAD_METADATA[case]
+    folder = write_bag2(tmp_path / "bag", MESSAGES)
+    (folder / "metadata.yaml").write_text(text)
+    with pytest.raises(BadInput, match=complaint) as caught:
+        open_message_log(folder, salvage=False)
+    assert "\n" not in str(caught.value)
+    messages, damage = _salvaged(folder)
+    assert messages == MESSAGES and len(damage) == 1 and complaint in damage[0]
+
+
+def test_bag2_database_cut_or_with_a_lost_page(tmp_path: Path) -> None:
+    """What stands on whole pages is read; the rest is named. SQLite has no checksums, so that structure must tell."""
+    messages = some_messages(400)
+    path = write_bag2(tmp_path / "bag", messages) / "bag.db3"
+    whole = path.read_bytes()
+    pages = len(whole) // 4096
+    salvaged_some = 0
+    for page in random.Random(0).sample(range(3, pages), 12):
+        _write(path, whole[: page * 4096] + b"\xff" * 4096 + whole[(page + 1) * 4096 :])
+        found, damage = _salvaged(path)
+        assert damage and set(found) <= set(messages)
+        _refused(path)
+        salvaged_some += len(found) > 300
+    assert salvaged_some > 6
+    for cut in (100, 4096, 5000, len(whole) // 2, len(whole) - 1):
+        _write(path, whole[:cut])
+        _refused(path)
+        try:
+            found, damage = _salvaged(path)
+        except BadInput as error:
+            assert cut < 10_000, error
+        else:
+            assert damage and set(found) <= set(messages)
+
+
+def _changed(tmp_path: Path, *statements: str) -> Path:
+    path = write_bag2(tmp_path / "bag", MESSAGES) / "bag.db3"
+    with sqlite3.connect(path) as database:
+        for statement in statements:
+            database.execute(statement)
+    return path
+
+
+def test_bag2_databases_that_lie(tmp_path: Path) -> None:
+    path = _changed(
+        tmp_path / "rows",
+        "UPDATE messages SET data = 'words' WHERE id = 3",
+        "UPDATE messages SET topic_id = 99 WHERE id IN (4, 5)",
+        "UPDATE messages SET timestamp = x'00' WHERE id = 6",
+    )
+    messages, damage = _salvaged(path)
+    assert messages == MESSAGES[:2] + MESSAGES[6:]
+    assert damage == [
+        "2 times: a message belongs to topic 99, which the bag does not define",
+        "2 times: a message holds no bytes or no time",
+    ]
+    _refused(path)
+    endless = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i AS id, 1, i, x'00' FROM n"
+    view = _changed(
+        tmp_path / "view",
+        "DROP TABLE messages",
+        f"CREATE VIEW messages(id, topic_id, timestamp, data) AS {endless}",
+    )
+    with pytest.raises(BadInput, match="without the tables of a bag"):
+        open_message_log(view, salvage=True)
+    computed = _changed(
+        tmp_path / "computed",
+        "DROP TABLE messages",
+        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp, data GENERATED ALWAYS AS (zeroblob(1e8)))",
+    )
+    with pytest.raises(BadInput, match="without the tables of a bag"):
+        open_message_log(computed, salvage=True)
+    other = _changed(tmp_path / "other", "DROP TABLE topics", "CREATE TABLE topics(something)")
+    messages, damage = _salvaged(other)
+    assert messages == [] and "table of topics" in damage[0]
+
+
+def test_bag2_whose_messages_are_damaged_or_bombs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = write_bag2(tmp_path / "bag", MESSAGES, mode=CompressionMode.MESSAGE)
+    with sqlite3.connect(folder / "bag.db3") as database:
+        database.execute("UPDATE messages SET data = ? WHERE id = 3", (zstandard.compress(bytes(10**8)),))
+        database.execute("UPDATE messages SET data = x'0011' WHERE id = 5")
+    monkeypatch.setattr("stages.ingest.messages.rosbag2_container.LARGEST_MESSAGE", 1 << 20)
+    with _at_most(20e6):
+        messages, damage = _salvaged(folder)
+    assert messages == [m for k, m in enumerate(MESSAGES) if k not in (2, 4)]
+    assert len(damage) == 2 and any("holds more than 1048576 bytes" in line for line in damage)
+    with pytest.raises(BadInput, match="a packed message"):
+        read_messages(open_message_log(folder, salvage=False))
+
+
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+def test_bag2_packed_parts_that_are_cut_or_bombs(
+    tmp_path: Path, storage: StoragePlugin, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = write_bag2(tmp_path / "bag", MESSAGES, storage=storage, mode=CompressionMode.FILE)
+    part = next(folder.glob("*.zstd"))
+    packed = part.read_bytes()
+    part.write_bytes(packed[: len(packed) // 2])
+    with pytest.raises(BadInput, match="bag.*zstd") as caught:
+        read_messages(open_message_log(folder, salvage=False))
+    assert "scenewright-" not in str(caught.value)
+    try:
+        assert set(_salvaged(folder)[0]) <= set(MESSAGES)
+    except BadInput as error:
+        assert "no part of the bag" in str(error)
+    monkeypatch.setattr("stages.ingest.messages.rosbag2_container.ALWAYS_ACCEPTED", 1 << 20)
+    content = b"SQLite format 3\0" if storage == StoragePlugin.SQLITE3 else MAGIC
+    bomb = zstandard.ZstdCompressor(write_content_size=False).compress(content + bytes(10**8))
+    part.write_bytes(bomb)
+    with _at_most(60e6), pytest.raises(BadInput, match="holds more than"):
+        open_message_log(folder, salvage=False)
+
+
+# --- any damage ------------------------------------------------------------------------------------------------
+
+
+def _damaged(data: st.DataObject, whole: bytes) -> bytes:
+    damaged = bytearray(whole)
+    for _ in range(data.draw(st.integers(1, 3))):
+        place = data.draw(st.integers(0, len(whole) - 1)) % len(damaged)
+        kind = data.draw(st.sampled_from(["flip", "fill", "cut", "drop", "insert"]))
+        if kind == "flip":
+            damaged[place] ^= 1 << data.draw(st.integers(0, 7))
+        elif kind == "fill":
+            damaged[place : place + 8] = b"\xff" * len(damaged[place : place + 8])
+        elif kind == "cut":
+            del damaged[max(1, place) :]
+        elif kind == "drop":
+            del damaged[place : place + data.draw(st.integers(1, 300))]
+            damaged = damaged or bytearray(b"x")
+        else:
+            damaged[place:place] = data.draw(st.binary(min_size=1, max_size=40))
+    return bytes(damaged)
+
+
+FUZZ = settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+CHECKED: dict[str, Callable[[Path], Path]] = {
+    "log.mcap": lambda path: write_mcap(path, MESSAGES),
+    "plain.mcap": lambda path: write_mcap(path, MESSAGES, compression=CompressionType.NONE),
+    "torn.mcap": lambda path: write_mcap(path, MESSAGES, **WITHOUT_SUMMARY),
+    "log.bag": lambda path: write_bag1(path, MESSAGES, packing="bz2"),
+}
+UNCHECKED: dict[str, Callable[[Path], Path]] = {
+    "loose.mcap": lambda path: write_mcap(path, MESSAGES, use_chunking=False, enable_crcs=False),
+    "plain.bag": lambda path: write_bag1(path, MESSAGES),
+    "lz4.bag": lambda path: write_bag1(path, MESSAGES, packing="lz4"),
+    "bag.db3": lambda path: write_bag2(path.with_suffix(""), MESSAGES) / "bag.db3",
+}
+
+
+@pytest.fixture(scope="module")
+def originals(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    folder = tmp_path_factory.mktemp("originals")
+    return {name: write(folder / name).read_bytes() for name, write in {**CHECKED, **UNCHECKED}.items()}
+
+
+@pytest.mark.parametrize("name", [*CHECKED, *UNCHECKED])
+@FUZZ
+@given(data=st.data())
+def test_any_damage_is_bad_input_or_gives_what_was_written(
+    tmp_path: Path, originals: dict[str, bytes], name: str, data: st.DataObject
+) -> None:
+    """With checksums nothing but original messages comes out, and nothing is lost in silence."""
+    path = _write(tmp_path / name, _damaged(data, originals[name]))
+    for salvage in (True, False):
+        try:
+            log = open_message_log(path, salvage=salvage)
+            messages = read_messages(log)
+        except BadInput as error:
+            assert name in str(error)
+            continue
+        if name in CHECKED:
+            assert set(messages) <= set(MESSAGES)
+            assert log.damage or messages == MESSAGES
+        for message in log.messages():
+            assert log.fetch(message.location).data == message.data
+        log.close()
