@@ -26,18 +26,29 @@ $(STAMP): requirements.lock pyproject.toml data/setup.sh
 	TORCH_INDEX="$(TORCH_INDEX)" bash data/setup.sh $(VENV)
 	touch $@
 
+.PHONY: extras
+extras: $(VENV)/.extras ## Install the extras too: Rerun, Ray, MuJoCo, atheris
+
+$(VENV)/.extras: requirements-extras.lock $(STAMP)
+	$(PYTHON) -m pip --disable-pip-version-check install --quiet -r requirements-extras.lock
+	touch $@
+
 .PHONY: lock
-lock: ## Write requirements.lock from what is installed
-	$(PYTHON) -m pip freeze --exclude-editable --exclude scenewright --exclude rerun-sdk | sed 's/+cpu$$//' > requirements.lock
+lock: ## Write requirements.lock from what is installed, but for the extras
+	$(PYTHON) -m pip freeze --exclude-editable --exclude scenewright $$(sed 's/==.*//; s/^/--exclude /' requirements-extras.lock) | sed 's/+cpu$$//' > requirements.lock
 
 # ---- checks -------------------------------------------------------------------------------------------------------
 
-.PHONY: test test-all lint format rules
+.PHONY: test test-all fuzz lint format rules
 test: setup ## Run the tests (under 12 minutes on 2 cores)
 	$(PYTHON) -m pytest
 
-test-all: setup ## Run the slow tests too
+test-all: extras ## Run the slow tests and those of the extras too
 	$(PYTHON) -m pytest -m ''
+
+SECONDS_EACH ?= 60
+fuzz: extras ## Fuzz every parser with coverage guidance (SECONDS_EACH=60)
+	$(PYTHON) -m tests.fuzz.run --seconds $(SECONDS_EACH)
 
 lint: setup ## Format and lint check, types, import contracts
 	$(PYTHON) -m ruff format --check .
