@@ -49,7 +49,7 @@ def _npy(data: bytes) -> np.ndarray:
             (2, 0): np.lib.format.read_array_header_2_0,
         }[version]
         shape, fortran_order, kind = read_header(stream)
-    except (ValueError, KeyError, EOFError) as error:
+    except Exception as error:  # numpy parses the header as a Python literal and raises whatever that stumbles over
         raise Unusable("undecodable_depth", f"no .npy array ({error})"[:200]) from None
     shape = tuple(size for size in shape if size != 1) if len(shape) == 3 else shape
     if kind not in (np.dtype("<f4"), np.dtype("<f8"), np.dtype("<u2"), np.dtype("<f2")):

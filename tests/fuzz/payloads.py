@@ -1,0 +1,254 @@
+"""Harnesses of artifact payloads: archives, arrays, meshes, URDF, trajectories, JSON and TOML."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from schemas.base import Model
+from schemas.errors import BadInput, UsageError
+from schemas.kinds import KINDS
+from schemas.manifest import MANIFEST_NAME, Manifest
+from stages.kit.formats.masks import PanopticReader, write_panoptic_zip
+from stages.kit.formats.mesh_files import read_mesh
+from stages.kit.formats.numpy_files import read_arrays
+from stages.kit.formats.ply_files import ColoredMesh, read_ply, write_ply
+from stages.kit.formats.trajectories import (
+    number_rows,
+    read_matrix,
+    read_open3d_log,
+    read_tum,
+    write_open3d_log,
+    write_tum,
+)
+from stages.kit.formats.urdf_check import check_urdf
+from stages.kit.formats.urdf_file import parse_urdf
+from stages.kit.running import store
+from stages.kit.running.configuration import read_config
+from stages.kit.running.pipelines import read_pipeline
+from stages.kit.running.reading import check_hashes, open_artifact
+from stages.kit.running.verification import verify
+from tests.fuzz.harness import Harness, as_file, chosen, scratch
+
+GOLDEN = Path(__file__).resolve().parents[1] / "golden"
+PIPELINES = Path(__file__).resolve().parents[2] / "data" / "pipelines"
+MODELS: tuple[type[Model], ...] = tuple(
+    model for kind in sorted(KINDS) if not kind.startswith("test_") for model in KINDS[kind].json_files.values()
+)
+MESH = trimesh.creation.box((1.0, 2.0, 3.0))
+
+
+def _written(name: str, write) -> bytes:  # type: ignore[no-untyped-def]
+    path = scratch() / name
+    write(path)
+    return path.read_bytes()
+
+
+def panoptic_zip(data: bytes) -> None:
+    """Open a zip of masks and read three of its images."""
+    with contextlib.suppress(BadInput), PanopticReader(as_file("panoptic.zip", data)) as reader:
+        for frame in reader.frame_indices()[:3]:
+            with contextlib.suppress(BadInput):
+                assert reader.read(frame).ndim == 2
+
+
+def _panoptic_seeds() -> dict[str, bytes]:
+    ids = np.arange(12, dtype=np.int32).reshape(3, 4)
+    return {"two frames": _written("a.zip", lambda p: write_panoptic_zip(p, [(0, ids), (1, ids * 70_000)]))}
+
+
+def npz(data: bytes) -> None:
+    """Read two arrays."""
+    with contextlib.suppress(BadInput):
+        for array in read_arrays(as_file("arrays.npz", data), "a", "b"):
+            assert array.nbytes <= 1032 * (len(data) + 1024)
+
+
+def _npz_seeds() -> dict[str, bytes]:
+    seeds = {}
+    for name, save in (("stored", np.savez), ("packed", np.savez_compressed)):
+        buffer = io.BytesIO()
+        save(buffer, a=np.arange(6, dtype=np.int32).reshape(2, 3), b=np.asfortranarray(np.ones((2, 2))))
+        seeds[name] = buffer.getvalue()
+    return seeds
+
+
+def _mesh(suffix: str):  # type: ignore[no-untyped-def]
+    def target(data: bytes) -> None:
+        with contextlib.suppress(BadInput):
+            mesh = read_mesh(as_file(f"mesh.{suffix}", data), may_be_empty=True)
+            assert np.isfinite(mesh.vertices).all() and mesh.faces.shape[1] == 3
+
+    return target
+
+
+def _ply_seeds() -> dict[str, bytes]:
+    ascii_text = trimesh.exchange.ply.export_ply(MESH, encoding="ascii")
+    return {"ascii": ascii_text, "binary": MESH.export(file_type="ply")}
+
+
+def our_ply(data: bytes) -> None:
+    """The reader of the meshes that write_ply writes."""
+    with contextlib.suppress(BadInput):
+        read_ply(as_file("ours.ply", data))
+
+
+def _our_ply_seeds() -> dict[str, bytes]:
+    mesh = ColoredMesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), np.zeros((3, 3), np.uint8))
+    return {"triangle": _written("t.ply", lambda path: write_ply(path, mesh))}
+
+
+def urdf(data: bytes) -> None:
+    """Check a URDF, and parse it."""
+    path = as_file("robot.urdf", data)
+    check_urdf(path)
+    with contextlib.suppress(BadInput):
+        parse_urdf(path)
+
+
+def _urdf_seeds() -> dict[str, bytes]:
+    static = (GOLDEN / "v1/interactive_scene/static.urdf").read_text()
+    small = """<robot name="r"><link name="a"/><link name="b"><inertial>
+<origin xyz="0 0 1" rpy="0 1 0"/><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial><visual><origin xyz="1 2 3"/><geometry>
+<mesh filename="m.obj" scale="2 2 2"/></geometry><material name="c"><color rgba="1 0 0 1"/></material></visual>
+<collision><geometry><box size="1 2 3"/></geometry></collision></link><joint name="j" type="revolute"><parent link="a"/>
+<child link="b"/><axis xyz="0 0 1"/><limit lower="0" upper="1" effort="1" velocity="1"/><dynamics damping="1"/>
+<mimic joint="j"/></joint></robot>"""
+    return {"small": small.encode(), "scene": static[: static.index("</link>") + 7].encode() + b"</robot>"}
+
+
+def trajectory(data: bytes) -> None:
+    """Every reader of poses as text."""
+    path = as_file("trajectory.txt", data)
+    for read in (read_tum, read_open3d_log, read_matrix, lambda file: number_rows(file, 7)):
+        with contextlib.suppress(BadInput):
+            read(path)
+
+
+def _trajectory_seeds() -> dict[str, bytes]:
+    poses = np.tile(np.eye(4), (3, 1, 1))
+    return {
+        "tum": _written("t", lambda path: write_tum(path, np.arange(3.0), poses)),
+        "open3d": _written("l", lambda path: write_open3d_log(path, poses[:2])),
+        "matrix": b"1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n",
+        "rows": b"1 2 3 0 0 0 1 # comment\n\n",
+    }
+
+
+def manifest(data: bytes) -> None:
+    """An artifact whose manifest is garbage: opened, hashed and verified."""
+    root = scratch() / "artifact"
+    root.mkdir(exist_ok=True)
+    (root / "graph.json").write_bytes(b"{}")
+    (root / MANIFEST_NAME).write_bytes(data)
+    with contextlib.suppress(BadInput):
+        artifact = open_artifact(root)
+        assert artifact.manifest is not None
+        check_hashes(root, artifact.manifest)
+    with contextlib.suppress(BadInput):
+        verify(root)
+    with contextlib.suppress(UsageError):
+        store.check_target(root, "contact_graph")
+
+
+def _manifest_seeds() -> dict[str, bytes]:
+    whole = Manifest.read(GOLDEN / "v1/contact_graph" / MANIFEST_NAME)
+    small = whole.model_copy(update={"parameters": {}, "libraries": {}, "files": whole.files[:1]})
+    return {"contact graph": small.model_dump_json().encode()}
+
+
+def json_payload(data: bytes) -> None:
+    """The first byte chooses which payload model reads the rest."""
+    number, rest = chosen(data, len(MODELS))
+    with contextlib.suppress(BadInput):
+        MODELS[number].read(as_file("payload.json", rest))
+
+
+def _json_seeds() -> dict[str, bytes]:
+    seeds = {}
+    for number, model in enumerate(MODELS):
+        for path in sorted(GOLDEN.glob("v*/*/*.json")):
+            text = _shortened(json.loads(path.read_text()))
+            try:
+                model.model_validate_json(text)
+            except ValueError:
+                continue
+            seeds[f"{path.parent.name} {path.stem}"] = bytes([number]) + text.encode()
+            break
+    return seeds
+
+
+def _shortened(value: object) -> str:
+    """Return a document as JSON with lists cut to one entry where that leaves the shape (numbers stay together)."""
+
+    def cut(item: object) -> object:
+        if isinstance(item, dict):
+            return {key: cut(entry) for key, entry in item.items()}
+        if isinstance(item, list) and item and isinstance(item[0], dict):
+            return [cut(entry) for entry in item[:1]]
+        if isinstance(item, list):
+            return [cut(entry) for entry in item]
+        return item
+
+    return json.dumps(cut(value), separators=(",", ":"))
+
+
+def settings(data: bytes) -> None:
+    """TOML of pipelines and config files."""
+    path = as_file("settings.toml", data)
+    for read in (read_pipeline, read_config):
+        with contextlib.suppress(UsageError):
+            read(path)
+
+
+def _settings_seeds() -> dict[str, bytes]:
+    pipeline = b"""name = "p"
+summary = "s"
+[variables.log]
+description = "a log"
+[[step]]
+name = "sequence"
+stage = "ingest"
+inputs = { log = "$log" }
+parameters = { every = 2 }
+seed = 1
+"""
+    return {"pipeline": pipeline, "config": b"every = 2\nstart = 1.5\ngravity = 'none'\n"}
+
+
+def journal(data: bytes) -> None:
+    """A replacement that was interrupted, with any bytes as its journal."""
+    folder = scratch() / "journalled"
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "a").mkdir(parents=True)
+    (folder / "a" / "kept").write_bytes(b"x")
+    (folder / ".a.journal").write_bytes(data)
+    store.complete_interrupted(folder / "a")
+    assert (folder / "a" / "kept").exists() and not (folder / ".a.journal").exists()
+
+
+HARNESSES = {
+    "panoptic_zip": Harness(panoptic_zip, _panoptic_seeds),
+    "npz": Harness(npz, _npz_seeds),
+    "ply": Harness(_mesh("ply"), _ply_seeds),
+    "our_ply": Harness(our_ply, _our_ply_seeds),
+    "obj": Harness(_mesh("obj"), lambda: {"box": trimesh.exchange.obj.export_obj(MESH).encode()}),
+    "stl": Harness(
+        _mesh("stl"),
+        lambda: {"binary": MESH.export(file_type="stl"), "ascii": MESH.export(file_type="stl_ascii").encode()},
+    ),
+    "glb": Harness(_mesh("glb"), lambda: {"box": trimesh.Scene(MESH).export(file_type="glb")}),
+    "urdf": Harness(urdf, _urdf_seeds),
+    "trajectory": Harness(trajectory, _trajectory_seeds),
+    "manifest": Harness(manifest, _manifest_seeds),
+    "json_payload": Harness(json_payload, _json_seeds),
+    "settings": Harness(settings, _settings_seeds),
+    "journal": Harness(journal, lambda: {"plan": b'{"partial": ".a.partial-1-00000000", "old": ".a.old-00000000"}'}),
+}

@@ -1,0 +1,33 @@
+"""The harnesses by name. Says where they are without loading them, so that a fuzzer can instrument what they load."""
+
+from __future__ import annotations
+
+import importlib
+
+from tests.fuzz.harness import Harness
+
+MODULES = {
+    "tests.fuzz.payloads": (
+        "panoptic_zip", "npz", "ply", "our_ply", "obj", "stl", "glb", "urdf", "trajectory", "manifest", "json_payload",
+        "settings", "journal",
+    ),
+    "tests.fuzz.logs": (
+        "mcap", "rosbag1", "rosbag2", "rosbag2_metadata", "frames_mcap", "message", "ros_definition",
+        "compressed_depth", "image_message", "room_mcap", "room_rosbag1", "room_rosbag2",
+    ),
+    "tests.fuzz.layouts": (
+        "layout_7scenes", "layout_redwood", "layout_posed_images", "layout_tum", "layout_scenenn", "layout_scannet",
+        "layout_nerfstudio", "layout_replica", "layout_colmap", "layout_images", "depth_array", "calibration_file",
+    ),
+}  # fmt: skip
+NAMES = tuple(name for names in MODULES.values() for name in names)
+INSTRUMENTED = ["stages.ingest", "stages.kit.formats", "stages.kit.running", "schemas"]
+"""Packages of ours whose branches a fuzzer watches."""
+
+
+def load(name: str) -> Harness:
+    """Return a harness. Raises KeyError for an unknown name."""
+    module = next((module for module, names in MODULES.items() if name in names), None)
+    if module is None:
+        raise KeyError(f"no harness {name!r}; there are: {', '.join(NAMES)}")
+    return importlib.import_module(module).HARNESSES[name]
