@@ -13,13 +13,12 @@ import cv2
 import numpy as np
 
 from schemas.errors import BadInput
+from stages.kit.formats.image_headers import LARGEST_IMAGE
 from stages.kit.formats.zip_files import find_entry, zip_errors
 
 LARGEST_ID = (1 << 24) - 1
 REMAKE = "run `scenewright segment` again"
 PNG_BEGINNING = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"
-LARGEST_IMAGE = 1 << 26
-"""Pixels. A PNG of zeros packs a thousand to one: its size is checked before it is unpacked."""
 LARGEST_FILE = 4 * LARGEST_IMAGE
 FRAME_NAME = re.compile(r"(\d{6,9})\.png", re.ASCII)
 FIXED_TIMESTAMP = (1980, 1, 1, 0, 0, 0)
@@ -49,7 +48,7 @@ def encode_panoptic_png(ids: np.ndarray) -> bytes:
 def decode_panoptic_png(data: bytes) -> np.ndarray:
     """Return the id image (H, W) int32 of a COCO panoptic PNG.
 
-    Raises BadInput when it is no 8-bit colour PNG, or larger than LARGEST_IMAGE.
+    Raises BadInput when it is no 8-bit colour PNG, or larger than any image that is read.
     """
     if not data.startswith(PNG_BEGINNING) or len(data) < 33:
         raise BadInput("not a COCO panoptic PNG", hint="ids are R + 256 G + 65536 B")
