@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 import numpy as np
@@ -78,16 +79,25 @@ def factor_words(factor: float) -> str:
     return f"{1 / factor:.4g} times too large" if factor < 1 else f"{factor:.4g} times too small"
 
 
-def scale_advice(factor: float) -> str:
-    """Return how to apply a factor on depth with the option that ingest has."""
-    return (
-        f"ingest with --depth-scale {1000 / factor:.6g} if the log was read as millimetres (the depth units per metre "
-        f"that were used, times {1 / factor:.4g})"
-    )
+def units_per_metre(notes: Iterable[str], depth_scale: float | None) -> float:
+    """Return the depth units per metre that a log was read with: the option's, else what the reader noted, else 1000
+    (millimetres, which every other reader takes)."""
+    if depth_scale is not None:
+        return depth_scale
+    noted = [match for note in notes if (match := re.match(r"depth unit assumed: 1/([0-9.e+]+) m", note))]
+    return float(noted[0][1]) if noted else 1000.0
 
 
-def depth_findings(report: DepthReport, camera: str) -> list[Finding]:
-    """Return what is odd about the depth itself. Whether it agrees with the poses is said with the poses."""
+def scale_advice(factor: float, units: float) -> str:
+    """Return the option of ingest that multiplies depth by a factor, read with so many units per metre so far."""
+    return f"ingest with --depth-scale {units / factor:.6g}"
+
+
+def depth_findings(report: DepthReport, units: float, camera: str) -> list[Finding]:
+    """Return what is odd about the depth itself; `units` per metre is how it was read.
+
+    Whether it agrees with the poses is said with the poses.
+    """
     found = []
 
     def add(severity: str, message: str, fix: str = "") -> None:
@@ -99,7 +109,9 @@ def depth_findings(report: DepthReport, camera: str) -> list[Finding]:
         add(
             "wasted",
             f"depth unit: the median depth is {report.median:.3g} m ({words})",
-            scale_advice(factors[0]) if factors else "find out the unit of the depth images and give --depth-scale",
+            scale_advice(factors[0], units)
+            if factors
+            else "find out the unit of the depth images and give --depth-scale",
         )
     if report.valid_share < LITTLE_VALID:
         add("doubtful", f"only {100 * report.valid_share:.1f} % of the depth pixels are valid")

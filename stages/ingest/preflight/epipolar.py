@@ -15,7 +15,10 @@ from schemas.scene_parts import Camera
 from stages.ingest.preflight.fits import Fit, as_fit, relative_pose
 from stages.ingest.preflight.looking import Look
 
-FEATURES = 1200
+FEATURES = 800
+MOST_PAIRS, MOST_MATCHES = 16, 400
+"""Matching is the dear part of the pre-flight: more of either changes no verdict."""
+ITERATIONS = 300
 MATCH_RATIO = 0.8
 INLIER_DISTANCE = 1.5
 """Pixels from the epipolar line that a match may have to count as one."""
@@ -43,6 +46,8 @@ class FeaturePairs:
     """Matched pairs of frames of one camera, prepared once for many hypotheses about their poses."""
 
     def __init__(self, looks: Mapping[int, Look], pairs: Sequence[tuple[int, int]]) -> None:
+        if len(pairs) > MOST_PAIRS:
+            pairs = [pairs[k] for k in np.unique(np.linspace(0, len(pairs) - 1, MOST_PAIRS).astype(int))]
         features = {}
         for index in sorted({index for pair in pairs for index in pair}):
             look = looks.get(index)
@@ -117,11 +122,20 @@ def _consistent(first: np.ndarray, second: np.ndarray, camera: Camera) -> Matche
     """Keep the matches that one essential matrix explains; None when too few are left."""
     if len(first) < LEAST_INLIERS:
         return None
+    if len(first) > MOST_MATCHES:
+        chosen = np.linspace(0, len(first) - 1, MOST_MATCHES).astype(int)
+        first, second = first[chosen], second[chosen]
     rays = [_normalised(points, camera) for points in (first, second)]
     cv2.setRNGSeed(0)
     focal = (camera.fx + camera.fy) / 2
     essential, mask = cv2.findEssentialMat(
-        rays[0], rays[1], np.eye(3), method=cv2.RANSAC, prob=0.999, threshold=INLIER_DISTANCE / focal
+        rays[0],
+        rays[1],
+        np.eye(3),
+        method=cv2.RANSAC,
+        prob=0.999,
+        threshold=INLIER_DISTANCE / focal,
+        maxIters=ITERATIONS,
     )
     if essential is None or mask is None:
         return None

@@ -17,7 +17,7 @@ from stages.ingest.parameters import IngestParameters
 from stages.ingest.pose_conventions import converted
 from stages.ingest.preflight.calibration import calibration_findings, calibration_report
 from stages.ingest.preflight.choice import Choice, choose
-from stages.ingest.preflight.depth import depth_findings, depth_report
+from stages.ingest.preflight.depth import depth_findings, depth_report, units_per_metre
 from stages.ingest.preflight.epipolar import FeaturePairs
 from stages.ingest.preflight.looking import Look, look_at_entry
 from stages.ingest.preflight.motion import motion_findings, motion_report
@@ -54,6 +54,16 @@ LEAST_FRAMES = 12
 HEAVY_LOSS, LOSS = 0.5, 0.1
 """Shares of the frames that are lost from which a log is wasted, and doubtful."""
 NO_POSES = PoseReport(verdict="none", method="none", detail="the frames have no poses")
+ADVICE = {
+    "no_depth_within_tolerance": "compare the clocks of colour and depth; ingest has --maximum-time-difference",
+    "missing_pose": "ingest has --maximum-transform-gap, --pose-topic and --world-frame",
+    "size_mismatch": "colour and depth of a frame must have one shape",
+    "depth_not_16_bit": "pictures of depth for people are no depth: record 16-bit or float images",
+    "no_valid_depth": "is the depth unit right (--depth-scale)?",
+    "missing_color": "colour and depth files must pair",
+    "missing_depth": "colour and depth files must pair",
+}
+"""Reason for which frames are lost -> what to do."""
 SEVERITIES = ("wasted", "doubtful", "note")
 
 
@@ -210,6 +220,7 @@ def _judge_camera(
 ) -> tuple[CameraReport, PoseOutcome, list[Finding]]:
     looks, choice, poses = material.looks, material.choice, material.poses
     name, findings = known.name, []
+    units = units_per_metre(source.notes, parameters.depth_scale)
     interval = float(np.median(np.diff(material.times))) if len(material.times) > 1 else 0.0
     depth = depth_report(looks.values())
     stereo = stereo_report(looks, known.baseline)
@@ -227,11 +238,13 @@ def _judge_camera(
     motion = motion_report(poses, material.times, looks, choice.runs) if poses is not None else None
     findings += calibration_findings(calibration, known.camera, name)
     if depth is not None:
-        findings += depth_findings(depth, name)
+        findings += depth_findings(depth, units, name)
     if stereo is not None:
         findings += stereo_findings(stereo, name)
     if poses is not None:
-        findings += pose_findings(outcome.report, depth, known.camera, interval, name, _untouched(parameters))
+        findings += pose_findings(
+            outcome.report, depth, known.camera, interval, name, untouched=_untouched(parameters), units=units
+        )
     if motion is not None:
         findings += motion_findings(motion, outcome.report.verdict == "agree", name)
     findings += registration_findings(registration, interval, name)
@@ -335,6 +348,8 @@ def _frame_findings(frames: FramesReport, source: LogSource) -> list[Finding]:
     listed = ", ".join(f"{reason} {count}" for reason, count in sorted(lost.items(), key=lambda item: -item[1]))
     share = sum(lost.values()) / max(sum(lost.values()) + frames.selected, 1)
     bad = ", ".join(f"{reason} {count}" for reason, count in frames.unusable.items())
+    worst = max({**frames.unusable, **lost}.items(), key=lambda item: item[1], default=("", 0))[0]
+    advice = ADVICE.get(worst, "")
     bad_share = sum(frames.unusable.values()) / max(frames.looked_at, 1)
     why = ""
     if lost.get("non_rigid_pose", 0) > LOSS * frames.in_log:
@@ -342,20 +357,21 @@ def _frame_findings(frames: FramesReport, source: LogSource) -> list[Finding]:
     if not frames.in_log:
         add("wasted", "there are no frames in the log", "does it hold images of a camera? see the streams")
     elif not frames.selected:
-        add("wasted", f"no usable frame: {listed or 'none is selected'}{why}")
+        add("wasted", f"no usable frame: {listed or 'none is selected'}{why}", advice)
     elif frames.looked_at and bad_share == 1:
-        add("wasted", f"no usable frame among the {frames.looked_at} looked at: {bad}")
+        add("wasted", f"no usable frame among the {frames.looked_at} looked at: {bad}", advice)
     else:
         if share > LOSS:
             add(
                 "wasted" if share > HEAVY_LOSS else "doubtful",
                 f"{100 * share:.0f} % of the frames are lost: {listed}{why}",
+                advice,
             )
         elif lost:
             add("note", f"frames left out: {listed}")
         if bad_share > LOSS:
             severity = "wasted" if bad_share > HEAVY_LOSS else "doubtful"
-            add(severity, f"{100 * bad_share:.0f} % of the frames looked at cannot be used: {bad}")
+            add(severity, f"{100 * bad_share:.0f} % of the frames looked at cannot be used: {bad}", advice)
         elif frames.unusable:
             add("note", f"frames looked at that cannot be used: {bad}")
     if source.damage:

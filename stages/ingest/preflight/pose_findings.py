@@ -42,11 +42,19 @@ def depth_is_blamed(scale: float, median_depth: float) -> bool | None:
 
 
 def pose_findings(
-    report: PoseReport, depth: DepthReport | None, camera: Camera, interval: float, name: str, untouched: bool
+    report: PoseReport,
+    depth: DepthReport | None,
+    camera: Camera,
+    interval: float,
+    name: str,
+    *,
+    untouched: bool,
+    units: float,
 ) -> list[Finding]:
     """Return what the pose check found.
 
-    `interval` [s] is that of the frames; `untouched` says that no option changes the poses already.
+    `interval` [s] is that of the frames; `untouched` says that no option changes the poses already; `units` per metre
+    is how depth was read.
     """
     found: list[Finding] = []
     measure = BY_FEATURES if report.method == "epipolar" else BY_DEPTH
@@ -90,7 +98,7 @@ def pose_findings(
                 "calibration",
             )
         elif best.convention == "as-is":
-            _add_scale(add, severity, best, depth, contradict, agree, untouched)
+            _add_scale(add, severity, best, depth, contradict, agree, untouched, units)
         else:
             words = CONVENTION_WORDS[best.convention]  # type: ignore[index]
             scaled = f" and translations times {best.translation_scale:.4g}" if best.translation_scale != 1 else ""
@@ -123,6 +131,7 @@ def _add_scale(
     contradict: str,
     agree: str,
     untouched: bool,
+    units: float,
 ) -> None:
     scale = best.translation_scale
     blamed = depth_is_blamed(scale, depth.median) if depth is not None else False
@@ -132,14 +141,14 @@ def _add_scale(
             "wasted",
             f"depth unit: depth is {factor_words(1 / scale)} for the poses: {contradict}; with depth times "
             f"{1 / scale:.4g} {agree}",
-            scale_advice(1 / scale),
+            scale_advice(1 / scale, units),
             "depth",
         )
     elif blamed is None:
         add(
             severity,
             f"{contradict}; with {times}, or depth times {1 / scale:.4g}, {agree}",
-            f"{_scale_fix(scale, untouched)}, or {scale_advice(1 / scale)}",
+            f"{_scale_fix(scale, untouched)}, or {scale_advice(1 / scale, units)}",
         )
     else:
         add(severity, f"{contradict}; with {times} {agree}", _scale_fix(scale, untouched))

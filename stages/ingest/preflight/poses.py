@@ -170,13 +170,20 @@ def _better(first: Candidate, second: Candidate) -> bool:
 
 
 def _searched(pairs: Pairs, poses: np.ndarray, candidates: list[Candidate], measure: Measure) -> Candidate:
-    """Return the best of all single changes and of all conventions with all scales, the scale refined."""
+    """Return the best of all single changes and of conventions with scales, the scale refined.
+
+    One change that explains everything is tried with other scales only; otherwise every convention is.
+    """
     found = list(candidates)
     if measure.sees_scale:
-        for name in POSE_CONVENTIONS[1:]:
+        best = min(found, key=lambda c: c.cost)
+        rivals = [c for c in found if c.differs(best)]
+        clear = best.fit.residual <= measure.good / 2 and all(_better(best, rival) for rival in rivals)
+        names = POSE_CONVENTIONS[1:] if not clear else (best.convention,) if best.convention != "as-is" else ()
+        for name in names:
             found += [_scaled(pairs, poses, name, scale) for scale in SCALES if scale != 1]
         ranked = sorted((c for c in found if not c.lag and c.focal == 1), key=lambda c: c.cost)
-        for start in ranked[:6]:
+        for start in ranked[: 2 if clear else 6]:
             found += [_scaled(pairs, poses, start.convention, start.scale * f) for f in (0.7, 0.84, 1.19, 1.43)]
     best = min(found, key=lambda c: c.cost)
     if measure.sees_scale and best.scale != 1:

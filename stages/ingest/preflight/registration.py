@@ -88,10 +88,13 @@ def check_registration(
         return RegistrationReport(checked=False, detail=f"cannot be checked: too few {what}")
     score = float(np.mean([_score(gradient, jumps) for gradient, jumps in pairs]))
     lags = lag_scores(edges, runs)
-    lag, decisive = _best_lag(lags)
+    lag, late = _best_lag(lags)
     offset, offset_score = best_offset(pairs)
     factor = next(iter(edges.values())).factor
-    shifted = max(map(abs, offset)) >= LEAST_OFFSET and offset_score >= OFFSET_RATIO * score and not decisive
+    # Each mistake looks a little like the other while the camera moves one way; the better explanation counts.
+    shifted = max(map(abs, offset)) >= LEAST_OFFSET and offset_score >= OFFSET_RATIO * score
+    shifted &= offset_score > max(lags.values(), default=0.0)
+    decisive = late and not shifted
     return RegistrationReport(
         checked=True,
         detail=_words(score, lag, decisive, shifted, registered),

@@ -79,6 +79,9 @@ def stream_line(stream: StreamReport) -> str:
 def _camera_lines(report: CameraReport) -> Iterator[str]:
     camera, calibration = report.camera, report.calibration
     yield ""
+    if camera.width == 0:
+        yield _row("camera", f"{report.name}: no image of it can be decoded")
+        return
     yield _row(
         "camera",
         f"{report.name}: {camera.width}x{camera.height}, fx {camera.fx:.5g} fy {camera.fy:.5g} cx {camera.cx:.5g} "
