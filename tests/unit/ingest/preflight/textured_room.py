@@ -35,7 +35,9 @@ def painted(depth: np.ndarray, camera: Camera, world_from_camera: np.ndarray, sp
     """
     points = apply(world_from_camera, back_project(depth, camera).astype(float))
     x, y, z = np.moveaxis(points, -1, 0)
-    soft = 150 + 25 * np.sin(3.1 * x + 1.3 * y) + 25 * np.sin(2.3 * y + 2.9 * z) + 15 * np.sin(11 * x) * np.sin(9 * y + z)
+    soft = (
+        150 + 25 * np.sin(3.1 * x + 1.3 * y) + 25 * np.sin(2.3 * y + 2.9 * z) + 15 * np.sin(11 * x) * np.sin(9 * y + z)
+    )
     near = ((points > TABLE[0] - 1e-3) & (points < TABLE[1] + 1e-3)).all(axis=-1)
     grey = np.where(near, 45 + 10 * np.sin(14 * x) * np.sin(13 * y), soft)
     if speckled:
@@ -80,4 +82,3 @@ def source(
 def inspected(what: LogSource, frames: int = 40, *settings: str, **options: Any) -> Inspection:
     """Inspect a source."""
     return inspect_source(what, Path("room"), ingest_parameters(settings), frames, SilentProgress(), **options)
-
