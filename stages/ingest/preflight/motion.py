@@ -52,7 +52,7 @@ def motion_report(
         turn_largest=exact(float(turns.max())),
         speed_median=exact(float(np.median(steps / seconds))),
         jumps=len(jumps),
-        jump_times=tuple(exact(times[k], 12) for k in jumps[:LISTED]),
+        jump_times=tuple(exact(times[k], 15) for k in jumps[:LISTED]),
         repeated_share=exact(float(repeated.mean())),
         overlap=significant(float(np.median(overlaps)), 3) if overlaps else None,
     )

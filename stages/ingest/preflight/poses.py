@@ -304,7 +304,7 @@ def _judged(
         turns_only=turns_only,
         lag_frames=best.lag if decisive and best.lag else None,
         bad_pairs=len(bad),
-        bad_times=tuple(exact(time, 12) for time in bad_times[:8]),
+        bad_times=tuple(exact(time, 15) for time in bad_times[:8]),
     )
 
 

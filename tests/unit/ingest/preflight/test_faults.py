@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from benchmarks.tables.preflight import FAULTS, doubled, on_poses, scaled_depth, shifted_color, stretched
+from stages.ingest.preflight.page import render
 from stages.ingest.preflight.report import InspectionReport
-from stages.ingest.source import Entry, LogSource, SourceCamera, Unusable
+from stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
 from tests.unit.ingest.preflight.textured_room import CAMERA, inspected, source, walk
 
 COUNT = 48
@@ -245,3 +246,33 @@ def test_impossible_intrinsics_are_a_finding_not_an_error() -> None:
     mad = replace(source(20), cameras=(SourceCamera("camera", CAMERA.model_copy(update={"fx": 1e-3})),))
     report = report_of(mad)
     assert report.verdict == "wasted" and "focal length" in report.reason
+
+
+@pytest.mark.parametrize("size", [(160, 120), (7, 5), (1, 1), (3, 40)], ids=str)
+@pytest.mark.parametrize("kind", ["zero", "constant", "noise", "full"])
+def test_pictures_of_nothing_never_crash(size: tuple[int, int], kind: str) -> None:
+    """Constant, empty and random images, of any size, under good poses and under nonsense."""
+    random = np.random.default_rng(0)
+    shape = (size[1], size[0])
+    camera = CAMERA.model_copy(update={"width": size[0], "height": size[1]})
+    values = {
+        "zero": lambda: np.zeros(shape, np.uint16),
+        "constant": lambda: np.full(shape, 1500, np.uint16),
+        "noise": lambda: random.integers(0, 65535, shape).astype(np.uint16),
+        "full": lambda: np.full(shape, 65534, np.uint16),
+    }
+    poses = walk(14)
+    poses[7:, :3, 3] *= 1e5
+    entries = tuple(
+        Entry(
+            f"{k}",
+            k / 10,
+            poses[k],
+            lambda: LoadedFrame((values[kind]() % 256).astype(np.uint8)[..., None].repeat(3, axis=2), values[kind]()),
+        )
+        for k in range(14)
+    )
+    what = LogSource("noise", "noise", (SourceCamera("camera", camera),), entries)
+    found = inspected(what, keep_pictures=True)
+    assert found.report.verdict != "ready"
+    assert found.report.model_dump_json() and render(found)
