@@ -83,7 +83,7 @@ def ticks(low: float, high: float, count: int = 5) -> list[float]:
 
 def histogram(shares: Sequence[float], end: float, marks: Sequence[tuple[float, str]]) -> Markup:
     """Return bars of shares over [0, end] metres, with vertical marks (place, word)."""
-    top = max([*shares, 1e-6])
+    top = 1.15 * max([*shares, 1e-6])
     plot = _Plot(170, (0.0, end), (0.0, top))
     plot.axes(ticks(0, end), [], "depth [m]")
     width = end / max(len(shares), 1)
@@ -149,12 +149,13 @@ def path_from_above(positions: np.ndarray, axes: tuple[int, int]) -> Markup:
     """Return the camera path (N, 3) [m] along two of its axes, start marked, at one scale."""
     points = positions[:, list(axes)].astype(float)
     low, high = points.min(axis=0), points.max(axis=0)
-    size = float(max((high - low).max(), 1e-3)) * 1.1
+    wide, tall = (float(max(side, 1e-3)) * 1.1 for side in high - low)
     center = (low + high) / 2
-    height = 300
-    scale = (height - 30) / size
+    height = 260
+    scale = min((WIDTH - 120) / wide, (height - 60) / tall)
+    size = (WIDTH - 120) / scale
     place = (points - center) * scale
-    drawn = [(WIDTH / 2 + x, height / 2 - y) for x, y in place[:: max(1, len(place) // 800)]]
+    drawn = [(WIDTH / 2 + x, height / 2 - 12 - y) for x, y in place[:: max(1, len(place) // 800)]]
     plot = _Plot(height, (0, 1), (0, 1))
     plot.path(drawn, "curve")
     plot.parts.append(f'<circle cx="{drawn[0][0]:.1f}" cy="{drawn[0][1]:.1f}" r="4" class="dot"/>')
