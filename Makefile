@@ -73,8 +73,8 @@ $(PIPELINES): setup
 	@folder=$(OUTPUTS)/$(or $(RUN),$@)/plan; if [ -d $$folder ]; then cat $$folder/plan.txt; $(PYTHON) -m cli inspect $$folder --expect ok > /dev/null; fi
 
 .PHONY: batch
-batch: setup ## Run a pipeline over a data set: make batch SPEC=batch.toml RUN=folder
-	$(PYTHON) -m cli batch $(SPEC) --out $(OUTPUTS)/$(or $(RUN),batch)
+batch: setup ## Run a pipeline over a data set: make batch SPEC=batch.toml RUN=folder JOBS=2
+	$(PYTHON) -m cli batch $(SPEC) --out $(OUTPUTS)/$(or $(RUN),batch) $(if $(JOBS),--jobs $(JOBS))
 
 .PHONY: clean
 clean: ## Remove everything that runs made (outputs/*)
