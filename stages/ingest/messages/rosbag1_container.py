@@ -198,10 +198,9 @@ class Rosbag1Messages:
         size, compression = record.number(b"size"), record.fields.get(b"compression", b"")
         if compression == b"none" and size != record.length:
             raise Damaged(f"is a chunk that claims {size} bytes and holds {record.length}")
-        if size:
-            self._chunks.append(offset)
-            self._indexed_chunk = len(self._chunks) - 1
-            self._plain_chunks += compression == b"none"
+        self._chunks.append(offset)
+        self._indexed_chunk = len(self._chunks) - 1
+        self._plain_chunks += compression == b"none" and size > 0
 
     def _index(self, record: Record) -> None:
         connection, count = record.number(b"conn"), record.number(b"count")
@@ -224,7 +223,7 @@ class Rosbag1Messages:
         self._indexed_chunk = -1
         following = self._own_end(offset)
         if following is None:
-            following = find_chunk(self._file, scan_from)
+            following = find_chunk(self._file, scan_from + (scan_from == offset))
         lost = (self._size if following is None else following) - offset
         what = f"record at byte {offset} of {self._size} {fault}"
         if str(fault) == "ends within it":
@@ -256,8 +255,7 @@ class Rosbag1Messages:
                 if record.op != CHUNK:
                     raise Damaged("is no chunk")
                 self._chunk(record, offset)
-                if record.number(b"size"):
-                    self._lines.found(f"a record before the chunk at byte {offset} lies about its length")
+                self._lines.found(f"a record before the chunk at byte {offset} lies about its length")
             except Damaged as fault:
                 self._lines.found(f"chunk at byte {offset}, which the index names, {fault}: it is lost")
 

@@ -125,7 +125,8 @@ def find_chunk(file: LogFile, start: int) -> int | None:
 def _is_chunk(file: LogFile, offset: int) -> bool:
     try:
         record = read_record(file, offset)
-        record.number(b"size")
+        size = record.number(b"size")
     except Damaged:
         return False
-    return record.op == CHUNK and record.fields.get(b"compression") in COMPRESSIONS
+    compression = record.fields.get(b"compression")
+    return record.op == CHUNK and compression in COMPRESSIONS and (compression != b"none" or size == record.length)

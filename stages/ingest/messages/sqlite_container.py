@@ -23,12 +23,18 @@ from stages.kit.formats.log_file import Damaged, LogFile
 
 MAGIC = b"SQLite format 3\x00"
 _HEAD_SIZE = 100
+_MOST_STEPS = 4000
+"""Millions of steps of SQLite's machine that opening may take; a sound bag of 10 million messages takes about 300."""
+_FAULTS = (sqlite3.Error, UnicodeDecodeError, MemoryError)
+"""What Python makes of a damaged file; the second of an error message with a damaged name, the third of a row that
+claims more than is accepted."""
+_MOST_TOPICS = 65_536
 _PAGE_SIZES = {1 << power for power in range(9, 17)}
 LARGEST_MESSAGE = 512 << 20
 """Bytes of one message that are accepted."""
 _JOURNAL_MAGIC = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
 _WAL_MAGICS = (b"\x37\x7f\x06\x82", b"\x37\x7f\x06\x83")
-_ROWS = "SELECT rowid, topic_id, timestamp, data FROM messages WHERE rowid > ?"
+_ROWS = "SELECT rowid, topic_id, timestamp, {data} FROM messages WHERE rowid > ?"
 
 
 class SqliteMessages:
@@ -54,10 +60,13 @@ class SqliteMessages:
                 self._take_in(journals)
             else:
                 self._check_size(head, size)
+            steps = iter(range(_MOST_STEPS))
+            self._database.set_progress_handler(lambda: next(steps, None) is None, 1_000_000)
             self._open()
-        except sqlite3.Error as error:
+            self._database.set_progress_handler(None, 0)
+        except _FAULTS as error:
             self.close()
-            raise BadInput(f"{path}: cannot be read as a bag: {error}", hint=HINT) from None
+            raise BadInput(f"{path}: cannot be read as a bag: {_reason(error)}", hint=HINT) from None
         except BaseException:
             self.close()
             raise
@@ -86,9 +95,9 @@ class SqliteMessages:
     def fetch(self, location: Hashable) -> StoredMessage:
         """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
         try:
-            rows = self._database.execute(_ROWS + " AND rowid = ?", (-1, location)).fetchall()
-        except (sqlite3.Error, OverflowError) as error:
-            raise BadInput(f"{self.path}: message {location!r} cannot be read: {error}", hint=HINT) from None
+            rows = self._database.execute(_ROWS.format(data="data") + " AND rowid = ?", (-1, location)).fetchall()
+        except (*_FAULTS, OverflowError) as error:
+            raise BadInput(f"{self.path}: message {location!r} cannot be read: {_reason(error)}", hint=HINT) from None
         if not rows or rows[0][1] not in self._topics or not _is_message(*rows[0][2:]):
             raise BadInput(f"{self.path}: {location!r} is no place in the bag")
         _, topic, time, data = rows[0]
@@ -129,7 +138,8 @@ class SqliteMessages:
     def _connect(self, path: Path, mode: str) -> sqlite3.Connection:
         connection = sqlite3.connect(f"file:{quote(str(path))}?{mode}", uri=True, check_same_thread=False)
         connection.text_factory = lambda text: text.decode("utf-8", "replace")
-        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_MESSAGE)
+        longest = min(LARGEST_MESSAGE, max(1 << 20, path.stat().st_size))
+        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, longest)
         connection.execute("PRAGMA trusted_schema=OFF")
         connection.execute("PRAGMA cell_size_check=ON")
         if self._lines.salvage:  # nothing is written; a file that is shorter than it says is read all the same
@@ -157,8 +167,8 @@ class SqliteMessages:
         try:
             taken_in = self._connect(copy, "mode=rw")
             taken_in.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()
-        except sqlite3.Error as error:
-            self._lines.found(f"journal beside it cannot be taken in: {error}")
+        except _FAULTS as error:
+            self._lines.found(f"journal beside it cannot be taken in: {_reason(error)}")
             return
         self._database.close()
         self._database = taken_in
@@ -182,17 +192,13 @@ class SqliteMessages:
         tables = self._tables()
         if not {"topics", "messages"} <= tables:
             raise BadInput(f"{self.path}: is a database without the tables of a bag (topics, messages)")
-        try:
-            found = [str(row[0]) for row in self._database.execute("PRAGMA quick_check(5)")]
-        except sqlite3.Error as error:
-            found = [str(error)]
-        for line in found:
-            if line != "ok":
-                self._lines.found(f"structure is damaged: {' '.join(line.split()):.200}")
+        sound = self._check_structure()
         definitions = self._definitions() if "message_definitions" in tables else {}
-        counts = self._counts()
+        counts = self._counts() if sound else None
         try:
-            rows = self._database.execute("SELECT id, name, type, serialization_format FROM topics ORDER BY id")
+            rows = self._database.execute(
+                "SELECT id, name, type, serialization_format FROM topics ORDER BY id LIMIT ?", (_MOST_TOPICS,)
+            )
             for number, name, kind, encoding in rows:
                 if not (isinstance(number, int) and isinstance(name, str) and isinstance(kind, str)):
                     self._lines.found(f"topic {number!r:.40} has no name or type")
@@ -200,13 +206,24 @@ class SqliteMessages:
                 schema_encoding, schema = definitions.get(kind, ("", b""))
                 count = None if counts is None else counts.get(number, 0)
                 self._topics[number] = Channel(number, name, kind, str(encoding), schema_encoding, schema, count)
-        except sqlite3.Error as error:
-            self._lines.found(f"table of topics cannot be read: {error}")
+        except _FAULTS as error:
+            self._lines.found(f"table of topics cannot be read: {_reason(error)}")
         self.channels = tuple(self._topics.values())
+
+    def _check_structure(self) -> bool:
+        """Have SQLite follow all pages once; return whether it finds nothing."""
+        try:
+            found = [str(row[0]) for row in self._database.execute("PRAGMA quick_check(5)")]
+        except _FAULTS as error:
+            found = [_reason(error)]
+        for line in found:
+            if line != "ok":
+                self._lines.found(f"structure is damaged: {_reason(line.removeprefix('*** in database main ***'))}")
+        return found == ["ok"]
 
     def _tables(self) -> set[str]:
         """Return the names of the true tables; views and virtual tables could compute anything."""
-        rows = self._database.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table'")
+        rows = self._database.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table' LIMIT 1000")
         return {
             name
             for name, sql in rows
@@ -215,49 +232,57 @@ class SqliteMessages:
 
     def _definitions(self) -> dict[str, tuple[str, bytes]]:
         """Return type -> (encoding, definition)."""
-        query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions ORDER BY id"
+        query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions ORDER BY id LIMIT ?"
         try:
             return {
-                str(kind): (str(encoding), str(text).encode()) for kind, encoding, text in self._database.execute(query)
+                str(kind): (str(encoding), str(text).encode())
+                for kind, encoding, text in self._database.execute(query, (_MOST_TOPICS,))
             }
-        except sqlite3.Error as error:
-            self._lines.found(f"table of message definitions cannot be read: {error}")
+        except _FAULTS as error:
+            self._lines.found(f"table of message definitions cannot be read: {_reason(error)}")
             return {}
 
     def _counts(self) -> dict[int, int] | None:
         try:
             return dict(self._database.execute("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id"))
-        except sqlite3.Error:
+        except _FAULTS:
             return None
 
     # --- reading ---------------------------------------------------------------------------------------------
 
     def _rows(self, channel_ids: Collection[int] | None) -> Iterator[tuple[int, Any, Any, Any]]:
-        """Yield rows by number; what cannot be read is skipped and noted."""
-        query, wanted = _ROWS, tuple(channel_ids or ())
+        """Yield rows of the channels by number; what cannot be read is skipped and noted.
+
+        Rows of other channels are stepped over here and not in SQL: pages that lead in a circle would keep it there.
+        """
+        data, wanted = "data", tuple(channel_ids or ())
         if channel_ids is not None:
-            query += f" AND topic_id IN ({','.join('?' * len(wanted))})"
-        query += " ORDER BY rowid"
+            data = f"CASE WHEN topic_id IN ({','.join('?' * len(wanted))}) THEN data END"
+        query = _ROWS.format(data=data) + " ORDER BY rowid"
         last = -1
         while True:
             try:
-                for row in self._database.execute(query, (last, *wanted)):
+                for row in self._database.execute(query, (*wanted, last)):
+                    if row[0] <= last:
+                        raise sqlite3.DatabaseError("its pages lead in a circle")
                     last = row[0]
-                    yield row
+                    if channel_ids is None or row[1] in wanted:
+                        yield row
                 return
-            except sqlite3.Error as error:
-                following = self._next_readable(query, last, wanted)
+            except _FAULTS as error:
+                following = self._next_readable(query, wanted, last)
                 if following is None:
-                    self._lines.found(f"messages after number {last} cannot be read ({error}): they are lost")
+                    self._lines.found(f"messages after number {last} cannot be read ({_reason(error)}): they are lost")
                     return
                 lost = following[0] - last - 1
                 if lost:
                     span = f"messages {last + 1} to {following[0] - 1}"
-                    self._lines.found(f"{span} cannot be read ({error}): up to {lost} are lost")
+                    self._lines.found(f"{span} cannot be read ({_reason(error)}): up to {lost} are lost")
                 last = following[0]
-                yield following
+                if channel_ids is None or following[1] in wanted:
+                    yield following
 
-    def _next_readable(self, query: str, last: int, wanted: tuple[int, ...]) -> tuple[int, Any, Any, Any] | None:
+    def _next_readable(self, query: str, wanted: tuple[int, ...], last: int) -> tuple[int, Any, Any, Any] | None:
         """Return the next row after `last` that can be read, found in steps that double, then halve; None: no more.
 
         sqlite3 reads one row ahead, so that the first may be the very next.
@@ -266,9 +291,10 @@ class SqliteMessages:
         def first(number: int) -> Any:
             """Return the first row from a number on, None at the end, False when it cannot be read."""
             try:
-                return self._database.execute(query + " LIMIT 1", (number - 1, *wanted)).fetchone()
-            except sqlite3.Error:
+                row = self._database.execute(query + " LIMIT 1", (*wanted, number - 1)).fetchone()
+            except _FAULTS:
                 return False
+            return row if row is None or row[0] >= number else False
 
         bad, step = last, 1
         while (row := first(last + step)) is False:
@@ -284,6 +310,12 @@ class SqliteMessages:
             else:
                 good, row = middle, between
         return row
+
+
+def _reason(error: object) -> str:
+    """Return what SQLite says in one line; it may quote names from damaged pages."""
+    words = " ".join(str(error).split()) or "it claims more bytes than are accepted"
+    return "".join(letter if letter.isprintable() else "?" for letter in words)[:200]
 
 
 def _is_message(time: Any, data: Any) -> bool:

@@ -197,10 +197,9 @@ class McapStructure:
 
     def _visit_chunk(self, offset: int, length: int) -> None:
         head = read_chunk_head(self._file, offset, length)
-        if head.size:
-            self.chunks.append(offset)
-            self.unchecked_chunks += head.checksum == 0
-            self._indexed_chunk = len(self.chunks) - 1
+        self.chunks.append(offset)
+        self.unchecked_chunks += head.checksum == 0 and head.size > 0
+        self._indexed_chunk = len(self.chunks) - 1
 
     def _is_like_chunk(self, offset: int, length: int) -> bool:
         try:
@@ -277,6 +276,7 @@ class McapStructure:
         end = self._own_end(offset)
         if end is not None:
             return end
+        scan_from += scan_from == offset  # what is damaged cannot be where reading goes on
         places = [find_chunk(self._file, scan_from)]
         if self._data_end is None:
             places.append(find_data_end(self._file))
@@ -329,10 +329,8 @@ class McapStructure:
             opcode, length = self.head(offset)
             if opcode != Opcode.CHUNK:
                 raise Damaged("is no chunk")
-            number = len(self.chunks)
             self._visit_chunk(offset, length)
-            if len(self.chunks) > number:
-                self.damage.found(f"a record before the chunk at byte {offset} lies about its length")
+            self.damage.found(f"a record before the chunk at byte {offset} lies about its length")
         except Damaged as fault:
             self.damage.found(f"chunk at byte {offset}, which the summary names, {fault}: it is lost")
 
