@@ -109,6 +109,7 @@ def main() -> None:
 
     try:
         interruption.install()
+        interruption.end_with_parent()
         _keep_standard_output_for_data()
         os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the default probes TBB first, warns about its version
         os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads sleep: spinning halves the rate when busy

@@ -1,13 +1,14 @@
 """Coverage-guided fuzzing with atheris: python -m tests.fuzz.run --seconds 60 [HARNESS...] (make fuzz).
 
 Every harness runs in a process of its own, with caps on memory (2 GiB) and on the time of one input (10 s), from the
-committed corpus. What breaks a parser is written to outputs/fuzz/<harness>/; once fixed, put it into
+committed corpus. The input that breaks a parser is written to outputs/fuzz/<harness>/; once fixed, put it into
 tests/fuzz/corpus/<harness>/crash-<what> so that the suite replays it.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import re
@@ -16,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -50,22 +52,27 @@ def fuzz(name: str, seconds: int, findings: Path, seed: int) -> Outcome:
     folder = findings / name
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
+        corpus, current = Path(scratch) / "corpus", Path(scratch) / "current"
+        corpus.mkdir()
         for path in corpus_of(name):
-            shutil.copy(path, scratch)
+            shutil.copy(path, corpus)
         environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(REPOSITORY)}
         started = time.monotonic()
         done = subprocess.run(
             [sys.executable, "-m", "tests.fuzz.run", "--worker", name, "--seconds", str(seconds), "--seed", str(seed),
-             "--findings", str(folder), "--corpus", scratch],
+             "--corpus", str(corpus), "--current", str(current)],
             cwd=REPOSITORY, env=environment, capture_output=True, text=True, errors="replace",
         )  # fmt: skip
-        inputs = len(list(Path(scratch).iterdir()))
+        inputs = len(list(corpus.iterdir()))
+        if done.returncode != 0 and current.exists():
+            data = current.read_bytes()
+            (folder / f"crash-{hashlib.sha256(data).hexdigest()[:12]}").write_bytes(data)
     text = done.stderr + done.stdout
     runs = re.findall(r"^#(\d+)\s+\w+.*?cov: (\d+)", text, re.MULTILINE)
     total = re.search(r"Done (\d+) runs", text)
     executions = int(total[1]) if total else int(runs[-1][0]) if runs else 0
     found = tuple(sorted(path.name for path in folder.iterdir()))
-    message = "" if done.returncode == 0 and not found else _last_error(text)
+    message = "" if done.returncode == 0 else _last_error(text)
     return Outcome(
         name,
         round(time.monotonic() - started, 1),
@@ -78,13 +85,15 @@ def fuzz(name: str, seconds: int, findings: Path, seed: int) -> Outcome:
 
 
 def _last_error(text: str) -> str:
-    raised = re.search(r"=== Uncaught Python exception: ===\s*\n(.*?)\n(?:Traceback|\s*$)", text, re.DOTALL)
+    raised = re.findall(
+        r"^(?:[A-Za-z_.]+(?:Error|Exception|Interrupt|Failure|Input)\b.*|ERROR: libFuzzer.*)", text, re.MULTILINE
+    )
     lines = [line for line in text.splitlines() if line.strip()]
-    return " ".join((raised[1] if raised else (lines or ["no output"])[-1]).split())[:200]
+    return " ".join((raised or lines or ["no output"])[-1].split())[:200]
 
 
-def work(name: str, seconds: int, findings: Path, corpus: Path, seed: int) -> None:
-    """Fuzz one harness in this process; does not return."""
+def work(name: str, seconds: int, corpus: Path, current: Path, seed: int) -> None:
+    """Fuzz one harness in this process; does not return. `current` holds the input that it is at."""
     import atheris
 
     from tests.fuzz.registry import load
@@ -92,11 +101,23 @@ def work(name: str, seconds: int, findings: Path, corpus: Path, seed: int) -> No
     with atheris.instrument_imports(include=INSTRUMENTED):
         harness = load(name)
     harness.seeds()  # what is loaded late is loaded now
+
+    def target(data: bytes) -> None:
+        current.write_bytes(data)
+        started = time.monotonic()
+        try:
+            harness.target(data)
+            if time.monotonic() - started > INPUT_SECONDS:
+                raise RuntimeError(f"one input took {time.monotonic() - started:.0f} s")
+        except Exception:
+            traceback.print_exc()
+            sys.stderr.flush()
+            os._exit(1)
+
     atheris.Setup(
         [sys.argv[0], str(corpus), f"-max_total_time={seconds}", f"-rss_limit_mb={MEMORY_LIMIT}", f"-seed={seed}",
-         f"-timeout={INPUT_SECONDS}", f"-max_len={harness.largest}", f"-artifact_prefix={findings}/",
-         "-print_final_stats=1"],
-        harness.target,
+         f"-timeout={3 * INPUT_SECONDS}", f"-max_len={harness.largest}", f"-artifact_prefix={current}-"],
+        target,
     )  # fmt: skip
     atheris.Fuzz()
 
@@ -123,9 +144,10 @@ def main() -> int:
     parser.add_argument("--out", type=Path, help="JSON file of the outcomes")
     parser.add_argument("--worker", help=argparse.SUPPRESS)
     parser.add_argument("--corpus", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--current", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.worker:
-        work(options.worker, options.seconds, options.findings, options.corpus, options.seed)
+        work(options.worker, options.seconds, options.corpus, options.current, options.seed)
     unknown = sorted(set(options.harness) - set(NAMES))
     if unknown:
         parser.error(f"no harness {unknown[0]!r}; there are: {', '.join(NAMES)}")

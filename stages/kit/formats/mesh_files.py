@@ -50,8 +50,14 @@ def read_mesh(path: Path, *, may_be_empty: bool = False, hint: str = "make the a
     except BadInput as error:
         raise BadInput(f"{path}: {error.message}", hint=hint) from None
     mesh = mesh or trimesh.Trimesh(process=False)
-    if not may_be_empty and len(mesh.faces) == 0:
-        raise BadInput(f"{path}: holds no triangles", hint=hint)
+    if mesh.vertices.ndim != 2 or mesh.vertices.shape[1] != 3:
+        raise BadInput(f"{path}: vertices of {mesh.vertices.shape[1:]} numbers, expected 3", hint=hint)
+    if len(mesh.faces) == 0:
+        if not may_be_empty:
+            raise BadInput(f"{path}: holds no triangles", hint=hint)
+        mesh = trimesh.Trimesh(mesh.vertices, np.zeros((0, 3), np.int64), process=False)
+    if mesh.faces.ndim != 2 or mesh.faces.shape[1] != 3:
+        raise BadInput(f"{path}: faces are not triangles", hint=hint)
     if not np.isfinite(mesh.vertices).all():
         raise BadInput(f"{path}: vertices are not finite", hint=hint)
     if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):

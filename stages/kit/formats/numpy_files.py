@@ -15,6 +15,7 @@ from stages.kit.formats.zip_files import find_entry, zip_errors
 LARGEST_ARRAY = 8 * 2**30
 """Bytes. A map of ten million voxel blocks does not fit; nothing that the steps write comes near."""
 LARGEST_HEADER = 10_000
+PIECE = 1 << 24
 PLAIN_KINDS = "biufUS"
 
 
@@ -39,15 +40,11 @@ def _read_entry(archive: zipfile.ZipFile, name: str) -> np.ndarray:
         expected = math.prod(shape) * kind.itemsize
         if expected > entry.file_size:
             raise BadInput(f"{name}: shape {shape} of {kind} needs {expected} bytes, there are {entry.file_size}")
-        data = bytearray(expected)
-        filled = file.readinto(memoryview(data)) if expected else 0
-        while 0 < filled < expected:
-            more = file.readinto(memoryview(data)[filled:])
-            if not more:
-                break
-            filled += more
-        if filled != expected or file.read(1):
-            raise BadInput(f"{name}: {filled} bytes or more, shape {shape} of {kind} needs {expected}")
+        data = bytearray()  # grows with what is really there
+        while len(data) < expected and (piece := file.read(min(PIECE, expected - len(data)))):
+            data += piece
+        if len(data) != expected or file.read(1):
+            raise BadInput(f"{name}: {len(data)} bytes or more, shape {shape} of {kind} needs {expected}")
     return np.frombuffer(data, dtype=kind).reshape(shape, order="F" if fortran_order else "C")
 
 

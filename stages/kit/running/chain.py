@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from stages.kit.running.interruption import PARENT_VARIABLE
 from stages.kit.running.pipelines import Pipeline, resolve_variables, step_arguments
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -32,7 +33,7 @@ def command_prefix() -> list[str]:
 
 def run_command(arguments: list[str]) -> tuple[int, str]:
     """Run one scenewright command; progress and messages pass through, standard output is returned."""
-    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
+    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY), PARENT_VARIABLE: str(os.getpid())}
     process = subprocess.Popen([*command_prefix(), *arguments], stdout=subprocess.PIPE, text=True, env=environment)
     try:
         output, _ = process.communicate()

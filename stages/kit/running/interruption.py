@@ -6,9 +6,15 @@ runner therefore asks once more before a result takes its place.
 
 from __future__ import annotations
 
+import ctypes
+import os
 import signal
 from types import FrameType
 
+PARENT_VARIABLE = "SCENEWRIGHT_PARENT"
+"""Environment variable: process that started this one as a step of its chain."""
+SET_PARENT_DEATH_SIGNAL = 1
+"""PR_SET_PDEATHSIG of Linux."""
 _requested = False
 
 
@@ -23,6 +29,23 @@ def install() -> None:
     """Let SIGINT and SIGTERM interrupt this process."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, interrupt)
+
+
+def end_with_parent() -> None:
+    """Let the system interrupt this process when the chain that started it is killed (Linux).
+
+    Else a step would go on alone, and hold its lock against the next run. Raises KeyboardInterrupt when the parent is
+    gone already.
+    """
+    parent = os.environ.pop(PARENT_VARIABLE, "")
+    if not parent.isdigit():
+        return
+    try:
+        ctypes.CDLL(None).prctl(SET_PARENT_DEATH_SIGNAL, int(signal.SIGTERM), 0, 0, 0)
+    except (OSError, AttributeError):
+        return
+    if os.getppid() != int(parent):
+        raise KeyboardInterrupt
 
 
 def ignore() -> None:

@@ -177,11 +177,11 @@ def partial_folder(target: Path) -> Iterator[Path]:
     Raises MachineFailure when it cannot be made.
     """
     partial = _beside(target, f"partial-{os.getpid()}-{secrets.token_hex(4)}")
-    try:
-        partial.mkdir()
-    except OSError as error:
-        raise MachineFailure(f"{target}: {error.strerror}", hint="choose a writable --out") from None
-    try:
+    try:  # around its making too: a signal may arrive in between
+        try:
+            partial.mkdir()
+        except OSError as error:
+            raise MachineFailure(f"{target}: {error.strerror}", hint="choose a writable --out") from None
         yield partial
     finally:
         shutil.rmtree(partial, ignore_errors=True)
