@@ -221,7 +221,9 @@ def reset_peak() -> None:
 
 def work(arm: str, case: str, frames_file: Path) -> dict[str, float]:
     """Run one arm once on the frames of a file; this is what a subprocess does."""
-    frames = {name: np.load(frames_file / f"{name}.npy") for name in ("depth", "color", "ids", "poses")}
+    frames = {
+        name: np.load(frames_file / f"{name}.npy", allow_pickle=False) for name in ("depth", "color", "ids", "poses")
+    }
     step, mesh = build(arm, {name: images[:2] for name, images in frames.items()}, 0.05)
     step(0)
     step(1)

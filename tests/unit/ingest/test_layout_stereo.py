@@ -210,7 +210,7 @@ def test_real_middlebury_pair(tmp_path: Path) -> None:
     folder = real_data("middlebury_motorcycle")
     for name, eye in (("im0", "left"), ("im1", "right")):
         shutil.copy(folder / f"motorcycle_{eye}.png", tmp_path / f"{name}.png")
-    disparity = np.load(folder / "motorcycle_disp.npz")["arr_0"]
+    disparity = np.load(folder / "motorcycle_disp.npz", allow_pickle=False)["arr_0"]
     write_pfm(tmp_path / "disp0.pfm", disparity)
     focal, center, offset, baseline = 994.978, (311.193, 254.877), 31.086, 193.001
     (tmp_path / "calib.txt").write_text(
