@@ -16,9 +16,9 @@ from stages.ingest.preflight.fits import Fit, as_fit, relative_pose
 from stages.ingest.preflight.looking import Look
 
 FEATURES = 800
-MOST_PAIRS, MOST_MATCHES = 16, 400
+MOST_PAIRS, MOST_MATCHES = 12, 400
 """Matching is the dear part of the pre-flight: more of either changes no verdict."""
-ITERATIONS = 300
+ITERATIONS = 200
 MATCH_RATIO = 0.8
 INLIER_DISTANCE = 1.5
 """Pixels from the epipolar line that a match may have to count as one."""

@@ -39,12 +39,12 @@ def write_log(root: Path, count: int, change=lambda pose: pose) -> Path:
 
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_log(tmp_path_factory.mktemp("good") / "log", 30)
+    return write_log(tmp_path_factory.mktemp("good") / "log", 20)
 
 
 @pytest.fixture(scope="module")
 def bad(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_log(tmp_path_factory.mktemp("bad") / "log", 30, np.linalg.inv)
+    return write_log(tmp_path_factory.mktemp("bad") / "log", 20, np.linalg.inv)
 
 
 def inspect(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> tuple[int, str, str]:
@@ -121,7 +121,7 @@ def test_sequence_artifact_is_inspected_with_its_manifest(
     code, out, _ = inspect(capsys, folder, "--json")
     document = json.loads(out)
     assert document["kind"] == "sequence" and set(document["preflight"]) == KEYS
-    assert document["preflight"]["frames"]["in_log"] == 30
+    assert document["preflight"]["frames"]["in_log"] == 20
     code, out, _ = inspect(capsys, folder, "--json", "--frames", "0")
     assert code == 0 and "preflight" not in json.loads(out)
     assert inspect(capsys, folder, "--set", "fx=5")[0] == 2
@@ -149,11 +149,11 @@ def test_what_is_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
 
 def test_tiny_room_without_texture_is_judged_by_depth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Colour that changes from frame to frame and shows nothing must not be called wrong poses."""
-    log = tiny_room.write_redwood(tmp_path / "log", tiny_room.frames(25))
+    log = tiny_room.write_redwood(tmp_path / "log", tiny_room.frames(16))
     code, out, _ = inspect(capsys, log, "--json")
     document = json.loads(out)
     assert code == 0 and document["cameras"][0]["poses"]["verdict"] == "agree"
-    flipped = [(c, d, p @ np.diag([1.0, -1, -1, 1])) for c, d, p in tiny_room.frames(25)]
+    flipped = [(c, d, p @ np.diag([1.0, -1, -1, 1])) for c, d, p in tiny_room.frames(16)]
     log = tiny_room.write_redwood(tmp_path / "flipped", flipped)
     code, out, _ = inspect(capsys, log, "--json")
     assert code == 3 and json.loads(out)["cameras"][0]["poses"]["best"]["convention"] == "opengl"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.scene_parts import Camera
@@ -50,6 +50,7 @@ def test_streams_with_hardly_any_stamps(stamps: list[int]) -> None:
     assert report.count == 7 and report.rate is None and report.gaps.count == 0
 
 
+@settings(deadline=None)
 @given(st.lists(st.integers(-(2**62), 2**62), max_size=40))
 def test_any_stamps_make_a_report(stamps: list[int]) -> None:
     report = stream_report(StreamInfo("x", "depth", "", np.array(stamps, dtype=np.int64)))
@@ -161,6 +162,7 @@ def test_who_is_to_blame_for_a_scale() -> None:
 # ---- choice ----
 
 
+@settings(deadline=None)
 @given(st.integers(0, 400), st.integers(1, 90), st.booleans())
 def test_choice_is_bounded_and_within(total: int, count: int, posed: bool) -> None:
     times = np.arange(total) / 30
@@ -257,6 +259,7 @@ def test_steps_name_what_is_missing() -> None:
     assert not any(row.ready for row in step_reports(set()))
 
 
+@settings(deadline=None)
 @given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6))
 def test_ticks_are_round_and_inside(low: float, size: float) -> None:
     found = ticks(low, low + size)

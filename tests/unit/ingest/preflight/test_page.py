@@ -51,10 +51,10 @@ def checked(text: str) -> Balanced:
 
 
 def test_page_of_a_good_and_of_a_bad_log() -> None:
-    good = render(inspected(source(40), keep_pictures=True))
+    good = render(inspected(source(20), keep_pictures=True))
     page = checked(good)
     assert {"svg", "img", "table"} <= page.tags and "ready" in good
-    bad = render(inspected(FAULTS["inverse poses"][0](source(40)), keep_pictures=True))
+    bad = render(inspected(FAULTS["inverse poses"][0](source(20)), keep_pictures=True))
     checked(bad)
     assert "wasted" in bad and "--pose-convention inverse" in bad and "the worst pair" in bad
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -75,6 +75,7 @@ def test_every_convention_has_a_writer_and_words() -> None:
 
 
 @pytest.mark.parametrize("name", POSE_CONVENTIONS)
+@settings(deadline=None, max_examples=40)
 @given(seed=st.integers(0, 10_000))
 def test_conversion_undoes_the_writer(name: str, seed: int) -> None:
     pose = pose_of(seed)

@@ -79,6 +79,6 @@ def source(
     return LogSource(**{**made, "entries": entries, **changes})
 
 
-def inspected(what: LogSource, frames: int = 40, *settings: str, **options: Any) -> Inspection:
+def inspected(what: LogSource, frames: int = 26, *settings: str, **options: Any) -> Inspection:
     """Inspect a source."""
     return inspect_source(what, Path("room"), ingest_parameters(settings), frames, SilentProgress(), **options)
