@@ -32,6 +32,8 @@ UNRELATED = 1.2
 LAG_RATIO = 1.1
 """Score of the best lag over that of none from which colour and depth are called shifted in time."""
 OFFSET_RATIO = 1.12
+RELATED = 1.3
+"""Score that another place must have to be claimed as the right one."""
 LEAST_OFFSET = 3
 """Pixels at 320 pixels width under which an offset is within what jumps can tell."""
 
@@ -93,7 +95,7 @@ def check_registration(
     factor = next(iter(edges.values())).factor
     # Each mistake looks a little like the other while the camera moves one way; the better explanation counts.
     shifted = max(map(abs, offset)) >= LEAST_OFFSET and offset_score >= OFFSET_RATIO * score
-    shifted &= offset_score > max(lags.values(), default=0.0)
+    shifted &= offset_score > max([RELATED, *lags.values()])
     decisive = late and not shifted
     return RegistrationReport(
         checked=True,
