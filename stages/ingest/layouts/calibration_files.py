@@ -300,7 +300,10 @@ def _kitti(text: str, path: Path, camera_number: int) -> FolderCalibration:
         matrix = np.array(values).reshape(3, 4)
         records[number] = _record(matrix[:, :3], (0, 0), path, projection=values)
     left = records[camera_number]
-    offset = np.linalg.solve(np.array(left.K).reshape(3, 3), np.array(left.P).reshape(3, 4)[:, 3])
+    try:
+        offset = np.linalg.solve(np.array(left.K).reshape(3, 3), np.array(left.P).reshape(3, 4)[:, 3])
+    except np.linalg.LinAlgError:
+        raise BadInput(f"{path}: the camera matrix of P{camera_number} cannot be inverted") from None
     posed_from_left = transform_from(np.eye(3), -offset)
     return FolderCalibration(left, records.get(camera_number + 1), None, True, posed_from_left)
 

@@ -49,8 +49,11 @@ def decode_compressed_depth(encoding: str, data: bytes) -> np.ndarray:
     if not (np.isfinite(a) and np.isfinite(b) and a > 0):
         raise Unusable("undecodable_depth", f"quantisation A = {a}, B = {b}")
     values = stored.astype(np.float32)
-    with np.errstate(divide="ignore", over="ignore"):
-        return np.where(stored > 0, np.float32(a) / (values - np.float32(b)), np.float32(np.nan))
+    values -= np.float32(b)
+    with np.errstate(divide="ignore", over="ignore"):  # in place: the image may be a large one
+        np.divide(np.float32(a), values, out=values)
+    values[stored == 0] = np.nan
+    return values
 
 
 def stored_as(encoding: str, data: bytes) -> str:

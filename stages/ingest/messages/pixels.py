@@ -189,9 +189,9 @@ def _compressed_color(record: ImageRecord) -> np.ndarray | bytes:
         video = any(word in record.encoding.lower() for word in VIDEO)
         reason = "unknown_encoding" if video else "undecodable_color"
         raise Unusable(reason, f"{len(data)} bytes of {record.encoding!r:.40}, neither JPEG, PNG nor WebP")
+    _check_whole(data, "undecodable_color")
     if not may_be_decoded(data):
         raise Unusable("undecodable_color", _claimed(data))
-    _check_whole(data, "undecodable_color")
     image = decode_color(data)
     if image is None:
         raise Unusable("undecodable_color", f"{len(data)} bytes of {record.encoding!r:.40}")
@@ -268,9 +268,9 @@ def _decoded_png(record: ImageRecord, reason: str) -> np.ndarray:
         raise Unusable("depth_not_16_bit" if "depth" in reason else reason, "JPEG does not keep values")
     if not data.startswith(PNG_START):
         raise Unusable(reason, f"{len(data)} bytes of {record.encoding!r:.40}, no PNG")
+    _check_whole(data, reason)
     if not may_be_decoded(data):
         raise Unusable(reason, _claimed(data))
-    _check_whole(data, reason)
     image = decode_image(data)
     if image is None:
         raise Unusable(reason, f"PNG of {len(data)} bytes")

@@ -11,6 +11,10 @@ JPEG_SIZE_MARKERS = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})
 """Start of frame; the three left out are tables and an extension."""
 JPEG_BARE_MARKERS = frozenset({0x01, *range(0xD0, 0xD9)})
 """Markers without a length."""
+PNG_START = b"\x89PNG\r\n\x1a\n"
+PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
+DEFLATE_LIMIT = 1032
+"""Deflate never packs more than this many bytes into one."""
 TIFF_WIDTH, TIFF_HEIGHT = 256, 257
 PNM = re.compile(rb"P[1-6]((?:\s|#[^\n]*\n)+(\d{1,9}))((?:\s|#[^\n]*\n)+(\d{1,9}))(?=[\s#])")
 
@@ -39,9 +43,29 @@ def image_size(data: bytes) -> tuple[int, int] | None:
 
 
 def may_be_decoded(data: bytes) -> bool:
-    """Whether the header is that of an image of a known kind, with pixels, at most LARGEST_IMAGE of them."""
+    """Whether the header is that of an image of a known kind, with pixels, at most LARGEST_IMAGE of them.
+
+    The chunks of a PNG have to lie in the data and be able to unpack to its pixels: decoders reserve what they claim.
+    """
     size = image_size(data)
-    return size is not None and 0 < size[0] * size[1] <= LARGEST_IMAGE
+    if size is None or not 0 < size[0] * size[1] <= LARGEST_IMAGE:
+        return False
+    return not bytes(data).startswith(PNG_START) or _png_holds_its_pixels(bytes(data), *size)
+
+
+def _png_holds_its_pixels(data: bytes, width: int, height: int) -> bool:
+    packed, place = 0, 8
+    while place + 12 <= len(data):
+        length, kind = struct.unpack_from(">I4s", data, place)
+        if place + 12 + length > len(data):
+            return False
+        packed += length if kind in (b"IDAT", b"fdAT") else 0
+        place += 12 + length
+        if kind == b"IEND":
+            break
+    bits, color = struct.unpack_from("BB", data, 24)
+    row = (width * bits * PNG_CHANNELS.get(color, 4) + 7) // 8
+    return row * height <= DEFLATE_LIMIT * packed
 
 
 def _png(data: bytes) -> tuple[int, int] | None:

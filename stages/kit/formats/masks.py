@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.kit.formats.image_headers import LARGEST_IMAGE
+from stages.kit.formats.image_headers import LARGEST_IMAGE, may_be_decoded
 from stages.kit.formats.zip_files import find_entry, zip_errors
 
 LARGEST_ID = (1 << 24) - 1
@@ -52,9 +52,9 @@ def decode_panoptic_png(data: bytes) -> np.ndarray:
     """
     if not data.startswith(PNG_BEGINNING) or len(data) < 33:
         raise BadInput("not a COCO panoptic PNG", hint="ids are R + 256 G + 65536 B")
-    width, height = struct.unpack_from(">II", data, 16)
-    if not 0 < width * height <= LARGEST_IMAGE:
-        raise BadInput(f"panoptic PNG declares {width}x{height} pixels, at most {LARGEST_IMAGE} are read")
+    if not may_be_decoded(data):
+        width, height = struct.unpack_from(">II", data, 16)
+        raise BadInput(f"panoptic PNG declares {width}x{height} pixels, which {len(data)} bytes cannot hold")
     try:
         image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:

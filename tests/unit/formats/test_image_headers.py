@@ -68,7 +68,13 @@ def test_lying_headers_are_refused() -> None:
     png[16:24] = struct.pack(">II", 0, 37)
     assert not may_be_decoded(png)
     png[16:24] = struct.pack(">II", LARGEST_IMAGE, 1)
-    assert may_be_decoded(png)
+    assert not may_be_decoded(png)  # its few bytes cannot unpack to that
+    black = cv2.imencode(".png", np.zeros((4000, 5000), np.uint8))[1].tobytes()
+    assert len(black) < 100_000 and may_be_decoded(black) and not may_be_decoded(black[:-20])
+    long_chunk = bytearray(KINDS["png"])
+    place = long_chunk.find(b"IDAT") - 4
+    long_chunk[place : place + 4] = b"\xff\0\0\x34"  # four gigabytes, which a decoder would reserve
+    assert not may_be_decoded(long_chunk)
     assert not may_be_decoded(b"P5 99999 99999 65535\n")
     jpeg = bytearray(KINDS["jpeg"])
     place = jpeg.find(b"\xff\xc0")
