@@ -85,9 +85,13 @@ clean: ## Remove everything that runs made (outputs/*)
 # The folder that holds the real logs (see docs/DATA.md); none of it is part of the project.
 REAL_DATA ?= ../shared/data
 
-.PHONY: real bench
+.PHONY: real bench bench-preflight
 real: setup ## The chain on real logs, one table; fails unless it finds what the pictures show (REAL_DATA=folder)
 	$(PYTHON) -m benchmarks.tables.real --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real
+
+# Twelve generated rooms (three with QUICK=1) and the real logs, each with every planted fault.
+bench-preflight: setup ## What `inspect` makes of planted faults (QUICK=1: three rooms)
+	$(PYTHON) -m benchmarks.tables.preflight $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-preflight
 
 bench: setup ## Speed beside named peers, medians (QUICK=1: fewer runs)
 	$(PYTHON) -m benchmarks.speed.fusion $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-fusion

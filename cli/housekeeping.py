@@ -1,4 +1,4 @@
-"""Commands that are no steps: run, batch, verify, inspect, migrate, view, models, doctor, schemas, makefile."""
+"""Commands that are no steps: run, batch, verify, migrate, view, models, doctor, schemas, makefile."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """`scenewright inspect` against faults that were planted: what is detected, what is named, what is a false alarm.
 
 Every log is opened once a fault, the fault is put into its frames in memory, and the pre-flight judges it. Logs: MCAP
-files of generated rooms (`--rooms`), and the real logs of benchmarks/expectations/real.toml (`--data`). Writes
-metrics.json and table.md.
+files of generated rooms (made below `--out` unless `--rooms` has some), and the real logs of
+benchmarks/expectations/real.toml (`--data`). Writes metrics.json and table.md.
 """
 
 from __future__ import annotations
@@ -28,8 +28,12 @@ from stages.ingest.preflight.report import CameraReport, InspectionReport
 from stages.ingest.source import Entry, LoadedFrame, LogSource
 from stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion
 from stages.kit.progress import SilentProgress
+from stages.kit.running.chain import run_command
 
 EXPECTATIONS = Path(__file__).resolve().parent.parent / "expectations" / "real.toml"
+REPORTED_SEEDS = range(200, 212)
+"""Rooms that no threshold was set on."""
+RECIPES = ("room", "kitchen", "office", "bedroom")
 Fault = Callable[[LogSource], LogSource]
 Named = Callable[[CameraReport], bool]
 
@@ -220,10 +224,23 @@ def row_of(report: InspectionReport, seconds: float, named: Named | None) -> dic
     }
 
 
+def make_rooms(folder: Path, seeds: range) -> None:
+    """Generate the rooms that are missing in `folder`, one of the four recipes after the other."""
+    commands = [["library", "build", "--seed", "1", "--out", f"{folder}/library"]]
+    for seed in seeds:
+        size = ["--frames", "240", "--width", "320", "--height", "240"]
+        recipe = ["--recipe", RECIPES[seed % len(RECIPES)], "--library", f"{folder}/library"]
+        commands.append(["synthesize", *recipe, *size, "--seed", str(seed), "--out", f"{folder}/{seed}"])
+    for command in commands:
+        code, _ = run_command([*command, "--quiet"])
+        if code != 0:
+            sys.exit(f"{' '.join(command)} exited with {code}")
+
+
 def logs_of(arguments: argparse.Namespace) -> dict[str, tuple[Path, IngestParameters]]:
     """Name -> (path, options) of every log that is there."""
     logs = {}
-    if arguments.rooms:
+    if arguments.rooms.is_dir():
         for folder in sorted(arguments.rooms.iterdir()):
             if (folder / "log.mcap").exists() and (not arguments.only or folder.name in arguments.only):
                 logs[f"room {folder.name}"] = (folder / "log.mcap", IngestParameters())  # type: ignore[call-arg]
@@ -269,13 +286,17 @@ def _cell(row: dict[str, Any] | None) -> str:
 def main() -> int:
     """Plant, inspect, print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rooms", type=Path, help="folder with ground_truth artifacts of generated rooms")
+    parser.add_argument("--rooms", type=Path, help="folder with ground_truth artifacts; default: made in OUT/rooms")
+    parser.add_argument("--quick", action="store_true", help="three rooms instead of twelve")
     parser.add_argument("--data", type=Path, help="folder with the real logs")
-    parser.add_argument("--out", type=Path, default=Path("outputs/experiments/preflight"))
+    parser.add_argument("--out", type=Path, default=Path("outputs/experiments/bench-preflight"))
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--only", nargs="*", help="only these rooms or logs")
     parser.add_argument("--faults", nargs="*", help="only these faults")
     arguments = parser.parse_args()
+    if arguments.rooms is None:
+        arguments.rooms = arguments.out / "rooms"
+        make_rooms(arguments.rooms, REPORTED_SEEDS[:3] if arguments.quick else REPORTED_SEEDS)
     rows: dict[str, dict[str, dict[str, Any]]] = {}
     for name, (log, parameters) in logs_of(arguments).items():
         rows[name] = {}
