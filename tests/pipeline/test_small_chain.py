@@ -19,6 +19,7 @@ from stages.kit.running.pipelines import pipeline_path, read_pipeline, resolve_v
 from stages.kit.running.reading import open_artifact
 from stages.kit.running.verification import verify
 from tests.contract.test_command_line import scenewright
+from tests.reliability.kill_chain import SIGNALS, run_trial
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SMALL = {"frames": "24", "width": "240", "height": "180", "voxel_size": "0.04", "seed": "3"}
@@ -127,3 +128,18 @@ def test_kill_leaves_the_previous_artifact(run_folder: Path, tmp_path: Path, nam
     found = manifest(out)
     assert content_digest(record_files(out, type(open_artifact(out)).undigested)) == found.content_digest
     assert found.content_digest == manifest(run_folder / name).content_digest
+
+
+FAST = ("sequence", "geometric_segments", "geometric_map", "contact_graph")
+
+
+@pytest.mark.parametrize("number", range(12))
+def test_interrupted_steps_resume_to_the_same_digest(run_folder: Path, tmp_path: Path, number: int) -> None:
+    """A dozen interruptions as in docs/RELIABILITY.md: SIGKILL, SIGINT, SIGTERM, early and as the artifact is whole."""
+    rng = random.Random(number)
+    name, how, late = FAST[number % 4], SIGNALS[number % 3], number >= 8
+    seconds = manifest(run_folder / name).provenance.seconds + 1.0
+    moment = 1 + rng.random() if late else rng.random()
+    atomic = number % 4 != 3
+    trial = run_trial(name, run_folder, tmp_path / "trial", seconds, moment, how, number % 2 == 0, atomic, SMALL)
+    assert trial.problems == (), trial

@@ -20,7 +20,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -87,10 +87,10 @@ def run_whole_chain(folder: Path) -> dict[str, float]:
     return seconds
 
 
-def arguments_of(name: str, folder: Path, out: Path) -> list[str]:
+def arguments_of(name: str, folder: Path, out: Path, settings: Mapping[str, str] = SMALL) -> list[str]:
     """Return the words after `scenewright` of one step on the inputs in `folder`, writing to `out`."""
     step = next(step for step in PIPELINE.step if step.name == name)
-    return [*step_arguments(step, str(folder), resolve_variables(PIPELINE, SMALL))[:-1], str(out)]
+    return [*step_arguments(step, str(folder), resolve_variables(PIPELINE, settings))[:-1], str(out)]
 
 
 def older_version(clean: Path, target: Path) -> str:
@@ -154,9 +154,17 @@ def wait_for_moment(process: subprocess.Popen[str], out: Path, moment: float, se
 
 
 def run_trial(
-    name: str, runs: Path, work: Path, seconds: float, moment: float, how: signal.Signals, previous: bool, atomic: bool
+    name: str,
+    runs: Path,
+    work: Path,
+    seconds: float,
+    moment: float,
+    how: signal.Signals,
+    previous: bool,
+    atomic: bool,
+    settings: Mapping[str, str] = SMALL,
 ) -> Trial:
-    """Interrupt one step once. `work` is emptied."""
+    """Interrupt one step once. `work` is emptied; `runs` holds the undisturbed run that has these settings."""
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
     out = work / name
@@ -165,7 +173,7 @@ def run_trial(
     kept = work / "previous-manifest.json"
     if previous:
         shutil.copy(out / MANIFEST_NAME, kept)
-    words = [*arguments_of(name, runs, out), "--json"]
+    words = [*arguments_of(name, runs, out, settings), "--json"]
     process = scenewright([*words, "--quiet"], atomic=atomic)
     wait_for_moment(process, out, moment, seconds)
     process.send_signal(signal.SIGSTOP)
