@@ -474,6 +474,25 @@ def test_out_of_memory(tmp_path: Path) -> None:
     assert content(tmp_path / "a") == before and beside(tmp_path / "a") == set()
 
 
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError(),
+        ImportError("libOpen3D.so: failed to map segment from shared object"),
+        RuntimeError("[enforce fail at alloc_cpu.cpp] DefaultCPUAllocator: can't allocate memory: you tried"),
+        RuntimeError("can't start new thread"),
+        ValueError("Unable to allocate 7.3 GiB for an array"),
+        RuntimeError("std::bad_alloc"),
+    ],
+    ids=repr,
+)
+def test_native_libraries_say_out_of_memory_in_their_own_words(error: Exception, tmp_path: Path) -> None:
+    with pytest.raises(MachineFailure, match="out of memory"), runner._machine_errors(tmp_path):
+        raise error
+    with pytest.raises(ValueError, match="another"), runner._machine_errors(tmp_path):
+        raise ValueError("another thing")
+
+
 def test_a_missing_library_is_named(tmp_path: Path) -> None:
     done = run_probe("--out", tmp_path / "a", "--behaviour", "import nonsense")
     assert done.returncode == 5 and "nonsense" in only_error(done) and "scenewright doctor" in only_error(done)

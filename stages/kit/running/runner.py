@@ -7,6 +7,7 @@ import importlib
 import json
 import logging
 import os
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from schemas.artifact import Artifact
-from schemas.errors import BadInput, MachineFailure, MissingDependency, UsageError
+from schemas.errors import BadInput, MachineFailure, MissingDependency, ScenewrightError, UsageError
 from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
 from stages.kit.progress import SilentProgress
 from stages.kit.running import estimation, interruption, memory_limit, store
@@ -55,6 +56,11 @@ MACHINE_ERRORS = (
     *(errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENXIO, errno.ENODEV, errno.ESTALE, errno.ETIMEDOUT, errno.EMLINK),
 )
 """What the system says when the fault is neither the input's nor ours."""
+OUT_OF_MEMORY = re.compile(
+    r"failed to map segment|annot allocate memory|can't allocate memory|out of memory|bad_alloc|Insufficient memory"
+    r"|Unable to allocate|can't start new thread",
+    re.IGNORECASE,
+)
 
 
 Stamp = tuple[tuple[str, int, int, int], ...]
@@ -218,8 +224,12 @@ def _machine_errors(out: Path) -> Iterator[None]:
                 f"{error.filename or out}: {error.strerror}", hint="free space or choose another --out"
             ) from error
         raise
-    except MemoryError as error:
-        raise MachineFailure(f"{out}: out of memory", hint="use fewer frames or larger voxels") from error
+    except ScenewrightError:
+        raise
+    except Exception as error:  # native libraries say it in words of their own
+        if isinstance(error, MemoryError) or OUT_OF_MEMORY.search(str(error)):
+            raise MachineFailure(f"{out}: out of memory", hint="use fewer frames or larger voxels") from error
+        raise
 
 
 def run_stage(
