@@ -69,6 +69,8 @@ class Rosbag1Messages:
         self._stated_chunks: list[int] = []
         self._indexed_chunk = -1
         """Chunk that index records belong to at this place of the walk; -1 after a damaged one."""
+        self._in_index: list[Channel] = []
+        """Connections that the index at the end of the bag repeats."""
         self._orphans = 0
         """Messages that indexes of damaged chunks name."""
         self._plain_chunks = 0
@@ -124,8 +126,10 @@ class Rosbag1Messages:
         closed = self._walk()
         if closed:
             self._find_stated_chunks()
-        if not closed or not self._connections:
+        if not closed or not self._in_index:  # a damaged index is less to be believed than the chunks
             self._find_connections()
+        for channel in self._in_index:
+            self._define(channel)
         if self._plain_chunks:
             many = f"{self._plain_chunks} of {len(self._chunks)} chunks"
             self.notes.append(f"{many} carry no checksum: changed bytes in them cannot be noticed")
@@ -149,7 +153,7 @@ class Rosbag1Messages:
                     self._index(record)
                 elif record.op == CONNECTION:
                     indexed_connections += 1
-                    self._define(record, self._data(record))
+                    self._in_index.append(_connection(record, self._data(record)))
                 elif record.op == CHUNK_INFO:
                     self._chunk_info(record)
                 else:
@@ -164,7 +168,7 @@ class Rosbag1Messages:
             scan_from = record.end if record.op == CHUNK else offset + 1
             offset = record.end
         if self._orphans:
-            self._lines.found(f"indexes of lost chunks name {self._orphans} messages")
+            self._lines.found(f"index records behind damaged places name {self._orphans} messages")
         if header is None or torn:
             if not torn:
                 self._lines.found("ends before its header")
@@ -269,7 +273,7 @@ class Rosbag1Messages:
                 while offset < len(data):
                     record = record_within(data, offset)
                     if record.op == CONNECTION:
-                        self._define(record, data[record.start : record.end])
+                        self._define(_connection(record, data[record.start : record.end]))
                     elif record.op == MESSAGE:
                         found[record.number(b"conn")] += 1
                     offset = record.end
@@ -277,22 +281,15 @@ class Rosbag1Messages:
                 self._chunk_damage(index, fault, found)
             self._stated.update(found)
 
-    def _define(self, record: Record, data: bytes) -> None:
+    def _define(self, channel: Channel) -> None:
         """Take in a connection; one that contradicts an earlier one is damage, and the earlier one stays."""
-        number, fields = record.number(b"conn"), read_fields(data)
-        try:
-            topic, type_name = record.fields[b"topic"].decode(), fields[b"type"].decode()
-            schema = fields[b"message_definition"]
-        except (KeyError, UnicodeDecodeError):
-            raise Damaged("is a connection without topic, type or message definition") from None
+        number = channel.id
         if number not in self._connections and len(self._connections) >= MOST_CONNECTIONS:
-            raise Damaged(f"is one connection more than the {MOST_CONNECTIONS} that are accepted")
-        channel = Channel(number, topic, type_name, "ros1", "ros1msg", schema)
+            raise Damaged(f"has more than the {MOST_CONNECTIONS} connections that are accepted")
         known = self._connections.setdefault(number, channel)
-        if (known.topic, known.type_name, known.schema) != (topic, type_name, schema):
-            self._lines.found(
-                f"connection {number} is defined twice, as {known.topic!r} and as {topic!r}: the first is used"
-            )
+        if (known.topic, known.type_name, known.schema) != (channel.topic, channel.type_name, channel.schema):
+            names = f"as {known.topic!r} and as {channel.topic!r}"
+            self._lines.found(f"connection {number} is defined twice, {names}: the first is used")
 
     def _channel(self, number: int) -> Channel:
         channel = self._connections[number]
@@ -318,7 +315,7 @@ class Rosbag1Messages:
                         place = Place(index, offset)
                         yield StoredMessage(channel, time, data[record.start : record.end], place)
                 elif record.op == CONNECTION:
-                    self._define(record, data[record.start : record.end])
+                    self._define(_connection(record, data[record.start : record.end]))
                 offset = record.end
         except Damaged as fault:
             self._chunk_damage(index, fault, found)
@@ -366,3 +363,13 @@ def open_rosbag1(path: Path, *, salvage: bool) -> Rosbag1Messages:
     """Open a ROS 1 bag. Raises BadInput when it is none, is encrypted or of version 1; without `salvage` also when it
     is torn or damaged."""
     return Rosbag1Messages(path, salvage=salvage)
+
+
+def _connection(record: Record, data: bytes) -> Channel:
+    """Return what a connection record defines. Raises Damaged."""
+    number, fields = record.number(b"conn"), read_fields(data)
+    try:
+        topic, type_name = record.fields[b"topic"].decode(), fields[b"type"].decode()
+        return Channel(number, topic, type_name, "ros1", "ros1msg", fields[b"message_definition"])
+    except (KeyError, UnicodeDecodeError):
+        raise Damaged("is a connection without topic, type or message definition") from None

@@ -21,7 +21,8 @@ _USUAL_HEADER = 256
 _LENGTH = struct.Struct("<I")
 _WINDOW = 4 << 20
 _CHUNK_START = re.compile(rb"[\x10-\x80]\0{3}[\x04-\x40]\0{3}(?:op=\x05|size=|compression=)", re.DOTALL)
-_LONGEST_START = 20
+_LONGEST_HEADER = 0x80
+_MARK = b"op=" + bytes([CHUNK])
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,12 +114,15 @@ def find_chunk(file: LogFile, start: int) -> int | None:
     """Return the offset of the first thing from `start` on that can only be a whole chunk record, or None."""
     for begin in range(start, file.size, _WINDOW):
         try:
-            window = file.read(begin, _WINDOW + _LONGEST_START)
+            window = file.read(begin, _WINDOW + _LONGEST_HEADER)
         except Damaged:  # a part of the disk that cannot be read
             continue
-        for match in _CHUNK_START.finditer(window):
-            if _is_chunk(file, begin + match.start()):
-                return begin + match.start()
+        place = window.find(_MARK)
+        while place >= 0:
+            for match in _CHUNK_START.finditer(window, max(0, place - _LONGEST_HEADER), place + len(_MARK)):
+                if _is_chunk(file, begin + match.start()):
+                    return begin + match.start()
+            place = window.find(_MARK, place + 1)
     return None
 
 

@@ -45,6 +45,13 @@ _INDEX_ENTRY = 16
 _KNOWN = {int(code) for code in Opcode}
 _PARSED = {Opcode.MESSAGE, Opcode.MESSAGE_INDEX, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.ATTACHMENT}
 """Opcodes whose records prove in another way that they are what they say, or are too many to look at twice."""
+_SUMMARY_ONLY = {
+    Opcode.CHUNK_INDEX,
+    Opcode.ATTACHMENT_INDEX,
+    Opcode.STATISTICS,
+    Opcode.METADATA_INDEX,
+    Opcode.SUMMARY_OFFSET,
+}
 _CUT = "ends within it"
 _UNFINISHED = "ends without a footer: it was not closed, as after a power failure"
 
@@ -82,6 +89,10 @@ class McapStructure:
         self._data_checksum = 0
         self._late: list[Schema | Channel] = []
         """Definitions that the summary repeats."""
+        self._misplaced = False
+        """Whether a record of the summary stands before the end of data."""
+        self._doubted: list[Schema | Channel] = []
+        """Definitions outside of chunks after the first damage."""
         self._index_rows = array("Q")
         self._indexed_chunk = -1
         """Chunk that MessageIndex records belong to at this place of the walk; -1 after a damaged one."""
@@ -151,11 +162,24 @@ class McapStructure:
             scan_from = end if opcode == Opcode.CHUNK else offset + 1  # only a chunk proves its own length
             offset = end
         if self._orphans:
-            self.damage.found(f"indexes of lost chunks name {self._orphans} messages")
+            self.damage.found(f"message indexes behind damaged places name {self._orphans} messages")
+        self._settle_doubts()
         return footer if footer is not None and self._is_closed(offset) else None
+
+    def _settle_doubts(self) -> None:
+        """What stands outside of chunks in a damaged file that has chunks may be the inside of a damaged one."""
+        if not self.chunks:
+            for record in self._doubted:
+                self.define(record)
+        elif self.damage and self.loose:
+            self.damage.found(f"{len(self.loose)} messages outside of chunks are not believed: they are lost")
+            del self.loose[:]
 
     def _visit(self, opcode: int, offset: int, length: int) -> Footer | None:
         """Take in one top-level record; its body is read where it is a definition. Raises Damaged."""
+        if opcode in _SUMMARY_ONLY and self._data_end is None and not self._misplaced:
+            self._misplaced = True
+            self.damage.found(f"record at byte {offset} with opcode {opcode} stands before the end of data")
         if offset == len(MAGIC):
             if opcode != Opcode.HEADER:
                 raise Damaged("is no header")
@@ -166,22 +190,26 @@ class McapStructure:
             self.damage.found(f"record at byte {offset} has the opcode {opcode} and is built like a chunk: read as one")
             self._visit_chunk(offset, length)
         elif opcode == Opcode.MESSAGE:
-            self.loose.append(offset)
+            self._visit_message(offset, length)
         elif opcode == Opcode.MESSAGE_INDEX:
             self._visit_index(offset, length)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             body = self._definition(offset, length)
             record = read_schema(body) if opcode == Opcode.SCHEMA else read_channel(body)
-            if self._data_end is None:
-                self.define(record)
-            else:
+            if self._data_end is not None:
                 self._late.append(record)
+            elif self.damage:
+                self._doubted.append(record)
+            else:
+                self.define(record)
         elif opcode == Opcode.METADATA:
             self.metadata.append(read_metadata(self._definition(offset, length)))
         elif opcode == Opcode.ATTACHMENT:
             self._visit_attachment(offset, length)
         elif opcode == Opcode.DATA_END:
-            self._data_checksum = int.from_bytes(self._body(offset, length)[:DATA_END_SIZE], "little")
+            if length != DATA_END_SIZE:
+                raise Damaged(f"is an end of data of {length} bytes")
+            self._data_checksum = int.from_bytes(self._body(offset, length), "little")
             self._data_end = offset + HEAD.size + length
         elif opcode == Opcode.STATISTICS:
             statistics = read_statistics(self._body(offset, length))
@@ -214,6 +242,15 @@ class McapStructure:
         if self._data_end is None and not self.damage:
             raise Damaged("is a footer without an end of data before it")
         return read_footer(self._body(offset, length))
+
+    def _visit_message(self, offset: int, length: int) -> None:
+        if self._data_end is not None:
+            raise Damaged("is a message after the end of data")
+        if self._indexed_chunk >= 0:  # one bit makes a message of the message index behind a chunk
+            head = self._file.exactly(offset + HEAD.size, min(length, _INDEX_HEAD))
+            if int.from_bytes(head[2:], "little") == length - _INDEX_HEAD:
+                raise Damaged("is a message that is built like a message index")
+        self.loose.append(offset)
 
     def _visit_index(self, offset: int, length: int) -> None:
         head = self._file.exactly(offset + HEAD.size, min(length, _INDEX_HEAD))
