@@ -43,13 +43,15 @@ def run(arguments: list[str]) -> int:
     from typer.exceptions import TyperException
 
     from schemas.errors import ScenewrightError
+    from stages.kit.running import interruption
 
     debug = "--debug" in arguments
     _set_up_logging(logging.WARNING if "--quiet" in arguments else logging.DEBUG if debug else logging.INFO)
     try:
         from cli.application import build_application
 
-        result = build_application()(args=arguments, prog_name="scenewright", standalone_mode=False)
+        with interruption.heard():
+            result = build_application()(args=arguments, prog_name="scenewright", standalone_mode=False)
         if result == INTERRUPTED:  # typer's own translation of KeyboardInterrupt
             _say_error(INTERRUPTED_TEXT)
         return result if isinstance(result, int) else 0

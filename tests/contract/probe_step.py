@@ -20,7 +20,9 @@ class ProbeParameters(Parameters):
     files: int = Field(8, ge=1, description="number of files")
     pause: float = Field(0.0, ge=0, description="pause after each file [s]")
     behaviour: str = Field(
-        "write", description="write, raise, empty, random, fill memory, import nonsense or swallow interrupts"
+        "write",
+        description="write, raise, empty, random, fill memory, import nonsense, swallow interrupts "
+        "or turn interrupts into errors",
     )
 
 
@@ -47,6 +49,8 @@ def run(upstream: Trajectory | None, log: Path | None, *, parameters: ProbeParam
         try:
             time.sleep(parameters.pause)
         except KeyboardInterrupt:
+            if parameters.behaviour == "turn interrupts into errors":
+                raise SystemError("returned a result with an exception set") from None
             if parameters.behaviour != "swallow interrupts":
                 raise
         if parameters.behaviour == "raise" and number == 1:

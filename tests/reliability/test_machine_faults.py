@@ -500,7 +500,7 @@ def test_a_missing_library_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("behaviour", ["write", "swallow interrupts"])
+@pytest.mark.parametrize("behaviour", ["write", "swallow interrupts", "turn interrupts into errors"])
 def test_signals_end_a_run_even_when_their_exception_gets_lost(
     tmp_path: Path, number: signal.Signals, behaviour: str
 ) -> None:

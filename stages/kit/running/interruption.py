@@ -9,6 +9,8 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType
 
 PARENT_VARIABLE = "SCENEWRIGHT_PARENT"
@@ -52,6 +54,19 @@ def ignore() -> None:
     """Let them pass: all is said and done."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
+
+
+@contextmanager
+def heard() -> Iterator[None]:
+    """Let every error that follows a signal be the interruption: libraries turn its exception into ones of their own.
+
+    numba, for one, raises SystemError. Raises KeyboardInterrupt.
+    """
+    try:
+        yield
+    except Exception:
+        raise_if_requested()
+        raise
 
 
 def raise_if_requested() -> None:
