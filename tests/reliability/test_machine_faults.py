@@ -474,6 +474,15 @@ def test_out_of_memory(tmp_path: Path) -> None:
     assert content(tmp_path / "a") == before and beside(tmp_path / "a") == set()
 
 
+def test_a_disk_that_fills_up_while_a_folder_is_copied(tmp_path: Path) -> None:
+    make(tmp_path / "a", text="0123456789")
+    full = pytest.raises(MachineFailure, match="No space left on device")
+    with small_disk(tmp_path / "disk", "size=64k") as disk, full, runner._machine_errors(disk):
+        shutil.copytree(tmp_path / "a", disk / "copy")
+    with pytest.raises(shutil.Error), runner._machine_errors(tmp_path):
+        raise shutil.Error([("a", "b", "are the same file")])
+
+
 @pytest.mark.parametrize(
     "error",
     [

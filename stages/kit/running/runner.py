@@ -213,15 +213,23 @@ def _what_changed(old: Manifest, new: dict[str, Any]) -> list[str]:
     return changed
 
 
+def _first_cause(error: OSError) -> tuple[int | None, str]:
+    """Return number and words of what the system said; copying a folder gathers them as text."""
+    if error.errno is None and (found := re.search(r"\[Errno (\d+)\] ([^:\"']+)", str(error))):
+        return int(found[1]), found[2]
+    return error.errno, error.strerror or str(error)
+
+
 @contextmanager
 def _machine_errors(out: Path) -> Iterator[None]:
     """Turn a full or read-only disk, a forbidden file and exhausted memory into MachineFailure."""
     try:
         yield
     except OSError as error:
-        if error.errno in MACHINE_ERRORS:
+        number, reason = _first_cause(error)
+        if number in MACHINE_ERRORS:
             raise MachineFailure(
-                f"{error.filename or out}: {error.strerror}", hint="free space or choose another --out"
+                f"{error.filename or out}: {reason}", hint="free space or choose another --out"
             ) from error
         raise
     except ScenewrightError:
