@@ -245,7 +245,8 @@ def _parse_link(element: ElementTree.Element, path: Path) -> Link:
         )
         matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         frame = _parse_origin(inertial, where)
-        matrix = frame[:3, :3] @ matrix @ frame[:3, :3].T
+        with np.errstate(all="ignore"):  # what overflows is infinite, and found so by the check
+            matrix = frame[:3, :3] @ matrix @ frame[:3, :3].T
         properties = MassProperties(float(_floats(mass.get("value"), 1, f"{where}: mass")[0]), frame[:3, 3], matrix)
     visuals = [_parse_shape(child, where) for child in element.findall("visual")]
     collisions = [_parse_shape(child, where) for child in element.findall("collision")]
