@@ -256,7 +256,9 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
     notes = []
     low, high = PLAUSIBLE_MEDIAN_DEPTH
     if written.median_depths and not low <= written.median_depth <= high:
-        notes.append(f"WARNING: median depth is {written.median_depth:.3g} m; is the depth unit right (depth_scale)? `scenewright inspect` tells")
+        notes.append(
+            f"WARNING: median depth is {written.median_depth:.3g} m; is the depth unit right (depth_scale)? `scenewright inspect` tells"
+        )
     poses = np.array(written.poses).reshape(-1, 4, 4)
     names = np.array(written.pose_cameras, dtype=str)
     step = max((largest_step(poses[names == name]) for name in sorted(set(written.pose_cameras))), default=0.0)
