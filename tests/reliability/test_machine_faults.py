@@ -543,6 +543,41 @@ def test_interruption_is_remembered(monkeypatch: pytest.MonkeyPatch) -> None:
         interruption.raise_if_requested()
 
 
+def test_interruptions_wait_insist_and_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Signals of this very process: kept back while libraries load, repeated while a step swallows them, then gone."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)}
+    monkeypatch.setattr(interruption, "_requested", False)
+    monkeypatch.setattr(interruption, "REPEAT_SECONDS", 0.02)
+    try:
+        interruption.install()
+        reached = False
+        with pytest.raises(KeyboardInterrupt), interruption.waiting():
+            signal.raise_signal(signal.SIGTERM)
+            reached = True
+        assert reached
+        monkeypatch.setattr(interruption, "_requested", False)
+        swallowed = 0
+        with pytest.raises(KeyboardInterrupt), interruption.insisting():
+            while True:
+                try:
+                    if not swallowed:
+                        signal.raise_signal(signal.SIGINT)
+                    time.sleep(5)
+                except KeyboardInterrupt:
+                    swallowed += 1
+                    if swallowed == 3:
+                        raise
+        assert swallowed == 3
+        time.sleep(0.1)  # nothing comes any more
+        assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+        monkeypatch.setattr(interruption, "_requested", False)
+        with interruption.waiting(), interruption.insisting():
+            pass
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def test_a_reader_that_leaves(tmp_path: Path) -> None:
     """`| head -1`, and a pager that is closed while a step still talks: no traceback, code 130 at most."""
     make(tmp_path / "a")

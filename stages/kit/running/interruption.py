@@ -1,7 +1,8 @@
 """SIGINT and SIGTERM: raised as KeyboardInterrupt, and remembered in case somebody swallows it.
 
-Python drops an exception that a signal handler raises inside a callback of a native library or inside a finalizer. The
-runner therefore asks once more before a result takes its place.
+An exception that a signal handler raises gets lost inside callbacks of native libraries, inside finalizers, and in
+libraries that import others between `try` and `except BaseException`. While a step works it is therefore raised again
+every second until it arrives, and the runner asks once more before a result takes its place.
 """
 
 from __future__ import annotations
@@ -17,20 +18,55 @@ PARENT_VARIABLE = "SCENEWRIGHT_PARENT"
 """Environment variable: process that started this one as a step of its chain."""
 SET_PARENT_DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of Linux."""
+REPEAT_SECONDS = 1.0
 _requested = False
+_insists = False
+_waits = False
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
     """Signal handler: remember that an end was asked for. Raises KeyboardInterrupt."""
     global _requested
     _requested = True
+    if _waits:
+        return
+    if _insists:
+        signal.setitimer(signal.ITIMER_REAL, REPEAT_SECONDS)
     raise KeyboardInterrupt
 
 
 def install() -> None:
     """Let SIGINT and SIGTERM interrupt this process."""
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
         signal.signal(number, interrupt)
+
+
+@contextmanager
+def waiting() -> Iterator[None]:
+    """Let an interruption wait for the end of what runs inside: loading libraries, which it would crash or cripple.
+
+    Raises KeyboardInterrupt afterwards.
+    """
+    global _waits
+    _waits = True
+    try:
+        yield
+    finally:
+        _waits = False
+    raise_if_requested()
+
+
+@contextmanager
+def insisting() -> Iterator[None]:
+    """Raise an interruption again and again while code of others runs inside, until it arrives here."""
+    global _insists
+    _insists = True
+    try:
+        yield
+    finally:
+        _insists = False
+        if _requested:
+            signal.setitimer(signal.ITIMER_REAL, 0)
 
 
 def end_with_parent() -> None:

@@ -297,7 +297,7 @@ def run_stage(
         progress = progress or SilentProgress()
         with store.partial_folder(out) as partial:
             context = Context(output=partial, seed=seed, device=device, progress=progress)
-            with _inputs_stay(opened), memory_limit.limited(max_memory, out):
+            with interruption.insisting(), _inputs_stay(opened), memory_limit.limited(max_memory, out):
                 made = _work(stage, opened, parameters, context)
             _check_payload(stage, made, partial)
             (partial / store.TIMINGS_NAME).write_text(
@@ -339,7 +339,8 @@ def run_stage(
 def _work(stage: Stage, opened: list[_OpenInput], parameters: Parameters, context: Context) -> Artifact:
     for item in opened:
         item.check()
-    run = importlib.import_module(f"stages.{stage.folder}.{stage.module}").run
+    with interruption.waiting():
+        run = importlib.import_module(f"stages.{stage.folder}.{stage.module}").run
     values: dict[str, Artifact | Path | None] = dict.fromkeys(stage.reads)
     values.update({item.role: item.value for item in opened})
     return run(**values, parameters=parameters, context=context)
