@@ -257,7 +257,8 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
     low, high = PLAUSIBLE_MEDIAN_DEPTH
     if written.median_depths and not low <= written.median_depth <= high:
         notes.append(
-            f"WARNING: median depth is {written.median_depth:.3g} m; is the depth unit right (depth_scale)? `scenewright inspect` tells"
+            f"WARNING: median depth is {written.median_depth:.3g} m; is the depth unit right (depth_scale)? "
+            "`scenewright inspect` tells"
         )
     poses = np.array(written.poses).reshape(-1, 4, 4)
     names = np.array(written.pose_cameras, dtype=str)
