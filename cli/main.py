@@ -124,4 +124,8 @@ def main() -> None:
         code = INTERRUPTED
     except BrokenPipeError:
         code = _reader_left()
+    if code == INTERRUPTED:
+        # Python ends by SIGINT, not by our code, when the exception once passed through an `exec` (dataclasses use it).
+        sys.stderr.flush()
+        os._exit(code)
     sys.exit(code)
