@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import io
 import re
-from pathlib import Path
 
 import numpy as np
 
@@ -26,18 +25,6 @@ def depth_array(data: bytes, suffix: str) -> np.ndarray:
     file's own unit. Raises Unusable."""
     read = {".npy": _npy, ".pfm": _pfm, ".bin": _colmap}[suffix]
     return read(data)
-
-
-def write_pfm(path: Path, image: np.ndarray) -> None:
-    """Write an (H, W) float array as a Portable Float Map."""
-    height, width = image.shape
-    path.write_bytes(f"Pf\n{width} {height}\n-1.0\n".encode() + np.flipud(image).astype("<f4").tobytes())
-
-
-def write_colmap_array(path: Path, image: np.ndarray) -> None:
-    """Write an (H, W) float array as COLMAP writes its dense depth maps."""
-    height, width = image.shape
-    path.write_bytes(f"{width}&{height}&1&".encode() + image.astype("<f4").tobytes())
 
 
 def _npy(data: bytes) -> np.ndarray:

@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 from schemas.errors import BadInput, UsageError
 from schemas.scene_parts import Camera
 from stages.ingest.detection import open_log
-from stages.ingest.layouts.depth_arrays import write_colmap_array
 from stages.ingest.parameters import IngestParameters
 from stages.kit.geometry.transforms import transform_from, transform_from_yaw
+from tests.unit.ingest.depth_array_writing import write_colmap_array
 from tests.unit.ingest.folder_writers import (
     FIRST_STAMP,
     OPENGL_FROM_OPENCV,

@@ -12,12 +12,12 @@ import pytest
 from schemas.errors import BadInput, UsageError
 from schemas.scene_parts import Camera
 from stages.ingest.detection import open_log
-from stages.ingest.layouts.depth_arrays import write_pfm
 from stages.ingest.layouts.image_folder import depth_of_disparity
 from stages.ingest.parameters import IngestParameters
 from stages.kit.geometry.cameras import intrinsic_matrix, project
 from stages.kit.geometry.transforms import inverse, transform_from
 from tests.real_data import real_data
+from tests.unit.ingest.depth_array_writing import write_pfm
 from tests.unit.ingest.loading import loaded_frames
 from tests.unit.ingest.tiny_room import png
 
