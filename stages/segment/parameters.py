@@ -10,14 +10,17 @@ from schemas.segments import Segments
 from schemas.sequence import Sequence
 from stages.kit.stage import External, Optionally, Parameters, Stage
 
+BACKENDS = r"^(ground-truth|geometric|detector)$"
+
 
 class SegmentParameters(Parameters):
     """Options of `segment`. Defaults of the geometric part and of the fusion are those of the published system."""
 
-    backend: Literal["ground-truth", "geometric", "detector"] = Field(
+    backend: str = Field(
         "ground-truth",
         description="Where panoptic masks come from: the log's labels, every geometric segment as an `object`, "
         "or an ONNX object detector",
+        pattern=BACKENDS,
     )
     corruption: float = Field(
         0.0, ge=0, le=1, description="Level of the errors put into ground-truth masks (0 none; part of every name)"
