@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -33,34 +35,60 @@ class Backend(Protocol):
         ...
 
 
-def choose_backend(
-    sequence: Sequence, reader: FrameReader, weights: Path | None, parameters: SegmentParameters
-) -> Backend:
+@dataclass(frozen=True)
+class BackendRequest:
+    """What a backend may be made of."""
+
+    parameters: SegmentParameters
+    weights: Path | None = None
+    device: str = "cpu"
+    sequence: Sequence | None = None
+    """The log, for backends that look at all of it; None when single frames are served (`models serve`)."""
+    reader: FrameReader | None = None
+
+    def log(self) -> tuple[Sequence, FrameReader]:
+        """Return the log. Raises UsageError when there is none."""
+        if self.sequence is None or self.reader is None:
+            raise UsageError(
+                f"--backend {self.parameters.backend} looks at a whole log and cannot be served",
+                hint="serve a backend that judges single frames",
+            )
+        return self.sequence, self.reader
+
+
+def choose_backend(request: BackendRequest) -> Backend:
     """Return the backend that the parameters ask for. Raises UsageError, BadInput or MissingDependency."""
-    vocabulary = load_vocabulary()
+    parameters = request.parameters
     if parameters.corruption > 0 and parameters.backend != "ground-truth":
         raise UsageError("--corruption is for --backend ground-truth alone")
-    if parameters.backend == "geometric":
-        return GeometricBackend(vocabulary, minimum_pixels=parameters.fusion_minimum)
-    if parameters.backend == "detector":
-        return _detector_backend(sequence, reader, weights, parameters)
-    return GroundTruthBackend(sequence.info, vocabulary, parameters.corruption)
+    if parameters.backend not in BUILDERS:
+        raise MissingDependency(f"--backend {parameters.backend} is not part of this version", hint="see --help")
+    return BUILDERS[parameters.backend](request)
 
 
-def _detector_backend(
-    sequence: Sequence, reader: FrameReader, weights: Path | None, parameters: SegmentParameters
-) -> Backend:
+def _ground_truth(request: BackendRequest) -> Backend:
+    sequence, _ = request.log()
+    return GroundTruthBackend(sequence.info, load_vocabulary(), request.parameters.corruption)
+
+
+def _geometric(request: BackendRequest) -> Backend:
+    return GeometricBackend(load_vocabulary(), minimum_pixels=request.parameters.fusion_minimum)
+
+
+def _detector(request: BackendRequest) -> Backend:
     # Imported here: the other backends do not need OpenCV's dnn module.
     from stages.segment.backend_detector import DetectorBackend
     from stages.segment.yolox import Detector
 
-    if weights is None:
+    parameters = request.parameters
+    sequence, reader = request.log()
+    if request.weights is None:
         raise MissingDependency(
             "--backend detector needs the weights of a detector",
             hint="give an ONNX export of a YOLOX model (COCO-80) with --weights, or use --backend geometric",
         )
     detector = Detector(
-        weights,
+        request.weights,
         score_threshold=parameters.score_threshold,
         suppression_overlap=parameters.suppression_overlap,
         tile_side=min(reader.camera.width, reader.camera.height) if parameters.tiles else 0,
@@ -70,7 +98,15 @@ def _detector_backend(
         reader,
         load_vocabulary(),
         detector,
-        weights=weights,
+        weights=request.weights,
         geometric=geometric_settings(parameters),
         minimum_pixels=parameters.small_object_pixels,
     )
+
+
+BUILDERS: dict[str, Callable[[BackendRequest], Backend]] = {
+    "ground-truth": _ground_truth,
+    "geometric": _geometric,
+    "detector": _detector,
+}
+"""Name (backend_names.BACKENDS) -> how it is made."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
+from pydantic_core import PydanticCustomError
 
 from schemas.segments import Segments
 from schemas.sequence import Sequence
 from stages.kit.stage import External, Optionally, Parameters, Stage
-
-BACKENDS = r"^(ground-truth|geometric|detector)$"
+from stages.segment.backend_names import BACKENDS, SERVICE, check_backend
 
 
 class SegmentParameters(Parameters):
@@ -18,17 +18,17 @@ class SegmentParameters(Parameters):
 
     backend: str = Field(
         "ground-truth",
-        description="Where panoptic masks come from: the log's labels, every geometric segment as an `object`, "
-        "or an ONNX object detector",
-        pattern=BACKENDS,
+        description="Where panoptic masks come from: "
+        + "; ".join(f"`{name}`: {what}" for name, what in BACKENDS.items())
+        + f"; or {SERVICE}",
     )
     corruption: float = Field(
         0.0, ge=0, le=1, description="Level of the errors put into ground-truth masks (0 none; part of every name)"
     )
-    fusion: Literal["ours", "thesis"] = Field(
+    fusion: Literal["ours", "thesis", "voxblox++"] = Field(
         "ours",
         description="`thesis` follows the text; `ours` also keeps small segments that a mask claims and cuts a "
-        "segment that several masks share",
+        "segment that several masks share; `voxblox++` neither splits nor clusters (give `--majority-share 0.5`)",
     )
 
     smoothing_window: int = Field(
@@ -83,6 +83,14 @@ class SegmentParameters(Parameters):
     tiles: bool = Field(
         True, description="Detect on overlapping tiles at full resolution too (finds small things, five times slower)"
     )
+
+    @field_validator("backend")
+    @classmethod
+    def _known_backend(cls, backend: str) -> str:
+        try:
+            return check_backend(backend)
+        except ValueError as error:
+            raise PydanticCustomError("backend", "{reason}", {"reason": str(error)}) from None
 
 
 STAGE = Stage(

@@ -13,7 +13,7 @@ from schemas.sequence import Sequence
 from stages.kit.formats.frames import Frame, FrameReader, require_depth
 from stages.kit.formats.masks import write_panoptic_zip
 from stages.kit.stage import Context
-from stages.segment.choice import Backend, choose_backend
+from stages.segment.choice import Backend, BackendRequest, choose_backend
 from stages.segment.fusion import FusedFrame, fuse
 from stages.segment.geometric import segment_depth
 from stages.segment.parameters import SegmentParameters
@@ -28,7 +28,7 @@ def run(sequence: Sequence, weights: Path | None, *, parameters: SegmentParamete
     require_depth(sequence)
     with FrameReader(sequence.path("frames.mcap")) as reader:
         with context.progress.step("prepare the backend"):
-            backend = choose_backend(sequence, reader, weights, parameters)
+            backend = choose_backend(BackendRequest(parameters, weights, context.device, sequence, reader))
         annotations: list[FrameSegments] = []
 
         def images() -> Iterator[tuple[int, np.ndarray]]:

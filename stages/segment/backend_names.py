@@ -1,0 +1,50 @@
+"""The names that `scenewright segment --backend` knows, and what stands behind each. Cheap to import."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from urllib.parse import urlsplit
+
+BACKENDS = {
+    "ground-truth": "the log's own labels",
+    "geometric": "every geometric segment is an `object`",
+    "objects": "whole objects from geometry and colour, each an `object`",
+    "detector": "an ONNX object detector and the depth",
+    "network": "a compact RGB-D network of our own",
+    "auto": "the best that is installed",
+    "huggingface": "a panoptic or open-vocabulary model of the transformers library",
+    "onnx": "an ONNX instance or panoptic network",
+}
+"""Name -> where its masks come from. `http://HOST:PORT` of a segmentation service is the ninth."""
+SERVICE = "http://HOST:PORT of a segmentation service"
+
+
+def is_service(backend: str) -> bool:
+    """Whether a backend is the address of a segmentation service (docs/SEGMENTATION.md)."""
+    return backend.startswith(("http://", "https://"))
+
+
+def check_backend(backend: str) -> str:
+    """Return the name of a backend, or the address of a service without its closing slash. Raises ValueError."""
+    if backend in BACKENDS:
+        return backend
+    if is_service(backend):
+        return _check_address(backend)
+    close = get_close_matches(backend, BACKENDS, n=1)
+    guess = f"did you mean {close[0]}? " if close else ""
+    raise ValueError(f"no such backend; {guess}one of {', '.join(BACKENDS)}, {SERVICE}")
+
+
+def _check_address(address: str) -> str:
+    try:
+        parts = urlsplit(address)
+        port_is_sound = parts.port is None or parts.port > 0
+    except ValueError as error:  # a port that is no number, a torn IPv6 address
+        raise ValueError(f"not the address of a service: {error}") from None
+    if not parts.hostname or not port_is_sound or not address.isascii() or not address.isprintable() or " " in address:
+        raise ValueError(f"not the address of a service: it reads {SERVICE}")
+    if parts.username is not None or parts.password is not None:
+        raise ValueError("a user or password in the address would be written into every manifest")
+    if parts.query or parts.fragment:
+        raise ValueError("the address of a service ends with its path: no '?' and no '#'")
+    return address.rstrip("/")
