@@ -15,7 +15,7 @@ from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.results import Part
 from stages.evaluate.truth import TrueRoom, thing_classes
 from stages.kit.geometry.boxes import box_iou, box_yaw
-from stages.kit.measurement.average_precision import ClassPrecision, class_precision, precision_recall
+from stages.kit.measurement.average_precision import class_precision
 from stages.kit.measurement.edge_agreement import edge_agreement
 from stages.kit.measurement.graph_edit_distance import EditDistance, graph_edit_distance, support_tree
 from stages.kit.measurement.tables import Table
@@ -125,7 +125,8 @@ def measure_boxes(
     object. Predictions on entities that were hardly seen count neither way.
     """
     for measure, field in (("obb_ap50_observed", "box_observed"), ("obb_ap50_refined", "box")):
-        result = _box_precision(truth, graph, points, field, parameters.match_iou)
+        candidates = box_candidates(truth, graph, points, field, parameters.match_iou)
+        result = {name: class_precision(found, parameters.match_iou) for name, found in candidates.items()}
         agnostic = result.pop(ANY_CLASS)
         record_precision(part, measure, result)
         part.set(f"{measure}_class_agnostic", agnostic.all_point)
@@ -133,9 +134,13 @@ def measure_boxes(
         part.tables.append(precision_table(measure, f"Oriented-box AP at IoU 0.5 by class, {when}", result))
 
 
-def _box_precision(
+def box_candidates(
     truth: TrueRoom, graph: ContactGraphFile, points: Mapping[int, int], field: str, match_iou: float
-) -> dict[str, ClassPrecision]:
+) -> dict[str, Candidates]:
+    """Return what box AP is computed from: by class of things, and `any` for all of them together.
+
+    `points`: instance -> number of vertices, the confidence (1 where unknown); `field`: `box_observed` or `box`.
+    """
     things = thing_classes()
     true = truth.evaluated(things_only=True)
     hidden = [o.box for o in truth.objects if o.instance in truth.optional]
@@ -145,13 +150,12 @@ def _box_precision(
         if node.class_name in things and (box := box_of(node, field)) is not None and upright(box)
     ]
     nodes = [(n, b) for n, b in nodes if not _is_hidden(b, hidden, [o.box for o in true], match_iou)]
-    result: dict[str, ClassPrecision] = {}
+    result: dict[str, Candidates] = {}
     for name in [*sorted({o.class_name for o in true} | {n.class_name for n, _ in nodes}), ANY_CLASS]:
         columns = [o for o in true if name in (o.class_name, ANY_CLASS)]
         rows = [(n, b) for n, b in nodes if name in (n.class_name, ANY_CLASS)]
         iou = np.array([[box_iou(b, o.box) for o in columns] for _, b in rows]).reshape(len(rows), len(columns))
-        confidence = np.array([float(points.get(n.instance, 1)) for n, _ in rows])
-        result[name] = class_precision(precision_recall(iou, confidence, len(columns), match_iou))
+        result[name] = Candidates(iou, np.array([float(points.get(n.instance, 1)) for n, _ in rows]))
     return result
 
 

@@ -13,12 +13,7 @@ from stages.evaluate.results import Part
 from stages.evaluate.surfaces import Surface, read_surface
 from stages.evaluate.truth import TrueRoom, stuff_classes
 from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.measurement.average_precision import (
-    ClassPrecision,
-    class_precision,
-    mean_precision,
-    precision_recall,
-)
+from stages.kit.measurement.average_precision import Candidates, ClassPrecision, class_precision, mean_precision
 from stages.kit.measurement.mesh_distance import distances_to_mesh, surface_agreement
 from stages.kit.measurement.panoptic_quality import (
     ClassQuality,
@@ -171,8 +166,20 @@ def quality_thesis_code(
 def measure_instances(
     part: Part, truth: TrueRoom, predicted: PredictedMap, labels: np.ndarray, parameters: EvaluateParameters
 ) -> dict[str, ClassPrecision]:
-    """Instance AP by class over things; confidence is the number of points (vertices), as in the thesis's code.
+    """Record the instance AP by class over things; see `instance_candidates`. Returns it by class."""
+    candidates = instance_candidates(truth, predicted, labels)
+    result = {name: class_precision(found, parameters.match_iou) for name, found in candidates.items()}
+    agnostic = result.pop(ANY_CLASS)
+    part.set("instance_ap50_class_agnostic", agnostic.all_point)
+    record_precision(part, "instance_ap50", {} if is_nameless(predicted) else result)
+    part.tables.append(precision_table("instance_precision", "Instance AP at IoU 0.5 by class", result))
+    return result
 
+
+def instance_candidates(truth: TrueRoom, predicted: PredictedMap, labels: np.ndarray) -> dict[str, Candidates]:
+    """Return what instance AP is computed from: by class of things, and `any` for all of them together.
+
+    `labels` (N,) from `label_true_points`. Confidence is the number of points (vertices), as in the thesis's code.
     Predictions that lie for more than half on entities that were hardly seen count neither way; in the
     class-agnostic figure neither do those on true stuff.
     """
@@ -185,20 +192,14 @@ def measure_instances(
     entities = [e for e in things if on_optional.get(e.instance, 0.0) <= 0.5]
     true = truth.evaluated(things_only=True)
     classes = sorted({o.class_name for o in true} | {e.class_name for e in entities})
-    result: dict[str, ClassPrecision] = {}
+    result: dict[str, Candidates] = {}
     for name in [*classes, ANY_CLASS]:
         columns = [o for o in true if name in (o.class_name, ANY_CLASS)]
         rows = [e for e in entities if name in (e.class_name, ANY_CLASS)]
         if name == ANY_CLASS:
             rows = [e for e in rows if on_stuff.get(e.instance, 0.0) <= 0.5]
         iou = np.array([[ious.get((o.instance, e.instance), 0.0) for o in columns] for e in rows])
-        confidence = np.array([float(e.vertices) for e in rows])
-        curve = precision_recall(iou.reshape(len(rows), len(columns)), confidence, len(columns), parameters.match_iou)
-        result[name] = class_precision(curve)
-    agnostic = result.pop(ANY_CLASS)
-    part.set("instance_ap50_class_agnostic", agnostic.all_point)
-    record_precision(part, "instance_ap50", {} if is_nameless(predicted) else result)
-    part.tables.append(precision_table("instance_precision", "Instance AP at IoU 0.5 by class", result))
+        result[name] = Candidates(iou.reshape(len(rows), len(columns)), np.array([float(e.vertices) for e in rows]))
     return result
 
 

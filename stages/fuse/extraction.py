@@ -51,6 +51,20 @@ def label_of_segments(
     return class_ids, instances
 
 
+def class_of_instances(counts: TripleCounts, class_of: np.ndarray, instance_of: np.ndarray) -> dict[int, int]:
+    """Return {instance: class} from class and instance (L + 1,) of the segment labels.
+
+    The labels of an instance agree on the class where both were counted together (eq. 2.4). Counted apart they need
+    not: then the class of the labels with most predictions in all counts, ties to the smaller number.
+    """
+    votes: dict[int, dict[int, int]] = {}
+    for segment in np.flatnonzero(instance_of):
+        per_class = votes.setdefault(int(instance_of[segment]), {})
+        class_id = int(class_of[segment])
+        per_class[class_id] = per_class.get(class_id, 0) + sum(counts.by_segment[int(segment)].values())
+    return {p: min(per_class, key=lambda c: (-per_class[c], c)) for p, per_class in votes.items()}
+
+
 def confidence_of(counts: TripleCounts, segments: tuple[int, ...], class_id: int, instance: int) -> float:
     """Return the share of the counts on an entity's segment labels that agrees with its class and instance."""
     rows = [counts.by_segment.get(segment, {}) for segment in segments]
@@ -93,7 +107,7 @@ def extract_entities(
     """
     largest = max([0, *counts.by_segment, int(segment.max(initial=0))])
     class_of, instance_of = label_of_segments(counts, sightings, largest, minimum_share)
-    class_of_instance = {int(p): int(c) for c, p in zip(class_of, instance_of, strict=True) if p > 0}
+    class_of_instance = class_of_instances(counts, class_of, instance_of)
     stuff = frozenset(p for p, c in class_of_instance.items() if c not in things)
     instance = absorb_specks(
         instance_of[segment], surface.faces, whole=stuff, minimum_size=minimum_voxels, minimum_share=speck_share

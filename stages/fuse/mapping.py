@@ -31,6 +31,7 @@ from stages.fuse.regularization import (
     merge_segments,
     merge_stuff,
 )
+from stages.fuse.separate import SeparateCounts, associate_separately
 from stages.fuse.voxel_blocks import COORDINATE_LIMIT, SIDE, VoxelBlocks
 
 
@@ -49,7 +50,7 @@ class PanopticMapper:
         self.instance_evidence = PairEvidence()
         self.sightings: dict[int, int] = {}
         """Frame segments that each segment label was matched to, predicted or background."""
-        self.counts = TripleCounts()
+        self.counts = SeparateCounts() if parameters.merging == "separate" else TripleCounts()
         self.seen_in: dict[int, int] = {}
         """Frames in which each instance was predicted, as the bits of an integer."""
         self.frames_integrated = 0
@@ -109,6 +110,8 @@ class PanopticMapper:
         """Merge instance labels that are one instance (eq. 2.5; in `ours` also all of a stuff class, and those that
         frames saw as one)."""
         options = self.parameters
+        if options.merging == "separate":
+            return
         done: list[tuple[int, int]] = []
         if options.merging == "ours":
             done += merge_stuff(self.counts, self.things)
@@ -157,7 +160,8 @@ class PanopticMapper:
                 Prediction(label, segment.category_id, segment.instance)
                 for label, segment in zip(labels, segments, strict=True)
                 if label > 0 and segment.category_id > 0
-            ]
+            ],
+            [label for label, segment in zip(labels, segments, strict=True) if label > 0 and segment.category_id == 0],
         )
         for label in labels:
             if label > 0:
@@ -181,10 +185,15 @@ class PanopticMapper:
         ]
         self.shared.observe(groups, [label for label in labels if label > 0] if options.merging == "ours" else [])
 
-    def _predict(self, predictions: list[Prediction]) -> None:
+    def _predict(self, predictions: list[Prediction], unpredicted: list[int]) -> None:
         """Give every predicted instance its global label and increase the triple-wise count."""
-        self._observe_instances(predictions)
-        instances, self._next_instance = associate_instances(predictions, self.counts, self._next_instance)
+        if isinstance(self.counts, SeparateCounts):
+            instances, self._next_instance = associate_separately(
+                predictions, unpredicted, self.counts, self._next_instance
+            )
+        else:
+            self._observe_instances(predictions)
+            instances, self._next_instance = associate_instances(predictions, self.counts, self._next_instance)
         for prediction in predictions:
             instance = instances[prediction.frame_instance, prediction.class_id]
             self.counts.add(prediction.segment, prediction.class_id, instance)

@@ -44,11 +44,12 @@ class FuseParameters(Parameters):
         0.1, ge=0, le=1, description="A frame segment is matched where this share of its voxels agrees"
     )
 
-    merging: Literal["ours", "thesis"] = Field(
+    merging: Literal["ours", "thesis", "separate"] = Field(
         "ours",
         description="`thesis` merges segment labels that lie in one frame segment, whatever they are; `ours` only when "
         "they are of that segment's class and more often together than apart; it also merges instances that frames saw "
-        "as one, and makes every stuff class one instance",
+        "as one, and makes every stuff class one instance; `separate` counts classes and instances apart and merges no "
+        "instances, as Voxblox++ does and the thesis without joint fusion",
     )
     merge_overlap_share: float = Field(
         0.2, gt=0, le=1, description="Two segment labels share a frame segment when each fills this share of it"

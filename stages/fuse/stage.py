@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 
 from schemas.panoptic_map import EntitiesFile, PanopticMap
 from schemas.segments import Segments
@@ -40,6 +41,15 @@ def run(
     info = segments.info
     with context.progress.step("integrate frames"):
         mapper, skipped = _integrate_frames(sequence, segments, trajectory, vocabulary, parameters, context)
+    return write_map(mapper, vocabulary, info.label, skipped, context)
+
+
+def write_map(
+    mapper: PanopticMapper, vocabulary: Vocabulary, label: str, skipped: Mapping[str, int], context: Context
+) -> PanopticMap:
+    """Write the map that was built: its entities, meshes, counts and voxels. `label` says whose masks these are,
+    `skipped` how many frames were left out by reason."""
+    parameters = mapper.parameters
     with context.progress.step("merge instances"):
         mapper.regularize()
     with context.progress.step("extract surface"):
@@ -58,7 +68,7 @@ def run(
             voxel_size=parameters.voxel_size,
             truncation_distance=mapper.truncation_distance,
             frames_integrated=mapper.frames_integrated,
-            segmentation=info.label,
+            segmentation=label,
             entities=tuple(describe(entity, vocabulary) for entity in entities),
         )
         write_payload(context.output, file, entities, surface, labelled, mapper.counts, mapper.blocks, merged)

@@ -27,7 +27,7 @@ the depth apart, and depth noise grows on top of that: at three metres 5 cm tear
 class FusionSettings:
     """Thresholds; see stages/segment/parameters.py for their meaning."""
 
-    rule: Literal["thesis", "ours"] = "ours"
+    rule: Literal["thesis", "ours", "voxblox++"] = "ours"
     minimum_pixels: int = 800
     contained_share: float = 0.9
     largest_part: float = 0.5
@@ -170,6 +170,11 @@ def fuse(geometric: np.ndarray, panoptic: PanopticFrame, points: np.ndarray, set
     `geometric` (H, W) int32 labels, 0 = none; `points` (H, W, 3) [m] in the camera frame. Pixels without a geometric
     segment (no depth, or discarded) are void. Segments without a label have category 0 and instance 0.
     """
+    if settings.rule == "voxblox++":
+        # Grinvald 2019: every geometric segment takes one mask; masks that no segment follows are lost.
+        return _describe(
+            geometric, majority_labels(geometric, panoptic.ids, majority_share=settings.majority_share), panoptic
+        )
     thesis = settings.rule == "thesis"
     # A mask is judged by its points: pixels of it without depth can be in no segment.
     panoptic = PanopticFrame(np.where(points[..., 2] > 0, panoptic.ids, 0).astype(np.int32), panoptic.masks)
