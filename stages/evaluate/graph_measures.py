@@ -15,7 +15,7 @@ from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.results import Part
 from stages.evaluate.truth import TrueRoom, thing_classes
 from stages.kit.geometry.boxes import box_iou, box_yaw
-from stages.kit.measurement.average_precision import class_precision
+from stages.kit.measurement.average_precision import Candidates, class_precision
 from stages.kit.measurement.edge_agreement import edge_agreement
 from stages.kit.measurement.graph_edit_distance import EditDistance, graph_edit_distance, support_tree
 from stages.kit.measurement.tables import Table
