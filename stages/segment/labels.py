@@ -1,0 +1,231 @@
+"""The labels that networks use and the class of data/vocabulary.toml that each stands for (data/labels/*.toml).
+
+Labels are found by their name. A position says nothing: of two published checkpoints of one network, one counts the 133
+COCO labels without gaps and the other keeps COCO's ids, with gaps.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Literal
+
+from pydantic import ValidationError
+
+from schemas.base import Model
+from schemas.errors import BadInput
+from schemas.vocabulary import Vocabulary, load_vocabulary
+
+LABELS_FOLDER = Path(__file__).resolve().parents[2] / "data" / "labels"
+LABEL_FILES = {
+    "coco-panoptic": "labels/coco_panoptic.toml",
+    "ade20k": "labels/ade20k.toml",
+    "words": "labels/words.toml",
+}
+"""Label set -> file of data/."""
+OWN = "scenewright"
+"""The label set that is the vocabulary itself."""
+MATCHED = ("coco-panoptic", "ade20k", OWN, "words")
+"""Where the labels of a network are sought."""
+VOCABULARIES = ("coco", "nyu40", "scannet", "ade20k")
+ANYTHING = "object"
+LARGEST_FILE = 2**20
+"""Bytes of a label file."""
+LONGEST_WORD = 100
+"""Characters."""
+
+
+class Label(Model):
+    """One label of a network."""
+
+    name: str
+    id: int | None = None
+    """Number of the label in its set."""
+    kind: Literal["thing", "stuff"] = "thing"
+    """`stuff`: the network gives one mask for all of it."""
+    class_name: str = ""
+    """Class of data/vocabulary.toml; empty: the label says nothing, its pixels stay void."""
+    also: tuple[str, ...] = ()
+    """Other spellings."""
+
+
+@dataclass(frozen=True)
+class LabelSet:
+    """Labels that belong together."""
+
+    name: str
+    labels: tuple[Label, ...]
+
+    def find(self, name: str) -> Label | None:
+        """Return the label called `name`, in any spelling, or by the first of several names between commas."""
+        by_name = self._by_name()
+        return by_name.get(plain(name)) or by_name.get(plain(name.split(",")[0]))
+
+    def by_id(self, number: int) -> Label | None:
+        """Return the label with this number."""
+        return next((label for label in self.labels if label.id == number), None)
+
+    def _by_name(self) -> dict[str, Label]:
+        found: dict[str, Label] = {}
+        for label in self.labels:
+            for spelling in (label.name, *label.also):
+                found.setdefault(plain(spelling), label)
+        return found
+
+
+@dataclass(frozen=True)
+class LabelMap:
+    """What the numbers that a network gives out stand for."""
+
+    set_name: str
+    labels: Mapping[int, Label]
+    """Number -> label; numbers that stand for nothing are left out."""
+    unknown: tuple[str, ...]
+    """Names that are in no table."""
+
+    def stuff(self) -> set[int]:
+        """Numbers of the labels of which a network gives one mask for all."""
+        return {number for number, label in self.labels.items() if label.kind == "stuff"}
+
+
+def plain(name: str) -> str:
+    """Return a name in small letters, with single spaces instead of underscores and hyphens."""
+    return " ".join(name.replace("_", " ").replace("-", " ").lower().split())
+
+
+@cache
+def load_label_set(name: str) -> LabelSet:
+    """Return a label set: `coco-panoptic`, `coco-80` (its things), `ade20k`, or `scenewright` (the vocabulary).
+
+    Raises BadInput for another name.
+    """
+    if name == OWN:
+        return _own_labels(load_vocabulary())
+    if name == "coco-80":
+        things = [label for label in load_label_set("coco-panoptic").labels if label.kind == "thing"]
+        return LabelSet(name, tuple(things))
+    if name not in LABEL_FILES:
+        known = ", ".join((*LABEL_FILES, "coco-80", OWN))
+        raise BadInput(f"no label set {name!r}", hint=f"label sets: {known}")
+    return read_label_table(LABELS_FOLDER.parent / LABEL_FILES[name])
+
+
+def _own_labels(vocabulary: Vocabulary) -> LabelSet:
+    labels = []
+    for entry in vocabulary.classes:
+        also = dict.fromkeys(alias for source in VOCABULARIES for alias in getattr(entry, source))
+        labels.append(Label(name=entry.name, id=entry.id, kind=entry.kind, class_name=entry.name, also=tuple(also)))
+    return LabelSet(OWN, tuple(labels))
+
+
+def read_label_file(path: Path) -> LabelSet:
+    """Read a user's own labels: a TOML table as in data/labels, or plain text with one word a line.
+
+    A line is `word` or `word = class`; `#` begins a comment. Raises BadInput.
+    """
+    if Path(path).suffix == ".toml":
+        return read_label_table(path)
+    return LabelSet(Path(path).name, parse_words(_text(path).splitlines(), str(path)))
+
+
+def read_label_table(path: Path) -> LabelSet:
+    """Read a TOML table: `name`, and `labels` with `name`, `class` and, if wanted, `id`, `kind`, `also`.
+
+    Raises BadInput when it is no such table, names a class that does not exist, or a label or id twice.
+    """
+    hint = "write it as data/labels/coco_panoptic.toml is written"
+    try:
+        rows = tomllib.loads(_text(path))
+        labels = tuple(
+            Label(**{("class_name" if k == "class" else k): v for k, v in r.items()}) for r in rows["labels"]
+        )
+        name = str(rows.get("name", Path(path).stem))
+    except (KeyError, AttributeError, TypeError, RecursionError) as error:
+        raise BadInput(f"{path}: no table of labels ({type(error).__name__}: {error})", hint=hint) from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise BadInput(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}", hint=hint) from None
+    except tomllib.TOMLDecodeError as error:
+        raise BadInput(f"{path}: {error}", hint=hint) from None
+    _check(labels, str(path))
+    return LabelSet(name, labels)
+
+
+def parse_words(words: Iterable[str], where: str) -> tuple[Label, ...]:
+    """Return the label of every word (`word` or `word = class`). Raises BadInput for a class that does not exist.
+
+    A word without a class gets the one that has this name or synonym in the vocabulary or a label set, else `object`:
+    whoever asks for a kettle wants to find it, under whatever class.
+    """
+    labels = []
+    for line in words:
+        word, given, class_name = (part.strip() for part in line.split("#")[0].partition("="))
+        if not word:
+            continue
+        if len(word) > LONGEST_WORD:
+            raise BadInput(f"{where}: a word of {len(word)} letters", hint=f"at most {LONGEST_WORD}")
+        labels.append(Label(name=word, class_name=class_name if given else class_of_word(word)))
+    if not labels:
+        raise BadInput(f"{where}: no words", hint='for example --words "cup, table, kettle"')
+    _check(tuple(labels), where)
+    return tuple(labels)
+
+
+def class_of_word(word: str) -> str:
+    """Return the class of a word by name or synonym (vocabulary first, then label sets); `object` when none has it."""
+    for name in (OWN, *LABEL_FILES):
+        label = load_label_set(name).find(word)
+        if label is not None and label.class_name:
+            return label.class_name
+    return ANYTHING
+
+
+def match_labels(names: Mapping[int, str], given: LabelSet | None = None, *, where: str) -> LabelMap:
+    """Return what the numbers of a network stand for, from the names that it gives them.
+
+    Without a `given` set, the one that knows most of the names is taken; of equals, the published sets go before the
+    vocabulary. Raises BadInput when not one name is known. Placeholders (`N/A`, empty) are passed over.
+    """
+    real = {number: name for number, name in names.items() if plain(name) not in ("", "n/a", "none", "background")}
+    candidates = [given] if given else [load_label_set(name) for name in MATCHED]
+    best = max(candidates, key=lambda labels: sum(labels.find(name) is not None for name in real.values()))
+    found = {number: label for number, name in real.items() if (label := best.find(name)) is not None}
+    unknown = tuple(sorted({name for name in real.values() if best.find(name) is None}))
+    if not found:
+        shown = ", ".join(list(real.values())[:5])
+        raise BadInput(
+            f"{where}: its labels ({shown}, ...) are in no table", hint="give a table of them: --labels FILE.toml"
+        )
+    return LabelMap(best.name, found, unknown)
+
+
+def _text(path: Path) -> str:
+    try:
+        if Path(path).stat().st_size > LARGEST_FILE:
+            raise BadInput(f"{path}: larger than {LARGEST_FILE} bytes", hint="a label file is short")
+        return Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror}", hint="check the path") from None
+    except ValueError:
+        raise BadInput(f"{path}: no UTF-8 text", hint="write one word a line, or a TOML table") from None
+
+
+def _check(labels: tuple[Label, ...], where: str) -> None:
+    classes = {entry.name for entry in load_vocabulary().classes}
+    names, numbers = set(), set()
+    for label in labels:
+        if label.class_name and label.class_name not in classes:
+            raise BadInput(
+                f"{where}: label {label.name!r} has class {label.class_name!r}, which is not in the vocabulary",
+                hint="classes: data/vocabulary.toml",
+            )
+        for spelling in (label.name, *label.also):
+            if plain(spelling) in names:
+                raise BadInput(f"{where}: {spelling!r} comes twice", hint="keep one of them")
+            names.add(plain(spelling))
+        if label.id is not None and label.id in numbers:
+            raise BadInput(f"{where}: id {label.id} comes twice", hint="keep one of them")
+        numbers.add(label.id)

@@ -1,0 +1,89 @@
+"""From the segments that a network found, with its own labels, to panoptic masks with classes of the vocabulary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from schemas.vocabulary import Vocabulary
+from stages.segment.labels import Label
+from stages.segment.panoptic import PanopticFrame, PanopticMask
+
+KEPT_SHARE = 0.5
+"""An instance of which better ones leave less than this is a second answer for one thing (Kirillov et al. 2019)."""
+
+
+@dataclass(frozen=True)
+class NamedSegment:
+    """What a network says of one segment."""
+
+    label: Label
+    score: float
+    """0..1."""
+
+
+@dataclass(frozen=True)
+class InstanceMask:
+    """One instance of an instance segmentation; these may overlap."""
+
+    mask: np.ndarray
+    """(H, W) bool."""
+    label: Label
+    score: float
+
+
+def name_segments(
+    ids: np.ndarray, segments: Mapping[int, NamedSegment], vocabulary: Vocabulary, *, minimum_pixels: int
+) -> PanopticFrame:
+    """Return panoptic masks, numbered 1..n, from an id image (H, W) and what its ids are; ids not listed are void.
+
+    Labels without a class are void. All of a stuff class becomes one mask (every wall is the wall), with the best of
+    the scores. Where a label is stuff and its class is a thing (COCO's `cabinet-merged`), each connected region
+    (8 neighbours) of at least `minimum_pixels` is an instance.
+    """
+    named = np.zeros(ids.shape, dtype=np.int32)
+    masks: dict[int, PanopticMask] = {}
+    stuff: dict[int, int] = {}
+    for segment_id in sorted(segments):
+        segment = segments[segment_id]
+        pixels = ids == segment_id
+        if not segment.label.class_name or not pixels.any():
+            continue
+        semantic = vocabulary.by_name(segment.label.class_name)
+        if semantic.kind == "stuff":
+            number = stuff.setdefault(semantic.id, len(masks) + 1)
+            best = max(segment.score, masks[number].score if number in masks else 0.0)
+            masks[number] = PanopticMask(semantic.id, False, best)
+            named[pixels] = number
+            continue
+        regions = _regions(pixels, minimum_pixels) if segment.label.kind == "stuff" else [pixels]
+        for region in regions:
+            masks[len(masks) + 1] = PanopticMask(semantic.id, True, segment.score)
+            named[region] = len(masks)
+    return PanopticFrame(named, masks)
+
+
+def name_instances(
+    instances: Iterable[InstanceMask], shape: tuple[int, int], vocabulary: Vocabulary, *, minimum_pixels: int
+) -> PanopticFrame:
+    """Return panoptic masks from instance masks that may overlap: the better scored one gets the pixel.
+
+    An instance of which less than half (or `minimum_pixels`) is left is dropped. Ties go by order.
+    """
+    ids = np.zeros(shape, dtype=np.int32)
+    segments: dict[int, NamedSegment] = {}
+    for instance in sorted(instances, key=lambda item: -item.score):
+        free = instance.mask & (ids == 0)
+        if free.sum() < max(minimum_pixels, KEPT_SHARE * instance.mask.sum(), 1):
+            continue
+        segments[len(segments) + 1] = NamedSegment(instance.label, instance.score)
+        ids[free] = len(segments)
+    return name_segments(ids, segments, vocabulary, minimum_pixels=minimum_pixels)
+
+
+def _regions(pixels: np.ndarray, minimum_pixels: int) -> list[np.ndarray]:
+    count, numbers, facts, _ = cv2.connectedComponentsWithStats(pixels.astype(np.uint8), connectivity=8)
+    return [numbers == k for k in range(1, count) if facts[k, cv2.CC_STAT_AREA] >= minimum_pixels]
