@@ -1,8 +1,8 @@
-"""Kind `ground_truth`: a generated log and everything that is true of the room it shows."""
+"""Kind `ground_truth`: what is true of the room that a log shows, generated or annotated."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from schemas.artifact import Artifact
 from schemas.base import Model, Name, Transform, Vector3
@@ -27,12 +27,15 @@ class TrueObject(Model):
     box: Box
     """Gravity-aligned box of the whole object as it stands (open doors included)."""
     visible_pixels: int = 0
-    """Pixels over all frames; 0 for what the camera never saw."""
+    """Pixels over all frames, in a scan points of visible.npz; 0 for what the camera never saw."""
 
 
 class GroundTruthFile(Model):
     """ground_truth.json."""
 
+    source: Literal["generated", "scan"] = "generated"
+    """`generated`: the frame is the world of the log. `scan`: somebody annotated a real scan; the frame is the world of
+    the sequence that it was made for, already upright."""
     seed: int
     recipe: str
     room_size: Vector3
@@ -47,10 +50,12 @@ class GroundTruth(Artifact):
     given as `world` z up; label stream), `trajectory.tum`, `graph.json` (true contact graph), `visible.npz`
     (`points` (N, 3) float32 on a 1 cm grid of true surface that was seen, `instance` (N,) int32), `mesh.ply`
     (the whole true surface), `room/` (interactive scene of the true room, laid out like kind
-    interactive_scene)."""
+    interactive_scene). That of a scan has no log, no trajectory and no room, and its graph no edges."""
 
     kind: ClassVar[str] = "ground_truth"
-    description: ClassVar[str] = "generated log with the true poses, boxes, contact graph, CAD poses and joints"
+    description: ClassVar[str] = (
+        "generated log with true poses, boxes, contact graph, CAD poses, joints; or annotated scan"
+    )
     json_files: ClassVar[dict[str, type[Model]]] = {
         "ground_truth.json": GroundTruthFile,
         "graph.json": ContactGraphFile,

@@ -137,7 +137,7 @@ def _label(evaluation: Evaluation | None, segments: Segments | None, panoptic_ma
 
 
 def _title(ground_truth: GroundTruth | None, sequence: Sequence | None) -> str:
-    if ground_truth is not None:
+    if ground_truth is not None and ground_truth.truth.source == "generated":
         return "A generated room, reconstructed"
     return "A scanned room, reconstructed" if sequence is not None else "A reconstructed room"
 
@@ -166,6 +166,8 @@ def _lead(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts
     if ground_truth is not None:
         file = ground_truth.truth
         truth = f" The room was generated (recipe {file.recipe}, seed {file.seed}), so the truth is known."
+        if file.source == "scan":
+            truth = f" What is true of the room was annotated by people ({file.recipe})."
     return (text[:1].upper() + text[1:] + "." if text else "") + truth
 
 
@@ -220,7 +222,8 @@ def _add_views(
     if values["map_views"] is not None:
         pictures.append(replace(values["map_views"]["color"], caption="The map from the same place."))
     if ground_truth is not None:
-        moved = np.eye(4) if sequence is None else np.array(sequence.info.gravity.world_from_log)
+        upright = sequence is None or ground_truth.truth.source == "scan"
+        moved = np.eye(4) if upright or sequence is None else np.array(sequence.info.gravity.world_from_log)
         truth = true_model(ground_truth, moved)
         if truth is not None:
             pictures.append(replace(_draw(truth, view, "The true room from the same place"), of_masks=False))

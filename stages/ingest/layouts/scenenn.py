@@ -2,7 +2,8 @@
 
 Two variants circulate: `image/image00001.png` with `depth/depth00001.png` as the data set's playback tool writes them,
 and `rgb/00001.png` with `depth/00001.png`. Both number frames from 1, while the entries of trajectory.log count from 0;
-folders numbered from 0 are matched one to one. Meshes (.ply) and annotations (.xml) are left alone.
+folders numbered from 0 are matched one to one. Meshes (.ply) and annotations (.xml) are left alone: `truth scenenn`
+reads them.
 """
 
 from __future__ import annotations
@@ -110,8 +111,9 @@ def _times(root: Path) -> dict[int, int]:
         fields = text.split()
         if not fields:
             continue
-        if len(fields) != 2 or not all(field.isdecimal() and len(field) < 18 for field in fields):
-            raise BadInput(f"{path}: line {line}: expected a frame number and whole microseconds")
+        # Older copies have the number and one time, the data set's playback tool writes that of colour, then of depth.
+        if len(fields) not in (2, 3) or not all(field.isdecimal() and len(field) < 18 for field in fields):
+            raise BadInput(f"{path}: line {line}: expected a frame number and one or two times in whole microseconds")
         times[int(fields[0])] = min(int(fields[1]), LATEST_MICROSECONDS)
     return times
 

@@ -84,8 +84,15 @@ def overlaps(true: np.ndarray, predicted: np.ndarray) -> dict[tuple[int, int], i
         raise ValueError(f"{len(true)} true labels and {len(predicted)} predicted labels")
     if not len(true):
         return {}
-    pairs, counts = np.unique(np.stack([true, predicted], axis=1), axis=0, return_counts=True)
-    return {(int(t), int(p)): int(n) for (t, p), n in zip(pairs, counts, strict=True)}
+    true_values, rows = np.unique(true, return_inverse=True)
+    predicted_values, columns = np.unique(predicted, return_inverse=True)
+    counts = np.bincount(rows * len(predicted_values) + columns)
+    return {
+        (int(true_values[pair // len(predicted_values)]), int(predicted_values[pair % len(predicted_values)])): int(
+            counts[pair]
+        )
+        for pair in np.flatnonzero(counts)
+    }
 
 
 def intersection_over_union(true: np.ndarray, predicted: np.ndarray) -> dict[tuple[int, int], float]:

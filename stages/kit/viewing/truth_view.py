@@ -25,6 +25,8 @@ def draw_ground_truth(truth: GroundTruth, canvas: Canvas) -> None:
     points, instances = _visible(truth)
     canvas.points("visible", points, instance_colors(instances), radius=0.006)
     canvas.view("what was seen", *HIDDEN, "room", "boxes")
+    if not truth.path("log.mcap").exists():
+        return
     with FrameReader(truth.path("log.mcap")) as reader:
         draw_path(canvas, reader.poses()[1])
         canvas.label_names("camera/labels", [(o.instance, o.name, instance_color(o.instance)) for o in objects])
