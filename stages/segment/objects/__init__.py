@@ -1,0 +1,1 @@
+"""Class-agnostic objects of one RGB-D frame: arrays in, labels out."""

@@ -1,0 +1,188 @@
+"""Smooth patches of what stands on a support surface: the pieces that objects are put together from.
+
+A patch ends at depth jumps, concave creases and convex creases, so that it is one face of a box, the jacket of a can
+or the inside of a bowl. What ends nowhere in the depth (boxes that stand flush) is cut later.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numba import njit, prange
+
+from schemas.scene_parts import Camera
+from stages.kit.geometry.cameras import back_project
+from stages.segment.geometric import label_regions, pixels_at, smooth_depth
+from stages.segment.normals import surface_normals
+from stages.segment.objects.support import SupportSettings, SupportSurface, find_supports, surface_inverse
+
+
+@dataclass(frozen=True)
+class PatchSettings:
+    """Constants of the patches; pixel counts hold for 640x480."""
+
+    smoothing_window: int = 7
+    smoothing_deviation: float = 0.009
+    normal_window: int = 9
+    normal_step: int = 2
+    crease_window: int = 5
+    concave_cosine: float = 0.97
+    convex_cosine: float = 0.88
+    jump: float = 0.012
+    """Neighbours farther apart than this share of the depth are not connected."""
+    minimum_pixels: int = 60
+    smallest_island: int = 150
+    """Connected pixels over the surface that are fewer than this are noise."""
+
+
+@dataclass(frozen=True)
+class PatchFrame:
+    """Patches of one frame with what was computed on the way."""
+
+    labels: np.ndarray
+    """(H, W) int32, 0 = none, else 1..n."""
+    points: np.ndarray
+    """(H, W, 3) float32 [m], camera frame, of the smoothed depth."""
+    normals: np.ndarray
+    """(H, W, 3) float32, zero off the patches."""
+    inverse: np.ndarray
+    """(H, W) float32 inverse of the smoothed depth [1/m], 0 without depth."""
+    foreground: np.ndarray
+    """(H, W) bool: over a support surface."""
+    supports: list[SupportSurface]
+    height: np.ndarray
+    """(H, W) float32 [m] over the nearest support surface below, 0 without one."""
+
+
+def foreground_of(
+    inverse: np.ndarray, camera: Camera, supports: list[SupportSurface], settings: SupportSettings
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return (foreground (H, W) bool, height over the largest surface (H, W) float32 [m]).
+
+    `inverse` (H, W) float32 [1/m], 0 invalid. A pixel is foreground when it has depth, belongs to no support surface,
+    and does not lie behind the largest one.
+    """
+    foreground = inverse > 0
+    height = np.zeros_like(inverse)
+    for k, surface in enumerate(supports):
+        over = inverse - surface_inverse(surface, camera)
+        metres = surface.offset * over / np.maximum(inverse, np.float32(1e-3))
+        on_it = (over < settings.clearance) | (metres < settings.height)
+        if k == 0:
+            height = np.where(foreground, metres, 0).astype(np.float32)
+        else:
+            on_it &= over > -settings.clearance * 2
+        foreground &= ~on_it
+    return foreground, height
+
+
+@njit(cache=True, parallel=True)
+def _edges(
+    points: np.ndarray,
+    normals: np.ndarray,
+    foreground: np.ndarray,
+    window: int,
+    concave_cosine: float,
+    convex_cosine: float,
+    jump: float,
+) -> np.ndarray:
+    """True on creases, on jumps between foreground pixels, and off the foreground."""
+    height, width = foreground.shape
+    edges = np.ones((height, width), dtype=np.bool_)
+    half = window // 2
+    for v in prange(height):
+        for u in range(width):
+            if not foreground[v, u]:
+                continue
+            nx, ny, nz = normals[v, u, 0], normals[v, u, 1], normals[v, u, 2]
+            if nx == 0.0 and ny == 0.0 and nz == 0.0:
+                continue
+            px, py, pz = points[v, u, 0], points[v, u, 1], points[v, u, 2]
+            edge = False
+            for row in range(max(0, v - half), min(height, v + half + 1)):
+                for column in range(max(0, u - half), min(width, u + half + 1)):
+                    if not foreground[row, column]:
+                        continue
+                    mx, my, mz = normals[row, column, 0], normals[row, column, 1], normals[row, column, 2]
+                    dx = points[row, column, 0] - px
+                    dy = points[row, column, 1] - py
+                    dz = points[row, column, 2] - pz
+                    along_p = dx * nx + dy * ny + dz * nz
+                    along_q = dx * mx + dy * my + dz * mz
+                    if abs(dz) > jump * pz:
+                        # A surface seen at a grazing angle changes its depth fast without ending.
+                        if (
+                            abs(row - v) <= 1
+                            and abs(column - u) <= 1
+                            and abs(along_p) > 0.5 * jump * pz
+                            and abs(along_q) > 0.5 * jump * pz
+                        ):
+                            edge = True
+                        continue
+                    cosine = mx * nx + my * ny + mz * nz
+                    if along_p - along_q > 0.0005:
+                        if cosine < concave_cosine:
+                            edge = True
+                    elif cosine < convex_cosine:
+                        edge = True
+                if edge:
+                    break
+            edges[v, u] = edge
+    return edges
+
+
+def find_patches(
+    depth: np.ndarray,
+    camera: Camera,
+    settings: PatchSettings | None = None,
+    support_settings: SupportSettings | None = None,
+) -> PatchFrame:
+    """Return the smooth patches over the support surfaces of a z-depth image (H, W) [m], 0 invalid."""
+    settings, support_settings = settings or PatchSettings(), support_settings or SupportSettings()
+    depth = np.ascontiguousarray(depth, dtype=np.float32)
+    if settings.smoothing_window:
+        depth = smooth_depth(depth, window=settings.smoothing_window, deviation=settings.smoothing_deviation)
+    valid = depth > 0
+    inverse = np.where(valid, 1 / np.where(valid, depth, 1), 0).astype(np.float32)
+    supports = find_supports(depth, camera, support_settings)
+    foreground, height = foreground_of(inverse, camera, supports, support_settings)
+    risen = (height > support_settings.rise) | (not supports)
+    foreground = _islands(foreground, risen, pixels_at(settings.smallest_island, depth.shape))
+    points = back_project(depth, camera)
+    # The surface takes no part in the normals beside it.
+    normals = surface_normals(
+        np.where(foreground[..., None], points, np.float32(0)),
+        window=settings.normal_window,
+        step=settings.normal_step,
+        distance_factor=0.02,
+    )
+    edges = _edges(
+        points,
+        normals,
+        foreground,
+        settings.crease_window,
+        settings.concave_cosine,
+        settings.convex_cosine,
+        settings.jump,
+    )
+    labels = label_regions(
+        edges,
+        np.where(foreground[..., None], points, np.float32(0)),
+        normals,
+        minimum_pixels=pixels_at(settings.minimum_pixels, depth.shape),
+        ratio=settings.jump,
+    )
+    return PatchFrame(labels, points, normals, inverse, foreground, supports, height)
+
+
+def _islands(mask: np.ndarray, risen: np.ndarray, smallest: int) -> np.ndarray:
+    """The connected parts of a mask (H, W) bool that have `smallest` pixels, a third of which are `risen`."""
+    count, labels, statistics, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
+    keep = statistics[:, cv2.CC_STAT_AREA] >= smallest
+    high = np.bincount(labels.ravel(), weights=(mask & risen).ravel(), minlength=count)
+    keep &= high >= np.maximum(1, statistics[:, cv2.CC_STAT_AREA] / 3)
+    keep[0] = False
+    kept: np.ndarray = keep[labels]
+    return kept
