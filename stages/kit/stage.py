@@ -72,6 +72,8 @@ class Context:
     """`cpu` or `cuda`."""
     progress: Progress
     logger: logging.Logger = field(default_factory=lambda: logging.getLogger("scenewright"))
+    force: bool = False
+    """`--force`: what a step keeps of earlier runs is not to be used."""
 
     def random(self, *stream: int) -> np.random.Generator:
         """Return a generator seeded by the run's seed and the given stream numbers."""
@@ -100,6 +102,10 @@ class Stage:
     data_files: Callable[[Any], tuple[str, ...]] | None = None
     """Parameters -> files of `data/` that the step reads; their content is part of the key. The class vocabulary
     always is."""
+    versions: str = ""
+    """Module of the step's folder whose function `versions(parameters)` returns name -> version of what decides the
+    bytes under these parameters alone: the library of a backend, the model that a service runs. It goes into the key
+    and the manifest beside `libraries`; it may raise MissingDependency."""
     check: Callable[[Any, Mapping[str, Any]], None] | None = None
     """Optional check of parameters against the inputs given (role -> path), raising UsageError before work starts."""
 

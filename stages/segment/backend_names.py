@@ -16,6 +16,8 @@ BACKENDS = {
     "onnx": "an ONNX instance or panoptic network",
 }
 """Name -> where its masks come from. `http://HOST:PORT` of a segmentation service is the ninth."""
+LABEL_FILES = ("labels/coco_panoptic.toml", "labels/ade20k.toml", "labels/words.toml")
+"""Files of data/ that say what the labels of networks stand for."""
 SERVICE = "http://HOST:PORT of a segmentation service"
 
 

@@ -9,13 +9,15 @@ from typing import Protocol
 
 import numpy as np
 
-from schemas.errors import MissingDependency, UsageError
+from schemas.errors import BadInput, MissingDependency, UsageError
 from schemas.sequence import Sequence
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.frames import Frame, FrameReader
 from stages.segment.backend_geometric import GeometricBackend
 from stages.segment.backend_ground_truth import GroundTruthBackend
+from stages.segment.backend_names import is_service
 from stages.segment.geometric import GeometricFrame
+from stages.segment.labels import read_label_file
 from stages.segment.panoptic import PanopticFrame
 from stages.segment.parameters import SegmentParameters
 from stages.segment.settings import geometric_settings
@@ -41,10 +43,17 @@ class BackendRequest:
 
     parameters: SegmentParameters
     weights: Path | None = None
+    mask_weights: Path | None = None
+    labels: Path | None = None
+    """Label table or list of words."""
+    sidecar: Path | None = None
     device: str = "cpu"
     sequence: Sequence | None = None
     """The log, for backends that look at all of it; None when single frames are served (`models serve`)."""
     reader: FrameReader | None = None
+    seed: int = 0
+    ask_again: bool = False
+    """Do not use what is kept of earlier runs (`--force`)."""
 
     def log(self) -> tuple[Sequence, FrameReader]:
         """Return the log. Raises UsageError when there is none."""
@@ -61,6 +70,10 @@ def choose_backend(request: BackendRequest) -> Backend:
     parameters = request.parameters
     if parameters.corruption > 0 and parameters.backend != "ground-truth":
         raise UsageError("--corruption is for --backend ground-truth alone")
+    if is_service(parameters.backend):
+        return _service(request)
+    if parameters.backend in NEEDS_COLOR and request.sequence is not None:
+        _require_color(request.sequence, parameters.backend)
     if parameters.backend not in BUILDERS:
         raise MissingDependency(f"--backend {parameters.backend} is not part of this version", hint="see --help")
     return BUILDERS[parameters.backend](request)
@@ -104,6 +117,41 @@ def _detector(request: BackendRequest) -> Backend:
     )
 
 
+def _service(request: BackendRequest) -> Backend:
+    # Imported here: the other backends do not need HTTP.
+    from stages.segment.service.backend import ServiceBackend
+    from stages.segment.service.connection import Connection
+
+    parameters = request.parameters
+    sequence, reader = request.log()
+    connection = Connection(
+        parameters.backend,
+        timeout=parameters.request_timeout,
+        retries=parameters.retries,
+        retry_wait=parameters.retry_wait,
+    )
+    return ServiceBackend(
+        connection,
+        sequence.info,
+        reader,
+        load_vocabulary(),
+        seed=request.seed,
+        expected=parameters.service_model,
+        labels=read_label_file(request.labels) if request.labels else None,
+        minimum_pixels=parameters.small_object_pixels,
+        ask_again=request.ask_again,
+    )
+
+
+def _require_color(sequence: Sequence, backend: str) -> None:
+    if "color" not in sequence.info.streams:
+        raise BadInput(
+            f"this sequence has no colour for --backend {backend}", hint="use --backend objects or geometric"
+        )
+
+
+NEEDS_COLOR = frozenset({"huggingface", "onnx"})
+"""Backends that see nothing in a frame without colour."""
 BUILDERS: dict[str, Callable[[BackendRequest], Backend]] = {
     "ground-truth": _ground_truth,
     "geometric": _geometric,

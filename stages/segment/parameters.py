@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 from schemas.segments import Segments
 from schemas.sequence import Sequence
 from stages.kit.stage import External, Optionally, Parameters, Stage
-from stages.segment.backend_names import BACKENDS, SERVICE, check_backend
+from stages.segment.backend_names import BACKENDS, LABEL_FILES, SERVICE, check_backend, is_service
 
 
 class SegmentParameters(Parameters):
@@ -76,12 +76,28 @@ class SegmentParameters(Parameters):
         60, ge=1, description="Smallest segment that `ours` keeps for a mask [pixels at 640x480]"
     )
 
-    score_threshold: float = Field(0.3, gt=0, lt=1, description="Detections under this score are dropped")
+    score_threshold: float = Field(
+        0.3, gt=0, lt=1, description="Detections, instances and panoptic segments under this score are dropped"
+    )
     suppression_overlap: float = Field(
         0.5, gt=0, lt=1, description="Detections of one class that overlap more than this are one (IoU)"
     )
     tiles: bool = Field(
         True, description="Detect on overlapping tiles at full resolution too (finds small things, five times slower)"
+    )
+
+    words: str = Field(
+        "",
+        description="What an open-vocabulary model looks for: `cup, table, blue mug = cup`; a word without a class "
+        "gets that of its name or synonym, else `object`",
+    )
+    request_timeout: float = Field(60.0, gt=0, le=3600, description="A service has to answer within this [s]")
+    retries: int = Field(3, ge=0, le=100, description="How often a service is asked again after a fault that may pass")
+    retry_wait: float = Field(0.5, ge=0, le=60, description="Wait before the first of these, doubled every time [s]")
+    service_model: str = Field(
+        "",
+        description="What a service has to say it is (the end of an artifact's label); empty: it is asked, and another "
+        "model behind the same address is another result",
     )
 
     @field_validator("backend")
@@ -93,6 +109,14 @@ class SegmentParameters(Parameters):
             raise PydanticCustomError("backend", "{reason}", {"reason": str(error)}) from None
 
 
+LABELLED = frozenset({"huggingface", "onnx"})
+"""Backends whose labels are looked up in data/labels; services do too."""
+
+
+def _data_files(parameters: SegmentParameters) -> tuple[str, ...]:
+    return LABEL_FILES if parameters.backend in LABELLED or is_service(parameters.backend) else ()
+
+
 STAGE = Stage(
     name="segment",
     version=1,
@@ -100,9 +124,23 @@ STAGE = Stage(
     parameters=SegmentParameters,
     reads={
         "sequence": Sequence,
-        "weights": Optionally(External("ONNX detector (YOLOX layout, COCO-80), for --backend detector", weights=True)),
+        "weights": Optionally(
+            External("Network: an ONNX file (detector, onnx), a model folder or hub id (huggingface)", weights=True)
+        ),
+        "mask_weights": Optionally(
+            External(
+                "Segment Anything folder or hub id that turns the boxes of an open-vocabulary model into masks",
+                weights=True,
+            )
+        ),
+        "labels": Optionally(
+            External("The network's labels and their classes (TOML as in data/labels), or a list of words, one a line")
+        ),
+        "sidecar": Optionally(External("TOML that says what goes into an ONNX network and what comes out")),
     },
     writes=Segments,
     libraries=("numpy", "opencv-python-headless", "numba", "scipy"),
+    versions="versions",
+    data_files=_data_files,
     example="scenewright segment --sequence outputs/demo/sequence --out outputs/demo/segments --corruption 0.2",
 )

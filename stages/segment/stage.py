@@ -20,7 +20,16 @@ from stages.segment.parameters import SegmentParameters
 from stages.segment.settings import fusion_settings, geometric_settings
 
 
-def run(sequence: Sequence, weights: Path | None, *, parameters: SegmentParameters, context: Context) -> Segments:
+def run(
+    sequence: Sequence,
+    weights: Path | None = None,
+    mask_weights: Path | None = None,
+    labels: Path | None = None,
+    sidecar: Path | None = None,
+    *,
+    parameters: SegmentParameters,
+    context: Context,
+) -> Segments:
     """Segment every frame geometrically and panoptically, and fuse both (Han 2024, section 2.3.1)."""
     info = sequence.info
     if "depth" not in info.streams:
@@ -28,11 +37,24 @@ def run(sequence: Sequence, weights: Path | None, *, parameters: SegmentParamete
     require_depth(sequence)
     with FrameReader(sequence.path("frames.mcap")) as reader:
         with context.progress.step("prepare the backend"):
-            backend = choose_backend(BackendRequest(parameters, weights, context.device, sequence, reader))
+            backend = choose_backend(
+                BackendRequest(
+                    parameters,
+                    weights,
+                    mask_weights=mask_weights,
+                    labels=labels,
+                    sidecar=sidecar,
+                    device=context.device,
+                    sequence=sequence,
+                    reader=reader,
+                    seed=context.seed,
+                    ask_again=context.force,
+                )
+            )
         annotations: list[FrameSegments] = []
 
         def images() -> Iterator[tuple[int, np.ndarray]]:
-            frames = reader.frames(streams=backend.streams)
+            frames = reader.frames(streams=dict.fromkeys(("depth", *backend.streams)))
             for frame in context.progress.track(frames, total=len(reader), description="segment"):
                 fused = segment_frame(frame, reader, backend, parameters, context.random(frame.index))
                 annotations.append(describe(frame.index, fused))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from collections.abc import Mapping
 from functools import cache
@@ -27,9 +28,15 @@ def library_version(distribution: str) -> str:
         return "absent"
 
 
-def library_versions(stage: Stage) -> dict[str, str]:
-    """Return the versions of the libraries that decide the step's output."""
-    return {name: library_version(name) for name in sorted(stage.libraries)}
+def library_versions(stage: Stage, parameters: Parameters) -> dict[str, str]:
+    """Return the versions of the libraries that decide the step's output, and of what else does so (`versions`).
+
+    Raises MissingDependency when that cannot be found out.
+    """
+    found = {name: library_version(name) for name in stage.libraries}
+    if stage.versions:
+        found.update(importlib.import_module(f"stages.{stage.folder}.{stage.versions}").versions(parameters))
+    return dict(sorted(found.items()))
 
 
 def data_file_digests(stage: Stage, parameters: Parameters) -> dict[str, str]:
@@ -46,10 +53,18 @@ def parameters_as_json(parameters: Parameters) -> dict[str, Any]:
     return json.loads(parameters.model_dump_json())
 
 
-def artifact_key(stage: Stage, parameters: Parameters, inputs: Mapping[str, str], seed: int, device_kind: str) -> str:
+def artifact_key(
+    stage: Stage,
+    parameters: Parameters,
+    inputs: Mapping[str, str],
+    seed: int,
+    device_kind: str,
+    libraries: Mapping[str, str] | None = None,
+) -> str:
     """Return the key: sha256 of canonical JSON of all that decides the output.
 
-    `inputs` maps role to content digest (artifacts) or file digest (raw inputs, weights).
+    `inputs` maps role to content digest (artifacts) or file digest (raw inputs, weights). `libraries` are those of
+    `library_versions`, when they are known already.
     """
     return sha256_of_text(
         canonical_json(
@@ -62,7 +77,7 @@ def artifact_key(stage: Stage, parameters: Parameters, inputs: Mapping[str, str]
                 "parameters": parameters_as_json(parameters),
                 "inputs": dict(inputs),
                 "seed": seed,
-                "libraries": library_versions(stage),
+                "libraries": dict(libraries) if libraries is not None else library_versions(stage, parameters),
                 "data_files": data_file_digests(stage, parameters),
                 "device_kind": device_kind,
             }

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from schemas.errors import BadInput, MachineFailure, MissingDependency
 from stages.kit.running.digests import sha256_of_file
+from stages.kit.running.hub_cache import find_in_hub_cache, is_hub_id
 from stages.kit.running.known_models import KnownModel, known_models
 from stages.kit.running.store import sync_folder
 
@@ -101,18 +102,21 @@ def _copy(source: Path, target: Path, digest: str) -> None:
 
 
 def resolve_weights(path: Path) -> Path:
-    """Return the weight file that a path or a name stands for: a file there is, else a model of the cache.
+    """Return the weights that a path or a name stands for: a file or folder there is, else a model of the cache.
 
-    A name is that of data/models.toml (`yolox_nano`), the file's, or the file's without its ending. Raises
-    MissingDependency when there is none, BadInput when several have the name or the cached file is damaged.
+    A name is that of data/models.toml (`yolox_nano`), the file's, or the file's without its ending; or a hub id
+    (`organisation/model`) of which the hub's own cache holds the folder. Raises MissingDependency when there is none,
+    BadInput when several have the name or the cached file is damaged.
     """
     path = Path(path)
-    if path.is_file():
+    if path.is_file() or path.is_dir():
         return path
     name = str(path)
     cached = cached_models()
     found = [model for model in cached if name in _names(model)]
     if not found:
+        if is_hub_id(name):
+            return find_in_hub_cache(name)
         listed = next((model for model in known_models() if name in (model.name, model.file)), None)
         if listed is not None:
             hint = f"get {listed.file} from {listed.source}, then: scenewright models --add {listed.file}"

@@ -265,7 +265,8 @@ def run_stage(
     opened = _open_inputs(stage, inputs)
     device = choose_device(device) if device != "cpu" else device
     digests = {item.role: item.digest for item in opened}
-    key = artifact_key(stage, parameters, digests, seed, device)
+    libraries = library_versions(stage, parameters)
+    key = artifact_key(stage, parameters, digests, seed, device, libraries)
     with _machine_errors(out):
         store.check_target(out, stage.writes.kind)
     facts: dict[str, Any] = {
@@ -274,7 +275,7 @@ def run_stage(
         "seed": seed,
         "device_kind": device,
         "parameters": parameters_as_json(parameters),
-        "libraries": library_versions(stage),
+        "libraries": libraries,
         "data_files": data_file_digests(stage, parameters),
         "inputs": digests,
     }
@@ -296,7 +297,7 @@ def run_stage(
         started = datetime.now(UTC)
         progress = progress or SilentProgress()
         with store.partial_folder(out) as partial:
-            context = Context(output=partial, seed=seed, device=device, progress=progress)
+            context = Context(output=partial, seed=seed, device=device, progress=progress, force=force)
             with interruption.insisting(), _inputs_stay(opened), memory_limit.limited(max_memory, out):
                 made = _work(stage, opened, parameters, context)
             _check_payload(stage, made, partial)

@@ -1,0 +1,52 @@
+"""Model folders in the cache that `hf download` fills: looked up by hub id, never fetched.
+
+`$HF_HUB_CACHE`, else `$HF_HOME/hub`, else `~/.cache/huggingface/hub`.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+from schemas.errors import MissingDependency
+
+HUB_ID = re.compile(
+    r"(?P<model>[A-Za-z0-9][\w.-]{0,95}/[A-Za-z0-9][\w.-]{0,95})(@(?P<revision>[\w.-]{1,80}))?", re.ASCII
+)
+"""`organisation/model`, or `organisation/model@revision` (a branch, tag or commit)."""
+FILE_ENDINGS = frozenset({".onnx", ".safetensors", ".pt", ".pth", ".bin", ".toml", ".txt", ".json"})
+
+
+def hub_folder() -> Path:
+    """Return the cache; it need not exist."""
+    given = os.environ.get("HF_HUB_CACHE")
+    if given:
+        return Path(given)
+    home = os.environ.get("HF_HOME")
+    return (Path(home) if home else Path.home() / ".cache" / "huggingface") / "hub"
+
+
+def is_hub_id(name: str) -> bool:
+    """Whether a name reads like the id of a model on the hub and not like a file."""
+    return HUB_ID.fullmatch(name) is not None and Path(name).suffix.lower() not in FILE_ENDINGS
+
+
+def find_in_hub_cache(name: str) -> Path:
+    """Return the folder of a model in the cache. Raises MissingDependency with the command that fetches it."""
+    match = HUB_ID.fullmatch(name)
+    assert match is not None
+    model, revision = match["model"], match["revision"] or "main"
+    root = hub_folder() / f"models--{model.replace('/', '--')}"
+    try:
+        commit = (root / "refs" / revision).read_text(encoding="ascii").strip()
+    except (OSError, ValueError):
+        commit = revision
+    folder = root / "snapshots" / commit
+    if re.fullmatch(r"[\w.-]+", commit, re.ASCII) and commit not in (".", "..") and folder.is_dir():
+        return folder
+    wanted = f" --revision {revision}" if match["revision"] else ""
+    raise MissingDependency(
+        f"{name}: no such folder, and not in the cache {hub_folder()}",
+        hint=f"fetch it with: hf download {model}{wanted}",
+    )
