@@ -93,6 +93,12 @@ real: setup ## The chain on real logs, one table; fails unless it finds what the
 bench-preflight: setup ## What `inspect` makes of planted faults (QUICK=1: three rooms)
 	$(PYTHON) -m benchmarks.tables.preflight $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-preflight
 
+.PHONY: bench-mapping
+# Twenty generated rooms (three of fewer frames with QUICK=1), every arm on the same frames and masks. A stopped run
+# goes on where it was.
+bench-mapping: setup ## The panoptic map beside the thesis and Voxblox++, tables 2.1 to 2.4 (QUICK=1: three rooms)
+	$(PYTHON) -m benchmarks.mapping $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-mapping$(if $(QUICK),-quick)
+
 bench: setup ## Speed beside named peers, medians (QUICK=1: fewer runs)
 	$(PYTHON) -m benchmarks.speed.fusion $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-fusion
 	$(PYTHON) -m benchmarks.speed.segmentation $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-segmentation

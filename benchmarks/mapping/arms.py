@@ -1,0 +1,92 @@
+"""The arms: which options of `segment`, `fuse` and `graph` stand for whom, and the cases they are measured in.
+
+What the arms share is not theirs to win by: frames, masks, voxel size, integrator, and the geometric segments. The
+published constants of the geometric segmentation (no smoothing, dense normals of 13 pixels, one-sided convexity) fail
+on this sensor's noise, so that every arm gets ours, which helps the rivals; `thesis_published_depth` shows by how much.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from stages.fuse.parameters import FuseParameters
+from stages.graph.parameters import GraphParameters
+from stages.segment.parameters import SegmentParameters
+
+LEVELS = {"clean": 0.0, "low": 0.15, "middle": 0.3, "high": 0.5}
+"""Corruption of the true masks by case (stages/segment/corruption.py)."""
+NETWORK = "network"
+DRIFTING = "middle/drifting"
+"""Masks of the middle level, poses that drift (drift.py)."""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One way from frames and masks to a map and boxes."""
+
+    name: str
+    title: str
+    segment: SegmentParameters
+    fuse: FuseParameters
+    graph: GraphParameters
+
+
+_PUBLISHED_SEGMENTS = {
+    "smoothing_window": 0,
+    "normal_window": 13,
+    "normal_step": 1,
+    "mutual_convexity": False,
+}
+# What only `ours` does when surfaces become entities.
+_PLAIN_EXTRACTION = {
+    "label_band": 1.0,
+    "smoothing": 0.0,
+    "minimum_prediction_share": 0.0,
+    "speck_share": 0.0,
+    "part_distance": 1000.0,
+    "minimum_observations": 1,
+    "minimum_overlap_share": 0.0,
+}
+_THESIS_CONSTANTS = {
+    "truncation_voxels": 4.0,
+    "maximum_depth": 4.0,
+    "minimum_overlap_voxels": 8,
+    "merge_overlap_share": 0.2,
+    "merge_minimum_frames": 3,
+}
+_VOXBLOX_SCENENN = {
+    "truncation_voxels": 5.0,
+    "maximum_depth": 3.0,
+    "minimum_overlap_voxels": 20,
+    "merge_overlap_share": 0.1,
+    "merge_minimum_frames": 2,
+}
+_VOXBLOX_DEFAULT = {**_VOXBLOX_SCENENN, "truncation_voxels": 3.0, "maximum_depth": 3.5}
+
+
+def all_arms(voxel_size: float) -> tuple[Arm, ...]:
+    """Return the arms in the order of the tables; all at one voxel size [m]."""
+
+    def arm(name: str, title: str, segment: dict[str, object], fuse: dict[str, object], method: str) -> Arm:
+        return Arm(
+            name,
+            title,
+            SegmentParameters.model_validate(segment),
+            FuseParameters.model_validate({"voxel_size": voxel_size, **fuse}),
+            GraphParameters.model_validate({"method": method}),
+        )
+
+    voxblox = {"fusion": "voxblox++", "majority_share": 0.5}
+    thesis = {"fusion": "thesis"}
+    published = {**thesis, **_PUBLISHED_SEGMENTS}
+    separate, joint = {**_PLAIN_EXTRACTION, "merging": "separate"}, {**_PLAIN_EXTRACTION, "merging": "thesis"}
+    return (
+        arm("voxblox++", "Voxblox++ (SceneNN constants)", voxblox, {**separate, **_VOXBLOX_SCENENN}, "thesis"),
+        arm("voxblox++_default", "Voxblox++ (default constants)", voxblox, {**separate, **_VOXBLOX_DEFAULT}, "thesis"),
+        arm("thesis_separate", "thesis without joint fusion", thesis, {**separate, **_THESIS_CONSTANTS}, "thesis"),
+        arm("thesis", "thesis", thesis, {**joint, **_THESIS_CONSTANTS}, "thesis"),
+        arm(
+            "thesis_published_depth", "thesis, its depth constants", published, {**joint, **_THESIS_CONSTANTS}, "thesis"
+        ),
+        arm("ours", "ours", {}, {}, "ours"),
+    )

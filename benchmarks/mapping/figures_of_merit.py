@@ -1,0 +1,120 @@
+"""Measures over rooms: sums and rankings are pooled before they become a figure; intervals resample whole rooms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from benchmarks.mapping.experiment import Outcome
+from stages.evaluate.truth import stuff_classes
+from stages.kit.measurement.average_precision import Candidates, ClassPrecision, class_precision, mean_precision, pool
+from stages.kit.measurement.bootstrap import Interval
+from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, average_quality_thesis_code
+
+Measure = Callable[[Sequence[Outcome]], float | None]
+ANY = "any"
+RESAMPLES = 200
+
+
+def summed_qualities(outcomes: Sequence[Outcome], field: str = "qualities") -> dict[str, ClassQuality]:
+    """Return the sums of eq. 2.15 by class over all rooms."""
+    sums: dict[str, ClassQuality] = {}
+    for outcome in outcomes:
+        for name, quality in getattr(outcome, field).items():
+            sums[name] = sums.get(name, ClassQuality()) + quality
+    return sums
+
+
+def pooled_precision(outcomes: Sequence[Outcome], field: str) -> dict[str, ClassPrecision]:
+    """Return average precision by class, the candidates of all rooms ranked together."""
+    scenes: dict[str, list[Candidates]] = {}
+    for outcome in outcomes:
+        for name, found in getattr(outcome, field).items():
+            scenes.setdefault(name, []).append(found)
+    return {name: class_precision(pool(found)) for name, found in sorted(scenes.items()) if name != ANY}
+
+
+def quality_measure(which: str, kind: str = "all") -> Measure:
+    """Return the measure `pq`, `sq` or `rq`, the mean over the classes that are true or predicted; `kind` is all,
+    stuff or thing."""
+
+    def measure(outcomes: Sequence[Outcome]) -> float | None:
+        stuff = stuff_classes()
+        sums = {
+            name: quality
+            for name, quality in summed_qualities(outcomes).items()
+            if kind == "all" or (name in stuff) == (kind == "stuff")
+        }
+        mean = average_quality(sums.values())
+        return getattr(mean, which)
+
+    return measure
+
+
+def quality_thesis_code(outcomes: Sequence[Outcome]) -> float | None:
+    """PQ as the thesis's code forms it: on the map's own vertices, classes never predicted left out."""
+    return average_quality_thesis_code(summed_qualities(outcomes, "qualities_thesis_code").values()).pq
+
+
+def precision_measure(field: str, form: str = "all_point") -> Measure:
+    """Return the mean over classes of average precision of `instances`, `boxes` or `boxes_refined`."""
+
+    def measure(outcomes: Sequence[Outcome]) -> float | None:
+        return mean_precision([getattr(found, form) for found in pooled_precision(outcomes, field).values()])
+
+    return measure
+
+
+def frames_per_second(outcomes: Sequence[Outcome]) -> float | None:
+    """Frames over the wall clock of geometric segmentation, fusion with the masks, and integration."""
+    seconds = sum(outcome.seconds for outcome in outcomes)
+    return sum(outcome.frames for outcome in outcomes) / seconds if seconds else None
+
+
+MEASURES: dict[str, Measure] = {
+    "pq": quality_measure("pq"),
+    "sq": quality_measure("sq"),
+    "rq": quality_measure("rq"),
+    "pq_stuff": quality_measure("pq", "stuff"),
+    "pq_thing": quality_measure("pq", "thing"),
+    "pq_thesis_code": quality_thesis_code,
+    "instance_ap": precision_measure("instances"),
+    "instance_ap_thesis_code": precision_measure("instances", "thesis_code"),
+    "box_ap": precision_measure("boxes"),
+    "box_ap_refined": precision_measure("boxes_refined"),
+    "frames_per_second": frames_per_second,
+}
+
+
+def interval(outcomes: Sequence[Outcome], measure: Measure, random: np.random.Generator) -> Interval | None:
+    """Return a measure with its 95 % percentile bootstrap interval over rooms; None where it is undefined."""
+    value = measure(outcomes)
+    if value is None:
+        return None
+    drawn = [measure([outcomes[k] for k in rows]) for rows in _draws(len(outcomes), random)]
+    return _interval(value, [v for v in drawn if v is not None])
+
+
+def difference(
+    first: Sequence[Outcome], second: Sequence[Outcome], measure: Measure, random: np.random.Generator
+) -> Interval | None:
+    """Return first minus second with the interval over rooms, both on the same draws (paired)."""
+    a, b = measure(first), measure(second)
+    if a is None or b is None:
+        return None
+    drawn = []
+    for rows in _draws(len(first), random):
+        x, y = measure([first[k] for k in rows]), measure([second[k] for k in rows])
+        if x is not None and y is not None:
+            drawn.append(x - y)
+    return _interval(a - b, drawn)
+
+
+def _draws(count: int, random: np.random.Generator) -> np.ndarray:
+    return random.integers(0, count, size=(RESAMPLES, count))
+
+
+def _interval(value: float, drawn: list[float]) -> Interval:
+    low, high = np.quantile(drawn, [0.025, 0.975]) if drawn else (value, value)
+    return Interval(float(value), float(low), float(high))
