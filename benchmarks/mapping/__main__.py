@@ -121,8 +121,8 @@ def write_results(
         f"{len(rooms)} generated rooms ({'tuning' if options.tuning else 'reporting'} seeds: "
         f"{', '.join(names)}), clutter {CLUTTER}, "
         f"{outcomes[0].frames} frames of 640x480 each, depth noise, voxels of {1000 * options.voxel_size:g} mm in "
-        "every arm. Shares in per cent; intervals: 95 %, bootstrap over rooms. Missed classes count; columns named for the "
-        "thesis's code leave them out and inflate.\n",
+        "every arm. Shares in per cent; intervals: 95 %, bootstrap over rooms. Missed classes count; columns named for "
+        "the thesis's code leave them out and inflate.\n",
         headline(results, arms, cases),
         differences(results, cases),
         by_room(results, arms, shown),
