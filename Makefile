@@ -103,6 +103,12 @@ bench: setup ## Speed beside named peers, medians (QUICK=1: fewer runs)
 	$(PYTHON) -m benchmarks.speed.fusion $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-fusion
 	$(PYTHON) -m benchmarks.speed.segmentation $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-segmentation
 
+.PHONY: scenenn
+# DATA=folder with SceneNN's scenes (docs/DATA.md); OPTIONS are those of the module, for example
+# OPTIONS="--backend detector --weights yolox.onnx --arms ours thesis --sequences 011 030".
+scenenn: setup ## The thesis's tables on SceneNN: make scenenn DATA=folder (OPTIONS="--backend ... --arms ...")
+	$(PYTHON) -m benchmarks.tables.scenenn $(if $(DATA),--data $(DATA)) $(OPTIONS) --out $(OUTPUTS)/experiments/scenenn
+
 .PHONY: pictures
 pictures: setup ## Take the README's pictures out of the demo run
 	$(PYTHON) docs/pictures.py $(OUTPUTS)/demo
