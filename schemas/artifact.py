@@ -25,6 +25,8 @@ class Artifact:
     description: ClassVar[str] = ""
     json_files: ClassVar[dict[str, type[Model]]] = {}
     """Payload JSON files that every artifact of this kind holds, with their models."""
+    optional_json_files: ClassVar[dict[str, type[Model]]] = {}
+    """Payload JSON files that an artifact of this kind may hold."""
     undigested: ClassVar[tuple[str, ...]] = ("timings.json",)
     """Payload files that hold wall-clock figures and therefore are in no digest."""
 

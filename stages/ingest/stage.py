@@ -11,16 +11,16 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
-from stages.ingest.alignment import align
 from stages.ingest.detection import open_log
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.pose_convention_names import CONVENTION_WORDS
 from stages.ingest.selection import NOT_SELECTED, largest_step, select
 from stages.ingest.source import Entry, LoadedFrame, LogSource, Unusable
-from stages.ingest.surface_samples import surface_samples
 from stages.kit.formats.foxglove import millimetres_to_depth, nanoseconds
 from stages.kit.formats.frames import FrameWriter
 from stages.kit.formats.trajectories import write_tum
+from stages.kit.geometry.surface_samples import surface_samples
+from stages.kit.geometry.upright_world import make_upright
 from stages.kit.stage import Context
 
 GRAVITY_FRAMES = 60
@@ -109,7 +109,7 @@ def _find_gravity(source: LogSource, entries: list[Entry], parameters: IngestPar
     untouched = parameters.pose_convention == "as-is"  # another reading of the poses is another world
     stated = source.world_up_detail if source.world_up == "z" and untouched else None
     measured = source.up_in_log if untouched else None
-    return align(parameters.gravity, parameters.up, stated, poses, cloud, context.random(0), measured)
+    return make_upright(parameters.gravity, parameters.up, stated, poses, cloud, context.random(0), measured)
 
 
 def _write_frames(

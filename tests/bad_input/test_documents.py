@@ -23,7 +23,9 @@ from stages.kit.running.pipelines import read_pipeline
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 MODELS: dict[str, type[Model]] = {
-    f"{kind.kind}/{name}": model for kind in KINDS.values() for name, model in kind.json_files.items()
+    f"{kind.kind}/{name}": model
+    for kind in KINDS.values()
+    for name, model in (kind.json_files | kind.optional_json_files).items()
 } | {"manifest.json": Manifest}
 FILES = settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 

@@ -26,7 +26,7 @@ def cut(source: Path, target: Path) -> None:
     if target.exists():
         shutil.rmtree(target)
     target.mkdir(parents=True)
-    for name in artifact.json_files:
+    for name in (*artifact.json_files, *(n for n in artifact.optional_json_files if artifact.path(n).exists())):
         data = json.loads((source / name).read_text())
         if name == "library.json":
             data["models"] = data["models"][:2]

@@ -8,12 +8,12 @@ from collections.abc import Iterable
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.ingest.alignment import align
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.preflight.looking import Look
 from stages.ingest.preflight.report import Finding, GravityReport, significant
 from stages.ingest.source import LogSource
-from stages.ingest.surface_samples import surface_samples
+from stages.kit.geometry.surface_samples import surface_samples
+from stages.kit.geometry.upright_world import make_upright
 
 
 def gravity_report(
@@ -38,7 +38,7 @@ def gravity_report(
 
     stated = source.world_up_detail if source.world_up == "z" and untouched else None
     try:
-        gravity = align(
+        gravity = make_upright(
             parameters.gravity, parameters.up, stated, poses, cloud, np.random.default_rng([0, 0]), source.up_in_log
         )
     except BadInput as error:

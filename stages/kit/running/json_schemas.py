@@ -12,7 +12,7 @@ def json_schemas() -> dict[str, str]:
     """Return file name -> JSON Schema text, for the manifest and each `<kind>.<payload>`."""
     schemas = {"manifest.schema.json": Manifest.model_json_schema()}
     for kind, artifact in sorted(KINDS.items()):
-        for name, model in artifact.json_files.items():
+        for name, model in (artifact.json_files | artifact.optional_json_files).items():
             stem = name.removesuffix(".json")
             schemas[f"{kind}.v{artifact.schema_version}.{stem}.schema.json"] = model.model_json_schema()
     return {name: json.dumps(schema, indent=1, sort_keys=True) + "\n" for name, schema in schemas.items()}

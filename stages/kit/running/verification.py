@@ -39,7 +39,9 @@ def _check_bytes(root: Path, manifest: Manifest) -> list[str]:
 def _check_models(root: Path, manifest: Manifest) -> list[str]:
     problems = []
     if manifest.outcome == "ok":
-        for name, model in check_version(root, manifest).json_files.items():
+        kind = check_version(root, manifest)
+        optional = {name: model for name, model in kind.optional_json_files.items() if (root / name).exists()}
+        for name, model in (kind.json_files | optional).items():
             try:
                 model.read(root / name)
             except BadInput as error:

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from schemas.errors import BadInput
-from stages.ingest.alignment import align
-from stages.ingest.gravity import find_floor, mean_camera_up, upright_from_direction, wall_yaw
-from stages.ingest.surface_samples import surface_samples
 from stages.kit.formats.frames import FrameReader
 from stages.kit.geometry.cameras import back_project
+from stages.kit.geometry.gravity import find_floor, mean_camera_up, upright_from_direction, wall_yaw
+from stages.kit.geometry.surface_samples import surface_samples
 from stages.kit.geometry.transforms import apply, look_at, rotation_between, transform_from
+from stages.kit.geometry.upright_world import make_upright
 from tests.real_data import real_data
 from tests.unit.ingest.running import ingest
 from tests.unit.ingest.tiny_room import CAMERA, TABLE, camera_poses, frames, room_depth, write_seven_scenes
@@ -68,25 +68,25 @@ def test_without_a_floor_the_camera_decides() -> None:
     normals = np.tile([-1.0, 0, 0], (900, 1))
     logged = np.array([TILT @ pose for pose in poses])
     cloud = (apply(TILT, wall), normals @ TILT[:3, :3].T)
-    gravity = align("auto", "z", None, logged, lambda: cloud, random)
+    gravity = make_upright("auto", "z", None, logged, lambda: cloud, random)
     assert gravity.method == "mean_camera_up" and "no floor was seen" in gravity.detail
     world_from_true = np.array(gravity.world_from_log) @ TILT
     assert world_from_true[2, 2] > math.cos(math.radians(15))
     heights = apply(np.array(gravity.world_from_log), cloud[0])[:, 2]
     assert abs(np.percentile(heights, 1)) < 0.01
     with pytest.raises(BadInput, match="no floor"):
-        align("floor", "z", None, logged, lambda: cloud, random)
+        make_upright("floor", "z", None, logged, lambda: cloud, random)
 
 
 def test_what_the_log_states_wins_over_the_floor() -> None:
-    gravity = align("auto", "z", "the log says so", camera_poses(3), lambda: pytest.fail("not looked at"), None)
+    gravity = make_upright("auto", "z", "the log says so", camera_poses(3), lambda: pytest.fail("not looked at"), None)
     assert (gravity.method, gravity.detail) == ("given", "the log says so")
     np.testing.assert_array_equal(gravity.world_from_log, np.eye(4))
 
 
 @pytest.mark.parametrize("axis", ["x", "-x", "y", "-y", "z", "-z"])
 def test_given_axis_becomes_z(axis: str) -> None:
-    gravity = align("given", axis, None, camera_poses(1), lambda: pytest.fail("not looked at"), None)
+    gravity = make_upright("given", axis, None, camera_poses(1), lambda: pytest.fail("not looked at"), None)
     direction = np.eye(3)["xyz".index(axis[-1])] * (-1 if axis[0] == "-" else 1)
     np.testing.assert_allclose(np.array(gravity.world_from_log)[:3, :3] @ direction, [0, 0, 1], atol=1e-12)
 
@@ -95,7 +95,7 @@ def test_cameras_that_look_everywhere_have_no_mean_up() -> None:
     down = look_at(np.zeros(3), np.array([1.0, 0, 0]))
     flipped = look_at(np.zeros(3), np.array([1.0, 0, 0]), np.array([0, 0, -1.0]))
     assert mean_camera_up(np.array([down, flipped])) is None
-    gravity = align("auto", "z", None, np.array([down, flipped]), lambda: pytest.fail("not looked at"), None)
+    gravity = make_upright("auto", "z", None, np.array([down, flipped]), lambda: pytest.fail("not looked at"), None)
     assert gravity.method == "none"
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from schemas.base import as_transform
 from schemas.errors import BadInput
 from schemas.sequence import Gravity
-from stages.ingest.gravity import (
+from stages.kit.geometry.gravity import (
     AXES,
     find_floor,
     grid_samples,
@@ -26,7 +26,7 @@ GRID = 0.05
 CLOUD = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 
-def align(
+def make_upright(
     method: str,
     up_axis: str,
     stated: str | None,

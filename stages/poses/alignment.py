@@ -1,0 +1,257 @@
+"""Dense alignment of two frames: point-to-plane distance and brightness difference together, Gauss-Newton.
+
+The hybrid objective of Park, Zhou and Koltun (Colored point cloud registration revisited, ICCV 2017) with projective
+association (KinectFusion, Newcombe 2011), weights by the sensor's noise at each depth (Nguyen, Izadi and Lovell 2012),
+and gain and bias of the exposure estimated along. One thread adds up in one order, so that the same frames give the
+same bits; Open3D's parallel sums do not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from stages.poses.pyramid import Level, Pyramid
+from stages.poses.rigid_motion import exponential, orthonormal
+
+PARAMETERS = 8
+"""Rotation, translation, gain and bias."""
+ITERATIONS = (6, 8, 10)
+"""At most so many per level, the finest first."""
+STRIDES = (2, 1, 1)
+"""Every how many-th pixel of the source is compared, per level."""
+GATES = (0.05, 0.1, 0.2)
+"""Points farther apart than this are no pair, per level [m]."""
+BRIGHTNESS_NOISE = 0.03
+"""Standard deviation of the brightness of one surface point in two frames, exposure apart."""
+BRIGHTNESS_GATE = 0.3
+INDEPENDENT_SHARE = 0.01
+"""Neighbouring residuals are alike: so many of them count as independent when uncertainty is stated."""
+SMALLEST_STEP = 2e-5
+"""Steps below this end a level [rad and m]."""
+_FIRST, _SECOND = np.triu_indices(PARAMETERS)
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """Where a source frame is, seen from a target frame."""
+
+    target_from_source: np.ndarray
+    """(4, 4)."""
+    information: np.ndarray
+    """(6, 6) inverse covariance of a perturbation from the left (rotation [rad], translation [m])."""
+    overlap: float
+    """Share of the source's points that lie on the target's surface."""
+    agreement: float
+    """Of the points that should be seen in the target, the share that lies on its surface: 1 when nothing floats in
+    front of what the target saw."""
+    residual: float
+    """Root mean square distance to the target's planes [m]."""
+    brightness_residual: float
+    """Root mean square difference of the brightness, 0 without colour."""
+
+    @property
+    def uncertainty(self) -> float:
+        """Standard deviation in the worst direction, rotations counted at 1 m [m]; infinite when degenerate."""
+        least = float(np.linalg.eigvalsh(self.information)[0])
+        return float(least**-0.5) if least > 0 else float("inf")
+
+
+@numba.njit(cache=True, fastmath=False)
+def _accumulate(
+    target_points: np.ndarray,
+    target_normals: np.ndarray,
+    target_brightness: np.ndarray,
+    target_gradient: np.ndarray,
+    intrinsics: np.ndarray,
+    source_points: np.ndarray,
+    source_normals: np.ndarray,
+    source_brightness: np.ndarray,
+    motion: np.ndarray,
+    gain: float,
+    bias: float,
+    stride: int,
+    gate: float,
+    use_color: bool,
+    brightness_noise: float,
+    brightness_gate: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the upper triangle of the normal matrix (36,), the right side (8,), and the sums behind the figures."""
+    fx, fy, cx, cy = intrinsics
+    height, width = target_points.shape[:2]
+    matrix = np.zeros(36)
+    right = np.zeros(8)
+    sums = np.zeros(8)  # samples, on surface, floating, hidden, plane count, plane squares, colour count, squares
+    row = np.zeros(8)
+    for v in range(0, source_points.shape[0], stride):
+        for u in range(0, source_points.shape[1], stride):
+            z_source = source_points[v, u, 2]
+            if z_source <= 0:
+                continue
+            sums[0] += 1
+            x, y = source_points[v, u, 0], source_points[v, u, 1]
+            q0 = motion[0, 0] * x + motion[0, 1] * y + motion[0, 2] * z_source + motion[0, 3]
+            q1 = motion[1, 0] * x + motion[1, 1] * y + motion[1, 2] * z_source + motion[1, 3]
+            q2 = motion[2, 0] * x + motion[2, 1] * y + motion[2, 2] * z_source + motion[2, 3]
+            if q2 <= 0.05:
+                continue
+            column, line = fx * q0 / q2 + cx, fy * q1 / q2 + cy
+            ut, vt = int(np.floor(column + 0.5)), int(np.floor(line + 0.5))
+            if ut < 1 or vt < 1 or ut >= width - 1 or vt >= height - 1:
+                continue
+            z_target = target_points[vt, ut, 2]
+            if z_target <= 0:
+                continue
+            noise = 0.0012 + 0.0019 * (q2 - 0.4) ** 2
+            reach = gate + 2 * noise
+            if q2 - z_target > reach:
+                sums[3] += 1
+                continue
+            if z_target - q2 > reach:
+                sums[2] += 1
+                continue
+            sums[1] += 1
+            n0, n1, n2 = target_normals[vt, ut, 0], target_normals[vt, ut, 1], target_normals[vt, ut, 2]
+            if n0 != 0 or n1 != 0 or n2 != 0:
+                s0, s1, s2 = source_normals[v, u, 0], source_normals[v, u, 1], source_normals[v, u, 2]
+                m0 = motion[0, 0] * s0 + motion[0, 1] * s1 + motion[0, 2] * s2
+                m1 = motion[1, 0] * s0 + motion[1, 1] * s1 + motion[1, 2] * s2
+                m2 = motion[2, 0] * s0 + motion[2, 1] * s1 + motion[2, 2] * s2
+                if m0 * n0 + m1 * n1 + m2 * n2 > 0.7:
+                    d0 = q0 - target_points[vt, ut, 0]
+                    d1 = q1 - target_points[vt, ut, 1]
+                    d2 = q2 - z_target
+                    distance = n0 * d0 + n1 * d1 + n2 * d2
+                    # Noise is along the ray; what of it is along the normal is what the plane sees.
+                    sigma = noise * max(abs(n2), 0.3)
+                    scaled = distance / (2 * sigma)
+                    weight = 1.0 / (sigma * sigma * (1.0 + scaled * scaled) ** 2)
+                    row[0], row[1], row[2] = q1 * n2 - q2 * n1, q2 * n0 - q0 * n2, q0 * n1 - q1 * n0
+                    row[3], row[4], row[5] = n0, n1, n2
+                    k = 0
+                    for i in range(6):
+                        right[i] -= weight * row[i] * distance
+                        for j in range(i, 6):
+                            matrix[k] += weight * row[i] * row[j]
+                            k += 1
+                        k += 2
+                    sums[4] += 1
+                    sums[5] += distance * distance
+            own = source_brightness[v, u]
+            if not use_color or own < 0:
+                continue
+            left, top = int(np.floor(column)), int(np.floor(line))
+            a, b = column - left, line - top
+            value, along_u, along_v, known = 0.0, 0.0, 0.0, True
+            for k in range(4):
+                i, j = top + k // 2, left + k % 2
+                known = known and target_brightness[i, j] >= 0
+                share = (b if k // 2 else 1.0 - b) * (a if k % 2 else 1.0 - a)
+                value += share * target_brightness[i, j]
+                along_u += share * target_gradient[i, j, 0]
+                along_v += share * target_gradient[i, j, 1]
+            if not known:
+                continue
+            difference = value - gain * own - bias
+            if abs(difference) > brightness_gate:
+                continue
+            scaled = difference / (2 * brightness_noise)
+            weight = 1.0 / (brightness_noise * brightness_noise * (1.0 + scaled * scaled) ** 2)
+            g0, g1 = along_u * fx / q2, along_v * fy / q2
+            g2 = -(g0 * q0 + g1 * q1) / q2
+            row[0], row[1], row[2] = q1 * g2 - q2 * g1, q2 * g0 - q0 * g2, q0 * g1 - q1 * g0
+            row[3], row[4], row[5], row[6], row[7] = g0, g1, g2, -own, -1.0
+            k = 0
+            for i in range(8):
+                right[i] -= weight * row[i] * difference
+                for j in range(i, 8):
+                    matrix[k] += weight * row[i] * row[j]
+                    k += 1
+            sums[6] += 1
+            sums[7] += difference * difference
+    return matrix, right, sums
+
+
+def align(
+    target: Pyramid,
+    source: Pyramid,
+    guess: np.ndarray,
+    *,
+    use_color: bool = True,
+    coarsest: int | None = None,
+    iterations: tuple[int, ...] = ITERATIONS,
+) -> Alignment:
+    """Return where `source` is in `target` (target_from_source), beginning at `guess` (4, 4).
+
+    `coarsest` is the level to begin at (default: the last); a good guess needs no coarse ones. With too little in
+    common the result is the guess with zero information and overlap.
+    """
+    use_color = use_color and target.has_color and source.has_color
+    motion, gain, bias = orthonormal(np.asarray(guess, dtype=float)), 1.0, 0.0
+    last = min(len(target.levels), len(source.levels)) - 1
+    first = last if coarsest is None else min(coarsest, last)
+    matrix, sums = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(8)
+    for number in range(first, -1, -1):
+        for _ in range(iterations[number]):
+            matrix, right, sums = _normal_equations(
+                target.levels[number], source.levels[number], motion, gain, bias, number, use_color
+            )
+            if sums[4] < 100:
+                break
+            step = np.linalg.solve(matrix + _damping(matrix), right)
+            motion = orthonormal(exponential(step[:6]) @ motion)
+            gain, bias = gain + step[6], bias + step[7]
+            if np.abs(step[:6]).max() < SMALLEST_STEP:
+                break
+    matrix, _, sums = _normal_equations(target.levels[0], source.levels[0], motion, gain, bias, 0, use_color)
+    return _described(motion, matrix, sums)
+
+
+def judge(target: Pyramid, source: Pyramid, target_from_source: np.ndarray, level: int = 0) -> Alignment:
+    """Return the figures of a pose as it is, by depth alone."""
+    number = min(level, len(target.levels) - 1, len(source.levels) - 1)
+    found = _normal_equations(
+        target.levels[number], source.levels[number], np.asarray(target_from_source, dtype=float), 1, 0, number, False
+    )
+    return _described(np.asarray(target_from_source, dtype=float), found[0], found[2])
+
+
+def _normal_equations(
+    target: Level, source: Level, motion: np.ndarray, gain: float, bias: float, number: int, use_color: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    packed, right, sums = _accumulate(
+        target.points, target.normals, target.brightness, target.gradient, target.intrinsics,
+        source.points, source.normals, source.brightness, motion, float(gain), float(bias),
+        STRIDES[number], GATES[number], use_color, BRIGHTNESS_NOISE, BRIGHTNESS_GATE,
+    )  # fmt: skip
+    matrix = np.zeros((PARAMETERS, PARAMETERS))
+    matrix[_FIRST, _SECOND] = packed
+    matrix[_SECOND, _FIRST] = packed
+    return matrix, right, sums
+
+
+def _damping(matrix: np.ndarray) -> np.ndarray:
+    """A little of the diagonal, so that directions that nothing fixes stay where they were guessed."""
+    diagonal = np.diag(matrix).copy()
+    floor = 1e-4 * max(float(diagonal[:6].max()), 1.0)
+    diagonal[:6] = 1e-4 * diagonal[:6] + 0.1 * floor
+    diagonal[6:] = 1e-3 * diagonal[6:] + 1.0
+    return np.diag(diagonal)
+
+
+def _described(motion: np.ndarray, matrix: np.ndarray, sums: np.ndarray) -> Alignment:
+    samples, on_surface, floating, _, planes, plane_squares, colors, color_squares = sums
+    motion_part, mixed, exposure = matrix[:6, :6], matrix[:6, 6:], matrix[6:, 6:]
+    # What the unknown exposure takes from the motion's certainty (Schur complement).
+    information = motion_part - mixed @ np.linalg.solve(exposure + np.eye(2), mixed.T)
+    information = 0.5 * (information + information.T) * INDEPENDENT_SHARE
+    return Alignment(
+        target_from_source=motion,
+        information=information,
+        overlap=float(on_surface / samples) if samples else 0.0,
+        agreement=float(on_surface / (on_surface + floating)) if on_surface else 0.0,
+        residual=float(np.sqrt(plane_squares / planes)) if planes else 0.0,
+        brightness_residual=float(np.sqrt(color_squares / colors)) if colors else 0.0,
+    )

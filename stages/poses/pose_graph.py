@@ -1,0 +1,194 @@
+"""Pose-graph optimisation: Gauss-Newton on SE(3) with switchable loop edges.
+
+Loop edges are scaled down by their own contradiction (dynamic covariance scaling, Agarwal et al. 2013, the closed form
+of the switchable constraints of Suenderhauf and Protzel 2012), so that a wrong loop cannot fold the map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix, csc_matrix, diags_array
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from stages.kit.geometry.transforms import inverse
+from stages.poses.rigid_motion import adjoint, between, exponential, logarithm, orthonormal
+
+SWITCH = 12.0
+"""Phi of dynamic covariance scaling: loop edges whose squared error is above it (6 degrees of freedom, of which two
+standard deviations each) begin to lose weight."""
+ANCHOR = 1e12
+"""Information with which the first node of each connected part is held."""
+MAXIMUM_ITERATIONS = 50
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A measured relative pose between two nodes."""
+
+    target: int
+    source: int
+    target_from_source: np.ndarray
+    """(4, 4)."""
+    information: np.ndarray
+    """(6, 6) of a perturbation from the left."""
+    switchable: bool = False
+    """Loop edges are; odometry is not."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Optimised poses and what the edges say of them."""
+
+    world_from_node: np.ndarray
+    """(N, 4, 4)."""
+    weights: np.ndarray
+    """(E,) in [0, 1]: how much of each edge was believed; odometry 1."""
+    squared_errors: np.ndarray
+    """(E,) Mahalanobis distances squared before scaling."""
+    covariances: np.ndarray
+    """(N, 6, 6) of a left perturbation of each node in the world, the first node of its part being exact."""
+    iterations: int
+
+    @property
+    def variance_factor(self) -> float:
+        """Mean squared error per degree of freedom of the believed edges: 1 when the information was honest."""
+        believed = self.weights > 0.5
+        freedom = 6 * max(int(believed.sum()) - len(self.world_from_node) + 1, 0)
+        return float(self.squared_errors[believed].sum() / freedom) if freedom else 1.0
+
+
+def parts_of(nodes: int, edges: Sequence[Edge]) -> np.ndarray:
+    """Return the connected part (N,) of every node."""
+    rows, columns = [e.target for e in edges], [e.source for e in edges]
+    graph = coo_matrix((np.ones(len(edges)), (rows, columns)), shape=(nodes, nodes))
+    return connected_components(graph, directed=False)[1]
+
+
+def laid_out(poses: np.ndarray, edges: Sequence[Edge]) -> np.ndarray:
+    """Return poses (N, 4, 4) in which parts that only loop edges join stand where these put them.
+
+    The non-switchable edges make parts that are moved as a whole, the largest staying where it is.
+    """
+    poses = np.array(poses, dtype=float)
+    part = parts_of(len(poses), [edge for edge in edges if not edge.switchable])
+    placed = {int(np.argmax(np.bincount(part)))}
+    waiting = [edge for edge in edges if part[edge.target] != part[edge.source]]
+    waiting.sort(key=lambda edge: -float(np.linalg.eigvalsh(edge.information)[0]))
+    while True:
+        for edge in waiting:
+            there, here = part[edge.target] in placed, part[edge.source] in placed
+            if there == here:
+                continue
+            if there:
+                moved = int(part[edge.source])
+                motion = poses[edge.target] @ edge.target_from_source @ inverse(poses[edge.source])
+            else:
+                moved = int(part[edge.target])
+                motion = poses[edge.source] @ inverse(edge.target_from_source) @ inverse(poses[edge.target])
+            rows = part == moved
+            poses[rows] = motion @ poses[rows]
+            placed.add(moved)
+            break
+        else:
+            return poses
+
+
+def optimize(world_from_node: np.ndarray, edges: Sequence[Edge], *, switch: float = SWITCH) -> Solution:
+    """Return the poses (N, 4, 4) that agree best with the edges, starting from `world_from_node`.
+
+    The first node of every connected part stays where it is. Without edges the poses are returned as they are.
+    """
+    poses = np.array(world_from_node, dtype=float)
+    part = parts_of(len(poses), edges)
+    anchors = np.unique(part, return_index=True)[1]
+    weights, errors = _weigh(poses, edges, switch)
+    cost = _cost(errors, edges, switch)
+    damping, iterations = 1e-6, 0
+    while iterations < MAXIMUM_ITERATIONS and edges:
+        iterations += 1
+        matrix, right = _assemble(poses, edges, weights, anchors)
+        damped = (matrix + diags_array(damping * matrix.diagonal())).tocsc()
+        twists = splu(damped).solve(right).reshape(-1, 6)
+        moved = np.array([orthonormal(exponential(t) @ pose) for t, pose in zip(twists, poses, strict=True)])
+        new_weights, new_errors = _weigh(moved, edges, switch)
+        new_cost = _cost(new_errors, edges, switch)
+        if new_cost > cost * (1 + 1e-12):
+            damping *= 10
+            if damping > 1e4:
+                break
+            continue
+        done = cost - new_cost < 1e-9 * cost + 1e-12
+        poses, weights, errors, cost, damping = moved, new_weights, new_errors, new_cost, max(damping / 10, 1e-9)
+        if done:
+            break
+    matrix, _ = _assemble(poses, edges, weights, anchors)
+    return Solution(poses, weights, errors, _covariances(matrix), iterations)
+
+
+def residual(edge: Edge, poses: np.ndarray) -> np.ndarray:
+    """Return the twist (6,) by which the poses differ from an edge, as a left perturbation in its target's frame."""
+    return logarithm(between(poses[edge.target], poses[edge.source]) @ inverse(edge.target_from_source))
+
+
+def _weigh(poses: np.ndarray, edges: Sequence[Edge], switch: float) -> tuple[np.ndarray, np.ndarray]:
+    twists = [residual(edge, poses) for edge in edges]
+    errors = np.array([twist @ edge.information @ twist for twist, edge in zip(twists, edges, strict=True)])
+    loops = np.array([edge.switchable for edge in edges], dtype=bool)
+    scale = np.where(loops, np.minimum(1.0, 2.0 * switch / (switch + errors)), 1.0)
+    return scale**2, errors
+
+
+def _cost(errors: np.ndarray, edges: Sequence[Edge], switch: float) -> float:
+    """The robust cost whose reweighted least squares these are: quadratic below `switch`, then saturating."""
+    loops = np.array([edge.switchable for edge in edges], dtype=bool)
+    scale = np.minimum(1.0, 2.0 * switch / (switch + errors))
+    return float(np.where(loops, scale**2 * errors + switch * (1 - scale) ** 2, errors).sum())
+
+
+def _assemble(
+    poses: np.ndarray, edges: Sequence[Edge], weights: np.ndarray, anchors: np.ndarray
+) -> tuple[csc_matrix, np.ndarray]:
+    """Return the normal matrix (6N, 6N) and the right side (6N,)."""
+    count = len(poses)
+    right = np.zeros((count, 6))
+    rows, columns, values = [], [], []
+    grid_row, grid_column = np.divmod(np.arange(36), 6)
+
+    def block(i: int, j: int, content: np.ndarray) -> None:
+        rows.append(6 * i + grid_row)
+        columns.append(6 * j + grid_column)
+        values.append(content.reshape(-1))
+
+    for edge, weight in zip(edges, weights, strict=True):
+        # r = log(Ti^-1 Tj Z^-1); a left step of both nodes changes it by Ad(Ti^-1) (dj - di) to first order.
+        jacobian = adjoint(inverse(poses[edge.target]))
+        weighted = weight * jacobian.T @ edge.information
+        content, gradient = weighted @ jacobian, weighted @ residual(edge, poses)
+        i, j = edge.target, edge.source
+        block(i, i, content)
+        block(j, j, content)
+        block(i, j, -content)
+        block(j, i, -content)
+        right[i] += gradient
+        right[j] -= gradient
+    for anchor in anchors:
+        block(int(anchor), int(anchor), ANCHOR * np.eye(6))
+    shape = (6 * count, 6 * count)
+    matrix = coo_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)
+    return matrix.tocsc(), right.reshape(-1)
+
+
+def _covariances(matrix: csc_matrix) -> np.ndarray:
+    """Return the diagonal blocks (N, 6, 6) of the inverse."""
+    solver = splu(matrix)
+    count = matrix.shape[0] // 6
+    result = np.zeros((count, 6, 6))
+    for node in range(count):
+        columns = np.zeros((6 * count, 6))
+        columns[6 * node : 6 * node + 6] = np.eye(6)
+        result[node] = solver.solve(columns)[6 * node : 6 * node + 6]
+    return result

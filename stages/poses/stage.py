@@ -1,0 +1,190 @@
+"""`scenewright poses`: camera poses for a sequence that has none, or to compare with those it has."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.sequence import Sequence
+from schemas.trajectory import FrameEstimate, LoopClosure, PosesFile, Trajectory
+from stages.kit.formats.frames import FrameReader, require_depth
+from stages.kit.formats.trajectories import write_tum
+from stages.kit.stage import Context
+from stages.poses.drift import drift_of, loop_closures, path_length
+from stages.poses.estimation import estimate
+from stages.poses.frame_poses import FramePose, frame_poses
+from stages.poses.parameters import PosesParameters
+from stages.poses.world import choose_world
+
+
+@dataclass(frozen=True)
+class Result:
+    """Poses in the world of the first key frame, whatever made them."""
+
+    poses: list[FramePose]
+    loops: tuple[LoopClosure, ...] = ()
+    variance_factor: float | None = None
+    parts: int = 1
+    counts: tuple[tuple[str, int], ...] = ()
+    """For the summary."""
+
+
+def run(sequence: Sequence, *, parameters: PosesParameters, context: Context) -> Trajectory:
+    """Estimate the pose of every frame of the main camera; write trajectory.tum and poses.json.
+
+    Frames that could not be placed have no line in trajectory.tum, so that `fuse` skips them, and the outcome is then
+    `tracking_lost`; `empty` when no two frames could be placed. Raises BadInput for a sequence without depth, without
+    colour where the method needs it, or with fewer than two frames of its main camera.
+    """
+    require_depth(sequence)
+    if not sequence.path("frames.mcap").is_file():
+        raise BadInput(f"{sequence.root}: frames.mcap is missing", hint="run `scenewright ingest` again")
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        camera_name, frames = main_camera(reader, sequence)
+        check_streams(reader, sequence, parameters)
+        result = (
+            _structure(reader, frames, camera_name, parameters, context)
+            if parameters.method == "sfm"
+            else (_dense(reader, frames, camera_name, parameters, context))
+        )
+        return _finish(sequence, reader, camera_name, result, parameters, context)
+
+
+def main_camera(reader: FrameReader, sequence: Sequence) -> tuple[str, list[int]]:
+    """Return the name of the main camera and its frames. Raises BadInput when it has fewer than two."""
+    if len(reader) == 0:
+        raise BadInput(f"{sequence.root}: it has no frames", hint="look at the drops in its sequence.json")
+    name = sequence.info.cameras[0].name
+    if name not in reader.cameras:
+        raise BadInput(f"{sequence.root}: its main camera {name!r} has no frames", hint="ingest with --camera NAME")
+    frames = [index for index in range(len(reader)) if reader.read(index, ()).camera_name == name]
+    if len(frames) < 2:
+        raise BadInput(f"{sequence.root}: one frame has no path", hint="poses need two frames of one camera or more")
+    return name, frames
+
+
+def check_streams(reader: FrameReader, sequence: Sequence, parameters: PosesParameters) -> None:
+    """Raise BadInput when colour is needed and there is none."""
+    needs = "--method sfm" if parameters.method == "sfm" else "--bundle-adjustment"
+    if (parameters.method == "sfm" or parameters.bundle_adjustment) and "color" not in reader.streams:
+        raise BadInput(
+            f"{sequence.root}: its frames have no colour, which {needs} needs", hint="use --method rgbd alone"
+        )
+
+
+def _dense(
+    reader: FrameReader, frames: list[int], camera_name: str, parameters: PosesParameters, context: Context
+) -> Result:
+    found = estimate(reader, frames, camera_name, parameters, context)
+    if parameters.bundle_adjustment:
+        from stages.poses.bundle_adjustment import adjust
+
+        with context.progress.step("bundle adjustment"):
+            found = adjust(found, reader.cameras[camera_name])
+    loops = loop_closures(found)
+    kept = sum(loop.weight >= 0.5 for loop in loops)
+    counts = (("key_frames", len(found.track.keys)), ("loops", kept), ("loops_rejected", len(loops) - kept))
+    for how, count in sorted(found.track.rescues.items()):
+        context.logger.info("tracking was rescued %d times: %s", count, how)
+    parts = len(set(found.parts.tolist()))
+    return Result(frame_poses(found), loops, found.solution.variance_factor, parts, counts)
+
+
+def _structure(
+    reader: FrameReader, frames: list[int], camera_name: str, parameters: PosesParameters, context: Context
+) -> Result:
+    from stages.poses.structure_from_motion import reconstruct
+
+    poses, parts = reconstruct(reader, frames, camera_name, parameters, context)
+    return Result(poses, parts=parts)
+
+
+def _finish(
+    sequence: Sequence,
+    reader: FrameReader,
+    camera_name: str,
+    result: Result,
+    parameters: PosesParameters,
+    context: Context,
+) -> Trajectory:
+    posed = [pose for pose in result.poses if pose.world_from_camera is not None]
+    if len(posed) < 2:
+        posed = []
+    estimated = np.array([pose.world_from_camera for pose in posed]).reshape(-1, 4, 4)
+    indices = [pose.frame for pose in posed]
+    with context.progress.step("world"):
+        world, gravity = choose_world(parameters.world, reader, indices, estimated, context.random(5))
+    context.logger.info("world %s: %s", world, gravity.detail)
+    placed = np.array(gravity.world_from_log) @ estimated
+    times = reader.times
+    write_tum(context.output / "trajectory.tum", times[indices], placed)
+    kept = set(indices)
+    info = PosesFile(
+        method=parameters.method,
+        camera=camera_name,
+        gravity=gravity,
+        world=world,
+        frames=tuple(
+            FrameEstimate(
+                frame=pose.frame, time=float(times[pose.frame]),
+                status=pose.status if pose.frame in kept else "unposed",
+                fault=pose.fault or ("" if pose.frame in kept else "not_joined"),
+                confidence=round(pose.confidence, 4) if pose.frame in kept else 0.0,
+                uncertainty=round(pose.uncertainty, 6) if pose.frame in kept and pose.uncertainty is not None else None,
+            )
+            for pose in result.poses
+        ),
+        loops=result.loops,
+        drift=drift_of(result.loops),
+        variance_factor=result.variance_factor,
+        parts=max(result.parts, 1),
+        path_length=path_length(placed[:, :3, 3]),
+    )  # fmt: skip
+    info.write(context.output / "poses.json")
+    return Trajectory(context.output, outcome=outcome_of(info), summary=_summary(info, result, context))
+
+
+def outcome_of(info: PosesFile) -> str:
+    """Return `ok`, `tracking_lost` when a frame has no pose, `empty` when none has."""
+    unposed = sum(frame.status == "unposed" for frame in info.frames)
+    if unposed == len(info.frames):
+        return "empty"
+    return "tracking_lost" if unposed else "ok"
+
+
+def _summary(info: PosesFile, result: Result, context: Context) -> dict[str, object]:
+    unposed = [frame for frame in info.frames if frame.status == "unposed"]
+    summary: dict[str, object] = {
+        "frames": len(info.frames),
+        "posed": len(info.frames) - len(unposed),
+        **dict(result.counts),
+        "path_length": round(info.path_length, 3),
+        "gravity": info.gravity.method,
+        "world": info.world,
+    }
+    if info.drift is not None:
+        summary["drift"] = round(info.drift, 5)
+    if unposed:
+        reasons = Counter(frame.fault for frame in unposed)
+        where = ranges([frame.frame for frame in unposed])
+        summary["reason"] = (
+            f"{len(unposed)} of {len(info.frames)} frames have no pose "
+            f"({', '.join(f'{reason} {count}' for reason, count in sorted(reasons.items()))}): {where}"
+        )
+        context.logger.warning("%s", summary["reason"])
+    return summary
+
+
+def ranges(numbers: list[int], most: int = 6) -> str:
+    """Return ascending numbers as text: `3-7, 12, 40-41`, at most `most` ranges."""
+    spans: list[list[int]] = []
+    for number in numbers:
+        if spans and number == spans[-1][1] + 1:
+            spans[-1][1] = number
+        else:
+            spans.append([number, number])
+    texts = [str(a) if a == b else f"{a}-{b}" for a, b in spans[:most]]
+    return ", ".join(texts) + (", ..." if len(spans) > most else "")

@@ -1,0 +1,245 @@
+"""Odometry: every frame is aligned with the current key frame; what cannot be aligned begins a new part.
+
+A part is a stretch of frames whose relative poses are known. Loops may join parts later (stages/poses/loops.py);
+frames of parts that nothing joins with the largest one stay without a pose.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stages.kit.geometry.transforms import inverse
+from stages.poses.alignment import Alignment, align
+from stages.poses.features import Features, ransac_motion
+from stages.poses.pyramid import Pyramid
+from stages.poses.rigid_motion import angle_of, distance_of, exponential
+
+LEAST_DEPTH_SHARE = 0.03
+"""A frame with depth on fewer of its pixels cannot be tracked."""
+SEARCH_ANGLES = (math.radians(8), math.radians(16))
+"""Turns about each axis that are tried when nothing else helps."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When an alignment is believed, and when a new key frame is due."""
+
+    overlap: float
+    agreement: float
+    residual: float
+    """[m]."""
+    uncertainty: float
+    """[m]."""
+    key_overlap: float
+    key_angle: float
+    """[rad]."""
+    key_distance: float
+    """Times the median depth of the key frame."""
+
+    def good(self, alignment: Alignment) -> bool:
+        """Whether an alignment is believed."""
+        return (
+            alignment.overlap >= self.overlap
+            and alignment.agreement >= self.agreement
+            and alignment.residual <= self.residual
+            and alignment.uncertainty <= self.uncertainty
+        )
+
+
+@dataclass
+class KeyFrame:
+    """What is kept of a key frame; its images are read again when they are needed."""
+
+    frame: int
+    """Index in the sequence."""
+    part: int
+    part_from_key: np.ndarray
+    """(4, 4): pose in the coordinates of the part's first key frame."""
+    features: Features
+    fern_code: np.ndarray
+    sparse_points: np.ndarray
+    """(K, 3) float32: some of what it saw, in its camera [m]."""
+    median_depth: float
+
+
+@dataclass(frozen=True)
+class TrackedFrame:
+    """Where one frame is."""
+
+    frame: int
+    key: int | None
+    """Key frame it was aligned with; None when it has no pose."""
+    key_from_frame: np.ndarray
+    alignment: Alignment | None
+    """None for the key frame itself and for frames without pose."""
+    fault: str = ""
+    """Why it has no pose, or why tracking had to begin anew here."""
+
+
+@dataclass(frozen=True)
+class KeyLink:
+    """Odometry between two key frames of one part."""
+
+    target: int
+    source: int
+    alignment: Alignment
+
+
+@dataclass
+class Track:
+    """The result of odometry."""
+
+    keys: list[KeyFrame] = field(default_factory=list)
+    frames: list[TrackedFrame] = field(default_factory=list)
+    links: list[KeyLink] = field(default_factory=list)
+    rescues: dict[str, int] = field(default_factory=dict)
+    """How often something else than the usual guess was needed."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A frame as tracking needs it."""
+
+    frame: int
+    pyramid: Pyramid
+    describe: Callable[[], Features]
+    """Finds its features; called only when they are needed."""
+    describe_depth: Callable[[], np.ndarray]
+
+
+class Tracker:
+    """Takes frames in order."""
+
+    def __init__(self, limits: Limits, use_color: bool, random: np.random.Generator) -> None:
+        self.track = Track()
+        self._limits, self._use_color, self._random = limits, use_color, random
+        self._key: Seen | None = None
+        self._previous: Seen | None = None
+        self._key_from_previous = np.eye(4)
+        self._motion = np.eye(4)
+        """previous_from_current of the last step: the next one is expected to be like it."""
+        self._link: Alignment | None = None
+        self._features: tuple[int, Features] | None = None
+
+    def add(self, seen: Seen) -> None:
+        """Track one frame."""
+        if seen.pyramid.depth_share < LEAST_DEPTH_SHARE:
+            self.track.frames.append(TrackedFrame(seen.frame, None, np.eye(4), None, "no_depth"))
+            self._motion = np.eye(4)
+            return
+        if self._key is None:
+            self._begin_part(seen, "")
+            return
+        found = self._locate(seen)
+        if found is None:
+            self._begin_part(seen, "lost")
+            return
+        limits, key = self._limits, self.track.keys[-1]
+        self._motion = inverse(self._key_from_previous) @ found.target_from_source
+        self._key_from_previous, self._previous = found.target_from_source, seen
+        due = (
+            found.overlap < limits.key_overlap
+            or angle_of(found.target_from_source) > limits.key_angle
+            or distance_of(found.target_from_source) > limits.key_distance * key.median_depth
+        )
+        if due:
+            self._continue_part(seen, found)
+        else:
+            number = len(self.track.keys) - 1
+            self.track.frames.append(TrackedFrame(seen.frame, number, found.target_from_source, found))
+
+    def _locate(self, seen: Seen) -> Alignment | None:
+        """Return where a frame is in the key frame, trying one guess after the other; None when it is lost."""
+        assert self._key is not None and self._previous is not None
+        expected = self._key_from_previous @ self._motion
+        found = self._try(self._key, seen, expected)
+        if found is None:
+            found = self._try(self._key, seen, self._key_from_previous)
+            self._note(found, "no_motion")
+        if found is None and self._previous.frame != self._key.frame:
+            step = self._try(self._previous, seen, self._motion) or self._try(self._previous, seen, np.eye(4))
+            self._note(step, "from_previous")
+            if step is None:
+                step = self._search(self._previous, seen)
+            if step is not None:
+                # The frame before becomes the key frame: it sees more of this one than the old one does.
+                self._promote_previous()
+                return step
+        return found if found is not None else self._search(self._key, seen)
+
+    def _search(self, target: Seen, seen: Seen) -> Alignment | None:
+        """Look for a frame by features, then by turning it about."""
+        match = ransac_motion(self._features_of(target), seen.describe(), self._random)
+        if match is not None:
+            found = self._try(target, seen, match.target_from_source)
+            self._note(found, "features")
+            if found is not None:
+                return found
+        best = None
+        for twist in _turns():
+            trial = align(target.pyramid, seen.pyramid, exponential(twist), use_color=self._use_color)
+            if self._limits.good(trial) and (best is None or trial.overlap * trial.agreement > best[0]):
+                best = (trial.overlap * trial.agreement, trial)
+        self._note(best, "search")
+        return best[1] if best is not None else None
+
+    def _try(self, target: Seen, seen: Seen, guess: np.ndarray) -> Alignment | None:
+        found = align(target.pyramid, seen.pyramid, guess, use_color=self._use_color)
+        return found if self._limits.good(found) else None
+
+    def _note(self, found: object, how: str) -> None:
+        if found is not None:
+            self.track.rescues[how] = self.track.rescues.get(how, 0) + 1
+
+    def _features_of(self, seen: Seen) -> Features:
+        if self._features is None or self._features[0] != seen.frame:
+            self._features = (seen.frame, seen.describe())
+        return self._features[1]
+
+    def _promote_previous(self) -> None:
+        assert self._previous is not None
+        last = self.track.frames.pop()
+        assert last.frame == self._previous.frame and last.alignment is not None
+        self._continue_part(self._previous, last.alignment)
+
+    def _begin_part(self, seen: Seen, fault: str) -> None:
+        part = self.track.keys[-1].part + 1 if self.track.keys else 0
+        self._add_key(seen, part, np.eye(4), fault)
+
+    def _continue_part(self, seen: Seen, found: Alignment) -> None:
+        key = self.track.keys[-1]
+        number = len(self.track.keys)
+        self.track.links.append(KeyLink(number - 1, number, found))
+        motion = self._motion
+        self._add_key(seen, key.part, key.part_from_key @ found.target_from_source, "")
+        self._motion = motion
+
+    def _add_key(self, seen: Seen, part: int, part_from_key: np.ndarray, fault: str) -> None:
+        number = len(self.track.keys)
+        level = seen.pyramid.levels[-1]
+        points = level.points.reshape(-1, 3)
+        points = points[points[:, 2] > 0]
+        self.track.keys.append(
+            KeyFrame(
+                seen.frame, part, part_from_key, self._features_of(seen), seen.describe_depth(),
+                points[:: max(1, len(points) // 200)].copy(), seen.pyramid.median_depth,
+            )
+        )  # fmt: skip
+        self.track.frames.append(TrackedFrame(seen.frame, number, np.eye(4), None, fault))
+        self._key = self._previous = seen
+        self._key_from_previous, self._motion = np.eye(4), np.eye(4)
+
+
+def _turns() -> Iterator[np.ndarray]:
+    """Twists (6,) that are tried as guesses: none, then turns about each axis and combinations of two."""
+    yield np.zeros(6)
+    for angle in SEARCH_ANGLES:
+        for axis in range(3):
+            for sign in (1.0, -1.0):
+                twist = np.zeros(6)
+                twist[axis] = sign * angle
+                yield twist
