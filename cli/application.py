@@ -35,5 +35,11 @@ def build_application() -> Callable[..., Any]:
         parent.command(name=command, help=stage.summary, rich_help_panel="Steps")(make_command(stage))
     for function, help_panel in housekeeping.COMMANDS:
         application.command(rich_help_panel=help_panel)(function)
+    for name, alone, below, help_panel in housekeeping.GROUPS:
+        group_application = typer.Typer(invoke_without_command=True, rich_markup_mode=None)
+        group_application.callback()(alone)
+        for function in below:
+            group_application.command()(function)
+        application.add_typer(group_application, name=name, rich_help_panel=help_panel)
     application.callback()(housekeeping.root)
     return typer.main.get_command(application)

@@ -14,6 +14,7 @@ from cli.batch_command import batch
 from cli.collection_command import gc
 from cli.comparison_command import diff
 from cli.inspect_command import inspect
+from cli.serve_command import serve
 from schemas.errors import BadInput, UsageError
 
 Paths = Annotated[list[Path], typer.Argument(help="Artifact folders.")]
@@ -161,12 +162,15 @@ def view(
 
 
 def models(
+    context: typer.Context,
     add: Annotated[Path | None, typer.Option("--add", help="Copy this weight file into the cache.")] = None,
     check: Annotated[Path | None, typer.Option("--check", help="Tell which known network this file is.")] = None,
     json_output: Json = False,
     debug: Debug = False,
 ) -> int:
-    """List the networks that steps can use (source, licence, checksum) and the weight files in the cache."""
+    """List the networks that steps can use (source, licence, checksum) and the weight files in the cache; serve one."""
+    if context.invoked_subcommand is not None:
+        return 0
     from stages.kit.running.known_models import identify, known_models
     from stages.kit.running.model_cache import add_model, cache_folder, cached_models
 
@@ -243,8 +247,12 @@ COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (migrate, "Artifacts"),
     (diff, "Artifacts"),
     (gc, "Artifacts"),
-    (models, "Installation"),
     (doctor, "Installation"),
     (schemas, "Installation"),
     (makefile, "Installation"),
 )
+
+GROUPS: tuple[tuple[str, Callable[..., Any], tuple[Callable[..., Any], ...], str], ...] = (
+    ("models", models, (serve,), "Installation"),
+)
+"""Commands that do something by themselves and have commands below them."""
