@@ -1,0 +1,380 @@
+"""Training frames: views of generated rooms and tabletops with strongly varied colours, lights, lenses and sensors.
+
+    python -m benchmarks.training.data --out FOLDER [--rooms N] [--tables N] [--quick]
+
+Rooms are those of all recipes of data/recipes with seeds of their tuning range, furnished from a library built with a
+seed of its own; the reporting seeds, and the library that other experiments use (seed 0), are never touched. A folder
+holds shards: `color.npy` (N, 240, 320, 3) uint8, `depth.npy` (N, 240, 320) uint16 [0.25 mm], `label.npy` (N, 240, 320)
+uint8 (place in the frame's table of instances + 1, 0 = nothing) and `frames.json` (camera, mount, class of every
+instance). Arrays are memory-mapped, so training needs little memory.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from benchmarks.training.clutter import Thing, height_map, primitives, put_down
+from schemas.errors import BadInput
+from schemas.kinds import CadLibrary
+from schemas.scene_parts import Camera
+from stages.kit.geometry.transforms import look_at, transform_from_yaw
+from stages.kit.rendering.light_map import AreaLight
+from stages.kit.rendering.patterns import PATTERNS, Material
+from stages.kit.rendering.ray_casting import Rendering, SceneRenderer
+from stages.kit.rendering.surfaces import TriangleSoup
+from stages.kit.running.reading import open_artifact
+from stages.synthesize.arrangement import Arrangement, arrange, world_meshes
+from stages.synthesize.depth_noise import DepthCamera, disturb_depth
+from stages.synthesize.furniture import Catalogue
+from stages.synthesize.recipes import load_recipe, recipe_names
+from stages.synthesize.shell import build_room
+
+WIDTH, HEIGHT = 320, 240
+DEPTH_UNIT = 0.00025
+"""[m]"""
+TRAINING_SEEDS, VALIDATION_SEEDS = range(0, 85), range(85, 100)
+"""Both of the recipes' tuning range."""
+VIEWS_PER_ROOM, VIEWS_PER_TABLE = 12, 8
+SHARD = 240
+LEAST_CLEARANCE = 0.25
+"""The camera keeps this far from everything [m]."""
+ROOM_STREAM, TABLE_STREAM = 31, 32
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Meshes of the world with the class of every instance; what a camera may look at."""
+
+    meshes: list[tuple[int, trimesh.Trimesh]]
+    classes: dict[int, str]
+    targets: list[tuple[np.ndarray, float, float]]
+    """(point (3,) [m], least and largest distance of the camera [m])."""
+    bounds: np.ndarray
+    """(2, 3): where the camera may be [m]."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One frame as it is stored."""
+
+    color: np.ndarray
+    depth: np.ndarray
+    label: np.ndarray
+    camera: Camera
+    up: np.ndarray
+    height: float
+    classes: tuple[str, ...]
+    """Class of label 1, 2, ..."""
+    origin: str
+
+
+def room_scene(recipe_name: str, seed: int, catalogue: Catalogue, random: np.random.Generator) -> Scene:
+    """Return a furnished room with things thrown about. Raises BadInput when the recipe finds no room."""
+    clutter = ("low", "medium", "high")[int(random.integers(3))]
+    arrangement: Arrangement = arrange(load_recipe(recipe_name), catalogue, clutter, seed)
+    meshes = world_meshes(arrangement)
+    classes = {k: layout.class_name for k, layout in enumerate(arrangement.room.layouts, start=1)}
+    classes |= {thing.instance: thing.class_name for thing in arrangement.objects}
+    half = arrangement.room.size / 2
+    number = int(random.integers(0, 14))
+    if number:
+        heights = height_map(
+            SceneRenderer(meshes), -half[:2] + 0.05, half[:2] - 0.05, arrangement.room.size[2] - 0.1, 0.02
+        )
+        raised = np.argwhere((heights.height > 0.2) & (heights.height < 1.6))
+        for thing in islice(primitives(random), number):
+            low, high = -half[:2], half[:2]
+            if len(raised) and random.random() < 0.75:
+                place = heights.origin + heights.cell * raised[int(random.integers(len(raised)))]
+                low, high = place - 0.05, place + 0.05
+            mesh = put_down(thing, heights, low, high, random)
+            if mesh is not None:
+                instance = max(classes) + 1
+                meshes.append((instance, mesh))
+                classes[instance] = thing.class_name
+    targets = [
+        (mesh.bounds.mean(axis=0), *((0.5, 2.2) if np.ptp(mesh.bounds, axis=0).max() < 0.5 else (0.9, 4.5)))
+        for instance, mesh in meshes
+        if classes[instance] not in ("floor", "wall", "ceiling")
+    ]
+    low = np.array([-half[0] + 0.2, -half[1] + 0.2, 0.35])
+    high = np.array([half[0] - 0.2, half[1] - 0.2, min(1.95, arrangement.room.size[2] - 0.3)])
+    return Scene(meshes, classes, targets, np.stack([low, high]))
+
+
+def table_scene(catalogue: Catalogue, random: np.random.Generator) -> Scene:
+    """Return an empty room with one table on which many small things stand, some on others, seen from close by."""
+    recipe = load_recipe(recipe_names()[int(random.integers(len(recipe_names())))])
+    room = build_room(recipe.shell, random)
+    meshes = [(k, layout.mesh) for k, layout in enumerate(room.layouts, start=1)]
+    classes = {k: layout.class_name for k, layout in enumerate(room.layouts, start=1)}
+    half = room.size[:2] / 2
+    size = random.uniform([0.7, 0.6], [2.0, 1.1])
+    top, middle = float(random.uniform(0.4, 1.1)), random.uniform(-half + 1.2, half - 1.2)
+    table = _slab_table(size, top, random)
+    table.apply_transform(transform_from_yaw(float(random.uniform(-np.pi, np.pi)), np.array([*middle, 0.0])))
+    meshes.append((len(meshes) + 1, table))
+    classes[len(meshes)] = "table"
+    reach = float(random.uniform(0.18, 0.45))
+    heights = height_map(SceneRenderer(meshes), middle - 1.3, middle + 1.3, top + 0.5, 0.005)
+    heights.height[heights.height < top - 0.01] = -1.0
+    small = [model for name in ("bottle", "bowl", "cup", "book", "box") for model in catalogue.by_class.get(name, [])]
+    shapes = primitives(random, scale=float(random.uniform(0.8, 1.3)))
+    for _ in range(int(random.integers(2, 16))):
+        if random.random() < 0.4 and small:
+            furnishing = catalogue.furnishing(small[int(random.integers(len(small)))], {})
+            mesh = furnishing.mesh.copy()
+            mesh.apply_scale(float(random.uniform(0.85, 1.2)))
+            mesh.apply_translation([0, 0, -mesh.bounds[0, 2]])
+            thing = Thing(furnishing.model.class_name, mesh, furnishing.model.class_name in ("box", "book"))
+        else:
+            thing = next(shapes)
+        low, high = middle - reach, middle + reach
+        put = put_down(thing, heights, low, high, random)
+        if put is not None:
+            meshes.append((len(meshes) + 1, put))
+            classes[len(meshes)] = thing.class_name
+    target = np.array([*middle, top + 0.05])
+    targets = [(target + np.array([*random.uniform(-0.2, 0.2, 2), 0.0]), 0.5, 1.5) for _ in range(6)]
+    low, high = np.array([*(-half + 0.2), top + 0.12]), np.array([*(half - 0.2), min(top + 1.1, room.size[2] - 0.2)])
+    return Scene(meshes, classes, targets, np.stack([low, high]))
+
+
+def _slab_table(size: np.ndarray, top: float, random: np.random.Generator) -> trimesh.Trimesh:
+    thickness = float(random.uniform(0.015, 0.05))
+    parts = [trimesh.creation.box(extents=(*size, thickness))]
+    parts[0].apply_translation([0, 0, top - thickness / 2])
+    for x in (-0.45, 0.45):
+        for y in (-0.45, 0.45):
+            leg = trimesh.creation.box(extents=(0.05, 0.05, top - thickness))
+            leg.apply_translation([x * size[0], y * size[1], (top - thickness) / 2])
+            parts.append(leg)
+    table = trimesh.util.concatenate(parts)
+    table.visual.face_colors = np.array([*random.integers(30, 240, 3), 255], dtype=np.uint8)
+    return table
+
+
+def random_camera(random: np.random.Generator) -> Camera:
+    """Return a camera of 320x240 with a horizontal field of view of 48 to 78 degrees and a slightly moved centre."""
+    focal = 0.5 * WIDTH / float(np.tan(np.deg2rad(random.uniform(48.0, 78.0)) / 2))
+    cx, cy = (WIDTH - 1) / 2 + random.uniform(-6, 6), (HEIGHT - 1) / 2 + random.uniform(-6, 6)
+    return Camera(width=WIDTH, height=HEIGHT, fx=focal, fy=focal, cx=float(cx), cy=float(cy))
+
+
+def random_pose(scene: Scene, renderer: SceneRenderer, random: np.random.Generator) -> np.ndarray | None:
+    """Return world_from_camera (4, 4) near one of the scene's targets, looking about at it; None when none was free."""
+    for _ in range(30):
+        target, near, far = scene.targets[int(random.integers(len(scene.targets)))]
+        direction = random.standard_normal(3) * np.array([1.0, 1.0, 0.6])
+        eye = target + float(random.uniform(near, far)) * direction / np.linalg.norm(direction)
+        if np.any(eye < scene.bounds[0]) or np.any(eye > scene.bounds[1]):
+            continue
+        if renderer.distance(eye[None])[0] < LEAST_CLEARANCE:
+            continue
+        # Mostly the target is to be seen.
+        if renderer.occluded(eye[None], target[None] + 1e-3)[0] and random.random() < 0.8:
+            continue
+        aim = target + 0.12 * np.linalg.norm(target - eye) * random.standard_normal(3)
+        pose = look_at(eye, aim)
+        roll = np.eye(4)
+        angle = float(np.deg2rad(random.normal(0.0, 5.0)))
+        roll[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        return pose @ roll
+    return None
+
+
+def vary_look(
+    renderer: SceneRenderer, soup: TriangleSoup, scene: Scene, size: np.ndarray, random: np.random.Generator
+) -> np.ndarray:
+    """Give the renderer other colours, patterns and lights than those of `soup`; returns the gloss (0..1) by instance.
+
+    A quarter of the views keeps the colours as designed; in the others every instance gets its own, and with them a
+    random pattern. One to three lamps, hard shadows in half of the views.
+    """
+    instances = max(scene.classes) + 1
+    colors = soup.corner_colors
+    table, rows = [Material().row()], np.zeros(soup.triangles, dtype=np.int32)
+    gloss = np.where(random.random(instances) < 0.3, random.uniform(0.0, 0.8, instances), 0.0).astype(np.float32)
+    if random.random() < 0.75:
+        tint = np.exp(random.normal(0.0, 0.35, (instances, 3))).astype(np.float32)
+        paint = random.random((instances, 3), dtype=np.float32) ** 2
+        repainted = (random.random(instances) < 0.6)[soup.instance][:, None, None]
+        # A quarter of the parts' own contrast stays in the new colour.
+        contrast = colors / np.maximum(colors.mean(axis=(1, 2), keepdims=True), 0.05)
+        painted = paint[soup.instance][:, None] * (0.75 + 0.25 * contrast)
+        colors = np.clip(np.where(repainted, painted, colors * tint[soup.instance][:, None]), 0.01, 1.0)
+    for instance in range(1, instances):
+        name = PATTERNS[int(random.integers(len(PATTERNS)))]
+        frame = np.eye(4)
+        frame[:3, :3] = np.linalg.qr(random.standard_normal((3, 3)))[0]
+        period = float(np.exp(random.uniform(np.log(0.01), np.log(0.4))))
+        strength, shine = float(random.uniform(0.0, 3.0)), float(gloss[instance])
+        seed = int(random.integers(4096))
+        rows[soup.instance == instance] = len(table)
+        table.append(Material(name, strength, period, shine, float(random.uniform(10, 80)), seed, frame).row())
+    renderer.soup = replace(
+        soup, corner_colors=colors.astype(np.float32), material=rows, material_table=np.stack(table)
+    )
+    lamps = []
+    for _ in range(int(random.integers(1, 4))):
+        place = random.uniform([-size[0] / 2, -size[1] / 2, 0.6 * size[2]], [size[0] / 2, size[1] / 2, size[2] - 0.05])
+        color = random.uniform(0.2, 0.9) * random.uniform(0.75, 1.0, 3)
+        lamps.append(AreaLight(tuple(map(float, place)), (0.1, 0, 0), (0, -0.1, 0), tuple(map(float, color))))
+    renderer.lights = tuple(lamps)
+    renderer.ambient = (random.uniform(0.15, 0.6) * random.uniform(0.85, 1.0, 3)).astype(np.float32)
+    renderer.shadows = bool(random.random() < 0.5)
+    renderer.exposure = float(np.exp(random.normal(0.0, 0.35)))
+    return gloss
+
+
+def random_sensor(random: np.random.Generator) -> DepthCamera:
+    """Return a depth sensor between a coarse and a fine one; ranges and losses vary."""
+    return DepthCamera(
+        minimum_range=float(random.uniform(0.2, 0.5)),
+        maximum_range=float(random.uniform(3.5, 9.0)),
+        baseline=float(random.uniform(0.04, 0.09)),
+        disparity_levels=float(np.exp(random.uniform(np.log(16), np.log(80)))),
+        jump_share=float(random.uniform(0.4, 0.8)),
+        dark_signal=float(np.exp(random.uniform(np.log(0.0003), np.log(0.003)))),
+        shine_loss=float(random.uniform(0.0, 0.8)),
+        block=int(random.integers(1, 5)),
+    )
+
+
+def sensed_depth(
+    true: np.ndarray, view: Rendering, gloss: np.ndarray, camera: Camera, random: np.random.Generator
+) -> np.ndarray:
+    """Return the depth (H, W) [m] that a random sensor makes of the true one: its errors shrunk by a random share, as
+    images of 640 pixels that are brought to 320 have finer noise; one view in twelve is exact."""
+    if random.random() < 1 / 12:
+        return true
+    noisy = disturb_depth(
+        true, view.incidence, view.albedo.mean(axis=2), gloss[view.instance], camera, random, random_sensor(random)
+    )
+    share = np.float32(random.uniform(0.15, 1.0))
+    step = np.abs(noisy - true) > 0.03 * true
+    return np.where((noisy > 0) & ~step, true + share * (noisy - true), noisy)
+
+
+def samples_of(
+    scene: Scene, number: int, size: np.ndarray, random: np.random.Generator, origin: str
+) -> Iterator[Sample]:
+    """Yield up to `number` views of a scene in which at least three instances can be seen."""
+    renderer = SceneRenderer(scene.meshes)
+    soup = renderer.soup
+    for _ in range(number):
+        camera = random_camera(random)
+        pose = random_pose(scene, renderer, random)
+        if pose is None:
+            continue
+        gloss = vary_look(renderer, soup, scene, size, random)
+        view = renderer.render(camera, pose)
+        present, counts = np.unique(view.instance, return_counts=True)
+        kept = present[(counts >= 12) & (present > 0)]
+        if len(kept) < 3 or counts[present > 0].max() > 0.9 * WIDTH * HEIGHT:
+            continue
+        # The same picture shows a larger world from further away.
+        scale = float(random.uniform(0.85, 1.15))
+        depth = sensed_depth(view.depth * np.float32(scale), view, gloss, camera, random)
+        lookup = np.zeros(max(scene.classes) + 1, dtype=np.uint8)
+        lookup[kept[:255]] = np.arange(1, len(kept[:255]) + 1)
+        yield Sample(
+            color=view.color,
+            depth=np.round(np.minimum(depth / DEPTH_UNIT, 65535)).astype(np.uint16),
+            label=lookup[view.instance],
+            camera=camera,
+            up=pose[2, :3],
+            height=float(pose[2, 3]) * scale,
+            classes=tuple(scene.classes[int(instance)] for instance in kept[:255]),
+            origin=origin,
+        )
+
+
+def write_shard(samples: list[Sample], folder: Path) -> None:
+    """Write the samples as one shard."""
+    folder.mkdir(parents=True, exist_ok=True)
+    np.save(folder / "color.npy", np.stack([sample.color for sample in samples]))
+    np.save(folder / "depth.npy", np.stack([sample.depth for sample in samples]))
+    np.save(folder / "label.npy", np.stack([sample.label for sample in samples]))
+    rows = [
+        {
+            "camera": sample.camera.model_dump(),
+            "up": [round(float(v), 6) for v in sample.up],
+            "height": round(sample.height, 4),
+            "classes": list(sample.classes),
+            "origin": sample.origin,
+        }
+        for sample in samples
+    ]
+    (folder / "frames.json").write_text(json.dumps(rows) + "\n")
+
+
+def generate(
+    catalogue: Catalogue, rooms: list[tuple[str, int]], tables: range, views: tuple[int, int]
+) -> Iterator[Sample]:
+    """Yield the samples of rooms (recipe, seed) and tables (seed), tables spread evenly among the rooms."""
+    share = len(tables) / max(len(rooms), 1)
+    done = 0
+    for k, (recipe, seed) in enumerate(rooms):
+        random = np.random.default_rng([seed, ROOM_STREAM, recipe_names().index(recipe)])
+        try:
+            scene = room_scene(recipe, seed, catalogue, random)
+        except BadInput as error:
+            print(f"{recipe} {seed}: {error}", flush=True)
+        else:
+            size = np.array([scene.bounds[1, 0] * 2, scene.bounds[1, 1] * 2, 2.5])
+            yield from samples_of(scene, views[0], size, random, f"{recipe}/{seed}")
+        while done < min(len(tables), round((k + 1) * share)):
+            random = np.random.default_rng([tables[done], TABLE_STREAM])
+            scene = table_scene(catalogue, random)
+            yield from samples_of(scene, views[1], np.array([4.0, 4.0, 2.5]), random, f"table/{tables[done]}")
+            done += 1
+
+
+def write_set(samples: Iterator[Sample], folder: Path) -> int:
+    """Write samples as shards of SHARD frames; returns how many frames there are."""
+    number = 0
+    while shard := list(islice(samples, SHARD)):
+        write_shard(shard, folder / f"shard_{number // SHARD:03d}")
+        number += len(shard)
+        print(f"{folder.name}: {number} frames", flush=True)
+    return number
+
+
+def main() -> None:
+    """Make the training and the validation set."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--library", type=Path, required=True, help="CAD library (library build --seed 41)")
+    parser.add_argument("--rooms", type=int, default=4 * len(TRAINING_SEEDS), help="training rooms")
+    parser.add_argument("--tables", type=int, default=260, help="training tabletops")
+    parser.add_argument("--frames", type=int, default=22 * SHARD, help="training frames at most")
+    parser.add_argument("--quick", action="store_true", help="8 rooms, 4 tabletops")
+    arguments = parser.parse_args()
+    catalogue = Catalogue(open_artifact(arguments.library, CadLibrary))  # type: ignore[arg-type]
+    started = time.perf_counter()
+    names = recipe_names()
+    rooms = [(name, seed) for seed in TRAINING_SEEDS for name in names][: 8 if arguments.quick else arguments.rooms]
+    tables = range(4 if arguments.quick else arguments.tables)
+    held_back = [(name, seed) for seed in VALIDATION_SEEDS for name in names][: 2 if arguments.quick else 16]
+    views = (VIEWS_PER_ROOM, VIEWS_PER_TABLE)
+    validation = generate(catalogue, held_back, range(100_000, 100_000 + len(held_back) // 2), (8, 6))
+    training = islice(generate(catalogue, rooms, tables, views), arguments.frames)
+    counts = {
+        "validation": write_set(validation, arguments.out / "validation"),
+        "training": write_set(training, arguments.out / "training"),
+    }
+    print(f"{counts} in {time.perf_counter() - started:.0f} s")
+
+
+if __name__ == "__main__":
+    main()

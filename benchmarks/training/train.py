@@ -1,0 +1,234 @@
+"""Train the network of `--backend network`; stop and start again at will.
+
+    python -m benchmarks.training.train --data FOLDER --out FOLDER [--steps N] [--batch N] [--seed N]
+
+The state (network, moving average, optimiser) is written every few minutes as safetensors with a small JSON beside it;
+the same command goes on from there. A step's samples and their changes depend on the seed and the number of the step
+alone, so that a run that was stopped ends with the bytes of one that was not, on the same machine with one thread.
+The result is `panoptic.safetensors`: the moving average of the weights.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch.nn import functional
+
+from benchmarks.training.samples import FrameSet, varied
+from benchmarks.training.targets import IGNORED, Targets
+from schemas.errors import BadInput
+from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from stages.segment.network.features import CHANNELS
+from stages.segment.network.model import PanopticNetwork, Widths
+from stages.segment.network.weights import save_checkpoint
+
+PEAK_RATE, WEIGHT_DECAY = 4e-3, 0.02
+WARM_UP, WHOLE_FRAMES = 0.04, 0.12
+"""Shares of the steps: the rate rises during the first; the last of them see whole frames instead of crops."""
+CENTRE_WEIGHT, OFFSET_WEIGHT = 200.0, 0.05
+AVERAGE_DECAY = 0.998
+GRADIENT_NORM = 10.0
+SMOOTHING = 0.05
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run is."""
+
+    steps: int
+    batch: int
+    seed: int
+    classes: tuple[str, ...]
+    frames: int
+
+
+def rate_at(step: int, steps: int) -> float:
+    """Return the learning rate: a linear rise, then half a cosine down to a hundredth."""
+    warm = max(1, round(WARM_UP * steps))
+    if step < warm:
+        return PEAK_RATE * (step + 1) / warm
+    share = (step - warm) / max(1, steps - warm)
+    return PEAK_RATE * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * share)))
+
+
+def batch_of(frames: FrameSet, plan: Plan, step: int) -> tuple[torch.Tensor, list[Targets]]:
+    """Return the inputs (batch, 16, H, W) and targets of a step."""
+    per_epoch = max(1, len(frames) // plan.batch)
+    epoch, place = divmod(step, per_epoch)
+    order = np.random.default_rng([plan.seed, 1, epoch]).permutation(len(frames))
+    chosen = order[place * plan.batch : (place + 1) * plan.batch]
+    whole = step >= (1 - WHOLE_FRAMES) * plan.steps
+    made = [
+        varied(frames[int(index)], plan.classes, np.random.default_rng([plan.seed, 2, step, k]), whole=whole)
+        for k, index in enumerate(chosen)
+    ]
+    inputs = torch.from_numpy(np.stack([inputs for inputs, _ in made])).to(memory_format=torch.channels_last)
+    return inputs, [targets for _, targets in made]
+
+
+def loss_of(
+    outputs: tuple[torch.Tensor, torch.Tensor, torch.Tensor], targets: list[Targets], class_weight: torch.Tensor
+) -> tuple[torch.Tensor, dict[str, float]]:
+    """Return the loss and its parts: weighted cross entropy of the classes, squared error of the heat map, absolute
+    error of the offsets on things."""
+    logits, centres, offsets = (output.float() for output in outputs)
+    classes = torch.from_numpy(np.stack([t.classes for t in targets]).astype(np.int64))
+    weight = torch.from_numpy(np.stack([t.weight for t in targets])) * (classes != IGNORED)
+    heat = torch.from_numpy(np.stack([t.centres for t in targets]))[:, None]
+    wanted = torch.from_numpy(np.stack([t.offsets for t in targets]))
+    things = torch.from_numpy(np.stack([t.things for t in targets]))[:, None].float()
+    each = functional.cross_entropy(
+        logits, classes, weight=class_weight, ignore_index=IGNORED, reduction="none", label_smoothing=SMOOTHING
+    )
+    semantic = (each * weight).sum() / weight.sum().clamp(min=1)
+    centre = functional.mse_loss(centres, heat)
+    offset = ((offsets - wanted).abs() * things).sum() / (things.sum() * 2).clamp(min=1)
+    loss = semantic + CENTRE_WEIGHT * centre + OFFSET_WEIGHT * offset
+    return loss, {"class": float(semantic.detach()), "centre": float(centre.detach()), "offset": float(offset.detach())}
+
+
+def class_weights(frames: FrameSet, classes: tuple[str, ...]) -> torch.Tensor:
+    """Return weights (classes,) with mean 1 over pixels' classes: the inverse of the share of pixels, to the power
+    0.3, of at most 240 frames spread over the set."""
+    counts = np.ones(len(classes))
+    for index in np.linspace(0, len(frames) - 1, min(240, len(frames))).astype(int):
+        frame = frames[int(index)]
+        pixels = np.bincount(frame.labels.ravel(), minlength=len(frame.classes) + 1)
+        for name, number in zip(frame.classes, pixels[1:], strict=False):
+            counts[classes.index(name)] += number
+    weights = (counts / counts.sum()) ** -0.3
+    return torch.tensor(weights / np.average(weights, weights=counts), dtype=torch.float32)
+
+
+class Run:
+    """A training run and its state on disk."""
+
+    def __init__(self, plan: Plan, out: Path, widths: Widths) -> None:
+        self.plan, self.out, self.widths, self.step, self.seconds = plan, out, widths, 0, 0.0
+        torch.manual_seed(plan.seed)
+        self.network = PanopticNetwork(len(CHANNELS), len(plan.classes), widths).to(memory_format=torch.channels_last)
+        self.average = {name: value.clone() for name, value in self.network.state_dict().items()}
+        self.optimizer = torch.optim.AdamW(
+            self.network.parameters(), lr=PEAK_RATE, weight_decay=WEIGHT_DECAY, fused=True
+        )
+        if (out / "state.json").is_file():
+            self._restore()
+
+    def train_step(self, frames: FrameSet, class_weight: torch.Tensor) -> dict[str, float]:
+        """Take one step and return the parts of its loss."""
+        self.network.train()
+        inputs, targets = batch_of(frames, self.plan, self.step)
+        for group in self.optimizer.param_groups:
+            group["lr"] = rate_at(self.step, self.plan.steps)
+        with torch.autocast("cpu", torch.bfloat16):
+            outputs = self.network(inputs)
+        loss, parts = loss_of(outputs, targets, class_weight)
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), GRADIENT_NORM)
+        self.optimizer.step()
+        self.step += 1
+        decay = min(AVERAGE_DECAY, self.step / (self.step + 10))
+        with torch.no_grad():
+            for name, value in self.network.state_dict().items():
+                if value.is_floating_point():
+                    self.average[name].lerp_(value, 1 - decay)
+                else:
+                    self.average[name].copy_(value)
+        return parts
+
+    def averaged(self) -> PanopticNetwork:
+        """Return a network with the moving average of the weights, for use."""
+        network = PanopticNetwork(len(CHANNELS), len(self.plan.classes), self.widths)
+        network.load_state_dict(self.average)
+        return network.eval()
+
+    def save(self) -> None:
+        """Write the state, whole or not at all, and the checkpoint as it would be used now."""
+        tensors = {f"network.{name}": value for name, value in self.network.state_dict().items()}
+        tensors |= {f"average.{name}": value for name, value in self.average.items()}
+        for number, entry in self.optimizer.state_dict()["state"].items():
+            tensors |= {f"optimizer.{number}.{name}": value for name, value in entry.items()}
+        self.out.mkdir(parents=True, exist_ok=True)
+        arrays = {name: value.detach().contiguous().numpy() for name, value in tensors.items()}
+        write_safetensors(self.out / "state.new", arrays, {"step": str(self.step)})
+        os.replace(self.out / "state.new", self.out / "state.safetensors")
+        facts = {"step": self.step, "seconds": round(self.seconds, 1), "plan": _plan_record(self.plan)}
+        (self.out / "state.json").write_text(json.dumps(facts, indent=1) + "\n")
+        save_checkpoint(
+            self.out / "panoptic.safetensors", self.averaged(), self.plan.classes, self.widths,
+            f"trained on {self.plan.frames} frames of generated rooms and tabletops, "
+            f"step {self.step} of {self.plan.steps}, batch {self.plan.batch}, seed {self.plan.seed}",
+        )  # fmt: skip
+
+    def _restore(self) -> None:
+        facts = json.loads((self.out / "state.json").read_text())
+        if facts["plan"] != _plan_record(self.plan):
+            raise BadInput(f"{self.out}: holds a run of another plan", hint="take another --out, or the same settings")
+        arrays, metadata = read_safetensors(self.out / "state.safetensors")
+        tensors = {name: torch.from_numpy(array) for name, array in arrays.items()}
+        parts: dict[str, dict[str, torch.Tensor]] = {"network": {}, "average": {}, "optimizer": {}}
+        for name, value in tensors.items():
+            head, _, rest = name.partition(".")
+            parts[head][rest] = value
+        self.network.load_state_dict(parts["network"])
+        self.average = parts["average"]
+        entries: dict[int, dict[str, torch.Tensor]] = {}
+        for name, value in parts["optimizer"].items():
+            number, _, rest = name.partition(".")
+            entries.setdefault(int(number), {})[rest] = value
+        state = self.optimizer.state_dict()
+        self.optimizer.load_state_dict({"state": entries, "param_groups": state["param_groups"]})
+        self.step, self.seconds = int(metadata["step"]), facts["seconds"]
+
+
+def _plan_record(plan: Plan) -> dict[str, int | list[str]]:
+    return asdict(plan) | {"classes": list(plan.classes)}
+
+
+def main() -> None:
+    """Train, or go on with a training."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, required=True, help="folder of benchmarks.training.data")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--steps", type=int, default=6600)
+    parser.add_argument("--batch", type=int, default=8)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--save-every", type=float, default=240.0, help="seconds between states")
+    arguments = parser.parse_args()
+    torch.set_num_threads(arguments.threads)
+    frames = FrameSet(arguments.data / "training")
+    plan = Plan(arguments.steps, arguments.batch, arguments.seed, frames.class_names(), len(frames))
+    run = Run(plan, arguments.out, Widths())
+    class_weight = class_weights(frames, plan.classes)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    began, saved, sums, seen = time.perf_counter() - run.seconds, time.perf_counter(), {}, 0
+    while run.step < plan.steps:
+        parts = run.train_step(frames, class_weight)
+        run.seconds = time.perf_counter() - began
+        sums = {name: sums.get(name, 0.0) + value for name, value in parts.items()}
+        seen += 1
+        if run.step % 50 == 0 or run.step == plan.steps:
+            means = {name: round(value / seen, 5) for name, value in sums.items()}
+            line = {"step": run.step, "seconds": round(run.seconds), **means}
+            with (arguments.out / "log.jsonl").open("a") as log:
+                log.write(json.dumps(line) + "\n")
+            print(line, flush=True)
+            sums, seen = {}, 0
+        if time.perf_counter() - saved > arguments.save_every or run.step == plan.steps:
+            run.save()
+            saved = time.perf_counter()
+    print(f"{plan.steps} steps in {run.seconds / 60:.1f} min: {arguments.out / 'panoptic.safetensors'}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,64 @@
+"""How good a checkpoint is on the validation frames: PQ per class, with and without colour.
+
+python -m benchmarks.training.validation --data FOLDER --weights FILE [--every N]
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.training.samples import FrameSet
+from schemas.vocabulary import load_vocabulary
+from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
+from stages.segment.network.backend import Predictor, load_predictor
+from stages.segment.network.features import Mount
+
+STUFF = frozenset(entry.name for entry in load_vocabulary().classes if entry.kind == "stuff")
+
+
+def quality_of(
+    predictor: Predictor, frames: FrameSet, indices: range, *, color: bool, gravity: bool
+) -> dict[str, ClassQuality]:
+    """Return the sums of PQ per class over the frames with these numbers."""
+    vocabulary = load_vocabulary()
+    names = {entry.id: entry.name for entry in vocabulary.classes}
+    sums: dict[str, ClassQuality] = {}
+    for index in indices:
+        frame = frames[index]
+        mount = Mount(frame.up, frame.height) if gravity else Mount()
+        found = predictor.predict(frame.depth, frame.color if color else None, frame.camera, mount)
+        frame_sums = panoptic_quality(
+            frame.labels.ravel().astype(np.int64),
+            found.ids.ravel().astype(np.int64),
+            dict(enumerate(frame.classes, start=1)),
+            {number: names[mask.category_id] for number, mask in found.masks.items()},
+            STUFF,
+        )
+        for name, entry in frame_sums.items():
+            sums[name] = sums.get(name, ClassQuality()) + entry
+    return sums
+
+
+def main() -> None:
+    """Print PQ per class and its mean."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, required=True)
+    parser.add_argument("--weights", type=Path, required=True)
+    parser.add_argument("--every", type=int, default=1)
+    arguments = parser.parse_args()
+    predictor = load_predictor(arguments.weights, load_vocabulary())
+    frames = FrameSet(arguments.data / "validation")
+    indices = range(0, len(frames), arguments.every)
+    for color, gravity in ((True, True), (False, True), (False, False)):
+        sums = quality_of(predictor, frames, indices, color=color, gravity=gravity)
+        mean = average_quality(sums.values())
+        print(f"colour {color}, gravity {gravity}, {len(indices)} frames:")
+        print(f"  PQ {mean.pq:.3f}, SQ {mean.sq:.3f}, RQ {mean.rq:.3f} over {mean.classes} classes")
+        print("  " + ", ".join(f"{name} {entry.pq:.2f}" for name, entry in sums.items()), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,92 @@
+"""The backend: frame in, masks out, on the processor and with nothing else installed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from schemas.scene_parts import Camera
+from schemas.sequence import SequenceFile
+from schemas.vocabulary import Vocabulary
+from stages.kit.formats.frames import Frame, FrameReader
+from stages.segment.geometric import GeometricFrame
+from stages.segment.network.features import STRIDE, Mount, features, input_camera, mount_of_pose, resized
+from stages.segment.network.grouping import GroupingSettings, Named, group, raise_to_depth
+from stages.segment.network.weights import BUNDLED, Checkpoint, load_checkpoint
+from stages.segment.panoptic import PanopticFrame
+
+
+@dataclass(frozen=True)
+class Predictor:
+    """A checkpoint with what it takes to use it on images."""
+
+    checkpoint: Checkpoint
+    classes: tuple[Named, ...]
+    settings: GroupingSettings
+
+    def predict(self, depth: np.ndarray, color: np.ndarray | None, camera: Camera, mount: Mount) -> PanopticFrame:
+        """Return the masks of an image at its own size.
+
+        `depth` (H, W) z-depth [m], 0 invalid; `color` (H, W, 3) uint8 RGB or None.
+        """
+        small = input_camera(camera)
+        small_depth, small_color = resized(depth, color, small)
+        inputs = torch.from_numpy(features(small_depth, small_color, small, mount))[None]
+        with torch.inference_mode():
+            logits, heat, offsets = self.checkpoint.network(inputs.to(memory_format=torch.channels_last))
+        coarse = group(
+            logits[0].contiguous().numpy(),
+            heat[0, 0].numpy(),
+            offsets[0].contiguous().numpy(),
+            self.classes,
+            self.settings,
+        )
+        named_at = np.ascontiguousarray(small_depth[::STRIDE, ::STRIDE])
+        ids = raise_to_depth(coarse.ids, named_at, depth, camera.width / small.width)
+        present = set(np.unique(ids).tolist())
+        return PanopticFrame(ids, {number: mask for number, mask in coarse.masks.items() if number in present})
+
+
+def load_predictor(path: Path, vocabulary: Vocabulary, settings: GroupingSettings | None = None) -> Predictor:
+    """Read a checkpoint for use. Raises BadInput as load_checkpoint does."""
+    checkpoint = load_checkpoint(path, vocabulary)
+    checkpoint.network.to(memory_format=torch.channels_last)
+    entries = [vocabulary.by_name(name) for name in checkpoint.classes]
+    named = tuple(Named(entry.id, entry.kind == "thing") for entry in entries)
+    return Predictor(checkpoint, named, settings or GroupingSettings())
+
+
+class NetworkBackend:
+    """Masks of our own network; of the bundled one when no weights are given. Colour is used where there is any."""
+
+    name = "network"
+
+    def __init__(
+        self,
+        sequence: SequenceFile,
+        reader: FrameReader,
+        vocabulary: Vocabulary,
+        weights: Path | None,
+        settings: GroupingSettings | None = None,
+    ) -> None:
+        self._predictor = load_predictor(weights or BUNDLED, vocabulary, settings)
+        self._reader = reader
+        colored = "color" in sequence.streams
+        self.streams: tuple[str, ...] = ("color", "depth") if colored else ("depth",)
+        self.label = "own network, trained on generated rooms" if weights is None else f"network {weights.stem}"
+        if not colored:
+            self.label += ", without colour"
+        self._gravity_known = sequence.gravity.method != "none"
+        self._floor_is_zero = sequence.gravity.method in ("given", "floor_plane")
+
+    def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
+        """Return the masks of a frame; one without depth has none, as no geometric segment could take them."""
+        if frame.depth is None:
+            return PanopticFrame(np.zeros(geometric.labels.shape, dtype=np.int32))
+        mount = mount_of_pose(
+            frame.world_from_camera, gravity_known=self._gravity_known, floor_is_zero=self._floor_is_zero
+        )
+        return self._predictor.predict(frame.depth, frame.color, self._reader.cameras[frame.camera_name], mount)
