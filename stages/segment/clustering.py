@@ -23,12 +23,24 @@ def clouds_touch(first: np.ndarray, second: np.ndarray, distance: float) -> bool
     return bool(np.isfinite(nearest).any())
 
 
+def bounds_in_reach(clouds: list[np.ndarray], distance: float) -> np.ndarray:
+    """Return (N, N) whether the bounds of clouds (N_i, 3) come within `distance` [m]; empty clouds reach nothing.
+
+    Most pairs fail here, without a look at their points.
+    """
+    low = np.array([cloud.min(axis=0) if len(cloud) else (np.inf,) * 3 for cloud in clouds]).reshape(-1, 3)
+    high = np.array([cloud.max(axis=0) if len(cloud) else (-np.inf,) * 3 for cloud in clouds]).reshape(-1, 3)
+    reached = low[:, None] - distance <= high[None, :]
+    return (reached & reached.transpose(1, 0, 2)).all(axis=2)
+
+
 def largest_cluster(clouds: list[np.ndarray], sizes: list[int], *, distance: float) -> set[int]:
     """Return the indices of the clouds (N_i, 3) [m] in the cluster with the largest sum of `sizes`.
 
     Clouds within `distance` of each other belong together, and so do chains of them. Of equal clusters the one with
     the smallest index wins.
     """
+    possible = bounds_in_reach(clouds, distance)
     unvisited = set(range(len(clouds)))
     best: set[int] = set()
     best_size = -1
@@ -39,7 +51,11 @@ def largest_cluster(clouds: list[np.ndarray], sizes: list[int], *, distance: flo
         cluster, front = {seed}, [seed]
         while front:
             current = front.pop()
-            reached = [other for other in sorted(unvisited) if clouds_touch(clouds[current], clouds[other], distance)]
+            reached = [
+                other
+                for other in sorted(unvisited)
+                if possible[current, other] and clouds_touch(clouds[current], clouds[other], distance)
+            ]
             cluster.update(reached)
             front.extend(reached)
             unvisited.difference_update(reached)
