@@ -10,8 +10,8 @@ BACKENDS = {
     "geometric": "every geometric segment is an `object`",
     "objects": "whole objects from geometry and colour, each an `object`",
     "detector": "an ONNX object detector and the depth",
-    "network": "a compact RGB-D network of our own",
-    "auto": "the best that is installed",
+    "network": "a compact RGB-D network of our own, trained on generated rooms",
+    "auto": "what needs nothing installed and nothing known of the log: `network`",
     "huggingface": "a panoptic or open-vocabulary model of the transformers library",
     "onnx": "an ONNX instance or panoptic network",
 }

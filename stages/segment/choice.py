@@ -143,6 +143,19 @@ def _service(request: BackendRequest) -> Backend:
     )
 
 
+def _network(request: BackendRequest) -> Backend:
+    # Imported here: loading torch takes seconds, which the other backends need not wait for.
+    from stages.segment.network.backend import NetworkBackend
+
+    if request.weights is not None and request.weights.suffix != ".safetensors":
+        raise UsageError(
+            f"{request.weights.name} is no checkpoint of the network of our own (a .safetensors file)",
+            hint="say whose weights they are with --backend detector, onnx or huggingface",
+        )
+    sequence = request.sequence.info if request.sequence is not None else None
+    return NetworkBackend(load_vocabulary(), request.weights, sequence=sequence, reader=request.reader)
+
+
 def _require_color(sequence: Sequence, backend: str) -> None:
     if "color" not in sequence.info.streams:
         raise BadInput(
@@ -156,5 +169,7 @@ BUILDERS: dict[str, Callable[[BackendRequest], Backend]] = {
     "ground-truth": _ground_truth,
     "geometric": _geometric,
     "detector": _detector,
+    "network": _network,
+    "auto": _network,
 }
 """Name (backend_names.BACKENDS) -> how it is made."""

@@ -113,7 +113,13 @@ LABELLED = frozenset({"huggingface", "onnx"})
 """Backends whose labels are looked up in data/labels; services do too."""
 
 
+OWN_NETWORK = frozenset({"network", "auto"})
+"""Backends that read the checkpoint that comes with the project."""
+
+
 def _data_files(parameters: SegmentParameters) -> tuple[str, ...]:
+    if parameters.backend in OWN_NETWORK:
+        return ("networks/panoptic.safetensors",)
     return LABEL_FILES if parameters.backend in LABELLED or is_service(parameters.backend) else ()
 
 
@@ -125,7 +131,11 @@ STAGE = Stage(
     reads={
         "sequence": Sequence,
         "weights": Optionally(
-            External("Network: an ONNX file (detector, onnx), a model folder or hub id (huggingface)", weights=True)
+            External(
+                "Network: an ONNX file (detector, onnx), a model folder or hub id (huggingface), or a .safetensors "
+                "checkpoint of our own (network; one comes with the project)",
+                weights=True,
+            )
         ),
         "mask_weights": Optionally(
             External(

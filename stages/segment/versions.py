@@ -9,6 +9,8 @@ from stages.segment.parameters import SegmentParameters
 LIBRARIES = {
     "huggingface": ("transformers", "torch", "tokenizers", "pillow"),
     "onnx": ("onnxruntime",),
+    "network": ("torch",),
+    "auto": ("torch",),
 }
 """Backend -> distributions that it alone needs."""
 

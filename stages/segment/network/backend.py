@@ -60,33 +60,57 @@ def load_predictor(path: Path, vocabulary: Vocabulary, settings: GroupingSetting
 
 
 class NetworkBackend:
-    """Masks of our own network; of the bundled one when no weights are given. Colour is used where there is any."""
+    """Masks of our own network; of the bundled one when no weights are given. Colour is used where there is any.
+
+    Without a sequence (frames that a service receives) nothing is known of gravity, and the camera is that of the
+    points.
+    """
 
     name = "network"
 
     def __init__(
         self,
-        sequence: SequenceFile,
-        reader: FrameReader,
         vocabulary: Vocabulary,
-        weights: Path | None,
+        weights: Path | None = None,
+        *,
+        sequence: SequenceFile | None = None,
+        reader: FrameReader | None = None,
         settings: GroupingSettings | None = None,
     ) -> None:
         self._predictor = load_predictor(weights or BUNDLED, vocabulary, settings)
         self._reader = reader
-        colored = "color" in sequence.streams
+        colored = sequence is None or "color" in sequence.streams
         self.streams: tuple[str, ...] = ("color", "depth") if colored else ("depth",)
         self.label = "own network, trained on generated rooms" if weights is None else f"network {weights.stem}"
         if not colored:
             self.label += ", without colour"
-        self._gravity_known = sequence.gravity.method != "none"
-        self._floor_is_zero = sequence.gravity.method in ("given", "floor_plane")
+        method = sequence.gravity.method if sequence is not None else "none"
+        self._gravity_known = method != "none"
+        self._floor_is_zero = method in ("given", "floor_plane")
 
     def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
         """Return the masks of a frame; one without depth has none, as no geometric segment could take them."""
-        if frame.depth is None:
+        camera = (
+            self._reader.cameras[frame.camera_name] if self._reader is not None else camera_of_points(geometric.points)
+        )
+        if frame.depth is None or camera is None:
             return PanopticFrame(np.zeros(geometric.labels.shape, dtype=np.int32))
         mount = mount_of_pose(
             frame.world_from_camera, gravity_known=self._gravity_known, floor_is_zero=self._floor_is_zero
         )
-        return self._predictor.predict(frame.depth, frame.color, self._reader.cameras[frame.camera_name], mount)
+        return self._predictor.predict(frame.depth, frame.color, camera, mount)
+
+
+def camera_of_points(points: np.ndarray) -> Camera | None:
+    """Return the pinhole camera in which points (H, W, 3) [m] lie behind their pixels, None when there are too few.
+
+    Least squares of u = fx x / z + cx, and the same for v, over the pixels that have a point.
+    """
+    v, u = np.nonzero(points[..., 2] > 0)
+    if len(u) < 16 or np.ptp(u) < 2 or np.ptp(v) < 2:
+        return None
+    found = points[v, u].astype(np.float64)
+    fx, cx = np.polyfit(found[:, 0] / found[:, 2], u, 1)
+    fy, cy = np.polyfit(found[:, 1] / found[:, 2], v, 1)
+    height, width = points.shape[:2]
+    return Camera(width=width, height=height, fx=float(fx), fy=float(fy), cx=float(cx), cy=float(cy))
