@@ -33,7 +33,7 @@ from stages.evaluate.map_measures import (
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.plan_measures import measure_plan
 from stages.evaluate.results import Part
-from stages.evaluate.trajectory_measures import measure_trajectory
+from stages.evaluate.trajectory_measures import count_poses, measure_trajectory
 from stages.evaluate.truth import TrueRoom, load_truth
 from stages.kit.formats.trajectories import read_tum
 from stages.kit.measurement.tables import write_table
@@ -209,13 +209,15 @@ def _evaluate_trajectory(inputs: Inputs, parameters: EvaluateParameters, context
     paths: dict[str, np.ndarray] = {}
     if estimated is not None:
         paths["camera"] = estimated[1][:, :3, 3]
-    if inputs.ground_truth is not None and estimated is not None:
-        times, poses = read_tum(inputs.ground_truth.path("trajectory.tum"))
-        poses = world_from_log(inputs.sequence) @ poses
+    if inputs.trajectory is not None and inputs.trajectory.path("poses.json").is_file():
+        count_poses(inputs.part("trajectory"), inputs.trajectory.info)
+    truth = _true_trajectory(inputs)
+    if truth is not None and estimated is not None:
+        times, poses = truth
         part = inputs.part("trajectory")
         measure_trajectory(part, times, poses, *estimated)
         _check_same_walk(inputs, part, len(estimated[0]))
-        paths["true camera"] = poses[:, :3, 3]
+        paths["true camera" if inputs.ground_truth is not None else "given camera"] = poses[:, :3, 3]
     if not parameters.plots or not paths:
         return
     graph: ContactGraphFile | None = None
@@ -229,6 +231,19 @@ def _evaluate_trajectory(inputs: Inputs, parameters: EvaluateParameters, context
         if node.box is not None and node.node_type != "layout"
     ]
     figures.draw_floor_plan(context.output / "plots" / "camera_path.png", boxes, paths, inputs.label)
+
+
+def _true_trajectory(inputs: Inputs) -> tuple[np.ndarray, np.ndarray] | None:
+    """Times and poses to compare with: those of the ground truth, else, for a trajectory, those that the log gave."""
+    if inputs.ground_truth is not None:
+        times, poses = read_tum(inputs.ground_truth.path("trajectory.tum"))
+        return times, world_from_log(inputs.sequence) @ poses
+    if inputs.trajectory is None:
+        return None
+    given = _trajectory(inputs.sequence)
+    if given is not None:
+        inputs.part("trajectory").notes.append("The camera path is compared with the poses that the log gave.")
+    return given
 
 
 def _check_same_walk(inputs: Inputs, part: Part, poses: int) -> None:

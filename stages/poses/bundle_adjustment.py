@@ -1,0 +1,128 @@
+"""Global bundle adjustment of the key frames (pycolmap) over the features that tracking and loops matched.
+
+Bundle adjustment knows no scale: afterwards the depth of the features gives it back, and the result is laid onto the
+poses it started from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from schemas.scene_parts import Camera
+from stages.kit.geometry.transforms import apply, inverse
+from stages.poses.estimation import Estimate
+from stages.poses.features import Features, match_features
+from stages.poses.frame_poses import largest_part
+from stages.poses.pose_graph import Edge
+from stages.poses.tracking import KeyFrame
+from stages.poses.world import laid_onto
+
+LEAST_TRACKS = 30
+"""Fewer tracks than this adjust nothing."""
+BELIEVED = 0.5
+LOSS_SCALE = 2.0
+"""Reprojection errors above this count less [pixels]."""
+
+
+def adjust(estimate: Estimate, camera: Camera) -> Estimate:
+    """Return the estimate with key frames of its largest part moved to where their features agree best.
+
+    Without enough tracks, or without scale, the estimate is returned as it is.
+    """
+    poses, part = estimate.world_from_key, largest_part(estimate)
+    edges = [
+        edge
+        for edge, weight in zip(estimate.edges, estimate.solution.weights, strict=True)
+        if weight >= BELIEVED and estimate.parts[edge.target] == part == estimate.parts[edge.source]
+    ]
+    tracks = feature_tracks(estimate.track.keys, edges)
+    if len(tracks) < LEAST_TRACKS:
+        return estimate
+    used = sorted({key for track in tracks for key, _ in track})
+    adjusted = _bundle(estimate.track.keys, poses, tracks, used, camera)
+    if adjusted is None:
+        return estimate
+    motion = laid_onto(adjusted, poses[used])
+    moved = poses.copy()
+    moved[used] = motion @ adjusted
+    return replace(estimate, world_from_key=moved)
+
+
+def feature_tracks(keys: list[KeyFrame], edges: list[Edge]) -> list[list[tuple[int, int]]]:
+    """Return tracks, lists of (key frame, feature), of features that edges join and whose points agree with them.
+
+    A track that holds two features of one key frame is dropped.
+    """
+    parent: dict[tuple[int, int], tuple[int, int]] = {}
+
+    def root(item: tuple[int, int]) -> tuple[int, int]:
+        while parent.setdefault(item, item) != item:
+            parent[item] = parent[parent[item]]
+            item = parent[item]
+        return item
+
+    for edge in edges:
+        for there, here in _agreeing(keys[edge.target].features, keys[edge.source].features, edge.target_from_source):
+            first, second = root((edge.target, there)), root((edge.source, here))
+            parent[max(first, second)] = min(first, second)
+    groups: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for item in sorted(parent):
+        groups.setdefault(root(item), []).append(item)
+    return [group for group in groups.values() if len(group) > 1 and len({key for key, _ in group}) == len(group)]
+
+
+def _agreeing(target: Features, source: Features, target_from_source: np.ndarray) -> list[tuple[int, int]]:
+    pairs = match_features(target, source)
+    if not len(pairs):
+        return []
+    moved = apply(target_from_source, source.points[pairs[:, 1]].astype(float))
+    points = target.points[pairs[:, 0]].astype(float)
+    near = np.linalg.norm(moved - points, axis=1) < 0.03 + 0.01 * points[:, 2] ** 2
+    return [(int(a), int(b)) for a, b in pairs[near]]
+
+
+def _bundle(
+    keys: list[KeyFrame], poses: np.ndarray, tracks: list[list[tuple[int, int]]], used: list[int], camera: Camera
+) -> np.ndarray | None:
+    """Return the adjusted world_from_key (U, 4, 4) of the key frames `used` in metres, or None without scale."""
+    import pycolmap
+
+    model = pycolmap.Reconstruction()
+    # Its pixel centres are at halves.
+    parameters = [camera.fx, camera.fy, camera.cx + 0.5, camera.cy + 0.5]
+    model.add_camera_with_trivial_rig(
+        pycolmap.Camera(model="PINHOLE", width=camera.width, height=camera.height, params=parameters, camera_id=1)
+    )
+    for key in used:
+        image = pycolmap.Image(
+            name=f"{key:06d}", keypoints=keys[key].features.pixels.astype(float) + 0.5, camera_id=1, image_id=key + 1
+        )
+        model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(inverse(poses[key])[:3]))
+    for track in tracks:
+        points = [apply(poses[key], keys[key].features.points[row].astype(float)) for key, row in track]
+        elements = [pycolmap.TrackElement(key + 1, row) for key, row in track]
+        model.add_point3D(np.mean(points, axis=0), pycolmap.Track(elements))
+    options = pycolmap.BundleAdjustmentOptions(
+        refine_focal_length=False, refine_extra_params=False, print_summary=False
+    )
+    options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
+    options.ceres.loss_function_scale = LOSS_SCALE
+    options.ceres.solver_options.num_threads = 1
+    pycolmap.bundle_adjustment(model, options)
+    result = np.array(
+        [inverse(np.vstack([model.images[key + 1].cam_from_world().matrix(), [0, 0, 0, 1]])) for key in used]
+    )
+    ratios = []
+    for pose, key in zip(result, used, strict=True):
+        camera_from_world, features = inverse(pose), keys[key].features
+        for row, point in enumerate(model.images[key + 1].points2D):
+            if point.has_point3D():
+                modelled = apply(camera_from_world, model.points3D[point.point3D_id].xyz)[2]
+                if modelled > 0:
+                    ratios.append(float(features.points[row, 2]) / modelled)
+    if len(ratios) < LEAST_TRACKS:
+        return None
+    result[:, :3, 3] *= np.median(ratios)
+    return result
