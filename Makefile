@@ -93,6 +93,12 @@ real: setup ## The chain on real logs, one table; fails unless it finds what the
 bench-preflight: setup ## What `inspect` makes of planted faults (QUICK=1: three rooms)
 	$(PYTHON) -m benchmarks.tables.preflight $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-preflight
 
+.PHONY: bench-poses
+# The red kitchen, Redwood's living room, the dining room (REAL_DATA), and six generated rooms of the reporting seeds
+# (QUICK=1: one). What is measured already is kept; FRESH=1 measures it again.
+bench-poses: setup ## Estimated camera paths: error, speed, effect on the map (QUICK=1: one room, two arms)
+	$(PYTHON) -m benchmarks.tables.poses $(if $(QUICK),--quick) $(if $(FRESH),--fresh) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-poses$(if $(QUICK),-quick)
+
 .PHONY: bench-mapping
 # Twenty generated rooms (three of fewer frames with QUICK=1), every arm on the same frames and masks. A stopped run
 # goes on where it was.

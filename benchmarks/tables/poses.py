@@ -1,0 +1,339 @@
+"""`make bench-poses`: how far estimated camera paths are from the given ones, how fast, and what it does to the map.
+
+Arms: `odometry` (no loops), `ours` (loops and pose graph), `ours_bundle` (and bundle adjustment), `ours_depth` (depth
+alone), `sfm` (features alone, pycolmap), and `open3d` (Open3D's tensor RGB-D odometry, frame to frame, hybrid, the same
+resolution). Logs: the red kitchen of 7-Scenes, Redwood's living room (whose poses are themselves an estimate), the five
+frames of the dining room, and generated rooms of the reporting seeds. Writes metrics.json, table.md and a plan of the
+paths of every log; results of a log and an arm that are there already are kept unless --fresh.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import shutil
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.mapping.drift import drifting_poses
+from schemas.kinds import GroundTruth, Segments, Sequence, Trajectory
+from stages.evaluate.parameters import EvaluateParameters
+from stages.evaluate.stage import run as evaluate
+from stages.fuse.parameters import FuseParameters
+from stages.fuse.stage import run as fuse
+from stages.kit.formats.frames import FrameReader
+from stages.kit.formats.trajectories import read_tum, write_tum
+from stages.kit.geometry.cameras import intrinsic_matrix
+from stages.kit.geometry.transforms import apply
+from stages.kit.measurement.plots import SERIES_COLORS, STYLE, plt, save
+from stages.kit.measurement.pose_error import align_rigidly, associate, trajectory_error
+from stages.kit.measurement.relative_pose_error import trajectory_drift
+from stages.kit.progress import SilentProgress
+from stages.kit.running.chain import run_command
+from stages.kit.running.reading import open_artifact
+from stages.kit.stage import Context
+from stages.poses.parameters import PosesParameters
+from stages.poses.stage import run as estimate_poses
+from stages.poses.world import laid_onto
+
+RECIPES = ("room", "kitchen", "office", "bedroom")
+REPORTING_SEEDS = range(1100, 1106)
+"""In the reporting range of the recipes; nothing was tuned on them."""
+REAL = {
+    "7scenes_kitchen": "7scenes_redkitchen",
+    "redwood_livingroom": "redwood_livingroom1",
+    "diningroom": "slambook2_rgbd/diningroom",
+}
+INTRINSICS = {"diningroom": ("--fx", "518", "--fy", "519", "--cx", "325.5", "--cy", "253.5")}
+ARMS: dict[str, PosesParameters | None] = {
+    "odometry": PosesParameters(loop_closure=False),  # type: ignore[call-arg]
+    "ours": PosesParameters(),  # type: ignore[call-arg]
+    "ours_bundle": PosesParameters(bundle_adjustment=True),  # type: ignore[call-arg]
+    "ours_depth": PosesParameters(use_color=False),  # type: ignore[call-arg]
+    "sfm": PosesParameters(method="sfm"),  # type: ignore[call-arg]
+    "open3d": None,
+}
+QUICK_ARMS = ("odometry", "ours")
+CORRUPTION = "0.2"
+MEASURES = (
+    "ate_m", "rpe_second_m", "rpe_second_rad", "rpe_metre_m", "posed_share", "loops", "frames_per_cpu_second",
+    "frames_per_second",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Log:
+    """One log, ingested."""
+
+    name: str
+    sequence: Sequence
+    ground_truth: GroundTruth | None
+
+    def given(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times (N,) and poses (N, 4, 4) to compare with."""
+        return read_tum(self.sequence.path("trajectory.tum"))
+
+
+def made(arguments: list[str], out: Path) -> Path:
+    """Run a scenewright command that writes `out` (nothing happens when it is up to date)."""
+    code, _ = run_command([*arguments, "--out", str(out), "--quiet"])
+    if code != 0:
+        sys.exit(f"{' '.join(arguments)} exited with {code}")
+    return out
+
+
+def logs_of(arguments: argparse.Namespace) -> list[Log]:
+    """Ingest the real logs, generate and ingest the rooms."""
+    wanted: Callable[[str], bool] = lambda name: not arguments.only or name in arguments.only  # noqa: E731
+    folder, logs = arguments.out / "logs", []
+    for name, where in REAL.items():
+        log = arguments.data / where
+        if log.is_dir() and wanted(name):
+            made(["ingest", "--log", str(log), *INTRINSICS.get(name, ())], folder / name)
+            logs.append(Log(name, open_artifact(folder / name, Sequence), None))  # type: ignore[arg-type]
+    rooms = [(RECIPES[k % len(RECIPES)], seed) for k, seed in enumerate(REPORTING_SEEDS)]
+    frames = ["--frames", "240" if arguments.quick else "400", "--width", "320", "--height", "240"]
+    for recipe, seed in rooms[:1] if arguments.quick else rooms:
+        name = f"{recipe}_{seed}"
+        if not wanted(name):
+            continue
+        library = made(["library", "build", "--seed", "1"], folder / "library")
+        synthesize = ["synthesize", "--library", str(library), "--recipe", recipe, "--seed", str(seed), *frames]
+        truth = made(synthesize, folder / f"{name}_truth")
+        made(["ingest", "--log", f"{truth}/log.mcap"], folder / name)
+        logs.append(Log(name, open_artifact(folder / name, Sequence), open_artifact(truth, GroundTruth)))  # type: ignore[arg-type]
+    return logs
+
+
+def run_arm(log: Log, arm: str, output: Path) -> dict[str, float | None]:
+    """Estimate the poses of a log into `output` and measure them."""
+    if output.exists():
+        shutil.rmtree(output)
+    output.mkdir(parents=True)
+    parameters = ARMS[arm]
+    cpu, wall = time.process_time(), time.perf_counter()
+    loops = 0
+    if parameters is None:
+        frames = open3d_odometry(log.sequence, output)
+    else:
+        context = Context(output, seed=0, device="cpu", progress=SilentProgress())
+        info = estimate_poses(log.sequence, parameters=parameters, context=context).info
+        frames, loops = len(info.frames), sum(loop.weight >= 0.5 for loop in info.loops)
+    cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
+    times, poses = read_tum(output / "trajectory.tum")
+    error = trajectory_error(*log.given(), times, poses)
+    drift = trajectory_drift(*log.given(), times, poses)
+    second, metre = drift.per_second, drift.per_metre
+    return {
+        "ate_m": error.rmse_aligned if error else None,
+        "rpe_second_m": second.translation_rmse if second else None,
+        "rpe_second_rad": second.rotation_mean if second else None,
+        "rpe_metre_m": metre.translation_rmse if metre else None,
+        "posed_share": len(times) / frames,
+        "loops": float(loops),
+        "frames_per_cpu_second": frames / cpu,
+        "frames_per_second": frames / wall,
+    }
+
+
+def open3d_odometry(sequence: Sequence, output: Path) -> int:
+    """Write the path that Open3D's hybrid odometry finds frame to frame at half the width; return how many frames."""
+    import open3d.core as o3c
+    from open3d.t.geometry import Image, RGBDImage
+    from open3d.t.pipelines import odometry
+
+    criteria = [odometry.OdometryConvergenceCriteria(n) for n in (10, 5, 3)]
+    losses = odometry.OdometryLossParams(0.07, 0.05, 0.1)
+    poses, previous = [np.eye(4)], None
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        stride = max(1, reader.camera.width // 320)
+        matrix = intrinsic_matrix(reader.camera)
+        matrix[:2] /= stride
+        for frame in reader.frames(("color", "depth")):
+            assert frame.color is not None and frame.depth is not None
+            color, depth = (np.ascontiguousarray(x[::stride, ::stride]) for x in (frame.color, frame.depth))
+            image = RGBDImage(Image(o3c.Tensor(color)), Image(o3c.Tensor(depth)))
+            if previous is not None:
+                found = odometry.rgbd_odometry_multi_scale(
+                    image, previous, o3c.Tensor(matrix), o3c.Tensor(np.eye(4)), 1.0, 4.5, criteria,
+                    odometry.Method.Hybrid, losses,
+                )  # fmt: skip
+                poses.append(poses[-1] @ found.transformation.numpy())
+            previous = image
+        write_tum(output / "trajectory.tum", reader.times, np.array([orthonormal(pose) for pose in poses]))
+        return len(reader)
+
+
+def orthonormal(pose: np.ndarray) -> np.ndarray:
+    """Return the pose with its rotation made orthonormal."""
+    u, _, vt = np.linalg.svd(pose[:3, :3])
+    result = pose.copy()
+    result[:3, :3] = u @ vt
+    return result
+
+
+def draw_paths(log: Log, paths: dict[str, Path], file: Path) -> None:
+    """Draw the paths from above, each aligned with the given one."""
+    times, given = log.given()
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(figsize=(6.0, 5.2))
+        axes.plot(given[:, 0, 3], given[:, 1, 3], color="#222222", linewidth=2.2, label="given")
+        for (name, path), color in zip(paths.items(), SERIES_COLORS, strict=False):
+            own, poses = read_tum(path / "trajectory.tum")
+            true_rows, rows = associate(times, own)
+            if len(rows) < 3:
+                continue
+            centres = apply(align_rigidly(poses[rows, :3, 3], given[true_rows, :3, 3]), poses[:, :3, 3])
+            axes.plot(centres[:, 0], centres[:, 1], color=color, linewidth=1.1, label=name)
+        axes.set_aspect("equal")
+        axes.set_xlabel("x [m]")
+        axes.set_ylabel("y [m]")
+        axes.set_title(f"{log.name}: camera path from above")
+        axes.legend()
+        file.parent.mkdir(parents=True, exist_ok=True)
+        save(figure, file)
+
+
+def map_quality(log: Log, paths: dict[str, Path], out: Path) -> dict[str, dict[str, float | None]]:
+    """Return panoptic quality of maps fused with exact, estimated and drifting poses (true masks, corruption 0.2)."""
+    assert log.ground_truth is not None
+    folder = out / "maps" / log.name
+    command = ["segment", "--sequence", str(log.sequence.root), "--backend", "ground-truth", "--corruption", CORRUPTION]
+    segments = open_artifact(made(command, folder / "segments"), Segments)
+    trajectories: dict[str, Path | None] = {"exact": None, **paths}
+    times, given = log.given()
+    drifting = folder / "drifting_path"
+    drifting.mkdir(parents=True, exist_ok=True)
+    drifted = drifting_poses(given, np.random.default_rng(0))
+    drifted = laid_onto(drifted, given) @ drifted
+    write_tum(drifting / "trajectory.tum", times, np.array([orthonormal(pose) for pose in drifted]))
+    trajectories["drifting"] = drifting
+    results = {}
+    for name, path in trajectories.items():
+        output = folder / name
+        for part in ("map", "evaluation"):
+            shutil.rmtree(output / part, ignore_errors=True)
+            (output / part).mkdir(parents=True)
+        progress = SilentProgress()
+        fused = fuse(
+            log.sequence, segments, None if path is None else Trajectory(path),  # type: ignore[arg-type]
+            parameters=FuseParameters(), context=Context(output / "map", 0, "cpu", progress),  # type: ignore[call-arg]
+        )  # fmt: skip
+        evaluate(
+            log.ground_truth, log.sequence, None if path is None else Trajectory(path), None, fused,
+            parameters=EvaluateParameters(plots=False),  # type: ignore[call-arg]
+            context=Context(output / "evaluation", 0, "cpu", progress),
+        )  # fmt: skip
+        metrics = json.loads((output / "evaluation" / "metrics.json").read_text())["metrics"]
+        results[name] = {
+            "pq": metrics["map/pq"],
+            "accuracy_mm": metrics["map/accuracy_mean_mm"],
+            "ate_m": metrics.get("trajectory/ate_rmse_aligned_m") if path is not None else 0.0,
+        }
+        print(f"{log.name:20} map {name:12} {results[name]}", file=sys.stderr, flush=True)
+    return results
+
+
+def table(
+    rows: dict[str, dict[str, dict[str, float | None]]], maps: dict[str, dict[str, dict[str, float | None]]]
+) -> str:
+    """Return the Markdown tables."""
+    header = [
+        "log",
+        "arm",
+        "ATE [cm]",
+        "RPE [cm/s]",
+        "RPE [deg/s]",
+        "RPE [cm/m]",
+        "posed",
+        "loops",
+        "frames/CPU s",
+        "frames/s",
+    ]
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    scales = (100.0, 100.0, float(np.degrees(1.0)), 100.0, 100.0, 1.0, 1.0, 1.0)
+    digits = (2, 2, 2, 2, 0, 0, 1, 1)
+    for log, arms in rows.items():
+        for arm, row in arms.items():
+            cells = [_cell(row[name], scale, k) for name, scale, k in zip(MEASURES, scales, digits, strict=True)]
+            cells[4] += " %"
+            lines.append("| " + " | ".join([log, arm, *cells]) + " |")
+    generated = {log: arms for log, arms in rows.items() if log not in REAL}
+    for arm in next(iter(generated.values()), {}):
+        values = [arms[arm]["ate_m"] for arms in generated.values() if arm in arms and arms[arm]["ate_m"] is not None]
+        if len(values) > 1:
+            text = f"{100 * float(np.median(values)):.2f}, worst {100 * max(values):.2f}"  # type: ignore[type-var]
+            lines.append(f"| {len(values)} generated rooms | {arm} | median {text} | | | | | | | |")
+    for log, arms in maps.items():
+        lines += ["", f"Map of {log}, true masks with corruption {CORRUPTION}, 2 cm voxels:", ""]
+        lines += ["| poses | ATE [cm] | PQ | surface error [mm] |", "|---|---|---|---|"]
+        for arm, row in arms.items():
+            cells = [_cell(row["ate_m"], 100, 2), _cell(row["pq"], 100, 1), _cell(row["accuracy_mm"], 1, 1)]
+            lines.append("| " + " | ".join([arm, *cells]) + " |")
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return "\n".join([*lines, "", f"Peak memory of the benchmark's process: {memory:.0f} MiB."]) + "\n"
+
+
+def _cell(value: float | None, scale: float, digits: int) -> str:
+    return "" if value is None else f"{value * scale:.{digits}f}"
+
+
+def main() -> int:
+    """Estimate, measure, draw, print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder with the real logs")
+    parser.add_argument("--out", type=Path, default=Path("outputs/experiments/bench-poses"))
+    parser.add_argument("--quick", action="store_true", help="one generated room, the arms odometry and ours")
+    parser.add_argument("--only", nargs="*", help="only these logs")
+    parser.add_argument("--arms", nargs="*", choices=list(ARMS), help="only these arms")
+    parser.add_argument("--fresh", action="store_true", help="measure again what is there already")
+    parser.add_argument("--no-map", action="store_true", help="leave out the maps")
+    arguments = parser.parse_args()
+    arms = arguments.arms or (QUICK_ARMS if arguments.quick else tuple(ARMS))
+    rows: dict[str, dict[str, dict[str, float | None]]] = {}
+    maps: dict[str, dict[str, dict[str, float | None]]] = {}
+    for log in logs_of(arguments):
+        rows[log.name], paths = {}, {}
+        for arm in arms:
+            output = arguments.out / "paths" / log.name / arm
+            kept = output.with_suffix(".json")
+            if arguments.fresh or not kept.is_file():
+                kept.unlink(missing_ok=True)
+                figures = run_arm(log, arm, output)
+                kept.write_text(json.dumps(figures))
+            rows[log.name][arm] = json.loads(kept.read_text())
+            paths[arm] = output
+            print(f"{log.name:20} {arm:12} {rows[log.name][arm]}", file=sys.stderr, flush=True)
+        draw_paths(log, paths, arguments.out / "plots" / f"{log.name}.png")
+        if log.ground_truth is not None and not maps and not arguments.no_map:
+            chosen = {arm: path for arm, path in paths.items() if arm in ("ours", "odometry", "sfm")}
+            maps[log.name] = map_quality(log, chosen, arguments.out)
+    metrics = {
+        f"{arm}/{log}/{measure}": value
+        for log, found in rows.items()
+        for arm, figures in found.items()
+        for measure, value in figures.items()
+        if value is not None
+    }
+    metrics |= {
+        f"{arm}/map_{log}/{measure}": value
+        for log, found in maps.items()
+        for arm, figures in found.items()
+        for measure, value in figures.items()
+        if value is not None
+    }
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    (arguments.out / "metrics.json").write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
+    (arguments.out / "table.md").write_text(table(rows, maps))
+    print(table(rows, maps))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
