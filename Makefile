@@ -118,3 +118,11 @@ scenenn: setup ## The thesis's tables on SceneNN: make scenenn DATA=folder (OPTI
 .PHONY: pictures
 pictures: setup ## Take the README's pictures out of the demo run
 	$(PYTHON) docs/pictures.py $(OUTPUTS)/demo
+
+.PHONY: train-network bench-network
+# About 15 minutes for the frames and an hour for the training, on one core each; stop it and start it again at will.
+train-network: setup ## Make the network of `segment --backend network` anew (QUICK=1: proves the recipe in a minute or two)
+	$(PYTHON) -m benchmarks.training $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/train-network$(if $(QUICK),-quick)
+
+bench-network: setup ## Our own network on rooms held back, real clouds and real logs (QUICK=1: fewer frames)
+	$(PYTHON) -m benchmarks.tables.network $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-network
