@@ -156,6 +156,17 @@ def _network(request: BackendRequest) -> Backend:
     return NetworkBackend(load_vocabulary(), request.weights, sequence=sequence, reader=request.reader)
 
 
+def _objects(request: BackendRequest) -> Backend:
+    # Imported here: its loops are compiled when they are first used.
+    from stages.segment.objects.backend import ObjectsBackend
+
+    _, reader = request.log()
+    parameters = request.parameters
+    return ObjectsBackend(
+        load_vocabulary(), reader.camera, learned=parameters.grouping == "learned", largest=parameters.largest_object
+    )
+
+
 def _require_color(sequence: Sequence, backend: str) -> None:
     if "color" not in sequence.info.streams:
         raise BadInput(
@@ -168,6 +179,7 @@ NEEDS_COLOR = frozenset({"huggingface", "onnx"})
 BUILDERS: dict[str, Callable[[BackendRequest], Backend]] = {
     "ground-truth": _ground_truth,
     "geometric": _geometric,
+    "objects": _objects,
     "detector": _detector,
     "network": _network,
     "auto": _network,

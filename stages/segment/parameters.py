@@ -86,6 +86,13 @@ class SegmentParameters(Parameters):
         True, description="Detect on overlapping tiles at full resolution too (finds small things, five times slower)"
     )
 
+    grouping: Literal["learned", "rules"] = Field(
+        "learned", description="What tells --backend objects which patches are one object: trained trees, or set rules"
+    )
+    largest_object: float = Field(
+        0.6, gt=0, description="What is larger across is no object for --backend objects [m]"
+    )
+
     words: str = Field(
         "",
         description="What an open-vocabulary model looks for: `cup, table, blue mug = cup`; a word without a class "
@@ -120,6 +127,8 @@ OWN_NETWORK = frozenset({"network", "auto"})
 def _data_files(parameters: SegmentParameters) -> tuple[str, ...]:
     if parameters.backend in OWN_NETWORK:
         return ("networks/panoptic.safetensors",)
+    if parameters.backend == "objects":
+        return ("networks/tabletop_pairs.safetensors",) if parameters.grouping == "learned" else ()
     return LABEL_FILES if parameters.backend in LABELLED or is_service(parameters.backend) else ()
 
 

@@ -45,6 +45,8 @@ FEATURES = (
     "extent",
     "depth",
     "top_difference",
+    "cut",
+    "fine_steps",
 )
 """Names of the features, in order."""
 COUNT = len(FEATURES)
@@ -128,6 +130,8 @@ def pair_features(
     if border[14] > 0:
         f[11] = border[8] / border[14]
         f[12] = border[9] / border[14]
+        f[37] = border[16] / border[14]
+        f[36] = border[15] / length
     shared = 0.0
     for k in range(colors.shape[1]):
         shared += min(colors[a, k] / na, colors[b, k] / nb)

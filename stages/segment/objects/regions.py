@@ -19,14 +19,16 @@ HEIGHT_BIN = 0.005
 POINT_SUMS = 1 + 3 + 6 + 3 + 9 + 3
 """Columns of `Regions.sums`: pixels; x y z; xx xy xz yy yz zz; normal; u v uu uv vv w uw vw ww (column, row, inverse
 depth); L a b."""
-BORDER_SUMS = 15
+BORDER_SUMS = 17
 """Layers of `Regions.borders`, see `_border_sums`."""
 REACH = 4
 """Normals and colours beside a border are taken this many pixels inside, where no window reaches over it."""
 CONCAVE, CONVEX = -0.12, 0.15
 """Bounds of (p - q) . (n_p - n_q) / |p - q|."""
 COLOR_STEP = 14.0
-"""A colour difference (CIE 1976) across a border over this is a step."""
+"""A colour difference (CIE 1976, lightness counts half) across a border over this is a step."""
+FINE_REACH, FINE_STEP = 2, 5.0
+"""The same close to the border: what a thin line or a faint step shows."""
 
 
 @dataclass
@@ -53,6 +55,12 @@ def lab_image(color: np.ndarray) -> np.ndarray:
     """Return (H, W, 3) float32 CIE Lab of RGB (H, W, 3) uint8, slightly smoothed: L 0..100, a and b about -100..100."""
     smooth = cv2.GaussianBlur(color, (5, 5), 1.0)
     return cv2.cvtColor(smooth.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
+
+
+@njit(cache=True)
+def color_difference(a: np.ndarray, b: np.ndarray) -> float:
+    """Return the difference of two Lab colours (3,), lightness at half weight: it changes with the light on a face."""
+    return np.sqrt(0.25 * (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
 @njit(cache=True)
@@ -114,6 +122,7 @@ def _point_sums(
 @njit(cache=True)
 def _border_sums(
     labels: np.ndarray,
+    patch_of: np.ndarray,
     points: np.ndarray,
     normals: np.ndarray,
     inverse: np.ndarray,
@@ -126,7 +135,8 @@ def _border_sums(
     """Layers: 0 sides; 1 connected sides; 2 sides where a is nearer minus those where b is; 3 sides sampled inside;
     4 sum of the convexity; 5 concave; 6 convex; 7 sum of the normals' cosine; 8 sum of the colour difference;
     9 colour steps; 10 height of a minus height of b [m]; 11 upward share of a's normals; 12 of b's; 13 sum of the
-    difference of the inverse depth where not connected; 14 colour samples."""
+    difference of the inverse depth where not connected; 14 colour samples; 15 sides along a cut through one patch;
+    16 fine colour steps."""
     borders = np.zeros((count + 1, count + 1, BORDER_SUMS), dtype=np.float32)
     perimeters = np.zeros(count + 1, dtype=np.float64)
     rows, columns = labels.shape
@@ -169,6 +179,9 @@ def _border_sums(
                     o[2] -= sign
                     e[13] += abs(difference)
                     o[13] += abs(difference)
+                if patch_of[a] == patch_of[b]:
+                    e[15] += 1
+                    o[15] += 1
                 # Step inside, as far as the patches reach.
                 pv, pu, qv, qu = v, u, row, column
                 for k in range(1, REACH + 1):
@@ -178,11 +191,10 @@ def _border_sums(
                     nv, nu = row + side * k, column + (1 - side) * k
                     if nv < rows and nu < columns and labels[nv, nu] == b:
                         qv, qu = nv, nu
-                d0 = lab[pv, pu, 0] - lab[qv, qu, 0]
-                d1 = lab[pv, pu, 1] - lab[qv, qu, 1]
-                d2 = lab[pv, pu, 2] - lab[qv, qu, 2]
-                # Lightness changes with the lighting of faces: it counts half.
-                step = np.sqrt(0.25 * d0 * d0 + d1 * d1 + d2 * d2)
+                    if k == FINE_REACH and color_difference(lab[pv, pu], lab[qv, qu]) > FINE_STEP:
+                        e[16] += 1
+                        o[16] += 1
+                step = color_difference(lab[pv, pu], lab[qv, qu])
                 e[14] += 1
                 o[14] += 1
                 e[8] += step
@@ -265,6 +277,7 @@ def _hulls(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 def measure_regions(
     labels: np.ndarray,
+    patch_of: np.ndarray,
     points: np.ndarray,
     normals: np.ndarray,
     inverse: np.ndarray,
@@ -274,7 +287,7 @@ def measure_regions(
     *,
     jump: float,
 ) -> Regions:
-    """Return the sums of patches `labels` (H, W) int32 1..n.
+    """Return the sums of patches `labels` (H, W) int32 1..n; pieces of one patch have the same `patch_of` (n + 1,).
 
     `points`, `normals` (H, W, 3) [m, camera frame], `inverse` (H, W) [1/m], `height` (H, W) [m] over the support
     surface, `lab` (H, W, 3) of lab_image, `up` (3,) the surface's normal; `jump` as PatchSettings.jump.
@@ -282,7 +295,7 @@ def measure_regions(
     count = int(labels.max(initial=0))
     sums, colors, heights = _point_sums(labels, points, normals, inverse, height, lab, count)
     borders, perimeters = _border_sums(
-        labels, points, normals, inverse, height, lab, np.asarray(up, dtype=np.float32), count, jump
+        labels, patch_of, points, normals, inverse, height, lab, np.asarray(up, dtype=np.float32), count, jump
     )
     corners, starts = _hulls(labels, count)
     return Regions(sums, colors, heights, perimeters, borders, corners, starts)

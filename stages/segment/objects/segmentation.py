@@ -10,6 +10,7 @@ import numpy as np
 from schemas.scene_parts import Camera
 from stages.segment.geometric import pixels_at, relabel
 from stages.segment.objects.boosting import NO_TREES, Trees
+from stages.segment.objects.cuts import CutSettings, cut_patches
 from stages.segment.objects.grouping import Recording, group_patches
 from stages.segment.objects.patches import PatchFrame, PatchSettings, find_patches
 from stages.segment.objects.regions import lab_image, measure_regions
@@ -25,6 +26,7 @@ class ObjectSettings:
 
     patches: PatchSettings = field(default_factory=PatchSettings)
     support: SupportSettings = field(default_factory=SupportSettings)
+    cuts: CutSettings = field(default_factory=CutSettings)
     threshold: float = 0.0
     """Pairs with a higher score are joined."""
     minimum_pixels: int = 250
@@ -60,18 +62,23 @@ def segment_objects(
         raise ValueError(f"color {color.shape} and depth {depth.shape} do not match {camera.height} x {camera.width}")
     patches = find_patches(depth, camera, settings.patches, settings.support)
     up = patches.supports[0].normal if patches.supports else UP_WITHOUT_SURFACE
+    lab = lab_image(color)
+    pieces, patch_of = cut_patches(
+        patches.labels, patches.points, patches.normals, lab, up, camera.fx, settings.cuts
+    )
     regions = measure_regions(
-        patches.labels,
+        pieces,
+        patch_of,
         patches.points,
         patches.normals,
         patches.inverse,
         patches.height,
-        lab_image(color),
+        lab,
         up,
         jump=settings.patches.jump,
     )
-    group_of = group_patches(regions, patches.labels, patches.inverse, trees, settings.threshold, recording)
-    labels = group_of[patches.labels].astype(np.int32)
+    group_of = group_patches(regions, pieces, patches.inverse, trees, settings.threshold, recording)
+    labels = group_of[pieces].astype(np.int32)
     labels = _holes_closed(labels, depth > 0, pixels_at(settings.largest_hole, depth.shape))
     large = np.bincount(labels.ravel()) >= pixels_at(settings.minimum_pixels, depth.shape)
     large[0] = False
