@@ -2,21 +2,60 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Hashable
 
 import numpy as np
 
+ClassInstance = tuple[int, int]
+"""(c, p)"""
 
-@dataclass
+
 class TripleCounts:
-    """Sparse counts: only triples that were seen are held. `by_segment[l][(c, p)]` is Phi(l, c, p) > 0."""
+    """Sparse counts: only triples that were seen are held. `by_segment[l][(c, p)]` is Phi(l, c, p) > 0; to be read, and
+    changed by the methods alone.
 
-    by_segment: dict[int, dict[tuple[int, int], int]] = field(default_factory=dict)
+    Which segments an instance was counted on, and what was counted since somebody last looked, is kept beside, so that
+    a frame costs what it sees, not what the map holds.
+    """
+
+    def __init__(self) -> None:
+        self.by_segment: dict[int, dict[ClassInstance, int]] = {}
+        self._segments: dict[ClassInstance, set[int]] = {}
+        self._totals: dict[ClassInstance, int] = {}
+        self._classes: dict[int, set[int]] = {}
+        self._instances: dict[int, set[int]] = {}
+        self._changed: set[int] = set()
+        self._rule: Hashable = None
 
     def add(self, segment: int, class_id: int, instance: int, amount: int = 1) -> None:
         """Increase Phi(segment, class_id, instance) (eq. 2.4)."""
+        key = (class_id, instance)
         row = self.by_segment.setdefault(segment, {})
-        row[(class_id, instance)] = row.get((class_id, instance), 0) + amount
+        row[key] = row.get(key, 0) + amount
+        self._segments.setdefault(key, set()).add(segment)
+        self._totals[key] = self._totals.get(key, 0) + amount
+        self._classes.setdefault(instance, set()).add(class_id)
+        self._instances.setdefault(class_id, set()).add(instance)
+        self._changed.add(segment)
+
+    def total(self, class_id: int, instance: int) -> int:
+        """Return the sum of Phi(l, class_id, instance) over all segment labels l."""
+        return self._totals.get((class_id, instance), 0)
+
+    def segments(self, class_id: int, instance: int) -> frozenset[int] | set[int]:
+        """Return the segment labels on which an instance was counted with a class; not to be changed."""
+        return self._segments.get((class_id, instance), frozenset())
+
+    def instances_of(self) -> dict[int, set[int]]:
+        """Return {c: instance labels that were counted with class c anywhere}; not to be changed."""
+        return self._instances
+
+    def take_changed(self, rule: Hashable) -> set[int]:
+        """Return the segment labels whose counts changed since this was last called with the same rule, all of them
+        when the rule is another one: what the rule did not find before, it can find there alone."""
+        changed = self._changed if rule == self._rule else set(self.by_segment)
+        self._changed, self._rule = set(), rule
+        return changed
 
     def instances(self, segment: int, class_id: int) -> dict[int, int]:
         """Return {p: Phi(segment, class_id, p)} of the positive counts."""
@@ -26,14 +65,18 @@ class TripleCounts:
     def merge_segments(self, removed: int, kept: int) -> None:
         """Move all counts of segment label `removed` to `kept`."""
         for (class_id, instance), count in self.by_segment.pop(removed, {}).items():
+            self._segments[class_id, instance].discard(removed)
+            self._totals[class_id, instance] -= count
             self.add(kept, class_id, instance, count)
 
     def merge_instances(self, removed: int, kept: int) -> None:
         """Move all counts of instance label `removed` to `kept`, on every segment."""
-        for row in self.by_segment.values():
-            for class_id, instance in [key for key in row if key[1] == removed]:
-                count = row.pop((class_id, instance))
-                row[(class_id, kept)] = row.get((class_id, kept), 0) + count
+        for class_id in sorted(self._classes.pop(removed, ())):
+            key = (class_id, removed)
+            for segment in sorted(self._segments.pop(key)):
+                self.add(segment, class_id, kept, self.by_segment[segment].pop(key))
+            del self._totals[key]
+            self._instances[class_id].discard(removed)
 
     def best(self, segment: int) -> tuple[int, int] | None:
         """Return (c, p) of a segment label, or None when nothing was counted (eq. 2.6).

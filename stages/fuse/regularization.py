@@ -3,82 +3,105 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
 
 from stages.fuse.counts import TripleCounts
 
+Pair = tuple[int, int]
+"""(smaller label, larger label)"""
+
 
 class MergedLabels:
     """Which label each label was merged into. The older label (the smaller number) stays."""
 
     def __init__(self) -> None:
-        self._parents = [0]
+        self._roots = np.zeros(64, dtype=np.int32)
+        self._count = 1
 
     def new(self) -> int:
         """Make the next label and return it; the first is 1."""
-        self._parents.append(len(self._parents))
-        return self._parents[-1]
+        if self._count == len(self._roots):
+            self._roots = np.concatenate([self._roots, np.zeros_like(self._roots)])
+        self._roots[self._count] = self._count
+        self._count += 1
+        return self._count - 1
 
     def root(self, label: int) -> int:
         """Return the label that `label` is part of."""
-        while self._parents[label] != label:
-            label = self._parents[label]
-        return label
+        return int(self._roots[label])
 
     def merge(self, first: int, second: int) -> tuple[int, int] | None:
         """Merge two labels; return (removed, kept), or None when they are one already."""
         kept, removed = sorted((self.root(first), self.root(second)))
         if kept == removed:
             return None
-        self._parents[removed] = kept
+        used = self._roots[: self._count]
+        used[used == removed] = kept
         return removed, kept
 
     def table(self) -> np.ndarray:
         """Return (L + 1,) int32: the root of every label 0 .. L."""
-        return np.array([self.root(label) for label in range(len(self._parents))], dtype=np.int32)
+        return self._roots[: self._count].copy()
 
 
-@dataclass
 class PairEvidence:
     """How often two labels were seen as one (`together`), and how often as two in one frame (`apart`).
 
     Of global segment labels: lying in one frame segment (Grinvald 2019), or matched to different ones. Of global
     instance labels: on the segments of one frame instance, or of different ones. Keys: (smaller label, larger label).
+    To be read, and changed by the methods alone.
     """
 
-    together: dict[tuple[int, int], int] = field(default_factory=dict)
-    apart: dict[tuple[int, int], int] = field(default_factory=dict)
+    def __init__(self) -> None:
+        self.together: dict[Pair, int] = {}
+        self.apart: dict[Pair, int] = {}
+        self._pairs: dict[int, set[Pair]] = {}
+        """The pairs that each label is in."""
+        self._open: set[Pair] = set()
+        """Pairs that may be due: those that gained since `due` last looked, and those that it found."""
+        self._rule: tuple[int, bool] | None = None
 
     def observe(self, groups: Iterable[Iterable[tuple[int, int]]], matched: Iterable[int]) -> None:
         """Count one frame: `groups` holds the pairs of labels that were seen as one, by segment or instance of the
         frame; `matched` all labels of the frame. Pairs that were seen as one are not counted as apart."""
         seen = [pair for group in groups for pair in group]
         for pair in seen:
-            self.together[pair] = self.together.get(pair, 0) + 1
+            self._increase(self.together, pair, 1)
         for pair in set(combinations(sorted(matched), 2)) - set(seen):
-            self.apart[pair] = self.apart.get(pair, 0) + 1
+            self._increase(self.apart, pair, 1)
 
     def due(self, minimum_frames: int, *, contested: bool) -> list[tuple[int, int]]:
         """Return the pairs that were seen as one at least `minimum_frames` times, ascending; if `contested`, only those
         that were less often apart."""
-        return sorted(
-            pair
-            for pair, count in self.together.items()
-            if count >= minimum_frames and not (contested and self.apart.get(pair, 0) >= count)
-        )
+        if self._rule != (minimum_frames, contested):
+            self._rule, self._open = (minimum_frames, contested), set(self.together)
+        # Being apart more often makes no pair due, so a pair that was not due is not until it is seen as one again.
+        self._open = {pair for pair in self._open if self._is_due(pair, minimum_frames, contested)}
+        return sorted(self._open)
 
     def rename(self, removed: int, kept: int) -> None:
         """Move the counts of label `removed` to `kept`."""
-        for counts in (self.together, self.apart):
-            for pair in [pair for pair in counts if removed in pair]:
-                count = counts.pop(pair)
-                other = pair[0] if pair[1] == removed else pair[1]
-                if other != kept:
-                    renamed = (min(other, kept), max(other, kept))
-                    counts[renamed] = counts.get(renamed, 0) + count
+        for pair in sorted(self._pairs.pop(removed, ())):
+            other = pair[0] if pair[1] == removed else pair[1]
+            self._pairs[other].discard(pair)
+            self._open.discard(pair)
+            for counts in (self.together, self.apart):
+                count = counts.pop(pair, 0)
+                if count and other != kept:
+                    self._increase(counts, (min(other, kept), max(other, kept)), count)
+
+    def _is_due(self, pair: Pair, minimum_frames: int, contested: bool) -> bool:
+        count = self.together.get(pair, 0)
+        return count >= minimum_frames and not (contested and self.apart.get(pair, 0) >= count)
+
+    def _increase(self, counts: dict[Pair, int], pair: Pair, amount: int) -> None:
+        counts[pair] = counts.get(pair, 0) + amount
+        for label in pair:
+            self._pairs.setdefault(label, set()).add(pair)
+        if counts is self.together:
+            self._open.add(pair)
 
 
 def label_pairs(labels: list[int], class_id: int, counts: TripleCounts, *, guarded: bool) -> list[tuple[int, int]]:
@@ -114,13 +137,9 @@ def merge_segments(
 def shared_share(counts: TripleCounts, class_id: int, first: int, second: int) -> tuple[int, int]:
     """Return both sums of eq. 2.5 for two instance labels of a class: over the segment labels that both were counted
     on, and over all."""
-    common = total = 0
-    for row in counts.by_segment.values():
-        one, two = row.get((class_id, first), 0), row.get((class_id, second), 0)
-        total += one + two
-        if one > 0 and two > 0:
-            common += one + two
-    return common, total
+    rows = [counts.by_segment[s] for s in counts.segments(class_id, first) & counts.segments(class_id, second)]
+    common = sum(row[class_id, first] + row[class_id, second] for row in rows)
+    return common, counts.total(class_id, first) + counts.total(class_id, second)
 
 
 def merge_instances(
@@ -133,10 +152,14 @@ def merge_instances(
     larger number) goes into the older.
     """
     done = []
-    while (pair := _due_pair(counts, things, threshold, minimum_count)) is not None:
+    rule = ("eq. 2.5", things, threshold, minimum_count)
+    # What two labels have in common grows only on segments where something was counted since the last call.
+    changed = counts.take_changed(rule)
+    while (pair := _due_pair(counts, changed, things, threshold, minimum_count)) is not None:
         kept, removed = pair
         counts.merge_instances(removed, kept)
         done.append((removed, kept))
+        changed |= counts.take_changed(rule)
     return done
 
 
@@ -146,14 +169,9 @@ def merge_stuff(counts: TripleCounts, things: frozenset[int]) -> list[tuple[int,
     Ours: within a frame a stuff class has one instance only (section 2.3.1), so the map has one too, although pieces of
     floor on both sides of a table never share a segment label.
     """
-    by_class: dict[int, set[int]] = {}
-    for row in counts.by_segment.values():
-        for class_id, instance in row:
-            if class_id not in things:
-                by_class.setdefault(class_id, set()).add(instance)
     done = []
-    for class_id in sorted(by_class):
-        kept, *others = sorted(by_class[class_id])
+    for class_id in sorted(counts.instances_of().keys() - things):
+        kept, *others = sorted(counts.instances_of()[class_id])
         for removed in others:
             counts.merge_instances(removed, kept)
             done.append((removed, kept))
@@ -178,12 +196,13 @@ def merge_evident_instances(
 
 
 def _due_pair(
-    counts: TripleCounts, things: frozenset[int], threshold: float, minimum_count: int
+    counts: TripleCounts, changed: set[int], things: frozenset[int], threshold: float, minimum_count: int
 ) -> tuple[int, int] | None:
+    """Return the first pair that is due among those that share one of the `changed` segment labels, or None."""
     candidates: set[tuple[int, int, int]] = set()
-    for row in counts.by_segment.values():
+    for segment in changed:
         by_class: dict[int, list[int]] = {}
-        for class_id, instance in row:
+        for class_id, instance in counts.by_segment.get(segment, ()):
             by_class.setdefault(class_id, []).append(instance)
         for class_id, instances in by_class.items():
             candidates.update((class_id, *pair) for pair in combinations(sorted(instances), 2))

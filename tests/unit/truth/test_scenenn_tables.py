@@ -1,4 +1,4 @@
-"""`make scenenn`: scenes are found or what they lack is said; the tables hold what was measured and what was printed."""
+"""`make scenenn`: scenes are found or what they lack is said; tables hold what was measured, and what was printed."""
 
 from __future__ import annotations
 
