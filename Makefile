@@ -109,6 +109,10 @@ bench: setup ## Speed beside named peers, medians (QUICK=1: fewer runs)
 	$(PYTHON) -m benchmarks.speed.fusion $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-fusion
 	$(PYTHON) -m benchmarks.speed.segmentation $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-segmentation
 
+.PHONY: bench-growth
+bench-growth: setup ## What a frame costs as the map grows, and what holds the memory (QUICK=1: 300 frames)
+	$(PYTHON) -m benchmarks.speed.growth $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-growth
+
 .PHONY: scenenn
 # DATA=folder with SceneNN's scenes (docs/DATA.md); OPTIONS are those of the module, for example
 # OPTIONS="--backend detector --weights yolox.onnx --arms ours thesis --sequences 011 030".
