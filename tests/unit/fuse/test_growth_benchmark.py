@@ -1,0 +1,56 @@
+"""The benchmark of growth: the corridor repeats, the walk goes on, and the verdict is that of the curve."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.speed.corridor import FURNITURE, LENGTH, PER_CELL, ROOM, class_of, instance_of, moved, walk
+from benchmarks.speed.growth import REPEATS, Timers, frame_at, growth
+
+
+def test_entities_of_all_cells_have_numbers_of_their_own() -> None:
+    numbers = [instance_of(number, cell) for cell in (-1, 0, 1, 2) for number in range(len(ROOM + FURNITURE))]
+    assert len(set(numbers)) == len(numbers) and min(numbers) == 1 and len(ROOM + FURNITURE) < PER_CELL
+    assert {class_of(instance_of(len(ROOM), cell)) for cell in (-1, 0, 2)} == {FURNITURE[0][0]}
+
+
+def test_the_walk_goes_on_where_the_cell_ends() -> None:
+    poses = walk(50)
+    step = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
+    assert np.allclose(step, LENGTH / 50)
+    following = moved(poses[0], 1)
+    assert np.linalg.norm(following[:3, 3] - poses[-1, :3, 3]) == pytest.approx(LENGTH / 50)
+    np.testing.assert_allclose(following[:3, :3], poses[0, :3, :3])
+
+
+def test_a_standing_camera_stays_in_the_first_cell() -> None:
+    class Stub:
+        def __init__(self, pose: np.ndarray) -> None:
+            self.pose = pose
+
+    frames = [Stub(pose) for pose in walk(5)]
+    late = 2 * REPEATS * len(frames) + REPEATS
+    for standing, cell in ((True, 0), (False, 2)):
+        frame, pose = frame_at(frames, late, standing)  # type: ignore[arg-type]
+        assert frame is frames[1] and pose[0, 3] == pytest.approx(frames[1].pose[0, 3] + cell * LENGTH)
+
+
+def test_growth_is_the_end_beside_the_beginning() -> None:
+    def rows(costs: list[float]) -> list[dict[str, float]]:
+        return [{"frame_ms": cost} for cost in costs]
+
+    assert growth(rows([50, 10, 10, 10, 10, 10])) == 1.0, "the first window does not count"
+    assert growth(rows([5, 10, 20, 30, 60, 90])) == 5.0
+
+
+def test_timers_count_what_they_wrap() -> None:
+    class Owner:
+        @staticmethod
+        def work(number: int) -> int:
+            return sum(range(number))
+
+    timers = Timers()
+    timers.wrap(Owner, "work", "labels")
+    assert Owner.work(300_000) == 300_000 * 299_999 // 2
+    assert timers.taken()["labels"] > 0 and timers.seconds["labels"] == 0
