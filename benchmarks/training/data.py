@@ -373,6 +373,7 @@ def main() -> None:
         "validation": write_set(validation, arguments.out / "validation"),
         "training": write_set(training, arguments.out / "training"),
     }
+    (arguments.out / "done.json").write_text(json.dumps(counts) + "\n")
     print(f"{counts} in {time.perf_counter() - started:.0f} s")
 
 

@@ -181,10 +181,14 @@ class Run:
             parts[head][rest] = value
         self.network.load_state_dict(parts["network"])
         self.average = parts["average"]
+        parameters = list(self.network.parameters())
         entries: dict[int, dict[str, torch.Tensor]] = {}
         for name, value in parts["optimizer"].items():
             number, _, rest = name.partition(".")
-            entries.setdefault(int(number), {})[rest] = value
+            # The fused optimiser walks through memory: its state must lie there in the order of the parameter.
+            like = parameters[int(number)]
+            laid = torch.empty_like(like).copy_(value) if value.shape == like.shape else value
+            entries.setdefault(int(number), {})[rest] = laid.detach()
         state = self.optimizer.state_dict()
         self.optimizer.load_state_dict({"state": entries, "param_groups": state["param_groups"]})
         self.step, self.seconds = int(metadata["step"]), facts["seconds"]

@@ -1,4 +1,4 @@
-"""How good a checkpoint is on the validation frames: PQ per class, with and without colour.
+"""How good a checkpoint is on the validation frames: PQ per class, with and without colour and gravity.
 
 python -m benchmarks.training.validation --data FOLDER --weights FILE [--every N]
 """
@@ -6,6 +6,7 @@ python -m benchmarks.training.validation --data FOLDER --weights FILE [--every N
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,16 @@ from stages.kit.measurement.panoptic_quality import ClassQuality, average_qualit
 from stages.segment.network.backend import Predictor, load_predictor
 from stages.segment.network.features import Mount
 
+
+@dataclass(frozen=True)
+class Known:
+    """What of a frame the network is shown beside its depth."""
+
+    color: bool
+    gravity: bool
+
+
+KNOWN = {"all": Known(True, True), "no_colour": Known(False, True), "depth_alone": Known(False, False)}
 STUFF = frozenset(entry.name for entry in load_vocabulary().classes if entry.kind == "stuff")
 
 
@@ -52,10 +63,10 @@ def main() -> None:
     predictor = load_predictor(arguments.weights, load_vocabulary())
     frames = FrameSet(arguments.data / "validation")
     indices = range(0, len(frames), arguments.every)
-    for color, gravity in ((True, True), (False, True), (False, False)):
-        sums = quality_of(predictor, frames, indices, color=color, gravity=gravity)
+    for shown, known in KNOWN.items():
+        sums = quality_of(predictor, frames, indices, color=known.color, gravity=known.gravity)
         mean = average_quality(sums.values())
-        print(f"colour {color}, gravity {gravity}, {len(indices)} frames:")
+        print(f"{shown}, {len(indices)} frames:")
         print(f"  PQ {mean.pq:.3f}, SQ {mean.sq:.3f}, RQ {mean.rq:.3f} over {mean.classes} classes")
         print("  " + ", ".join(f"{name} {entry.pq:.2f}" for name, entry in sums.items()), flush=True)
 

@@ -1,0 +1,74 @@
+"""`make train-network`: library, frames, training, validation; a part that is there is kept, training goes on.
+
+    python -m benchmarks.training --out FOLDER [--quick]
+
+Writes FOLDER/run/panoptic.safetensors, metrics.json and table.md. `--quick` proves the recipe in a minute or two: a few
+frames, a few steps, and figures that mean nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from benchmarks.training.samples import FrameSet
+from benchmarks.training.validation import KNOWN, quality_of
+from schemas.vocabulary import load_vocabulary
+from stages.kit.measurement.panoptic_quality import average_quality
+from stages.kit.running.chain import run_command
+from stages.segment.network.backend import load_predictor
+
+LIBRARY_SEED, LIBRARY_SHAPES = 41, 12
+"""Seed and shapes of every class of the training's own library; other experiments use seeds 0 and 1."""
+QUICK_STEPS, QUICK_SHAPES = 12, 3
+
+
+def main() -> int:
+    """Run the recipe."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--quick", action="store_true", help="a few frames and steps")
+    parser.add_argument("--threads", type=int, default=1, help="of the training; 1 gives the same bytes again")
+    arguments = parser.parse_args()
+    out: Path = arguments.out
+    shapes = str(QUICK_SHAPES if arguments.quick else LIBRARY_SHAPES)
+    code, _ = run_command(
+        ["library", "build", "--out", str(out / "library"), "--seed", str(LIBRARY_SEED)]
+        + ["--shapes-per-class", shapes, "--small-shapes-per-class", shapes]
+    )
+    if code:
+        return code
+    quick = ["--quick"] if arguments.quick else []
+    if not (out / "data" / "done.json").is_file():
+        _module("benchmarks.training.data", "--out", str(out / "data"), "--library", str(out / "library"), *quick)
+    steps = ["--steps", str(QUICK_STEPS)] if arguments.quick else []
+    train = ["--data", str(out / "data"), "--out", str(out / "run"), "--threads", str(arguments.threads)]
+    _module("benchmarks.training.train", *train, *steps)
+    weights = out / "run" / "panoptic.safetensors"
+    predictor = load_predictor(weights, load_vocabulary())
+    frames = FrameSet(out / "data" / "validation")
+    metrics: dict[str, float] = {}
+    lines = ["| shown | PQ | SQ | RQ | classes |", "|---|---|---|---|---|"]
+    for name, known in KNOWN.items():
+        sums = quality_of(predictor, frames, range(len(frames)), color=known.color, gravity=known.gravity)
+        mean = average_quality(sums.values())
+        values = {"pq": mean.pq or 0.0, "sq": mean.sq or 0.0, "rq": mean.rq or 0.0}
+        metrics |= {f"{name}/validation/{measure}": value for measure, value in values.items()}
+        lines.append(f"| {name} | " + " | ".join(f"{100 * v:.1f}" for v in values.values()) + f" | {mean.classes} |")
+    lines += ["", f"{predictor.checkpoint.description}; {len(frames)} validation frames."]
+    (out / "metrics.json").write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
+    (out / "table.md").write_text("\n".join(lines) + "\n")
+    print("\n".join(lines))
+    print(f"to ship it: cp {weights} data/networks/panoptic.safetensors")
+    return 0
+
+
+def _module(name: str, *arguments: str) -> None:
+    subprocess.run([sys.executable, "-m", name, *arguments], check=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

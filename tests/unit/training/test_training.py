@@ -1,0 +1,116 @@
+"""The recipe in small: stored frames come back, changed samples keep image and targets together, and a run that was
+stopped ends with the bytes of one that was not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from benchmarks.training.data import DEPTH_UNIT, HEIGHT, WIDTH, Sample, write_shard
+from benchmarks.training.samples import FrameSet, as_sample, varied
+from benchmarks.training.targets import IGNORED, make_targets
+from benchmarks.training.train import Plan, Run, class_weights, rate_at
+from schemas.errors import BadInput
+from schemas.scene_parts import Camera
+from stages.segment.network.features import CHANNELS
+from stages.segment.network.model import Widths
+
+TINY = Widths(encoder=(4, 4, 4, 6, 6), decoder=(4, 4, 4, 6), blocks=1)
+CAMERA = Camera(width=WIDTH, height=HEIGHT, fx=260.0, fy=260.0, cx=159.5, cy=119.5)
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory: pytest.TempPathFactory) -> FrameSet:
+    folder = tmp_path_factory.mktemp("frames")
+    samples = []
+    for k in range(4):
+        label = np.ones((HEIGHT, WIDTH), dtype=np.uint8)
+        label[100:200, 40 + 10 * k : 140] = 2
+        depth = np.where(label == 2, 1.0, 2.5) / DEPTH_UNIT
+        # The colour says which label a pixel has.
+        color = np.repeat((100 * label)[..., None], 3, axis=2)
+        samples.append(
+            Sample(
+                color, depth.astype(np.uint16), label, CAMERA, np.array([0.0, -1.0, 0.0]), 1.5, ("wall", "chair"), ""
+            )
+        )
+    write_shard(samples, folder / "shard_000")
+    return FrameSet(folder)
+
+
+def test_stored_frames_come_back(frames: FrameSet) -> None:
+    frame = frames[1]
+    assert len(frames) == 4 and frames.class_names() == ("wall", "chair")
+    assert frame.depth[150, 100] == pytest.approx(1.0) and frame.camera == CAMERA and frame.height == 1.5
+    with pytest.raises(BadInput, match="no frames"):
+        FrameSet(Path("/nowhere"))
+
+
+def test_targets_in_closed_form() -> None:
+    labels = np.zeros((20, 30), dtype=np.int64)
+    labels[5:10, 4:9], labels[12:, :] = 1, 2
+    targets = make_targets(labels, np.array([IGNORED, 0, 1]), np.array([True, False]))
+    assert targets.centres[7, 6] == 1 and targets.centres.argmax() == 7 * 30 + 6
+    assert targets.offsets[:, 5, 4].tolist() == [2, 2] and targets.offsets[:, 9, 8].tolist() == [-2, -2]
+    assert targets.classes[0, 0] == IGNORED and targets.classes[15, 3] == 1 and targets.classes[6, 6] == 0
+    assert np.array_equal(targets.things, labels == 1)
+    assert targets.weight[6, 6] == 3 and targets.weight[15, 3] == 1
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_what_is_changed_stays_together(frames: FrameSet, whole: bool) -> None:
+    """In every crop and mirror image the near pixels are those of the chair."""
+    seen = 0
+    for seed in range(8):
+        inputs, targets = varied(frames[0], frames.class_names(), np.random.default_rng(seed), whole=whole)
+        assert inputs.shape[0] == len(CHANNELS) and inputs.shape[1:] == ((240, 320) if whole else (192, 256))
+        near = inputs[CHANNELS.index("inverse_depth")][::2, ::2] > 0.2
+        known = inputs[CHANNELS.index("has_depth")][::2, ::2] > 0
+        if not known.all():
+            continue  # the background was cut
+        seen += 1
+        assert np.mean(near == (targets.classes == 1)) > 0.97
+    assert seen >= 3
+
+
+def test_as_it_is_nothing_is_changed(frames: FrameSet) -> None:
+    inputs, targets = as_sample(frames[2], frames.class_names(), color=True, gravity=True)
+    assert np.array_equal(targets.classes == 1, frames[2].labels[::2, ::2] == 2)
+    assert inputs[CHANNELS.index("red")][0, 0] == pytest.approx(100 / 127.5 - 1)
+
+
+def test_the_rate_rises_and_falls() -> None:
+    rates = [rate_at(step, 200) for step in range(200)]
+    top = int(np.argmax(rates))
+    assert rates[:top] == sorted(rates[:top]) and rates[top:] == sorted(rates[top:], reverse=True)
+    assert rates[-1] < 0.02 * rates[top]
+
+
+def test_a_stopped_run_ends_like_one_that_was_not(frames: FrameSet, tmp_path: Path) -> None:
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        plan = Plan(4, 2, 5, frames.class_names(), len(frames))
+        weight = class_weights(frames, plan.classes)
+        straight = Run(plan, tmp_path / "straight", TINY)
+        for _ in range(4):
+            straight.train_step(frames, weight)
+        straight.save()
+        first = Run(plan, tmp_path / "stopped", TINY)
+        for _ in range(2):
+            first.train_step(frames, weight)
+        first.save()
+        second = Run(plan, tmp_path / "stopped", TINY)
+        assert second.step == 2
+        for _ in range(2):
+            second.train_step(frames, weight)
+        second.save()
+        for name in ("panoptic.safetensors", "state.safetensors"):
+            assert (tmp_path / "straight" / name).read_bytes() == (tmp_path / "stopped" / name).read_bytes()
+        with pytest.raises(BadInput, match="another plan"):
+            Run(Plan(9, 2, 5, plan.classes, plan.frames), tmp_path / "stopped", TINY)
+    finally:
+        torch.set_num_threads(threads)
