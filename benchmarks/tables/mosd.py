@@ -1,11 +1,11 @@
-"""`make mosd`: class-agnostic objects of real Kinect frames against their labels (modified Object Segmentation Database).
+"""`make mosd`: class-agnostic objects of real Kinect frames against their labels (modified OSD data set).
 
     python -m benchmarks.tables.mosd --data FOLDER --out FOLDER [--quick]
 
 Arms: `plain` (convex segments, one merging pass), `geometric` (patches over the table, geometry and colour, hand-set
 rules), `ours` (the same patches, trained trees). Cases: `learn`, on which constants were set and trees trained, and
-`test`. Measures: stages/kit/measurement/object_masks.py; objects are label // 10 from 2 up, parts the raw labels. Writes
-metrics.json, table.md and frames.png, the worst and the best frames.
+`test`. Measures: stages/kit/measurement/object_masks.py; objects are label // 10 from 2 up, parts the raw labels.
+Writes metrics.json, table.md and frames.png, the worst and the best frames.
 """
 
 from __future__ import annotations
@@ -40,7 +40,12 @@ DEPTH_UNIT = 1e-4
 FIRST_OBJECT = 20
 """Labels below are table."""
 KINDS = {
-    "learn": {"boxes": range(17), "stacked boxes": range(17, 25), "occluded": range(25, 33), "cylinders": range(33, 45)},
+    "learn": {
+        "boxes": range(17),
+        "stacked boxes": range(17, 25),
+        "occluded": range(25, 33),
+        "cylinders": range(33, 45),
+    },
     "test": {
         "boxes": range(16),
         "stacked boxes": range(16, 24),
@@ -97,7 +102,9 @@ def _number(name: str) -> int:
 
 
 def _read_frame(folder: Path, name: str) -> LabelledFrame:
-    images = [cv2.imread(str(folder / f"{name}.{kind}.png"), cv2.IMREAD_UNCHANGED) for kind in ("color", "depth", "label")]
+    images = [
+        cv2.imread(str(folder / f"{name}.{kind}.png"), cv2.IMREAD_UNCHANGED) for kind in ("color", "depth", "label")
+    ]
     color, depth, label = images
     size = (CAMERA.height, CAMERA.width)
     if color is None or depth is None or label is None:
@@ -199,8 +206,8 @@ def table_of(results: dict[str, dict[str, list[FrameResult]]]) -> str:
         lines.append("")
     load = os.getloadavg()[0]
     lines += [
-        "Means over frames; intervals are percentile bootstraps over frames. `learn` tuned `geometric` and trained `ours`, "
-        f"`test` did neither. frames/s: 1 / median wall time of a frame; {os.cpu_count()} processors "
+        "Means over frames; intervals are percentile bootstraps over frames. `learn` tuned `geometric` and trained "
+        f"`ours`, `test` did neither. frames/s: 1 / median wall time of a frame; {os.cpu_count()} processors "
         f"({platform.machine()}), load {load:.1f} at the end.",
         "",
     ]

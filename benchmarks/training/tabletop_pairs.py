@@ -2,12 +2,12 @@
 
     python -m benchmarks.training.tabletop_pairs --data FOLDER --out FOLDER [--quick] [--ship]
 
-Pairs of patches come from generated tabletops (benchmarks/training/tabletops.py, seeds 0 up) and from the `learn` frames
-of the mOSD tabletops below `--data`; never from `test`. First trees are grown on the pairs that grouping by the truth
-meets; the second ones on those and on the pairs that the first trees meet when they group themselves, so that they know
-their own mistakes. Real pairs weigh more. Five-fold cross-validation over the `learn` frames is printed. Writes
-`tabletop_pairs.safetensors` and `cross_validation.json`; `--ship` copies the trees to data/networks. About 15 minutes on
-one core; generated frames are kept below `--out`. The seed is fixed: the same libraries give the same bytes.
+Pairs of patches come from generated tabletops (benchmarks/training/tabletops.py, seeds 0 up) and from the `learn`
+frames of the mOSD tabletops below `--data`; never from `test`. First trees are grown on the pairs that grouping by the
+truth meets; the second ones on those and on the pairs that the first trees meet when they group themselves, so that
+they know their own mistakes. Real pairs weigh more. Five-fold cross-validation over the `learn` frames is printed.
+Writes `tabletop_pairs.safetensors` and `cross_validation.json`; `--ship` copies the trees to data/networks. About 15
+minutes on one core; generated frames are kept below `--out`. The seed is fixed: the same libraries give the same bytes.
 """
 
 from __future__ import annotations

@@ -79,7 +79,7 @@ def hull_content(
             while column <= last:
                 if 0 <= column < width:
                     group = groups[row, column]
-                    if group == a or group == b:
+                    if group in (a, b):
                         own += 1.0
                     elif inverse[row, column] <= 0.0:
                         missing += 1.0

@@ -63,9 +63,7 @@ def segment_objects(
     patches = find_patches(depth, camera, settings.patches, settings.support)
     up = patches.supports[0].normal if patches.supports else UP_WITHOUT_SURFACE
     lab = lab_image(color)
-    pieces, patch_of = cut_patches(
-        patches.labels, patches.points, patches.normals, lab, up, camera.fx, settings.cuts
-    )
+    pieces, patch_of = cut_patches(patches.labels, patches.points, patches.normals, lab, up, camera.fx, settings.cuts)
     regions = measure_regions(
         pieces,
         patch_of,
