@@ -42,6 +42,7 @@ _PLAIN_EXTRACTION = {
     "label_band": 1.0,
     "smoothing": 0.0,
     "minimum_prediction_share": 0.0,
+    "spread_steps": 0,
     "speck_share": 0.0,
     "part_distance": 1000.0,
     "minimum_observations": 1,

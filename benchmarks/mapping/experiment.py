@@ -135,7 +135,7 @@ def build_maps(
         for arm in arms:
             geometric, spent = entry.geometric[geometric_settings(arm.segment)]
             start = time.perf_counter()
-            fused = fuse(geometric.labels, masks, geometric.points, fusion_settings(arm.segment))
+            fused = fuse(geometric.labels, masks, geometric.points, fusion_settings(arm.segment), geometric.small)
             listing = describe(frame.index, fused).segments
             assert frame.depth is not None
             mappers[arm.name].add_frame(camera, frame.depth, frame.color, pose, fused.ids, listing)

@@ -7,9 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.fuse.counts import TripleCounts
-from stages.fuse.parts import absorb_specks, drop_far_parts
+from stages.fuse.parts import absorb_specks, drop_far_parts, spread_labels
 from stages.fuse.surface import Surface
 from stages.kit.formats.ply_files import ColoredMesh
+
+SPREAD_COSINE = 0.7
+"""Labels spread to unlabelled vertices over surface that bends by less than 45 degrees from vertex to vertex."""
 
 
 @dataclass(frozen=True)
@@ -73,9 +76,13 @@ def confidence_of(counts: TripleCounts, segments: tuple[int, ...], class_id: int
 
 
 def face_labels(labels: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return the label (F,) of every face: that of two of its vertices, or of the first when all three differ."""
+    """Return the label (F,) of every face: that of its vertices when they agree, else 0.
+
+    A face between two labels belongs to neither: its far vertex would widen a cup by a voxel on every side.
+    """
     corners = labels[faces]
-    return np.where(corners[:, 1] == corners[:, 2], corners[:, 1], corners[:, 0])
+    agree = (corners[:, 0] == corners[:, 1]) & (corners[:, 1] == corners[:, 2])
+    return np.where(agree, corners[:, 0], 0)
 
 
 def cut_mesh(surface: Surface, chosen: np.ndarray) -> ColoredMesh:
@@ -98,6 +105,7 @@ def extract_entities(
     minimum_observations: int,
     speck_share: float,
     part_distance: float,
+    spread_steps: int = 0,
 ) -> tuple[list[ExtractedEntity], LabelledSurface]:
     """Return the entities, ascending by instance, and the labels of the whole surface.
 
@@ -109,9 +117,10 @@ def extract_entities(
     class_of, instance_of = label_of_segments(counts, sightings, largest, minimum_share)
     class_of_instance = class_of_instances(counts, class_of, instance_of)
     stuff = frozenset(p for p, c in class_of_instance.items() if c not in things)
-    instance = absorb_specks(
-        instance_of[segment], surface.faces, whole=stuff, minimum_size=minimum_voxels, minimum_share=speck_share
+    named = spread_labels(
+        instance_of[segment], surface.vertices, surface.faces, steps=spread_steps, minimum_cosine=SPREAD_COSINE
     )
+    instance = absorb_specks(named, surface.faces, whole=stuff, minimum_size=minimum_voxels, minimum_share=speck_share)
     instance = drop_far_parts(instance, surface.vertices, surface.faces, whole=stuff, distance=part_distance)
     of_face = face_labels(instance, surface.faces)
     by_label = np.argsort(of_face, kind="stable")

@@ -80,6 +80,9 @@ class FuseParameters(Parameters):
         0.15, ge=0, le=1, description="Segments that are background in more than the rest of their frames stay "
         "unlabelled (0: the thesis, in which the background has no vote)"
     )  # fmt: skip
+    spread_steps: int = Field(
+        2, ge=0, description="Unlabelled vertices take the label of the smooth surface around them, so many times"
+    )
     speck_share: float = Field(
         0.05,
         ge=0,

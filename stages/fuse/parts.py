@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
+from stages.kit.geometry.point_clouds import vertex_normals
+
 
 @njit(cache=True)
 def connected_parts(labels: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -57,6 +59,33 @@ def absorb_specks(
     order = np.lexsort((-keys, votes))
     replacement[keys[order] // width] = (keys % width)[order]
     return np.where(small, replacement[part], labels)
+
+
+def spread_labels(
+    labels: np.ndarray, vertices: np.ndarray, faces: np.ndarray, *, steps: int, minimum_cosine: float
+) -> np.ndarray:
+    """Return labels (V,) in which unlabelled vertices have taken those of their neighbours, `steps` times.
+
+    An unlabelled vertex takes the label > 0 that most of its edges lead to, ties to the smaller number; an edge counts
+    where the surface bends by less than `minimum_cosine` says, so that labels grow along a board, but not from a cup
+    onto the fringe behind it. Ours: pixels at creases belong to no geometric segment and leave unlabelled seams.
+    """
+    if len(faces) == 0 or steps == 0:
+        return labels.copy()
+    result = labels.copy()
+    normals = vertex_normals(vertices, faces)
+    edges = np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 0], [1, 2], [2, 1], [2, 0], [0, 2])])
+    smooth = np.einsum("ij,ij->i", normals[edges[:, 0]], normals[edges[:, 1]]) >= minimum_cosine
+    edges = edges[smooth & (result[edges[:, 0]] == 0)]
+    for _ in range(steps):
+        useful = edges[(result[edges[:, 0]] == 0) & (result[edges[:, 1]] > 0)]
+        if not len(useful):
+            break
+        width = int(result.max()) + 1
+        keys, votes = np.unique(useful[:, 0] * np.int64(width) + result[useful[:, 1]], return_counts=True)
+        order = np.lexsort((-keys, votes))
+        result[keys[order] // width] = (keys % width)[order]
+    return result
 
 
 def drop_far_parts(

@@ -62,6 +62,7 @@ def write_map(
             minimum_share=parameters.minimum_prediction_share, minimum_voxels=parameters.minimum_entity_voxels,
             minimum_observations=min(parameters.minimum_observations, max(1, mapper.labelled_frames // 10)),
             speck_share=parameters.speck_share, part_distance=parameters.part_distance,
+            spread_steps=parameters.spread_steps,
         )  # fmt: skip
     with context.progress.step("write the map"):
         file = EntitiesFile(

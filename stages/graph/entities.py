@@ -8,7 +8,8 @@ from schemas.errors import BadInput
 from schemas.panoptic_map import Entity as MapEntity
 from schemas.panoptic_map import PanopticMap
 from schemas.vocabulary import load_vocabulary
-from stages.graph.nodes import THINNEST_DISTANCE, Entity, observed_box, patch_from_fit, surface_planes
+from stages.graph.nodes import THINNEST_DISTANCE, Entity, patch_from_fit, surface_planes
+from stages.graph.observed_box import observed_box
 from stages.graph.parameters import GraphParameters
 from stages.kit.formats.entity_meshes import load_entity_mesh
 from stages.kit.geometry.boxes import box_volume, boxes_overlap_volume, convex_hull, minimum_box
@@ -87,7 +88,15 @@ def load_entity(
         # Walls and floors come in pieces by nature.
         box, kept = minimum_box(points), np.ones(len(points), dtype=bool)
     else:
-        box, kept = observed_box(points, stray_share=parameters.stray_share, stray_distance=parameters.stray_distance)
+        ours = parameters.method == "ours"
+        box, kept = observed_box(
+            points,
+            normals,
+            stray_share=parameters.stray_share,
+            stray_distance=parameters.stray_distance,
+            trim=parameters.box_trim if ours else 0.0,
+            side_share=parameters.side_share if ours else None,
+        )
     diagonal = float(np.linalg.norm(box.size))
     if diagonal < parameters.minimum_diagonal:
         return f"diagonal {diagonal:.3f} m is below {parameters.minimum_diagonal} m"

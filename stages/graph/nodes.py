@@ -10,9 +10,9 @@ import numpy as np
 
 from schemas.base import as_vector
 from schemas.scene_parts import Box, SurfacePlane
-from stages.kit.geometry.boxes import bottom, convex_hull, minimum_box, polygon_area, top
+from stages.kit.geometry.boxes import bottom, convex_hull, polygon_area, top
 from stages.kit.geometry.planes import PlaneFit, plane_rectangle, ransac_plane, ransac_planes
-from stages.kit.geometry.point_clouds import clusters, without_strays
+from stages.kit.geometry.point_clouds import clusters
 
 GRAVITY = np.array([0.0, 0.0, -1.0])
 CONTAINER_CLASSES = frozenset(
@@ -92,16 +92,6 @@ def plane_height(plane: SurfacePlane, at: np.ndarray) -> float:
     """
     nx, ny, nz = plane.normal
     return -(plane.offset + nx * float(at[0]) + ny * float(at[1])) / nz
-
-
-def observed_box(points: np.ndarray, *, stray_share: float, stray_distance: float) -> tuple[Box, np.ndarray]:
-    """Return the gravity-aligned minimum box of points (N, 3), and which points (N,) it was put around.
-
-    Labels leak at object borders, onto what stands behind them; one stray vertex would stretch the minimum box. So
-    small clusters that are cut off from the rest are left out (point_clouds.without_strays).
-    """
-    kept = without_strays(points, stray_share, stray_distance)
-    return minimum_box(points[kept]), kept
 
 
 def surface_planes(

@@ -40,6 +40,15 @@ class GraphParameters(Parameters):
     stray_share: float = Field(
         0.05, ge=0.0, lt=1.0, description="Clusters with a smaller share of an entity's points are left out of its box"
     )
+    box_trim: float = Field(
+        0.02, ge=0.0, lt=0.25, description="ours: share of the points left out at both ends of a box's axes"
+    )
+    side_share: float = Field(
+        0.5,
+        gt=0.0,
+        le=1.0,
+        description="ours: a box turns with its sides where this share of them agrees modulo 90 degrees",
+    )
     stray_distance: float = Field(0.1, gt=0.0, description="Gap that separates clusters [m]")
     maximum_sinking: float = Field(
         0.05, ge=0.0, description="ours: planes farther above the child's bottom than this do not support it [m]"

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from stages.segment.overlaps import overlap_table
+from stages.segment.panoptic import PanopticFrame
+
 
 @njit(cache=True)
 def _components(claims: np.ndarray, depth: np.ndarray, ratio: float, minimum_pixels: int, first: int) -> np.ndarray:
@@ -52,3 +55,26 @@ def claim_unlabelled(
     claims = np.where((geometric == 0) & (depth > 0), panoptic, 0).astype(np.int32)
     new = _components(claims, depth, ratio, minimum_pixels, int(geometric.max(initial=0)) + 1)
     return np.where(new > 0, new, geometric)
+
+
+def claim_small(
+    geometric: np.ndarray, small: np.ndarray, panoptic: PanopticFrame, *, minimum_pixels: int
+) -> np.ndarray:
+    """Return geometric labels (H, W) in which small regions that a thing claims leave the segment they were given to.
+
+    `small` (H, W) regions under the least segment size, 0 elsewhere. A region leaves when more than half of it lies in
+    one mask of a thing, and that mask is not the one that most of the segment lies in. Ours: the legs of a chair are
+    small regions within the floor, and every frame would vote them floor.
+    """
+    size = np.bincount(small.ravel())
+    masks = overlap_table(small, panoptic.ids)
+    things = np.zeros(masks.shape[1], dtype=bool)
+    things[[i for i, mask in panoptic.masks.items() if mask.is_thing and i < things.size]] = True
+    claimed = np.where(things, masks, 0)
+    winner = claimed.argmax(axis=1)
+    enough = (2 * claimed.max(axis=1) > size) & (size >= minimum_pixels)
+    enough[0] = False
+    segments = overlap_table(geometric, panoptic.ids).argmax(axis=1)
+    released = enough[small] & (segments[geometric] != winner[small])
+    number = np.cumsum(enough) + int(geometric.max(initial=0))
+    return np.where(released, number[small], geometric).astype(np.int32)

@@ -12,9 +12,10 @@ from typing import Literal
 
 import numpy as np
 
-from stages.segment.claims import claim_unlabelled
+from stages.segment.claims import claim_small, claim_unlabelled
 from stages.segment.clustering import largest_cluster
 from stages.segment.geometric import pixels_at, relabel
+from stages.segment.overlaps import overlap_table
 from stages.segment.panoptic import PanopticFrame
 
 BACKGROUND = 0
@@ -55,13 +56,6 @@ class FusedFrame:
 
     ids: np.ndarray
     segments: tuple[FusedSegment, ...]
-
-
-def overlap_table(geometric: np.ndarray, panoptic: np.ndarray) -> np.ndarray:
-    """Return the number of pixels (n + 1, m + 1) that geometric label j and panoptic id i share, labels from 0."""
-    rows, columns = int(geometric.max(initial=0)) + 1, int(panoptic.max(initial=0)) + 1
-    flat = geometric.ravel().astype(np.int64) * columns + panoptic.ravel()
-    return np.bincount(flat, minlength=rows * columns).reshape(rows, columns)
 
 
 def split_contained(
@@ -164,10 +158,17 @@ def far_from_instance(
     return [label for index, label in enumerate(segments) if index not in kept]
 
 
-def fuse(geometric: np.ndarray, panoptic: PanopticFrame, points: np.ndarray, settings: FusionSettings) -> FusedFrame:
+def fuse(
+    geometric: np.ndarray,
+    panoptic: PanopticFrame,
+    points: np.ndarray,
+    settings: FusionSettings,
+    small: np.ndarray | None = None,
+) -> FusedFrame:
     """Return the fused segments of a frame (Han 2024, section 2.3.1).
 
-    `geometric` (H, W) int32 labels, 0 = none; `points` (H, W, 3) [m] in the camera frame. Pixels without a geometric
+    `geometric` (H, W) int32 labels, 0 = none; `points` (H, W, 3) [m] in the camera frame; `small` (H, W) regions under
+    the least segment size, which only `ours` looks at. Pixels without a geometric
     segment (no depth, or discarded) are void. Segments without a label have category 0 and instance 0.
     """
     if settings.rule == "voxblox++":
@@ -185,12 +186,10 @@ def fuse(geometric: np.ndarray, panoptic: PanopticFrame, points: np.ndarray, set
         keep_claimed=None if thesis else pixels_at(settings.small_object_pixels, geometric.shape),
     )
     if not thesis:
-        labels = claim_unlabelled(
-            labels,
-            panoptic.ids,
-            points[..., 2],
-            minimum_pixels=pixels_at(settings.small_object_pixels // 2, labels.shape),
-        )
+        fewest = pixels_at(settings.small_object_pixels // 2, labels.shape)
+        labels = claim_unlabelled(labels, panoptic.ids, points[..., 2], minimum_pixels=fewest)
+        if small is not None:
+            labels = claim_small(labels, small, panoptic, minimum_pixels=fewest)
     labels = split_contained(
         labels, panoptic.ids, contained_share=settings.contained_share, largest_part=settings.largest_part
     )

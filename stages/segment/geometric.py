@@ -51,6 +51,9 @@ class GeometricFrame:
     """(H, W, 3) float32 [m], camera frame, of the smoothed depth; zero where depth is invalid."""
     normals: np.ndarray
     """(H, W, 3) float32 unit vectors that face the camera, zero where there is none."""
+    small: np.ndarray
+    """(H, W) int32 regions under the least size, 1..m, 0 elsewhere: `labels` gives them to what surrounds them, but a
+    mask may know better (a chair's leg before the floor)."""
 
 
 def smooth_depth(depth: np.ndarray, *, window: int = 7, deviation: float = 0.009) -> np.ndarray:
@@ -240,19 +243,28 @@ def relabel(labels: np.ndarray) -> np.ndarray:
 def label_regions(
     edges: np.ndarray, points: np.ndarray, normals: np.ndarray, *, minimum_pixels: int, ratio: float
 ) -> np.ndarray:
-    """Return geometric segment labels (H, W) int32, 0 = none, from an edge map (H, W) bool.
+    """Return geometric segment labels (H, W) int32, 0 = none; the first result of `label_all_regions`."""
+    return label_all_regions(edges, points, normals, minimum_pixels=minimum_pixels, ratio=ratio)[0]
+
+
+def label_all_regions(
+    edges: np.ndarray, points: np.ndarray, normals: np.ndarray, *, minimum_pixels: int, ratio: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return geometric segment labels (H, W) int32, 0 = none, from an edge map (H, W) bool, and the small regions.
 
     `points` (H, W, 3) [m], z = 0 without depth; `normals` (H, W, 3), zero where there is none. Connected
     (4-neighbour) regions without edges are segments; edge pixels join the nearest segment on their side of a depth
-    jump of `ratio`; a region under `minimum_pixels` joins the one large segment that surrounds it, or is none.
+    jump of `ratio`; a region under `minimum_pixels` joins the one large segment that surrounds it, or is none. The
+    second result (H, W) int32 holds those regions as they were, 0 elsewhere.
     """
     _, labels = cv2.connectedComponents((~edges).astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
     small = np.bincount(labels.ravel()) < minimum_pixels
     small[0] = False
     _fill_edges(labels, points, normals, ratio)
     sole = _sole_neighbours(labels, small)
-    lookup = np.where(small, np.maximum(sole, 0), np.arange(small.size)).astype(np.int32)
-    return relabel(lookup[labels])
+    own = np.arange(small.size)
+    lookup = np.where(small, np.maximum(sole, 0), own).astype(np.int32)
+    return relabel(lookup[labels]), relabel(np.where(small, own, 0).astype(np.int32)[labels])
 
 
 def pixels_at(count: int, shape: tuple[int, ...]) -> int:
@@ -274,11 +286,11 @@ def segment_depth(depth: np.ndarray, camera: Camera, settings: GeometricSettings
         distance_factor=settings.normal_distance_factor,
     )
     edges = edge_map(depth, points, normals, settings)
-    labels = label_regions(
+    labels, small = label_all_regions(
         edges,
         points,
         normals,
         minimum_pixels=pixels_at(settings.minimum_pixels, depth.shape),
         ratio=settings.discontinuity_ratio,
     )
-    return GeometricFrame(labels=labels, points=points, normals=normals)
+    return GeometricFrame(labels=labels, points=points, normals=normals, small=small)

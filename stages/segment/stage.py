@@ -90,7 +90,7 @@ def segment_frame(
     depth = frame.depth if frame.depth is not None else np.zeros(shape, dtype=np.float32)
     geometric = segment_depth(depth, camera, geometric_settings(parameters))
     panoptic = backend(frame, geometric, random)
-    return fuse(geometric.labels, panoptic, geometric.points, fusion_settings(parameters))
+    return fuse(geometric.labels, panoptic, geometric.points, fusion_settings(parameters), geometric.small)
 
 
 def describe(index: int, fused: FusedFrame) -> FrameSegments:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.fuse.extraction import confidence_of, extract_entities, face_labels, label_of_segments
-from stages.fuse.parts import absorb_specks, connected_parts, drop_far_parts
+from stages.fuse.parts import absorb_specks, connected_parts, drop_far_parts, spread_labels
 from stages.fuse.surface import Surface
 from tests.unit.fuse.test_association import CHAIR, TABLE, counted
 
@@ -35,9 +35,10 @@ def test_confidence_is_the_agreeing_share() -> None:
     assert confidence_of(counts, (), CHAIR, 1) == 0.0
 
 
-def test_faces_go_to_the_majority() -> None:
-    labels = np.array([1, 1, 2, 3])
-    assert face_labels(labels, np.array([[0, 1, 2], [2, 0, 1], [0, 2, 1], [2, 3, 0]])).tolist() == [1, 1, 1, 2]
+def test_faces_between_labels_belong_to_neither() -> None:
+    labels = np.array([1, 1, 2, 3, 1])
+    faces = np.array([[0, 1, 4], [0, 1, 2], [2, 0, 1], [0, 2, 1], [2, 3, 0]])
+    assert face_labels(labels, faces).tolist() == [1, 0, 0, 0, 0]
 
 
 def test_parts_are_connected_by_equal_labels() -> None:
@@ -93,7 +94,7 @@ def test_entities_partition_the_surface() -> None:
         (2, TABLE, (3,), 1),
         (4, CHAIR, (1, 2), 3),
     ]
-    assert sum(len(e.mesh.faces) for e in entities) == len(faces)
+    assert sum(len(e.mesh.faces) for e in entities) == len(faces) - 2, "the two faces between them belong to neither"
     assert labels.instance.tolist() == [4] * 28 + [2] * 12
     assert labels.class_id.tolist() == [CHAIR] * 28 + [TABLE] * 12
     entities, labels = extract_entities(
@@ -101,3 +102,26 @@ def test_entities_partition_the_surface() -> None:
         minimum_share=0.15, minimum_voxels=3, minimum_observations=2, speck_share=0.0, part_distance=1.0,
     )  # fmt: skip
     assert [e.instance for e in entities] == [4] and labels.instance.tolist() == [4] * 28 + [0] * 12
+
+
+def test_labels_spread_over_smooth_surface_and_not_round_a_corner() -> None:
+    # Two strips of vertices that meet at a right angle: x = 0..5 on the floor, then up the wall.
+    floor = [(x, y, 0.0) for x in range(6) for y in range(2)]
+    wall = [(5.0, y, float(z)) for z in range(1, 6) for y in range(2)]
+    vertices = np.array(floor + wall, dtype=np.float32)
+    columns = [(2 * k, 2 * k + 1) for k in range(11)]
+    faces = np.array(
+        [f for (a, b), (c, d) in zip(columns, columns[1:], strict=False) for f in ((a, c, b), (b, c, d))], np.int32
+    )
+    labels = np.zeros(22, dtype=np.int32)
+    labels[:4] = 7
+    assert spread_labels(labels, vertices, faces, steps=0, minimum_cosine=0.7).tolist() == labels.tolist()
+    once = spread_labels(labels, vertices, faces, steps=1, minimum_cosine=0.7)
+    assert once.tolist() == [7] * 6 + [0] * 16
+    # The vertices at the corner lean by 45 degrees: they are reached from the floor, what rises behind them is too,
+    # unless a sharper bound is set.
+    far = spread_labels(labels, vertices, faces, steps=20, minimum_cosine=0.95)
+    assert far.tolist() == [7] * 10 + [0] * 12
+    labels[-2:] = 9
+    both = spread_labels(labels, vertices, faces, steps=20, minimum_cosine=0.95)
+    assert both.tolist() == [7] * 10 + [0] * 2 + [9] * 10
