@@ -239,7 +239,7 @@ def test_stamps_out_of_order_and_twice(tmp_path: Path) -> None:
         ("trajectory.log", "0 0 1\n1 0 0 0\n", "multiple of 5"),
         ("trajectory.log", "9999999999999999999999 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n", "three integers"),
         ("trajectory.log", "0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n" * 2, "same frame number"),
-        ("timestamp.txt", "1 2 3\n", "whole microseconds"),
+        ("timestamp.txt", "1 2 3 4\n", "whole microseconds"),
         ("timestamp.txt", "1 -5\n", "whole microseconds"),
         ("asus.ini", "fx eighty\n", "a name and a number"),
         ("asus.ini", "fx\n", "a name and a number"),

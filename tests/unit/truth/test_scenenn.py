@@ -24,6 +24,7 @@ from stages.evaluate.truth import load_truth
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.stage import run as ingest
 from stages.kit.formats.mesh_files import read_mesh
+from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.truth.annotation import AnnotatedLabel, class_by_last_word, class_by_substring, read_annotation
@@ -75,7 +76,7 @@ def test_classes_and_instances_come_back(truth):
     assert {o.instance: o.class_name for o in file.objects} == {
         thing.instance: thing.class_name for thing in ROOM if thing.instance not in VOID
     }
-    points, instances = (np.load(truth.path("visible.npz"))[name] for name in ("points", "instance"))
+    points, instances = read_arrays(truth.path("visible.npz"), "points", "instance")
     assert len(points) == len(instances) > 10_000
     assert set(instances.tolist()) == {0} | {thing.instance for thing in ROOM} - VOID
     assert truth.graph.links == () and truth.graph.graph == {"annotated": "no"}
