@@ -117,6 +117,24 @@ def _detector(request: BackendRequest) -> Backend:
     )
 
 
+def _huggingface(request: BackendRequest) -> Backend:
+    # Imported here: transformers is an extra.
+    from stages.segment.huggingface.backend import make_backend
+
+    parameters = request.parameters
+    return make_backend(
+        request.weights,
+        request.mask_weights,
+        read_label_file(request.labels) if request.labels else None,
+        parameters.words,
+        load_vocabulary(),
+        score_threshold=parameters.score_threshold,
+        suppression_overlap=parameters.suppression_overlap,
+        minimum_pixels=parameters.small_object_pixels,
+        device=request.device,
+    )
+
+
 def _service(request: BackendRequest) -> Backend:
     # Imported here: the other backends do not need HTTP.
     from stages.segment.service.backend import ServiceBackend
@@ -181,6 +199,7 @@ BUILDERS: dict[str, Callable[[BackendRequest], Backend]] = {
     "geometric": _geometric,
     "objects": _objects,
     "detector": _detector,
+    "huggingface": _huggingface,
     "network": _network,
     "auto": _network,
 }

@@ -13,7 +13,9 @@ from stages.segment.labels import Label
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
 KEPT_SHARE = 0.5
-"""An instance of which better ones leave less than this is a second answer for one thing (Kirillov et al. 2019)."""
+"""An instance of which others leave less than this says nothing of its own (Kirillov et al. 2019)."""
+SAME_OVERLAP = 0.6
+"""IoU of two masks over which they are two answers for one thing."""
 
 
 @dataclass(frozen=True)
@@ -69,19 +71,33 @@ def name_segments(
 def name_instances(
     instances: Iterable[InstanceMask], shape: tuple[int, int], vocabulary: Vocabulary, *, minimum_pixels: int
 ) -> PanopticFrame:
-    """Return panoptic masks from instance masks that may overlap: the better scored one gets the pixel.
+    """Return panoptic masks from instance masks that may overlap.
 
-    An instance of which less than half (or `minimum_pixels`) is left is dropped. Ties go by order.
+    Of masks that are the same (IoU over SAME_OVERLAP) the best scored stays. Then smaller ones lie over larger ones:
+    the cup on the table is in front of it, whichever of the two the network is surer of. What keeps less than half of
+    its mask, or less than `minimum_pixels`, is dropped.
     """
-    ids = np.zeros(shape, dtype=np.int32)
-    segments: dict[int, NamedSegment] = {}
+    kept: list[InstanceMask] = []
     for instance in sorted(instances, key=lambda item: -item.score):
-        free = instance.mask & (ids == 0)
-        if free.sum() < max(minimum_pixels, KEPT_SHARE * instance.mask.sum(), 1):
-            continue
-        segments[len(segments) + 1] = NamedSegment(instance.label, instance.score)
-        ids[free] = len(segments)
+        if instance.mask.any() and not any(_are_same(instance.mask, other.mask) for other in kept):
+            kept.append(instance)
+    ids = np.zeros(shape, dtype=np.int32)
+    sizes = [int(instance.mask.sum()) for instance in kept]
+    order = sorted(range(len(kept)), key=lambda k: (-sizes[k], k))
+    for number, k in enumerate(order, start=1):
+        ids[kept[k].mask] = number
+    left = np.bincount(ids.ravel(), minlength=len(order) + 1)
+    segments = {
+        number: NamedSegment(kept[k].label, kept[k].score)
+        for number, k in enumerate(order, start=1)
+        if left[number] >= max(minimum_pixels, KEPT_SHARE * sizes[k])
+    }
     return name_segments(ids, segments, vocabulary, minimum_pixels=minimum_pixels)
+
+
+def _are_same(first: np.ndarray, second: np.ndarray) -> bool:
+    shared = np.count_nonzero(first & second)
+    return shared > SAME_OVERLAP * (np.count_nonzero(first) + np.count_nonzero(second) - shared)
 
 
 def _regions(pixels: np.ndarray, minimum_pixels: int) -> list[np.ndarray]:

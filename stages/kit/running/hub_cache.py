@@ -12,9 +12,9 @@ from pathlib import Path
 from schemas.errors import MissingDependency
 
 HUB_ID = re.compile(
-    r"(?P<model>[A-Za-z0-9][\w.-]{0,95}/[A-Za-z0-9][\w.-]{0,95})(@(?P<revision>[\w.-]{1,80}))?", re.ASCII
+    r"(?P<model>[A-Za-z0-9][\w.-]{0,95}/[A-Za-z0-9][\w.-]{0,95})(@(?P<revision>\w[\w.-]*(/\w[\w.-]*)*))?", re.ASCII
 )
-"""`organisation/model`, or `organisation/model@revision` (a branch, tag or commit)."""
+"""`organisation/model`, or `organisation/model@revision` (a branch, tag, commit or `refs/pr/N`)."""
 FILE_ENDINGS = frozenset({".onnx", ".safetensors", ".pt", ".pth", ".bin", ".toml", ".txt", ".json"})
 
 

@@ -152,17 +152,26 @@ def test_segments_take_classes() -> None:
     assert found.ids[0, 9] == 0 and found.ids[5, 9] == 0  # too small, no class
 
 
-def test_better_instances_go_first() -> None:
-    cup = load_label_set("coco-80").find("cup")
-    assert cup
-    low, high, rest = np.zeros((3, 4, 8), dtype=bool)
-    high[:, :4], low[:, 1:5], rest[:, 3:8] = True, True, True
+def test_overlapping_instances() -> None:
+    cup, table = (load_label_set("coco-80").find(name) for name in ("cup", "dining table"))
+    assert cup and table
+    top, on_it, again, hidden = np.zeros((4, 6, 10), dtype=bool)
+    top[:, :8], on_it[2:4, 2:4], again[2:4, 2:5], hidden[0, 0] = True, True, True, True
     found = name_instances(
-        [InstanceMask(low, cup, 0.4), InstanceMask(high, cup, 0.8), InstanceMask(rest, cup, 0.3)],
-        (4, 8), VOCABULARY, minimum_pixels=1,
+        [
+            InstanceMask(top, table, 0.9),
+            InstanceMask(on_it, cup, 0.5),
+            InstanceMask(again, cup, 0.4),  # the same cup, less sure
+            InstanceMask(hidden, cup, 0.8),  # too small
+            InstanceMask(np.zeros_like(top), cup, 0.99),
+        ],
+        (6, 10), VOCABULARY, minimum_pixels=2,
     )  # fmt: skip
-    assert [mask.score for mask in found.masks.values()] == [0.8, 0.3]  # of the second one a quarter was left
-    assert found.ids[0].tolist() == [1, 1, 1, 1, 2, 2, 2, 2]
+    assert [(VOCABULARY.by_id(m.category_id).name, m.score) for m in found.masks.values()] == [
+        ("table", 0.9),
+        ("cup", 0.5),
+    ]
+    assert (found.ids == 2).sum() == 4 and found.ids[2, 2] == 2 and found.ids[0, 0] == 0 and found.ids[5, 7] == 1
 
 
 def test_words_do_not_contradict_the_vocabulary() -> None:

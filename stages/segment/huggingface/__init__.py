@@ -1,0 +1,1 @@
+"""Backend `huggingface`: published panoptic and open-vocabulary models, through the transformers library."""
