@@ -13,10 +13,11 @@ _AT = {name: k for k, name in enumerate(FEATURES)}
 SMALLER, BORDER_SHARE, TOUCHING = _AT["smaller_pixels"], _AT["border_share"], _AT["touching"]
 CONNECTED, JUMP, CONCAVE, CONVEX = _AT["connected"], _AT["jump"], _AT["concave"], _AT["convex"]
 BORDER_COLOR, HISTOGRAM, CHROMA = _AT["border_color"], _AT["histogram"], _AT["chroma"]
-BEHIND, BEHIND_GAIN, HIDDEN, OWN = _AT["behind"], _AT["behind_gain"], _AT["hidden"], _AT["own"]
+BEHIND_GAIN, HIDDEN = _AT["behind_gain"], _AT["hidden"]
 NORMAL_ANGLE, RESIDUAL_GAIN, ENCLOSED = _AT["normal_angle"], _AT["residual_gain"], _AT["enclosed"]
-BOTTOM, TOP, GAP = _AT["bottom_difference"], _AT["top_difference"], _AT["gap"]
-CRUMB = math.log(260.0)
+TOP, GAP = _AT["top_difference"], _AT["gap"]
+CUT, FINE_STEPS = _AT["cut"], _AT["fine_steps"]
+CRUMB = math.log(400.0)
 """Patches with fewer pixels than this have no shape of their own: colour and border decide."""
 
 
@@ -24,25 +25,30 @@ CRUMB = math.log(260.0)
 def rule_score(f: np.ndarray) -> float:
     """Return a score of the features (pairs.FEATURES) of two groups: over 0 they are one object.
 
-    Touching groups: convex borders join, concave ones part; a union that fills its hull better than its parts is
-    likely one solid (bowls and mugs: inside and outside); a colour step and a depth jump speak against. Groups apart
-    are one only when something nearer hides what lies between, and they agree in colour, height and slope.
+    Pieces that a cut made are one unless the colours of both as wholes are others. Touching groups: convex borders
+    join, concave ones part; a union that fills its hull better than its parts is likely one solid (bowls and mugs:
+    inside and outside); a colour step and a depth jump speak against. Groups apart are one only when something nearer
+    hides what lies between, and they agree in colour, height and slope.
     """
+    if f[CUT] > 0.5:
+        other = 4.0 * (0.3 - f[HISTOGRAM]) + 2.0 * (f[FINE_STEPS] - 0.75) + 0.05 * (f[CHROMA] - 15.0)
+        return 1.2 - other - 6.0 * max(0.0, f[BEHIND_GAIN])
     if f[TOUCHING] > 0.0:
-        score = -0.35 + 2.2 * f[CONNECTED] * (f[CONVEX] - 1.25 * f[CONCAVE])
-        score += 1.6 * (f[BORDER_SHARE] - 0.15)
+        score = -0.1 + 2.2 * f[CONNECTED] * (f[CONVEX] - 1.25 * f[CONCAVE])
+        score += 1.2 * (f[BORDER_SHARE] - 0.15)
         score -= 7.0 * f[BEHIND_GAIN] if f[BEHIND_GAIN] > 0.0 else 4.0 * f[BEHIND_GAIN]
-        score -= 0.045 * (f[BORDER_COLOR] - 15.0)
-        score -= 0.03 * (f[CHROMA] - 12.0)
-        score -= 4.0 * (1.0 - f[CONNECTED]) * f[JUMP]
+        score -= 0.06 * (f[BORDER_COLOR] - 18.0)
+        score -= 0.02 * (f[CHROMA] - 14.0)
+        score -= 3.0 * (1.0 - f[CONNECTED]) * f[JUMP]
+        score -= 2.0 * f[TOP]
         score += 0.8 * f[ENCLOSED] * (1.0 - f[CONCAVE] * f[CONNECTED])
         if f[SMALLER] < CRUMB:
             score += 0.8 * (CRUMB - f[SMALLER])
         return score
-    score = -1.6 + 9.0 * min(f[HIDDEN], 0.25)
-    score -= 7.0 * max(0.0, f[BEHIND_GAIN])
-    score -= 0.05 * (f[CHROMA] - 12.0) - 1.5 * (f[HISTOGRAM] - 0.2)
-    score += 1.5 * (f[NORMAL_ANGLE] - 0.9) - 0.5 * f[RESIDUAL_GAIN]
-    score -= 6.0 * f[TOP]
+    score = -1.4 + 12.0 * min(f[HIDDEN], 0.25)
+    score -= 6.0 * max(0.0, f[BEHIND_GAIN])
+    score -= 0.04 * (f[CHROMA] - 12.0) - 1.5 * (f[HISTOGRAM] - 0.2)
+    score += 1.0 * (f[NORMAL_ANGLE] - 0.9) - 0.4 * f[RESIDUAL_GAIN]
+    score -= 5.0 * f[TOP]
     score -= 0.2 * f[GAP]
     return score
