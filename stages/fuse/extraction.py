@@ -111,7 +111,7 @@ def extract_entities(
 
     segment (V,) int32: merged segment label of every vertex. `seen_in`: frames that voted for an instance, as bits.
     A vertex stands for one surface voxel: entities under `minimum_voxels` vertices, or under `minimum_observations`
-    frames, are dropped, and their vertices are unlabelled.
+    frames or votes on the segments they ended up with, are dropped, and their vertices are unlabelled.
     """
     largest = max([0, *counts.by_segment, int(segment.max(initial=0))])
     class_of, instance_of = label_of_segments(counts, sightings, largest, minimum_share)
@@ -128,13 +128,15 @@ def extract_entities(
     entities = []
     kept = np.zeros_like(instance)
     for label in sorted(class_of_instance):
-        observations = seen_in.get(label, 0).bit_count()
+        class_id = class_of_instance[label]
+        segments = tuple(int(s) for s in np.flatnonzero(instance_of == label))
+        votes = sum(counts.by_segment[segment].get((class_id, label), 0) for segment in segments)
+        # A stuff class is one instance all over the room: frames that voted for it elsewhere say nothing here.
+        observations = min(seen_in.get(label, 0).bit_count(), votes)
         start, end = np.searchsorted(sorted_labels, (label, label + 1))
         mesh = cut_mesh(surface, by_label[start:end])
         if len(mesh.vertices) < minimum_voxels or observations < minimum_observations or len(mesh.faces) == 0:
             continue
-        class_id = class_of_instance[label]
-        segments = tuple(int(s) for s in np.flatnonzero(instance_of == label))
         confidence = confidence_of(counts, segments, class_id, label)
         entities.append(ExtractedEntity(label, class_id, segments, mesh, confidence, observations))
         kept[instance == label] = label
