@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,7 +37,7 @@ class Predictor:
         small = input_camera(camera)
         small_depth, small_color = resized(depth, color, small)
         inputs = torch.from_numpy(features(small_depth, small_color, small, mount))[None]
-        with torch.inference_mode():
+        with _one_thread(), torch.inference_mode():
             logits, heat, offsets = self.checkpoint.network(inputs.to(memory_format=torch.channels_last))
         coarse = group(
             logits[0].contiguous().numpy(),
@@ -50,10 +52,21 @@ class Predictor:
         return PanopticFrame(ids, {number: mask for number, mask in coarse.masks.items() if number in present})
 
 
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """One thread: an image is too small for more to pay, on a busy machine they wait for each other far longer than
+    they work, and the masks do not depend on the number of cores."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
 def load_predictor(path: Path, vocabulary: Vocabulary, settings: GroupingSettings | None = None) -> Predictor:
     """Read a checkpoint for use. Raises BadInput as load_checkpoint does."""
     checkpoint = load_checkpoint(path, vocabulary)
-    checkpoint.network.to(memory_format=torch.channels_last)
     entries = [vocabulary.by_name(name) for name in checkpoint.classes]
     named = tuple(Named(entry.id, entry.kind == "thing") for entry in entries)
     return Predictor(checkpoint, named, settings or GroupingSettings())
