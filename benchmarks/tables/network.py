@@ -126,8 +126,7 @@ def judge_rooms(
                         cost.frames += 1
                         cost.wall += time.perf_counter() - started
                         cost.processor += time.process_time() - processor
-                    own = {number: NAMES[mask.category_id] for number, mask in masks.masks.items()}
-                    results = {arm: (masks.ids, own)}
+                    results = {arm: (masks.ids, names_of(masks))}
                     if arm != "network_no_gravity":
                         results[f"{arm}_fused"] = fused_masks(frame, camera, masks)
                     for name, (ids, names) in results.items():
@@ -138,10 +137,15 @@ def judge_rooms(
     return sums, cost
 
 
-def objects_of(masks: PanopticFrame) -> np.ndarray:
+def names_of(masks: PanopticFrame) -> dict[int, str]:
+    """Return the class name of every mask."""
+    return {number: NAMES[mask.category_id] for number, mask in masks.masks.items()}
+
+
+def objects_of(ids: np.ndarray, names: dict[int, str]) -> np.ndarray:
     """Return the ids (H, W) of the masks of things that are no tables or desks."""
-    kept = [k for k, mask in masks.masks.items() if mask.is_thing and NAMES[mask.category_id] not in SURFACES]
-    return np.where(np.isin(masks.ids, kept), masks.ids, 0)
+    kept = [number for number, name in names.items() if name not in STUFF | SURFACES]
+    return np.where(np.isin(ids, kept), ids, 0)
 
 
 def mosd_frames(folder: Path) -> Iterator[tuple[str, Frame, np.ndarray]]:
@@ -160,22 +164,24 @@ def judge_mosd(predictor: Predictor, folder: Path, most: int | None, pictures: P
     """Return arm -> measure -> mean over the frames."""
     found: dict[str, dict[str, float]] = {}
     for arm in ("network", "network_no_colour"):
-        scores = []
+        scores, fused_scores = [], []
         for k, (name, frame, truth) in enumerate(mosd_frames(folder)):
             if most is not None and k >= most:
                 break
             masks = masks_of(predictor, frame, MOSD_CAMERA, arm)
-            scores.append(score_object_masks(truth, objects_of(masks)))
+            scores.append(score_object_masks(truth, objects_of(masks.ids, names_of(masks))))
+            fused_scores.append(score_object_masks(truth, objects_of(*fused_masks(frame, MOSD_CAMERA, masks))))
             if arm == "network" and k % 3 == 0:
                 draw(pictures / f"mosd_{name}.png", frame, masks)
-        found[arm] = {
-            "overlap_f": float(np.mean([score.overlap.f for score in scores])),
-            "overlap_precision": float(np.mean([score.overlap.precision for score in scores])),
-            "overlap_recall": float(np.mean([score.overlap.recall for score in scores])),
-            "boundary_f": float(np.mean([score.boundary.f for score in scores])),
-            "right_count": float(np.mean([score.right_count for score in scores])),
-            "frames": float(len(scores)),
-        }
+        for into, frame_scores in ((arm, scores), (f"{arm}_fused", fused_scores)):
+            found[into] = {
+                "overlap_f": float(np.mean([score.overlap.f for score in frame_scores])),
+                "overlap_precision": float(np.mean([score.overlap.precision for score in frame_scores])),
+                "overlap_recall": float(np.mean([score.overlap.recall for score in frame_scores])),
+                "boundary_f": float(np.mean([score.boundary.f for score in frame_scores])),
+                "right_count": float(np.mean([score.right_count for score in frame_scores])),
+                "frames": float(len(frame_scores)),
+            }
     return found
 
 
