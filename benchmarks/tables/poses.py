@@ -30,7 +30,7 @@ from stages.fuse.stage import run as fuse
 from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.trajectories import read_tum, write_tum
 from stages.kit.geometry.cameras import intrinsic_matrix
-from stages.kit.geometry.transforms import apply
+from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.measurement.plots import SERIES_COLORS, STYLE, plt, save
 from stages.kit.measurement.pose_error import align_rigidly, associate, trajectory_error
 from stages.kit.measurement.relative_pose_error import trajectory_drift
@@ -38,7 +38,9 @@ from stages.kit.progress import SilentProgress
 from stages.kit.running.chain import run_command
 from stages.kit.running.reading import open_artifact
 from stages.kit.stage import Context
+from stages.poses.alignment import judge
 from stages.poses.parameters import PosesParameters
+from stages.poses.pyramid import build_pyramid
 from stages.poses.stage import run as estimate_poses
 from stages.poses.world import laid_onto
 
@@ -62,9 +64,11 @@ ARMS: dict[str, PosesParameters | None] = {
 QUICK_ARMS = ("odometry", "ours")
 CORRUPTION = "0.2"
 MEASURES = (
-    "ate_m", "rpe_second_m", "rpe_second_rad", "rpe_metre_m", "posed_share", "loops", "frames_per_cpu_second",
+    "ate_m", "rpe_second_m", "rpe_second_rad", "rpe_metre_m", "fit_m", "posed_share", "loops", "frames_per_cpu_second",
     "frames_per_second",
 )  # fmt: skip
+FIT_PAIRS, FIT_GAP = 30, 15
+"""`fit_m`: depth against depth of so many pairs of frames so far apart, with the poses as they are; no truth needed."""
 
 
 @dataclass(frozen=True)
@@ -135,11 +139,31 @@ def run_arm(log: Log, arm: str, output: Path) -> dict[str, float | None]:
         "rpe_second_m": second.translation_rmse if second else None,
         "rpe_second_rad": second.rotation_mean if second else None,
         "rpe_metre_m": metre.translation_rmse if metre else None,
+        "fit_m": depth_fit(log.sequence, times, poses),
         "posed_share": len(times) / frames,
         "loops": float(loops),
         "frames_per_cpu_second": frames / cpu,
         "frames_per_second": frames / wall,
     }
+
+
+def depth_fit(sequence: Sequence, times: np.ndarray, poses: np.ndarray) -> float | None:
+    """Return the median over pairs of frames of the distance between their surfaces under these poses [m].
+
+    The distance of a pair is the root mean square to the planes of the earlier frame, of points within 5 cm of them.
+    """
+    found = []
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        rows, frames = associate(times, reader.times)
+        last = len(frames) - FIT_GAP
+        for k in np.unique(np.linspace(0, last - 1, min(FIT_PAIRS, max(last, 0))).astype(int)).tolist():
+            first, second = (
+                build_pyramid(depth, None, reader.camera, width=320, levels=1, maximum_depth=4.5)
+                for depth in (reader.read(int(frames[n]), ("depth",)).depth for n in (k, k + FIT_GAP))
+                if depth is not None
+            )
+            found.append(judge(first, second, inverse(poses[rows[k]]) @ poses[rows[k + FIT_GAP]]).residual)
+    return float(np.median(found)) if found else None
 
 
 def open3d_odometry(sequence: Sequence, output: Path) -> int:
@@ -251,25 +275,27 @@ def table(
         "RPE [cm/s]",
         "RPE [deg/s]",
         "RPE [cm/m]",
+        "fit [mm]",
         "posed",
         "loops",
         "frames/CPU s",
         "frames/s",
     ]
     lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    scales = (100.0, 100.0, float(np.degrees(1.0)), 100.0, 100.0, 1.0, 1.0, 1.0)
-    digits = (2, 2, 2, 2, 0, 0, 1, 1)
+    scales = (100.0, 100.0, float(np.degrees(1.0)), 100.0, 1000.0, 100.0, 1.0, 1.0, 1.0)
+    digits = (2, 2, 2, 2, 2, 0, 0, 1, 1)
     for log, arms in rows.items():
         for arm, row in arms.items():
-            cells = [_cell(row[name], scale, k) for name, scale, k in zip(MEASURES, scales, digits, strict=True)]
-            cells[4] += " %"
+            cells = [_cell(row.get(name), scale, k) for name, scale, k in zip(MEASURES, scales, digits, strict=True)]
+            cells[5] += " %" if cells[5] else ""
             lines.append("| " + " | ".join([log, arm, *cells]) + " |")
     generated = {log: arms for log, arms in rows.items() if log not in REAL}
     for arm in next(iter(generated.values()), {}):
-        values = [arms[arm]["ate_m"] for arms in generated.values() if arm in arms and arms[arm]["ate_m"] is not None]
+        found = [arms[arm].get("ate_m") for arms in generated.values() if arm in arms]
+        values = [value for value in found if value is not None]
         if len(values) > 1:
-            text = f"{100 * float(np.median(values)):.2f}, worst {100 * max(values):.2f}"  # type: ignore[type-var]
-            lines.append(f"| {len(values)} generated rooms | {arm} | median {text} | | | | | | | |")
+            text = f"{100 * float(np.median(values)):.2f}, worst {100 * max(values):.2f}"
+            lines.append(f"| {len(values)} generated rooms | {arm} | median {text} | | | | | | | | |")
     for log, arms in maps.items():
         lines += ["", f"Map of {log}, true masks with corruption {CORRUPTION}, 2 cm voxels:", ""]
         lines += ["| poses | ATE [cm] | PQ | surface error [mm] |", "|---|---|---|---|"]
@@ -300,6 +326,11 @@ def main() -> int:
     maps: dict[str, dict[str, dict[str, float | None]]] = {}
     for log in logs_of(arguments):
         rows[log.name], paths = {}, {}
+        kept = arguments.out / "paths" / log.name / "given.json"
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        if arguments.fresh or not kept.is_file():
+            kept.write_text(json.dumps({"fit_m": depth_fit(log.sequence, *log.given())}))
+        rows[log.name]["given"] = json.loads(kept.read_text())
         for arm in arms:
             output = arguments.out / "paths" / log.name / arm
             kept = output.with_suffix(".json")

@@ -22,8 +22,10 @@ ITERATIONS = (6, 8, 10)
 """At most so many per level, the finest first."""
 STRIDES = (2, 1, 1)
 """Every how many-th pixel of the source is compared, per level."""
-GATES = (0.05, 0.1, 0.2)
+GATES = (0.06, 0.12, 0.25)
 """Points farther apart than this are no pair, per level [m]."""
+TOLERANCES = (2.0, 4.0, 8.0)
+"""Residuals of so many standard deviations begin to lose weight, per level: from wide to narrow basins."""
 BRIGHTNESS_NOISE = 0.03
 """Standard deviation of the brightness of one surface point in two frames, exposure apart."""
 BRIGHTNESS_GATE = 0.3
@@ -50,7 +52,8 @@ class Alignment:
     residual: float
     """Root mean square distance to the target's planes [m]."""
     brightness_residual: float
-    """Root mean square difference of the brightness, 0 without colour."""
+    """Root mean square difference of the brightness, exposure apart, 0 without colour. Planes slide on each other
+    without any distance between them; their pictures do not."""
 
     @property
     def uncertainty(self) -> float:
@@ -74,6 +77,7 @@ def _accumulate(
     bias: float,
     stride: int,
     gate: float,
+    tolerance: float,
     use_color: bool,
     brightness_noise: float,
     brightness_gate: float,
@@ -126,7 +130,7 @@ def _accumulate(
                     distance = n0 * d0 + n1 * d1 + n2 * d2
                     # Noise is along the ray; what of it is along the normal is what the plane sees.
                     sigma = noise * max(abs(n2), 0.3)
-                    scaled = distance / (2 * sigma)
+                    scaled = distance / (tolerance * sigma)
                     weight = 1.0 / (sigma * sigma * (1.0 + scaled * scaled) ** 2)
                     row[0], row[1], row[2] = q1 * n2 - q2 * n1, q2 * n0 - q0 * n2, q0 * n1 - q1 * n0
                     row[3], row[4], row[5] = n0, n1, n2
@@ -155,9 +159,11 @@ def _accumulate(
             if not known:
                 continue
             difference = value - gain * own - bias
+            sums[6] += 1
+            sums[7] += min(difference * difference, brightness_gate * brightness_gate)
             if abs(difference) > brightness_gate:
                 continue
-            scaled = difference / (2 * brightness_noise)
+            scaled = difference / (tolerance * brightness_noise)
             weight = 1.0 / (brightness_noise * brightness_noise * (1.0 + scaled * scaled) ** 2)
             g0, g1 = along_u * fx / q2, along_v * fy / q2
             g2 = -(g0 * q0 + g1 * q1) / q2
@@ -169,8 +175,6 @@ def _accumulate(
                 for j in range(i, 8):
                     matrix[k] += weight * row[i] * row[j]
                     k += 1
-            sums[6] += 1
-            sums[7] += difference * difference
     return matrix, right, sums
 
 
@@ -224,7 +228,7 @@ def _normal_equations(
     packed, right, sums = _accumulate(
         target.points, target.normals, target.brightness, target.gradient, target.intrinsics,
         source.points, source.normals, source.brightness, motion, float(gain), float(bias),
-        STRIDES[number], GATES[number], use_color, BRIGHTNESS_NOISE, BRIGHTNESS_GATE,
+        STRIDES[number], GATES[number], TOLERANCES[number], use_color, BRIGHTNESS_NOISE, BRIGHTNESS_GATE,
     )  # fmt: skip
     matrix = np.zeros((PARAMETERS, PARAMETERS))
     matrix[_FIRST, _SECOND] = packed

@@ -6,6 +6,7 @@ poses it started from.
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 
 import numpy as np
@@ -15,21 +16,24 @@ from stages.kit.geometry.transforms import apply, inverse
 from stages.poses.estimation import Estimate
 from stages.poses.features import Features, match_features
 from stages.poses.frame_poses import largest_part
-from stages.poses.pose_graph import Edge
+from stages.poses.pose_graph import Edge, residual
 from stages.poses.tracking import KeyFrame
 from stages.poses.world import laid_onto
 
 LEAST_TRACKS = 30
 """Fewer tracks than this adjust nothing."""
 BELIEVED = 0.5
+CONTRADICTION = 4.0
+"""The edges that dense alignment gave may contradict the adjusted poses so much more than those before [times]."""
 LOSS_SCALE = 2.0
 """Reprojection errors above this count less [pixels]."""
 
 
-def adjust(estimate: Estimate, camera: Camera) -> Estimate:
+def adjust(estimate: Estimate, camera: Camera, logger: logging.Logger) -> Estimate:
     """Return the estimate with key frames of its largest part moved to where their features agree best.
 
-    Without enough tracks, or without scale, the estimate is returned as it is.
+    Without enough tracks, without scale, or where the result contradicts what the depth says (a camera that only
+    turns gives features no parallax), the estimate is returned as it is, and the log says why.
     """
     poses, part = estimate.world_from_key, largest_part(estimate)
     edges = [
@@ -39,15 +43,29 @@ def adjust(estimate: Estimate, camera: Camera) -> Estimate:
     ]
     tracks = feature_tracks(estimate.track.keys, edges)
     if len(tracks) < LEAST_TRACKS:
+        logger.warning("no bundle adjustment: %d features were seen twice", len(tracks))
         return estimate
     used = sorted({key for track in tracks for key, _ in track})
     adjusted = _bundle(estimate.track.keys, poses, tracks, used, camera)
     if adjusted is None:
+        logger.warning("no bundle adjustment: its scale is unknown")
         return estimate
     motion = laid_onto(adjusted, poses[used])
     moved = poses.copy()
     moved[used] = motion @ adjusted
+    before, after = mean_error(edges, poses), mean_error(edges, moved)
+    if after > CONTRADICTION * max(before, 1.0):
+        logger.warning("no bundle adjustment: it contradicts the depth (error %.1f instead of %.1f)", after, before)
+        return estimate
+    logger.info("bundle adjustment over %d features: error of the depth %.2f, was %.2f", len(tracks), after, before)
     return replace(estimate, world_from_key=moved)
+
+
+def mean_error(edges: list[Edge], poses: np.ndarray) -> float:
+    """Return the mean squared error per degree of freedom of edges under poses (N, 4, 4)."""
+    twists = [residual(edge, poses) for edge in edges]
+    squares = [float(twist @ edge.information @ twist) for twist, edge in zip(twists, edges, strict=True)]
+    return float(np.mean(squares)) / 6
 
 
 def feature_tracks(keys: list[KeyFrame], edges: list[Edge]) -> list[list[tuple[int, int]]]:
@@ -89,6 +107,7 @@ def _bundle(
     """Return the adjusted world_from_key (U, 4, 4) of the key frames `used` in metres, or None without scale."""
     import pycolmap
 
+    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
     model = pycolmap.Reconstruction()
     # Its pixel centres are at halves.
     parameters = [camera.fx, camera.fy, camera.cx + 0.5, camera.cy + 0.5]

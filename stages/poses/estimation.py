@@ -78,6 +78,7 @@ def limits_of(parameters: PosesParameters) -> Limits:
         agreement=parameters.minimum_agreement,
         residual=parameters.maximum_residual,
         uncertainty=parameters.maximum_uncertainty,
+        brightness=parameters.maximum_brightness_difference,
         key_overlap=parameters.key_overlap,
         key_angle=parameters.key_angle,
         key_distance=parameters.key_distance,

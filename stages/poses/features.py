@@ -109,7 +109,8 @@ def ransac_motion(target: Features, source: Features, random: np.random.Generato
     there = target.points[pairs[:, 0]].astype(float)
     here = source.points[pairs[:, 1]].astype(float)
     tolerance = 0.03 + 0.01 * np.maximum(there[:, 2], here[:, 2]) ** 2
-    triples = np.array([random.choice(len(pairs), 3, replace=False) for _ in range(TRIALS)])
+    triples = random.integers(0, len(pairs), (TRIALS, 3))
+    triples = triples[(triples[:, [0, 1, 2]] != triples[:, [1, 2, 0]]).all(axis=1)]
     motions = rigid_motions(there[triples], here[triples])
     moved = np.einsum("bij,nj->bni", motions[:, :3, :3], here) + motions[:, None, :3, 3]
     agreeing = np.linalg.norm(moved - there, axis=2) < tolerance

@@ -185,10 +185,11 @@ class Verifier:
 
     def _verified(self, target: int, source: int, guess: np.ndarray, found_by: FoundBy) -> Loop | None:
         first, second = self._pyramids(target), self._pyramids(source)
-        there = align(first, second, guess, use_color=self._use_color)
+        coarsest = None if found_by == "place" else 1
+        there = align(first, second, guess, use_color=self._use_color, coarsest=coarsest)
         if not self._limits.good(there):
             return None
-        back = align(second, first, inverse(there.target_from_source), use_color=self._use_color, coarsest=1)
+        back = align(second, first, inverse(there.target_from_source), use_color=self._use_color, coarsest=0)
         if not self._limits.good(back):
             return None
         turn = there.target_from_source @ back.target_from_source

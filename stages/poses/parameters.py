@@ -45,6 +45,9 @@ class PosesParameters(Parameters):
     maximum_uncertainty: float = Field(
         0.05, gt=0, description="... and its worst direction is known within this [m]; blank walls are not"
     )
+    maximum_brightness_difference: float = Field(
+        0.1, gt=0, le=1, description="... and the brightness differs by at most this share of the range (rms)"
+    )
     key_overlap: float = Field(0.75, gt=0, le=1, description="A key frame is made when the overlap falls below this")
     key_angle: float = Field(0.3, gt=0, le=1.5, description="... or the turn exceeds this [rad]")
     key_distance: float = Field(0.15, gt=0, description="... or the way exceeds this share of the median depth")
@@ -52,7 +55,7 @@ class PosesParameters(Parameters):
     loop_gap: int = Field(4, ge=2, description="Key frames nearer than this in order are no loop")
     loop_candidates: int = Field(3, ge=0, le=50, description="Places that look alike and are tried, per key frame")
     overlap_candidates: int = Field(
-        4, ge=0, le=50, description="Key frames that should see the same and are linked, per key frame and round"
+        2, ge=0, le=50, description="Key frames that should see the same and are linked, per key frame and round"
     )
     overlap_rounds: int = Field(2, ge=0, le=10, description="How often linking and optimising is repeated")
 

@@ -26,6 +26,7 @@ class PlaceIndex:
         self._bits = np.stack([random.choice(256, WORD_BITS, replace=False) for _ in range(TABLES)])
         self._places: dict[int, list[int]] = defaultdict(list)
         self._words: list[np.ndarray] = []
+        self._norms: np.ndarray | None = None
 
     def words(self, descriptors: np.ndarray) -> np.ndarray:
         """Return the sorted distinct words (K,) int64 of descriptors (N, 32) uint8."""
@@ -37,6 +38,7 @@ class PlaceIndex:
 
     def add(self, descriptors: np.ndarray) -> None:
         """Add the next frame; frames are numbered in the order they are added."""
+        self._norms = None
         number, words = len(self._words), self.words(descriptors)
         self._words.append(words)
         for word in words.tolist():
@@ -45,16 +47,17 @@ class PlaceIndex:
     def scores(self, number: int) -> np.ndarray:
         """Return the likeness (N,) in [0, 1] of an added frame with every added frame; its own is 1."""
         total = len(self._words)
-        shared, norms = np.zeros(total), self._norms()
+        if self._norms is None:
+            rarity = {word: math.log(total / len(places)) ** 2 for word, places in self._places.items()}
+            self._norms = np.array([math.sqrt(sum(rarity[word] for word in words.tolist())) for words in self._words])
+        shared = np.zeros(total)
         for word in self._words[number].tolist():
             places = self._places[word]
-            shared[places] += math.log(total / len(places)) ** 2
-        scale = norms * norms[number]
+            if len(places) > 1:
+                shared[places] += math.log(total / len(places)) ** 2
+        shared[number] = self._norms[number] ** 2
+        scale = self._norms * self._norms[number]
         return np.divide(shared, scale, out=np.zeros(total), where=scale > 0)
-
-    def _norms(self) -> np.ndarray:
-        rarity = {word: math.log(len(self._words) / len(places)) ** 2 for word, places in self._places.items()}
-        return np.array([math.sqrt(sum(rarity[word] for word in words.tolist())) for words in self._words])
 
 
 class Ferns:

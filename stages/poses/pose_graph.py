@@ -103,6 +103,8 @@ def optimize(world_from_node: np.ndarray, edges: Sequence[Edge], *, switch: floa
     The first node of every connected part stays where it is. Without edges the poses are returned as they are.
     """
     poses = np.array(world_from_node, dtype=float)
+    if not len(poses):
+        return Solution(poses, np.zeros(0), np.zeros(0), np.zeros((0, 6, 6)), 0)
     part = parts_of(len(poses), edges)
     anchors = np.unique(part, return_index=True)[1]
     weights, errors = _weigh(poses, edges, switch)

@@ -71,7 +71,7 @@ def check_streams(reader: FrameReader, sequence: Sequence, parameters: PosesPara
     needs = "--method sfm" if parameters.method == "sfm" else "--bundle-adjustment"
     if (parameters.method == "sfm" or parameters.bundle_adjustment) and "color" not in reader.streams:
         raise BadInput(
-            f"{sequence.root}: its frames have no colour, which {needs} needs", hint="use --method rgbd alone"
+            f"{sequence.root}: {needs} needs colour and its frames have none", hint="use --method rgbd alone"
         )
 
 
@@ -83,7 +83,7 @@ def _dense(
         from stages.poses.bundle_adjustment import adjust
 
         with context.progress.step("bundle adjustment"):
-            found = adjust(found, reader.cameras[camera_name])
+            found = adjust(found, reader.cameras[camera_name], context.logger)
     loops = loop_closures(found)
     kept = sum(loop.weight >= 0.5 for loop in loops)
     counts = (("key_frames", len(found.track.keys)), ("loops", kept), ("loops_rejected", len(loops) - kept))

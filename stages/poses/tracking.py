@@ -34,6 +34,7 @@ class Limits:
     """[m]."""
     uncertainty: float
     """[m]."""
+    brightness: float
     key_overlap: float
     key_angle: float
     """[rad]."""
@@ -47,6 +48,7 @@ class Limits:
             and alignment.agreement >= self.agreement
             and alignment.residual <= self.residual
             and alignment.uncertainty <= self.uncertainty
+            and alignment.brightness_residual <= self.brightness
         )
 
 
@@ -147,7 +149,7 @@ class Tracker:
             or distance_of(found.target_from_source) > limits.key_distance * key.median_depth
         )
         if due:
-            self._continue_part(seen, found)
+            self.track.frames.append(self._continue_part(seen, found))
         else:
             number = len(self.track.keys) - 1
             self.track.frames.append(TrackedFrame(seen.frame, number, found.target_from_source, found))
@@ -201,24 +203,29 @@ class Tracker:
         return self._features[1]
 
     def _promote_previous(self) -> None:
-        assert self._previous is not None
-        last = self.track.frames.pop()
-        assert last.frame == self._previous.frame and last.alignment is not None
-        self._continue_part(self._previous, last.alignment)
+        """Make a key frame of the last frame that was tracked; frames without depth may have come after it."""
+        previous = self._previous
+        assert previous is not None
+        place = next(k for k in reversed(range(len(self.track.frames))) if self.track.frames[k].frame == previous.frame)
+        alignment = self.track.frames[place].alignment
+        assert alignment is not None
+        self.track.frames[place] = self._continue_part(previous, alignment)
 
     def _begin_part(self, seen: Seen, fault: str) -> None:
         part = self.track.keys[-1].part + 1 if self.track.keys else 0
-        self._add_key(seen, part, np.eye(4), fault)
+        self.track.frames.append(self._add_key(seen, part, np.eye(4), fault))
 
-    def _continue_part(self, seen: Seen, found: Alignment) -> None:
+    def _continue_part(self, seen: Seen, found: Alignment) -> TrackedFrame:
+        """Make a key frame of a frame of the current part; return its entry."""
         key = self.track.keys[-1]
         number = len(self.track.keys)
         self.track.links.append(KeyLink(number - 1, number, found))
         motion = self._motion
-        self._add_key(seen, key.part, key.part_from_key @ found.target_from_source, "")
+        entry = self._add_key(seen, key.part, key.part_from_key @ found.target_from_source, "")
         self._motion = motion
+        return entry
 
-    def _add_key(self, seen: Seen, part: int, part_from_key: np.ndarray, fault: str) -> None:
+    def _add_key(self, seen: Seen, part: int, part_from_key: np.ndarray, fault: str) -> TrackedFrame:
         number = len(self.track.keys)
         level = seen.pyramid.levels[-1]
         points = level.points.reshape(-1, 3)
@@ -229,9 +236,9 @@ class Tracker:
                 points[:: max(1, len(points) // 200)].copy(), seen.pyramid.median_depth,
             )
         )  # fmt: skip
-        self.track.frames.append(TrackedFrame(seen.frame, number, np.eye(4), None, fault))
         self._key = self._previous = seen
         self._key_from_previous, self._motion = np.eye(4), np.eye(4)
+        return TrackedFrame(seen.frame, number, np.eye(4), None, fault)
 
 
 def _turns() -> Iterator[np.ndarray]:

