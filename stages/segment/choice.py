@@ -135,6 +135,23 @@ def _huggingface(request: BackendRequest) -> Backend:
     )
 
 
+def _onnx(request: BackendRequest) -> Backend:
+    # Imported here: ONNX Runtime is an extra.
+    from stages.segment.onnx.backend import OnnxBackend
+
+    parameters = request.parameters
+    return OnnxBackend(
+        request.weights,
+        request.sidecar,
+        read_label_file(request.labels) if request.labels else None,
+        load_vocabulary(),
+        score_threshold=parameters.score_threshold,
+        suppression_overlap=parameters.suppression_overlap,
+        minimum_pixels=parameters.small_object_pixels,
+        device=request.device,
+    )
+
+
 def _service(request: BackendRequest) -> Backend:
     # Imported here: the other backends do not need HTTP.
     from stages.segment.service.backend import ServiceBackend
@@ -200,6 +217,7 @@ BUILDERS: dict[str, Callable[[BackendRequest], Backend]] = {
     "objects": _objects,
     "detector": _detector,
     "huggingface": _huggingface,
+    "onnx": _onnx,
     "network": _network,
     "auto": _network,
 }

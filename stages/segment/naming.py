@@ -97,7 +97,7 @@ def name_instances(
 
 def _are_same(first: np.ndarray, second: np.ndarray) -> bool:
     shared = np.count_nonzero(first & second)
-    return shared > SAME_OVERLAP * (np.count_nonzero(first) + np.count_nonzero(second) - shared)
+    return bool(shared > SAME_OVERLAP * (np.count_nonzero(first) + np.count_nonzero(second) - shared))
 
 
 def _regions(pixels: np.ndarray, minimum_pixels: int) -> list[np.ndarray]:

@@ -94,7 +94,7 @@ def load_model(class_name: str, folder: Path, device: str) -> Any:
     parameters = {key for key, _ in model.named_parameters()}
     missing = sorted(set(info["missing_keys"]) & parameters)
     if missing or info["mismatched_keys"]:
-        shown = missing[0] if missing else str(next(iter(info["mismatched_keys"])))
+        shown = missing[0] if missing else str(sorted(info["mismatched_keys"])[0][0])
         raise BadInput(
             f"{name}: {len(missing) or len(info['mismatched_keys'])} parameters are missing or of another shape, "
             f"for example {shown:.100}; they would be random",

@@ -45,7 +45,9 @@ class WordBoxes:
 
 def make_prompts(words: list[str], token_counts: list[int]) -> list[Prompt]:
     """Return the prompts `cup. blue mug. ` that hold all words in small letters, at most MOST_TOKENS tokens each."""
-    prompts, group, used = [], [], 0
+    prompts: list[Prompt] = []
+    group: list[int] = []
+    used = 0
     for index, count in enumerate(token_counts):
         if group and used + count + 1 > MOST_TOKENS:
             prompts.append(_prompt(words, group))

@@ -1,0 +1,1 @@
+"""Backend `onnx`: instance and panoptic networks as ONNX files, run by ONNX Runtime."""
