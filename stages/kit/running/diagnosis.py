@@ -24,6 +24,8 @@ EXTRAS = {
     "ray": ("ray", "batches on a cluster: pip install ray"),
     "mujoco": ("mujoco", "opening scene.mjcf.xml: pip install mujoco"),
     "atheris": ("atheris", "make fuzz: pip install atheris"),
+    "transformers": ("transformers", "segment --backend huggingface: pip install transformers (without torchvision)"),
+    "onnxruntime": ("onnxruntime", "segment --backend onnx: pip install onnxruntime"),
 }
 """Distribution -> module, and what it is for."""
 

@@ -48,8 +48,8 @@ def fit(color: np.ndarray, sidecar: Sidecar, size: tuple[int, int] | None) -> Fi
     if sidecar.order == "bgr":
         image = image[..., ::-1]
     values = image.astype(np.float32) * np.float32(sidecar.scale)
-    values = (values - np.array(sidecar.mean, np.float32)) / np.array(sidecar.deviation, np.float32)
-    tensor = np.ascontiguousarray(values.transpose(2, 0, 1))
+    normalised = (values - np.array(sidecar.mean, np.float32)) / np.array(sidecar.deviation, np.float32)
+    tensor = np.ascontiguousarray(normalised.transpose(2, 0, 1))
     return Fitted(tensor[None] if sidecar.batch else tensor, inner[0] / width, inner[1] / height)
 
 

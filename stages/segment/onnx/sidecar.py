@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, ValidationError
+from pydantic import ValidationError
 
 from schemas.base import Model
 from schemas.errors import BadInput
@@ -44,7 +44,7 @@ class Sidecar(Model):
     resize: Literal["letterbox", "stretch"] = "stretch"
     """How an image comes to that size: padded on the right and below, or by one scale in each direction."""
     order: Literal["rgb", "bgr"] = "rgb"
-    scale: float = Field(1 / 255, gt=0)
+    scale: float = 1 / 255
     """Values 0..255 are multiplied by this, then `mean` is subtracted and the rest divided by `deviation`."""
     mean: tuple[float, float, float] = (0.0, 0.0, 0.0)
     deviation: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -52,7 +52,7 @@ class Sidecar(Model):
     """Whether the input has a batch axis of 1."""
 
 
-IMAGENET = {"mean": (0.485, 0.456, 0.406), "deviation": (0.229, 0.224, 0.225)}
+IMAGENET_MEAN, IMAGENET_DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 
 
 def read_sidecar(path: Path) -> Sidecar:
@@ -62,7 +62,7 @@ def read_sidecar(path: Path) -> Sidecar:
         if Path(path).stat().st_size > LARGEST_FILE:
             raise BadInput(f"{path}: larger than {LARGEST_FILE} bytes", hint=hint)
         values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-        sidecar = Sidecar(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})
+        sidecar = Sidecar.model_validate({k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})
     except OSError as error:
         raise BadInput(f"{path}: {error.strerror}", hint=hint) from None
     except ValidationError as error:
@@ -75,8 +75,8 @@ def read_sidecar(path: Path) -> Sidecar:
         raise BadInput(f"{path}: outputs are {sorted(sidecar.outputs)}, not {sorted(roles)}", hint=hint)
     if sidecar.size is not None and not all(0 < side <= 16384 for side in sidecar.size):
         raise BadInput(f"{path}: size {sidecar.size} is no image's", hint=hint)
-    if min(map(abs, sidecar.deviation)) == 0:
-        raise BadInput(f"{path}: a deviation of 0", hint=hint)
+    if not sidecar.scale > 0 or min(map(abs, sidecar.deviation)) == 0:
+        raise BadInput(f"{path}: a scale or deviation of 0", hint=hint)
     return sidecar
 
 
@@ -90,16 +90,25 @@ def find_layout(shapes: Mapping[str, tuple[int, ...]]) -> Sidecar | None:
     if set(roles) == set(OUTPUTS["instances"]):
         detectron = "pred_classes" in shapes
         return Sidecar(
-            layout="instances", outputs=roles, labels="coco-80", numbering="position" if detectron else "id",
-            **({"order": "bgr", "scale": 1.0} if detectron else {}),
-        )  # fmt: skip
+            layout="instances",
+            outputs=roles,
+            labels="coco-80",
+            numbering="position" if detectron else "id",
+            order="bgr" if detectron else "rgb",
+            scale=1.0 if detectron else 1 / 255,
+        )
     flat = [name for name, shape in shapes.items() if len(shape) == 3]
     deep = [name for name, shape in shapes.items() if len(shape) == 4]
     if len(shapes) != 2 or len(flat) != 1 or len(deep) != 1:
         return None
     first, second = shapes[flat[0]], shapes[deep[0]]
     if first[1] == second[1]:
-        return Sidecar(layout="panoptic", outputs={"classes": flat[0], "masks": deep[0]}, **IMAGENET)
+        return Sidecar(
+            layout="panoptic",
+            outputs={"classes": flat[0], "masks": deep[0]},
+            mean=IMAGENET_MEAN,
+            deviation=IMAGENET_DEVIATION,
+        )
     if first[1] > 4 + second[1] and first[2] > first[1]:
         return Sidecar(layout="yolo-seg", outputs={"predictions": flat[0], "prototypes": deep[0]}, resize="letterbox")
     return None
