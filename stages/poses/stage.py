@@ -45,12 +45,9 @@ def run(sequence: Sequence, *, parameters: PosesParameters, context: Context) ->
     with FrameReader(sequence.path("frames.mcap")) as reader:
         camera_name, frames = main_camera(reader, sequence)
         check_streams(reader, sequence, parameters)
-        result = (
-            _structure(reader, frames, camera_name, parameters, context)
-            if parameters.method == "sfm"
-            else (_dense(reader, frames, camera_name, parameters, context))
-        )
-        return _finish(sequence, reader, camera_name, result, parameters, context)
+        work = _structure if parameters.method == "sfm" else _dense
+        result = work(reader, frames, camera_name, parameters, context)
+        return _finish(reader, camera_name, result, parameters, context)
 
 
 def main_camera(reader: FrameReader, sequence: Sequence) -> tuple[str, list[int]]:
@@ -103,7 +100,6 @@ def _structure(
 
 
 def _finish(
-    sequence: Sequence,
     reader: FrameReader,
     camera_name: str,
     result: Result,
