@@ -28,7 +28,7 @@ LABEL_FILES = {
 """Label set -> file of data/."""
 OWN = "scenewright"
 """The label set that is the vocabulary itself."""
-MATCHED = ("coco-panoptic", "ade20k", OWN, "words")
+MATCHED = (OWN, "coco-panoptic", "ade20k", "words")
 """Where the labels of a network are sought."""
 VOCABULARIES = ("coco", "nyu40", "scannet", "ade20k")
 ANYTHING = "object"
@@ -186,8 +186,8 @@ def class_of_word(word: str) -> str:
 def match_labels(names: Mapping[int, str], given: LabelSet | None = None, *, where: str) -> LabelMap:
     """Return what the numbers of a network stand for, from the names that it gives them.
 
-    Without a `given` set, the one that knows most of the names is taken; of equals, the published sets go before the
-    vocabulary. Raises BadInput when not one name is known. Placeholders (`N/A`, empty) are passed over.
+    Without a `given` set, the one that knows most of the names is taken; of equals, the vocabulary goes first. Raises
+    BadInput when not one name is known. Placeholders (`N/A`, empty) are passed over.
     """
     real = {number: name for number, name in names.items() if plain(name) not in ("", "n/a", "none", "background")}
     candidates = [given] if given else [load_label_set(name) for name in MATCHED]

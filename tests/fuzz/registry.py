@@ -19,9 +19,18 @@ MODULES = {
         "layout_7scenes", "layout_redwood", "layout_posed_images", "layout_tum", "layout_scenenn", "layout_scannet",
         "layout_nerfstudio", "layout_replica", "layout_colmap", "layout_images", "depth_array", "calibration_file",
     ),
+    "tests.fuzz.networks": ("service_reply", "service_info", "service_request", "label_table", "onnx_sidecar"),
 }  # fmt: skip
 NAMES = tuple(name for names in MODULES.values() for name in names)
-INSTRUMENTED = ["stages.ingest", "stages.kit.formats", "stages.kit.running", "schemas"]
+INSTRUMENTED = [
+    "stages.ingest",
+    "stages.segment.labels",
+    "stages.segment.onnx",
+    "stages.segment.service",
+    "stages.kit.formats",
+    "stages.kit.running",
+    "schemas",
+]
 """Packages of ours whose branches a fuzzer watches."""
 
 

@@ -61,13 +61,15 @@ def test_the_thesis_mapping_of_coco_is_kept() -> None:
 
 
 def test_labels_are_matched_by_name_not_by_position() -> None:
-    names = {7: "table-merged", 3: "Chair", 250: "wall-other-merged", 0: "N/A", 11: "quark"}
+    names = {7: "table-merged", 3: "Chair", 250: "wall-other-merged", 0: "N/A", 11: "quark", 5: "river", 6: "wall"}
     matched = match_labels(names, where="net")
     assert matched.set_name == "coco-panoptic" and matched.unknown == ("quark",)
     assert {number: label.class_name for number, label in matched.labels.items()} == {
-        7: "table", 3: "chair", 250: "wall",
+        7: "table", 3: "chair", 250: "wall", 5: "", 6: "wall",
     }  # fmt: skip
-    assert matched.stuff() == {7, 250}
+    assert matched.stuff() == {5, 6, 7, 250}
+    few = match_labels({0: "chair", 1: "table"}, where="net")
+    assert few.set_name == "scenewright" and not few.stuff()  # somebody's own network: every table is one
     long = match_labels({0: "windowpane, window", 1: "rock, stone", 2: "window "}, where="net")
     assert long.set_name == "ade20k" and long.labels[0] == long.labels[2] and not long.unknown
     with pytest.raises(BadInput, match="LABEL_0.*no table"):
@@ -182,3 +184,22 @@ def test_words_do_not_contradict_the_vocabulary() -> None:
         for word in (row["name"], *row.get("also", ())):
             known = own.find(word)
             assert known is None or known.class_name == row["class"], word
+
+
+def table_of_labels() -> str:
+    """The table of docs/SEGMENTATION.md: class by class, the labels that stand for it."""
+    rows = ["| class | COCO panoptic | ADE20K | everyday words |", "|---|---|---|---|"]
+    for name in (*(entry.name for entry in VOCABULARY.classes), ""):
+        cells = []
+        for source in LABEL_FILES:
+            own = [label for label in load_label_set(source).labels if label.class_name == name]
+            words = [w for x in own for w in ((x.name, *x.also) if source == "words" else (x.name,))]
+            cells.append(", ".join(words))
+        if any(cells):
+            rows.append(f"| {f'`{name}`' if name else 'void'} | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def test_the_table_of_the_documentation_is_current() -> None:
+    text = (LABELS_FOLDER.parents[1] / "docs" / "SEGMENTATION.md").read_text()
+    assert table_of_labels() in text, "put the output of table_of_labels() into docs/SEGMENTATION.md"
