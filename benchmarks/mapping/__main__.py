@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from benchmarks.mapping.arms import DRIFTING, LEVELS, NETWORK, all_arms
+from benchmarks.mapping.arms import DRIFTING, LEVELS, NETWORK, SHOWN, all_arms
 from benchmarks.mapping.experiment import Outcome, run_room
 from benchmarks.mapping.figures_of_merit import MEASURES
 from benchmarks.mapping.records import read_outcomes, write_outcomes
@@ -28,7 +28,7 @@ from benchmarks.mapping.tables import (
 from stages.segment.choice import BUILDERS
 
 SEED = 0
-FRAMES, QUICK_FRAMES = 100, 60
+FRAMES, QUICK_FRAMES = 60, 40
 QUICK_ROOMS = 3
 
 
@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if failed:
         print(f"error: {len(failed)} rooms failed: {failed}; see above, then run the command again", file=sys.stderr)
         return 1
-    outcomes = [outcome for room in rooms for outcome in read_outcomes(outcomes_file(options, room))]
+    outcomes = [o for room in rooms for case in cases for o in read_outcomes(outcomes_file(options, room, case))]
     write_results(options, outcomes, cases, rooms)
     return 0
 
@@ -67,24 +67,27 @@ def default_cases() -> list[str]:
     return [*LEVELS, DRIFTING, *([NETWORK] if NETWORK in BUILDERS else [])]
 
 
-def outcomes_file(options: argparse.Namespace, room: tuple[str, int]) -> Path:
-    """Where a room's outcomes stand."""
-    return options.out / f"outcomes-{room[0]}-{room[1]}.json"
+def outcomes_file(options: argparse.Namespace, room: tuple[str, int], case: str) -> Path:
+    """Where a room's outcomes in a case stand."""
+    return options.out / "outcomes" / f"{room[0]}-{room[1]}-{case.replace('/', '-')}.json"
 
 
 def one_room(options: argparse.Namespace, cases: Sequence[str], frames: int) -> int:
-    """Make and run one room; writes its outcomes."""
+    """Make one room and run the cases that are not there yet; writes the outcomes of each."""
     recipe, seed = options.room.split(":")
     room = make_room(options.out / "rooms", recipe, int(seed), frames)
     chosen = options.arms.split(",") if options.arms else None
     arms = [arm for arm in all_arms(options.voxel_size) if chosen is None or arm.name in chosen]
-    outcomes = run_room(room, arms, cases, options.out / "maps", SEED)
-    write_outcomes(outcomes_file(options, (recipe, int(seed))), outcomes)
+    files = {case: outcomes_file(options, (recipe, int(seed)), case) for case in cases}
+    missing = [case for case, file in files.items() if not file.is_file()]
+    for case, outcomes in run_room(room, arms, missing, options.out / "maps", SEED):
+        files[case].parent.mkdir(exist_ok=True)
+        write_outcomes(files[case], outcomes)
     return 0
 
 
 def _room_process(options: argparse.Namespace, cases: Sequence[str], room: tuple[str, int]) -> int:
-    if outcomes_file(options, room).is_file():
+    if all(outcomes_file(options, room, case).is_file() for case in cases):
         print(f"{room[0]}-{room[1]}: kept from an earlier run", flush=True)
         return 0
     command = [sys.executable, "-m", "benchmarks.mapping", "--out", str(options.out), "--room", f"{room[0]}:{room[1]}"]
@@ -116,7 +119,7 @@ def write_results(
     names = [f"{recipe}-{seed}" for recipe, seed in rooms]
     metrics["rooms"], metrics["seeds"] = len(rooms), names
     (options.out / "metrics.json").write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
-    shown = "middle" if "middle" in cases else cases[0]
+    shown = SHOWN if SHOWN in cases else cases[0]
     text = [
         f"{len(rooms)} generated rooms ({'tuning' if options.tuning else 'reporting'} seeds: "
         f"{', '.join(names)}), clutter {CLUTTER}, "

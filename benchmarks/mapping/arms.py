@@ -2,7 +2,7 @@
 
 What the arms share is not theirs to win by: frames, masks, voxel size, integrator, and the geometric segments. The
 published constants of the geometric segmentation (no smoothing, dense normals of 13 pixels, one-sided convexity) fail
-on this sensor's noise, so that every arm gets ours, which helps the rivals; `thesis_published_depth` shows by how much.
+on this sensor's noise, so that every arm gets ours, which helps the rivals (docs/results/mapping.md).
 """
 
 from __future__ import annotations
@@ -20,6 +20,12 @@ DRIFTING = "middle/drifting"
 """Masks of the middle level, poses that drift (drift.py)."""
 
 
+SHOWN = "middle"
+"""The case that the tables by room and class show; all arms run in it."""
+EVERYWHERE = frozenset({"voxblox++", "thesis_separate", "thesis", "ours"})
+"""The arms that run in every case."""
+
+
 @dataclass(frozen=True)
 class Arm:
     """One way from frames and masks to a map and boxes."""
@@ -31,12 +37,6 @@ class Arm:
     graph: GraphParameters
 
 
-_PUBLISHED_SEGMENTS = {
-    "smoothing_window": 0,
-    "normal_window": 13,
-    "normal_step": 1,
-    "mutual_convexity": False,
-}
 # What only `ours` does when surfaces become entities.
 _PLAIN_EXTRACTION = {
     "label_band": 1.0,
@@ -79,15 +79,11 @@ def all_arms(voxel_size: float) -> tuple[Arm, ...]:
 
     voxblox = {"fusion": "voxblox++", "majority_share": 0.5}
     thesis = {"fusion": "thesis"}
-    published = {**thesis, **_PUBLISHED_SEGMENTS}
     separate, joint = {**_PLAIN_EXTRACTION, "merging": "separate"}, {**_PLAIN_EXTRACTION, "merging": "thesis"}
     return (
         arm("voxblox++", "Voxblox++ (SceneNN constants)", voxblox, {**separate, **_VOXBLOX_SCENENN}, "thesis"),
         arm("voxblox++_default", "Voxblox++ (default constants)", voxblox, {**separate, **_VOXBLOX_DEFAULT}, "thesis"),
         arm("thesis_separate", "thesis without joint fusion", thesis, {**separate, **_THESIS_CONSTANTS}, "thesis"),
         arm("thesis", "thesis", thesis, {**joint, **_THESIS_CONSTANTS}, "thesis"),
-        arm(
-            "thesis_published_depth", "thesis, its depth constants", published, {**joint, **_THESIS_CONSTANTS}, "thesis"
-        ),
         arm("ours", "ours", {}, {}, "ours"),
     )

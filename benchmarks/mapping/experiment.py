@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.mapping.arms import DRIFTING, LEVELS, NETWORK, Arm
+from benchmarks.mapping.arms import DRIFTING, EVERYWHERE, LEVELS, NETWORK, SHOWN, Arm
 from benchmarks.mapping.drift import drifting_poses
 from benchmarks.mapping.rooms import RoomFolder
 from schemas.kinds import GroundTruth, PanopticMap
@@ -71,26 +71,29 @@ class SharedFrame:
     """Geometric segments by settings, and the seconds they took."""
 
 
-def run_room(room: RoomFolder, arms: Sequence[Arm], cases: Sequence[str], scratch: Path, seed: int) -> list[Outcome]:
-    """Return the outcome of every arm in every case. Maps are written under `scratch` and stay there."""
+def run_room(
+    room: RoomFolder, arms: Sequence[Arm], cases: Sequence[str], scratch: Path, seed: int
+) -> Iterator[tuple[str, list[Outcome]]]:
+    """Yield case after case with the outcome of every arm. Maps are written under `scratch` and stay there."""
     sequence = open_artifact(room.sequence, SequenceArtifact)
     truth_artifact = open_artifact(room.ground_truth, GroundTruth)
     assert isinstance(sequence, SequenceArtifact) and isinstance(truth_artifact, GroundTruth)
     options = EvaluateParameters()
     truth = load_truth(truth_artifact, np.array(sequence.info.gravity.world_from_log), options.minimum_visible_points)
-    outcomes = []
     with FrameReader(sequence.path("frames.mcap")) as reader:
-        shared = read_frames(reader, arms)
+        shared = read_frames(reader, arms) if cases else []
         for case in cases:
-            seconds = dict.fromkeys([arm.name for arm in arms], 0.0)
-            mappers = build_maps(sequence, reader, shared, arms, case, seed, seconds)
-            for arm in arms:
+            outcomes = []
+            present = [arm for arm in arms if case == SHOWN or arm.name in EVERYWHERE]
+            seconds = dict.fromkeys([arm.name for arm in present], 0.0)
+            mappers = build_maps(sequence, reader, shared, present, case, seed, seconds)
+            for arm in present:
                 output = scratch / room.name / case / arm.name
                 panoptic_map = finish_map(mappers.pop(arm.name), output, seed)
                 scene = (room.name, arm, case)
                 found = measure(scene, truth, panoptic_map, options, output, seed)
                 outcomes.append(replace(found, frames=len(shared), seconds=seconds[arm.name]))
-    return outcomes
+            yield case, outcomes
 
 
 def read_frames(reader: FrameReader, arms: Sequence[Arm]) -> list[SharedFrame]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,18 +38,23 @@ class LabelledSurface:
 
 
 def label_of_segments(
-    counts: TripleCounts, sightings: dict[int, int], largest_segment: int, minimum_share: float
+    counts: TripleCounts,
+    sightings: dict[int, int],
+    largest_segment: int,
+    minimum_share: float,
+    grouped: Mapping[int, tuple[int, int]] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return class id and instance (L + 1,) int32 of every segment label 0 .. L (eq. 2.6); 0 where none was counted.
 
     A label whose predictions are fewer than `minimum_share` of its sightings (frame segments that were matched to it,
     background included) stays unlabelled: a detector that takes a cupboard for a fridge in one frame out of thirty is
     outvoted by the frames in which it sees nothing there. Equation 2.6 itself never weighs the background; 0 is that.
+    `grouped` (segment label -> class, instance) goes before equation 2.6 where it has an entry (partition.py).
     """
     class_ids = np.zeros(largest_segment + 1, dtype=np.int32)
     instances = np.zeros(largest_segment + 1, dtype=np.int32)
     for segment, row in counts.by_segment.items():
-        best = counts.best(segment)
+        best = (grouped or {}).get(segment) or counts.best(segment)
         if best is not None and sum(row.values()) >= minimum_share * sightings.get(segment, 0):
             class_ids[segment], instances[segment] = best
     return class_ids, instances
@@ -106,15 +112,17 @@ def extract_entities(
     speck_share: float,
     part_distance: float,
     spread_steps: int = 0,
+    grouped: Mapping[int, tuple[int, int]] | None = None,
 ) -> tuple[list[ExtractedEntity], LabelledSurface]:
     """Return the entities, ascending by instance, and the labels of the whole surface.
 
     segment (V,) int32: merged segment label of every vertex. `seen_in`: frames that voted for an instance, as bits.
     A vertex stands for one surface voxel: entities under `minimum_voxels` vertices, or under `minimum_observations`
-    frames or votes on the segments they ended up with, are dropped, and their vertices are unlabelled.
+    frames or votes on the segments they ended up with, are dropped, and their vertices are unlabelled. `grouped`: see
+    `label_of_segments`.
     """
     largest = max([0, *counts.by_segment, int(segment.max(initial=0))])
-    class_of, instance_of = label_of_segments(counts, sightings, largest, minimum_share)
+    class_of, instance_of = label_of_segments(counts, sightings, largest, minimum_share, grouped)
     class_of_instance = class_of_instances(counts, class_of, instance_of)
     stuff = frozenset(p for p, c in class_of_instance.items() if c not in things)
     named = spread_labels(

@@ -48,6 +48,8 @@ class PanopticMapper:
         self.labels = MergedLabels()
         self.shared = PairEvidence()
         self.instance_evidence = PairEvidence()
+        self.segment_evidence = PairEvidence()
+        """Segment labels that frames saw in one instance of a thing, or in two."""
         self.sightings: dict[int, int] = {}
         """Frame segments that each segment label was matched to, predicted or background."""
         self.counts = SeparateCounts() if parameters.merging == "separate" else TripleCounts()
@@ -172,6 +174,7 @@ class PanopticMapper:
         )  # fmt: skip
         for removed, kept in merged:
             self.sightings[kept] = self.sightings.get(kept, 0) + self.sightings.pop(removed, 0)
+            self.segment_evidence.rename(removed, kept)
         self.segment_merges += len(merged)
         return index_image, np.array([0, *(self.labels.root(label) for label in labels)], dtype=np.int32)
 
@@ -201,8 +204,15 @@ class PanopticMapper:
         self.labelled_frames += 1
 
     def _observe_instances(self, predictions: list[Prediction]) -> None:
-        """Count which instances of things the frame sees as one, and which as two: a frame instance stands for the
-        leading instances of the global segments that it lies on."""
+        """Count which segments and which instances of things the frame sees as one, and which as two: a frame instance
+        stands for the leading instances of the global segments that it lies on."""
+        of_things = [p for p in predictions if p.class_id in self.things]
+        parts: dict[int, set[int]] = {}
+        for prediction in of_things:
+            parts.setdefault(prediction.frame_instance, set()).add(prediction.segment)
+        self.segment_evidence.observe(
+            [list(combinations(sorted(labels), 2)) for labels in parts.values()], {p.segment for p in of_things}
+        )
         homes: dict[int, dict[int, set[int]]] = {}
         for prediction in predictions:
             best = self.counts.best(prediction.segment)

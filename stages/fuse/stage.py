@@ -14,6 +14,7 @@ from stages.fuse.extraction import extract_entities
 from stages.fuse.inputs import check_origin, check_segments, listings, poses_at
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.parameters import FuseParameters
+from stages.fuse.partition import group_things
 from stages.fuse.payload import describe, write_payload
 from stages.fuse.smoothing import smoothed_tsdf
 from stages.fuse.surface import extract_surface
@@ -57,12 +58,16 @@ def write_map(
         surface = extract_surface(mapper.blocks, minimum_weight=parameters.minimum_weight, tsdf=tsdf)
     with context.progress.step("extract entities"):
         merged = mapper.labels.table()
+        counts, seen_in, grouped = mapper.counts, mapper.seen_in, None
+        if parameters.merging == "ours":
+            things = group_things(mapper.counts, mapper.segment_evidence, mapper.things, mapper.seen_in)
+            counts, seen_in, grouped = things.counts, things.seen_in, things.best
         entities, labelled = extract_entities(
-            surface, merged[surface.segment], mapper.counts, mapper.seen_in, mapper.sightings, mapper.things,
+            surface, merged[surface.segment], counts, seen_in, mapper.sightings, mapper.things,
             minimum_share=parameters.minimum_prediction_share, minimum_voxels=parameters.minimum_entity_voxels,
             minimum_observations=min(parameters.minimum_observations, max(1, mapper.labelled_frames // 10)),
             speck_share=parameters.speck_share, part_distance=parameters.part_distance,
-            spread_steps=parameters.spread_steps,
+            spread_steps=parameters.spread_steps, grouped=grouped,
         )  # fmt: skip
     with context.progress.step("write the map"):
         file = EntitiesFile(
@@ -72,7 +77,7 @@ def write_map(
             segmentation=label,
             entities=tuple(describe(entity, vocabulary) for entity in entities),
         )
-        write_payload(context.output, file, entities, surface, labelled, mapper.counts, mapper.blocks, merged)
+        write_payload(context.output, file, entities, surface, labelled, counts, mapper.blocks, merged)
     summary = {
         "frames": mapper.frames_integrated,
         **{f"skipped_{reason}": count for reason, count in sorted(skipped.items())},

@@ -1,0 +1,170 @@
+"""Which segments are one thing: a partition of their graph, decided by all frames together when the map is closed.
+
+Ours, in place of the instance labels of equations 2.4 to 2.6. Those are decided frame by frame and feed on themselves:
+of two cabinets that one mask covered early on, the one that is seen alone takes the other's label, and every such frame
+confirms it. What frames said of each pair of segments, one thing or two, does not depend on any label.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
+
+from stages.fuse.counts import TripleCounts
+from stages.fuse.regularization import PairEvidence
+
+
+@dataclass(frozen=True)
+class Grouping:
+    """Segments with the thing that they are part of."""
+
+    counts: TripleCounts
+    """The counts with one instance label for all segments of a thing."""
+    best: dict[int, tuple[int, int]]
+    """Segment label -> (class, instance) of its thing."""
+    seen_in: dict[int, int]
+    """Frames in which each instance was predicted, as bits."""
+
+
+SURE_VOTES = 3
+"""From so many predictions on, the leading class of a segment is believed."""
+APART_WEIGHT = 2
+"""A frame that saw two things outweighs one that saw one: masks cover a neighbour more often than they split."""
+LEAST_WEIGHT = 2
+"""Groups merge from this summed weight on; a single frame decides nothing."""
+
+
+def pair_weights(labels: Iterable[int], evidence: PairEvidence) -> dict[int, dict[int, int]]:
+    """Return {a: {b: weight}}, symmetric: how often frames saw both segments in one instance of a thing, less
+    APART_WEIGHT times how often in two."""
+    weights: dict[int, dict[int, int]] = {label: {} for label in sorted(labels)}
+    for factor, counted in ((1, evidence.together), (-APART_WEIGHT, evidence.apart)):
+        for (first, second), count in counted.items():
+            if first in weights and second in weights:
+                weight = weights[first].get(second, 0) + factor * count
+                weights[first][second] = weights[second][first] = weight
+    return weights
+
+
+def group_segments(weights: dict[int, dict[int, int]], believed: Mapping[int, int]) -> list[list[int]]:
+    """Return the groups of segment labels, each ascending, in the order of their smallest label; uses `weights` up.
+
+    Greedy additive edge contraction (Keuper 2015): the two groups with the largest summed weight merge until no sum
+    reaches LEAST_WEIGHT. Ties go to the smaller labels. One stray frame in which a mask covered two things is
+    outweighed by those that saw two. Groups of different `believed` classes {label: class, 0 unknown} never merge: a
+    mask that covered both in some frames gave both its class there, and was outvoted on one of them.
+    """
+    members = {label: [label] for label in sorted(weights)}
+    classes = {label: believed.get(label, 0) for label in members}
+    heap = [(-w, a, b) for a, row in weights.items() for b, w in row.items() if a < b and w >= LEAST_WEIGHT]
+    heapify(heap)
+    while heap:
+        negative, kept, removed = heappop(heap)
+        if weights.get(kept, {}).get(removed) != -negative:
+            continue  # One of the two has merged since, or the sum has changed.
+        if classes[kept] and classes[removed] and classes[kept] != classes[removed]:
+            continue
+        members[kept] += members.pop(removed)
+        classes[kept] = classes[kept] or classes[removed]
+        for other, weight in weights.pop(removed).items():
+            del weights[other][removed]
+            if other == kept:
+                continue
+            total = weights[kept].get(other, 0) + weight
+            weights[kept][other] = weights[other][kept] = total
+            if total >= LEAST_WEIGHT:
+                heappush(heap, (-total, min(kept, other), max(kept, other)))
+    return [sorted(members[label]) for label in sorted(members)]
+
+
+def attach_unseen_pairs(groups: list[list[int]], evidence: PairEvidence, counts: TripleCounts) -> list[list[int]]:
+    """Return the groups in which those that no frame ever showed together have joined by their instance labels.
+
+    Two groups of which no pair was in one frame say nothing of each other; the instance label that leads on both
+    (eq. 2.6) was carried from one to the other by frames that saw parts of both. The larger group takes the smaller.
+    """
+    home = {label: number for number, group in enumerate(groups) for label in group}
+    met: set[tuple[int, int]] = set()
+    for first, second in [*evidence.together, *evidence.apart]:
+        if first in home and second in home:
+            met.add((min(home[first], home[second]), max(home[first], home[second])))
+    votes = [_total(group, counts) for group in groups]
+    leading: dict[tuple[int, int], list[int]] = {}
+    for number, group in enumerate(groups):
+        best = _leading(group, counts)
+        if best is not None:
+            leading.setdefault(best, []).append(number)
+    target = list(range(len(groups)))
+    for numbers in leading.values():
+        main = max(numbers, key=lambda n: (votes[n], -n))
+        for number in numbers:
+            if number != main and (min(number, main), max(number, main)) not in met:
+                target[number] = main
+    merged: dict[int, list[int]] = {}
+    for number, group in enumerate(groups):
+        merged.setdefault(target[number], []).extend(group)
+    return sorted(sorted(group) for group in merged.values())
+
+
+def name_groups(
+    groups: Iterable[list[int]], counts: TripleCounts, things: frozenset[int], seen_in: Mapping[int, int]
+) -> Grouping:
+    """Give every group the class of things that most of its predictions say, and an instance label of its own.
+
+    The label is the one with most predictions of that class in the group that no stronger group has, else a new one.
+    """
+    regrouped = TripleCounts()
+    best: dict[int, tuple[int, int]] = {}
+    seen = dict(seen_in)
+    unused = max([0, *seen_in, *(p for row in counts.by_segment.values() for _, p in row)]) + 1
+    taken: set[int] = set()
+    for group in sorted(groups, key=lambda g: (-_total(g, counts), g)):
+        per_class: dict[int, int] = {}
+        per_instance: dict[tuple[int, int], int] = {}
+        for segment in group:
+            for (class_id, instance), count in counts.by_segment[segment].items():
+                if class_id in things:
+                    per_class[class_id] = per_class.get(class_id, 0) + count
+                    key = (class_id, instance)
+                    per_instance[key] = per_instance.get(key, 0) + count
+        class_id = min(per_class, key=lambda c: (-per_class[c], c))
+        own = [p for c, p in sorted(per_instance, key=lambda k: (-per_instance[k], k)) if c == class_id]
+        label = next((p for p in own if p not in taken), unused)
+        unused = max(unused, label + 1)
+        taken.add(label)
+        bits = 0
+        for p in own:
+            bits |= seen_in.get(p, 0)
+        seen[label] = bits
+        for segment in group:
+            best[segment] = (class_id, label)
+    for segment, row in counts.by_segment.items():
+        for (c, p), count in row.items():
+            regrouped.add(segment, c, best[segment][1] if segment in best else p, count)
+    return Grouping(regrouped, best, seen)
+
+
+def group_things(
+    counts: TripleCounts, evidence: PairEvidence, things: frozenset[int], seen_in: Mapping[int, int]
+) -> Grouping:
+    """Return the things of a map: the segments whose leading class is one of things, partitioned and named."""
+    classes = {}
+    for segment, row in counts.by_segment.items():
+        best = counts.best(segment)
+        if best is not None and best[0] in things:
+            classes[segment] = best[0] if sum(row.values()) >= SURE_VOTES else 0
+    groups = attach_unseen_pairs(group_segments(pair_weights(classes, evidence), classes), evidence, counts)
+    return name_groups(groups, counts, things, seen_in)
+
+
+def _total(group: Iterable[int], counts: TripleCounts) -> int:
+    return sum(sum(counts.by_segment[segment].values()) for segment in group)
+
+
+def _leading(group: Iterable[int], counts: TripleCounts) -> tuple[int, int] | None:
+    votes: dict[tuple[int, int], int] = {}
+    for segment in group:
+        for key, count in counts.by_segment[segment].items():
+            votes[key] = votes.get(key, 0) + count
+    return min(votes, key=lambda k: (-votes[k], k)) if votes else None
