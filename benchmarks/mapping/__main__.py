@@ -23,6 +23,7 @@ from benchmarks.mapping.tables import (
     headline,
     percent,
     precision_by_class,
+    printed_by_the_thesis,
     quality_by_class,
 )
 from stages.segment.choice import BUILDERS
@@ -133,6 +134,7 @@ def write_results(
         precision_by_class(results, arms, shown, "instances", "Table 2.3's layout: instance AP at IoU 0.5"),
         precision_by_class(results, arms, shown, "boxes", "Table 2.4's layout: oriented boxes as observed"),
         precision_by_class(results, arms, shown, "boxes_refined", "Table 2.4's layout: oriented boxes, refined"),
+        printed_by_the_thesis(),
     ]
     (options.out / "table.md").write_text("\n".join(text))
     for (arm, case), found in results.items():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -19,6 +21,7 @@ from stages.evaluate.truth import stuff_classes
 from stages.kit.measurement.bootstrap import Interval
 from stages.kit.measurement.panoptic_quality import ClassQuality
 
+PRINTED = Path(__file__).resolve().parent.parent / "expectations" / "thesis_mapping.toml"
 Results = Mapping[tuple[str, str], Sequence[Outcome]]
 """(arm, case) -> outcomes, one a room, rooms in the same order everywhere."""
 
@@ -135,3 +138,20 @@ def precision_by_class(results: Results, arms: Mapping[str, str], case: str, fie
 def _mean(values: Sequence[float | None]) -> float | None:
     defined = [value for value in values if value is not None]
     return float(np.mean(defined)) if defined else None
+
+
+def printed_by_the_thesis() -> str:
+    """The thesis's own figures (SceneNN, other masks, other sensor): context, never compared with."""
+    with PRINTED.open("rb") as stream:
+        printed = tomllib.load(stream)
+    instances, boxes = printed["table_2_3"], printed["table_2_4"]
+    rows = []
+    for name in dict.fromkeys([*printed["table_2_2"], *instances, *boxes]):
+        quality = printed["table_2_2"].get(name)
+        cells = [f"{quality[which]['all']:.1f}" if quality else "–" for which in ("pq", "sq", "rq")]
+        by_class = list(instances.get(name, {}).values())
+        cells += [f"{np.mean(by_class):.1f}" if by_class else "–"]
+        cells += [f"{boxes[name]['all']:.1f}" if name in boxes else "–"]
+        rows.append((name, *cells))
+    head = ("as printed", "PQ", "SQ", "RQ", "instance AP, mean of the classes", "box AP")
+    return markdown("Context: what the thesis prints for SceneNN", head, rows)
