@@ -11,7 +11,9 @@ import numpy as np
 from schemas.scene_parts import Camera
 
 DEPTH_JUMP = 0.04
-"""Depths of one surface differ by less than this share between neighbouring pixels of the finest level."""
+"""Depths of one surface differ by less than this share within 2x2 pixels, and bend by less along three."""
+STEEPEST = 0.6
+"""A surface along which the depth changes by more than this share within a normal's reach has no normal."""
 
 
 @dataclass(frozen=True)
@@ -86,12 +88,14 @@ def _points_and_normals(
             z = depth[v, u]
             if z <= 0:
                 continue
-            limit = jump * z * reach
             left, right = depth[v, u - reach], depth[v, u + reach]
             above, below = depth[v - reach, u], depth[v + reach, u]
             if left <= 0 or right <= 0 or above <= 0 or below <= 0:
                 continue
-            if abs(left - z) > limit or abs(right - z) > limit or abs(above - z) > limit or abs(below - z) > limit:
+            # An edge bends the depth; a floor that is seen at a grazing angle only slants it.
+            if abs(left + right - 2 * z) > jump * z or abs(above + below - 2 * z) > jump * z:
+                continue
+            if abs(right - left) > STEEPEST * z or abs(below - above) > STEEPEST * z:
                 continue
             a0 = points[v, u + reach, 0] - points[v, u - reach, 0]
             a1 = points[v, u + reach, 1] - points[v, u - reach, 1]
