@@ -23,10 +23,10 @@ from stages.segment.network.features import STRIDE, Mount, features
 from stages.segment.network.grouping import GroupingSettings, group
 
 GRID = {
-    "centre_threshold": (0.05, 0.1, 0.2, 0.3),
-    "peak_window": (5, 9, 15),
-    "score_threshold": (0.1, 0.2, 0.3),
-    "minimum_pixels": (6, 20),
+    "centre_threshold": (0.1, 0.15, 0.2),
+    "peak_window": (7, 9, 13),
+    "score_threshold": (0.2, 0.3, 0.4, 0.5),
+    "minimum_pixels": (12, 24, 40),
 }
 
 

@@ -17,7 +17,7 @@ class SegmentParameters(Parameters):
     """Options of `segment`. Defaults of the geometric part and of the fusion are those of the published system."""
 
     backend: str = Field(
-        "ground-truth",
+        "auto",
         description="Where panoptic masks come from: "
         + "; ".join(f"`{name}`: {what}" for name, what in BACKENDS.items())
         + f"; or {SERVICE}",
@@ -89,9 +89,7 @@ class SegmentParameters(Parameters):
     grouping: Literal["learned", "rules"] = Field(
         "learned", description="What tells --backend objects which patches are one object: trained trees, or set rules"
     )
-    largest_object: float = Field(
-        0.6, gt=0, description="What is larger across is no object for --backend objects [m]"
-    )
+    largest_object: float = Field(0.6, gt=0, description="What is larger across is no object for --backend objects [m]")
 
     words: str = Field(
         "",
@@ -134,7 +132,7 @@ def _data_files(parameters: SegmentParameters) -> tuple[str, ...]:
 
 STAGE = Stage(
     name="segment",
-    version=1,
+    version=2,
     summary="Segment every frame: panoptic masks of a backend fused with geometric segments of the depth",
     parameters=SegmentParameters,
     reads={
@@ -161,5 +159,5 @@ STAGE = Stage(
     libraries=("numpy", "opencv-python-headless", "numba", "scipy"),
     versions="versions",
     data_files=_data_files,
-    example="scenewright segment --sequence outputs/demo/sequence --out outputs/demo/segments --corruption 0.2",
+    example="scenewright segment --sequence outputs/demo/sequence --out outputs/demo/segments",
 )

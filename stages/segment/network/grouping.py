@@ -20,9 +20,9 @@ from stages.segment.panoptic import PanopticFrame, PanopticMask
 class GroupingSettings:
     """Constants of the grouping."""
 
-    centre_threshold: float = 0.1
+    centre_threshold: float = 0.15
     """Peaks of the heat map under this are no instances."""
-    peak_window: int = 7
+    peak_window: int = 9
     """A centre is the largest value in a window this wide [output pixels]."""
     largest_number: int = 200
     """Centres that are kept, best first."""

@@ -75,6 +75,7 @@ def segment(
     sequence: Sequence, out: Path, *, seed: int = 0, weights: Path | None = None, **options: object
 ) -> Segments:
     out.mkdir(parents=True)
+    options.setdefault("backend", "ground-truth")
     context = Context(output=out, seed=seed, device="cpu", progress=SilentProgress())
     return run(sequence, weights, parameters=SegmentParameters(**options), context=context)  # type: ignore[arg-type]
 
