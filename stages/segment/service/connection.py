@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import logging
 import socket
 import ssl
 import threading
@@ -21,6 +22,8 @@ LONGEST_WAIT = 30.0
 """Seconds between two tries."""
 LONGEST_EXCERPT = 200
 """Characters of a server's own words in an error."""
+
+logger = logging.getLogger("scenewright")
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,11 @@ class Connection:
                 self.close()
                 reason, asked = str(error), error.wait
             if attempt < self._retries:
-                self._sleep(min(LONGEST_WAIT, max(asked, self._retry_wait * 2**attempt)))
+                wait = min(LONGEST_WAIT, max(asked, self._retry_wait * 2**attempt))
+                logger.warning(
+                    "%s: %s; asked again in %g s (%d of %d)", self.address, reason, wait, attempt + 1, self._retries
+                )
+                self._sleep(wait)
         tries = f"{self._retries + 1} tries" if self._retries else "one try"
         raise MachineFailure(f"{self.address}: {reason}, after {tries}", hint="see --request-timeout and --retries")
 

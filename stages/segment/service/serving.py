@@ -6,7 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from schemas.errors import UsageError
+from schemas.scene_parts import Camera
+from stages.kit.formats.frames import Frame
 from stages.kit.running.configuration import parameters_for, read_config
 from stages.kit.running.digests import external_digest
 from stages.kit.running.keys import data_file_digests, library_version, library_versions, parameters_as_json
@@ -16,8 +20,15 @@ from stages.kit.stage import External, Optionally
 from stages.segment.backend_names import is_service
 from stages.segment.choice import NEEDS_COLOR, BackendRequest, choose_backend
 from stages.segment.parameters import STAGE, SegmentParameters
-from stages.segment.service.server import SegmentationServer, revision_of
+from stages.segment.service.protocol import SegmentRequest
+from stages.segment.service.server import SegmentationServer, revision_of, segment_request
 from stages.segment.settings import geometric_settings
+
+_BLANK = SegmentRequest(
+    Frame(0, 0.0, np.zeros((480, 640, 3), np.uint8), np.full((480, 640), 2, np.float32), None, np.eye(4)),
+    Camera(width=640, height=480, fx=525, fy=525, cx=319.5, cy=239.5),
+    seed=0,
+)
 
 
 def open_server(
@@ -33,7 +44,7 @@ def open_server(
 
     `files` maps input roles of `segment` to paths. Its revision is a digest of the parameters, the content of all
     files, the versions of the libraries and of this project, so that clients notice when any of them changes. Raises
-    UsageError, BadInput, MissingDependency or MachineFailure.
+    UsageError, BadInput, MissingDependency or MachineFailure. One empty frame is segmented before it returns.
     """
     parameters = parameters_for(STAGE, given, read_config(config) if config else {}, str(config))
     assert isinstance(parameters, SegmentParameters)
@@ -62,6 +73,8 @@ def open_server(
             "device": device,
         }
     )
+    # Libraries load and kernels are compiled on first use: now, and not while a client waits.
+    segment_request(_BLANK, backend, geometric_settings(parameters))
     required = ("color",) if parameters.backend in NEEDS_COLOR else ("depth",)
     return SegmentationServer(host, port, backend, geometric_settings(parameters), revision=revision, required=required)
 

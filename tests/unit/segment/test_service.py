@@ -19,7 +19,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from schemas.errors import BadInput, MachineFailure, MissingDependency, ScenewrightError
+from schemas.errors import BadInput, MachineFailure, MissingDependency, ScenewrightError, UsageError
 from schemas.scene_parts import Camera
 from schemas.segments import Segments
 from schemas.vocabulary import load_vocabulary
@@ -28,7 +28,8 @@ from stages.kit.formats.masks import encode_panoptic_png
 from stages.kit.progress import SilentProgress
 from stages.kit.running.keys import library_versions
 from stages.kit.stage import Context
-from stages.segment.choice import BackendRequest, choose_backend
+from stages.segment.backend_names import BACKENDS, check_backend
+from stages.segment.choice import BUILDERS, BackendRequest, choose_backend
 from stages.segment.parameters import STAGE, SegmentParameters
 from stages.segment.service import reply_cache
 from stages.segment.service.connection import Connection
@@ -43,6 +44,7 @@ from stages.segment.service.protocol import (
     split_multipart,
 )
 from stages.segment.service.server import SegmentationServer
+from stages.segment.service.serving import open_server
 from stages.segment.settings import geometric_settings
 from stages.segment.stage import run
 from tests.unit.segment.test_stage import Written, payload, write_sequence
@@ -492,6 +494,37 @@ def test_the_server_refuses_in_words(room: Written) -> None:
                 raw.sendall(b"POST /v1/segment HTTP/1.1\r\nHost: x\r\n" + head + b"\r\n")
                 assert status in raw.recv(1000)
         connection.close()
+
+
+def test_the_revision_follows_what_decides_the_answers(tmp_path: Path) -> None:
+    config = tmp_path / "segment.toml"
+    config.write_text("fusion_minimum = 400\n")
+    opened = [open_server({"backend": "geometric"}, {}, config=path) for path in (None, None, config)]
+    revisions = [server.info.revision for server in opened]
+    for server in opened:
+        server.server_close()
+    assert revisions[0] == revisions[1] != revisions[2]
+    for name in ("detector", "ground-truth"):
+        with pytest.raises(UsageError, match="whole log"):
+            open_server({"backend": name}, {})
+    with pytest.raises(UsageError, match="cannot be served"):
+        open_server({"backend": "http://127.0.0.1:1"}, {})
+
+
+def test_every_backend_has_a_name_and_a_builder() -> None:
+    assert set(BACKENDS) == set(BUILDERS)
+    for address in (
+        "http://",
+        "http://host:99999",
+        "http://a:b@host",
+        "http://host/?q",
+        "https://host/#a",
+        "ftp://host",
+        "x",
+    ):
+        with pytest.raises(ValueError):
+            check_backend(address)
+    assert check_backend("https://host:8765/path/") == "https://host:8765/path"
 
 
 def test_a_port_that_is_taken() -> None:
