@@ -104,7 +104,7 @@ def check(parameters: FuseParameters, inputs: Mapping[str, Any]) -> None:
 
 STAGE = Stage(
     name="fuse",
-    version=1,
+    version=2,
     summary="Integrate posed frames and their segments into one labelled map with a mesh per entity",
     parameters=FuseParameters,
     reads={"sequence": Sequence, "segments": Segments, "trajectory": Optionally(Trajectory)},

@@ -22,7 +22,7 @@ class Grouping:
     counts: TripleCounts
     """The counts with one instance label for all segments of a thing."""
     best: dict[int, tuple[int, int]]
-    """Segment label -> (class, instance) of its thing."""
+    """Segment label -> (class, instance) of its thing, NOTHING where predictions are too few to believe."""
     seen_in: dict[int, int]
     """Frames in which each instance was predicted, as bits."""
 
@@ -31,6 +31,7 @@ SURE_VOTES = 3
 """From so many predictions on, the leading class of a segment is believed."""
 APART_WEIGHT = 2
 """A frame that saw two things outweighs one that saw one: masks cover a neighbour more often than they split."""
+NOTHING = (0, 0)
 LEAST_WEIGHT = 2
 """Groups merge from this summed weight on; a single frame decides nothing."""
 
@@ -146,16 +147,30 @@ def name_groups(
 
 
 def group_things(
-    counts: TripleCounts, evidence: PairEvidence, things: frozenset[int], seen_in: Mapping[int, int]
+    counts: TripleCounts,
+    evidence: PairEvidence,
+    things: frozenset[int],
+    seen_in: Mapping[int, int],
+    minimum_votes: int = 1,
 ) -> Grouping:
-    """Return the things of a map: the segments whose leading class is one of things, partitioned and named."""
+    """Return the things of a map: the segments whose leading class is one of things, partitioned and named.
+
+    Segments whose leading class is stuff stay what they are from `minimum_votes` predictions of it on, and are nothing
+    below: all of a stuff class is one instance, so that a wall that was taken for a curtain here and there would add
+    up to a curtain.
+    """
     classes = {}
+    doubtful = []
     for segment, row in counts.by_segment.items():
         best = counts.best(segment)
         if best is not None and best[0] in things:
             classes[segment] = best[0] if sum(row.values()) >= SURE_VOTES else 0
+        elif best is not None and sum(counts.instances(segment, best[0]).values()) < minimum_votes:
+            doubtful.append(segment)
     groups = attach_unseen_pairs(group_segments(pair_weights(classes, evidence), classes), evidence, counts)
-    return name_groups(groups, counts, things, seen_in)
+    grouping = name_groups(groups, counts, things, seen_in)
+    grouping.best.update(dict.fromkeys(doubtful, NOTHING))
+    return grouping
 
 
 def _total(group: Iterable[int], counts: TripleCounts) -> int:

@@ -37,8 +37,8 @@ def absorb_specks(
 
     A part is a set of vertices of one label > 0 that triangles (F, 3) connect. It is small under `minimum_size`
     vertices, or, unless its label is in `whole`, under `minimum_share` of the label's largest part. The neighbours of a
-    small part are the parts that are larger than it and not small themselves (a shelf board must not become part of the
-    bottle that stands on it). Without such a neighbour, a part under `minimum_size` becomes 0 and others keep their
+    small part are the parts that are larger than it and not small themselves, of labels whose largest part is larger than
+    that of its own (a piece of shelf board must not become part of the bottle that stands on it). Without such a neighbour, a part under `minimum_size` becomes 0 and others keep their
     label. Ties go to the smaller label.
     """
     if len(labels) == 0:
@@ -52,7 +52,9 @@ def absorb_specks(
     small = (labels > 0) & ((size < minimum_size) | (divisible & (size < minimum_share * largest[labels])))
     # Every edge from a small part to another one is a vote for the label behind it (inner edges count for both faces).
     edges = np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 0], [1, 2], [2, 1], [2, 0], [0, 2])])
-    edges = edges[small[edges[:, 0]] & ~small[edges[:, 1]] & (size[edges[:, 1]] > size[edges[:, 0]])]
+    inner, outer = edges[:, 0], edges[:, 1]
+    greater = (size[outer] > size[inner]) & (largest[labels[outer]] > largest[labels[inner]])
+    edges = edges[small[inner] & ~small[outer] & greater]
     replacement = np.where(sizes < minimum_size, 0, labels)
     width = int(labels.max()) + 1
     keys, votes = np.unique(part[edges[:, 0]] * width + labels[edges[:, 1]], return_counts=True)

@@ -59,14 +59,14 @@ def write_map(
     with context.progress.step("extract entities"):
         merged = mapper.labels.table()
         counts, seen_in, grouped = mapper.counts, mapper.seen_in, None
+        fewest = min(parameters.minimum_observations, max(1, mapper.labelled_frames // 10))
         if parameters.merging == "ours":
-            things = group_things(mapper.counts, mapper.segment_evidence, mapper.things, mapper.seen_in)
+            things = group_things(mapper.counts, mapper.segment_evidence, mapper.things, mapper.seen_in, fewest)
             counts, seen_in, grouped = things.counts, things.seen_in, things.best
         entities, labelled = extract_entities(
             surface, merged[surface.segment], counts, seen_in, mapper.sightings, mapper.things,
             minimum_share=parameters.minimum_prediction_share, minimum_voxels=parameters.minimum_entity_voxels,
-            minimum_observations=min(parameters.minimum_observations, max(1, mapper.labelled_frames // 10)),
-            speck_share=parameters.speck_share, part_distance=parameters.part_distance,
+            minimum_observations=fewest, speck_share=parameters.speck_share, part_distance=parameters.part_distance,
             spread_steps=parameters.spread_steps, grouped=grouped,
         )  # fmt: skip
     with context.progress.step("write the map"):

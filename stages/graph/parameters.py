@@ -82,7 +82,7 @@ class GraphParameters(Parameters):
 
 STAGE = Stage(
     name="graph",
-    version=1,
+    version=2,
     summary="Build the contact graph (who supports, contains, carries whom) from a panoptic map",
     parameters=GraphParameters,
     reads={"panoptic_map": PanopticMap},

@@ -53,12 +53,22 @@ def test_specks_take_the_label_of_their_surroundings() -> None:
     absorbed = absorb_specks(labels, faces, whole=frozenset(), minimum_size=3, minimum_share=0.0)
     assert absorbed.tolist() == [1] * 30 + [3] * 10
     # By share: the second part of 1 is under 60 % of its first; it lies between 2 and 3, which are not small.
-    labels = np.array([1] * 18 + [2] * 10 + [1] * 4 + [3] * 8)
+    labels = np.array([1] * 7 + [2] * 15 + [1] * 4 + [3] * 14)
     assert absorb_specks(labels, faces, whole=frozenset({1}), minimum_size=3, minimum_share=0.6).tolist() == list(
         labels
     )
     shared = absorb_specks(labels, faces, whole=frozenset(), minimum_size=3, minimum_share=0.6)
-    assert shared.tolist() == [1] * 18 + [2] * 14 + [3] * 8, "a tie goes to the smaller label"
+    assert shared.tolist() == [1] * 7 + [2] * 19 + [3] * 14, "a tie goes to the smaller label"
+
+
+def test_a_piece_of_a_large_thing_does_not_join_a_small_one() -> None:
+    _, faces = strip(20)
+    labels = np.array([1] * 22 + [2] * 12 + [1] * 6)
+    assert absorb_specks(labels, faces, whole=frozenset(), minimum_size=3, minimum_share=0.6).tolist() == list(labels)
+    # Too small to stand alone, it is nothing rather than a part of its neighbour.
+    assert absorb_specks(labels, faces, whole=frozenset(), minimum_size=8, minimum_share=0.0).tolist() == (
+        [1] * 22 + [2] * 12 + [0] * 6
+    )
 
 
 def test_lone_specks_become_unlabelled() -> None:

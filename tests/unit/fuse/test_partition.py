@@ -11,6 +11,7 @@ from stages.fuse.counts import TripleCounts
 from stages.fuse.partition import (
     APART_WEIGHT,
     LEAST_WEIGHT,
+    NOTHING,
     attach_unseen_pairs,
     group_segments,
     group_things,
@@ -74,6 +75,12 @@ def test_two_cabinets_that_share_a_label_become_two() -> None:
     assert grouping.counts.by_segment[1] == {(CABINET, 55): 26}
     assert grouping.counts.by_segment[2] == {(CABINET, 15): 30, (BOX, 15): 1}
     assert grouping.counts.by_segment[3] == {(WALL, 4): 50}, "stuff keeps its label"
+
+
+def test_stuff_that_hardly_anybody_predicted_is_nothing() -> None:
+    counts = counted((1, WALL, 4, 2), (1, CABINET, 7, 1), (2, WALL, 4, 3), (3, CABINET, 7, 1))
+    best = group_things(counts, PairEvidence(), THINGS, {}, minimum_votes=3).best
+    assert best == {1: NOTHING, 3: (CABINET, 7)}, "segment 2 keeps what equation 2.6 says"
 
 
 def test_a_group_takes_the_class_of_most_predictions_and_a_new_label_when_its_own_are_gone() -> None:
