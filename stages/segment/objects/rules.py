@@ -10,11 +10,11 @@ from numba import njit
 from stages.segment.objects.pairs import FEATURES
 
 _AT = {name: k for k, name in enumerate(FEATURES)}
-SMALLER, BORDER_SHARE, TOUCHING = _AT["smaller_pixels"], _AT["border_share"], _AT["touching"]
+SMALLER, TOUCHING = _AT["smaller_pixels"], _AT["touching"]
 CONNECTED, JUMP, CONCAVE, CONVEX = _AT["connected"], _AT["jump"], _AT["concave"], _AT["convex"]
 BORDER_COLOR, HISTOGRAM, CHROMA = _AT["border_color"], _AT["histogram"], _AT["chroma"]
 BEHIND_GAIN, HIDDEN = _AT["behind_gain"], _AT["hidden"]
-NORMAL_ANGLE, RESIDUAL_GAIN, ENCLOSED = _AT["normal_angle"], _AT["residual_gain"], _AT["enclosed"]
+NORMAL_ANGLE, RESIDUAL_GAIN = _AT["normal_angle"], _AT["residual_gain"]
 TOP, GAP = _AT["top_difference"], _AT["gap"]
 CUT, FINE_STEPS = _AT["cut"], _AT["fine_steps"]
 CRUMB = math.log(400.0)
@@ -32,18 +32,14 @@ def rule_score(f: np.ndarray) -> float:
     """
     if f[CUT] > 0.5:
         other = 4.0 * (0.3 - f[HISTOGRAM]) + 2.0 * (f[FINE_STEPS] - 0.75) + 0.05 * (f[CHROMA] - 15.0)
-        return 1.2 - other - 6.0 * max(0.0, f[BEHIND_GAIN])
+        return 2.4 - other - 6.0 * max(0.0, f[BEHIND_GAIN])
     if f[TOUCHING] > 0.0:
-        score = -0.1 + 2.2 * f[CONNECTED] * (f[CONVEX] - 1.25 * f[CONCAVE])
-        score += 1.2 * (f[BORDER_SHARE] - 0.15)
-        score -= 7.0 * f[BEHIND_GAIN] if f[BEHIND_GAIN] > 0.0 else 4.0 * f[BEHIND_GAIN]
-        score -= 0.06 * (f[BORDER_COLOR] - 18.0)
-        score -= 0.02 * (f[CHROMA] - 14.0)
-        score -= 3.0 * (1.0 - f[CONNECTED]) * f[JUMP]
-        score -= 2.0 * f[TOP]
-        score += 0.8 * f[ENCLOSED] * (1.0 - f[CONCAVE] * f[CONNECTED])
+        score = 3.0 + f[CONNECTED] * (3.0 * f[CONVEX] - 2.3 * f[CONCAVE])
+        score -= 10.0 * f[BEHIND_GAIN]
+        score -= 0.12 * f[BORDER_COLOR] + 0.08 * f[CHROMA]
+        score -= 5.0 * (1.0 - f[CONNECTED]) * f[JUMP] + 8.0 * f[TOP]
         if f[SMALLER] < CRUMB:
-            score += 0.8 * (CRUMB - f[SMALLER])
+            score += 1.5 * (CRUMB - f[SMALLER])
         return score
     score = -1.4 + 12.0 * min(f[HIDDEN], 0.25)
     score -= 6.0 * max(0.0, f[BEHIND_GAIN])
