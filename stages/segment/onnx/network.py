@@ -66,6 +66,7 @@ class Network:
             providers.insert(0, "CUDAExecutionProvider")
         options = runtime.SessionOptions()
         options.log_severity_level = 4  # errors reach us as exceptions
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # other steps want the cores too
         try:
             self._session = runtime.InferenceSession(str(self.path), options, providers=providers)
         except Exception as error:  # its exceptions have no common base but this
