@@ -132,6 +132,7 @@ def surface_planes(
         least = max(5, math.ceil(minimum_support_area / spacing**2))
         found = small_support_planes(points[rest], normals[rest], distance, horizontal_threshold, least, random)
         fits += [PlaneFit(fit.normal, fit.offset, rest[fit.inliers]) for fit in found]
+        fits = level_planes(points, fits, horizontal_threshold, least)
         fits = merge_levels(points, fits, horizontal_threshold)
         if split_distance is not None:
             fits = split_levels(points, fits, horizontal_threshold, split_distance, least)
@@ -175,6 +176,31 @@ def small_support_planes(
         found.append(PlaneFit(fit.normal, fit.offset, upward[fit.inliers]))
         upward = np.delete(upward, fit.inliers)
     return found
+
+
+def level_planes(
+    points: np.ndarray, fits: list[PlaneFit], horizontal_threshold: float, minimum_count: int
+) -> list[PlaneFit]:
+    """Return the planes with the horizontal ones made level, at the height around which most of their inliers lie.
+
+    A board of a fridge that only its back edge shows fits a plane that leans by some degrees as well as a level one,
+    and half a metre further in front, under the bottle, such a plane is centimetres too low. Inliers farther than
+    SAME_HEIGHT from the level belong to something else; a plane that keeps fewer than `minimum_count` is none.
+    """
+    result = []
+    for fit in fits:
+        if not is_horizontal(fit.normal, horizontal_threshold):
+            result.append(fit)
+            continue
+        heights = points[fit.inliers, 2]
+        ordered = np.sort(heights)
+        reach = np.searchsorted(ordered, ordered + SAME_HEIGHT, side="right") - np.arange(len(ordered))
+        first = int(np.argmax(reach))
+        height = float(np.median(ordered[first : first + reach[first]]))
+        kept = fit.inliers[np.abs(heights - height) <= SAME_HEIGHT]
+        if len(kept) >= minimum_count:
+            result.append(PlaneFit(np.array([0.0, 0.0, 1.0]), -height, kept))
+    return result
 
 
 def merge_levels(points: np.ndarray, fits: list[PlaneFit], horizontal_threshold: float) -> list[PlaneFit]:
