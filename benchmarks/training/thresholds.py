@@ -56,7 +56,9 @@ def main() -> None:
                     for output in predictor.checkpoint.network(torch.from_numpy(inputs)[None])
                 )
             for choice, into in zip(choices, sums, strict=True):
-                found = group(logits, heat[0], offsets, predictor.classes, GroupingSettings(**choice))
+                found = group(
+                    logits, heat[0], offsets, predictor.classes, GroupingSettings(**choice), predictor.unnamed
+                )
                 named = {number: names[mask.category_id] for number, mask in found.masks.items()}
                 ids = found.ids.ravel().astype(np.int64)
                 quality = panoptic_quality(truth, ids, dict(enumerate(frame.classes, start=1)), named, STUFF)

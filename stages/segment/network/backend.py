@@ -20,6 +20,8 @@ from stages.segment.network.grouping import GroupingSettings, Named, group, rais
 from stages.segment.network.weights import BUNDLED, Checkpoint, load_checkpoint
 from stages.segment.panoptic import PanopticFrame
 
+UNNAMED = "object"
+
 
 @dataclass(frozen=True)
 class Predictor:
@@ -28,6 +30,8 @@ class Predictor:
     checkpoint: Checkpoint
     classes: tuple[Named, ...]
     settings: GroupingSettings
+    unnamed: int | None
+    """Index of class `object`, which things get that are not recognised."""
 
     def predict(self, depth: np.ndarray, color: np.ndarray | None, camera: Camera, mount: Mount) -> PanopticFrame:
         """Return the masks of an image at its own size.
@@ -45,6 +49,7 @@ class Predictor:
             offsets[0].contiguous().numpy(),
             self.classes,
             self.settings,
+            self.unnamed,
         )
         named_at = np.ascontiguousarray(small_depth[::STRIDE, ::STRIDE])
         ids = raise_to_depth(coarse.ids, named_at, depth, camera.width / small.width)
@@ -69,7 +74,8 @@ def load_predictor(path: Path, vocabulary: Vocabulary, settings: GroupingSetting
     checkpoint = load_checkpoint(path, vocabulary)
     entries = [vocabulary.by_name(name) for name in checkpoint.classes]
     named = tuple(Named(entry.id, entry.kind == "thing") for entry in entries)
-    return Predictor(checkpoint, named, settings or GroupingSettings())
+    unnamed = checkpoint.classes.index(UNNAMED) if UNNAMED in checkpoint.classes else None
+    return Predictor(checkpoint, named, settings or GroupingSettings(), unnamed)
 
 
 class NetworkBackend:

@@ -29,7 +29,8 @@ class GroupingSettings:
     minimum_pixels: int = 12
     """Smaller masks are dropped [output pixels]."""
     score_threshold: float = 0.3
-    """Masks whose mean probability of their class is under this are dropped."""
+    """Masks whose mean probability of their class is under this are not named: stuff is dropped, a thing becomes an
+    `object`."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +47,15 @@ def group(
     offsets: np.ndarray,
     classes: tuple[Named, ...],
     settings: GroupingSettings | None = None,
+    unnamed: int | None = None,
 ) -> PanopticFrame:
     """Return masks at the resolution of the heads.
 
     `logits` (C, h, w), `heat` (h, w), `offsets` (2, h, w) rows and columns [output pixels]. Stuff: one mask a class.
     Things: every pixel whose likeliest class is a thing goes to the centre nearest to where its offset points; the mask
     takes the thing class with the largest sum of probabilities over its pixels, and its score is the mean of them.
+    Where that is under the threshold, as when a chair might as well be a sofa, the mask is still that of a thing: it
+    gets the class with the index `unnamed`, or is dropped when that is None.
     """
     settings = settings or GroupingSettings()
     probability = _softmax(logits)
@@ -62,7 +66,11 @@ def group(
 
     def add(mask: np.ndarray, index: int) -> None:
         score = float(probability[index][mask].mean())
-        if mask.sum() >= settings.minimum_pixels and score >= settings.score_threshold:
+        if score < settings.score_threshold:
+            if unnamed is None or not classes[index].is_thing:
+                return
+            index = unnamed
+        if mask.sum() >= settings.minimum_pixels:
             number = len(masks) + 1
             ids[mask] = number
             masks[number] = PanopticMask(classes[index].category_id, classes[index].is_thing, min(score, 1.0))

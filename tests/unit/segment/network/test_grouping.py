@@ -66,6 +66,22 @@ def test_the_class_of_an_instance_is_that_of_most_of_its_pixels() -> None:
     assert len(numbers) == 1 and found.masks[int(numbers[0])].category_id == 4
 
 
+def test_a_thing_that_is_not_recognised_becomes_the_unnamed_class_or_nothing() -> None:
+    """Five kinds of things are equally likely: a thing it is, but which?"""
+    classes = (Named(1, False), *(Named(k, True) for k in range(4, 9)), Named(40, True))
+    logits = np.full((7, 20, 20), -8.0, dtype=np.float32)
+    logits[0] = 0.0
+    logits[1:6, 5:15, 5:15] = 4.0
+    heat, offsets = np.zeros((20, 20), np.float32), np.zeros((2, 20, 20), np.float32)
+    heat[10, 10] = 1.0
+    found = group(logits, heat, offsets, classes, unnamed=6)
+    number = int(found.ids[10, 10])
+    assert np.array_equal(found.ids == number, logits[1] > 0)
+    assert found.masks[number].category_id == 40 and 0.15 < found.masks[number].score < 0.2
+    dropped = group(logits, heat, offsets, classes)
+    assert not dropped.ids[10, 10] and len(dropped.masks) == 1
+
+
 def test_centres_are_peaks_over_the_threshold_best_first() -> None:
     heat = np.zeros((40, 40), dtype=np.float32)
     heat[10, 10], heat[10, 12], heat[30, 30], heat[5, 35] = 0.9, 0.8, 0.95, 0.05
