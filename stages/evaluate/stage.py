@@ -183,9 +183,12 @@ def _evaluate_graph(inputs: Inputs, parameters: EvaluateParameters, context: Con
         return
     part = inputs.part("graph")
     graph = artifact.graph
+    measure_boxes(part, truth, graph, _vertices(inputs.predicted_map), parameters)
+    if truth.graph.graph.get("annotated") == "no":
+        part.notes.append("Nobody annotated what carries what: there is no graph to compare with.")
+        return
     comparison = compare_graphs(truth, graph, inputs.overlaps, parameters.node_match_iou)
     measure_graph(part, truth, comparison)
-    measure_boxes(part, truth, graph, _vertices(inputs.predicted_map), parameters)
     if parameters.plots:
         figures.draw_comparison(context.output / "plots" / "contact_graphs.png", comparison, inputs.label)
 
@@ -235,7 +238,7 @@ def _evaluate_trajectory(inputs: Inputs, parameters: EvaluateParameters, context
 
 def _true_trajectory(inputs: Inputs) -> tuple[np.ndarray, np.ndarray] | None:
     """Times and poses to compare with: those of the ground truth, else, for a trajectory, those that the log gave."""
-    if inputs.ground_truth is not None:
+    if inputs.ground_truth is not None and inputs.ground_truth.truth.source == "generated":
         times, poses = read_tum(inputs.ground_truth.path("trajectory.tum"))
         return times, world_from_log(inputs.sequence) @ poses
     if inputs.trajectory is None:

@@ -71,9 +71,11 @@ def load_truth(truth: GroundTruth, world_from_log: np.ndarray, minimum_visible_p
     """Read the ground truth and move it by `world_from_log` (4, 4), what ingest did to the log's world.
 
     Boxes keep their size and stay upright: exact when ingest only turned about z, close when it corrected a small
-    tilt. Raises BadInput when visible.npz is unreadable or its arrays disagree.
+    tilt. That of an annotated scan is not moved. Raises BadInput when visible.npz is unreadable or its arrays disagree.
     """
     file = truth.truth
+    if file.source == "scan":  # it is in the sequence's world already
+        world_from_log = np.eye(4)
     points, instances = read_arrays(truth.path("visible.npz"), "points", "instance")
     points, instances = points.astype(float), instances.astype(np.int64)
     if points.shape != (len(instances), 3):
@@ -88,7 +90,7 @@ def load_truth(truth: GroundTruth, world_from_log: np.ndarray, minimum_visible_p
         graph=truth.graph,
         surface=replace(surface, vertices=apply(world_from_log, surface.vertices)),
         optional=frozenset(optional),
-        name=f"{file.recipe}, seed {file.seed}",
+        name=f"{file.recipe}, seed {file.seed}" if file.source == "generated" else file.recipe,
     )
 
 

@@ -148,11 +148,16 @@ def measure_overlap(
         blocks.slots, blocks.segment, canonical,
     )  # fmt: skip
     sizes = np.bincount(rows, minlength=segment_count)
-    width = len(canonical)
-    table = np.bincount(rows * width + labels, minlength=segment_count * width).reshape(segment_count, width)
-    table[:, 0] = 0  # voxels without a label
-    pair_rows, pair_labels = np.nonzero(table)
-    return Overlap(sizes, pair_rows, pair_labels, table[pair_rows, pair_labels])
+    # Only labels that are in sight get a column: a table of all labels of the map would grow with it.
+    present = np.flatnonzero(np.bincount(labels, minlength=1))
+    column_of = np.zeros(len(canonical), dtype=np.int64)
+    column_of[present] = np.arange(len(present))
+    width = len(present)
+    table = np.bincount(rows * width + column_of[labels], minlength=segment_count * width)
+    table = table.reshape(segment_count, width)
+    table[:, present == 0] = 0  # voxels without a label
+    pair_rows, columns = np.nonzero(table)
+    return Overlap(sizes, pair_rows, present[columns], table[pair_rows, columns])
 
 
 def match_segments(overlap: Overlap, *, minimum_voxels: int, minimum_share: float) -> list[int]:

@@ -37,8 +37,9 @@ def absorb_specks(
 
     A part is a set of vertices of one label > 0 that triangles (F, 3) connect. It is small under `minimum_size`
     vertices, or, unless its label is in `whole`, under `minimum_share` of the label's largest part. The neighbours of a
-    small part are the parts that are larger than it and not small themselves, of labels whose largest part is larger than
-    that of its own (a piece of shelf board must not become part of the bottle that stands on it). Without such a neighbour, a part under `minimum_size` becomes 0 and others keep their
+    small part are the parts that are larger than it and not small themselves, of labels whose largest part is larger
+    than that of its own (a piece of shelf board must not become part of the bottle that stands on it). Without such a
+    neighbour, a part under `minimum_size` becomes 0 and others keep their
     label. Ties go to the smaller label.
     """
     if len(labels) == 0:
