@@ -31,7 +31,7 @@ def bounds_in_reach(clouds: list[np.ndarray], distance: float) -> np.ndarray:
     low = np.array([cloud.min(axis=0) if len(cloud) else (np.inf,) * 3 for cloud in clouds]).reshape(-1, 3)
     high = np.array([cloud.max(axis=0) if len(cloud) else (-np.inf,) * 3 for cloud in clouds]).reshape(-1, 3)
     reached = low[:, None] - distance <= high[None, :]
-    return (reached & reached.transpose(1, 0, 2)).all(axis=2)
+    return np.all(reached & reached.transpose(1, 0, 2), axis=2)
 
 
 def largest_cluster(clouds: list[np.ndarray], sizes: list[int], *, distance: float) -> set[int]:

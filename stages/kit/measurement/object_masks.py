@@ -102,8 +102,8 @@ def score_object_masks(truth: np.ndarray, found: np.ndarray) -> ObjectMaskScore:
     found_edges = [boundary_of(found == k) for k in found_ids]
     near_hits = near_recalled = 0
     for row, column in matched:
-        near_hits += np.count_nonzero(found_edges[column] & _dilated(true_edges[row], disk))
-        near_recalled += np.count_nonzero(true_edges[row] & _dilated(found_edges[column], disk))
+        near_hits += int(np.count_nonzero(found_edges[column] & _dilated(true_edges[row], disk)))
+        near_recalled += int(np.count_nonzero(true_edges[row] & _dilated(found_edges[column], disk)))
     return ObjectMaskScore(
         overlap=_agreement(hits, hits, found_pixels.sum(), true_pixels.sum()),
         boundary=_agreement(
