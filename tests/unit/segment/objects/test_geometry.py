@@ -46,13 +46,13 @@ def test_content_of_a_hull_with_an_occluder_a_gap_and_a_background() -> None:
 
 
 def test_plane_of_sums_is_the_plane() -> None:
-    u, v = np.meshgrid(np.arange(20.0), np.arange(30.0))
-    w = 0.8 + 0.002 * u - 0.003 * v
+    u, v = np.meshgrid(np.arange(200.0), np.arange(300.0))
+    w = 0.8 + 0.0002 * u - 0.0003 * v
     sums = np.zeros(POINT_SUMS)
     sums[0] = u.size
     sums[13:22] = [a.sum() for a in (u, v, u * u, u * v, v * v, w, u * w, v * w, w * w)]
     plane, residual = inverse_plane(sums)
-    assert plane == pytest.approx([0.8, 0.002, -0.003], abs=2e-3)
+    assert plane == pytest.approx([0.8, 0.0002, -0.0003], rel=1e-3)
     assert residual < 1e-3
 
 
