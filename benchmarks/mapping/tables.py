@@ -46,7 +46,19 @@ def markdown(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 
 def headline(results: Results, arms: Mapping[str, str], cases: Sequence[str]) -> str:
     """Every arm in every case, PQ and the average precisions with intervals over rooms."""
-    head = ("case", "arm", "PQ", "SQ", "RQ", "instance AP", "AP, thesis's code", "box AP", "box AP refined", "frames/s")
+    head = (
+        "case",
+        "arm",
+        "rooms",
+        "PQ",
+        "SQ",
+        "RQ",
+        "instance AP",
+        "AP, thesis's code",
+        "box AP",
+        "box AP refined",
+        "frames/s",
+    )
     rows = []
     for case in cases:
         for arm, title in arms.items():
@@ -60,7 +72,7 @@ def headline(results: Results, arms: Mapping[str, str], cases: Sequence[str]) ->
             cells += [percent(MEASURES["instance_ap_thesis_code"](outcomes)), percent(MEASURES["box_ap"](outcomes))]
             cells += [with_interval(interval(outcomes, MEASURES["box_ap_refined"], random))]
             cells += [f"{MEASURES['frames_per_second'](outcomes) or 0:.1f}"]
-            rows.append((case, title, *cells))
+            rows.append((case, title, str(len(outcomes)), *cells))
     return markdown("All arms, all cases", head, rows)
 
 
