@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from benchmarks.mapping.experiment import Outcome
 from stages.evaluate.truth import stuff_classes
-from stages.kit.measurement.average_precision import Candidates, ClassPrecision, class_precision, mean_precision, pool
+from stages.kit.measurement.average_precision import (
+    Candidates,
+    PrecisionRecall,
+    average_precision,
+    average_precision_thesis_code,
+    match_greedily,
+    mean_precision,
+)
 from stages.kit.measurement.bootstrap import Interval
 from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, average_quality_thesis_code
 
@@ -26,13 +34,50 @@ def summed_qualities(outcomes: Sequence[Outcome], field: str = "qualities") -> d
     return sums
 
 
-def pooled_precision(outcomes: Sequence[Outcome], field: str) -> dict[str, ClassPrecision]:
-    """Return average precision by class, the candidates of all rooms ranked together."""
-    scenes: dict[str, list[Candidates]] = {}
+@dataclass(frozen=True)
+class Ranked:
+    """Predictions of one class in one room with whether each found something true. Matching never crosses rooms, so
+    that it is done once and pooling is a sort."""
+
+    confidence: np.ndarray
+    hits: np.ndarray
+    true_count: int
+
+
+def ranked(found: Candidates) -> Ranked:
+    """Match one room's predictions of a class (`average_precision.match_greedily`); remembered by the object."""
+    key = id(found)
+    if key not in _RANKED:
+        matches = match_greedily(found.iou, found.confidence)
+        order = [row for row, _ in matches]
+        hits = np.array([truth is not None for _, truth in matches], dtype=float)
+        # The object is kept beside, so that its id stays its own.
+        _RANKED[key] = (found, Ranked(found.confidence[order], hits, found.iou.shape[1]))
+    return _RANKED[key][1]
+
+
+_RANKED: dict[int, tuple[Candidates, Ranked]] = {}
+
+
+def pooled_curve(rooms: Sequence[Ranked]) -> PrecisionRecall:
+    """Return the precision-recall curve of one class over rooms; ties in confidence: earlier room first."""
+    confidence = np.concatenate([np.zeros(0), *(room.confidence for room in rooms)])
+    hits = np.concatenate([np.zeros(0), *(room.hits for room in rooms)])[np.argsort(-confidence, kind="stable")]
+    true_count = sum(room.true_count for room in rooms)
+    found = np.cumsum(hits)
+    precision = found / np.arange(1, len(hits) + 1)
+    recall = found / true_count if true_count else np.zeros(len(hits))
+    return PrecisionRecall(precision, recall, true_count)
+
+
+def pooled_curves(outcomes: Sequence[Outcome], field: str) -> dict[str, PrecisionRecall]:
+    """Return the precision-recall curve of every class, the predictions of all rooms ranked together."""
+    rooms: dict[str, list[Ranked]] = {}
     for outcome in outcomes:
         for name, found in getattr(outcome, field).items():
-            scenes.setdefault(name, []).append(found)
-    return {name: class_precision(pool(found)) for name, found in sorted(scenes.items()) if name != ANY}
+            if name != ANY:
+                rooms.setdefault(name, []).append(ranked(found))
+    return {name: pooled_curve(found) for name, found in sorted(rooms.items())}
 
 
 def quality_measure(which: str, kind: str = "all") -> Measure:
@@ -57,11 +102,11 @@ def quality_thesis_code(outcomes: Sequence[Outcome]) -> float | None:
     return average_quality_thesis_code(summed_qualities(outcomes, "qualities_thesis_code").values()).pq
 
 
-def precision_measure(field: str, form: str = "all_point") -> Measure:
+def precision_measure(field: str, form: Callable[[PrecisionRecall], float | None] = average_precision) -> Measure:
     """Return the mean over classes of average precision of `instances`, `boxes` or `boxes_refined`."""
 
     def measure(outcomes: Sequence[Outcome]) -> float | None:
-        return mean_precision([getattr(found, form) for found in pooled_precision(outcomes, field).values()])
+        return mean_precision([form(curve) for curve in pooled_curves(outcomes, field).values()])
 
     return measure
 
@@ -80,7 +125,7 @@ MEASURES: dict[str, Measure] = {
     "pq_thing": quality_measure("pq", "thing"),
     "pq_thesis_code": quality_thesis_code,
     "instance_ap": precision_measure("instances"),
-    "instance_ap_thesis_code": precision_measure("instances", "thesis_code"),
+    "instance_ap_thesis_code": precision_measure("instances", average_precision_thesis_code),
     "box_ap": precision_measure("boxes"),
     "box_ap_refined": precision_measure("boxes_refined"),
     "frames_per_second": frames_per_second,

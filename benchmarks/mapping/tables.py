@@ -13,11 +13,12 @@ from benchmarks.mapping.figures_of_merit import (
     MEASURES,
     difference,
     interval,
-    pooled_precision,
+    pooled_curves,
     quality_measure,
     summed_qualities,
 )
 from stages.evaluate.truth import stuff_classes
+from stages.kit.measurement.average_precision import average_precision, average_precision_thesis_code
 from stages.kit.measurement.bootstrap import Interval
 from stages.kit.measurement.panoptic_quality import ClassQuality
 
@@ -137,12 +138,12 @@ def _class_cell(quality: ClassQuality, which: str) -> str:
 
 def precision_by_class(results: Results, arms: Mapping[str, str], case: str, field: str, title: str) -> str:
     """Tables 2.3 and 2.4: average precision by class, in the standard form; the thesis's form in the last column."""
-    found = {arm: pooled_precision(results[arm, case], field) for arm in arms if results.get((arm, case))}
-    classes = sorted({name for each in found.values() for name, value in each.items() if value.true_count})
+    found = {arm: pooled_curves(results[arm, case], field) for arm in arms if results.get((arm, case))}
+    classes = sorted({name for each in found.values() for name, curve in each.items() if curve.true_count})
     rows = []
     for arm, each in found.items():
-        values = [each[name].all_point if name in each else 0.0 for name in classes]
-        inflated = [each[name].thesis_code or 0.0 if name in each else 0.0 for name in classes]
+        values = [average_precision(each[name]) if name in each else 0.0 for name in classes]
+        inflated = [average_precision_thesis_code(each[name]) if name in each else 0.0 for name in classes]
         rows.append((arms[arm], percent(_mean(values)), *(percent(v) for v in values), percent(_mean(inflated))))
     return markdown(f"{title}, case {case}", ("arm", "all", *classes, "all, thesis's code"), rows)
 

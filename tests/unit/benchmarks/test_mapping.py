@@ -10,11 +10,11 @@ import pytest
 from benchmarks.mapping.arms import EVERYWHERE, SHOWN, all_arms
 from benchmarks.mapping.drift import TRANSLATION_PER_METRE, drifting_poses
 from benchmarks.mapping.experiment import Outcome
-from benchmarks.mapping.figures_of_merit import MEASURES, difference, interval
+from benchmarks.mapping.figures_of_merit import MEASURES, difference, interval, pooled_curve, ranked
 from benchmarks.mapping.records import read_outcomes, write_outcomes
 from benchmarks.mapping.rooms import REPORTING, TUNING
 from benchmarks.mapping.tables import by_room, differences, headline, printed_by_the_thesis, quality_by_class
-from stages.kit.measurement.average_precision import Candidates
+from stages.kit.measurement.average_precision import Candidates, average_precision
 from stages.kit.measurement.panoptic_quality import ClassQuality
 from stages.synthesize.recipes import load_recipe
 
@@ -77,6 +77,16 @@ def test_figures_are_pooled_before_they_are_divided() -> None:
     assert found is not None and found.low < found.value < found.high
     same = difference(rooms, rooms, MEASURES["pq"], np.random.default_rng(0))
     assert same is not None and (same.value, same.low, same.high) == (0.0, 0.0, 0.0)
+
+
+def test_pooled_rooms_share_the_ranking_but_not_the_truth() -> None:
+    # The sure miss of the second room stands before the hit of the first one: precision 0, 1/2.
+    first = Candidates(np.array([[0.9]]), np.array([5.0]))
+    second = Candidates(np.array([[0.1, 0.2]]), np.array([9.0]))
+    curve = pooled_curve([ranked(first), ranked(second)])
+    assert curve.true_count == 3 and curve.precision.tolist() == [0.0, 0.5]
+    assert average_precision(curve) == pytest.approx(1 / 3 * 1 / 2)
+    assert average_precision(pooled_curve([])) is None
 
 
 def test_tables_show_every_arm_and_the_thesis_beside() -> None:
