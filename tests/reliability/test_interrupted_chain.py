@@ -61,7 +61,7 @@ def test_the_step_ends_with_its_chain(tmp_path: Path, number: signal.Signals) ->
 
 def test_a_step_whose_chain_is_gone_does_not_begin(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(interruption.ctypes, "CDLL", lambda name: type("Library", (), {"prctl": lambda *a: 0})())
-    monkeypatch.setenv(interruption.PARENT_VARIABLE, "1")
+    monkeypatch.setenv(interruption.PARENT_VARIABLE, str(os.getppid() + 1))
     with pytest.raises(KeyboardInterrupt):
         interruption.end_with_parent()
     assert interruption.PARENT_VARIABLE not in os.environ  # grandchildren are not its business
