@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,12 +104,24 @@ def _eleven_point(curve: PrecisionRecall, beyond_last: bool) -> float | None:
 
 @dataclass(frozen=True)
 class Candidates:
-    """What one class's average precision is computed from."""
+    """What one class's average precision is computed from. Those of several scenes add up: `pool`."""
 
     iou: np.ndarray
     """(P, T) of every prediction with every true one."""
     confidence: np.ndarray
     """(P,)"""
+
+
+def pool(scenes: Sequence[Candidates]) -> Candidates:
+    """Return the candidates of all scenes as those of one; predictions never match the truth of another scene."""
+    rows, columns = (sum(scene.iou.shape[axis] for scene in scenes) for axis in (0, 1))
+    iou = np.zeros((rows, columns))
+    row = column = 0
+    for scene in scenes:
+        height, width = scene.iou.shape
+        iou[row : row + height, column : column + width] = scene.iou
+        row, column = row + height, column + width
+    return Candidates(iou, np.concatenate([np.zeros(0), *(scene.confidence for scene in scenes)]))
 
 
 @dataclass(frozen=True)

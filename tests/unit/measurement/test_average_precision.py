@@ -16,6 +16,7 @@ from stages.kit.measurement.average_precision import (
     class_precision,
     match_greedily,
     mean_precision,
+    pool,
     precision_recall,
 )
 
@@ -61,6 +62,17 @@ def test_perfect_empty_and_undefined():
     assert (undefined.all_point, undefined.eleven_point, undefined.thesis_code) == (None, None, None)
     assert mean_precision([1.0, None, 0.0]) == 0.5
     assert mean_precision([None]) is None
+
+
+def test_pooled_scenes_share_the_ranking_but_not_the_truth():
+    # The sure miss of the second scene stands before the hit of the first one: precision 0, 1/2.
+    first = Candidates(np.array([[0.9]]), np.array([5.0]))
+    second = Candidates(np.array([[0.1, 0.2]]), np.array([9.0]))
+    pooled = pool([first, second])
+    assert pooled.iou.tolist() == [[0.9, 0.0, 0.0], [0.0, 0.1, 0.2]] and pooled.confidence.tolist() == [5.0, 9.0]
+    found = class_precision(pooled)
+    assert (found.true_count, found.found) == (3, 1) and found.all_point == pytest.approx(1 / 3 * 1 / 2)
+    assert pool([]).iou.shape == (0, 0) and class_precision(pool([])).all_point is None
 
 
 def test_each_truth_is_found_once_and_the_confident_come_first():
