@@ -47,7 +47,7 @@ class ObjectsBackend:
         found = segment_objects(color, frame.depth, self._camera, trees=self._trees)
         ids = found.labels.copy()
         for k in range(1, int(ids.max(initial=0)) + 1):
-            points = found.patches.points[ids == k]
+            points = found.patches.points[ids[found.patches.window] == k]
             if np.linalg.norm(np.quantile(points, 0.98, axis=0) - np.quantile(points, 0.02, axis=0)) > self._largest:
                 ids[ids == k] = 0
         return PanopticFrame(ids=ids, masks=dict.fromkeys(np.unique(ids[ids > 0]).tolist(), self._mask))

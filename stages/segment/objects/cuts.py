@@ -144,6 +144,28 @@ def _peaks(score: np.ndarray, least: float, apart: int, most: int) -> list[int]:
     return found
 
 
+@njit(cache=True)
+def _pixels_by_label(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows and columns (K,) of all pixels with a label, label by label and row by row, and where every label 0..count
+    begins (count + 2,); label 0 has none."""
+    height, width = labels.shape
+    starts = np.zeros(count + 2, dtype=np.int64)
+    for v in range(height):
+        for u in range(width):
+            if labels[v, u] > 0:
+                starts[labels[v, u] + 1] += 1
+    starts = np.cumsum(starts)
+    following = starts.copy()
+    rows, columns = np.empty(starts[-1], dtype=np.int32), np.empty(starts[-1], dtype=np.int32)
+    for v in range(height):
+        for u in range(width):
+            k = labels[v, u]
+            if k > 0:
+                rows[following[k]], columns[following[k]] = v, u
+                following[k] += 1
+    return rows, columns, starts
+
+
 def cut_patches(
     labels: np.ndarray,
     points: np.ndarray,
@@ -159,30 +181,27 @@ def cut_patches(
     `up` (3,) normal of the support surface; `focal` length [pixels].
     """
     count = int(labels.max(initial=0))
-    pixels_of = np.bincount(labels.ravel(), minlength=count + 1)
-    order = np.argsort(labels.ravel(), kind="stable")
-    starts = np.concatenate([[0], np.cumsum(pixels_of)])
-    width = labels.shape[1]
+    all_rows, all_columns, starts = _pixels_by_label(labels, count)
+    pixels_of = np.diff(starts)
     result = labels.copy()
     patch_of = list(range(count + 1))
     for k in range(1, count + 1):
         if pixels_of[k] < settings.minimum_pixels:
             continue
-        index = order[starts[k] : starts[k + 1]]
-        rows, columns = index // width, index % width
-        patch_points = points[rows, columns].astype(np.float64)
-        patch_normals = normals[rows, columns].astype(np.float64)
-        thin = slice(None, None, max(1, len(index) // 1500))
-        mean = patch_normals[thin].mean(axis=0)
-        cell = settings.cell * float(patch_points[thin, 2].mean()) / focal
-        code = np.zeros(len(index), dtype=np.int64)
-        for direction in _directions(patch_points[thin], patch_normals[thin], up):
+        rows, columns = all_rows[starts[k] : starts[k + 1]], all_columns[starts[k] : starts[k + 1]]
+        thin = slice(None, None, max(1, len(rows) // 1500))
+        some_points = points[rows[thin], columns[thin]].astype(np.float64)
+        some_normals = normals[rows[thin], columns[thin]].astype(np.float64)
+        mean = some_normals.mean(axis=0)
+        cell = settings.cell * float(some_points[:, 2].mean()) / focal
+        code = np.zeros(len(rows), dtype=np.int64)
+        for direction in _directions(some_points, some_normals, up):
             across = np.cross(mean, direction)
             if np.linalg.norm(across) < 0.2:
                 continue
             across /= np.linalg.norm(across)
             # A slanted face has fewer pixels to the metre: its cells are longer.
-            view = patch_points[thin].mean(axis=0)
+            view = some_points.mean(axis=0)
             seen_share = float(np.linalg.norm(np.cross(direction, view / np.linalg.norm(view))))
             size = cell / max(0.4, seen_share)
             color, filled, low = _unrolled(rows, columns, points, lab, direction, across, size)
@@ -190,7 +209,7 @@ def cut_patches(
             places = _peaks(support, settings.support, max(3, round(settings.margin / size)), settings.most)
             if not places:
                 continue
-            along = patch_points @ direction
+            along = points[rows, columns].astype(np.float64) @ direction
             bounds = np.sort(low + (np.array(places) + 0.5) * size)
             code = code * (settings.most + 1) + np.searchsorted(bounds, along)
         kinds, piece = np.unique(code, return_inverse=True)

@@ -13,10 +13,15 @@ import numpy as np
 from numba import njit, prange
 
 from schemas.scene_parts import Camera
-from stages.kit.geometry.cameras import back_project
 from stages.segment.geometric import label_regions, pixels_at, smooth_depth
 from stages.segment.normals import surface_normals
-from stages.segment.objects.support import SupportSettings, SupportSurface, find_supports, surface_inverse
+from stages.segment.objects.support import SupportSettings, SupportSurface, find_supports, ray_slopes, surface_inverse
+
+Window = tuple[slice, slice]
+NORMAL_DISTANCE = 0.02
+"""Points farther away than this share of the depth take no part in a normal."""
+WINDOW_GRID = 12
+"""Windows begin at multiples of this, so that what looks at every n-th pixel meets the same ones in every window."""
 
 
 @dataclass(frozen=True)
@@ -39,21 +44,21 @@ class PatchSettings:
 
 @dataclass(frozen=True)
 class PatchFrame:
-    """Patches of one frame with what was computed on the way."""
+    """Patches of one frame with what was computed on the way, in the window that holds all foreground."""
 
+    window: Window
+    """Rows and columns of the image that the arrays are of, (h, w) in size."""
     labels: np.ndarray
-    """(H, W) int32, 0 = none, else 1..n."""
+    """(h, w) int32, 0 = none, else 1..n."""
     points: np.ndarray
-    """(H, W, 3) float32 [m], camera frame, of the smoothed depth."""
+    """(h, w, 3) float32 [m], camera frame, of the smoothed depth."""
     normals: np.ndarray
-    """(H, W, 3) float32, zero off the patches."""
+    """(h, w, 3) float32, zero off the patches."""
     inverse: np.ndarray
-    """(H, W) float32 inverse of the smoothed depth [1/m], 0 without depth."""
-    foreground: np.ndarray
-    """(H, W) bool: over a support surface."""
+    """(h, w) float32 inverse of the smoothed depth [1/m], 0 without depth."""
     supports: list[SupportSurface]
     height: np.ndarray
-    """(H, W) float32 [m] over the nearest support surface below, 0 without one."""
+    """(h, w) float32 [m] over the largest support surface, 0 without one."""
 
 
 def foreground_of(
@@ -103,6 +108,8 @@ def _edges(
             edge = False
             for row in range(max(0, v - half), min(height, v + half + 1)):
                 for column in range(max(0, u - half), min(width, u + half + 1)):
+                    if edge:
+                        break
                     if not foreground[row, column]:
                         continue
                     mx, my, mz = normals[row, column, 0], normals[row, column, 1], normals[row, column, 2]
@@ -144,19 +151,19 @@ def find_patches(
     depth = np.ascontiguousarray(depth, dtype=np.float32)
     if settings.smoothing_window:
         depth = smooth_depth(depth, window=settings.smoothing_window, deviation=settings.smoothing_deviation)
-    valid = depth > 0
-    inverse = np.where(valid, 1 / np.where(valid, depth, 1), 0).astype(np.float32)
+    inverse = reciprocal(depth)
     supports = find_supports(depth, camera, support_settings)
     foreground, height = foreground_of(inverse, camera, supports, support_settings)
     risen = (height > support_settings.rise) | (not supports)
     foreground = _islands(foreground, risen, pixels_at(settings.smallest_island, depth.shape))
-    points = back_project(depth, camera)
+    # All that follows costs time by the pixel, and most pixels show the table.
+    window = _window_of(foreground)
+    foreground, inverse, height = (np.ascontiguousarray(a[window]) for a in (foreground, inverse, height))
+    x, y = ray_slopes(camera)
+    points, standing = _points(depth[window], foreground, y[window[0]], x[window[1]])
     # The surface takes no part in the normals beside it.
     normals = surface_normals(
-        np.where(foreground[..., None], points, np.float32(0)),
-        window=settings.normal_window,
-        step=settings.normal_step,
-        distance_factor=0.02,
+        standing, window=settings.normal_window, step=settings.normal_step, distance_factor=NORMAL_DISTANCE
     )
     edges = _edges(
         points,
@@ -169,19 +176,55 @@ def find_patches(
     )
     labels = label_regions(
         edges,
-        np.where(foreground[..., None], points, np.float32(0)),
+        standing,
         normals,
         minimum_pixels=pixels_at(settings.minimum_pixels, depth.shape),
         ratio=settings.jump,
     )
-    return PatchFrame(labels, points, normals, inverse, foreground, supports, height)
+    return PatchFrame(window, labels, points, normals, inverse, supports, height)
+
+
+@njit(cache=True)
+def reciprocal(depth: np.ndarray) -> np.ndarray:
+    """Return 1 / depth (H, W) float32, 0 where the depth (H, W) float32 is 0."""
+    result = np.zeros(depth.shape, dtype=np.float32)
+    for v in range(depth.shape[0]):
+        for u in range(depth.shape[1]):
+            if depth[v, u] > 0:
+                result[v, u] = np.float32(1) / depth[v, u]
+    return result
+
+
+@njit(cache=True)
+def _points(depth: np.ndarray, foreground: np.ndarray, y: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (h, w, 3) of a depth image, y / z of every row and x / z of every column; the second time without those
+    off the foreground."""
+    height, width = depth.shape
+    points = np.empty((height, width, 3), dtype=np.float32)
+    standing = np.zeros((height, width, 3), dtype=np.float32)
+    for v in range(height):
+        for u in range(width):
+            z = depth[v, u]
+            points[v, u, 0], points[v, u, 1], points[v, u, 2] = x[u] * z, y[v] * z, z
+            if foreground[v, u]:
+                standing[v, u] = points[v, u]
+    return points, standing
+
+
+def _window_of(mask: np.ndarray) -> Window:
+    """The rows and columns that hold a mask (H, W) bool, and at least one more to every side that has one."""
+    rows, columns = np.nonzero(mask.any(axis=1))[0], np.nonzero(mask.any(axis=0))[0]
+    if len(rows) == 0:
+        return slice(0, 1), slice(0, 1)
+    top, left = (max(0, int(k[0]) - 1) // WINDOW_GRID * WINDOW_GRID for k in (rows, columns))
+    return slice(top, int(rows[-1]) + 2), slice(left, int(columns[-1]) + 2)
 
 
 def _islands(mask: np.ndarray, risen: np.ndarray, smallest: int) -> np.ndarray:
     """The connected parts of a mask (H, W) bool that have `smallest` pixels, a third of which are `risen`."""
-    count, labels, statistics, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
+    count, labels, statistics, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=4)
     keep = statistics[:, cv2.CC_STAT_AREA] >= smallest
-    high = np.bincount(labels.ravel(), weights=(mask & risen).ravel(), minlength=count)
+    high = np.bincount(labels[mask & risen], minlength=count)
     keep &= high >= np.maximum(1, statistics[:, cv2.CC_STAT_AREA] / 3)
     keep[0] = False
     kept: np.ndarray = keep[labels]

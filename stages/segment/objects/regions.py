@@ -51,10 +51,14 @@ class Regions:
     """(N + 2,) where the hull of every patch begins."""
 
 
-def lab_image(color: np.ndarray) -> np.ndarray:
-    """Return (H, W, 3) float32 CIE Lab of RGB (H, W, 3) uint8, slightly smoothed: L 0..100, a and b about -100..100."""
-    smooth = cv2.GaussianBlur(color, (5, 5), 1.0)
-    return cv2.cvtColor(smooth.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
+def lab_image(color: np.ndarray, window: tuple[slice, slice]) -> np.ndarray:
+    """Return (h, w, 3) float32 CIE Lab of a window of RGB (H, W, 3) uint8, slightly smoothed: L 0..100, a and b about
+    -100..100."""
+    # Two pixels more on every side: the filter reaches so far.
+    top, left = (max(0, side.start - 2) for side in window)
+    smooth = cv2.GaussianBlur(color[top : window[0].stop + 2, left : window[1].stop + 2], (5, 5), 1.0)
+    inner = smooth[window[0].start - top : window[0].stop - top, window[1].start - left : window[1].stop - left]
+    return cv2.cvtColor(np.divide(inner, np.float32(255), dtype=np.float32), cv2.COLOR_RGB2LAB)
 
 
 @njit(cache=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
+from numba import njit
 
 from schemas.scene_parts import Camera
 from stages.segment.geometric import pixels_at, relabel
@@ -62,7 +63,7 @@ def segment_objects(
         raise ValueError(f"color {color.shape} and depth {depth.shape} do not match {camera.height} x {camera.width}")
     patches = find_patches(depth, camera, settings.patches, settings.support)
     up = patches.supports[0].normal if patches.supports else UP_WITHOUT_SURFACE
-    lab = lab_image(color)
+    lab = lab_image(color, patches.window)
     pieces, patch_of = cut_patches(patches.labels, patches.points, patches.normals, lab, up, camera.fx, settings.cuts)
     regions = measure_regions(
         pieces,
@@ -76,33 +77,44 @@ def segment_objects(
         jump=settings.patches.jump,
     )
     group_of = group_patches(regions, pieces, patches.inverse, trees, settings.threshold, recording)
-    labels = group_of[pieces].astype(np.int32)
-    labels = _holes_closed(labels, depth > 0, pixels_at(settings.largest_hole, depth.shape))
+    labels = group_of.astype(np.int32)[pieces]
+    labels = _holes_closed(labels, depth[patches.window] > 0, pixels_at(settings.largest_hole, depth.shape))
     large = np.bincount(labels.ravel()) >= pixels_at(settings.minimum_pixels, depth.shape)
     large[0] = False
-    return ObjectFrame(relabel(np.where(large[labels], labels, 0).astype(np.int32)), patches)
+    result = np.zeros(depth.shape, dtype=np.int32)
+    result[patches.window] = relabel(np.where(large, np.arange(len(large)), 0).astype(np.int32)[labels])
+    return ObjectFrame(result, patches)
 
 
 def _holes_closed(labels: np.ndarray, valid: np.ndarray, largest: int) -> np.ndarray:
     """Give pixels that one object surrounds to it: (H, W) int32 labels, where `valid`, holes up to `largest` pixels."""
-    count, holes, statistics, _ = cv2.connectedComponentsWithStats((labels == 0).astype(np.uint8), connectivity=4)
-    owner = np.zeros(count, dtype=np.int32)
-    mixed = np.zeros(count, dtype=bool)
-    mixed[0] = True
-    for first, second in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-        for hole_side, object_side in ((first, second), (second, first)):
-            touching = (labels[hole_side] == 0) & (labels[object_side] > 0)
-            hole, around = holes[hole_side][touching], labels[object_side][touching]
-            fresh = np.zeros(count, dtype=np.int32)
-            np.maximum.at(fresh, hole, around)
-            least = np.full(count, np.iinfo(np.int32).max, dtype=np.int32)
-            np.minimum.at(least, hole, around)
-            seen = fresh > 0
-            mixed |= seen & ((least != fresh) | ((owner > 0) & (owner != fresh)))
-            owner = np.where(seen, fresh, owner)
+    count, holes, statistics, _ = cv2.connectedComponentsWithStats((labels == 0).view(np.uint8), connectivity=4)
+    owner = _surrounding(labels, holes, count)
     x, y = statistics[:, cv2.CC_STAT_LEFT], statistics[:, cv2.CC_STAT_TOP]
     outside = (x == 0) | (y == 0)
     outside |= x + statistics[:, cv2.CC_STAT_WIDTH] == labels.shape[1]
     outside |= y + statistics[:, cv2.CC_STAT_HEIGHT] == labels.shape[0]
-    owner[mixed | outside | (statistics[:, cv2.CC_STAT_AREA] > largest)] = 0
-    return np.where((labels == 0) & valid, owner[holes], labels).astype(np.int32)
+    owner[outside | (owner < 0) | (statistics[:, cv2.CC_STAT_AREA] > largest)] = 0
+    return np.where((labels == 0) & valid, owner[holes], labels)
+
+
+@njit(cache=True)
+def _surrounding(labels: np.ndarray, holes: np.ndarray, count: int) -> np.ndarray:
+    """The one label that every hole 0..count-1 of `holes` (H, W) touches: 0 when none, -1 when several."""
+    sole = np.zeros(count, dtype=np.int32)
+    height, width = labels.shape
+    for v in range(height):
+        for u in range(width):
+            for side in range(2):
+                row, column = v + side, u + 1 - side
+                if row >= height or column >= width:
+                    continue
+                a, b = labels[v, u], labels[row, column]
+                if (a == 0) == (b == 0):
+                    continue
+                hole = holes[v, u] if a == 0 else holes[row, column]
+                if sole[hole] == 0:
+                    sole[hole] = a + b
+                elif sole[hole] != a + b:
+                    sole[hole] = -1
+    return sole

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from schemas.scene_parts import Camera
 
@@ -70,11 +71,31 @@ def _best_plane(design: np.ndarray, inverse: np.ndarray, thickness: float, weigh
         return None
     planes = np.linalg.solve(matrices[sound], inverse[triples[sound]][..., None])[..., 0]
     screened = random.integers(0, len(inverse), size=min(1500, len(inverse)))
-    errors = np.abs(design[screened][:, :3] @ planes.T - inverse[screened][:, None])
-    planes = planes[np.argsort(-((errors < thickness) * weights[screened][:, None]).sum(axis=0), kind="stable")[:8]]
-    errors = np.abs(design[:, :3] @ planes.T - inverse[:, None])
-    best: np.ndarray = planes[np.argmax(((errors < thickness) * weights[:, None]).sum(axis=0))]
+    screened_weight = _weight_within(design[screened], inverse[screened], weights[screened], planes, thickness)
+    planes = planes[np.argsort(-screened_weight, kind="stable")[:8]]
+    best: np.ndarray = planes[np.argmax(_weight_within(design, inverse, weights, planes, thickness))]
     return best
+
+
+@njit(cache=True)
+def _weight_within(
+    design: np.ndarray, inverse: np.ndarray, weights: np.ndarray, planes: np.ndarray, thickness: float
+) -> np.ndarray:
+    """Of every plane (K, 3) the weight of the samples that lie within `thickness` of it."""
+    result = np.zeros(len(planes))
+    for k in range(len(planes)):
+        a, b, c = planes[k, 0], planes[k, 1], planes[k, 2]
+        for i in range(len(inverse)):
+            if abs(a + b * design[i, 1] + c * design[i, 2] - inverse[i]) < thickness:
+                result[k] += weights[i]
+    return result
+
+
+def _fitted(design: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+    """Least-squares coefficients by the normal equations: slopes are of order one, so that they are well enough
+    conditioned, and a tenth of the time of an orthogonal decomposition. Pixels in a line have the smallest solution."""
+    coefficients: np.ndarray = np.linalg.lstsq(design.T @ design, design.T @ inverse, rcond=None)[0]
+    return coefficients
 
 
 def find_supports(depth: np.ndarray, camera: Camera, settings: SupportSettings) -> list[SupportSurface]:
@@ -101,11 +122,11 @@ def find_supports(depth: np.ndarray, camera: Camera, settings: SupportSettings) 
         for _ in range(REFITS):
             if np.count_nonzero(inside) < 30:
                 break
-            coefficients = np.linalg.lstsq(design[inside], inverse[inside], rcond=None)[0]
+            coefficients = _fitted(design[inside], inverse[inside])
             inside = rest & (np.abs(design @ coefficients - inverse) < settings.thickness)
         if np.count_nonzero(inside) < 30:
             break
-        plane = np.linalg.lstsq(design[inside][:, :3], inverse[inside], rcond=None)[0]
+        plane = _fitted(design[inside][:, :3], inverse[inside])
         # a + b x + c y = 1/z means (b, c, a) . p = 1; the camera is on the side where the form is below 1.
         length = float(np.linalg.norm(plane))
         normal = -np.array([plane[1], plane[2], plane[0]]) / length

@@ -9,8 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stages.segment.objects.hulls import convex_hull, hull_content, hull_span, inside_hull
+from stages.segment.objects.cuts import _pixels_by_label
 from stages.segment.objects.pairs import inverse_plane
-from stages.segment.objects.regions import POINT_SUMS
+from stages.segment.objects.regions import POINT_SUMS, lab_image
+from stages.segment.objects.segmentation import _holes_closed
 from stages.segment.objects.support import SupportSettings, find_supports, surface_inverse
 from tests.unit.segment.scenes import CAMERA, plane_depth, rays
 
@@ -73,3 +75,34 @@ def test_support_of_a_tilted_table_with_a_bend() -> None:
 
 def test_no_depth_no_support() -> None:
     assert find_supports(np.zeros((CAMERA.height, CAMERA.width), np.float32), CAMERA, SupportSettings()) == []
+
+
+def test_pixels_by_label_are_those_of_a_stable_sort() -> None:
+    labels = np.random.default_rng(0).integers(0, 5, (20, 30)).astype(np.int32)
+    labels[labels == 3] = 0  # a label without pixels
+    rows, columns, starts = _pixels_by_label(labels, 4)
+    order = np.argsort(labels.ravel(), kind="stable")
+    order = order[labels.ravel()[order] > 0]
+    assert np.array_equal(rows * 30 + columns, order)
+    assert np.array_equal(np.diff(starts), [0, *np.bincount(labels.ravel(), minlength=5)[1:]])
+
+
+def test_a_hole_is_closed_where_one_object_surrounds_it_and_there_is_depth() -> None:
+    labels = np.zeros((30, 40), np.int32)
+    labels[2:20, 2:20], labels[2:20, 20:38] = 1, 2
+    labels[5:8, 5:8] = 0  # inside the first
+    labels[5:8, 19:22] = 0  # between the two
+    labels[12:18, 25:36] = 0  # inside the second, too large
+    valid = np.ones(labels.shape, bool)
+    valid[6, 6] = False
+    expected = labels.copy()
+    expected[5:8, 5:8] = 1
+    expected[6, 6] = 0
+    assert np.array_equal(_holes_closed(labels, valid, 50), expected)
+
+
+def test_a_window_of_the_lab_image_is_cut_out_of_the_whole() -> None:
+    color = np.random.default_rng(0).integers(0, 256, (40, 50, 3)).astype(np.uint8)
+    whole = lab_image(color, (slice(0, 40), slice(0, 50)))
+    for window in ((slice(7, 31), slice(9, 44)), (slice(0, 12), slice(1, 50))):
+        assert np.allclose(lab_image(color, window), whole[window], atol=1e-3)
