@@ -15,7 +15,7 @@ from numba import njit, prange
 from schemas.scene_parts import Camera
 from stages.segment.geometric import label_regions, pixels_at, smooth_depth
 from stages.segment.normals import surface_normals
-from stages.segment.objects.support import SupportSettings, SupportSurface, find_supports, ray_slopes, surface_inverse
+from stages.segment.objects.support import SupportSettings, SupportSurface, find_supports, ray_slopes
 
 Window = tuple[slice, slice]
 NORMAL_DISTANCE = 0.02
@@ -71,16 +71,44 @@ def foreground_of(
     """
     foreground = inverse > 0
     height = np.zeros_like(inverse)
+    x, y = ray_slopes(camera)
+    limits = np.array([settings.clearance, settings.height], dtype=np.float32)
     for k, surface in enumerate(supports):
-        over = inverse - surface_inverse(surface, camera)
-        metres = surface.offset * over / np.maximum(inverse, np.float32(1e-3))
-        on_it = (over < settings.clearance) | (metres < settings.height)
-        if k == 0:
-            height = np.where(foreground, metres, 0).astype(np.float32)
-        else:
-            on_it &= over > -settings.clearance * 2
-        foreground &= ~on_it
+        coefficients = surface.coefficients.astype(np.float32)
+        _take_surface(foreground, height, inverse, x, y, coefficients, np.float32(surface.offset), limits, k == 0)
     return foreground, height
+
+
+@njit(cache=True)
+def _take_surface(
+    foreground: np.ndarray,
+    height: np.ndarray,
+    inverse: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+    coefficients: np.ndarray,
+    offset: float,
+    limits: np.ndarray,
+    largest: bool,
+) -> None:
+    """Take what lies on a surface, and behind the largest one, out of the foreground (H, W) bool; write the height
+    (H, W) [m] over the largest one. `limits`: clearance [1/m] and height [m] of SupportSettings."""
+    a, b, c, d, e, f = coefficients
+    clearance, lowest = limits
+    column_part = a + b * x + d * x * x
+    row_part = c * y + f * y * y
+    for v in range(inverse.shape[0]):
+        slope = e * y[v]
+        for u in range(inverse.shape[1]):
+            if not (foreground[v, u] or (largest and inverse[v, u] > 0)):
+                continue
+            over = inverse[v, u] - (column_part[u] + row_part[v] + slope * x[u])
+            metres = offset * over / max(inverse[v, u], np.float32(1e-3))
+            if largest:
+                height[v, u] = metres
+            on_it = over < clearance or metres < lowest
+            if on_it and (largest or over > -clearance * 2):
+                foreground[v, u] = False
 
 
 @njit(cache=True, parallel=True)

@@ -82,12 +82,14 @@ def _weight_within(
     design: np.ndarray, inverse: np.ndarray, weights: np.ndarray, planes: np.ndarray, thickness: float
 ) -> np.ndarray:
     """Of every plane (K, 3) the weight of the samples that lie within `thickness` of it."""
-    result = np.zeros(len(planes))
-    for k in range(len(planes)):
-        a, b, c = planes[k, 0], planes[k, 1], planes[k, 2]
-        for i in range(len(inverse)):
-            if abs(a + b * design[i, 1] + c * design[i, 2] - inverse[i]) < thickness:
-                result[k] += weights[i]
+    count = len(planes)
+    a, b, c = planes[:, 0].copy(), planes[:, 1].copy(), planes[:, 2].copy()
+    result = np.zeros(count)
+    for i in range(len(inverse)):
+        x, y, w, weight = design[i, 1], design[i, 2], inverse[i], weights[i]
+        # No branch and a step of one: several planes at a time.
+        for k in range(count):
+            result[k] += weight if abs(a[k] + b[k] * x + c[k] * y - w) < thickness else 0.0
     return result
 
 

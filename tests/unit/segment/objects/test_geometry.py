@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stages.segment.objects.hulls import convex_hull, hull_content, hull_span, inside_hull
 from stages.segment.objects.cuts import _pixels_by_label
+from stages.segment.objects.hulls import convex_hull, hull_content, hull_span, inside_hull
 from stages.segment.objects.pairs import inverse_plane
 from stages.segment.objects.regions import POINT_SUMS, lab_image
 from stages.segment.objects.segmentation import _holes_closed
