@@ -31,6 +31,9 @@ BRIGHTNESS_NOISE = 0.03
 BRIGHTNESS_GATE = 0.3
 INDEPENDENT_SHARE = 0.01
 """Neighbouring residuals are alike: so many of them count as independent when uncertainty is stated."""
+SYSTEMATIC_DEPTH = 0.005
+"""Error of a depth camera that stays from frame to frame (lens, scale, bending of planes), as a share of the depth. It
+keeps near surfaces, whose noise is a millimetre, from outweighing everything else. Chosen: docs/POSES.md."""
 SMALLEST_STEP = 2e-5
 """Steps below this end a level [rad and m]."""
 _FIRST, _SECOND = np.triu_indices(PARAMETERS)
@@ -81,6 +84,7 @@ def _accumulate(
     use_color: bool,
     brightness_noise: float,
     brightness_gate: float,
+    systematic: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the upper triangle of the normal matrix (36,), the right side (8,), and the sums behind the figures."""
     fx, fy, cx, cy = intrinsics
@@ -108,7 +112,7 @@ def _accumulate(
             z_target = target_points[vt, ut, 2]
             if z_target <= 0:
                 continue
-            noise = 0.0012 + 0.0019 * (q2 - 0.4) ** 2
+            noise = np.hypot(0.0012 + 0.0019 * (q2 - 0.4) ** 2, systematic * q2)
             reach = gate + 2 * noise
             if q2 - z_target > reach:
                 sums[3] += 1
@@ -229,6 +233,7 @@ def _normal_equations(
         target.points, target.normals, target.brightness, target.gradient, target.intrinsics,
         source.points, source.normals, source.brightness, motion, float(gain), float(bias),
         STRIDES[number], GATES[number], TOLERANCES[number], use_color, BRIGHTNESS_NOISE, BRIGHTNESS_GATE,
+        SYSTEMATIC_DEPTH,
     )  # fmt: skip
     matrix = np.zeros((PARAMETERS, PARAMETERS))
     matrix[_FIRST, _SECOND] = packed
