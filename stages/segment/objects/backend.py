@@ -15,6 +15,7 @@ from schemas.vocabulary import Vocabulary
 from stages.kit.formats.frames import Frame
 from stages.segment.geometric import GeometricFrame
 from stages.segment.objects.boosting import NO_TREES, read_trees
+from stages.segment.objects.cuts import pixels_by_label
 from stages.segment.objects.pairs import FEATURES
 from stages.segment.objects.segmentation import segment_objects
 from stages.segment.panoptic import PanopticFrame, PanopticMask
@@ -32,7 +33,7 @@ class ObjectsBackend:
     streams: tuple[str, ...] = ("color", "depth")
 
     def __init__(self, vocabulary: Vocabulary, camera: Camera, *, learned: bool, largest: float) -> None:
-        """`learned`: trees decide what is one object, else the hand-set rules; `largest` diameter of an object [m].
+        """`learned`: trees decide what is one object, else the table of rules; `largest` diameter of an object [m].
         Raises BadInput when the trees cannot be read."""
         self._camera = camera
         self._trees = read_trees(BUNDLED, FEATURES) if learned else NO_TREES
@@ -45,9 +46,13 @@ class ObjectsBackend:
         assert frame.depth is not None
         color = frame.color if frame.color is not None else np.full((*frame.depth.shape, 3), GREY, dtype=np.uint8)
         found = segment_objects(color, frame.depth, self._camera, trees=self._trees)
-        ids = found.labels.copy()
-        for k in range(1, int(ids.max(initial=0)) + 1):
-            points = found.patches.points[ids[found.patches.window] == k]
-            if np.linalg.norm(np.quantile(points, 0.98, axis=0) - np.quantile(points, 0.02, axis=0)) > self._largest:
-                ids[ids == k] = 0
+        count = int(found.labels.max(initial=0))
+        rows, columns, starts = pixels_by_label(found.labels[found.patches.window], count)
+        kept = np.arange(count + 1, dtype=np.int32)
+        for k in range(1, count + 1):
+            own = slice(starts[k], starts[k + 1])
+            low, high = np.quantile(found.patches.points[rows[own], columns[own]], (0.02, 0.98), axis=0)
+            if np.linalg.norm(high - low) > self._largest:
+                kept[k] = 0
+        ids = kept[found.labels]
         return PanopticFrame(ids=ids, masks=dict.fromkeys(np.unique(ids[ids > 0]).tolist(), self._mask))

@@ -145,9 +145,9 @@ def _peaks(score: np.ndarray, least: float, apart: int, most: int) -> list[int]:
 
 
 @njit(cache=True)
-def _pixels_by_label(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows and columns (K,) of all pixels with a label, label by label and row by row, and where every label 0..count
-    begins (count + 2,); label 0 has none."""
+def pixels_by_label(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return rows and columns (K,) of all pixels with a label in `labels` (H, W), label by label and row by row, and
+    where every label 0..count begins (count + 2,); label 0 has none."""
     height, width = labels.shape
     starts = np.zeros(count + 2, dtype=np.int64)
     for v in range(height):
@@ -181,7 +181,7 @@ def cut_patches(
     `up` (3,) normal of the support surface; `focal` length [pixels].
     """
     count = int(labels.max(initial=0))
-    all_rows, all_columns, starts = _pixels_by_label(labels, count)
+    all_rows, all_columns, starts = pixels_by_label(labels, count)
     pixels_of = np.diff(starts)
     result = labels.copy()
     patch_of = list(range(count + 1))
@@ -212,14 +212,13 @@ def cut_patches(
             along = points[rows, columns].astype(np.float64) @ direction
             bounds = np.sort(low + (np.array(places) + 0.5) * size)
             code = code * (settings.most + 1) + np.searchsorted(bounds, along)
-        kinds, piece = np.unique(code, return_inverse=True)
-        if len(kinds) < 2:
-            continue
-        small = np.bincount(piece) < settings.minimum_pixels // 4
-        for other in range(len(kinds)):
-            if other == int(np.argmax(np.bincount(piece))) or small[other]:
+        pixels = np.bincount(code)
+        largest = int(pixels.argmax())
+        # A piece too small to be judged stays with the largest one.
+        for piece in np.nonzero(pixels >= max(1, settings.minimum_pixels // 4))[0]:
+            if piece == largest:
                 continue
-            here = piece == other
+            here = code == piece
             patch_of.append(k)
             result[rows[here], columns[here]] = len(patch_of) - 1
     return result, np.array(patch_of)

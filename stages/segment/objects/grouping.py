@@ -58,15 +58,16 @@ def _agglomerate(
     groups: np.ndarray,
     inverse: np.ndarray,
     trees: tuple[np.ndarray, np.ndarray, np.ndarray, float],
+    rules: np.ndarray,
     threshold: float,
     truth: np.ndarray,
     exploration: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return (group of every patch (N + 1,), features of every pair looked at, its truth: 1 same, 0 other, -1 unknown).
 
-    The scorer is `trees` (boosting.Trees) or, where they are empty, the rules. With `truth` (N + 1,) the true object
-    of every patch, features are recorded, and `exploration` (N + 1,) random numbers below the share of joints that
-    follow the truth instead of the scorer.
+    The scorer is `trees` (boosting.Trees) or, where they are empty, `rules` (rules.rule_table). With `truth` (N + 1,)
+    the true object of every patch, features are recorded, and `exploration` (N + 1,) random numbers below the share of
+    joints that follow the truth instead of the scorer.
     """
     count = len(sums) - 1
     learned = trees[0].shape[0] > 0
@@ -110,7 +111,7 @@ def _agglomerate(
                     groups,
                     inverse,
                 )
-                scores[a, b] = score_rows(row, trees) if learned else rule_score(row)
+                scores[a, b] = score_rows(row, trees) if learned else rule_score(row, rules)
                 if recording:
                     if recorded == len(records):
                         more = np.empty((2 * recorded, COUNT), dtype=np.float32)
@@ -171,7 +172,7 @@ class Recording:
     """What training needs of one frame: which pairs were looked at, and which of them are one object."""
 
     truth: np.ndarray
-    """(H, W) int32 true object of every pixel, 0 none."""
+    """(H, W) int32 true object of every pixel of the image, 0 none."""
     random: np.random.Generator
     by_truth: float
     """This share of the joints follows the truth, the rest the scorer: later pairs are then those that it meets."""
@@ -185,19 +186,23 @@ def group_patches(
     labels: np.ndarray,
     inverse: np.ndarray,
     trees: Trees,
+    rules: np.ndarray,
     threshold: float,
+    window: tuple[slice, slice],
     recording: Recording | None = None,
 ) -> np.ndarray:
     """Return the group (N + 1,) of every patch: the number of one of its patches.
 
     `regions` are used up; `labels` (H, W) int32 patches; `inverse` (H, W) [1/m]. Pairs are joined while the best of
-    them scores more than `threshold`. With `recording` the pairs that were looked at are written into it.
+    them scores more than `threshold`, by `trees` or, where these are empty, by `rules` (rules.rule_table). With
+    `recording` the pairs that were looked at are written into it; its truth is of the whole image, everything else of
+    this `window`.
     """
     count = len(regions.sums) - 1
     truth = np.zeros(0, dtype=np.int64)
     exploration = np.ones(count + 1)
     if recording is not None:
-        truth = majority_owner(labels, recording.truth, count)
+        truth = majority_owner(labels, recording.truth[window], count)
         exploration = np.where(recording.random.random(count + 1) < recording.by_truth, 0.0, 1.0)
     group_of, features, answers = _agglomerate(
         regions.sums,
@@ -210,6 +215,7 @@ def group_patches(
         labels.copy(),
         inverse,
         trees,
+        rules,
         threshold,
         truth,
         exploration,

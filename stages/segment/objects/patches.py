@@ -72,10 +72,10 @@ def foreground_of(
     foreground = inverse > 0
     height = np.zeros_like(inverse)
     x, y = ray_slopes(camera)
-    limits = np.array([settings.clearance, settings.height], dtype=np.float32)
     for k, surface in enumerate(supports):
         coefficients = surface.coefficients.astype(np.float32)
-        _take_surface(foreground, height, inverse, x, y, coefficients, np.float32(surface.offset), limits, k == 0)
+        limits = np.array([surface.offset, settings.clearance, settings.height], dtype=np.float32)
+        _take_surface(foreground, height, inverse, x, y, coefficients, limits, k == 0)
     return foreground, height
 
 
@@ -87,14 +87,13 @@ def _take_surface(
     x: np.ndarray,
     y: np.ndarray,
     coefficients: np.ndarray,
-    offset: float,
     limits: np.ndarray,
     largest: bool,
 ) -> None:
     """Take what lies on a surface, and behind the largest one, out of the foreground (H, W) bool; write the height
-    (H, W) [m] over the largest one. `limits`: clearance [1/m] and height [m] of SupportSettings."""
+    (H, W) [m] over the largest one. `limits` (3,) float32: the surface's offset [m], clearance [1/m], height [m]."""
     a, b, c, d, e, f = coefficients
-    clearance, lowest = limits
+    offset, clearance, lowest = limits
     column_part = a + b * x + d * x * x
     row_part = c * y + f * y * y
     for v in range(inverse.shape[0]):
@@ -140,27 +139,23 @@ def _edges(
                         break
                     if not foreground[row, column]:
                         continue
+                    dz = points[row, column, 2] - pz
+                    far = abs(dz) > jump * pz
+                    if far and (abs(row - v) > 1 or abs(column - u) > 1):
+                        continue
                     mx, my, mz = normals[row, column, 0], normals[row, column, 1], normals[row, column, 2]
+                    cosine = mx * nx + my * ny + mz * nz
+                    if not far and cosine >= concave_cosine and cosine >= convex_cosine:
+                        continue
                     dx = points[row, column, 0] - px
                     dy = points[row, column, 1] - py
-                    dz = points[row, column, 2] - pz
                     along_p = dx * nx + dy * ny + dz * nz
                     along_q = dx * mx + dy * my + dz * mz
-                    if abs(dz) > jump * pz:
+                    if far:
                         # A surface seen at a grazing angle changes its depth fast without ending.
-                        if (
-                            abs(row - v) <= 1
-                            and abs(column - u) <= 1
-                            and abs(along_p) > 0.5 * jump * pz
-                            and abs(along_q) > 0.5 * jump * pz
-                        ):
+                        if abs(along_p) > 0.5 * jump * pz and abs(along_q) > 0.5 * jump * pz:
                             edge = True
-                        continue
-                    cosine = mx * nx + my * ny + mz * nz
-                    if along_p - along_q > 0.0005:
-                        if cosine < concave_cosine:
-                            edge = True
-                    elif cosine < convex_cosine:
+                    elif cosine < (concave_cosine if along_p - along_q > 0.0005 else convex_cosine):
                         edge = True
                 if edge:
                     break

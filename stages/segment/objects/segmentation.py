@@ -15,6 +15,7 @@ from stages.segment.objects.cuts import CutSettings, cut_patches
 from stages.segment.objects.grouping import Recording, group_patches
 from stages.segment.objects.patches import PatchFrame, PatchSettings, find_patches
 from stages.segment.objects.regions import lab_image, measure_regions
+from stages.segment.objects.rules import RULES, START, rule_table
 from stages.segment.objects.support import SupportSettings
 
 UP_WITHOUT_SURFACE = np.array([0.0, -1.0, 0.0])
@@ -28,6 +29,8 @@ class ObjectSettings:
     patches: PatchSettings = field(default_factory=PatchSettings)
     support: SupportSettings = field(default_factory=SupportSettings)
     cuts: CutSettings = field(default_factory=CutSettings)
+    rules: np.ndarray = field(default_factory=lambda: rule_table(RULES, START))
+    """Decide which patches are one object where no trees do."""
     threshold: float = 0.0
     """Pairs with a higher score are joined."""
     minimum_pixels: int = 250
@@ -55,7 +58,7 @@ def segment_objects(
 ) -> ObjectFrame:
     """Return the objects of a frame: RGB (H, W, 3) uint8 and z-depth (H, W) [m], 0 invalid, in the same pixels.
 
-    `trees` decide which patches are one object; without them the hand-set rules do. Raises ValueError when the shapes
+    `trees` decide which patches are one object; without them the rules do. Raises ValueError when the shapes
     do not match the camera.
     """
     settings = settings or ObjectSettings()
@@ -76,7 +79,9 @@ def segment_objects(
         up,
         jump=settings.patches.jump,
     )
-    group_of = group_patches(regions, pieces, patches.inverse, trees, settings.threshold, recording)
+    group_of = group_patches(
+        regions, pieces, patches.inverse, trees, settings.rules, settings.threshold, patches.window, recording
+    )
     labels = group_of.astype(np.int32)[pieces]
     labels = _holes_closed(labels, depth[patches.window] > 0, pixels_at(settings.largest_hole, depth.shape))
     large = np.bincount(labels.ravel()) >= pixels_at(settings.minimum_pixels, depth.shape)

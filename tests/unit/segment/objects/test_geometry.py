@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stages.segment.objects.cuts import _pixels_by_label
+from stages.segment.objects.cuts import pixels_by_label
 from stages.segment.objects.hulls import convex_hull, hull_content, hull_span, inside_hull
 from stages.segment.objects.pairs import inverse_plane
 from stages.segment.objects.regions import POINT_SUMS, lab_image
@@ -77,10 +77,10 @@ def test_no_depth_no_support() -> None:
     assert find_supports(np.zeros((CAMERA.height, CAMERA.width), np.float32), CAMERA, SupportSettings()) == []
 
 
-def test_pixels_by_label_are_those_of_a_stable_sort() -> None:
+def testpixels_by_label_are_those_of_a_stable_sort() -> None:
     labels = np.random.default_rng(0).integers(0, 5, (20, 30)).astype(np.int32)
     labels[labels == 3] = 0  # a label without pixels
-    rows, columns, starts = _pixels_by_label(labels, 4)
+    rows, columns, starts = pixels_by_label(labels, 4)
     order = np.argsort(labels.ravel(), kind="stable")
     order = order[labels.ravel()[order] > 0]
     assert np.array_equal(rows * 30 + columns, order)

@@ -13,6 +13,7 @@ from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.frames import Frame
 from stages.segment.objects.backend import BUNDLED, ObjectsBackend
 from stages.segment.objects.boosting import read_trees, score_rows, write_trees
+from stages.segment.objects.grouping import Recording
 from stages.segment.objects.pairs import FEATURES
 from stages.segment.objects.plain import segment_plain
 from stages.segment.objects.segmentation import ObjectFrame, segment_objects
@@ -64,6 +65,18 @@ def test_a_box_behind_a_post_is_one_object() -> None:
     found = segment_objects(painted(owner, (60, 160, 70), (200, 190, 60)), depth, CAMERA).labels
     assert found.max() == 2
     assert best_overlap(found, owner == 1)[1] > 0.85
+
+
+def test_a_recording_knows_which_pairs_are_one_object() -> None:
+    depth, owner = tabletop(((-0.08, 0.25, 0.8), (0.16, 0.2, 0.1)), ((0.08, 0.25, 0.8), (0.16, 0.2, 0.1)))
+    color = painted(owner, (210, 60, 40), (30, 80, 200))
+    recording = Recording(owner, np.random.default_rng(0), by_truth=1.0)
+    found = segment_objects(color, depth, CAMERA, recording=recording).labels
+    assert found.max() == 2  # by the truth
+    # Each box shows two faces, so that there are pairs of both kinds, and the last one looked at is the two boxes.
+    assert set(recording.answers.tolist()) == {0, 1}
+    assert recording.answers[-1] == 0
+    assert recording.features.shape == (len(recording.answers), len(FEATURES))
 
 
 def test_the_same_frame_gives_the_same_labels() -> None:
