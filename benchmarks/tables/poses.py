@@ -4,12 +4,13 @@ Arms: `odometry` (no loops), `ours` (loops and pose graph), `ours_bundle` (and b
 alone), `sfm` (features alone, pycolmap), and `open3d` (Open3D's tensor RGB-D odometry, frame to frame, hybrid, the same
 resolution). Logs: the red kitchen of 7-Scenes, Redwood's living room (whose poses are themselves an estimate), the five
 frames of the dining room, and generated rooms of the reporting seeds. Writes metrics.json, table.md and a plan of the
-paths of every log; results of a log and an arm that are there already are kept unless --fresh.
+paths of every log; what is there already is kept unless the code of the steps has changed or --fresh is given.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import resource
 import shutil
@@ -19,6 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from benchmarks.mapping.drift import drifting_poses
@@ -64,9 +66,12 @@ ARMS: dict[str, PosesParameters | None] = {
 QUICK_ARMS = ("odometry", "ours")
 CORRUPTION = "0.2"
 MEASURES = (
-    "ate_m", "rpe_second_m", "rpe_second_rad", "rpe_metre_m", "fit_m", "posed_share", "loops", "frames_per_cpu_second",
-    "frames_per_second",
+    "ate_m", "rpe_second_m", "rpe_second_rad", "rpe_metre_m", "fit_m", "epipolar_rad", "posed_share", "loops",
+    "frames_per_cpu_second", "frames_per_second",
 )  # fmt: skip
+EPIPOLAR_EVERY, EPIPOLAR_GAP, EPIPOLAR_MATCHES = 12, 25, 40
+"""`epipolar_rad`: the turn between frames so far apart, against that which their features say by epipolar geometry,
+beginning at every so many-th frame and with at least so many matches that agree; neither depth nor truth is needed."""
 FIT_PAIRS, FIT_GAP = 30, 15
 """`fit_m`: depth against depth of so many pairs of frames so far apart, with the poses as they are; no truth needed."""
 
@@ -102,8 +107,9 @@ def logs_of(arguments: argparse.Namespace) -> list[Log]:
             made(["ingest", "--log", str(log), *INTRINSICS.get(name, ())], folder / name)
             logs.append(Log(name, open_artifact(folder / name, Sequence), None))  # type: ignore[arg-type]
     rooms = [(RECIPES[k % len(RECIPES)], seed) for k, seed in enumerate(REPORTING_SEEDS)]
-    frames = ["--frames", "240" if arguments.quick else "400", "--width", "320", "--height", "240"]
-    for recipe, seed in rooms[:1] if arguments.quick else rooms:
+    number = arguments.frames or (240 if arguments.quick else 400)
+    frames = ["--frames", str(number), "--width", "320", "--height", "240"]
+    for recipe, seed in rooms[: arguments.rooms or (1 if arguments.quick else len(rooms))]:
         name = f"{recipe}_{seed}"
         if not wanted(name):
             continue
@@ -113,6 +119,29 @@ def logs_of(arguments: argparse.Namespace) -> list[Log]:
         made(["ingest", "--log", f"{truth}/log.mcap"], folder / name)
         logs.append(Log(name, open_artifact(folder / name, Sequence), open_artifact(truth, GroundTruth)))  # type: ignore[arg-type]
     return logs
+
+
+def code_of(*steps: str) -> str:
+    """Return a digest of the source of these steps, which says whether a kept result is still theirs."""
+    stages, digest = Path(__file__).resolve().parents[2] / "stages", hashlib.sha256()
+    for step in steps:
+        for file in sorted((stages / step).rglob("*.py")):
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def kept_or(
+    file: Path, code: str, fresh: bool, measure: Callable[[], dict[str, float | None]]
+) -> dict[str, float | None]:
+    """Return the figures that `file` keeps of this code, else measure them and keep them there."""
+    if file.is_file() and not fresh:
+        kept = json.loads(file.read_text())
+        if kept.get("code") == code:
+            return dict(kept["figures"])
+    figures = measure()
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(json.dumps({"code": code, "figures": figures}))
+    return figures
 
 
 def run_arm(log: Log, arm: str, output: Path) -> dict[str, float | None]:
@@ -164,6 +193,49 @@ def depth_fit(sequence: Sequence, times: np.ndarray, poses: np.ndarray) -> float
             )
             found.append(judge(first, second, inverse(poses[rows[k]]) @ poses[rows[k + FIT_GAP]]).residual)
     return float(np.median(found)) if found else None
+
+
+def epipolar_turns(sequence: Sequence) -> list[list[float]]:
+    """Return first frame, second frame and the rotation vector [rad] of first_from_second, of pairs whose SIFT matches
+    have an essential matrix."""
+    finder, matcher, turns = cv2.SIFT_create(1500), cv2.BFMatcher(), []  # type: ignore[attr-defined]
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        matrix = intrinsic_matrix(reader.camera)
+        for first in range(0, len(reader) - EPIPOLAR_GAP, EPIPOLAR_EVERY):
+            colors = [reader.read(k, ("color",)).color for k in (first, first + EPIPOLAR_GAP)]
+            if any(color is None for color in colors):
+                continue
+            found = [finder.detectAndCompute(cv2.cvtColor(c, cv2.COLOR_RGB2GRAY), None) for c in colors]  # type: ignore
+            if any(descriptors is None or len(descriptors) < 2 for _, descriptors in found):
+                continue
+            pairs = matcher.knnMatch(found[0][1], found[1][1], k=2)
+            good = [near for near, next_best in pairs if near.distance < 0.75 * next_best.distance]
+            if len(good) < EPIPOLAR_MATCHES:
+                continue
+            here = np.array([found[0][0][match.queryIdx].pt for match in good])
+            there = np.array([found[1][0][match.trainIdx].pt for match in good])
+            cv2.setRNGSeed(0)
+            essential, mask = cv2.findEssentialMat(here, there, matrix, method=cv2.RANSAC, prob=0.9999, threshold=0.7)
+            if essential is None or essential.shape != (3, 3):
+                continue
+            agreeing, rotation, _, _ = cv2.recoverPose(essential, here, there, matrix, mask=mask)
+            if agreeing >= EPIPOLAR_MATCHES:
+                turns.append([first, first + EPIPOLAR_GAP, *cv2.Rodrigues(rotation.T)[0][:, 0].tolist()])
+    return turns
+
+
+def epipolar_disagreement(
+    turns: list[list[float]], frame_times: np.ndarray, times: np.ndarray, poses: np.ndarray
+) -> float | None:
+    """Return the median angle between the turns of these poses and those of `epipolar_turns` [rad]."""
+    rows = dict(zip(*(found.tolist() for found in associate(frame_times, times)), strict=True))
+    angles = []
+    for first, second, *vector in turns:
+        if first in rows and second in rows:
+            own = poses[rows[first], :3, :3].T @ poses[rows[second], :3, :3]
+            other = cv2.Rodrigues(np.array(vector))[0]
+            angles.append(float(np.linalg.norm(cv2.Rodrigues(own.T @ other)[0])))
+    return float(np.median(angles)) if len(angles) >= 5 else None
 
 
 def open3d_odometry(sequence: Sequence, output: Path) -> int:
@@ -224,44 +296,57 @@ def draw_paths(log: Log, paths: dict[str, Path], file: Path) -> None:
         save(figure, file)
 
 
-def map_quality(log: Log, paths: dict[str, Path], out: Path) -> dict[str, dict[str, float | None]]:
+def map_quality(log: Log, paths: dict[str, Path], out: Path, fresh: bool) -> dict[str, dict[str, float | None]]:
     """Return panoptic quality of maps fused with exact, estimated and drifting poses (true masks, corruption 0.2)."""
-    assert log.ground_truth is not None
     folder = out / "maps" / log.name
     command = ["segment", "--sequence", str(log.sequence.root), "--backend", "ground-truth", "--corruption", CORRUPTION]
     segments = open_artifact(made(command, folder / "segments"), Segments)
-    trajectories: dict[str, Path | None] = {"exact": None, **paths}
-    times, given = log.given()
-    drifting = folder / "drifting_path"
-    drifting.mkdir(parents=True, exist_ok=True)
-    drifted = drifting_poses(given, np.random.default_rng(0))
-    drifted = laid_onto(drifted, given) @ drifted
-    write_tum(drifting / "trajectory.tum", times, np.array([orthonormal(pose) for pose in drifted]))
-    trajectories["drifting"] = drifting
-    results = {}
+    trajectories: dict[str, Path | None] = {"exact": None, **paths, "drifting": drifting_path(log, folder)}
+    code, results = code_of("poses", "fuse", "evaluate"), {}
     for name, path in trajectories.items():
-        output = folder / name
-        for part in ("map", "evaluation"):
-            shutil.rmtree(output / part, ignore_errors=True)
-            (output / part).mkdir(parents=True)
-        progress = SilentProgress()
-        fused = fuse(
-            log.sequence, segments, None if path is None else Trajectory(path),  # type: ignore[arg-type]
-            parameters=FuseParameters(), context=Context(output / "map", 0, "cpu", progress),  # type: ignore[call-arg]
-        )  # fmt: skip
-        evaluate(
-            log.ground_truth, log.sequence, None if path is None else Trajectory(path), None, fused,
-            parameters=EvaluateParameters(plots=False),  # type: ignore[call-arg]
-            context=Context(output / "evaluation", 0, "cpu", progress),
-        )  # fmt: skip
-        metrics = json.loads((output / "evaluation" / "metrics.json").read_text())["metrics"]
-        results[name] = {
-            "pq": metrics["map/pq"],
-            "accuracy_mm": metrics["map/accuracy_mean_mm"],
-            "ate_m": metrics.get("trajectory/ate_rmse_aligned_m") if path is not None else 0.0,
-        }
+
+        def measure(output: Path = folder / name, path: Path | None = path) -> dict[str, float | None]:
+            return map_figures(log, segments, path, output)  # type: ignore[arg-type]
+
+        results[name] = kept_or(folder / f"{name}.json", code, fresh, measure)
         print(f"{log.name:20} map {name:12} {results[name]}", file=sys.stderr, flush=True)
     return results
+
+
+def drifting_path(log: Log, folder: Path) -> Path:
+    """Write the given poses with the mapping benchmark's drift, laid onto the given ones; return their folder."""
+    times, given = log.given()
+    output = folder / "drifting_path"
+    output.mkdir(parents=True, exist_ok=True)
+    drifted = drifting_poses(given, np.random.default_rng(0))
+    drifted = laid_onto(drifted, given) @ drifted
+    write_tum(output / "trajectory.tum", times, np.array([orthonormal(pose) for pose in drifted]))
+    return output
+
+
+def map_figures(log: Log, segments: Segments, path: Path | None, output: Path) -> dict[str, float | None]:
+    """Fuse with the poses in the folder `path` (None: the sequence's own), evaluate, return the figures."""
+    assert log.ground_truth is not None
+    for part in ("map", "evaluation"):
+        shutil.rmtree(output / part, ignore_errors=True)
+        (output / part).mkdir(parents=True)
+    trajectory = None if path is None else Trajectory(path)
+    progress = SilentProgress()
+    fused = fuse(
+        log.sequence, segments, trajectory,
+        parameters=FuseParameters(), context=Context(output / "map", 0, "cpu", progress),  # type: ignore[call-arg]
+    )  # fmt: skip
+    evaluate(
+        log.ground_truth, log.sequence, trajectory, None, fused,
+        parameters=EvaluateParameters(plots=False),  # type: ignore[call-arg]
+        context=Context(output / "evaluation", 0, "cpu", progress),
+    )  # fmt: skip
+    metrics = json.loads((output / "evaluation" / "metrics.json").read_text())["metrics"]
+    return {
+        "pq": metrics["map/pq"],
+        "accuracy_mm": metrics["map/accuracy_mean_mm"],
+        "ate_m": metrics.get("trajectory/ate_rmse_aligned_m") if path is not None else 0.0,
+    }
 
 
 def table(
@@ -276,18 +361,20 @@ def table(
         "RPE [deg/s]",
         "RPE [cm/m]",
         "fit [mm]",
+        "epipolar [deg]",
         "posed",
         "loops",
         "frames/CPU s",
         "frames/s",
     ]
     lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    scales = (100.0, 100.0, float(np.degrees(1.0)), 100.0, 1000.0, 100.0, 1.0, 1.0, 1.0)
-    digits = (2, 2, 2, 2, 2, 0, 0, 1, 1)
+    degrees = float(np.degrees(1.0))
+    scales = (100.0, 100.0, degrees, 100.0, 1000.0, degrees, 100.0, 1.0, 1.0, 1.0)
+    digits = (2, 2, 2, 2, 2, 2, 0, 0, 1, 1)
     for log, arms in rows.items():
         for arm, row in arms.items():
             cells = [_cell(row.get(name), scale, k) for name, scale, k in zip(MEASURES, scales, digits, strict=True)]
-            cells[5] += " %" if cells[5] else ""
+            cells[6] += " %" if cells[6] else ""
             lines.append("| " + " | ".join([log, arm, *cells]) + " |")
     generated = {log: arms for log, arms in rows.items() if log not in REAL}
     for arm in next(iter(generated.values()), {}):
@@ -295,7 +382,7 @@ def table(
         values = [value for value in found if value is not None]
         if len(values) > 1:
             text = f"{100 * float(np.median(values)):.2f}, worst {100 * max(values):.2f}"
-            lines.append(f"| {len(values)} generated rooms | {arm} | median {text} | | | | | | | | |")
+            lines.append(f"| {len(values)} generated rooms | {arm} | median {text} |" + " |" * 9)
     for log, arms in maps.items():
         lines += ["", f"Map of {log}, true masks with corruption {CORRUPTION}, 2 cm voxels:", ""]
         lines += ["| poses | ATE [cm] | PQ | surface error [mm] |", "|---|---|---|---|"]
@@ -318,6 +405,8 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="one generated room, the arms odometry and ours")
     parser.add_argument("--only", nargs="*", help="only these logs")
     parser.add_argument("--arms", nargs="*", choices=list(ARMS), help="only these arms")
+    parser.add_argument("--rooms", type=int, choices=range(1, len(REPORTING_SEEDS) + 1), help="so many generated rooms")
+    parser.add_argument("--frames", type=int, help="frames of a generated room (400; 240 with --quick)")
     parser.add_argument("--fresh", action="store_true", help="measure again what is there already")
     parser.add_argument("--no-map", action="store_true", help="leave out the maps")
     arguments = parser.parse_args()
@@ -325,26 +414,33 @@ def main() -> int:
     rows: dict[str, dict[str, dict[str, float | None]]] = {}
     maps: dict[str, dict[str, dict[str, float | None]]] = {}
     for log in logs_of(arguments):
-        rows[log.name], paths = {}, {}
-        kept = arguments.out / "paths" / log.name / "given.json"
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        if arguments.fresh or not kept.is_file():
-            kept.write_text(json.dumps({"fit_m": depth_fit(log.sequence, *log.given())}))
-        rows[log.name]["given"] = json.loads(kept.read_text())
+        rows[log.name], paths, folder = {}, {}, arguments.out / "paths" / log.name
+
+        def given_fit(log: Log = log) -> dict[str, float | None]:
+            return {"fit_m": depth_fit(log.sequence, *log.given())}
+
+        rows[log.name]["given"] = kept_or(folder / "given.json", code_of("poses"), arguments.fresh, given_fit)
         for arm in arms:
-            output = arguments.out / "paths" / log.name / arm
-            kept = output.with_suffix(".json")
-            if arguments.fresh or not kept.is_file():
-                kept.unlink(missing_ok=True)
-                figures = run_arm(log, arm, output)
-                kept.write_text(json.dumps(figures))
-            rows[log.name][arm] = json.loads(kept.read_text())
-            paths[arm] = output
+            paths[arm] = folder / arm
+
+            def measure(log: Log = log, arm: str = arm, output: Path = folder / arm) -> dict[str, float | None]:
+                return run_arm(log, arm, output)
+
+            code = code_of("poses") if ARMS[arm] is not None else "open3d"
+            rows[log.name][arm] = kept_or(folder / f"{arm}.json", code, arguments.fresh, measure)
             print(f"{log.name:20} {arm:12} {rows[log.name][arm]}", file=sys.stderr, flush=True)
+        kept = folder / "epipolar.json"
+        if arguments.fresh or not kept.is_file():
+            kept.write_text(json.dumps(epipolar_turns(log.sequence)))
+        with FrameReader(log.sequence.path("frames.mcap")) as reader:
+            frame_times = reader.times
+        for arm, row in rows[log.name].items():
+            path = log.given() if arm == "given" else read_tum(paths[arm] / "trajectory.tum")
+            row["epipolar_rad"] = epipolar_disagreement(json.loads(kept.read_text()), frame_times, *path)
         draw_paths(log, paths, arguments.out / "plots" / f"{log.name}.png")
         if log.ground_truth is not None and not maps and not arguments.no_map:
             chosen = {arm: path for arm, path in paths.items() if arm in ("ours", "odometry", "sfm")}
-            maps[log.name] = map_quality(log, chosen, arguments.out)
+            maps[log.name] = map_quality(log, chosen, arguments.out, arguments.fresh)
     metrics = {
         f"{arm}/{log}/{measure}": value
         for log, found in rows.items()
