@@ -4,7 +4,8 @@ Arms: `odometry` (no loops), `ours` (loops and pose graph), `ours_bundle` (and b
 alone), `sfm` (features alone, pycolmap), and `open3d` (Open3D's tensor RGB-D odometry, frame to frame, hybrid, the same
 resolution). Logs: the red kitchen of 7-Scenes, Redwood's living room (whose poses are themselves an estimate), the five
 frames of the dining room, and generated rooms of the reporting seeds. Writes metrics.json, table.md and a plan of the
-paths of every log; what is there already is kept unless the code of the steps has changed or --fresh is given.
+paths of every log; what is there already is kept unless the code of the steps has changed or --fresh is given, and
+--kept-only tabulates that alone.
 """
 
 from __future__ import annotations
@@ -103,7 +104,7 @@ def logs_of(arguments: argparse.Namespace) -> list[Log]:
     folder, logs = arguments.out / "logs", []
     for name, where in REAL.items():
         log = arguments.data / where
-        if log.is_dir() and wanted(name):
+        if log.is_dir() and wanted(name) and ((folder / name).is_dir() or not arguments.kept_only):
             made(["ingest", "--log", str(log), *INTRINSICS.get(name, ())], folder / name)
             logs.append(Log(name, open_artifact(folder / name, Sequence), None))  # type: ignore[arg-type]
     rooms = [(RECIPES[k % len(RECIPES)], seed) for k, seed in enumerate(REPORTING_SEEDS)]
@@ -111,7 +112,7 @@ def logs_of(arguments: argparse.Namespace) -> list[Log]:
     frames = ["--frames", str(number), "--width", "320", "--height", "240"]
     for recipe, seed in rooms[: arguments.rooms or (1 if arguments.quick else len(rooms))]:
         name = f"{recipe}_{seed}"
-        if not wanted(name):
+        if not wanted(name) or (arguments.kept_only and not (folder / name).is_dir()):
             continue
         library = made(["library", "build", "--seed", "1"], folder / "library")
         synthesize = ["synthesize", "--library", str(library), "--recipe", recipe, "--seed", str(seed), *frames]
@@ -130,21 +131,30 @@ def code_of(*steps: str) -> str:
     return digest.hexdigest()[:16]
 
 
-def kept_or(
-    file: Path, code: str, fresh: bool, measure: Callable[[], dict[str, float | None]]
-) -> dict[str, float | None]:
-    """Return the figures that `file` keeps of this code, else measure them and keep them there."""
-    if file.is_file() and not fresh:
-        kept = json.loads(file.read_text())
-        if kept.get("code") == code:
-            return dict(kept["figures"])
-    figures = measure()
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(json.dumps({"code": code, "figures": figures}))
-    return figures
+Row = dict[str, float | None]
 
 
-def run_arm(log: Log, arm: str, output: Path) -> dict[str, float | None]:
+class Kept:
+    """Figures in files, each with the digest of the code that they were measured with."""
+
+    def __init__(self, fresh: bool, only: bool) -> None:
+        self._fresh, self._only = fresh, only
+
+    def get(self, file: Path, code: str, measure: Callable[[], Row]) -> Row | None:
+        """Return the figures that `file` keeps of this code, else measure and keep them; None with --kept-only."""
+        if file.is_file() and not self._fresh:
+            kept = json.loads(file.read_text())
+            if kept.get("code") == code:
+                return dict(kept["figures"])
+        if self._only:
+            return None
+        figures = measure()
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps({"code": code, "figures": figures}))
+        return figures
+
+
+def run_arm(log: Log, arm: str, output: Path) -> Row:
     """Estimate the poses of a log into `output` and measure them."""
     if output.exists():
         shutil.rmtree(output)
@@ -296,7 +306,7 @@ def draw_paths(log: Log, paths: dict[str, Path], file: Path) -> None:
         save(figure, file)
 
 
-def map_quality(log: Log, paths: dict[str, Path], out: Path, fresh: bool) -> dict[str, dict[str, float | None]]:
+def map_quality(log: Log, paths: dict[str, Path], out: Path, keeper: Kept) -> dict[str, Row]:
     """Return panoptic quality of maps fused with exact, estimated and drifting poses (true masks, corruption 0.2)."""
     folder = out / "maps" / log.name
     command = ["segment", "--sequence", str(log.sequence.root), "--backend", "ground-truth", "--corruption", CORRUPTION]
@@ -305,10 +315,13 @@ def map_quality(log: Log, paths: dict[str, Path], out: Path, fresh: bool) -> dic
     code, results = code_of("poses", "fuse", "evaluate"), {}
     for name, path in trajectories.items():
 
-        def measure(output: Path = folder / name, path: Path | None = path) -> dict[str, float | None]:
+        def measure(output: Path = folder / name, path: Path | None = path) -> Row:
             return map_figures(log, segments, path, output)  # type: ignore[arg-type]
 
-        results[name] = kept_or(folder / f"{name}.json", code, fresh, measure)
+        found = keeper.get(folder / f"{name}.json", code, measure)
+        if found is None:
+            continue
+        results[name] = found
         print(f"{log.name:20} map {name:12} {results[name]}", file=sys.stderr, flush=True)
     return results
 
@@ -324,7 +337,7 @@ def drifting_path(log: Log, folder: Path) -> Path:
     return output
 
 
-def map_figures(log: Log, segments: Segments, path: Path | None, output: Path) -> dict[str, float | None]:
+def map_figures(log: Log, segments: Segments, path: Path | None, output: Path) -> Row:
     """Fuse with the poses in the folder `path` (None: the sequence's own), evaluate, return the figures."""
     assert log.ground_truth is not None
     for part in ("map", "evaluation"):
@@ -349,9 +362,7 @@ def map_figures(log: Log, segments: Segments, path: Path | None, output: Path) -
     }
 
 
-def table(
-    rows: dict[str, dict[str, dict[str, float | None]]], maps: dict[str, dict[str, dict[str, float | None]]]
-) -> str:
+def table(rows: dict[str, dict[str, Row]], maps: dict[str, dict[str, Row]]) -> str:
     """Return the Markdown tables."""
     header = [
         "log",
@@ -408,27 +419,33 @@ def main() -> int:
     parser.add_argument("--rooms", type=int, choices=range(1, len(REPORTING_SEEDS) + 1), help="so many generated rooms")
     parser.add_argument("--frames", type=int, help="frames of a generated room (400; 240 with --quick)")
     parser.add_argument("--fresh", action="store_true", help="measure again what is there already")
+    parser.add_argument("--kept-only", action="store_true", help="measure nothing: tabulate what is there")
     parser.add_argument("--no-map", action="store_true", help="leave out the maps")
     arguments = parser.parse_args()
     arms = arguments.arms or (QUICK_ARMS if arguments.quick else tuple(ARMS))
-    rows: dict[str, dict[str, dict[str, float | None]]] = {}
-    maps: dict[str, dict[str, dict[str, float | None]]] = {}
+    keeper = Kept(arguments.fresh, arguments.kept_only)
+    rows: dict[str, dict[str, Row]] = {}
+    maps: dict[str, dict[str, Row]] = {}
     for log in logs_of(arguments):
         rows[log.name], paths, folder = {}, {}, arguments.out / "paths" / log.name
 
-        def given_fit(log: Log = log) -> dict[str, float | None]:
+        def given_fit(log: Log = log) -> Row:
             return {"fit_m": depth_fit(log.sequence, *log.given())}
 
-        rows[log.name]["given"] = kept_or(folder / "given.json", code_of("poses"), arguments.fresh, given_fit)
+        fit = keeper.get(folder / "given.json", code_of("poses"), given_fit)
+        rows[log.name]["given"] = fit or {}
         for arm in arms:
-            paths[arm] = folder / arm
 
-            def measure(log: Log = log, arm: str = arm, output: Path = folder / arm) -> dict[str, float | None]:
+            def measure(log: Log = log, arm: str = arm, output: Path = folder / arm) -> Row:
                 return run_arm(log, arm, output)
 
             code = code_of("poses") if ARMS[arm] is not None else "open3d"
-            rows[log.name][arm] = kept_or(folder / f"{arm}.json", code, arguments.fresh, measure)
+            found = keeper.get(folder / f"{arm}.json", code, measure)
+            if found is None:
+                continue
+            rows[log.name][arm], paths[arm] = found, folder / arm
             print(f"{log.name:20} {arm:12} {rows[log.name][arm]}", file=sys.stderr, flush=True)
+        folder.mkdir(parents=True, exist_ok=True)
         kept = folder / "epipolar.json"
         if arguments.fresh or not kept.is_file():
             kept.write_text(json.dumps(epipolar_turns(log.sequence)))
@@ -440,7 +457,7 @@ def main() -> int:
         draw_paths(log, paths, arguments.out / "plots" / f"{log.name}.png")
         if log.ground_truth is not None and not maps and not arguments.no_map:
             chosen = {arm: path for arm, path in paths.items() if arm in ("ours", "odometry", "sfm")}
-            maps[log.name] = map_quality(log, chosen, arguments.out, arguments.fresh)
+            maps[log.name] = map_quality(log, chosen, arguments.out, keeper)
     metrics = {
         f"{arm}/{log}/{measure}": value
         for log, found in rows.items()
