@@ -56,7 +56,8 @@ def test_rules_speak_for_one_object_or_against_it_as_their_terms_do() -> None:
 
 def test_parts_with_the_table_between_them_are_not_joined() -> None:
     table = rule_table(RULES, START)
-    alike = {"histogram": 0.9, "hidden": 0.4, "normal_angle": 1.0, "extent": 0.05, "lowest": 0.002}
+    # Two ends of a box of like colour behind something that hides its middle.
+    alike = {"histogram": 0.9, "hidden": 0.4, "extent": 0.05, "joint_residual": 0.3}
     assert rule_score(features(**alike), table) > 0
     assert rule_score(features(**(alike | {"hidden": 0.0, "behind": 0.4, "behind_gain": 0.4})), table) < 0
 
@@ -82,6 +83,10 @@ def test_the_first_rule_chosen_is_the_one_that_decides() -> None:
     values = random.random((600, len(TERMS)))
     answers = (values[:, TERMS.index("histogram")] + 0.1 * random.normal(size=600) > 0.5).astype(float)
     rules, _ = choose_rules(APART, values, answers, np.ones(600))
-    decided = max(rules, key=lambda rule: abs(rule.weight))
-    assert decided.term == "histogram"
+
+    def spread(rule: Rule) -> float:
+        excess = np.maximum(0, rule.side * (values[:, TERMS.index(rule.term)] - rule.bound))
+        return abs(rule.weight) * float(excess.std())
+
+    assert max(rules, key=spread).term == "histogram"
     assert all(rule.weight * rule.side * JOINS[rule.term] > 0 for rule in rules)
