@@ -25,7 +25,9 @@ class TrueObject(Model):
     joints: dict[str, float] = {}
     """Joint name -> value while the room was scanned."""
     box: Box
-    """Gravity-aligned box of the whole object as it stands (open doors included)."""
+    """Gravity-aligned box of the whole object as it stands (open doors included), along the model's own axes."""
+    round: bool = False
+    """Turning it about the vertical changes nothing that matters (a bottle): the yaw of its box says nothing."""
     visible_pixels: int = 0
     """Pixels over all frames, in a scan points of visible.npz; 0 for what the camera never saw."""
 

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from schemas.contact_graph import ContactGraphFile, GraphNode
+from schemas.ground_truth import TrueObject
 from schemas.scene_parts import Box
 from stages.evaluate.correspondence import merge_stuff_nodes, node_affinity
 from stages.evaluate.map_measures import precision_table, record_precision
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.results import Part
 from stages.evaluate.truth import TrueRoom, thing_classes
-from stages.kit.geometry.boxes import box_iou, box_yaw
+from stages.kit.geometry.boxes import box_iou, box_yaw, turned_to
 from stages.kit.measurement.average_precision import Candidates, class_precision
 from stages.kit.measurement.edge_agreement import edge_agreement
 from stages.kit.measurement.graph_edit_distance import EditDistance, graph_edit_distance, support_tree
@@ -143,25 +144,31 @@ def box_candidates(
     """
     things = thing_classes()
     true = truth.evaluated(things_only=True)
-    hidden = [o.box for o in truth.objects if o.instance in truth.optional]
+    hidden = [o for o in truth.objects if o.instance in truth.optional]
     nodes = [
         (node, box)
         for node in graph.nodes
         if node.class_name in things and (box := box_of(node, field)) is not None and upright(box)
     ]
-    nodes = [(n, b) for n, b in nodes if not _is_hidden(b, hidden, [o.box for o in true], match_iou)]
+    nodes = [(n, b) for n, b in nodes if not _is_hidden(b, hidden, true, match_iou)]
     result: dict[str, Candidates] = {}
     for name in [*sorted({o.class_name for o in true} | {n.class_name for n, _ in nodes}), ANY_CLASS]:
         columns = [o for o in true if name in (o.class_name, ANY_CLASS)]
         rows = [(n, b) for n, b in nodes if name in (n.class_name, ANY_CLASS)]
-        iou = np.array([[box_iou(b, o.box) for o in columns] for _, b in rows]).reshape(len(rows), len(columns))
+        iou = np.array([[iou_with(b, o) for o in columns] for _, b in rows]).reshape(len(rows), len(columns))
         result[name] = Candidates(iou, np.array([float(points.get(n.instance, 1)) for n, _ in rows]))
     return result
 
 
-def _is_hidden(box: Box, hidden: list[Box], seen: list[Box], match_iou: float) -> bool:
-    best_hidden = max((box_iou(box, other) for other in hidden), default=0.0)
-    return best_hidden > match_iou and best_hidden > max((box_iou(box, other) for other in seen), default=0.0)
+def iou_with(box: Box, true: TrueObject) -> float:
+    """Return the IoU of a predicted box with that of a true object. A round object has no yaw: the predicted box is
+    turned to the true one's first, as pose benchmarks do for symmetric objects (Wang et al. 2019, NOCS)."""
+    return box_iou(turned_to(box, box_yaw(true.box)) if true.round else box, true.box)
+
+
+def _is_hidden(box: Box, hidden: list[TrueObject], seen: list[TrueObject], match_iou: float) -> bool:
+    best_hidden = max((iou_with(box, other) for other in hidden), default=0.0)
+    return best_hidden > match_iou and best_hidden > max((iou_with(box, other) for other in seen), default=0.0)
 
 
 def box_of(node: GraphNode, field: str) -> Box | None:

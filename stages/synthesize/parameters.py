@@ -27,7 +27,7 @@ class SynthesizeParameters(Parameters):
 
 STAGE = Stage(
     name="synthesize",
-    version=1,
+    version=2,
     summary="Make a room by support rules and record it with a simulated RGB-D camera, with all ground truth",
     parameters=SynthesizeParameters,
     reads={"library": CadLibrary},

@@ -14,11 +14,13 @@ from schemas.scene_parts import Box, Relation, SurfacePlane
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.scene_bundle import BundleBody
 from stages.kit.geometry.boxes import (
+    box_at_yaw,
     box_from_bounds,
     boxes_overlap_volume,
     clip_polygon,
     convex_hull,
     footprint,
+    is_round,
     minimum_box,
     polygon_area,
 )
@@ -28,6 +30,10 @@ from stages.synthesize.shell import Layout
 
 LEAST_SHARED_VOLUME = 1e-6
 """Boxes that share less than a cubic centimetre only touch [m^3]."""
+AXES_TOLERANCE = 0.1
+"""A box along the model's axes may have this much more footprint than the least rectangle."""
+UPRIGHT = 0.9999
+"""Cosine from which on a model stands upright."""
 
 
 def layout_name(instance: int, layout: Layout) -> str:
@@ -36,14 +42,28 @@ def layout_name(instance: int, layout: Layout) -> str:
 
 
 def object_boxes(arrangement: Arrangement) -> dict[str, Box]:
-    """Return the gravity-aligned minimum box of everything as it stands, by name; layout: the slab."""
+    """Return the gravity-aligned box of everything as it stands, by name; layout: the slab."""
     boxes = {
         layout_name(instance, layout): box_from_bounds(layout.minimum, layout.maximum)
         for instance, layout in enumerate(arrangement.room.layouts, start=1)
     }
     for thing in arrangement.objects:
-        boxes[thing.name] = minimum_box(np.asarray(thing.world_mesh().vertices))
+        boxes[thing.name] = object_box(np.asarray(thing.world_mesh().vertices), thing.world_from_model)
     return boxes
+
+
+def object_box(vertices: np.ndarray, world_from_model: np.ndarray) -> Box:
+    """Return the gravity-aligned box of vertices (V, 3) [m] along the axes of the model.
+
+    The least rectangle around a monitor on a round foot stands at an angle to the screen, for a gain of two per cent.
+    Where a turned rectangle is smaller by more than AXES_TOLERANCE the model does not lie along its axes, and that
+    rectangle it is; so with a model that leans.
+    """
+    least = minimum_box(vertices)
+    if world_from_model[2, 2] < UPRIGHT * np.linalg.norm(world_from_model[:3, 2]):
+        return least
+    own = box_at_yaw(vertices, float(np.arctan2(world_from_model[1, 0], world_from_model[0, 0])))
+    return own if own.size[0] * own.size[1] <= (1.0 + AXES_TOLERANCE) * least.size[0] * least.size[1] else least
 
 
 def true_objects(arrangement: Arrangement, boxes: dict[str, Box], visible_pixels: np.ndarray) -> list[TrueObject]:
@@ -73,6 +93,7 @@ def true_objects(arrangement: Arrangement, boxes: dict[str, Box], visible_pixels
             world_from_model=as_transform(thing.world_from_model),
             joints=_all_joints(thing),
             box=boxes[thing.name],
+            round=is_round(np.asarray(thing.world_mesh().vertices)[:, :2]),
             visible_pixels=pixels(thing.instance),
         )
         for thing in arrangement.objects

@@ -19,7 +19,7 @@ from schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
 from schemas.sequence import Sequence
 from schemas.vocabulary import VOCABULARY_FILE, load_vocabulary
 from stages.kit.formats.ply_files import ColoredMesh, write_ply
-from stages.kit.geometry.boxes import minimum_box
+from stages.kit.geometry.boxes import is_round, minimum_box
 from stages.kit.geometry.transforms import apply
 from stages.kit.measurement.palette import instance_color
 from stages.kit.stage import Context
@@ -142,6 +142,7 @@ def true_objects(
             class_name=name,
             world_from_model=as_transform(np.eye(4)),
             box=minimum_box(vertices[parts[instance]]),
+            round=is_round(vertices[parts[instance], :2]),
             visible_pixels=counts.get(instance, 0),
         )
         for instance, name in sorted(classes.items())

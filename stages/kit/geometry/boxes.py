@@ -76,6 +76,29 @@ def minimum_rectangle(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float
     return rotation @ middle, np.array([length[best], width[best]]), float(angles[best])
 
 
+def box_at_yaw(points: np.ndarray, yaw: float) -> Box:
+    """Return the gravity-aligned box of points (N, 3) [m], N >= 1, whose axes are turned by `yaw` [rad] about z."""
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    world_from_box = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    turned = np.asarray(points, dtype=float) @ world_from_box
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    return gravity_aligned_box(world_from_box @ ((low + high) / 2.0), high - low, yaw)
+
+
+def turned_to(box: Box, yaw: float) -> Box:
+    """Return the box turned about its own vertical axis until its yaw is `yaw` [rad]."""
+    return gravity_aligned_box(box.center, box.size, yaw)
+
+
+def is_round(points: np.ndarray, tolerance: float = 0.05) -> bool:
+    """Whether points (N, 2) are as wide in every direction, within the share `tolerance`: a bottle, a bowl; a cup with
+    a handle is not, nor is a square, which is 41 % wider along its diagonal."""
+    hull = convex_hull(points)
+    angles = np.arange(0.0, math.pi, math.radians(5.0))
+    widths = np.ptp(hull @ np.stack([np.cos(angles), np.sin(angles)]), axis=0)
+    return bool(widths.max() <= (1.0 + tolerance) * widths.min())
+
+
 def convex_hull(points: np.ndarray) -> np.ndarray:
     """Return the hull vertices (K, 2) of points (N, 2), counter-clockwise; K is 1 or 2 for degenerate input."""
     points = np.asarray(points, dtype=float).reshape(-1, 2)

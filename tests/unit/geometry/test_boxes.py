@@ -127,3 +127,31 @@ def test_with_extent_keeps_the_footprint():
     longer = boxes.with_extent(box, 0.0, boxes.top(box))
     assert boxes.bottom(longer) == pytest.approx(0) and boxes.top(longer) == pytest.approx(1.25)
     assert np.allclose(boxes.footprint(longer), boxes.footprint(box))
+
+
+@given(st.integers(0, 1000), yaws)
+@settings(max_examples=30, deadline=None)
+def test_box_at_a_yaw_touches_all_its_points(seed, yaw):
+    points = np.random.default_rng(seed).normal(size=(20, 3))
+    box = boxes.box_at_yaw(points, yaw)
+    assert boxes.box_yaw(box) == pytest.approx(yaw)
+    inside = boxes.transform_points_to_box(box, points)
+    assert inside.max(axis=0) == pytest.approx(np.array(box.size) / 2)
+    assert inside.min(axis=0) == pytest.approx(-np.array(box.size) / 2)
+
+
+def test_turned_box_keeps_centre_and_size():
+    box = boxes.gravity_aligned_box((1, 2, 3), (0.1, 0.2, 0.3), 0.4)
+    turned = boxes.turned_to(box, 1.0)
+    assert (turned.center, turned.size) == (box.center, box.size)
+    assert boxes.box_yaw(turned) == pytest.approx(1.0)
+
+
+def test_what_is_round():
+    angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    assert boxes.is_round(circle)
+    assert boxes.is_round(0.03 * circle + [5.0, -2.0])
+    assert not boxes.is_round(np.concatenate([circle, [[1.4, 0.0]]])), "a cup with a handle"
+    assert not boxes.is_round(np.array([[0, 0], [1, 0], [1, 1], [0, 1]]))
+    assert not boxes.is_round(np.array([[0, 0], [1, 0]]))
