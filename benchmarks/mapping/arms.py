@@ -44,6 +44,7 @@ _PLAIN_EXTRACTION = {
     "minimum_prediction_share": 0.0,
     "spread_steps": 0,
     "speck_share": 0.0,
+    "piece_share": 0.0,
     "part_distance": 1000.0,
     "minimum_observations": 1,
     "minimum_overlap_share": 0.0,

@@ -185,6 +185,7 @@ class Prediction:
     segment: int
     class_id: int
     frame_instance: int
+    score: float = 1.0
 
 
 def associate_instances(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.fuse.counts import TripleCounts
-from stages.fuse.parts import absorb_specks, drop_far_parts, spread_labels
+from stages.fuse.parts import absorb_pieces, absorb_specks, drop_far_parts, spread_labels
 from stages.fuse.surface import Surface
 from stages.kit.formats.ply_files import ColoredMesh
 
@@ -112,6 +112,7 @@ def extract_entities(
     speck_share: float,
     part_distance: float,
     spread_steps: int = 0,
+    piece_share: float = 0.0,
     grouped: Mapping[int, tuple[int, int]] | None = None,
 ) -> tuple[list[ExtractedEntity], LabelledSurface]:
     """Return the entities, ascending by instance, and the labels of the whole surface.
@@ -129,6 +130,8 @@ def extract_entities(
         instance_of[segment], surface.vertices, surface.faces, steps=spread_steps, minimum_cosine=SPREAD_COSINE
     )
     instance = absorb_specks(named, surface.faces, whole=stuff, minimum_size=minimum_voxels, minimum_share=speck_share)
+    countable = {p: c for p, c in class_of_instance.items() if c in things}
+    instance = absorb_pieces(instance, surface.faces, countable, share=piece_share)
     instance = drop_far_parts(instance, surface.vertices, surface.faces, whole=stuff, distance=part_distance)
     of_face = face_labels(instance, surface.faces)
     by_label = np.argsort(of_face, kind="stable")
@@ -138,7 +141,9 @@ def extract_entities(
     for label in sorted(class_of_instance):
         class_id = class_of_instance[label]
         segments = tuple(int(s) for s in np.flatnonzero(instance_of == label))
-        votes = sum(counts.by_segment[segment].get((class_id, label), 0) for segment in segments)
+        votes = sum(
+            count for segment in segments for (_, voted), count in counts.by_segment[segment].items() if voted == label
+        )
         # A stuff class is one instance all over the room: frames that voted for it elsewhere say nothing here.
         observations = min(seen_in.get(label, 0).bit_count(), votes)
         start, end = np.searchsorted(sorted_labels, (label, label + 1))

@@ -19,6 +19,7 @@ from stages.fuse.association import (
     measure_overlap,
     overlapping_labels,
 )
+from stages.fuse.class_scores import ClassScores
 from stages.fuse.counts import TripleCounts
 from stages.fuse.integration import integrate
 from stages.fuse.parameters import FuseParameters
@@ -50,6 +51,7 @@ class PanopticMapper:
         self.instance_evidence = PairEvidence()
         self.segment_evidence = PairEvidence()
         """Segment labels that frames saw in one instance of a thing, or in two."""
+        self.class_scores = ClassScores()
         self.sightings: dict[int, int] = {}
         """Frame segments that each segment label was matched to, predicted or background."""
         self.counts = SeparateCounts() if parameters.merging == "separate" else TripleCounts()
@@ -159,7 +161,7 @@ class PanopticMapper:
         self._observe_shared(overlap, segments, labels)
         self._predict(
             [
-                Prediction(label, segment.category_id, segment.instance)
+                Prediction(label, segment.category_id, segment.instance, segment.score)
                 for label, segment in zip(labels, segments, strict=True)
                 if label > 0 and segment.category_id > 0
             ],
@@ -175,6 +177,7 @@ class PanopticMapper:
         for removed, kept in merged:
             self.sightings[kept] = self.sightings.get(kept, 0) + self.sightings.pop(removed, 0)
             self.segment_evidence.rename(removed, kept)
+            self.class_scores.merge_segments(removed, kept)
         self.segment_merges += len(merged)
         return index_image, np.array([0, *(self.labels.root(label) for label in labels)], dtype=np.int32)
 
@@ -200,6 +203,7 @@ class PanopticMapper:
         for prediction in predictions:
             instance = instances[prediction.frame_instance, prediction.class_id]
             self.counts.add(prediction.segment, prediction.class_id, instance)
+            self.class_scores.add(prediction.segment, prediction.class_id, prediction.score)
             self.seen_in[instance] = self.seen_in.get(instance, 0) | (1 << self.labelled_frames)
         self.labelled_frames += 1
 

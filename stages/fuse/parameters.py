@@ -89,6 +89,12 @@ class FuseParameters(Parameters):
         lt=1,
         description="Parts of a thing under this share of its largest part take the label of what surrounds them",
     )
+    piece_share: float = Field(
+        0.2,
+        ge=0,
+        lt=1,
+        description="Things under this share of one of their class that they touch are a part of it",
+    )
     part_distance: float = Field(
         0.2, gt=0, description="Parts of a thing farther than this from its largest part are left unlabelled [m]"
     )
@@ -104,7 +110,7 @@ def check(parameters: FuseParameters, inputs: Mapping[str, Any]) -> None:
 
 STAGE = Stage(
     name="fuse",
-    version=2,
+    version=3,
     summary="Integrate posed frames and their segments into one labelled map with a mesh per entity",
     parameters=FuseParameters,
     reads={"sequence": Sequence, "segments": Segments, "trajectory": Optionally(Trajectory)},

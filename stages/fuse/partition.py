@@ -29,8 +29,10 @@ class Grouping:
 
 SURE_VOTES = 3
 """From so many predictions on, the leading class of a segment is believed."""
-APART_WEIGHT = 2
-"""A frame that saw two things outweighs one that saw one: masks cover a neighbour more often than they split."""
+APART_WEIGHT = 1
+"""How much a frame that saw two things weighs beside one that saw one."""
+NAMED_SHARE = 0.2
+"""A thing is nameless only where the masks that did name it add up to less than this share of all scores."""
 NOTHING = (0, 0)
 LEAST_WEIGHT = 2
 """Groups merge from this summed weight on; a single frame decides nothing."""
@@ -108,10 +110,27 @@ def attach_unseen_pairs(groups: list[list[int]], evidence: PairEvidence, counts:
     return sorted(sorted(group) for group in merged.values())
 
 
+def leading_class(scores: Mapping[int, float], unnamed: int | None) -> int:
+    """Return the class with the largest sum of scores; ties to the smaller number. 0 where there is none.
+
+    A mask of the class `unnamed` has found a thing and not recognised it, which says nothing against those that have:
+    it leads only where the named ones hold less than NAMED_SHARE of the sum.
+    """
+    named = {c: s for c, s in scores.items() if c != unnamed}
+    if unnamed in scores and sum(named.values()) < NAMED_SHARE * sum(scores.values()):
+        return int(unnamed) if unnamed is not None else 0
+    return min(named, key=lambda c: (-named[c], c)) if named else 0
+
+
 def name_groups(
-    groups: Iterable[list[int]], counts: TripleCounts, things: frozenset[int], seen_in: Mapping[int, int]
+    groups: Iterable[list[int]],
+    counts: TripleCounts,
+    things: frozenset[int],
+    seen_in: Mapping[int, int],
+    scores: Mapping[int, Mapping[int, float]],
+    unnamed: int | None = None,
 ) -> Grouping:
-    """Give every group the class of things that most of its predictions say, and an instance label of its own.
+    """Give every group the class of things that the scores of its predictions say, and an instance label of its own.
 
     The label is the one with most predictions of that class in the group that no stronger group has, else a new one.
     """
@@ -121,15 +140,17 @@ def name_groups(
     unused = max([0, *seen_in, *(p for row in counts.by_segment.values() for _, p in row)]) + 1
     taken: set[int] = set()
     for group in sorted(groups, key=lambda g: (-_total(g, counts), g)):
-        per_class: dict[int, int] = {}
+        per_class: dict[int, float] = {}
         per_instance: dict[tuple[int, int], int] = {}
         for segment in group:
+            for class_id, score in scores[segment].items():
+                if class_id in things:
+                    per_class[class_id] = per_class.get(class_id, 0.0) + score
             for (class_id, instance), count in counts.by_segment[segment].items():
                 if class_id in things:
-                    per_class[class_id] = per_class.get(class_id, 0) + count
                     key = (class_id, instance)
                     per_instance[key] = per_instance.get(key, 0) + count
-        class_id = min(per_class, key=lambda c: (-per_class[c], c))
+        class_id = leading_class(per_class, unnamed)
         own = [p for c, p in sorted(per_instance, key=lambda k: (-per_instance[k], k)) if c == class_id]
         label = next((p for p in own if p not in taken), unused)
         unused = max(unused, label + 1)
@@ -152,8 +173,14 @@ def group_things(
     things: frozenset[int],
     seen_in: Mapping[int, int],
     minimum_votes: int = 1,
+    *,
+    scores: Mapping[int, Mapping[int, float]],
+    unnamed: int | None = None,
 ) -> Grouping:
     """Return the things of a map: the segments whose leading class is one of things, partitioned and named.
+
+    `scores`: by segment label and class the sum of the scores of all predictions (ClassScores); `unnamed`: the class
+    of things that were found and not recognised.
 
     Segments whose leading class is stuff stay what they are from `minimum_votes` predictions of it on, and are nothing
     below: all of a stuff class is one instance, so that a wall that was taken for a curtain here and there would add
@@ -164,11 +191,12 @@ def group_things(
     for segment, row in counts.by_segment.items():
         best = counts.best(segment)
         if best is not None and best[0] in things:
-            classes[segment] = best[0] if sum(row.values()) >= SURE_VOTES else 0
+            named = leading_class({c: s for c, s in scores[segment].items() if c in things}, unnamed)
+            classes[segment] = named if sum(row.values()) >= SURE_VOTES and named != unnamed else 0
         elif best is not None and sum(counts.instances(segment, best[0]).values()) < minimum_votes:
             doubtful.append(segment)
     groups = attach_unseen_pairs(group_segments(pair_weights(classes, evidence), classes), evidence, counts)
-    grouping = name_groups(groups, counts, things, seen_in)
+    grouping = name_groups(groups, counts, things, seen_in, scores, unnamed)
     grouping.best.update(dict.fromkeys(doubtful, NOTHING))
     return grouping
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
@@ -62,6 +64,36 @@ def absorb_specks(
     order = np.lexsort((-keys, votes))
     replacement[keys[order] // width] = (keys % width)[order]
     return np.where(small, replacement[part], labels)
+
+
+def absorb_pieces(labels: np.ndarray, faces: np.ndarray, class_of: Mapping[int, int], *, share: float) -> np.ndarray:
+    """Return labels (V,) in which small things have become part of a much larger one of their class that they touch.
+
+    `class_of` gives the class of every label that is a thing. A thing joins the one that most edges of triangles (F, 3)
+    lead to, of those of its class with more than 1 / `share` as many vertices; ties to the smaller label. Ours: a leg
+    that a mask missed in most frames and took for a chair of its own in the rest is no second chair.
+    """
+    result = labels.copy()
+    if not class_of or not len(faces):
+        return result
+    sizes = np.bincount(labels)
+    edges = np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
+    ends = labels[edges]
+    ends = ends[(ends[:, 0] != ends[:, 1]) & (ends > 0).all(axis=1)]
+    pairs, votes = np.unique(np.sort(ends, axis=1), axis=0, return_counts=True)
+    best: dict[int, tuple[int, int]] = {}
+    for (first, second), count in zip(pairs.tolist(), votes.tolist(), strict=True):
+        small, large = sorted((first, second), key=lambda label: (sizes[label], -label))
+        same = first in class_of and class_of[first] == class_of.get(second)
+        if same and sizes[small] < share * sizes[large] and (count, -large) > best.get(small, (0, 0)):
+            best[small] = (count, -large)
+    final: dict[int, int] = {}
+    for small in sorted(best, key=lambda label: (-sizes[label], label)):
+        target = -best[small][1]
+        # The larger ones come first, so that a chain ends at a label that stays.
+        final[small] = final.get(target, target)
+        result[labels == small] = final[small]
+    return result
 
 
 def spread_labels(

@@ -23,6 +23,9 @@ from stages.kit.formats.masks import PanopticReader
 from stages.kit.formats.trajectories import read_tum
 from stages.kit.stage import Context
 
+UNNAMED = "object"
+"""The class of things that masks found and did not recognise."""
+
 
 def run(
     sequence: Sequence,
@@ -61,13 +64,16 @@ def write_map(
         counts, seen_in, grouped = mapper.counts, mapper.seen_in, None
         fewest = min(parameters.minimum_observations, max(1, mapper.labelled_frames // 10))
         if parameters.merging == "ours":
-            things = group_things(mapper.counts, mapper.segment_evidence, mapper.things, mapper.seen_in, fewest)
+            things = group_things(
+                mapper.counts, mapper.segment_evidence, mapper.things, mapper.seen_in, fewest,
+                scores=mapper.class_scores.by_segment, unnamed=vocabulary.by_name(UNNAMED).id,
+            )  # fmt: skip
             counts, seen_in, grouped = things.counts, things.seen_in, things.best
         entities, labelled = extract_entities(
             surface, merged[surface.segment], counts, seen_in, mapper.sightings, mapper.things,
             minimum_share=parameters.minimum_prediction_share, minimum_voxels=parameters.minimum_entity_voxels,
             minimum_observations=fewest, speck_share=parameters.speck_share, part_distance=parameters.part_distance,
-            spread_steps=parameters.spread_steps, grouped=grouped,
+            spread_steps=parameters.spread_steps, piece_share=parameters.piece_share, grouped=grouped,
         )  # fmt: skip
     with context.progress.step("write the map"):
         file = EntitiesFile(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.fuse.extraction import confidence_of, extract_entities, face_labels, label_of_segments
-from stages.fuse.parts import absorb_specks, connected_parts, drop_far_parts, spread_labels
+from stages.fuse.parts import absorb_pieces, absorb_specks, connected_parts, drop_far_parts, spread_labels
 from stages.fuse.surface import Surface
 from tests.unit.fuse.test_association import CHAIR, TABLE, counted
 
@@ -135,3 +135,21 @@ def test_labels_spread_over_smooth_surface_and_not_round_a_corner() -> None:
     labels[-2:] = 9
     both = spread_labels(labels, vertices, faces, steps=20, minimum_cosine=0.95)
     assert both.tolist() == [7] * 10 + [0] * 2 + [9] * 10
+
+
+def test_a_piece_joins_the_much_larger_thing_of_its_class_that_it_touches() -> None:
+    _, faces = strip(30)
+    labels = np.array([1] * 40 + [2] * 6 + [3] * 14)
+    assert absorb_pieces(labels, faces, {1: CHAIR, 2: CHAIR, 3: CHAIR}, share=0.2).tolist() == [1] * 46 + [3] * 14
+    assert absorb_pieces(labels, faces, {1: CHAIR, 2: TABLE, 3: CHAIR}, share=0.2).tolist() == list(labels)
+    assert absorb_pieces(labels, faces, {1: CHAIR, 3: CHAIR}, share=0.2).tolist() == list(labels), "stuff joins nothing"
+    assert absorb_pieces(labels, faces, {1: CHAIR, 2: CHAIR, 3: CHAIR}, share=0.1).tolist() == list(labels)
+    apart = np.array([1] * 40 + [0] * 6 + [2] * 6 + [0] * 8)
+    assert absorb_pieces(apart, faces, {1: CHAIR, 2: CHAIR}, share=0.2).tolist() == list(apart)
+
+
+def test_pieces_of_pieces_end_at_the_whole() -> None:
+    _, faces = strip(40)
+    labels = np.array([1] * 60 + [2] * 11 + [3] * 2 + [0] * 7)
+    result = absorb_pieces(labels, faces, {1: CHAIR, 2: CHAIR, 3: CHAIR}, share=0.2)
+    assert result.tolist() == [1] * 73 + [0] * 7
