@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import cv2
 import numpy as np
 
 from stages.segment.claims import claim_small, claim_unlabelled
@@ -19,6 +20,12 @@ from stages.segment.overlaps import overlap_table
 from stages.segment.panoptic import PanopticFrame
 
 BACKGROUND = 0
+RIM = 2
+"""Ours: what a mask takes of a neighbour along its outline is this wide at most [pixels at 640 width]."""
+REACH_PER_SIZE = 0.5
+"""Ours: segments of an instance within this share of its size belong together, ..."""
+LONGEST_REACH = 0.2
+"""... up to this distance [m]: the foot of a lamp under its shade."""
 REACH_PER_DEPTH = 0.03
 """Ours: segments of an instance within this share of their depth belong together. Sampled points lie a hundredth of
 the depth apart, and depth noise grows on top of that: at three metres 5 cm tear a desk into pieces."""
@@ -100,8 +107,9 @@ def split_shared(
     """Return geometric labels (H, W) in which segments that several masks share are cut between them.
 
     A mask beside the strongest one leaves segment G_j when at least `minimum_pixels` of it lie in G_j and they are
-    `minimum_share` of G_j or half of the mask. This is ours, not the thesis's: two things that touch without a crease
-    (cushions of a sofa, doors of one cabinet front) otherwise become one, as neither mask is contained in the segment.
+    `minimum_share` of G_j or half of the mask, or no mere rim (`has_core`). This is ours, not the thesis's: two things
+    that touch without a crease (cushions of a sofa, doors of one cabinet front) otherwise become one, as neither mask
+    is contained in the segment, and a monitor's foot becomes desk.
     """
     table = overlap_table(geometric, panoptic)
     mask_pixels = table.sum(axis=0)
@@ -111,11 +119,26 @@ def split_shared(
         shared = table[j].copy()
         shared[0] = 0
         enough = (shared >= minimum_share * table[j].sum()) | (2 * shared >= mask_pixels)
-        for i in np.flatnonzero((shared >= minimum_pixels) & enough):
-            if i != int(np.argmax(shared)):
-                result[(geometric == j) & (panoptic == i)] = next_label
+        for i in np.flatnonzero(shared >= minimum_pixels):
+            if i == int(np.argmax(shared)):
+                continue
+            part = (geometric == j) & (panoptic == i)
+            if enough[i] or has_core(part, minimum_pixels):
+                result[part] = next_label
                 next_label += 1
     return result
+
+
+def has_core(region: np.ndarray, minimum_pixels: int) -> bool:
+    """Whether at least `minimum_pixels` of a region (H, W) bool are farther from its outline than masks err."""
+    rows, columns = np.flatnonzero(region.any(axis=1)), np.flatnonzero(region.any(axis=0))
+    width = 2 * max(1, round(RIM * region.shape[1] / 640)) + 1
+    if len(rows) < width or len(columns) < width:
+        return False
+    cut = region[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(np.uint8)
+    # Beyond the image and the cut there is nothing of the region.
+    core = cv2.erode(cut, np.ones((width, width), np.uint8), borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    return int(np.count_nonzero(core)) >= minimum_pixels
 
 
 def without_small(
@@ -156,6 +179,13 @@ def far_from_instance(
         clouds.append(points.reshape(-1, 3)[pixels[::step]])
     kept = largest_cluster(clouds, sizes, distance=distance)
     return [label for index, label in enumerate(segments) if index not in kept]
+
+
+def reach_of(points: np.ndarray) -> float:
+    """Return how far apart [m] segments of one instance with points (N, 3) [m] in the camera frame may lie."""
+    low, middle, high = np.quantile(points, [0.05, 0.5, 0.95], axis=0)
+    size = float(np.linalg.norm(high - low))
+    return max(REACH_PER_DEPTH * float(middle[2]), min(LONGEST_REACH, REACH_PER_SIZE * size))
 
 
 def fuse(
@@ -207,7 +237,7 @@ def fuse(
         parts = [int(label) for label in np.flatnonzero(owner == mask_id)]
         distance, step = settings.cluster_distance, settings.cluster_step
         if not thesis and parts:
-            distance = max(distance, REACH_PER_DEPTH * float(np.median(points[..., 2][np.isin(labels, parts)])))
+            distance = max(distance, reach_of(points[np.isin(labels, parts)]))
         owner[far_from_instance(labels, parts, points, distance=distance, step=step)] = BACKGROUND
     return _describe(labels, owner, panoptic)
 

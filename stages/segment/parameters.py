@@ -132,7 +132,7 @@ def _data_files(parameters: SegmentParameters) -> tuple[str, ...]:
 
 STAGE = Stage(
     name="segment",
-    version=2,
+    version=3,
     summary="Segment every frame: panoptic masks of a backend fused with geometric segments of the depth",
     parameters=SegmentParameters,
     reads={

@@ -16,8 +16,10 @@ from stages.segment.fusion import (
     FusionSettings,
     far_from_instance,
     fuse,
+    has_core,
     majority_labels,
     overlap_table,
+    reach_of,
     split_contained,
 )
 from stages.segment.panoptic import PanopticFrame, PanopticMask
@@ -223,3 +225,37 @@ def test_pixel_counts_follow_the_area_of_the_image() -> None:
     assert not fuse(geometric, nothing, points()[::2, ::2], THESIS).ids.any()
     larger = image((1, 100, 100, 130, 130))[::2, ::2]  # 900 become 225
     assert (fuse(larger, nothing, points()[::2, ::2], THESIS).ids > 0).sum() == 225
+
+
+def test_a_rim_has_no_core_and_a_patch_has() -> None:
+    assert not has_core(image((1, 100, 100, 104, 400)) == 1, 60)
+    assert has_core(image((1, 100, 100, 110, 140)) == 1, 60)
+    assert has_core(image((1, 100, 100, 110, 115)) == 1, 66) and not has_core(image((1, 100, 100, 110, 115)) == 1, 67)
+    assert has_core(image((1, 0, 0, 10, 40)) == 1, 60), "the edge of the image is an outline as any other"
+
+
+def test_the_foot_of_a_monitor_leaves_the_desk_and_a_rim_does_not() -> None:
+    """A part that is small beside both the desk and its mask is a thing's when it is no mere rim."""
+    desk = (1, 240, 0, 480, 640)
+    screen = (2, 40, 200, 200, 440)
+    geometric = image(desk, screen)
+    for foot, leaves in (((2, 260, 290, 275, 350), True), ((2, 240, 200, 243, 440), False)):
+        panoptic = PanopticFrame(image(desk, screen, foot), {1: OTHER, 2: THING})
+        found = by_category(fuse(geometric, panoptic, points(), OURS), 17)
+        assert found[foot[1] + 1, foot[2] + 20] == leaves, foot
+        assert not by_category(fuse(geometric, panoptic, points(), THESIS), 17)[foot[1] + 1, foot[2] + 20]
+
+
+def test_parts_may_lie_as_far_apart_as_the_thing_is_large() -> None:
+    small = np.array([[0.0, 0.0, 1.0], [0.05, 0.05, 1.0]])
+    assert reach_of(small) == pytest.approx(0.5 * 0.9 * np.hypot(0.05, 0.05))
+    assert reach_of(np.array([[-1.0, 0.0, 1.0], [1.0, 0.0, 1.0]])) == 0.2
+    assert reach_of(np.array([[0.0, 0.0, 8.0]])) == pytest.approx(0.24)
+
+
+def test_the_foot_of_a_lamp_stays_with_its_shade() -> None:
+    shade, foot = (1, 100, 270, 200, 370), (2, 240, 290, 270, 350)
+    geometric = image(shade, foot)
+    panoptic = PanopticFrame(np.where(geometric > 0, 1, 0).astype(np.int32), {1: THING})
+    assert by_category(fuse(geometric, panoptic, points(), OURS), 17)[255, 320]
+    assert not by_category(fuse(geometric, panoptic, points(), THESIS), 17)[255, 320]
