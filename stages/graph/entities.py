@@ -96,6 +96,7 @@ def load_entity(
             stray_distance=parameters.stray_distance,
             trim=parameters.box_trim if ours else 0.0,
             side_share=parameters.side_share if ours else None,
+            may_be_round=ours and entry.class_name in parameters.round_classes,
         )
     diagonal = float(np.linalg.norm(box.size))
     if diagonal < parameters.minimum_diagonal:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from schemas.scene_parts import Box
+from stages.graph.round_footprint import RoundFootprint, round_footprint
 from stages.kit.geometry.boxes import gravity_aligned_box, minimum_rectangle
 from stages.kit.geometry.point_clouds import without_strays
 
+Extent = tuple[float, float]
+"""Least and largest coordinate [m]."""
 QUARTER = np.pi / 2
 UPRIGHT_SLOPE = 0.35
 """A surface whose normal rises by less than this belongs to a side."""
@@ -54,24 +57,49 @@ def observed_box(
     stray_distance: float,
     trim: float,
     side_share: float | None,
+    may_be_round: bool = False,
 ) -> tuple[Box, np.ndarray]:
     """Return the gravity-aligned box of points (N, 3) [m] with unit normals (N, 3), and which points it was put around.
 
     Labels leak at object borders, onto what stands behind them and beside them. Small clusters that are cut off from
     the rest are left out (point_clouds.without_strays), and so is the share `trim` at both ends of every axis: a side
-    that was seen holds far more points than that. The yaw is that of the sides (`side_yaw`; None: not asked for),
-    else of the least rectangle, as the thesis has it (section 2.2.2).
+    that was seen holds far more points than that. A thing that `may_be_round` gets the box of its disc where its sides
+    say that it is. Else the yaw is that of the sides (`side_yaw`; None: not asked for), or of the least rectangle, as
+    the thesis has it (section 2.2.2).
     """
     kept = without_strays(points, stray_share, stray_distance)
     inside = points[kept]
+    bottom, top = trimmed_extent(inside[:, 2], trim / 2)
+    if may_be_round and (disc := round_footprint(inside, normals[kept])) is not None:
+        return box_over_disc(disc, inside, (bottom, top), trim), kept
     yaw = None if side_share is None else side_yaw(normals[kept], minimum_share=side_share)
     if yaw is None:
         _, _, yaw = minimum_rectangle(inside[:, :2])
-    cosine, sine = np.cos(yaw), np.sin(yaw)
-    left, right = trimmed_extent(inside[:, :2] @ np.array([cosine, sine]), trim)
-    front, back = trimmed_extent(inside[:, :2] @ np.array([-sine, cosine]), trim)
-    bottom, top = trimmed_extent(inside[:, 2], trim / 2)
-    middle = np.array([(left + right) / 2, (front + back) / 2])
-    center = np.array([[cosine, -sine], [sine, cosine]]) @ middle
-    box = gravity_aligned_box((*center, (bottom + top) / 2), (right - left, back - front, top - bottom), yaw)
-    return box, kept
+    along, across = axes_of(yaw)
+    sides = trimmed_extent(inside[:, :2] @ along, trim), trimmed_extent(inside[:, :2] @ across, trim)
+    return box_between(*sides, (bottom, top), yaw), kept
+
+
+def box_over_disc(disc: RoundFootprint, points: np.ndarray, height: Extent, trim: float) -> Box:
+    """Return the box of a round thing: as wide as its disc, turned and widened to where a handle among points (N, 3)
+    stands out. `height`: bottom and top [m]."""
+    yaw = disc.handle_yaw or 0.0
+    along, across = axes_of(yaw)
+    low, high = disc.center @ along - disc.radius, disc.center @ along + disc.radius
+    if disc.handle_yaw is not None:
+        high = max(high, trimmed_extent(points[:, :2] @ along, trim)[1])
+    middle = disc.center @ across
+    return box_between((low, high), (middle - disc.radius, middle + disc.radius), height, yaw)
+
+
+def axes_of(yaw: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ground directions (2,) along and across a yaw [rad]."""
+    return np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+
+
+def box_between(along: Extent, across: Extent, height: Extent, yaw: float) -> Box:
+    """Return the box with these extents [m] along the axes of a yaw [rad]."""
+    first, second = axes_of(yaw)
+    center = sum(along) / 2 * first + sum(across) / 2 * second
+    size = (along[1] - along[0], across[1] - across[0], height[1] - height[0])
+    return gravity_aligned_box((*center, sum(height) / 2), size, yaw)

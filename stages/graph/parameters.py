@@ -41,13 +41,17 @@ class GraphParameters(Parameters):
         0.05, ge=0.0, lt=1.0, description="Clusters with a smaller share of an entity's points are left out of its box"
     )
     box_trim: float = Field(
-        0.02, ge=0.0, lt=0.25, description="ours: share of the points left out at both ends of a box's axes"
+        0.01, ge=0.0, lt=0.25, description="ours: share of the points left out at both ends of a box's axes"
     )
     side_share: float = Field(
         0.5,
         gt=0.0,
         le=1.0,
         description="ours: a box turns with its sides where this share of them agrees modulo 90 degrees",
+    )
+    round_classes: tuple[str, ...] = Field(
+        ("bottle", "bowl", "cup", "vase", "lamp", "bin", "plant"),
+        description="ours: classes of which the normals of the sides may say that they are round",
     )
     stray_distance: float = Field(0.1, gt=0.0, description="Gap that separates clusters [m]")
     maximum_sinking: float = Field(
@@ -82,7 +86,7 @@ class GraphParameters(Parameters):
 
 STAGE = Stage(
     name="graph",
-    version=2,
+    version=3,
     summary="Build the contact graph (who supports, contains, carries whom) from a panoptic map",
     parameters=GraphParameters,
     reads={"panoptic_map": PanopticMap},
