@@ -53,6 +53,17 @@ def test_a_blank_wall_is_uncertain() -> None:
     np.testing.assert_allclose(found.target_from_source, np.eye(4), atol=1e-6)
 
 
+@pytest.mark.parametrize("z", [0.4, 1.5, 4.0])
+def test_a_wall_is_known_as_well_as_noise_and_systematic_error_allow(z: float) -> None:
+    depth = np.full((CAMERA.height, CAMERA.width), z, dtype=np.float32)
+    wall = build_pyramid(depth, None, CAMERA, width=160, levels=3, maximum_depth=4.5)
+    points = np.count_nonzero(wall.levels[0].normals[::2, ::2, 2])
+    variance = (0.0012 + 0.0019 * (z - 0.4) ** 2) ** 2 + (0.005 * z) ** 2
+    known = judge(wall, wall, np.eye(4)).information
+    assert known[5, 5] == pytest.approx(0.01 * points / variance, rel=1e-3)
+    assert np.abs(known[:, 3:5]).max() < 1e-6 * known[5, 5]
+
+
 def test_black_holes_of_registered_colour_are_no_edges() -> None:
     image, depth = render(TARGET)
     image[40:60, 50:70] = 0
