@@ -105,13 +105,17 @@ bench-poses: setup ## Estimated camera paths: error, speed, effect on the map (Q
 bench-mapping: setup ## The panoptic map beside the thesis and Voxblox++, tables 2.1 to 2.4 (QUICK=1: three rooms)
 	$(PYTHON) -m benchmarks.mapping $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-mapping$(if $(QUICK),-quick)
 
-.PHONY: mosd train-pairs
+.PHONY: mosd train-pairs pair-rules
 mosd: setup ## Objects of real tabletop frames against their labels (QUICK=1: every fifth frame; REAL_DATA=folder)
 	$(PYTHON) -m benchmarks.tables.mosd $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/mosd$(if $(QUICK),-quick)
 
 # About a quarter of an hour on one core; stands in data/networks/tabletop_pairs.safetensors.
 train-pairs: setup ## Train the trees of `segment --backend objects` anew (QUICK=1: few generated frames)
 	$(PYTHON) -m benchmarks.training.tabletop_pairs $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/train-pairs$(if $(QUICK),-quick)
+
+# About ten minutes on one core; prints what stands in stages/segment/objects/rules.py.
+pair-rules: setup ## Fit the rules of `segment --backend objects` anew (QUICK=1: few generated frames)
+	$(PYTHON) -m benchmarks.training.pair_rules $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/pair-rules$(if $(QUICK),-quick)
 
 bench: setup ## Speed beside named peers, medians (QUICK=1: fewer runs)
 	$(PYTHON) -m benchmarks.speed.fusion $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-fusion
