@@ -2,7 +2,7 @@
 
     python -m benchmarks.tables.mosd --data FOLDER --out FOLDER [--quick]
 
-Arms: `plain` (convex segments, one merging pass), `geometric` (patches over the table, geometry and colour, hand-set
+Arms: `plain` (convex segments, one merging pass), `geometric` (patches over the table, geometry and colour, a table of
 rules), `ours` (the same patches, trained trees). Cases: `learn`, on which constants were set and trees trained, and
 `test`. Measures: stages/kit/measurement/object_masks.py; objects are label // 10 from 2 up, parts the raw labels.
 Writes metrics.json, table.md and frames.png, the worst and the best frames.
@@ -206,8 +206,8 @@ def table_of(results: dict[str, dict[str, list[FrameResult]]]) -> str:
         lines.append("")
     load = os.getloadavg()[0]
     lines += [
-        "Means over frames; intervals are percentile bootstraps over frames. `learn` tuned `geometric` and trained "
-        f"`ours`, `test` did neither. frames/s: 1 / median wall time of a frame; {os.cpu_count()} processors "
+        "Means over frames; intervals are percentile bootstraps over frames. `learn` helped to fit `geometric` and to "
+        f"train `ours`, `test` did neither. frames/s: 1 / median wall time of a frame; {os.cpu_count()} processors "
         f"({platform.machine()}), load {load:.1f} at the end.",
         "",
     ]

@@ -1,4 +1,4 @@
-"""Fit the table of rules that tells backend `objects --objects rules` which patches are one object.
+"""Fit the table of rules by which `segment --backend objects --grouping rules` tells which patches are one object.
 
     python -m benchmarks.training.pair_rules --data FOLDER --out FOLDER [--quick]
 
