@@ -23,6 +23,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -191,10 +192,10 @@ def segment_parts(frames: list[CorridorFrame]) -> dict[str, float]:
 
 
 def listing_memory(frames: list[CorridorFrame], count: int) -> dict[str, float]:
-    """Return what the list of segments of a log of `count` frames takes once `fuse` has read it [MB]: the one thing
-    that it holds of every frame."""
+    """Return what the list of segments of a log of `count` frames takes once `fuse` has read it, and while it reads,
+    before there is a map [MB]: the one thing that it holds of every frame."""
     from schemas.segments import FrameSegments, SegmentsFile
-    from stages.fuse.inputs import listings
+    from stages.fuse.listings import Listings
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "segments.json"
@@ -205,10 +206,18 @@ def listing_memory(frames: list[CorridorFrame], count: int) -> dict[str, float]:
             for k, entry in enumerate(entries):
                 file.write(("," if k else "") + entry.model_dump_json())
             file.write("]}")
-        before = memory("VmRSS")
-        listed = listings(SegmentsFile.read(path))
-        segments = sum(len(entry) for entry in listed.values())
-        return {"frames": float(count), "segments": float(segments), "memory_mb": memory("VmRSS") - before}
+        tracemalloc.start()
+        listed = Listings(SegmentsFile.read(path))
+        kept, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        segments = sum(len(listed.get(k) or ()) for k in range(count))
+        megabyte = 2.0**20
+        return {
+            "frames": float(count),
+            "segments": float(segments),
+            "memory_mb": kept / megabyte,
+            "peak_mb": peak / megabyte,
+        }
 
 
 def worker(arm: str, case: str, folder: Path, quick: bool) -> list[dict[str, float]]:
@@ -288,8 +297,11 @@ def as_tables(results: dict[tuple[str, str], list[dict[str, float]]]) -> list[Ta
     listing = results.get(("listing", "640x480"))
     if listing:
         row = listing[0]
-        cells = (int(row["frames"]), int(row["segments"]), row["memory_mb"], 1024 * row["memory_mb"] / row["frames"])
-        names = ("frames", "segments", "MB", "kB a frame")
+        cells = (
+            int(row["frames"]), int(row["segments"]), row["memory_mb"], 1024 * row["memory_mb"] / row["frames"],
+            row["peak_mb"],
+        )  # fmt: skip
+        names = ("frames", "segments", "MB", "kB a frame", "MB while it is read")
         tables.append(Table("listing", "What fuse holds of every frame: the list of its segments", names, (cells,)))
     return tables
 

@@ -15,6 +15,10 @@ class ClassScores:
         row = self.by_segment.setdefault(segment, {})
         row[class_id] = row.get(class_id, 0.0) + score
 
+    def forget(self, segment: int) -> None:
+        """Drop all sums of a segment label."""
+        self.by_segment.pop(segment, None)
+
     def merge_segments(self, removed: int, kept: int) -> None:
         """Move all sums of segment label `removed` to `kept`."""
         for class_id, score in self.by_segment.pop(removed, {}).items():

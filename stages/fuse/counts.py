@@ -78,6 +78,18 @@ class TripleCounts:
             del self._totals[key]
             self._instances[class_id].discard(removed)
 
+    def forget(self, segment: int) -> None:
+        """Drop all counts of a segment label."""
+        for key, count in self.by_segment.pop(segment, {}).items():
+            class_id, instance = key
+            self._segments[key].discard(segment)
+            self._totals[key] -= count
+            if not self._segments[key]:
+                del self._segments[key], self._totals[key]
+                self._classes[instance].discard(class_id)
+                self._instances[class_id].discard(instance)
+        self._changed.discard(segment)
+
     def best(self, segment: int) -> tuple[int, int] | None:
         """Return (c, p) of a segment label, or None when nothing was counted (eq. 2.6).
 

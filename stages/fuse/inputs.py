@@ -6,7 +6,7 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
-from schemas.segments import FrameSegment, Segments, SegmentsFile
+from schemas.segments import Segments, SegmentsFile
 from schemas.sequence import Sequence
 from schemas.vocabulary import Vocabulary
 
@@ -55,11 +55,6 @@ def check_origin(sequence: Sequence, segments: Segments) -> None:
             f"this one ({sequence.manifest.content_digest[:12]})",
             hint="run `scenewright segment` on this sequence",
         )
-
-
-def listings(segments: SegmentsFile) -> dict[int, tuple[FrameSegment, ...]]:
-    """Return frame index -> its segments."""
-    return {frame.frame: frame.segments for frame in segments.frames}
 
 
 def poses_at(times: np.ndarray, pose_times: np.ndarray, poses: np.ndarray, tolerance: float) -> list[np.ndarray | None]:

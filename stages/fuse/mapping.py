@@ -36,6 +36,10 @@ from stages.fuse.separate import SeparateCounts, associate_separately
 from stages.fuse.voxel_blocks import COORDINATE_LIMIT, SIDE, VoxelBlocks
 
 
+FIRST_FORGETTING = 4000
+"""Segment labels from which on those without a voxel are looked for, each time that their number has doubled."""
+
+
 class PanopticMapper:
     """Voxel blocks, segment labels, the triple-wise count and what was seen of every instance.
 
@@ -62,6 +66,7 @@ class PanopticMapper:
         self.segment_merges = 0
         self.instance_merges = 0
         self._next_instance = 1
+        self._labels_to_forget_at = FIRST_FORGETTING
 
     @property
     def truncation_distance(self) -> float:
@@ -109,6 +114,9 @@ class PanopticMapper:
         self.frames_integrated += 1
         if self.frames_integrated % options.regularize_every == 0:
             self.regularize()
+        if len(self.sightings) >= self._labels_to_forget_at and options.merging == "ours":
+            self._forget_lost_labels()
+            self._labels_to_forget_at = max(FIRST_FORGETTING, 2 * len(self.sightings))
 
     def regularize(self) -> None:
         """Merge instance labels that are one instance (eq. 2.5; in `ours` also all of a stuff class, and those that
@@ -130,6 +138,23 @@ class PanopticMapper:
         for removed, kept in done + by_count:
             self.seen_in[kept] = self.seen_in.get(kept, 0) | self.seen_in.pop(removed, 0)
             self.instance_merges += 1
+
+    def _forget_lost_labels(self) -> None:
+        """Drop what was counted for segment labels that hold no voxel any more.
+
+        No frame can be matched to such a label again, and a camera that stands still makes some in every frame: what is
+        kept would follow the log and not the map.
+        """
+        table = self.labels.table()
+        alive = np.zeros(len(table), dtype=bool)
+        alive[self.blocks.segment[: self.blocks.count].ravel()] = True
+        roots = set(table[alive].tolist())
+        for label in [label for label in self.sightings if label not in roots]:
+            del self.sightings[label]
+            self.counts.forget(label)
+            self.class_scores.forget(label)
+            self.shared.forget(label)
+            self.segment_evidence.forget(label)
 
     def _associate(
         self,

@@ -81,6 +81,14 @@ class PairEvidence:
         self._open = {pair for pair in self._open if self._is_due(pair, minimum_frames, contested)}
         return sorted(self._open)
 
+    def forget(self, label: int) -> None:
+        """Drop all counts of a label."""
+        for pair in self._pairs.pop(label, ()):
+            self._pairs[pair[0] if pair[1] == label else pair[1]].discard(pair)
+            self._open.discard(pair)
+            self.together.pop(pair, None)
+            self.apart.pop(pair, None)
+
     def rename(self, removed: int, kept: int) -> None:
         """Move the counts of label `removed` to `kept`."""
         for pair in sorted(self._pairs.pop(removed, ())):

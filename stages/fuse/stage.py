@@ -11,7 +11,8 @@ from schemas.sequence import Sequence
 from schemas.trajectory import Trajectory
 from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.fuse.extraction import extract_entities
-from stages.fuse.inputs import check_origin, check_segments, listings, poses_at
+from stages.fuse.inputs import check_origin, check_segments, poses_at
+from stages.fuse.listings import Listings
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.partition import group_things
@@ -42,10 +43,9 @@ def run(
     """
     check_origin(sequence, segments)
     vocabulary = load_vocabulary()
-    info = segments.info
     with context.progress.step("integrate frames"):
-        mapper, skipped = _integrate_frames(sequence, segments, trajectory, vocabulary, parameters, context)
-    return write_map(mapper, vocabulary, info.label, skipped, context)
+        mapper, skipped, label = _integrate_frames(sequence, segments, trajectory, vocabulary, parameters, context)
+    return write_map(mapper, vocabulary, label, skipped, context)
 
 
 def write_map(
@@ -105,14 +105,16 @@ def _integrate_frames(
     vocabulary: Vocabulary,
     parameters: FuseParameters,
     context: Context,
-) -> tuple[PanopticMapper, Counter[str]]:
-    """Return the map of all frames, and how many frames were skipped by reason."""
+) -> tuple[PanopticMapper, Counter[str], str]:
+    """Return the map of all frames, how many frames were skipped by reason, and whose masks these are."""
     things = frozenset(entry.id for entry in vocabulary.classes if entry.kind == "thing")
     skipped: Counter[str] = Counter()
     require_depth(sequence)
     with FrameReader(sequence.path("frames.mcap")) as reader, PanopticReader(segments.path("panoptic.zip")) as masks:
-        check_segments(segments.info, reader.camera, len(reader), vocabulary)
-        listed = listings(segments.info)
+        info = segments.info
+        check_segments(info, reader.camera, len(reader), vocabulary)
+        listed, label = Listings(info), info.label
+        del info  # the parsed file goes before the map grows
         poses = None
         if trajectory is not None:
             poses = poses_at(reader.times, *read_tum(trajectory.path("trajectory.tum")), parameters.pose_tolerance)
@@ -130,4 +132,4 @@ def _integrate_frames(
                 ids = None if listing is None else masks.read(frame.index)
                 camera = reader.cameras[frame.camera_name]
                 mapper.add_frame(camera, frame.depth, frame.color, pose, ids, listing or ())
-    return mapper, skipped
+    return mapper, skipped, label

@@ -1,0 +1,41 @@
+"""What the segments of every frame are, in a few bytes each: the whole log's stay in memory while the map is built."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.segments import FrameSegment, SegmentsFile
+
+
+class Listings:
+    """The segments of all frames as one table. Parsed records take thirty times as much, and would grow with the log
+    beside a map that does not."""
+
+    def __init__(self, segments: SegmentsFile) -> None:
+        entries = [segment for frame in segments.frames for segment in frame.segments]
+        self._ids = np.array([(s.id, s.category_id, s.instance, s.area) for s in entries], dtype=np.int32)
+        self._ids = self._ids.reshape(-1, 4)
+        self._is_thing = np.array([s.is_thing for s in entries], dtype=bool)
+        self._score = np.array([s.score for s in entries], dtype=np.float64)
+        ends = np.cumsum([len(frame.segments) for frame in segments.frames], dtype=np.int64)
+        starts = np.concatenate([[0], ends[:-1]]) if len(ends) else ends
+        self._rows = {
+            frame.frame: (int(start), int(end)) for frame, start, end in zip(segments.frames, starts, ends, strict=True)
+        }
+
+    def get(self, frame: int) -> tuple[FrameSegment, ...] | None:
+        """Return the segments of a frame, None for one that is not listed."""
+        if frame not in self._rows:
+            return None
+        start, end = self._rows[frame]
+        return tuple(
+            FrameSegment(
+                id=identifier,
+                category_id=category,
+                instance=instance,
+                is_thing=bool(self._is_thing[row]),
+                score=float(self._score[row]),
+                area=area,
+            )
+            for row, (identifier, category, instance, area) in enumerate(self._ids[start:end].tolist(), start=start)
+        )
