@@ -113,7 +113,7 @@ mosd: setup ## Objects of real tabletop frames against their labels (QUICK=1: ev
 train-pairs: setup ## Train the trees of `segment --backend objects` anew (QUICK=1: few generated frames)
 	$(PYTHON) -m benchmarks.training.tabletop_pairs $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/train-pairs$(if $(QUICK),-quick)
 
-# About ten minutes on one core; prints what stands in stages/segment/objects/rules.py.
+# About a quarter of an hour on one core; prints what stands in stages/segment/objects/rules.py.
 pair-rules: setup ## Fit the rules of `segment --backend objects` anew (QUICK=1: few generated frames)
 	$(PYTHON) -m benchmarks.training.pair_rules $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/pair-rules$(if $(QUICK),-quick)
 
