@@ -45,6 +45,7 @@ def run(sequence: Sequence, *, parameters: PosesParameters, context: Context) ->
     with FrameReader(sequence.path("frames.mcap")) as reader:
         camera_name, frames = main_camera(reader, sequence)
         check_streams(reader, sequence, parameters)
+        check_world(reader, frames, sequence, parameters)
         work = _structure if parameters.method == "sfm" else _dense
         result = work(reader, frames, camera_name, parameters, context)
         return _finish(reader, camera_name, result, parameters, context)
@@ -70,6 +71,12 @@ def check_streams(reader: FrameReader, sequence: Sequence, parameters: PosesPara
         raise BadInput(
             f"{sequence.root}: {needs} needs colour and its frames have none", hint="use --method rgbd alone"
         )
+
+
+def check_world(reader: FrameReader, frames: list[int], sequence: Sequence, parameters: PosesParameters) -> None:
+    """Raise BadInput, before any work, when the world of a sequence without poses is asked for."""
+    if parameters.world == "sequence" and all(reader.read(k, ()).world_from_camera is None for k in frames):
+        raise BadInput(f"{sequence.root}: none of its frames has a pose in the sequence", hint="--world upright")
 
 
 def _dense(
