@@ -15,7 +15,7 @@ from benchmarks.mapping.arms import DRIFTING, LEVELS, NETWORK, SHOWN, all_arms
 from benchmarks.mapping.experiment import Outcome, run_room
 from benchmarks.mapping.figures_of_merit import MEASURES
 from benchmarks.mapping.records import read_outcomes, write_outcomes
-from benchmarks.mapping.rooms import CLUTTER, REPORTING, TUNING, make_room
+from benchmarks.mapping.rooms import CLUTTER, REPORTING, TUNING, TUNING_UNTRAINED, make_room
 from benchmarks.mapping.tables import (
     Results,
     by_room,
@@ -39,6 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--quick", action="store_true", help=f"{QUICK_ROOMS} rooms of {QUICK_FRAMES} frames")
     parser.add_argument("--tuning", action="store_true", help="the tuning rooms instead of those for reporting")
+    parser.add_argument("--untrained", action="store_true", help="with --tuning: rooms our own network never saw")
     parser.add_argument("--voxel-size", type=float, default=0.02, help="of all arms [m] (the publications: 0.01)")
     parser.add_argument("--jobs", type=int, default=min(2, os.cpu_count() or 1))
     parser.add_argument("--arms", default="", help="comma-separated; default: all")
@@ -50,7 +51,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     if options.room:
         return one_room(options, cases, frames)
-    rooms = (TUNING if options.tuning else REPORTING)[: QUICK_ROOMS if options.quick else None]
+    tuning = TUNING_UNTRAINED if options.untrained else TUNING
+    rooms = (tuning if options.tuning else REPORTING)[: QUICK_ROOMS if options.quick else None]
     make_room(options.out / "rooms", *rooms[0], frames)  # the library is shared: make it before rooms run beside it
     with ThreadPoolExecutor(options.jobs) as pool:
         codes = list(pool.map(lambda room: _room_process(options, cases, room), rooms))

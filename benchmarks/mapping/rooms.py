@@ -14,6 +14,8 @@ TUNING = (
     *(("room", seed) for seed in (40, 41)),
 )
 """Looked at while methods and constants were chosen (seeds of the recipes' tuning range)."""
+TUNING_UNTRAINED = tuple((recipe, seed) for seed in (2000, 2001) for recipe in ("kitchen", "office", "bedroom", "room"))
+"""Looked at as well, where the masks of our own network matter: it was trained on rooms of the seeds of TUNING."""
 REPORTING = tuple((recipe, seed) for seed in range(1000, 1005) for recipe in ("kitchen", "office", "bedroom", "room"))
 """For figures alone (seeds of the recipes' reporting range)."""
 CLUTTER = "high"
