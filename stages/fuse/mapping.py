@@ -35,7 +35,6 @@ from stages.fuse.regularization import (
 from stages.fuse.separate import SeparateCounts, associate_separately
 from stages.fuse.voxel_blocks import COORDINATE_LIMIT, SIDE, VoxelBlocks
 
-
 FIRST_FORGETTING = 4000
 """Segment labels from which on those without a voxel are looked for, each time that their number has doubled."""
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import reduce
 from heapq import heapify, heappop, heappush
+from operator import or_
 
 from stages.fuse.counts import TripleCounts
 from stages.fuse.regularization import PairEvidence
@@ -133,38 +135,51 @@ def name_groups(
     """Give every group the class of things that the scores of its predictions say, and an instance label of its own.
 
     The label is the one with most predictions of that class in the group that no stronger group has, else a new one.
+    A group was seen in the frames that called it what it is called now: names that came up once are mostly wrong.
     """
-    regrouped = TripleCounts()
     best: dict[int, tuple[int, int]] = {}
     seen = dict(seen_in)
     unused = max([0, *seen_in, *(p for row in counts.by_segment.values() for _, p in row)]) + 1
     taken: set[int] = set()
     for group in sorted(groups, key=lambda g: (-_total(g, counts), g)):
-        per_class: dict[int, float] = {}
-        per_instance: dict[tuple[int, int], int] = {}
-        for segment in group:
-            for class_id, score in scores[segment].items():
-                if class_id in things:
-                    per_class[class_id] = per_class.get(class_id, 0.0) + score
-            for (class_id, instance), count in counts.by_segment[segment].items():
-                if class_id in things:
-                    key = (class_id, instance)
-                    per_instance[key] = per_instance.get(key, 0) + count
-        class_id = leading_class(per_class, unnamed)
-        own = [p for c, p in sorted(per_instance, key=lambda k: (-per_instance[k], k)) if c == class_id]
+        class_id = leading_class(_scores_of(group, scores, things), unnamed)
+        predictions = _predictions_of(group, counts, things)
+        own = [p for c, p in sorted(predictions, key=lambda k: (-predictions[k], k)) if c == class_id]
         label = next((p for p in own if p not in taken), unused)
         unused = max(unused, label + 1)
         taken.add(label)
-        bits = 0
-        for p in own:
-            bits |= seen_in.get(p, 0)
-        seen[label] = bits
-        for segment in group:
-            best[segment] = (class_id, label)
+        seen[label] = reduce(or_, (seen_in.get(p, 0) for p in own), 0)
+        best.update(dict.fromkeys(group, (class_id, label)))
+    return Grouping(_with_labels(counts, best), best, seen)
+
+
+def _scores_of(
+    group: Iterable[int], scores: Mapping[int, Mapping[int, float]], things: frozenset[int]
+) -> dict[int, float]:
+    result: dict[int, float] = {}
+    for segment in group:
+        for class_id, score in scores[segment].items():
+            if class_id in things:
+                result[class_id] = result.get(class_id, 0.0) + score
+    return result
+
+
+def _predictions_of(group: Iterable[int], counts: TripleCounts, things: frozenset[int]) -> dict[tuple[int, int], int]:
+    result: dict[tuple[int, int], int] = {}
+    for segment in group:
+        for (class_id, instance), count in counts.by_segment[segment].items():
+            if class_id in things:
+                result[class_id, instance] = result.get((class_id, instance), 0) + count
+    return result
+
+
+def _with_labels(counts: TripleCounts, best: Mapping[int, tuple[int, int]]) -> TripleCounts:
+    """The counts with the instance label of its group on every segment that has one."""
+    result = TripleCounts()
     for segment, row in counts.by_segment.items():
-        for (c, p), count in row.items():
-            regrouped.add(segment, c, best[segment][1] if segment in best else p, count)
-    return Grouping(regrouped, best, seen)
+        for (class_id, instance), count in row.items():
+            result.add(segment, class_id, best[segment][1] if segment in best else instance, count)
+    return result
 
 
 def group_things(
