@@ -42,4 +42,12 @@ def build_application() -> Callable[..., Any]:
             group_application.command()(function)
         application.add_typer(group_application, name=name, rich_help_panel=help_panel)
     application.callback()(housekeeping.root)
-    return typer.main.get_command(application)
+    table = typer.main.get_command(application)
+
+    def entry(args: list[str], **settings: Any) -> Any:
+        """`urdf` is a step by itself, so that `urdf check` cannot be a group below it."""
+        if args[:2] == ["urdf", "check"]:
+            args = ["urdf-check", *args[2:]]
+        return table(args=args, **settings)
+
+    return entry

@@ -15,6 +15,7 @@ from cli.collection_command import gc
 from cli.comparison_command import diff
 from cli.inspect_command import inspect
 from cli.serve_command import serve
+from cli.urdf_check_command import urdf_check
 from schemas.errors import BadInput, UsageError
 
 Paths = Annotated[list[Path], typer.Argument(help="Artifact folders.")]
@@ -244,6 +245,7 @@ COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (view, "Artifacts"),
     (inspect, "Artifacts"),
     (verify, "Artifacts"),
+    (urdf_check, "Artifacts"),
     (migrate, "Artifacts"),
     (diff, "Artifacts"),
     (gc, "Artifacts"),
