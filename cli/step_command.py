@@ -15,6 +15,7 @@ import typer
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from schemas.errors import UsageError
 from stages.kit.progress import progress_for
 from stages.kit.running.configuration import parameters_for, read_config
 from stages.kit.running.memory_limit import parse_limit
@@ -81,8 +82,12 @@ def _input_options(stage: Stage) -> list[inspect.Parameter]:
         what = declared.what if isinstance(declared, Optionally) else declared
         text = what.description if isinstance(what, External) else f"Artifact {what.kind}: {what.description}"
         flag = "--" + role.replace("_", "-")
+        optional = optional or role == stage.argument
         annotation = Optional[Path] if optional else Path  # noqa: UP045
         default = None if optional else ...
+        if role == stage.argument:
+            argument = typer.Argument(None, metavar=role.upper(), help=text, show_default=False)
+            options.append(_parameter("argument", annotation, argument))
         options.append(
             _parameter(f"input_{role}", annotation, typer.Option(default, flag, help=text, rich_help_panel="Inputs"))
         )
@@ -180,6 +185,10 @@ def make_command(stage: Stage) -> Callable[..., int]:
         flags = {name: options[f"parameter_{name}"] for name in stage.parameters.model_fields}
         flags = {name: value for name, value in flags.items() if value not in (None, [])}
         parameters = parameters_for(stage, flags, config, str(options["config"]))
+        if options.get("argument") is not None:
+            if options[f"input_{stage.argument}"] is not None:
+                raise UsageError(f"{stage.name}: {stage.argument} is given twice", hint="see --help")
+            options[f"input_{stage.argument}"] = options["argument"]
         inputs = {role: path for role in stage.reads if (path := options[f"input_{role}"]) is not None}
         result = run_stage(
             stage,

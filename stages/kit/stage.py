@@ -99,6 +99,8 @@ class Stage:
     libraries: tuple[str, ...] = ("numpy",)
     module: str = "stage"
     example: str = ""
+    argument: str = ""
+    """Role that may also be given as the command's one argument (`library add FOLDER`)."""
     data_files: Callable[[Any], tuple[str, ...]] | None = None
     """Parameters -> files of `data/` that the step reads; their content is part of the key. The class vocabulary
     always is."""

@@ -25,7 +25,7 @@ def describe(design: Design, model_id: str, movable: bool) -> CadModel:
         class_name=design.class_name,
         articulated=bool(joints),
         mass=round(sum(part.properties.mass for part in part_geometries(design)), 6),
-        states=tuple(_state(design, values) for values in _joint_values(joints)),
+        states=tuple(_state(design, values) for values in joint_values(joints)),
         joints=joints,
         movable=movable,
         contains=design.contains,
@@ -49,14 +49,18 @@ def part_geometries(design: Design) -> list[PartGeometry]:
     return parts
 
 
-def _joint_values(joints: tuple[Joint, ...]) -> list[dict[str, float]]:
-    """Return closed; every joint alone half and fully open; all fully open."""
+def joint_values(joints: tuple[Joint, ...], opened: tuple[Joint, ...] | None = None) -> list[dict[str, float]]:
+    """Return closed; every joint alone half and fully open; all fully open.
+
+    With `opened` only those joints open, the others stay closed (the knobs of an oven change none of its shape).
+    """
     closed = {joint.name: 0.0 for joint in joints}
     values = [closed]
+    joints = joints if opened is None else opened
     for joint in joints:
         values += [{**closed, joint.name: round(share * joint.upper, 6)} for share in (0.5, 1.0)]
     if len(joints) > 1:
-        values.append({joint.name: joint.upper for joint in joints})
+        values.append({**closed, **{joint.name: joint.upper for joint in joints}})
     return values
 
 

@@ -1,11 +1,13 @@
-"""Declaration of the step `library build`."""
+"""Declarations of the steps `library build` and `library add`."""
 
 from __future__ import annotations
+
+from typing import Literal
 
 from pydantic import Field
 
 from schemas.cad_library import CadLibrary
-from stages.kit.stage import Parameters, Stage
+from stages.kit.stage import External, Optionally, Parameters, Stage
 
 
 class LibraryParameters(Parameters):
@@ -16,7 +18,32 @@ class LibraryParameters(Parameters):
     classes: tuple[str, ...] = Field((), description="Class names to build; all when empty")
 
 
-STAGE = Stage(
+class AdditionParameters(Parameters):
+    """Options of `library add`."""
+
+    class_name: str = Field("", description="Class of all models; without it the names of models and folders tell")
+    unknown: Literal["skip", "object"] = Field("skip", description="What becomes of models whose class nothing tells")
+    unit: Literal["declared", "m", "dm", "cm", "mm", "inch", "foot"] = Field(
+        "declared", description="Unit of the files, whatever they declare"
+    )
+    up: Literal["declared", "+x", "-x", "+y", "-y", "+z", "-z"] = Field(
+        "declared", description="Axis of the files that points up, whatever they declare"
+    )
+    front: Literal["declared", "+x", "-x", "+y", "-y", "+z", "-z"] = Field(
+        "declared", description="Axis of the files that points to the front, whatever they declare"
+    )
+    collision: Literal["given", "visual"] = Field(
+        "given", description="Take collision shapes from those of the file where it has some, or from what is drawn"
+    )
+    decomposition: Literal["auto", "coacd", "hulls"] = Field(
+        "auto", description="Cut hollow pieces up with CoACD, or fill them by their hulls; auto: CoACD where installed"
+    )
+    density: float = Field(
+        250.0, gt=0, le=20000, description="Density of models without a mass, over their collision pieces [kg/m^3]"
+    )
+
+
+BUILD = Stage(
     name="library build",
     version=1,
     summary="Make a CAD library of parametric furniture, articulated, with collision shapes and masses",
@@ -26,3 +53,24 @@ STAGE = Stage(
     libraries=("numpy", "scipy", "shapely", "trimesh"),
     example="scenewright library build --out outputs/demo/cad_library --seed 0",
 )
+
+ADD = Stage(
+    name="library add",
+    version=1,
+    summary="Import models of other people into a CAD library: URDF, MJCF, SDF, meshes, PartNet, ShapeNetSem",
+    parameters=AdditionParameters,
+    reads={
+        "models": External("folder of models to import"),
+        "library": Optionally(CadLibrary),
+        "mapping": Optionally(External("TOML file: class, unit, up and front of single models by name")),
+    },
+    writes=CadLibrary,
+    libraries=("numpy", "scipy", "shapely", "trimesh", "opencv-python-headless"),
+    module="addition",
+    argument="models",
+    example="scenewright library add furniture/ --out outputs/imported",
+    data_files=lambda parameters: ("imported_models.toml", "labels/words.toml"),
+    versions="importing.versions",
+)
+
+STAGES = (BUILD, ADD)

@@ -14,6 +14,7 @@ import re
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import trimesh
@@ -45,24 +46,56 @@ def read_mesh(path: Path, *, may_be_empty: bool = False, hint: str = "make the a
         raise BadInput(f"{path}: file is missing", hint=hint) from None
     except (OSError, ValueError) as error:
         raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}", hint=hint) from None
+    return mesh_of_bytes(data, path.suffix.lower(), str(path), may_be_empty=may_be_empty, hint=hint)
+
+
+def mesh_of_bytes(
+    data: bytes, suffix: str, where: str, *, may_be_empty: bool = False, hint: str = "make the artifact again"
+) -> trimesh.Trimesh:
+    """Return the mesh in the bytes of a file with this suffix (`.stl`), as `read_mesh` does; errors name `where`."""
+    path = where
     try:
-        mesh = None if check(data) else _parse(data, path.suffix.lower().removeprefix("."))
+        mesh = None if _CHECKS[suffix](data) else _parse(data, suffix.removeprefix("."))
     except BadInput as error:
         raise BadInput(f"{path}: {error.message}", hint=hint) from None
     mesh = mesh or trimesh.Trimesh(process=False)
+    _check_mesh(mesh, path, may_be_empty=may_be_empty, hint=hint)
+    return mesh if len(mesh.faces) else trimesh.Trimesh(mesh.vertices, np.zeros((0, 3), np.int64), process=False)
+
+
+def meshes_of_glb(data: bytes, where: str, *, hint: str = "make the artifact again") -> list[trimesh.Trimesh]:
+    """Return the meshes of a GLB one by one, where its nodes put them [m], with colours or textures of their own.
+
+    Raises BadInput, beginning with `where`, as `read_mesh` does.
+    """
+    try:
+        _check_glb(data)
+        scene = trimesh.load(io.BytesIO(data), file_type="glb", process=False, force="scene")
+        meshes = [mesh for mesh in cast(trimesh.Scene, scene).dump() if isinstance(mesh, trimesh.Trimesh)]
+    except BadInput as error:
+        raise BadInput(f"{where}: {error.message}", hint=hint) from None
+    except Exception as error:  # trimesh raises whatever its parsers raise
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise BadInput(f"{where}: cannot be read as a mesh: {reason:.120}", hint=hint) from None
+    if not meshes:
+        raise BadInput(f"{where}: holds no triangles", hint=hint)
+    for mesh in meshes:
+        _check_mesh(mesh, where, may_be_empty=False, hint=hint)
+    return meshes
+
+
+def _check_mesh(mesh: trimesh.Trimesh, path: str, *, may_be_empty: bool, hint: str) -> None:
     if mesh.vertices.ndim != 2 or mesh.vertices.shape[1] != 3:
         raise BadInput(f"{path}: vertices of {mesh.vertices.shape[1:]} numbers, expected 3", hint=hint)
     if len(mesh.faces) == 0:
         if not may_be_empty:
             raise BadInput(f"{path}: holds no triangles", hint=hint)
-        mesh = trimesh.Trimesh(mesh.vertices, np.zeros((0, 3), np.int64), process=False)
-    if mesh.faces.ndim != 2 or mesh.faces.shape[1] != 3:
+    elif mesh.faces.ndim != 2 or mesh.faces.shape[1] != 3:
         raise BadInput(f"{path}: faces are not triangles", hint=hint)
     if not np.isfinite(mesh.vertices).all():
         raise BadInput(f"{path}: vertices are not finite", hint=hint)
     if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
         raise BadInput(f"{path}: a face names a vertex outside of 0..{len(mesh.vertices) - 1}", hint=hint)
-    return mesh
 
 
 def _parse(data: bytes, kind: str) -> trimesh.Trimesh | None:

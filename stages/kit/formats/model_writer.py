@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import trimesh
@@ -22,6 +23,16 @@ HINGE_FRICTION, SLIDE_FRICTION = 0.1, 1.0
 HINGE_EFFORT, SLIDE_EFFORT = 30.0, 60.0
 
 
+class Faceted(Protocol):
+    """Anything with vertices (V, 3) [m] and triangles (F, 3)."""
+
+    @property
+    def vertices(self) -> np.ndarray: ...
+
+    @property
+    def faces(self) -> np.ndarray: ...
+
+
 @dataclass(frozen=True)
 class PartGeometry:
     """One link in its part frame: convex solids, a colour for each, mass properties."""
@@ -30,6 +41,10 @@ class PartGeometry:
     solids: Sequence[Solid]
     colors: Sequence[tuple[int, int, int]]
     properties: MassProperties
+    visual: Sequence[Faceted] = ()
+    """What it looks like, when that is not the solids."""
+    visual_colors: Sequence[tuple[int, int, int]] = ()
+    """One for each of `visual`."""
 
 
 def write_model_folder(folder: Path, model: CadModel, parts: Sequence[PartGeometry]) -> None:
@@ -43,11 +58,13 @@ def write_model_folder(folder: Path, model: CadModel, parts: Sequence[PartGeomet
         (folder / name).mkdir(parents=True, exist_ok=True)
     links = []
     for part in parts:
-        (folder / "visual" / f"{part.name}.glb").write_bytes(glb_bytes(colored_mesh(part.solids, part.colors)))
+        shown: Sequence[Faceted] = part.visual or part.solids
+        colors = part.visual_colors if part.visual else part.colors
+        (folder / "visual" / f"{part.name}.glb").write_bytes(glb_bytes(colored_mesh(shown, colors)))
         visuals, collisions = [], []
-        palette = list(dict.fromkeys(part.colors))
+        palette = list(dict.fromkeys(colors))
         for k, color in enumerate(palette):
-            mesh = colored_mesh([s for s, c in zip(part.solids, part.colors, strict=True) if c == color], None)
+            mesh = colored_mesh([s for s, c in zip(shown, colors, strict=True) if c == color], None)
             name = f"visual/{part.name}_{k}.obj"
             write_obj(folder / name, mesh.vertices, mesh.faces)
             visuals.append(Shape(mesh=name, color=(color[0] / 255, color[1] / 255, color[2] / 255, 1.0)))
@@ -80,7 +97,7 @@ def write_model_folder(folder: Path, model: CadModel, parts: Sequence[PartGeomet
     model.write(folder / MODEL_FILE)
 
 
-def colored_mesh(solids: Sequence[Solid], colors: Sequence[tuple[int, int, int]] | None) -> trimesh.Trimesh:
+def colored_mesh(solids: Sequence[Faceted], colors: Sequence[tuple[int, int, int]] | None) -> trimesh.Trimesh:
     """Return the solids as one mesh, vertices in their order; vertex colours when `colors` (one a solid) is given."""
     vertices = np.concatenate([solid.vertices for solid in solids])
     starts = np.cumsum([0, *(len(solid.vertices) for solid in solids)])

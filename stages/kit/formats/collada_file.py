@@ -1,0 +1,284 @@
+"""Triangles, unit, up axis and colours out of a COLLADA file (.dae) that nobody vouches for.
+
+Covers what furniture is exported as: geometries of triangles, polylists and polygons, placed by the nodes of the visual
+scene, with the diffuse colour or texture of their materials (COLLADA 1.4.1 specification, chapters 5 and 6). Skins,
+morphs, splines and external references are left out. The file is read by itself: textures are named, not opened.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from schemas.errors import BadInput
+from stages.kit.formats.xml_files import parse_xml
+
+MOST_INDICES = 30_000_000
+MOST_INSTANCES = 20_000
+DEEPEST_NODES = 60
+UP_AXES = {"X_UP": (1.0, 0.0, 0.0), "Y_UP": (0.0, 1.0, 0.0), "Z_UP": (0.0, 0.0, 1.0)}
+
+
+@dataclass(frozen=True)
+class ColladaPatch:
+    """Triangles of one material, in the file's frame and unit."""
+
+    name: str
+    """Of the node and the geometry."""
+    vertices: np.ndarray
+    """(V, 3)."""
+    faces: np.ndarray
+    """(F, 3) int."""
+    texture_points: np.ndarray | None
+    """(F, 3, 2) u and v of the corners, v up, or None."""
+    color: tuple[float, float, float]
+    """Diffuse RGB in 0..1; white when a texture says it."""
+    texture: str | None
+    """Name of the image file, as written."""
+
+
+@dataclass(frozen=True)
+class Collada:
+    """What a COLLADA file holds."""
+
+    patches: tuple[ColladaPatch, ...]
+    metres_per_unit: float | None
+    """None when the file does not say (the specification then means 1)."""
+    up: tuple[float, float, float] | None
+    """None when the file does not say (the specification then means y)."""
+    left_out: tuple[str, ...]
+    """Kinds of elements that were passed over."""
+
+
+def parse_collada(data: bytes, where: str) -> Collada:
+    """Return the content of a .dae file. Raises BadInput, beginning with `where`, for what is broken or too large."""
+    root = parse_xml(data, where)
+    for element in root.iter():  # the namespace says nothing that the names do not
+        if isinstance(element.tag, str):
+            element.tag = element.tag.rpartition("}")[2]
+    if root.tag != "COLLADA":
+        raise BadInput(f"{where}: root element is <{root.tag}>, expected <COLLADA>")
+    return _Reader(root, where).content()
+
+
+class _Reader:
+    def __init__(self, root: ElementTree.Element, where: str) -> None:
+        self.root, self.where = root, where
+        self.by_id: dict[tuple[str, str], ElementTree.Element] = {}
+        for element in root.iter():  # exporters give a scene and its node the same id
+            if element.get("id"):
+                self.by_id.setdefault((element.tag, element.get("id", "")), element)
+        self.left_out: set[str] = set()
+        self.budget = MOST_INDICES
+        self.instances = 0
+
+    def content(self) -> Collada:
+        unit, axis = self.root.find("asset/unit"), self.root.findtext("asset/up_axis", "").strip()
+        metres = None
+        if unit is not None and unit.get("meter") is not None:
+            metres = float(self._numbers(unit.get("meter"), "unit")[0])
+            if not (np.isfinite(metres) and metres > 0):
+                raise BadInput(f"{self.where}: unit of {metres:g} m")
+        patches: list[ColladaPatch] = []
+        scenes = self.root.findall("library_visual_scenes/visual_scene")
+        shown = self._target(self.root.find("scene/instance_visual_scene"), "visual_scene")
+        for scene in [shown] if shown is not None else scenes[:1]:
+            for node in scene.findall("node"):
+                patches += self._node(node, np.eye(4), 0)
+        if not scenes:
+            for geometry in self.root.findall("library_geometries/geometry"):
+                patches += self._geometry(geometry, np.eye(4), geometry.get("id", ""), {})
+        return Collada(tuple(patches), metres, UP_AXES.get(axis), tuple(sorted(self.left_out)))
+
+    def _target(self, instance: ElementTree.Element | None, tag: str) -> ElementTree.Element | None:
+        if instance is None:
+            return None
+        url = instance.get("url", "")
+        return self.by_id.get((tag, url[1:])) if url.startswith("#") else None
+
+    def _numbers(self, text: str | None, what: str) -> np.ndarray:
+        try:
+            values = np.array((text or "").split(), dtype=float)
+        except ValueError:
+            raise BadInput(f"{self.where}: {what} holds what is no number") from None
+        if values.size == 0:
+            raise BadInput(f"{self.where}: {what} is empty")
+        return values
+
+    def _transform(self, node: ElementTree.Element) -> np.ndarray:
+        whole = np.eye(4)
+        for element in node:
+            step = np.eye(4)
+            if element.tag == "matrix":
+                values = self._numbers(element.text, "matrix")
+                if len(values) != 16:
+                    raise BadInput(f"{self.where}: a matrix of {len(values)} numbers")
+                step = values.reshape(4, 4)
+            elif element.tag in ("translate", "scale", "rotate"):
+                values = self._numbers(element.text, element.tag)
+                if len(values) != (4 if element.tag == "rotate" else 3):
+                    raise BadInput(f"{self.where}: {element.tag} of {len(values)} numbers")
+                if element.tag == "translate":
+                    step[:3, 3] = values
+                elif element.tag == "scale":
+                    step[:3, :3] = np.diag(values)
+                else:
+                    length = np.linalg.norm(values[:3])
+                    turn = np.radians(values[3]) * values[:3] / length if length > 0 else np.zeros(3)
+                    step[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
+            elif element.tag in ("lookat", "skew"):
+                self.left_out.add(element.tag)
+            whole = whole @ step
+        return whole
+
+    def _node(self, node: ElementTree.Element, outer: np.ndarray, depth: int) -> Iterator[ColladaPatch]:
+        self.instances += 1
+        if depth > DEEPEST_NODES or self.instances > MOST_INSTANCES:
+            raise BadInput(f"{self.where}: nodes are nested too deeply, or there are too many")
+        pose = outer @ self._transform(node)
+        name = node.get("name") or node.get("id") or ""
+        for child in node:
+            if child.tag == "instance_geometry" and (geometry := self._target(child, "geometry")) is not None:
+                bound = {
+                    material.get("symbol", ""): material.get("target", "").removeprefix("#")
+                    for material in child.iter("instance_material")
+                }
+                yield from self._geometry(geometry, pose, f"{name} {geometry.get('name', '')}", bound)
+            elif child.tag == "node":
+                yield from self._node(child, pose, depth + 1)
+            elif child.tag == "instance_node" and (target := self._target(child, "node")) is not None:
+                yield from self._node(target, pose, depth + 1)
+            elif child.tag == "instance_controller":
+                self.left_out.add("skinned geometry")
+
+    def _geometry(
+        self, geometry: ElementTree.Element, pose: np.ndarray, name: str, bound: dict[str, str]
+    ) -> Iterator[ColladaPatch]:
+        mesh = geometry.find("mesh")
+        if mesh is None:
+            self.left_out.add("geometry that is no mesh")
+            return
+        for element in mesh:
+            if element.tag in ("triangles", "polylist", "polygons"):
+                patch = self._patch(element, pose, name, bound)
+                if patch is not None:
+                    yield patch
+            elif element.tag in ("lines", "linestrips", "tristrips", "trifans"):
+                self.left_out.add(element.tag)
+
+    def _source(self, reference: str) -> np.ndarray:
+        name = reference.removeprefix("#")
+        if (vertices := self.by_id.get(("vertices", name))) is not None:
+            inner = [i for i in vertices.findall("input") if i.get("semantic") == "POSITION"]
+            name = inner[0].get("source", "").removeprefix("#") if inner else ""
+        source = self.by_id.get(("source", name))
+        array = source.find("float_array") if source is not None else None
+        accessor = source.find("technique_common/accessor") if source is not None else None
+        if array is None:
+            raise BadInput(f"{self.where}: source {reference!r:.60} holds no numbers")
+        stride = int(accessor.get("stride", "1")) if accessor is not None else 3
+        values = self._numbers(array.text, f"source {reference!r:.60}")
+        if not 1 <= stride <= 16 or len(values) % stride or not np.isfinite(values).all():
+            raise BadInput(f"{self.where}: source {reference!r:.60} is torn or not finite")
+        return values.reshape(-1, stride)
+
+    def _patch(
+        self, element: ElementTree.Element, pose: np.ndarray, name: str, bound: dict[str, str]
+    ) -> ColladaPatch | None:
+        inputs = [
+            (i.get("semantic"), i.get("source", ""), int(i.get("offset", "0")), i.get("set", "0"))
+            for i in element.findall("input")
+        ]
+        width = 1 + max((entry[2] for entry in inputs), default=0)
+        corners = self._corners(element, width)
+        if len(corners) == 0:
+            return None
+        positions = next((entry for entry in inputs if entry[0] == "VERTEX"), None)
+        if positions is None:
+            raise BadInput(f"{self.where}: {element.tag} without vertices")
+        vertices = self._source(positions[1])
+        if vertices.shape[1] != 3:
+            raise BadInput(f"{self.where}: vertices of {vertices.shape[1]} numbers")
+        faces = corners[:, :, positions[2]]
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise BadInput(f"{self.where}: a face names a vertex outside of 0..{len(vertices) - 1}")
+        color, texture = self._material(bound.get(element.get("material", ""), element.get("material", "")))
+        texture_points = None
+        mapped = next((entry for entry in inputs if entry[0] == "TEXCOORD"), None)
+        if texture is not None and mapped is not None:
+            table = self._source(mapped[1])
+            chosen = corners[:, :, mapped[2]]
+            if table.shape[1] >= 2 and chosen.min() >= 0 and chosen.max() < len(table):
+                texture_points = table[chosen][:, :, :2]
+        moved = vertices @ pose[:3, :3].T + pose[:3, 3]
+        if np.linalg.det(pose[:3, :3]) < 0:  # a mirrored node turns its faces inside out
+            faces = faces[:, ::-1]
+            texture_points = None if texture_points is None else texture_points[:, ::-1]
+        return ColladaPatch(name.strip(), moved, faces, texture_points, color, texture)
+
+    def _corners(self, element: ElementTree.Element, width: int) -> np.ndarray:
+        """Return (F, 3, width) indices of triangles; polygons are cut into fans."""
+        texts = [p.text or "" for p in element.findall("p")]
+        total = sum(text.count(" ") + text.count("\n") + 1 for text in texts)
+        self.budget -= total
+        if self.budget < 0:
+            raise BadInput(f"{self.where}: more than {MOST_INDICES} indices")
+        try:
+            lists = [np.array(text.split(), dtype=np.int64) for text in texts]
+            if any(len(entry) % width for entry in lists):
+                raise BadInput(f"{self.where}: {element.tag}: indices are no multiple of {width}")
+            rows = [entry.reshape(-1, width) for entry in lists]
+            if element.tag == "triangles":
+                joined = np.concatenate(rows) if rows else np.zeros((0, width), np.int64)
+                return joined[: len(joined) // 3 * 3].reshape(-1, 3, width)
+            counts = [len(row) for row in rows]
+            if element.tag == "polylist":
+                counts = np.array((element.findtext("vcount") or "").split(), dtype=np.int64).tolist()
+        except ValueError:
+            raise BadInput(f"{self.where}: {element.tag}: indices are no numbers") from None
+        joined = np.concatenate(rows) if rows else np.zeros((0, width), np.int64)
+        if any(count < 0 for count in counts) or sum(counts) > len(joined):
+            raise BadInput(f"{self.where}: {element.tag} counts more corners than it has")
+        triangles, start = [], 0
+        for count in counts:
+            polygon = joined[start : start + count]
+            triangles += [polygon[[0, k, k + 1]] for k in range(1, count - 1)]
+            start += count
+        return np.array(triangles, dtype=np.int64).reshape(-1, 3, width)
+
+    def _material(self, name: str) -> tuple[tuple[float, float, float], str | None]:
+        """Return the diffuse colour and the texture's file name of a material."""
+        plain = (0.7, 0.7, 0.7)
+        material = self.by_id.get(("material", name))
+        effect = self._target(material.find("instance_effect"), "effect") if material is not None else None
+        if effect is None:
+            return plain, None
+        diffuse = next(iter(effect.iter("diffuse")), None)
+        if diffuse is None:
+            return plain, None
+        if (texture := diffuse.find("texture")) is not None:
+            return (1.0, 1.0, 1.0), self._image(effect, texture.get("texture", ""))
+        color = diffuse.find("color")
+        if color is None:
+            return plain, None
+        values = self._numbers(color.text, "diffuse colour")
+        if len(values) < 3 or not np.isfinite(values).all():
+            return plain, None
+        red, green, blue = (float(v) for v in np.clip(values[:3], 0.0, 1.0))
+        return (red, green, blue), None
+
+    def _image(self, effect: ElementTree.Element, name: str) -> str | None:
+        """Follow a texture to its image: sampler, surface, image; exporters often name the image at once."""
+        for _ in range(3):
+            image = self.by_id.get(("image", name))
+            if image is not None:
+                return (image.findtext("init_from") or image.findtext("init_from/ref") or "").strip() or None
+            parameter = next((p for p in effect.iter("newparam") if p.get("sid") == name), None)
+            if parameter is None:
+                return None
+            name = (parameter.findtext("sampler2D/source") or parameter.findtext("surface/init_from") or "").strip()
+        return None

@@ -1,0 +1,251 @@
+"""Import a folder of models into a CAD library: read each, choose its frame, write its folder, say what was found."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from schemas.base import as_vector
+from schemas.cad_library import CadLibrary, CadModel, ImportedModel, ImportFile, LibraryFile
+from schemas.errors import BadInput, UsageError
+from schemas.vocabulary import load_vocabulary
+from stages.kit.formats.cad_models import model_folder
+from stages.kit.formats.model_writer import write_model_folder
+from stages.kit.stage import Context
+from stages.library.importing.assembly import (
+    Assembled,
+    assembled,
+    centered,
+    grouped,
+    placed_parts,
+    plain_name,
+    source_points,
+    told_front,
+    turned,
+)
+from stages.library.importing.classes import class_of, usual_size
+from stages.library.importing.discovery import Unread, find_models
+from stages.library.importing.frames import AXES, UNITS, Choice, axis_name, choose, model_rotation, upright_rotation
+from stages.library.importing.mapping import SKIP, Entry, Mapping, read_mapping
+from stages.library.importing.report import table_lines
+from stages.library.importing.source_folder import SourceFolder
+from stages.library.importing.source_model import Declared, Direction, SourceModel
+from stages.library.importing.versions import uses_coacd
+from stages.library.parameters import AdditionParameters
+
+IMPORTS_FILE = "imports.json"
+Y_UP_FORMATS = ("OBJ", "ShapeNetSem")
+SMALLEST, LARGEST = 0.001, 10_000.0
+"""Largest extent of a model [m] that is taken."""
+
+
+@dataclass(frozen=True)
+class Said:
+    """What the options and the mapping say about a model."""
+
+    entry: Entry
+    parameters: AdditionParameters
+
+    def class_name(self, source: SourceModel) -> str | None:
+        """Return the class: of the mapping, the option, or the names; None when nothing tells."""
+        return self.entry.class_name or self.parameters.class_name or class_of(source.words)
+
+    def unit(self, source: SourceModel) -> Declared:
+        """Return the unit [m] that is said, else the declared one."""
+        name = self.entry.unit or self.parameters.unit
+        return source.unit if name == "declared" else Declared(UNITS[name], "option")
+
+    def up(self, source: SourceModel) -> Declared:
+        """Return the up axis that is said, else the declared one."""
+        name = self.entry.up or self.parameters.up
+        return source.up if name == "declared" else Declared(AXES[name], "option")
+
+    def front(self, source: SourceModel) -> Declared:
+        """Return the front that is said, else the declared one."""
+        name = self.entry.front or self.parameters.front
+        return source.front if name == "declared" else Declared(AXES[name], "option")
+
+
+def run(
+    models: Path, library: CadLibrary | None, mapping: Path | None, *, parameters: AdditionParameters, context: Context
+) -> CadLibrary:
+    """Import every model of the folder, beside those of `library` when it is given.
+
+    Raises BadInput when there is no folder, or nothing in it could be imported; UsageError for an unknown class.
+    """
+    _check_options(models, parameters)
+    decompose = uses_coacd(parameters)
+    said = read_mapping(mapping) if mapping is not None else Mapping()
+    taken, records, seed = _kept_models(library, context)
+    names = {model.id.lower() for model in taken}
+    folder = SourceFolder(models)
+    imported = 0
+    for source in context.progress.track(find_models(folder), description="importing models"):
+        if isinstance(source, Unread):
+            records.append(_left_out(source.source, source.source, "", (source.reason.replace(f"{folder.root}/", ""),)))
+            continue
+        try:
+            record, result = _import(source, Said(said.entry(source), parameters), names, decompose)
+        except BadInput as error:
+            reason = str(error).replace(f"{folder.root}/", "")
+            record, result = _left_out(source.name, source.source, source.format, (reason, *source.findings)), None
+        records.append(record)
+        if result is not None:
+            names.add(result.model.id.lower())
+            write_model_folder(context.output / "models" / result.model.id, result.model, result.parts)
+            taken.append(result.model)
+            imported += 1
+    for line in table_lines(records):
+        context.logger.info(line)
+    if imported == 0:
+        why = records[-1].findings[0] if records and records[-1].findings else "it holds no model files"
+        raise BadInput(f"{models}: nothing was imported: {why}", hint="see docs/LIBRARY.md; --class-name, --mapping")
+    LibraryFile(seed=seed, models=tuple(taken)).write(context.output / "library.json")
+    ImportFile(models=tuple(records)).write(context.output / IMPORTS_FILE)
+    summary = {
+        "models": len(taken),
+        "imported": imported,
+        "left_out": sum(not record.id for record in records),
+        "classes": len({model.class_name for model in taken}),
+        "articulated": sum(model.articulated for model in taken),
+        "joints": sum(len(model.joints) for model in taken),
+    }
+    return CadLibrary(context.output, summary=summary)
+
+
+def _check_options(models: Path, parameters: AdditionParameters) -> None:
+    if not Path(models).is_dir():
+        raise BadInput(f"{models}: no folder", hint="give the folder that holds the models")
+    names = [entry.name for entry in load_vocabulary().classes]
+    if parameters.class_name and parameters.class_name not in names:
+        raise UsageError(f"no class {parameters.class_name!r}", hint=f"one of: {', '.join(names)}")
+
+
+def _kept_models(library: CadLibrary | None, context: Context) -> tuple[list[CadModel], list[ImportedModel], int]:
+    """Copy the models of an existing library; return them, what was said when they were imported, and its seed."""
+    if library is None:
+        return [], [], context.seed
+    for model in library.library.models:
+        shutil.copytree(model_folder(library, model.id), context.output / "models" / model.id)
+    records: list[ImportedModel] = []
+    if (path := library.path(IMPORTS_FILE)).is_file():
+        records = list(ImportFile.read(path).models)
+    return list(library.library.models), records, library.library.seed
+
+
+def _import(
+    source: SourceModel, said: Said, names: set[str], decompose: bool
+) -> tuple[ImportedModel, Assembled | None]:
+    """Return what was found out about a model, and the model; None in its place when it is left out."""
+    parameters = said.parameters
+    class_name = said.class_name(source)
+    if class_name is None and parameters.unknown == "object":
+        class_name = "object"
+    if class_name == SKIP:
+        return _left_out(source.name, source.source, source.format, ("left out by the mapping",)), None
+    if class_name is None:
+        reason = "nothing tells its class (--class-name, --mapping, --unknown object)"
+        return _left_out(source.name, source.source, source.format, (reason, *source.findings)), None
+    groups, findings = grouped(source)
+    points = source_points(groups)
+    if not np.isfinite(points).all() or float(np.abs(points).max()) > 1e9:
+        raise BadInput(f"{source.source}: corners are not finite, or far away")
+    choice = choose(said.unit(source), said.up(source), points, usual_size(class_name), source.format in Y_UP_FORMATS)
+    extent = choice.unit * float(np.ptp(points, axis=0).max())
+    if not SMALLEST <= extent <= LARGEST:
+        raise BadInput(
+            f"{source.source}: {extent:.3g} m large in units of {choice.unit:g} m", hint="--unit says otherwise"
+        )
+    front = said.front(source)
+    given = front.value if isinstance(front.value, tuple) else None
+    parts, more = placed_parts(
+        source,
+        groups,
+        model_rotation(choice.up, given),
+        choice.unit,
+        collision_given=parameters.collision == "given",
+        decompose=decompose,
+    )
+    front_name, front_from = axis_name(given) if given is not None else "", front.origin
+    if given is None:
+        told = told_front(parts, class_name)
+        upright = upright_rotation(choice.up)
+        direction: Direction = told[0] if told is not None else AXES["-y"]
+        parts = turned(parts, direction)
+        front_from = told[1] if told is not None else "assumed"
+        front_name = axis_name(as_vector(upright.T @ np.asarray(direction)))
+    model_id = _free_id(plain_name(source.name) or class_name, names)
+    result = assembled(
+        centered(parts),
+        model_id,
+        class_name,
+        contains=said.entry.contains if said.entry.contains is not None else source.contains,
+        density=parameters.density,
+        recipe={"source": source.source, "format": source.format},
+    )
+    findings = [*choice.findings, *source.findings, *findings, *more, *result.findings]
+    result = replace(result, findings=tuple(dict.fromkeys(findings)))
+    return _record(source, result, choice, front_name, front_from), result
+
+
+def _free_id(name: str, names: set[str]) -> str:
+    found, number = name, 1
+    while found.lower() in names:
+        number += 1
+        found = f"{name}_{number}"
+    return found
+
+
+def _record(source: SourceModel, result: Assembled, choice: Choice, front: str, front_from: str) -> ImportedModel:
+    model, closed = result.model, result.model.states[0]
+    size = np.asarray(closed.box_maximum) - np.asarray(closed.box_minimum)
+    return ImportedModel(
+        id=model.id,
+        name=source.name,
+        source=source.source,
+        format=source.format,
+        class_name=model.class_name,
+        size=as_vector(np.round(size, 6)),
+        unit=choice.unit if source.mesh_unit is None else choice.unit * source.mesh_unit,
+        unit_from=choice.unit_origin if source.mesh_unit is None else "meshes",
+        up=axis_name(choice.up),
+        up_from=choice.up_origin,
+        front=front,
+        front_from=front_from,
+        joints=len(model.joints),
+        collision_pieces=result.collision_pieces,
+        can_be_carried=model.movable,
+        can_be_opened=any(joint.upper > 0 for joint in model.joints),
+        can_contain=model.contains,
+        can_support=any(plane.horizontal for plane in closed.planes),
+        has_handle=any(joint.handle is not None for joint in model.joints),
+        findings=result.findings,
+    )
+
+
+def _left_out(name: str, source: str, kind: str, findings: tuple[str, ...]) -> ImportedModel:
+    return ImportedModel(
+        id="",
+        name=name,
+        source=source,
+        format=kind,
+        class_name="",
+        size=None,
+        unit=None,
+        unit_from="",
+        up="",
+        up_from="",
+        front="",
+        front_from="",
+        joints=0,
+        collision_pieces=0,
+        can_be_carried=False,
+        can_be_opened=False,
+        can_contain=False,
+        can_support=False,
+        has_handle=False,
+        findings=findings,
+    )

@@ -1,0 +1,110 @@
+"""Which models a folder holds: descriptions and tables first, then the meshes that none of them names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from schemas.errors import BadInput
+from stages.library.importing.loose_models import (
+    is_shapenet_table,
+    read_loose_model,
+    read_shapenet_model,
+    shapenet_rows,
+)
+from stages.library.importing.mesh_reading import MESH_SUFFIXES
+from stages.library.importing.mjcf_models import is_mjcf, read_mjcf_models
+from stages.library.importing.sdf_models import read_sdf_models
+from stages.library.importing.source_folder import SourceFolder
+from stages.library.importing.source_model import SourceModel
+from stages.library.importing.urdf_models import read_partnet_model, read_urdf_model
+
+PARTNET_FILE, SHAPENET_FILE = "mobility.urdf", "metadata.csv"
+SHELVES = {"meshes", "mesh", "visual", "collision", "textured_objs", "materials", "textures"}
+"""Folders that hold parts of models."""
+PART_OF_A_MODEL = re.compile(r"collision|vhacd|coacd|convex", re.IGNORECASE)
+MOST_MODELS = 20_000
+
+
+@dataclass(frozen=True)
+class Unread:
+    """A file that should hold a model, and why it was not read."""
+
+    source: str
+    reason: str
+
+
+def find_models(folder: SourceFolder) -> Iterator[SourceModel | Unread]:
+    """Yield the models of a folder in the order of their paths, descriptions before loose meshes.
+
+    What cannot be read is yielded as Unread. Raises BadInput when there are too many files or models.
+    """
+    files = folder.files()
+    count = 0
+    claimed: set[Path] = set()
+    for path in files:
+        for model in _described(folder, path, claimed):
+            count += 1
+            if count > MOST_MODELS:
+                raise BadInput(f"{folder.root}: more than {MOST_MODELS} models", hint="import its parts one by one")
+            yield model
+    used = {path.resolve() for path in claimed} | set(folder.read_bytes_of)
+    for path in files:
+        shelves = {part.lower() for part in path.relative_to(folder.root).parts[:-1]}
+        if path.suffix.lower() not in MESH_SUFFIXES or path.resolve() in used or shelves & SHELVES:
+            continue
+        if PART_OF_A_MODEL.search(path.stem):
+            continue
+        count += 1
+        if count > MOST_MODELS:
+            raise BadInput(f"{folder.root}: more than {MOST_MODELS} models", hint="import its parts one by one")
+        yield _tried(folder, path, partial(read_loose_model, folder, path))
+
+
+def _described(folder: SourceFolder, path: Path, claimed: set[Path]) -> Iterator[SourceModel | Unread]:
+    suffix = path.suffix.lower()
+    if path.name == PARTNET_FILE:
+        claimed.update(path.parent.rglob("*"))
+        yield _tried(folder, path, lambda: read_partnet_model(folder, path))
+    elif suffix == ".urdf":
+        yield _tried(folder, path, lambda: read_urdf_model(folder, path))
+    elif suffix in (".sdf", ".world"):
+        yield from _several(folder, path, lambda: read_sdf_models(folder, path))
+    elif suffix in (".xml", ".mjcf"):
+        yield from _several(folder, path, lambda: read_mjcf_models(folder, path) if _whole_mjcf(folder, path) else [])
+    elif path.name == SHAPENET_FILE and is_shapenet_table(folder, path):
+        try:
+            rows = shapenet_rows(folder, path)
+        except BadInput as error:
+            yield Unread(folder.relative(path), str(error))
+            return
+        claimed.update(mesh for mesh, _ in rows)
+        for mesh, row in rows:
+            yield _tried(folder, mesh, partial(read_shapenet_model, folder, mesh, row))
+
+
+def _whole_mjcf(folder: SourceFolder, path: Path) -> bool:
+    """Whether an XML file is an MJCF model; one that is no XML is so only when it is called .mjcf."""
+    try:
+        return is_mjcf(folder.read_xml(path))
+    except BadInput:
+        if path.suffix.lower() == ".mjcf" or b"<mujoco" in folder.read(path)[:4096]:
+            raise
+        return False
+
+
+def _tried(folder: SourceFolder, path: Path, read: Callable[[], SourceModel]) -> SourceModel | Unread:
+    try:
+        return read()
+    except BadInput as error:
+        return Unread(folder.relative(path), str(error))
+
+
+def _several(folder: SourceFolder, path: Path, read: Callable[[], list[SourceModel]]) -> Iterator[SourceModel | Unread]:
+    try:
+        yield from read()
+    except BadInput as error:
+        yield Unread(folder.relative(path), str(error))

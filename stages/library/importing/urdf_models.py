@@ -1,0 +1,243 @@
+"""URDF, and the PartNet-Mobility layout around one (mobility.urdf, meta.json, semantics.txt)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from schemas.errors import BadInput
+from stages.kit.geometry.solids import Solid, box, cylinder
+from stages.kit.geometry.transforms import transform_from
+from stages.library.importing.mesh_reading import read_mesh_file
+from stages.library.importing.primitives import ball
+from stages.library.importing.source_folder import SourceFolder, numbers
+from stages.library.importing.source_model import (
+    Declared,
+    JointKind,
+    SourceJoint,
+    SourceLink,
+    SourceModel,
+    Surface,
+    painted_faces,
+    solid_surface,
+)
+
+KINDS: dict[str, JointKind] = {
+    "fixed": "fixed",
+    "floating": "floating",
+    "revolute": "revolute",
+    "continuous": "continuous",
+    "prismatic": "prismatic",
+}
+PARTNET_FRONT = (-1.0, 0.0, 0.0)
+"""Doors and drawers of PartNet-Mobility models look along -x of mobility.urdf's root frame, z is up."""
+LARGEST_TEXT = 2**20
+
+
+def read_urdf_model(folder: SourceFolder, path: Path) -> SourceModel:
+    """Return the model of a URDF file. Raises BadInput."""
+    return _Reader(folder, path).model()
+
+
+def read_partnet_model(folder: SourceFolder, path: Path) -> SourceModel:
+    """Return the model of a `mobility.urdf`, with the category of meta.json and the part names of semantics.txt.
+
+    Raises BadInput.
+    """
+    model = _Reader(folder, path).model()
+    words, roles = [path.parent.name], {}
+    meta = path.parent / "meta.json"
+    if meta.is_file():
+        try:
+            facts = json.loads(folder.read(meta, LARGEST_TEXT))
+            words = [str(facts[key]) for key in ("model_cat", "model_category") if key in facts] + words
+        except (ValueError, TypeError, RecursionError):
+            raise BadInput(f"{meta}: no JSON object", hint="copy the model again") from None
+    semantics = path.parent / "semantics.txt"
+    if semantics.is_file():
+        for line in folder.read(semantics, LARGEST_TEXT).decode("utf-8", "replace").splitlines():
+            parts = line.split()
+            if len(parts) >= 3:
+                roles[parts[0]] = parts[2]
+    links = tuple(
+        SourceLink(link.name, link.visual, link.collision, link.mass, link.marks, roles.get(link.name, ""))
+        for link in model.links
+    )
+    return SourceModel(
+        name=f"{words[0]}_{path.parent.name}",
+        source=model.source,
+        format="PartNet-Mobility",
+        links=links,
+        joints=model.joints,
+        front=Declared(PARTNET_FRONT, "format"),
+        words=tuple(words),
+        mesh_unit=model.mesh_unit,
+        findings=model.findings,
+    )
+
+
+class _Reader:
+    def __init__(self, folder: SourceFolder, path: Path) -> None:
+        self.folder, self.path = folder, path
+        self.findings: list[str] = []
+        self.units: set[float] = set()
+        self.materials: dict[str, tuple[float, float, float]] = {}
+
+    def model(self) -> SourceModel:
+        robot = self.folder.read_xml(self.path)
+        if robot.tag != "robot":
+            raise BadInput(f"{self.path}: root element is <{robot.tag}>, expected <robot>")
+        for material in robot.findall("material"):
+            color = material.find("color")
+            if color is not None:
+                rgba = numbers(color.get("rgba"), 4, f"{self.path}: rgba")
+                self.materials[material.get("name", "")] = (float(rgba[0]), float(rgba[1]), float(rgba[2]))
+        links = tuple(self._link(element) for element in robot.findall("link"))
+        joints = tuple(self._joint(element) for element in robot.findall("joint"))
+        name = self.path.stem
+        return SourceModel(
+            name=name,
+            source=self.folder.relative(self.path),
+            format="URDF",
+            links=links,
+            joints=joints,
+            words=(name, robot.get("name", ""), self.path.parent.name),
+            mesh_unit=min(self.units) if len(self.units) == 1 else None,
+            findings=tuple(dict.fromkeys(self.findings)),
+        )
+
+    def _pose(self, element: ElementTree.Element, where: str) -> np.ndarray:
+        origin = element.find("origin")
+        if origin is None:
+            return np.eye(4)
+        angles = numbers(origin.get("rpy", "0 0 0"), 3, f"{where}: rpy")
+        return transform_from(
+            Rotation.from_euler("xyz", angles).as_matrix(), numbers(origin.get("xyz", "0 0 0"), 3, f"{where}: xyz")
+        )
+
+    def _link(self, element: ElementTree.Element) -> SourceLink:
+        name = element.get("name", "")
+        where = f"{self.path}: link {name!r:.60}"
+        mass_element = element.find("inertial/mass")
+        mass = None
+        if mass_element is not None:
+            mass = float(numbers(mass_element.get("value"), 1, f"{where}: mass")[0])
+        return SourceLink(
+            name,
+            tuple(s for child in element.findall("visual") for s in self._shape(child, where)),
+            tuple(s for child in element.findall("collision") for s in self._shape(child, where)),
+            mass if mass is not None and mass > 0 else None,
+        )
+
+    def _color(self, element: ElementTree.Element, where: str) -> tuple[float, float, float] | None:
+        material = element.find("material")
+        if material is None:
+            return None
+        color = material.find("color")
+        if color is None:
+            return self.materials.get(material.get("name", ""))
+        rgba = numbers(color.get("rgba"), 4, f"{where}: rgba")
+        return (float(rgba[0]), float(rgba[1]), float(rgba[2]))
+
+    def _shape(self, element: ElementTree.Element, where: str) -> list[Surface]:
+        pose, color, name = self._pose(element, where), self._color(element, where), element.get("name", "")
+        geometry = element.find("geometry")
+        if geometry is None:
+            raise BadInput(f"{where}: no geometry")
+        mesh, solid = geometry.find("mesh"), _primitive(geometry, where)
+        if solid is not None:
+            return [solid_surface(solid, color, name).moved(pose)]
+        if mesh is None:
+            self.findings.append(f"a shape of link {element.get('name', '')!r:.40} is of no known kind")
+            return []
+        scale = np.diag([*numbers(mesh.get("scale", "1 1 1"), 3, f"{where}: scale"), 1.0])
+        file = mesh.get("filename", "")
+        return mesh_surfaces(self.folder, self.path, file, pose @ scale, color, name, self.findings, self.units)
+
+    def _joint(self, element: ElementTree.Element) -> SourceJoint:
+        name = element.get("name", "")
+        where = f"{self.path}: joint {name!r:.60}"
+        ends = []
+        for tag in ("parent", "child"):
+            end = element.find(tag)
+            if end is None or not end.get("link"):
+                raise BadInput(f"{where}: no {tag} link")
+            ends.append(end.get("link", ""))
+        axis, limit = element.find("axis"), element.find("limit")
+        lower, upper = (
+            float(numbers("0" if limit is None else limit.get(key, "0"), 1, f"{where}: {key}")[0])
+            for key in ("lower", "upper")
+        )
+        return SourceJoint(
+            name=name,
+            kind=KINDS.get(element.get("type", ""), "unknown"),
+            parent=ends[0],
+            child=ends[1],
+            parent_from_child=self._pose(element, where),
+            axis=numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"), 3, f"{where}: axis"),
+            lower=lower,
+            upper=upper,
+        )
+
+
+def mesh_surfaces(
+    folder: SourceFolder,
+    path: Path,
+    name: str,
+    link_from_mesh: np.ndarray,
+    color: tuple[float, float, float] | None,
+    label: str,
+    findings: list[str],
+    units: set[float],
+) -> list[Surface]:
+    """Return the surfaces of a mesh file that a description at `path` names; `link_from_mesh` (4, 4) may scale.
+
+    A COLLADA file's unit is applied and noted in `units`, its up axis is not: simulators read it so. Raises BadInput
+    for a missing file.
+    """
+    found = folder.find(name, path.parent)
+    if found is None:
+        raise BadInput(f"{path}: mesh {name!r:.100} is not in the folder", hint="copy it beside the description")
+    if not found.is_relative_to(path.parent) or ".." in Path(name).parts:
+        findings.append("meshes are named elsewhere; files of the same path were found in the folder")
+    content = read_mesh_file(folder, found)
+    unit = 1.0
+    if isinstance(content.unit.value, float) and content.unit.origin == "file":
+        unit = content.unit.value
+        units.add(unit)
+    findings += content.findings
+    whole = link_from_mesh @ np.diag([unit, unit, unit, 1.0])
+    moved = []
+    for surface in content.surfaces:
+        if (
+            color is not None
+            and found.suffix.lower() in (".stl", ".obj")
+            and len(np.unique(surface.colors, axis=0)) == 1
+        ):
+            surface = Surface(surface.vertices, surface.faces, painted_faces(len(surface.faces), color), surface.name)
+        named = Surface(surface.vertices, surface.faces, surface.colors, f"{label} {found.stem} {surface.name}".strip())
+        moved.append(named.moved(whole))
+    return moved
+
+
+def _primitive(geometry: ElementTree.Element, where: str) -> Solid | None:
+    """Return the box, cylinder or sphere of a URDF geometry, None when it is another."""
+    for tag, keys in (("box", ("size",)), ("cylinder", ("radius", "length")), ("sphere", ("radius",))):
+        element = geometry.find(tag)
+        if element is None:
+            continue
+        if tag == "box":
+            x, y, z = numbers(element.get("size"), 3, f"{where}: box size") / 2
+        else:
+            values = [float(numbers(element.get(key), 1, f"{where}: {key}")[0]) for key in keys]
+            x, y, z = values[0], values[0], values[-1] / 2 if tag == "cylinder" else values[0]
+        if not 0 < min(x, y, z) <= max(x, y, z) < 1e6:
+            raise BadInput(f"{where}: a {tag} without size")
+        if tag == "box":
+            return box((-x, x), (-y, y), (-z, z))
+        return cylinder(x, (-z, z), count=24) if tag == "cylinder" else ball(np.array([x, y, z]))
+    return None
