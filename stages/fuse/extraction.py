@@ -113,6 +113,7 @@ def extract_entities(
     part_distance: float,
     spread_steps: int = 0,
     piece_share: float = 0.0,
+    unnamed: int | None = None,
     grouped: Mapping[int, tuple[int, int]] | None = None,
 ) -> tuple[list[ExtractedEntity], LabelledSurface]:
     """Return the entities, ascending by instance, and the labels of the whole surface.
@@ -130,7 +131,8 @@ def extract_entities(
         instance_of[segment], surface.vertices, surface.faces, steps=spread_steps, minimum_cosine=SPREAD_COSINE
     )
     instance = absorb_specks(named, surface.faces, whole=stuff, minimum_size=minimum_voxels, minimum_share=speck_share)
-    countable = {p: c for p, c in class_of_instance.items() if c in things}
+    # Things without a name are not of one class: a cup is no piece of the table that nobody recognised either.
+    countable = {p: c for p, c in class_of_instance.items() if c in things and c != unnamed}
     instance = absorb_pieces(instance, surface.faces, countable, share=piece_share)
     instance = drop_far_parts(instance, surface.vertices, surface.faces, whole=stuff, distance=part_distance)
     of_face = face_labels(instance, surface.faces)

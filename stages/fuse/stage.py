@@ -61,19 +61,20 @@ def write_map(
         surface = extract_surface(mapper.blocks, minimum_weight=parameters.minimum_weight, tsdf=tsdf)
     with context.progress.step("extract entities"):
         merged = mapper.labels.table()
+        unnamed = vocabulary.by_name(UNNAMED).id
         counts, seen_in, grouped = mapper.counts, mapper.seen_in, None
         fewest = min(parameters.minimum_observations, max(1, mapper.labelled_frames // 10))
         if parameters.merging == "ours":
             things = group_things(
                 mapper.counts, mapper.segment_evidence, mapper.things, mapper.seen_in, fewest,
-                scores=mapper.class_scores.by_segment, unnamed=vocabulary.by_name(UNNAMED).id,
+                scores=mapper.class_scores.by_segment, unnamed=unnamed,
             )  # fmt: skip
             counts, seen_in, grouped = things.counts, things.seen_in, things.best
         entities, labelled = extract_entities(
             surface, merged[surface.segment], counts, seen_in, mapper.sightings, mapper.things,
             minimum_share=parameters.minimum_prediction_share, minimum_voxels=parameters.minimum_entity_voxels,
             minimum_observations=fewest, speck_share=parameters.speck_share, part_distance=parameters.part_distance,
-            spread_steps=parameters.spread_steps, piece_share=parameters.piece_share, grouped=grouped,
+            spread_steps=parameters.spread_steps, piece_share=parameters.piece_share, unnamed=unnamed, grouped=grouped,
         )  # fmt: skip
     with context.progress.step("write the map"):
         file = EntitiesFile(

@@ -153,3 +153,16 @@ def test_pieces_of_pieces_end_at_the_whole() -> None:
     labels = np.array([1] * 60 + [2] * 11 + [3] * 2 + [0] * 7)
     result = absorb_pieces(labels, faces, {1: CHAIR, 2: CHAIR, 3: CHAIR}, share=0.2)
     assert result.tolist() == [1] * 73 + [0] * 7
+
+
+@pytest.mark.parametrize(("unnamed", "expected"), [(None, [4]), (CHAIR, [4, 5])])
+def test_things_without_a_name_are_no_pieces_of_each_other(unnamed: int | None, expected: list[int]) -> None:
+    vertices, faces = strip(30)
+    surface = Surface(vertices, faces, np.full((60, 3), 9, np.uint8), np.zeros(60, np.int32))
+    segment = np.array([1] * 52 + [2] * 8, dtype=np.int32)
+    entities, _ = extract_entities(
+        surface, segment, counted((1, CHAIR, 4, 5), (2, CHAIR, 5, 5)), {4: 0b111, 5: 0b111}, {1: 5, 2: 5}, THINGS,
+        minimum_share=0.15, minimum_voxels=3, minimum_observations=1, speck_share=0.0, part_distance=1.0,
+        piece_share=0.2, unnamed=unnamed,
+    )  # fmt: skip
+    assert [entity.instance for entity in entities] == expected
