@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 from schemas.artifact import Artifact
 from schemas.base import Model, Name, RelativePath, Transform
-from schemas.scene_parts import Box, Relation, SurfacePlane
+from schemas.scene_parts import TREE_RELATIONS, Box, Relation, SurfacePlane
 
 SCENE_NODE = "scene"
 
@@ -55,13 +55,13 @@ class ContactGraphFile(Model):
     def parent_link(self, node_id: str) -> Relation | None:
         """Return the directed relation whose target is `node_id` (every node but the root has one)."""
         for link in self.links:
-            if link.target == node_id and link.relation != "proximal":
+            if link.target == node_id and link.relation in TREE_RELATIONS:
                 return link
         return None
 
     def children(self, node_id: str) -> tuple[str, ...]:
         """Return the ids of the nodes that `node_id` carries or contains."""
-        return tuple(link.target for link in self.links if link.source == node_id and link.relation != "proximal")
+        return tuple(link.target for link in self.links if link.source == node_id and link.relation in TREE_RELATIONS)
 
 
 class ContactGraph(Artifact):

@@ -64,17 +64,23 @@ class Joint(Model):
     """Direction of the handle bar, model frame."""
 
 
+TREE_RELATIONS = ("supports", "contains", "carries_on_wall", "hangs_from")
+"""Relations from a parent to its child: every node but the root is the target of one. The others stand beside the tree:
+`also_supports` (a second carrier), `leans_on` (what keeps the target from falling over), `proximal` (undirected)."""
+
+
 class Relation(Model):
     """An edge of a contact graph (node-link `links` entry)."""
 
     source: str
     """Parent for directed relations; either end for `proximal`."""
     target: str
-    relation: Literal["supports", "contains", "carries_on_wall", "proximal"]
+    relation: Literal["supports", "contains", "carries_on_wall", "hangs_from", "also_supports", "leans_on", "proximal"]
     confidence: float
     plane: int | None = None
     """Index of the supporting plane in the parent's `planes`."""
     gap: float | None = None
-    """Signed height of the child's bottom over the plane before refinement [m] (equation 2.1)."""
+    """Signed height of the child's bottom over the plane before refinement [m] (equation 2.1); distance to the wall,
+    the ceiling or what it leans on."""
     overlap: float | None = None
     """Share of the child's footprint over the plane (equation 2.2)."""

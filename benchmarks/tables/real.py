@@ -18,6 +18,7 @@ import numpy as np
 import trimesh
 
 from schemas.kinds import ContactGraph, PanopticMap, Sequence
+from schemas.scene_parts import TREE_RELATIONS
 from stages.kit.running.chain import run_pipeline
 from stages.kit.running.pipelines import pipeline_path, read_pipeline
 from stages.kit.running.reading import open_artifact
@@ -57,7 +58,7 @@ def facts_of_run(run: Path) -> dict[str, Any]:
     supports = Counter(
         f"{classes[link.source]} > {classes[link.target]}"
         for link in graph.graph.links
-        if link.relation != "proximal" and link.source != "scene"
+        if link.relation in TREE_RELATIONS and link.source != "scene"
     )
     steps = {}
     for folder in sorted(run.iterdir()):

@@ -133,7 +133,7 @@ def shortlist(
     )
     walls = [entry for entry in graph.nodes if entry.class_name == "wall"]
     link = graph.parent_link(node.id)
-    hangs = link is not None and link.relation == "carries_on_wall"
+    hangs = link is not None and link.relation in ("carries_on_wall", "hangs_from")
     aligned = []
     for match in matches:
         placement = placement_of(match, align(match, weights, parameters.evaluations))

@@ -13,6 +13,7 @@ from schemas.cad_scene import CadCandidate, CadScene, CadSceneFile, Replacement
 from schemas.contact_graph import ContactGraph, ContactGraphFile, GraphNode
 from schemas.errors import BadInput, UsageError
 from schemas.panoptic_map import PanopticMap
+from schemas.scene_parts import TREE_RELATIONS
 from stages.cad.candidates import Shortlist, models_for, object_points, shortlist
 from stages.cad.conflicts import Selection, Solid, min_conflicts, penetration, placed_solid
 from stages.cad.model_surfaces import ModelSurface, load_surface
@@ -106,7 +107,7 @@ def find_candidates(
 
 
 def may_touch(graph: ContactGraphFile) -> set[frozenset[str]]:
-    """Return pairs that are no collision: parent and child."""
+    """Return pairs that are no collision: parent and child, and what else touches by nature."""
     return {frozenset((link.source, link.target)) for link in graph.links if link.relation != "proximal"}
 
 
@@ -253,7 +254,7 @@ def cad_graph(graph: ContactGraphFile, settled: Settled, surfaces: dict[str, Mod
             )
         )
     links = tuple(
-        settled.relations.get(link.target, link) if link.relation != "proximal" else link for link in graph.links
+        settled.relations.get(link.target, link) if link.relation in TREE_RELATIONS else link for link in graph.links
     )
     return graph.model_copy(update={"nodes": tuple(nodes), "links": links})
 

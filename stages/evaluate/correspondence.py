@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.scene_parts import Relation
+from schemas.scene_parts import TREE_RELATIONS, Relation
 from stages.evaluate.truth import TrueRoom, stuff_classes
 from stages.kit.geometry.boxes import box_iou, box_yaw
 from stages.kit.measurement.panoptic_quality import intersection_over_union, merge_stuff
@@ -34,7 +34,7 @@ def merge_stuff_nodes(graph: ContactGraphFile) -> tuple[ContactGraphFile, dict[s
         source, target = kept.get(link.source, link.source), kept.get(link.target, link.target)
         if source == target:
             continue
-        if link.relation != "proximal":
+        if link.relation in TREE_RELATIONS:
             if target in parents or _is_above(target, source, parents):
                 continue
             parents[target] = source

@@ -14,9 +14,8 @@ from stages.evaluate.map_measures import PredictedMap
 from stages.evaluate.results import Part
 from stages.evaluate.surfaces import read_surface
 from stages.kit.geometry.planes import fit_plane
+from stages.kit.measurement.edge_agreement import BESIDE_THE_TREE, DIRECTED
 from stages.kit.measurement.tables import Table
-
-DIRECTED = ("supports", "contains", "carries_on_wall")
 
 
 def count_frames(part: Part, info: SequenceFile) -> None:
@@ -84,7 +83,7 @@ def count_graph(part: Part, graph: ContactGraphFile) -> None:
     """Nodes by type and edges by relation."""
     for node_type in ("layout", "rigid", "articulated"):
         part.set(f"nodes_{node_type}", sum(n.node_type == node_type for n in graph.nodes))
-    for relation in (*DIRECTED, "proximal"):
+    for relation in (*DIRECTED, *BESIDE_THE_TREE):
         part.set(f"edges_{relation}", sum(link.relation == relation for link in graph.links))
     things = {n.id for n in graph.nodes if n.node_type in ("rigid", "articulated")}
     part.set("support_edges", sum(link.relation in DIRECTED and link.target in things for link in graph.links))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from schemas.contact_graph import SCENE_NODE, ContactGraph, ContactGraphFile, GraphNode
 from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import Relation
+from schemas.scene_parts import TREE_RELATIONS, Relation
+from stages.graph.beside import relations_beside
 from stages.graph.entities import load_entities, suppose_floor
 from stages.graph.nodes import Entity
 from stages.graph.parameters import GraphParameters
@@ -41,9 +42,12 @@ def run(panoptic_map: PanopticMap, *, parameters: GraphParameters, context: Cont
         "supports": sum(link.relation == "supports" for link in supports),
         "contains": sum(link.relation == "contains" for link in supports),
         "carried_on_wall": sum(link.relation == "carries_on_wall" for link in graph.links),
+        "hang_from_above": sum(link.relation == "hangs_from" for link in graph.links),
+        "second_carriers": sum(link.relation == "also_supports" for link in graph.links),
+        "leaning": sum(link.relation == "leans_on" for link in graph.links),
         "proximal": sum(link.relation == "proximal" for link in graph.links),
         "uncertain": sum(
-            link.confidence < parameters.minimum_score for link in graph.links if link.relation != "proximal"
+            link.confidence < parameters.minimum_score for link in graph.links if link.relation in TREE_RELATIONS
         ),
         "hidden_planes": sum(plane.hidden for node in graph.nodes for plane in node.planes),
         "floor": floor_note,
@@ -88,6 +92,8 @@ def contact_graph(
             links.append(Relation(source=SCENE_NODE, target=entity.name, relation="supports", confidence=1.0))
         else:
             links.append(relation_of(chosen[entity.name]))
+    if parameters.method == "ours":
+        links += relations_beside(entities, chosen, parameters)
     linked = {(link.source, link.target) for link in links}
     links += proximal_relations(entities, boxes, linked)
     return ContactGraphFile(nodes=tuple(nodes), links=tuple(links), graph={"method": parameters.method})
@@ -102,6 +108,6 @@ def relation_of(candidate: Candidate) -> Relation:
         relation=candidate.relation,
         confidence=float(min(1.0, max(0.0, candidate.score))),
         plane=candidate.patch,
-        gap=float(candidate.gap) if on_plane or candidate.relation == "carries_on_wall" else None,
+        gap=float(candidate.gap) if on_plane or candidate.relation in ("carries_on_wall", "hangs_from") else None,
         overlap=float(candidate.overlap) if on_plane else None,
     )

@@ -50,7 +50,7 @@ class Candidate:
     child: str
     parent: str
     score: float
-    relation: Literal["supports", "contains", "carries_on_wall"]
+    relation: Literal["supports", "contains", "carries_on_wall", "hangs_from"]
     gap: float
     """Signed height D of the child's bottom over the plane [m] (2.1)."""
     overlap: float

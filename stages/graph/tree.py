@@ -5,9 +5,11 @@ from __future__ import annotations
 from scipy.spatial import cKDTree
 
 from schemas.contact_graph import SCENE_NODE
+from stages.graph.hanging import hanging_candidate
 from stages.graph.nodes import Entity
 from stages.graph.parameters import GraphParameters
-from stages.graph.support import Candidate, candidates_for
+from stages.graph.shared_support import shared_candidates
+from stages.graph.support import HIDDEN_TOP_DISTANCE, Candidate, candidates_for
 from stages.graph.walls import wall_candidate
 
 FLOOR_CONFIDENCE = 0.1
@@ -19,24 +21,31 @@ UPRIGHT_LAYOUT = ("wall", "door", "window", "curtain", "ceiling")
 
 
 def ranked_candidates(entities: list[Entity], parameters: GraphParameters) -> dict[str, list[Candidate]]:
-    """Return for every object its acceptable relations, best first: support, then wall, then floor or scene.
+    """Return for every object its acceptable relations, best first: support, then wall or ceiling, then floor or scene.
 
     The last entry always hangs on the scene, so a tree exists whatever the map shows.
     """
     objects = [entity for entity in entities if entity.node_type != "layout"]
-    walls = [entity for entity in entities if entity.class_name in UPRIGHT_LAYOUT and len(entity.points)]
+    ours = parameters.method == "ours"
+    ceilings = [entity for entity in entities if entity.class_name == "ceiling"] if ours else []
+    upright = [e for e in entities if e.class_name in UPRIGHT_LAYOUT and len(e.points)]
+    walls = [entity for entity in upright if entity not in ceilings]
     floors = [entity for entity in entities if entity.class_name == "floor" and entity.supporting]
     trees = {wall.name: cKDTree(wall.points) for wall in walls}
     ranked: dict[str, list[Candidate]] = {}
     for child in objects:
         choices = candidates_for(child, entities, parameters)
+        if ours and not any(abs(c.gap) <= HIDDEN_TOP_DISTANCE for c in choices):
+            choices = [*shared_candidates(child, entities, parameters), *choices]
+            choices.sort(key=lambda candidate: -candidate.score)
         reach = parameters.wall_distance
-        if parameters.method == "ours" and child.movable:
+        if ours and child.movable:
             # A cup does not hang on the wall that the desk, which the map lacks, stands at.
             reach *= MOVABLE_REACH
         wall = wall_candidate(child, walls, reach, trees)
-        if wall is not None:
-            choices.append(wall)
+        hanging = hanging_candidate(child, ceilings, reach)
+        held = [candidate for candidate in (wall, hanging) if candidate is not None]
+        choices += sorted(held, key=lambda candidate: -candidate.score)
         choices += fallback_candidates(child, floors)
         ranked[child.name] = choices
     return ranked

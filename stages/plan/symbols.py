@@ -123,6 +123,9 @@ def symbolic_state(model: WorldModel, graph: ContactGraphFile) -> tuple[dict[str
     loaded = set()
     for link in graph.links:
         item, parent = link.target, link.source
+        if link.relation in ("also_supports", "leans_on"):
+            loaded.add(parent)  # it falls when this is moved
+            continue
         if link.relation == "proximal" or objects.get(item) != "item" or parent not in model.records:
             continue
         loaded.add(parent)

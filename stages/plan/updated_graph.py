@@ -6,7 +6,7 @@ import numpy as np
 
 from schemas.base import as_transform, as_vector
 from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.scene_parts import Box, Relation, SurfacePlane
+from schemas.scene_parts import TREE_RELATIONS, Box, Relation, SurfacePlane
 from stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion
 
 
@@ -19,7 +19,7 @@ def update_graph(
     """Return the graph after actions.
 
     `moved`: node -> (world_from_body before, after), `parents`: node -> (new parent, relation), `joints`: node ->
-    values by model joint name (without the node's prefix). Proximal relations of moved nodes are dropped.
+    values by model joint name (without the node's prefix). Of moved nodes, relations beside the tree are dropped.
     """
     nodes = []
     for node in graph.nodes:
@@ -31,7 +31,7 @@ def update_graph(
         nodes.append(node)
     links = []
     for link in graph.links:
-        if link.relation == "proximal":
+        if link.relation not in TREE_RELATIONS:
             if link.source not in moved and link.target not in moved:
                 links.append(link)
             continue

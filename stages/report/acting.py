@@ -78,7 +78,7 @@ def body_rows(scene: InteractiveScene) -> list[BodyRow]:
 def _place(relation: str, parent: str | None) -> str:
     if parent is None or parent == SCENE_NODE:
         return "part of the room"
-    word = {"contains": "in", "carries_on_wall": "hangs on"}.get(relation, "on")
+    word = {"contains": "in", "carries_on_wall": "hangs on", "hangs_from": "hangs from"}.get(relation, "on")
     return f"{word} {parent}"
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from schemas.contact_graph import ContactGraphFile, GraphNode
-from schemas.scene_parts import Relation
+from schemas.scene_parts import TREE_RELATIONS, Relation
 from stages.kit.measurement.palette import entity_color, hex_color
 from stages.kit.measurement.tree_layout import tree_layout
 
@@ -63,7 +63,7 @@ def draw_graph(
     marks = marks or {}
     parents: dict[str, str | None] = {node.id: None for node in graph.nodes}
     for link in graph.links:
-        if link.relation != "proximal" and link.target in parents and link.source in parents:
+        if link.relation in TREE_RELATIONS and link.target in parents and link.source in parents:
             parents[link.target] = link.source
     layout = tree_layout(parents)
     widths: dict[int, float] = {}
@@ -88,8 +88,8 @@ def draw_graph(
     for link in graph.links:
         if link.source not in boxes or link.target not in boxes:
             continue
-        if link.relation == "proximal":
-            proximal.append(DrawnEdge(_arc(boxes[link.source], boxes[link.target]), "proximal", _link_title(link)))
+        if link.relation not in TREE_RELATIONS:
+            proximal.append(DrawnEdge(_arc(boxes[link.source], boxes[link.target]), link.relation, _link_title(link)))
         else:
             edges.append(DrawnEdge(_elbow(boxes[link.source], boxes[link.target]), link.relation, _link_title(link)))
     rows = max((row for _, row in layout.values()), default=0.0)

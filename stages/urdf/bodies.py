@@ -30,7 +30,8 @@ def _body(cad_scene: CadScene, graph: ContactGraphFile, node: GraphNode, movable
     link = graph.parent_link(node.id)
     relation = "supports" if link is None else link.relation
     parent = None if link is None or link.source == SCENE_NODE else link.source
-    carried = node.class_name in movable and node.node_type != "layout"
+    stands = relation in ("supports", "contains")  # what hangs would fall
+    carried = node.class_name in movable and node.node_type != "layout" and stands
     if node.model_id is not None:
         if node.world_from_model is None or node.scale is None:
             raise BadInput(f"{cad_scene.path('graph.json')}: node {node.id} has a model but no pose or scale")

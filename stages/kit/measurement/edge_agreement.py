@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from schemas.contact_graph import ContactGraphFile
+from schemas.scene_parts import TREE_RELATIONS
 
-DIRECTED = ("supports", "contains", "carries_on_wall")
+DIRECTED = TREE_RELATIONS
+BESIDE_THE_TREE = ("also_supports", "leans_on", "proximal")
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ def edge_agreement(
     partner: Mapping[str, str],
     *,
     ignored: frozenset[str] = frozenset(),
-    relations: tuple[str, ...] = (*DIRECTED, "proximal"),
+    relations: tuple[str, ...] = (*DIRECTED, *BESIDE_THE_TREE),
 ) -> dict[str, EdgeAgreement]:
     """Compare edges under a pairing of nodes.
 

@@ -15,6 +15,7 @@ from scipy.optimize import linear_sum_assignment
 
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile
 from schemas.errors import BadInput
+from schemas.scene_parts import TREE_RELATIONS
 
 WRONG_SUPPORT_COST = 2
 EXPANSION_BUDGET = 200_000
@@ -43,7 +44,7 @@ def support_tree(graph: ContactGraphFile, optional: frozenset[str] = frozenset()
     """
     parent = {n.id: SCENE_NODE for n in graph.nodes if n.node_type != "scene"}
     for link in graph.links:
-        if link.relation != "proximal" and link.target in parent:
+        if link.relation in TREE_RELATIONS and link.target in parent:
             parent[link.target] = link.source if link.source in parent else SCENE_NODE
     classes = {n.id: n.class_name for n in graph.nodes}
     ordered: list[str] = []

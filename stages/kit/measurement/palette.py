@@ -8,6 +8,9 @@ RELATION_COLORS = {
     "supports": "#2f6fb3",
     "contains": "#c2571a",
     "carries_on_wall": "#7a4fb0",
+    "hangs_from": "#2c8f6f",
+    "also_supports": "#2f6fb3",
+    "leans_on": "#b0487a",
     "proximal": "#8c8c8c",
 }
 UNLABELLED = (0.46, 0.45, 0.44)

@@ -16,6 +16,7 @@ from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 
 from schemas.contact_graph import ContactGraphFile  # noqa: E402
+from schemas.scene_parts import TREE_RELATIONS  # noqa: E402
 from stages.kit.geometry.boxes import polygon_area  # noqa: E402
 from stages.kit.measurement.palette import RELATION_COLORS  # noqa: E402
 from stages.kit.measurement.tree_layout import tree_layout  # noqa: E402
@@ -148,7 +149,7 @@ def plot_graphs(
 def _parents(graph: ContactGraphFile) -> dict[str, str | None]:
     result: dict[str, str | None] = {node.id: None for node in graph.nodes}
     for link in graph.links:
-        if link.relation != "proximal" and link.target in result:
+        if link.relation in TREE_RELATIONS and link.target in result:
             result[link.target] = link.source
     return result
 
@@ -168,7 +169,9 @@ def _draw_tree(
             continue
         (x0, y0), (x1, y1) = places[link.source], places[link.target]
         bend = x1 - 2.0
-        axes.plot([x0, bend, bend, x1], [y0, y0, y1, y1], color=RELATION_COLORS[link.relation], linewidth=1.2)
+        style = "-" if link.relation in TREE_RELATIONS else "--"
+        color = RELATION_COLORS[link.relation]
+        axes.plot([x0, bend, bend, x1], [y0, y0, y1, y1], color=color, linewidth=1.2, linestyle=style)
     for name, (x, y) in places.items():
         axes.annotate(
             name, (x, y), ha="left", va="center", size=7.5, color=marked.get(name, "#222222"),

@@ -6,6 +6,7 @@ import numpy as np
 
 from schemas.contact_graph import ContactGraph, ContactGraphFile, GraphNode
 from schemas.panoptic_map import PanopticMap
+from schemas.scene_parts import TREE_RELATIONS
 from stages.kit.geometry.boxes import box_corners
 from stages.kit.measurement.palette import RELATION_COLORS, UNLABELLED, instance_color
 from stages.kit.viewing.canvas import SHELL, Canvas, Color
@@ -58,7 +59,7 @@ def draw_graph(graph: ContactGraphFile, canvas: Canvas, *hidden: str) -> None:
         strips = [np.stack([centers[a], centers[b]]) for a, b in ends if a in centers and b in centers]
         if strips:
             canvas.line(f"edges/{relation}", strips, [_rgb(color)] * len(strips), radius=0.008)
-    tree = [(link.source, link.target) for link in graph.links if link.relation != "proximal"]
+    tree = [(link.source, link.target) for link in graph.links if link.relation in TREE_RELATIONS]
     canvas.graph([node.id for node in graph.nodes], [_color(node) for node in graph.nodes], tree)
 
 

@@ -10,8 +10,9 @@ from schemas.contact_graph import ContactGraphFile
 def as_networkx(graph: ContactGraphFile) -> Any:
     """Return a networkx.MultiDiGraph: node id -> the fields of GraphNode, edges keyed and attributed by relation.
 
-    `supports`, `contains` and `carries_on_wall` go from the carrier to what it carries; `proximal` holds both ways and
-    is there once. `box` and `planes` are the models of schemas/scene_parts.py.
+    `supports`, `contains`, `carries_on_wall` and `hangs_from` go from the carrier to what it carries, and so do
+    `also_supports` and `leans_on`, which stand beside the tree; `proximal` holds both ways and is there once. `box` and
+    `planes` are the models of schemas/scene_parts.py.
     """
     import networkx
 

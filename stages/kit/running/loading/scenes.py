@@ -25,7 +25,8 @@ class _WithGraph(LoadedArtifact):
     @cached_property
     def graph(self) -> Any:
         """The contact graph, a networkx.MultiDiGraph: node id -> class_name, node_type, box, planes, ...; edges have
-        `relation` (supports, contains, carries_on_wall from carrier to carried; proximal)."""
+        `relation` (supports, contains, carries_on_wall, hangs_from, also_supports, leans_on from carrier to carried;
+        proximal)."""
         return as_networkx(self.graph_file)
 
 

@@ -1,0 +1,82 @@
+"""Whether an object can stand on what is under it, or must be held by something beside it (statics, not learning)."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+
+from schemas.scene_parts import Relation
+from stages.graph.nodes import Entity
+from stages.kit.geometry.boxes import convex_hull
+
+FOOT_HEIGHT = 0.03
+"""Points within this height over the lowest one can touch the ground [m]."""
+LOWEST_SHARE = 0.01
+"""Share of the points that is noise below the object."""
+CLEARANCE = 0.02
+"""How far outside of its footing the middle of an object must lie before it counts as unbalanced [m]."""
+CLEARANCE_SHARE = 0.1
+"""... and in shares of its height: a board of 2 m that leans by less stands."""
+TOUCH = 0.03
+"""What an object leans on is at most this far from it [m]."""
+LEAST_HEIGHT = 0.3
+"""... and touches it at this share of its height or above."""
+LEAST_TOUCHING = 5
+
+
+def footing(points: np.ndarray) -> np.ndarray:
+    """Return the hull (K, 2) of the ground projection of the points (N, 3) [m] that can touch what carries them."""
+    lowest = np.quantile(points[:, 2], LOWEST_SHARE)
+    return convex_hull(points[points[:, 2] <= lowest + FOOT_HEIGHT, :2])
+
+
+def overhang(points: np.ndarray) -> float:
+    """Return how far [m] the middle of points (N, 3) lies outside of their footing; 0 inside.
+
+    The mean of a surface stands in for the centre of mass: exact for shells, close for boards and boxes. A surface that
+    was seen from one side shifts it by half the thickness, which is what CLEARANCE is for.
+    """
+    hull = footing(points)
+    middle = shapely.Point(points[:, :2].mean(axis=0))
+    return float(shapely.MultiPoint(hull).convex_hull.distance(middle))
+
+
+def is_unbalanced(child: Entity) -> bool:
+    """Whether an object would fall over if nothing but its footing carried it."""
+    if len(child.points) < LEAST_TOUCHING:
+        return False
+    height = child.top - child.bottom
+    return overhang(child.points) > max(CLEARANCE, CLEARANCE_SHARE * height)
+
+
+def leaning_relation(child: Entity, parent: str, entities: list[Entity]) -> Relation | None:
+    """Return `leans_on`: what an unbalanced object touches beside its carrier `parent`, the nearest of all; else None.
+
+    The contact must lie at LEAST_HEIGHT of its height or above, and on the side to which it would fall. The confidence
+    falls from 1 at contact to 0.5 at TOUCH.
+    """
+    if not is_unbalanced(child):
+        return None
+    middle = child.points[:, :2].mean(axis=0)
+    outward = middle - footing(child.points).mean(axis=0)
+    outward /= max(float(np.linalg.norm(outward)), 1e-9)
+    high = child.points[child.points[:, 2] >= child.bottom + LEAST_HEIGHT * (child.top - child.bottom)]
+    best: tuple[float, int, str] | None = None
+    for other in entities:
+        if other.name in (child.name, parent) or other.class_name in ("floor", "ceiling") or not len(other.points):
+            continue
+        distance, nearest = cKDTree(other.points).query(high, distance_upper_bound=TOUCH)
+        touching = np.isfinite(distance)
+        if np.count_nonzero(touching) < LEAST_TOUCHING:
+            continue
+        contact = other.points[nearest[touching], :2].mean(axis=0)
+        if (contact - middle) @ outward <= 0.0:
+            continue
+        found = (float(np.sort(distance[touching])[LEAST_TOUCHING - 1]), other.instance, other.name)
+        best = found if best is None else min(best, found)
+    if best is None:
+        return None
+    return Relation(
+        source=best[2], target=child.name, relation="leans_on", confidence=1.0 - 0.5 * best[0] / TOUCH, gap=best[0]
+    )

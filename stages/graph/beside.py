@@ -1,0 +1,57 @@
+"""Relations beside the tree: further carriers, and what keeps an object from falling over (Han 2024, section 2.6.5)."""
+
+from __future__ import annotations
+
+from schemas.scene_parts import Relation
+from stages.graph.balance import leaning_relation
+from stages.graph.nodes import Entity
+from stages.graph.parameters import GraphParameters
+from stages.graph.shared_support import PartialSupport, partial_supports, together_with
+from stages.graph.support import Candidate
+from stages.graph.tree import descends_from
+
+FULLY_CARRIED = 0.9
+"""Over so much of its footprint a carrier needs no help."""
+
+
+def relations_beside(
+    entities: list[Entity], chosen: dict[str, Candidate], parameters: GraphParameters
+) -> list[Relation]:
+    """Return `also_supports` and `leans_on` of all objects, in the order of the entities."""
+    found: list[Relation] = []
+    for child in entities:
+        candidate = chosen.get(child.name)
+        if candidate is None or candidate.relation not in ("supports", "contains"):
+            continue
+        found += further_carriers(child, candidate, entities, chosen, parameters)
+        if candidate.relation == "supports":
+            leaning = leaning_relation(child, candidate.parent, entities)
+            if leaning is not None and not descends_from(leaning.source, child.name, chosen):
+                found.append(leaning)
+    return found
+
+
+def further_carriers(
+    child: Entity,
+    candidate: Candidate,
+    entities: list[Entity],
+    chosen: dict[str, Candidate],
+    parameters: GraphParameters,
+) -> list[Relation]:
+    """Return `also_supports` of every other entity that carries a part of the child at the height of its parent."""
+    if candidate.patch is None or candidate.relation != "supports" or candidate.overlap >= FULLY_CARRIED:
+        return []
+    main = PartialSupport(candidate.parent, candidate.patch, candidate.gap, candidate.overlap, candidate.height)
+    return [
+        Relation(
+            source=part.parent,
+            target=child.name,
+            relation="also_supports",
+            confidence=float(part.share),
+            plane=part.patch,
+            gap=float(part.gap),
+            overlap=float(part.share),
+        )
+        for part in together_with(main, partial_supports(child, entities, parameters))
+        if not descends_from(part.parent, child.name, chosen)
+    ]

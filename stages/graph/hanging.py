@@ -1,0 +1,42 @@
+"""Objects that hang from above: a lamp from the ceiling (what Han 2024, section 2.6.5, leaves out)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from stages.graph.nodes import Entity
+from stages.graph.support import Candidate
+
+NEIGHBOURHOOD = 0.5
+"""The ceiling over an object is what lies within this ground distance of its middle [m]; the object hides the rest."""
+LEAST_POINTS = 10
+
+
+def ceiling_height(ceiling: Entity, at: np.ndarray) -> float | None:
+    """Return the height [m] of a ceiling over the ground point `at` (2,): the median of what was seen around it, else
+    of all of it. None without points."""
+    if not len(ceiling.points):
+        return None
+    near = cKDTree(ceiling.points[:, :2]).query_ball_point(at, NEIGHBOURHOOD)
+    heights = ceiling.points[near, 2] if len(near) >= LEAST_POINTS else ceiling.points[:, 2]
+    return float(np.median(heights))
+
+
+def hanging_candidate(child: Entity, ceilings: list[Entity], limit: float) -> Candidate | None:
+    """Return the relation `hangs_from` of the nearest ceiling whose gap over the child's top is at most `limit` [m].
+
+    The confidence falls from 1 at contact to 0.5 at the limit, as on a wall (`wall_candidate`).
+    """
+    found: list[tuple[float, int, Entity]] = []
+    for ceiling in ceilings:
+        height = ceiling_height(ceiling, np.asarray(child.box.center[:2]))
+        if height is not None:
+            found.append((abs(height - child.top), ceiling.instance, ceiling))
+    gap, _, ceiling_ = min(found, key=lambda entry: entry[:2], default=(math.inf, 0, child))
+    if gap > limit:
+        return None
+    confidence = 1.0 - 0.5 * gap / limit if limit > 0 else 1.0
+    return Candidate(child.name, ceiling_.name, confidence, "hangs_from", gap, 0.0, child.top, None)

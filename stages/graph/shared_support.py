@@ -1,0 +1,74 @@
+"""Objects that several others carry at one height: a board over two tables (Han 2024, section 2.6.5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.graph.nodes import Entity, plane_height
+from stages.graph.parameters import GraphParameters
+from stages.graph.support import Candidate, height_gap, hull_overlap, stands_inside, support_score
+
+SAME_LEVEL = 0.02
+"""Planes nearer than this in height carry one thing together [m]."""
+PART_SHARE = 0.1
+"""A carrier among several is over at least this share of the child's footprint."""
+
+
+@dataclass(frozen=True)
+class PartialSupport:
+    """A plane that carries a part of an object."""
+
+    parent: str
+    patch: int
+    gap: float
+    share: float
+    """Of the child's footprint."""
+    height: float
+
+
+def partial_supports(child: Entity, entities: list[Entity], parameters: GraphParameters) -> list[PartialSupport]:
+    """Return of every entity the seen plane just below the child that carries most of it, at least PART_SHARE.
+
+    Layout and what lies around the child (a shelf around a book) carry no part: the floor is under everything.
+    """
+    found: dict[str, PartialSupport] = {}
+    for parent in entities:
+        if parent.name == child.name or parent.node_type == "layout":
+            continue
+        for k in parent.supporting:
+            patch = parent.patches[k]
+            gap = height_gap(child.box, patch)
+            if patch.plane.hidden or not -SAME_LEVEL <= gap <= parameters.maximum_sinking:
+                continue
+            share = hull_overlap(patch.hull, child.box)
+            height = plane_height(patch.plane, np.asarray(child.box.center[:2]))
+            if share < PART_SHARE or stands_inside(child, parent, height):
+                continue
+            if parent.name not in found or share > found[parent.name].share:
+                found[parent.name] = PartialSupport(parent.name, k, gap, share, height)
+    return list(found.values())
+
+
+def together_with(main: PartialSupport, parts: list[PartialSupport]) -> list[PartialSupport]:
+    """Return the other parts at the height of `main`."""
+    return [p for p in parts if p.parent != main.parent and abs(p.height - main.height) <= SAME_LEVEL]
+
+
+def shared_candidates(child: Entity, entities: list[Entity], parameters: GraphParameters) -> list[Candidate]:
+    """Return relations to carriers of which none reaches b_th (2.2) alone and that do together: a board over two tables
+    (Han 2024, section 2.6.5). The one that carries most is the parent; the score counts the shares of all."""
+    parts = partial_supports(child, entities, parameters)
+    result = []
+    for main in parts:
+        others = together_with(main, parts)
+        total = min(1.0, main.share + sum(p.share for p in others))
+        if not others or total < parameters.area_threshold or any(p.share > main.share for p in others):
+            continue
+        score = support_score(main.gap, total)
+        if score >= parameters.minimum_score:
+            result.append(
+                Candidate(child.name, main.parent, score, "supports", main.gap, main.share, main.height, main.patch)
+            )
+    return result
