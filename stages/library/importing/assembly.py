@@ -49,7 +49,7 @@ WIDEST_GRASP = 0.08
 """Opening of a two-finger gripper [m]."""
 HANDLE = re.compile(r"handle|grip|knob|pull", re.IGNORECASE)
 LARGEST_MASS = 1000.0
-"""[kg]"""
+"""[kg]; larger ones are questioned, and none is assumed to be larger."""
 LIGHTEST, HEAVIEST = 5.0, 12000.0
 """Mean density over the collision pieces [kg/m^3]."""
 MOST_STATES_OF = 12
@@ -484,6 +484,7 @@ def _geometries(parts: Sequence[Part], density: float, findings: list[str]) -> l
         mean = known / covered
         masses = [mean * v if mass is None else mass for v, mass in zip(volumes, given, strict=True)]
     else:
+        density = min(density, LARGEST_MASS / sum(volumes))
         masses = [density * v for v in volumes]
         findings.append(f"no mass: {sum(masses):.3g} kg at {density:g} kg/m3")
     mean_density = sum(masses) / sum(volumes)
