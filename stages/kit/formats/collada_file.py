@@ -109,6 +109,11 @@ class _Reader:
             raise BadInput(f"{self.where}: {what} is empty")
         return values
 
+    def _count(self, text: str) -> int:
+        if not (text.isascii() and text.isdigit() and len(text) < 4):
+            raise BadInput(f"{self.where}: {text!r:.40} is no stride or offset")
+        return int(text)
+
     def _transform(self, node: ElementTree.Element) -> np.ndarray:
         whole = np.eye(4)
         for element in node:
@@ -180,7 +185,7 @@ class _Reader:
         accessor = source.find("technique_common/accessor") if source is not None else None
         if array is None:
             raise BadInput(f"{self.where}: source {reference!r:.60} holds no numbers")
-        stride = int(accessor.get("stride", "1")) if accessor is not None else 3
+        stride = self._count(accessor.get("stride", "1")) if accessor is not None else 3
         values = self._numbers(array.text, f"source {reference!r:.60}")
         if not 1 <= stride <= 16 or len(values) % stride or not np.isfinite(values).all():
             raise BadInput(f"{self.where}: source {reference!r:.60} is torn or not finite")
@@ -190,7 +195,7 @@ class _Reader:
         self, element: ElementTree.Element, pose: np.ndarray, name: str, bound: dict[str, str]
     ) -> ColladaPatch | None:
         inputs = [
-            (i.get("semantic"), i.get("source", ""), int(i.get("offset", "0")), i.get("set", "0"))
+            (i.get("semantic"), i.get("source", ""), self._count(i.get("offset", "0")))
             for i in element.findall("input")
         ]
         width = 1 + max((entry[2] for entry in inputs), default=0)

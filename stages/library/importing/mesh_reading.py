@@ -6,6 +6,7 @@ import base64
 import binascii
 import json
 import struct
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -66,10 +67,11 @@ def _surface_of(mesh: trimesh.Trimesh, name: str) -> Surface:
     visual = mesh.visual
     if isinstance(visual, trimesh.visual.TextureVisuals):
         image = getattr(visual.material, "baseColorTexture", None) or getattr(visual.material, "image", None)
-        if visual.uv is not None and image is not None:
-            colors = face_colors(np.asarray(image.convert("RGB")), np.asarray(visual.uv)[faces])
-        else:
-            colors = np.tile(np.asarray(visual.material.main_color, dtype=np.uint8)[:3], (len(faces), 1))
+        with suppress(Exception):  # Pillow raises whatever its decoders raise; the colour is then the plain one
+            if visual.uv is not None and image is not None:
+                colors = face_colors(np.asarray(image.convert("RGB")), np.asarray(visual.uv)[faces])
+            else:
+                colors = np.tile(np.asarray(visual.material.main_color, dtype=np.uint8)[:3], (len(faces), 1))
     elif visual is not None and visual.kind is not None:
         colors = np.asarray(visual.face_colors, dtype=np.uint8)[:, :3]
     return Surface(np.asarray(mesh.vertices, dtype=float), faces, colors, name)

@@ -166,7 +166,7 @@ class _Reader:
         for geom in body.findall("geom"):
             attributes = self._attributes(geom, child_class)
             surfaces = self._geom(attributes, where)
-            if int(attributes.get("group", "0")) <= LAST_VISIBLE_GROUP:
+            if float(numbers(attributes.get("group", "0"), 1, f"{where}: group")[0]) <= LAST_VISIBLE_GROUP:
                 visual += surfaces
             if attributes.get("contype", "1") != "0" or attributes.get("conaffinity", "1") != "0":
                 collision += surfaces
@@ -305,7 +305,7 @@ class _Reader:
         element = self.assets["mesh"].get(name)
         if element is None:
             raise BadInput(f"{where}: mesh {name!r:.60} is not declared")
-        attributes = {**self.defaults[element.get("class", MAIN)].get("mesh", {}), **element.attrib}
+        attributes = self._attributes(element, MAIN)
         file = attributes.get("file", "")
         shelf = self.compiler.get("meshdir") or self.compiler.get("assetdir") or ""
         found = self.folder.find(f"{shelf}/{file}" if shelf else file, self.path.parent)

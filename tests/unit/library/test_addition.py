@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from pathlib import Path
@@ -12,6 +13,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cli.main import run as command_line
 from schemas.cad_library import CadLibrary, CadModel, ImportedModel, ImportFile
 from schemas.errors import BadInput, MissingDependency
 from stages.kit.formats.cad_models import load_collision_parts, model_folder, part_transforms, posed_mesh, read_model
@@ -21,12 +23,13 @@ from stages.kit.geometry.transforms import apply
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.library.addition import run
-from stages.library.importing.assembly import normal_limits
+from stages.library.importing.assembly import grouped, normal_limits, source_points
 from stages.library.importing.classes import class_of
+from stages.library.importing.discovery import find_models
 from stages.library.importing.frames import AXES, model_rotation
 from stages.library.importing.pieces import convex_pieces
 from stages.library.importing.source_folder import SourceFolder
-from stages.library.importing.source_model import Surface, painted_faces
+from stages.library.importing.source_model import SourceModel, Surface, painted_faces
 from stages.library.importing.versions import coacd_version, uses_coacd
 from stages.library.parameters import AdditionParameters
 from tests.real_data import real_data
@@ -527,3 +530,70 @@ def test_real_dae_furniture_is_in_centimetres(tmp_path) -> None:
     np.testing.assert_allclose(sorted(size_of(model).tolist()), [0.437, 0.474, 0.913], atol=1e-3)
     assert (record.unit, record.unit_from, record.front_from) == (0.01, "meshes", "back rest")
     assert any(plane.horizontal and 0.35 < plane.center[2] < 0.5 for plane in model.states[0].planes)  # the seat
+
+
+def test_the_command_takes_a_folder_and_prints_a_table(tmp_path, capsys) -> None:
+    obj_box(tmp_path / "in" / "mug.obj", (0.08, 0.1, 0.08))
+    out = tmp_path / "out"
+    assert command_line(["library", "add", str(tmp_path / "in"), "--out", str(out), "--decomposition", "hulls"]) == 0
+    said = capsys.readouterr()
+    assert said.out == f"{out}\n"
+    (row,) = [line for line in said.err.splitlines() if line.startswith("mug ")]
+    assert row.split()[:7] == ["mug", "cup", "0.08", "x", "0.08", "x", "0.10"]
+    assert "m (assumed)" in row and "+y (assumed)" in row
+    twice = ["library", "add", str(tmp_path), "--models", str(tmp_path), "--out", str(out)]
+    assert command_line(twice) == 2 and command_line(["library", "add", "--out", str(out)]) == 2
+    assert command_line(["library", "add", str(tmp_path / "nowhere"), "--out", str(out)]) == 3
+    assert all(line.startswith("error: ") for line in capsys.readouterr().err.splitlines())
+
+
+SEEDS = {
+    "old_cabinet.urdf": URDF,
+    "hutch.xml": MJCF.format(angle="degree", turn=30, low=-10, high=70)
+    .replace("../renamed/sub/", "")
+    .replace("/></body>", ' group="1"/></body>'),
+    "chair.dae": dae(0.01, "Y_UP", (45.0, 90.0, 50.0)),
+    "box.obj": "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\nf 1 2 4\n",
+    "shelf.sdf": '<sdf version="1.7"><model name="shelf"><link name="a"><visual name="v"><geometry><cylinder>'
+    "<radius>1</radius><length>2</length></cylinder></geometry></visual></link></model></sdf>",
+    "cup.gltf": '{"buffers":[{"uri":"data:;base64,AAAA","byteLength":3}],"bufferViews":[{"buffer":0,"byteLength":3}],'
+    '"accessors":[{"bufferView":0,"count":1,"type":"SCALAR","componentType":5121}],"meshes":[{"primitives":[{}]}]}',
+}  # fmt: skip
+PIECES = (
+    "",
+    "nan",
+    "-1",
+    "1e400",
+    "99999999999999999999",
+    "0",
+    '"',
+    "<",
+    "/",
+    "../",
+    "\0",
+    "\u20ac",
+    "mesh",
+    "box",
+    "#g",
+)
+
+
+CHANGE = st.tuples(st.floats(0, 1), st.integers(0, 12), st.sampled_from(PIECES))
+
+
+@given(st.sampled_from(sorted(SEEDS)), st.lists(CHANGE, max_size=4))
+@settings(max_examples=250, deadline=None)
+def test_damaged_files_are_bad_input_and_nothing_else(tmp_path_factory, name, changes) -> None:
+    text = SEEDS[name]
+    for place, length, piece in changes:
+        start = int(place * len(text))
+        text = text[:start] + piece + text[start + length :]
+    folder = tmp_path_factory.mktemp("damaged")
+    write(folder / "assets.xml", ASSETS)
+    obj_box(folder / "parts" / "carcass.obj", (60.0, 50.0, 80.0))
+    (folder / name).write_text(text, encoding="utf-8")
+    for model in find_models(SourceFolder(folder)):
+        if isinstance(model, SourceModel):
+            with contextlib.suppress(BadInput):
+                groups, _ = grouped(model)
+                assert source_points(groups).shape[1] == 3
