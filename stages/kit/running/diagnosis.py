@@ -23,6 +23,7 @@ EXTRAS = {
     "rerun-sdk": ("rerun", "viewing artifacts: pip install rerun-sdk"),
     "ray": ("ray", "batches on a cluster: pip install ray"),
     "mujoco": ("mujoco", "opening scene.mjcf.xml: pip install mujoco"),
+    "coacd": ("coacd", "library add cuts up hollow collision shapes: pip install coacd"),
     "atheris": ("atheris", "make fuzz: pip install atheris"),
     "transformers": ("transformers", "segment --backend huggingface: pip install transformers (without torchvision)"),
     "onnxruntime": ("onnxruntime", "segment --backend onnx: pip install onnxruntime"),
