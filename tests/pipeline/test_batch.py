@@ -51,8 +51,10 @@ def runs_of(out: Path, job: str) -> int:
 def start(spec: Path, out: Path, jobs: int = 2) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "tests.pipeline.batch_process", str(spec), str(out), str(jobs)]
     return subprocess.Popen(
-        command, cwd=REPOSITORY, stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(REPOSITORY)}
-    )
+        command, cwd=REPOSITORY, stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
+        # A shell lets what it starts in the background ignore SIGINT, and children inherit that.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
 
 
 def wait_for(condition: object, what: str) -> None:

@@ -140,6 +140,7 @@ def _read_obj(folder: SourceFolder, path: Path) -> MeshContent:
                 libraries.append(rest.strip())
     except (ValueError, IndexError) as error:
         raise BadInput(f"{path}: cannot be read as OBJ: {error}"[:200]) from None
+    blocks = {key: block for key, block in blocks.items() if block[0]}  # faces of two corners hold no triangle
     if not vertices or not blocks or any(len(vertex) != 3 for vertex in vertices):
         raise BadInput(f"{path}: holds no triangles")
     materials = _read_materials(folder, path, libraries)

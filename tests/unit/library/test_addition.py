@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from cli.main import run as command_line
@@ -582,6 +582,7 @@ CHANGE = st.tuples(st.floats(0, 1), st.integers(0, 12), st.sampled_from(PIECES))
 
 
 @given(st.sampled_from(sorted(SEEDS)), st.lists(CHANGE, max_size=4))
+@example(name="box.obj", changes=[(0.75, 0, "nan"), (0.9375, 1, "")])  # a face that lost corners
 @settings(max_examples=250, deadline=None)
 def test_damaged_files_are_bad_input_and_nothing_else(tmp_path_factory, name, changes) -> None:
     text = SEEDS[name]
