@@ -25,7 +25,8 @@ class TrueObject(Model):
     joints: dict[str, float] = {}
     """Joint name -> value while the room was scanned."""
     box: Box
-    """Gravity-aligned box of the whole object as it stands (open doors included), along the model's own axes."""
+    """Gravity-aligned box of the whole object as it stands (open doors included): along its model's own axes; in a
+    scan, and where a model lies across its axes, the one of least footprint."""
     round: bool = False
     """Turning it about the vertical changes nothing that matters (a bottle): the yaw of its box says nothing."""
     visible_pixels: int = 0

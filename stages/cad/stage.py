@@ -254,7 +254,10 @@ def cad_graph(graph: ContactGraphFile, settled: Settled, surfaces: dict[str, Mod
             )
         )
     links = tuple(
-        settled.relations.get(link.target, link) if link.relation in TREE_RELATIONS else link for link in graph.links
+        settled.relations.get(link.target, link)
+        if link.relation in TREE_RELATIONS
+        else link.model_copy(update={"plane": None})  # it counted the planes that were seen, not the model's
+        for link in graph.links
     )
     return graph.model_copy(update={"nodes": tuple(nodes), "links": links})
 

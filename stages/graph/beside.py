@@ -21,13 +21,12 @@ def relations_beside(
     found: list[Relation] = []
     for child in entities:
         candidate = chosen.get(child.name)
-        if candidate is None or candidate.relation not in ("supports", "contains"):
+        if candidate is None or candidate.relation != "supports":
             continue
         found += further_carriers(child, candidate, entities, chosen, parameters)
-        if candidate.relation == "supports":
-            leaning = leaning_relation(child, candidate.parent, entities)
-            if leaning is not None and not descends_from(leaning.source, child.name, chosen):
-                found.append(leaning)
+        leaning = leaning_relation(child, candidate.parent, entities)
+        if leaning is not None and not descends_from(leaning.source, child.name, chosen):
+            found.append(leaning)
     return found
 
 
@@ -39,7 +38,7 @@ def further_carriers(
     parameters: GraphParameters,
 ) -> list[Relation]:
     """Return `also_supports` of every other entity that carries a part of the child at the height of its parent."""
-    if candidate.patch is None or candidate.relation != "supports" or candidate.overlap >= FULLY_CARRIED:
+    if candidate.patch is None or candidate.overlap >= FULLY_CARRIED:
         return []
     main = PartialSupport(candidate.parent, candidate.patch, candidate.gap, candidate.overlap, candidate.height)
     return [

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -30,13 +28,11 @@ def hanging_candidate(child: Entity, ceilings: list[Entity], limit: float) -> Ca
 
     The confidence falls from 1 at contact to 0.5 at the limit, as on a wall (`wall_candidate`).
     """
-    found: list[tuple[float, int, Entity]] = []
-    for ceiling in ceilings:
-        height = ceiling_height(ceiling, np.asarray(child.box.center[:2]))
-        if height is not None:
-            found.append((abs(height - child.top), ceiling.instance, ceiling))
-    gap, _, ceiling_ = min(found, key=lambda entry: entry[:2], default=(math.inf, 0, child))
-    if gap > limit:
+    over = [(ceiling_height(ceiling, np.asarray(child.box.center[:2])), ceiling) for ceiling in ceilings]
+    gaps = [(abs(height - child.top), ceiling.instance, ceiling.name) for height, ceiling in over if height is not None]
+    near = [entry for entry in gaps if entry[0] <= limit]
+    if not near:
         return None
+    gap, _, name = min(near)
     confidence = 1.0 - 0.5 * gap / limit if limit > 0 else 1.0
-    return Candidate(child.name, ceiling_.name, confidence, "hangs_from", gap, 0.0, child.top, None)
+    return Candidate(child.name, name, confidence, "hangs_from", gap, 0.0, child.top, None)

@@ -30,7 +30,7 @@ class SceneNNParameters(Parameters):
 
 STAGE = Stage(
     name="truth scenenn",
-    version=1,
+    version=2,
     summary="Make ground truth out of SceneNN's annotation, in the world frame of a sequence of that scene",
     parameters=SceneNNParameters,
     reads={

@@ -22,7 +22,7 @@ class UrdfParameters(Parameters):
 
 STAGE = Stage(
     name="urdf",
-    version=1,
+    version=2,
     summary="Convert the CAD scene into a kinematic tree: URDF for simulators and robots, MJCF beside it",
     parameters=UrdfParameters,
     reads={"cad_scene": CadScene},

@@ -253,15 +253,22 @@ def _parse_link(element: ElementTree.Element, path: Path) -> Link:
     return Link(name, properties, tuple(s for s in visuals if s), tuple(s for s in collisions if s))
 
 
-def _parse_joint(element: ElementTree.Element, path: Path) -> UrdfJoint:
-    name = element.get("name", "")
-    where = f"{path}: joint {name!r}"
+def joint_ends(element: ElementTree.Element, where: str) -> tuple[str, str]:
+    """Return the names of parent and child link of a joint element. Raises BadInput, which begins with `where`, when
+    one is missing."""
     ends = []
     for tag in ("parent", "child"):
         end = element.find(tag)
         if end is None or not end.get("link"):
             raise BadInput(f"{where}: no {tag} link")
         ends.append(end.get("link", ""))
+    return ends[0], ends[1]
+
+
+def _parse_joint(element: ElementTree.Element, path: Path) -> UrdfJoint:
+    name = element.get("name", "")
+    where = f"{path}: joint {name!r}"
+    parent, child = joint_ends(element, where)
     axis_element, limit, dynamics = element.find("axis"), element.find("limit"), element.find("dynamics")
     axis = _floats(axis_element.get("xyz") if axis_element is not None else "1 0 0", 3, f"{where}: axis")
 
@@ -271,8 +278,8 @@ def _parse_joint(element: ElementTree.Element, path: Path) -> UrdfJoint:
     return UrdfJoint(
         name=name,
         type=element.get("type", ""),
-        parent=ends[0],
-        child=ends[1],
+        parent=parent,
+        child=child,
         parent_from_child=_parse_origin(element, where),
         axis=(float(axis[0]), float(axis[1]), float(axis[2])),
         lower=value(limit, "lower", "0"),

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from schemas.errors import BadInput
+from stages.kit.formats.urdf_file import joint_ends
 from stages.kit.geometry.solids import Solid, box, cylinder
 from stages.kit.geometry.transforms import transform_from
 from stages.library.importing.mesh_reading import read_mesh_file
@@ -161,12 +162,7 @@ class _Reader:
     def _joint(self, element: ElementTree.Element) -> SourceJoint:
         name = element.get("name", "")
         where = f"{self.path}: joint {name!r:.60}"
-        ends = []
-        for tag in ("parent", "child"):
-            end = element.find(tag)
-            if end is None or not end.get("link"):
-                raise BadInput(f"{where}: no {tag} link")
-            ends.append(end.get("link", ""))
+        parent, child = joint_ends(element, where)
         axis, limit = element.find("axis"), element.find("limit")
         lower, upper = (
             float(numbers("0" if limit is None else limit.get(key, "0"), 1, f"{where}: {key}")[0])
@@ -175,8 +171,8 @@ class _Reader:
         return SourceJoint(
             name=name,
             kind=KINDS.get(element.get("type", ""), "unknown"),
-            parent=ends[0],
-            child=ends[1],
+            parent=parent,
+            child=child,
             parent_from_child=self._pose(element, where),
             axis=numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"), 3, f"{where}: axis"),
             lower=lower,
