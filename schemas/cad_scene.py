@@ -32,6 +32,11 @@ class Replacement(Model):
     reason: str = ""
     """Why not `cad`, with numbers."""
     chosen: CadCandidate | None = None
+    """Where it stands after the global check."""
+    best_single: CadCandidate | None = None
+    """What fitted this node best by itself, before the global check and before it was put on its support."""
+    part_colors: dict[str, tuple[int, int, int]] = {}
+    """Part of the chosen model -> colour (sRGB, 0 to 255) that the map shows there; parts that nobody saw are absent."""
     alternatives: tuple[CadCandidate, ...] = ()
     rejected: dict[str, int] = {}
     """Reason -> number of candidates discarded."""
