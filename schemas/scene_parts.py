@@ -78,9 +78,16 @@ class Relation(Model):
     relation: Literal["supports", "contains", "carries_on_wall", "hangs_from", "also_supports", "leans_on", "proximal"]
     confidence: float
     plane: int | None = None
-    """Index of the supporting plane in the parent's `planes`."""
+    """Index into the source's `planes`: the surface that carries, the inner surface that a contained thing stands on,
+    the upright plane that it hangs on, the ceiling's plane, the plane it leans on; None where no plane was seen."""
     gap: float | None = None
     """Signed height of the child's bottom over the plane before refinement [m] (equation 2.1); distance to the wall,
-    the ceiling or what it leans on."""
+    the ceiling or what it leans on; `proximal`: least distance of the two surfaces."""
     overlap: float | None = None
-    """Share of the child's footprint over the plane (equation 2.2)."""
+    """Share of the child's footprint over (`hangs_from`: under) the plane (equation 2.2); `carries_on_wall`: of its
+    side before the plane; `leans_on`: height of the contact as a share of the child's; `proximal`: shared volume as a
+    share of the smaller box."""
+    contact: Vector3 | None = None
+    """Where the two meet, world frame [m]: the middle of what they share."""
+    inside: float | None = None
+    """`contains`: share of the child's box that lies within the parent's."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from schemas.scene_parts import Relation
 from stages.graph.balance import leaning_relation
+from stages.graph.evidence import on_surface, with_leaning_contact
 from stages.graph.nodes import Entity
 from stages.graph.parameters import GraphParameters
 from stages.graph.shared_support import PartialSupport, partial_supports, together_with
@@ -19,6 +20,7 @@ def relations_beside(
 ) -> list[Relation]:
     """Return `also_supports` and `leans_on` of all objects, in the order of the entities."""
     found: list[Relation] = []
+    by_name = {entity.name: entity for entity in entities}
     for child in entities:
         candidate = chosen.get(child.name)
         if candidate is None or candidate.relation != "supports":
@@ -26,7 +28,7 @@ def relations_beside(
         found += further_carriers(child, candidate, entities, chosen, parameters)
         leaning = leaning_relation(child, candidate.parent, entities)
         if leaning is not None and not descends_from(leaning.source, child.name, chosen):
-            found.append(leaning)
+            found.append(with_leaning_contact(leaning, child, by_name[leaning.source]))
     return found
 
 
@@ -40,6 +42,7 @@ def further_carriers(
     """Return `also_supports` of every other entity that carries a part of the child at the height of its parent."""
     if candidate.patch is None or candidate.overlap >= FULLY_CARRIED:
         return []
+    by_name = {entity.name: entity for entity in entities}
     main = PartialSupport(candidate.parent, candidate.patch, candidate.gap, candidate.overlap, candidate.height)
     return [
         Relation(
@@ -50,6 +53,7 @@ def further_carriers(
             plane=part.patch,
             gap=float(part.gap),
             overlap=float(part.share),
+            contact=on_surface(child.box, by_name[part.parent].patches[part.patch].hull, part.height),
         )
         for part in together_with(main, partial_supports(child, entities, parameters))
         if not descends_from(part.parent, child.name, chosen)

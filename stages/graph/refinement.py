@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from schemas.scene_parts import Box, Relation
+from stages.graph.evidence import Surfaces, shared_middle
 from stages.graph.nodes import SAME_HEIGHT, Entity
 from stages.graph.support import Candidate
 from stages.kit.geometry.boxes import box_volume, boxes_overlap_volume, minimum_box, top, with_extent
@@ -62,27 +63,28 @@ def refined_box(box: Box, height: float, maximum_extension: float) -> Box:
     return with_extent(box, height, high)
 
 
-def wall_slabs(entity: Entity) -> list[Box]:
-    """Return thin boxes around the planes of a layout entity.
+def wall_slabs(entity: Entity) -> list[tuple[int | None, Box]]:
+    """Return thin boxes around the planes of a layout entity, with the index of the plane.
 
     One wall entity may hold all four walls of a room, whose common box would meet everything in it.
     """
-    slabs = []
-    for patch in entity.patches:
+    slabs: list[tuple[int | None, Box]] = []
+    for k, patch in enumerate(entity.patches):
         corners = np.asarray(patch.plane.corners)
         if len(corners) == 4:
             normal = np.asarray(patch.plane.normal)
-            slabs.append(minimum_box(np.concatenate([corners, corners - SLAB_THICKNESS * normal])))
-    return slabs or [entity.box]
+            slabs.append((k, minimum_box(np.concatenate([corners, corners - SLAB_THICKNESS * normal]))))
+    return slabs or [(None, entity.box)]
 
 
 def proximal_relations(entities: list[Entity], boxes: dict[str, Box], linked: set[tuple[str, str]]) -> list[Relation]:
     """Return undirected proximal relations: Vol(B_1 n B_2) > 0 and neither carries the other (section 2.2.1).
 
     `boxes`: refined boxes by name; `linked`: (parent, child) pairs. Layout nodes take part with the slabs of their
-    planes; two layout nodes do not. The confidence is the share of the smaller box.
+    planes; two layout nodes do not. The confidence is the shared volume as a share of the smaller box.
     """
-    solids = {e.name: (wall_slabs(e) if e.node_type == "layout" else [boxes[e.name]]) for e in entities}
+    solids = {e.name: (wall_slabs(e) if e.node_type == "layout" else [(None, boxes[e.name])]) for e in entities}
+    surfaces = Surfaces()
     relations = []
     for k, a in enumerate(entities):
         for b in entities[k + 1 :]:
@@ -90,13 +92,29 @@ def proximal_relations(entities: list[Entity], boxes: dict[str, Box], linked: se
                 continue
             if (a.name, b.name) in linked or (b.name, a.name) in linked:
                 continue
-            shared, smaller = 0.0, 1.0
-            for first in solids[a.name]:
-                for second in solids[b.name]:
+            shared, plane, pair = 0.0, None, (boxes[a.name], boxes[b.name])
+            for first_plane, first in solids[a.name]:
+                for second_plane, second in solids[b.name]:
                     volume = boxes_overlap_volume(first, second)
                     if volume > shared:
-                        shared, smaller = volume, min(box_volume(first), box_volume(second))
-            if shared > LEAST_SHARED_VOLUME:
-                confidence = float(min(1.0, shared / smaller)) if smaller > 0 else 1.0
-                relations.append(Relation(source=a.name, target=b.name, relation="proximal", confidence=confidence))
+                        shared, pair = volume, (first, second)
+                        plane = first_plane if first_plane is not None else second_plane
+            if shared <= LEAST_SHARED_VOLUME:
+                continue
+            smaller = min(box_volume(pair[0]), box_volume(pair[1]))
+            share = float(min(1.0, shared / smaller)) if smaller > 0 else 1.0
+            # A layout entity comes first, so that `plane` counts the planes of the source.
+            source, target = (b, a) if b.node_type == "layout" else (a, b)
+            relations.append(
+                Relation(
+                    source=source.name,
+                    target=target.name,
+                    relation="proximal",
+                    confidence=share,
+                    plane=plane,
+                    gap=surfaces.distance(a, b),
+                    overlap=share,
+                    contact=shared_middle(*pair),
+                )
+            )
     return relations

@@ -7,6 +7,7 @@ from schemas.panoptic_map import PanopticMap
 from schemas.scene_parts import TREE_RELATIONS, Relation
 from stages.graph.beside import relations_beside
 from stages.graph.entities import load_entities, suppose_floor
+from stages.graph.evidence import relation_of
 from stages.graph.nodes import Entity
 from stages.graph.parameters import GraphParameters
 from stages.graph.refinement import proximal_relations, refined_box, register_hidden_planes
@@ -61,6 +62,7 @@ def contact_graph(
     entities: list[Entity], chosen: dict[str, Candidate], parameters: GraphParameters
 ) -> ContactGraphFile:
     """Put nodes, tree and proximal relations into the file's form; boxes are refined on the way."""
+    by_name = {entity.name: entity for entity in entities}
     boxes = {}
     for entity in entities:
         candidate = chosen.get(entity.name)
@@ -91,23 +93,9 @@ def contact_graph(
         if entity.node_type == "layout":
             links.append(Relation(source=SCENE_NODE, target=entity.name, relation="supports", confidence=1.0))
         else:
-            links.append(relation_of(chosen[entity.name]))
+            links.append(relation_of(chosen[entity.name], by_name))
     if parameters.method == "ours":
         links += relations_beside(entities, chosen, parameters)
     linked = {(link.source, link.target) for link in links}
     links += proximal_relations(entities, boxes, linked)
     return ContactGraphFile(nodes=tuple(nodes), links=tuple(links), graph={"method": parameters.method})
-
-
-def relation_of(candidate: Candidate) -> Relation:
-    """Return the edge of a chosen relation."""
-    on_plane = candidate.patch is not None
-    return Relation(
-        source=candidate.parent,
-        target=candidate.child,
-        relation=candidate.relation,
-        confidence=float(min(1.0, max(0.0, candidate.score))),
-        plane=candidate.patch,
-        gap=float(candidate.gap) if on_plane or candidate.relation in ("carries_on_wall", "hangs_from") else None,
-        overlap=float(candidate.overlap) if on_plane else None,
-    )

@@ -37,7 +37,9 @@ def update_graph(
             continue
         if link.target in parents:
             parent, relation = parents[link.target]
-            changes = {"source": parent, "relation": relation, "plane": None, "gap": None, "overlap": None}
+            # What was seen of the old place is no evidence of the new one.
+            unseen = dict.fromkeys(("plane", "gap", "overlap", "contact", "inside"))
+            changes = {"source": parent, "relation": relation, **unseen}
             links.append(Relation(**{**link.model_dump(), **changes, "confidence": 1.0}))
         else:
             links.append(link)
