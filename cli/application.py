@@ -45,9 +45,9 @@ def build_application() -> Callable[..., Any]:
     table = typer.main.get_command(application)
 
     def entry(args: list[str], **settings: Any) -> Any:
-        """`urdf` is a step by itself, so that `urdf check` cannot be a group below it."""
-        if args[:2] == ["urdf", "check"]:
-            args = ["urdf-check", *args[2:]]
+        """`urdf` is a step by itself, so that `urdf check` and `urdf settle` cannot be a group below it."""
+        if args[:2] in (["urdf", "check"], ["urdf", "settle"]):
+            args = [f"urdf-{args[1]}", *args[2:]]
         return table(args=args, **settings)
 
     return entry

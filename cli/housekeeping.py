@@ -16,6 +16,7 @@ from cli.comparison_command import diff
 from cli.inspect_command import inspect
 from cli.serve_command import serve
 from cli.urdf_check_command import urdf_check
+from cli.urdf_settle_command import urdf_settle
 from schemas.errors import BadInput, UsageError
 
 Paths = Annotated[list[Path], typer.Argument(help="Artifact folders.")]
@@ -246,6 +247,7 @@ COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (inspect, "Artifacts"),
     (verify, "Artifacts"),
     (urdf_check, "Artifacts"),
+    (urdf_settle, "Artifacts"),
     (migrate, "Artifacts"),
     (diff, "Artifacts"),
     (gc, "Artifacts"),

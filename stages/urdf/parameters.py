@@ -16,13 +16,14 @@ class UrdfParameters(Parameters):
         (), description="Further classes to put on floating joints (default: vocabulary)"
     )
     fixed_classes: tuple[str, ...] = Field((), description="Classes to fix although the vocabulary calls them movable")
-    settle_seconds: float = Field(1.0, ge=0, le=30, description="Simulated time of the settle test, 0 for none [s]")
-    settle_distance: float = Field(0.05, gt=0, description="A movable body that moves further is called unstable [m]")
+    settle_seconds: float = Field(3.0, ge=0, le=30, description="Simulated time of the settle test, 0 for none [s]")
+    settle_distance: float = Field(0.01, gt=0, description="A movable body that moves further does not stay [m]")
+    settle_angle: float = Field(2.0, gt=0, le=180, description="A movable body that turns more does not stay [degrees]")
 
 
 STAGE = Stage(
     name="urdf",
-    version=2,
+    version=3,
     summary="Convert the CAD scene into a kinematic tree: URDF for simulators and robots, MJCF beside it",
     parameters=UrdfParameters,
     reads={"cad_scene": CadScene},

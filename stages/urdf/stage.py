@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 from schemas.cad_scene import CadScene
 from schemas.errors import UsageError
 from schemas.interactive_scene import InteractiveScene
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.scene_bundle import write_scene_bundle
-from stages.kit.simulation.world import load_scene
+from stages.kit.simulation.settle_report import settle_report
 from stages.kit.stage import Context
 from stages.urdf.bodies import scene_bodies
 from stages.urdf.parameters import UrdfParameters
@@ -24,28 +26,46 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
         bodies = scene_bodies(cad_scene, graph, movable)
     with context.progress.step("write and check the kinematic tree"):
         scene = write_scene_bundle(context.output, bodies, graph)
-    with context.progress.step("settle in physics"):
-        unstable = _unstable(context, parameters)
-    summary = {
+    summary: dict[str, float] = {
         "bodies": len(scene.bodies),
         "movable": sum(body.movable for body in scene.bodies),
         "joints": sum(len(body.joints) for body in scene.bodies),
         "cad_models": sum(body.model is not None for body in bodies),
-        "unstable": len(unstable),
     }
+    if parameters.settle_seconds:
+        with context.progress.step("settle in physics"):
+            summary |= _settle(context, parameters)
     return InteractiveScene(context.output, outcome="ok" if scene.bodies else "empty", summary=summary)
 
 
-def _unstable(context: Context, parameters: UrdfParameters) -> dict[str, float]:
-    """Return movable body -> how far it moved [m], of those that do not stay when the scene is let go."""
-    if parameters.settle_seconds == 0:
-        return {}
-    with load_scene(context.output) as world:
-        moved = world.settle(parameters.settle_seconds)
-    unstable = {name: distance for name, distance in sorted(moved.items()) if distance > parameters.settle_distance}
-    for name, distance in unstable.items():
-        context.logger.warning("%s does not stay where it was reconstructed: moved %.2f m in physics", name, distance)
-    return unstable
+def _settle(context: Context, parameters: UrdfParameters) -> dict[str, float]:
+    """Run the settle test on the scene just written, warn of what it finds, and return its measures."""
+    report = settle_report(
+        context.output,
+        parameters.settle_seconds,
+        moved_limit=parameters.settle_distance,
+        turned_limit=math.radians(parameters.settle_angle),
+    )
+    for body in report.unsettled:
+        fate = "falls through the floor" if body.fell_through else "does not stay where it was reconstructed"
+        context.logger.warning(
+            "%s %s: moved %.3f m, turned %.1f degrees in physics",
+            body.name,
+            fate,
+            body.moved,
+            math.degrees(body.turned),
+        )
+    for joint in report.blocked:
+        context.logger.warning("%s meets %s at the start of its motion", joint.joint, joint.hit_link)
+    return {
+        "settled": float(report.settled),
+        "unstable": len(report.unsettled),
+        "fell_through": sum(body.fell_through for body in report.bodies),
+        "largest_move_mm": round(1000 * max((body.moved for body in report.bodies), default=0.0), 3),
+        "blocked_joints": len(report.blocked),
+        "max_penetration_mm": round(report.max_penetration_mm, 3),
+        "collisions": len(report.collisions),
+    }
 
 
 def _movable_classes(parameters: UrdfParameters) -> frozenset[str]:

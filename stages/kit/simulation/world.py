@@ -149,10 +149,14 @@ class PhysicsWorld:
 
     def pose(self, name: str) -> np.ndarray:
         """Return world_from_body (4, 4) of the base link frame."""
-        body_id = self.bodies[name].body_id
-        position, quaternion = engine.getBasePositionAndOrientation(body_id, physicsClientId=self.client)
-        pose = transform_from_quaternion(np.array(quaternion), np.array(position))
-        return pose @ inverse(self._base_from_inertial[body_id])
+        return self.center_of_mass(name) @ inverse(self._base_from_inertial[self.bodies[name].body_id])
+
+    def center_of_mass(self, name: str) -> np.ndarray:
+        """Return world_from_inertial (4, 4) of the base link: its centre of mass and principal axes."""
+        position, quaternion = engine.getBasePositionAndOrientation(
+            self.bodies[name].body_id, physicsClientId=self.client
+        )
+        return transform_from_quaternion(np.array(quaternion), np.array(position))
 
     def link_pose(self, name: str, link: str) -> np.ndarray:
         """Return world_from_link (4, 4) of a link of a body."""

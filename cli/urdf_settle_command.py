@@ -1,0 +1,58 @@
+"""`scenewright urdf settle`: does a scene stay as it is once it is let go, and can it be opened?"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+BAD_INPUT = 3
+
+
+def urdf_settle(
+    scene: Annotated[Path, typer.Argument(help="Folder of an interactive scene, or `room/` of a ground truth.")],
+    seconds: Annotated[float, typer.Option("--seconds", min=0.0, max=60.0, help="Simulated time [s].")] = 3.0,
+    moved: Annotated[float, typer.Option("--moved", min=0.0, help="Movable bodies may move by this much [m].")] = 0.01,
+    turned: Annotated[
+        float, typer.Option("--turned", min=0.0, max=180.0, help="Movable bodies may turn by this much [degrees].")
+    ] = 2.0,
+    json_output: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+) -> int:
+    """Let go of a scene in physics and open its doors and drawers; a line for each body that moves, turns or falls
+    through the floor, for each joint that meets something in the first tenth of its range, and for each pair of bodies
+    more than 5 mm in each other. Exits with 3 when there is any.
+    """
+    from stages.kit.simulation.settle_report import SettleReport, settle_report
+
+    report: SettleReport = settle_report(scene, seconds, moved_limit=moved, turned_limit=math.radians(turned))
+    lines = [f"{body.name}: falls through the floor" for body in report.unsettled if body.fell_through]
+    lines += [
+        f"{body.name}: does not stay: moves {1000 * body.moved:.1f} mm, turns {math.degrees(body.turned):.1f} degrees"
+        for body in report.unsettled
+        if not body.fell_through
+    ]
+    lines += [
+        f"{joint.joint}: meets {joint.hit_link} after {100 * joint.free_share:.0f} % of its range, "
+        f"{1000 * joint.hit_depth:.1f} mm deep"
+        for joint in report.blocked
+    ]
+    lines += [
+        f"{pair.first_link}: lies {1000 * pair.depth:.1f} mm in {pair.second_link} at rest"
+        for pair in report.collisions
+    ]
+    sound = report.settled and not report.collisions
+    if json_output:
+        sys.stdout.write(json.dumps({"scene": str(scene), "sound": sound, **report.as_json()}) + "\n")
+    else:
+        for line in lines:
+            sys.stdout.write(f"{scene}: {line}\n")
+        if sound:
+            sys.stdout.write(
+                f"{scene}: settles: {len(report.bodies)} movable bodies stay, {len(report.joints)} joints are free\n"
+            )
+    return 0 if sound else BAD_INPUT
