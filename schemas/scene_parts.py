@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
+from pydantic import Field
+
 from schemas.base import Model, QuaternionXYZW, Vector3
 
 
@@ -53,6 +55,9 @@ class Joint(Model):
     type: Literal["revolute", "prismatic"]
     part: str
     """Name of the moving link."""
+    parent: str | None = Field(None, exclude_if=lambda name: name is None)
+    """Name of the part that it hangs on, a moving one itself (a drawer behind a door); None: the body. Absent from the
+    file then."""
     origin: Vector3
     axis: Vector3
     lower: float
