@@ -44,7 +44,8 @@ class GroundTruthBackend:
             self._lookup[entry.instance] = mask_id
             self._masks[mask_id] = PanopticMask(semantic.id, semantic.kind == "thing")
         self._lookup[0] = 0
-        named = [c for c in vocabulary.classes if c.name != "object"]
+        # Classes that came after `object` take no part, so that a seed keeps its confusions as the vocabulary grows.
+        named = [c for c in vocabulary.classes if c.id < vocabulary.by_name("object").id]
         self._classes = {
             True: tuple(c.id for c in named if c.kind == "thing"),
             False: tuple(c.id for c in named if c.kind == "stuff"),

@@ -158,7 +158,7 @@ def parse_words(words: Iterable[str], where: str) -> tuple[Label, ...]:
     """Return the label of every word (`word` or `word = class`). Raises BadInput for a class that does not exist.
 
     A word without a class gets the one that has this name or synonym in the vocabulary or a label set, else `object`:
-    whoever asks for a kettle wants to find it, under whatever class.
+    whoever asks for an abacus wants to find it, under whatever class.
     """
     labels = []
     for line in words:

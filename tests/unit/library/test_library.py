@@ -34,7 +34,7 @@ REQUIRED = {
     *("chair", "table", "desk", "cabinet", "wall_cabinet", "shelf", "fridge", "microwave", "sofa", "bed"),
     *("monitor", "keyboard", "bottle", "cup", "bowl", "box", "bin"),
 }
-ARTICULATED = {"cabinet", "wall_cabinet", "fridge", "microwave"}
+ARTICULATED = {"cabinet", "wall_cabinet", "fridge", "microwave", "drawer_unit"}
 
 
 def build(output: Path, seed: int, **parameters) -> CadLibrary:
