@@ -1,0 +1,167 @@
+"""Read the shapes of the true room and of a CAD scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+import trimesh
+from trimesh.visual.color import ColorVisuals
+
+from schemas.cad_scene import CadCandidate
+from schemas.contact_graph import ContactGraphFile
+from schemas.ground_truth import GroundTruth
+from schemas.interactive_scene import InteractiveSceneFile, SceneBody
+from schemas.scene_parts import Joint
+from stages.evaluate.model_shapes import ModelShape, PartShape, PlacedShape
+from stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, read_model
+from stages.kit.formats.mesh_files import read_mesh
+from stages.kit.geometry.layout_slabs import Slab, level_slab, surface_height, wall_slabs
+from stages.kit.measurement.convex_overlap import ConvexPiece, convex_piece
+from stages.kit.simulation.shapes import link_shapes
+from stages.kit.simulation.urdf_split import PART_SEPARATOR, read_urdf, with_absolute_meshes
+
+GREY = (128.0, 128.0, 128.0)
+BODY = "body"
+
+
+def true_shapes(truth: GroundTruth, world_from_log: np.ndarray) -> dict[str, PlacedShape]:
+    """Return object name -> its model as it stands, out of the true room's scene, moved by `world_from_log` (4, 4).
+
+    The room's meshes are scaled already, so the scale is 1. Empty when the ground truth has no room (scans). Raises
+    BadInput when the room's files are broken.
+    """
+    root = truth.path("room")
+    if not (root / "scene.json").is_file():
+        return {}
+    scene = InteractiveSceneFile.read(root / "scene.json")
+    if not (root / scene.static_file).is_file():
+        return {}
+    files = [scene.static_file, *(body.file for body in scene.bodies if body.file is not None)]
+    visual: dict[str, list[trimesh.Trimesh]] = {}
+    collision: dict[str, list[trimesh.Trimesh]] = {}
+    for file in files:
+        text = with_absolute_meshes(read_urdf(root / file), (root / file).parent)
+        visual |= link_shapes(text, "visual")
+        collision |= link_shapes(text, "collision")
+    models = {entry.name: entry.model_id for entry in truth.truth.objects}
+    shapes: dict[str, PlacedShape] = {}
+    for body in scene.bodies:
+        model_id = models.get(body.name)
+        if model_id is not None and visual.get(body.name):
+            shape = _shape_of_body(body, model_id, visual, collision)
+            prefix = body.name + PART_SEPARATOR
+            values = {name.removeprefix(prefix): value for name, value in body.joint_values.items()}
+            pose = world_from_log @ np.array(body.world_from_body)
+            shapes[body.name] = PlacedShape(shape, pose, 1.0, values)
+    return shapes
+
+
+def _shape_of_body(
+    body: SceneBody,
+    model_id: str,
+    visual: Mapping[str, Sequence[trimesh.Trimesh]],
+    collision: Mapping[str, Sequence[trimesh.Trimesh]],
+) -> ModelShape:
+    prefix = body.name + PART_SEPARATOR
+    links = [link for link in visual if link == body.name or link.startswith(prefix)]
+    return ModelShape(
+        model_id=model_id,
+        class_name=body.class_name,
+        parts={
+            link.removeprefix(prefix) if link != body.name else BODY: _part(visual[link], collision.get(link, ()))
+            for link in links
+            if visual[link]
+        },
+        joints=tuple(_without_prefix(joint, prefix) for joint in body.joints),
+        movable=body.movable,
+        contains=body.contains,
+    )
+
+
+def _without_prefix(joint: Joint, prefix: str) -> Joint:
+    return joint.model_copy(update={"name": joint.name.removeprefix(prefix), "part": joint.part.removeprefix(prefix)})
+
+
+def model_shape(folder: Path) -> ModelShape:
+    """Return the shape of a model folder of a CAD library or a CAD scene. Raises BadInput when it is broken."""
+    model = read_model(folder)
+    visual, collision = load_visual_parts(folder), load_collision_parts(folder)
+    return ModelShape(
+        model_id=model.id,
+        class_name=model.class_name,
+        parts={part: _part([visual[part]], collision.get(part, ())) for part in model.parts if part in visual},
+        joints=model.joints,
+        movable=model.movable,
+        contains=model.contains,
+    )
+
+
+def model_shapes(model_ids: Sequence[str], roots: Sequence[Path]) -> dict[str, ModelShape]:
+    """Return model id -> shape for ids that have a folder below one of `roots` (`models/` of a scene or library)."""
+    found: dict[str, ModelShape] = {}
+    for model_id in sorted(set(model_ids)):
+        folder = next((root / model_id for root in roots if (root / model_id).is_dir()), None)
+        if folder is not None:
+            found[model_id] = model_shape(folder)
+    return found
+
+
+def placed_candidate(candidate: CadCandidate, shapes: Mapping[str, ModelShape]) -> PlacedShape | None:
+    """Return a candidate's model where the candidate puts it; None when its model is not among `shapes`."""
+    shape = shapes.get(candidate.model_id)
+    if shape is None:
+        return None
+    return PlacedShape(shape, np.array(candidate.world_from_model), candidate.scale, candidate.joints)
+
+
+def _part(visual: Sequence[trimesh.Trimesh], collision: Sequence[trimesh.Trimesh]) -> PartShape:
+    triangles = np.concatenate([np.asarray(mesh.triangles, dtype=float) for mesh in visual])
+    areas = np.concatenate([mesh.area_faces for mesh in visual])
+    colors = np.concatenate([_face_colors(mesh) for mesh in visual])
+    weights = areas / areas.sum() if areas.sum() > 0 else np.full(len(areas), 1.0 / max(len(areas), 1))
+    red, green, blue = (float(value) for value in weights @ colors)
+    pieces = tuple(piece for mesh in collision if (piece := convex_piece(np.asarray(mesh.vertices))) is not None)
+    return PartShape(triangles, (red, green, blue), pieces)
+
+
+def _face_colors(mesh: trimesh.Trimesh) -> np.ndarray:
+    """(T, 3) sRGB colours of the triangles; grey where the mesh has none."""
+    if getattr(mesh.visual, "kind", None) in ("face", "vertex"):
+        return np.asarray(cast(ColorVisuals, mesh.visual).face_colors, dtype=float)[:, :3]
+    return np.tile(GREY, (len(mesh.faces), 1))
+
+
+def layout_pieces(graph: ContactGraphFile, layout_folder: Path) -> dict[str, list[ConvexPiece]]:
+    """Return layout node -> the slabs that it collides with in the exported scene, as convex pieces in the world.
+
+    Made of planes, mesh (`<node>.ply` in `layout_folder`, where there is one) and box, as the scene's files make them.
+    """
+    boxes = [node.box for node in graph.nodes if node.box is not None]
+    if not boxes:
+        return {}
+    centers = np.array([box.center for box in boxes])
+    middle = 0.5 * (centers.min(axis=0) + centers.max(axis=0))
+    found: dict[str, list[ConvexPiece]] = {}
+    for node in graph.nodes:
+        if node.node_type != "layout" or node.box is None:
+            continue
+        file = layout_folder / f"{node.id}.ply"
+        mesh = read_mesh(file, may_be_empty=True) if file.is_file() else None
+        if node.class_name in ("floor", "ceiling"):
+            used = [link.plane for link in graph.links if link.source == node.id and link.plane is not None]
+            planes = tuple(plane for k, plane in enumerate(node.planes) if k in used) or node.planes
+            upwards = node.class_name == "floor"
+            slabs = [level_slab(node.box, surface_height(planes, mesh, node.box, upwards=upwards), downwards=upwards)]
+        else:
+            slabs = wall_slabs(node.planes, mesh, node.box, middle)
+        found[node.id] = [piece for slab in slabs if (piece := _slab_piece(slab)) is not None]
+    return found
+
+
+def _slab_piece(slab: Slab) -> ConvexPiece | None:
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * slab.size
+    piece = convex_piece(corners)
+    return None if piece is None else piece.placed(slab.world_from_slab)
