@@ -64,14 +64,75 @@ class ContactGraphFile(Model):
         return tuple(link.target for link in self.links if link.source == node_id and link.relation in TREE_RELATIONS)
 
 
+class Reattached(Model):
+    """A node that hangs elsewhere in the tree than it did."""
+
+    node: Name
+    parent: Name
+    relation: str
+    before_parent: Name
+    before_relation: str
+
+
+class Beside(Model):
+    """A relation beside the tree that came or went."""
+
+    source: Name
+    target: Name
+    relation: str
+
+
+class GraphChanges(Model):
+    """What is different from the snapshot before. Nodes by their lasting ids."""
+
+    appeared: tuple[Name, ...] = ()
+    vanished: tuple[Name, ...] = ()
+    """Nodes whose surface no node holds any more."""
+    merged: dict[Name, Name] = {}
+    """Node that is gone -> node that most of its surface went to."""
+    renamed: dict[Name, Name] = {}
+    """Node -> the class that it had before."""
+    reattached: tuple[Reattached, ...] = ()
+    added: tuple[Beside, ...] = ()
+    removed: tuple[Beside, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """How many things changed."""
+        return sum(len(getattr(self, name)) for name in type(self).model_fields)
+
+
+class GraphSnapshot(Model):
+    """The contact graph after so many frames. Links and nodes by lasting ids; planes and meshes are left out."""
+
+    frames: int
+    nodes: tuple[GraphNode, ...]
+    links: tuple[Relation, ...]
+    changes: GraphChanges
+
+
+class TimelineFile(Model):
+    """timeline.json: the graph while the map grew. A node keeps its id throughout: the one that it has in the last
+    snapshot in which it occurs (numbered where another node has it). The last snapshot is graph.json."""
+
+    snapshots: tuple[GraphSnapshot, ...]
+
+
 class ContactGraph(Artifact):
-    """`graph.json`."""
+    """`graph.json`; where the map holds snapshots also `timeline.json`."""
 
     kind: ClassVar[str] = "contact_graph"
     description: ClassVar[str] = "contact graph: support tree and proximal relations, node-link JSON"
     json_files: ClassVar[dict[str, type[Model]]] = {"graph.json": ContactGraphFile}
+    optional_json_files: ClassVar[dict[str, type[Model]]] = {"timeline.json": TimelineFile}
 
     @property
     def graph(self) -> ContactGraphFile:
         """The parsed graph.json."""
         return ContactGraphFile.read(self.path("graph.json"))
+
+    @property
+    def timeline(self) -> TimelineFile | None:
+        """The parsed timeline.json, or None where the map kept no snapshots."""
+        path = self.path("timeline.json")
+        return TimelineFile.read(path) if path.is_file() else None

@@ -7,6 +7,9 @@ from typing import ClassVar
 from schemas.artifact import Artifact
 from schemas.base import Model, RelativePath, Vector3
 
+SNAPSHOTS = "snapshots"
+"""Folder of the partial maps; each is named by the number of frames in it."""
+
 
 class Entity(Model):
     """One panoptic entity: an object or a layout surface."""
@@ -45,7 +48,8 @@ class PanopticMap(Artifact):
     of mesh.ply, 0 = unlabelled), `entities/<instance>.ply`, `entities.json`, `counts.npz` (the triple-wise
     count: `segment`, `class_id`, `instance`, `count`, each (K,)), `volume.npz` (`block_coordinates` (B, 3) int32,
     blocks sorted by z, y, x; over the 8^3 voxels of a block, x fastest: `tsdf` (B, 512) float16 in truncation
-    distances, `weight` (B, 512) float16, `segment` (B, 512) int32, `color` (B, 512, 3) uint8)."""
+    distances, `weight` (B, 512) float16, `segment` (B, 512) int32, `color` (B, 512, 3) uint8). With `--snapshot-every`
+    also `snapshots/<frames>/`, the map as it was after so many frames: entities.json, entities/ and mesh.ply."""
 
     kind: ClassVar[str] = "panoptic_map"
     description: ClassVar[str] = "labelled TSDF map: whole mesh, a mesh per entity, counts"
@@ -55,3 +59,10 @@ class PanopticMap(Artifact):
     def info(self) -> EntitiesFile:
         """The parsed entities.json."""
         return EntitiesFile.read(self.path("entities.json"))
+
+    def snapshots(self) -> tuple[PanopticMap, ...]:
+        """Return the partial maps kept while mapping went on, the earliest first; they have no volume and no counts."""
+        folder = self.path(SNAPSHOTS)
+        if not folder.is_dir():
+            return ()
+        return tuple(PanopticMap(entry) for entry in sorted(folder.iterdir()) if entry.is_dir())

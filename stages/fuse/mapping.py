@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy, deepcopy
 from itertools import combinations
 
 import numpy as np
@@ -71,6 +72,17 @@ class PanopticMapper:
     def truncation_distance(self) -> float:
         """Metres."""
         return self.parameters.truncation_voxels * self.parameters.voxel_size
+
+    def held(self) -> PanopticMapper:
+        """Return a mapper of the same voxels that can be closed without a trace in this one: closing merges labels.
+
+        It shares the voxel blocks and is good until the next frame.
+        """
+        other = copy(self)
+        for name in ("labels", "shared", "instance_evidence", "segment_evidence", "class_scores", "counts"):
+            setattr(other, name, deepcopy(getattr(self, name)))
+        other.sightings, other.seen_in = dict(self.sightings), dict(self.seen_in)
+        return other
 
     def add_frame(
         self,

@@ -25,6 +25,11 @@ class FuseParameters(Parameters):
     maximum_weight: float = Field(1000.0, gt=0, le=60000, description="Weight at which a voxel starts to forget")
     every: int = Field(1, ge=1, description="Integrate every how many-th frame")
     block_stride: int = Field(4, ge=1, le=16, description="Every how many-th pixel looks for voxel blocks")
+    snapshot_every: int = Field(
+        0,
+        ge=0,
+        description="Keep the map as it is after every so many frames, for graphs that grow with it (0: never)",
+    )
     pose_tolerance: float = Field(
         0.02, ge=0, description="A pose of --trajectory belongs to the frame at most this far from its time [s]"
     )

@@ -66,6 +66,15 @@ def volume_arrays(blocks: VoxelBlocks, merged: np.ndarray) -> dict[str, np.ndarr
     }
 
 
+def write_meshes(root: Path, file: EntitiesFile, entities: Sequence[ExtractedEntity], surface: Surface) -> None:
+    """Write what a contact graph is built from: entities.json, a mesh per entity and the whole mesh."""
+    (root / "entities").mkdir(parents=True, exist_ok=True)
+    file.write(root / "entities.json")
+    write_ply(root / "mesh.ply", ColoredMesh(surface.vertices, surface.faces, surface.colors))
+    for entity in entities:
+        write_ply(root / mesh_name(entity.instance), entity.mesh)
+
+
 def write_payload(
     root: Path,
     file: EntitiesFile,
@@ -77,11 +86,7 @@ def write_payload(
     merged: np.ndarray,
 ) -> None:
     """Write every file of schemas/panoptic_map.py under `root`."""
-    (root / "entities").mkdir(parents=True, exist_ok=True)
-    file.write(root / "entities.json")
-    write_ply(root / "mesh.ply", ColoredMesh(surface.vertices, surface.faces, surface.colors))
-    for entity in entities:
-        write_ply(root / mesh_name(entity.instance), entity.mesh)
+    write_meshes(root, file, entities, surface)
     labels = {"instance": labelled.instance, "segment": labelled.segment, "class_id": labelled.class_id}
     write_arrays(root / "mesh_labels.npz", labels)
     write_arrays(root / "counts.npz", counts.as_arrays())

@@ -4,25 +4,30 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import dataclass
 
-from schemas.panoptic_map import EntitiesFile, PanopticMap
+import numpy as np
+
+from schemas.panoptic_map import SNAPSHOTS, EntitiesFile, PanopticMap
 from schemas.segments import Segments
 from schemas.sequence import Sequence
 from schemas.trajectory import Trajectory
 from schemas.vocabulary import Vocabulary, load_vocabulary
-from stages.fuse.extraction import extract_entities
+from stages.fuse.counts import TripleCounts
+from stages.fuse.extraction import ExtractedEntity, LabelledSurface, extract_entities
 from stages.fuse.inputs import check_origin, check_segments, poses_at
 from stages.fuse.listings import Listings
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.partition import group_things
-from stages.fuse.payload import describe, write_payload
+from stages.fuse.payload import describe, write_meshes, write_payload
 from stages.fuse.smoothing import smoothed_tsdf
-from stages.fuse.surface import extract_surface
+from stages.fuse.surface import Surface, extract_surface
 from stages.kit.formats.frames import FrameReader, require_depth
 from stages.kit.formats.masks import PanopticReader
 from stages.kit.formats.trajectories import read_tum
-from stages.kit.stage import Context
+from stages.kit.progress import SilentProgress
+from stages.kit.stage import Context, Progress
 
 UNNAMED = "object"
 """The class of things that masks found and did not recognise."""
@@ -48,18 +53,31 @@ def run(
     return write_map(mapper, vocabulary, label, skipped, context)
 
 
-def write_map(
-    mapper: PanopticMapper, vocabulary: Vocabulary, label: str, skipped: Mapping[str, int], context: Context
-) -> PanopticMap:
-    """Write the map that was built: its entities, meshes, counts and voxels. `label` says whose masks these are,
-    `skipped` how many frames were left out by reason."""
+@dataclass(frozen=True)
+class ClosedMap:
+    """What a map comes to: its entities, surface and labels."""
+
+    file: EntitiesFile
+    entities: list[ExtractedEntity]
+    surface: Surface
+    labelled: LabelledSurface
+    counts: TripleCounts
+    merged: np.ndarray
+    """Merged segment label of every segment label."""
+
+
+def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, progress: Progress) -> ClosedMap:
+    """Merge what is one instance, draw the surface and cut it into entities. `label` says whose masks these are.
+
+    Labels of the mapper are merged by it.
+    """
     parameters = mapper.parameters
-    with context.progress.step("merge instances"):
+    with progress.step("merge instances"):
         mapper.regularize()
-    with context.progress.step("extract surface"):
+    with progress.step("extract surface"):
         tsdf = smoothed_tsdf(mapper.blocks, parameters.smoothing)
         surface = extract_surface(mapper.blocks, minimum_weight=parameters.minimum_weight, tsdf=tsdf)
-    with context.progress.step("extract entities"):
+    with progress.step("extract entities"):
         merged = mapper.labels.table()
         unnamed = vocabulary.by_name(UNNAMED).id
         counts, seen_in, grouped = mapper.counts, mapper.seen_in, None
@@ -76,27 +94,47 @@ def write_map(
             minimum_observations=fewest, speck_share=parameters.speck_share, part_distance=parameters.part_distance,
             spread_steps=parameters.spread_steps, piece_share=parameters.piece_share, unnamed=unnamed, grouped=grouped,
         )  # fmt: skip
+    file = EntitiesFile(
+        voxel_size=parameters.voxel_size,
+        truncation_distance=mapper.truncation_distance,
+        frames_integrated=mapper.frames_integrated,
+        segmentation=label,
+        entities=tuple(describe(entity, vocabulary) for entity in entities),
+    )
+    return ClosedMap(file, entities, surface, labelled, counts, merged)
+
+
+def write_map(
+    mapper: PanopticMapper, vocabulary: Vocabulary, label: str, skipped: Mapping[str, int], context: Context
+) -> PanopticMap:
+    """Write the map that was built: its entities, meshes, counts and voxels. `label` says whose masks these are,
+    `skipped` how many frames were left out by reason."""
+    closed = close_map(mapper, vocabulary, label, context.progress)
     with context.progress.step("write the map"):
-        file = EntitiesFile(
-            voxel_size=parameters.voxel_size,
-            truncation_distance=mapper.truncation_distance,
-            frames_integrated=mapper.frames_integrated,
-            segmentation=label,
-            entities=tuple(describe(entity, vocabulary) for entity in entities),
-        )
-        write_payload(context.output, file, entities, surface, labelled, counts, mapper.blocks, merged)
+        write_payload(
+            context.output, closed.file, closed.entities, closed.surface, closed.labelled, closed.counts, mapper.blocks,
+            closed.merged,
+        )  # fmt: skip
     summary = {
         "frames": mapper.frames_integrated,
         **{f"skipped_{reason}": count for reason, count in sorted(skipped.items())},
         "frames_without_segments": mapper.frames_integrated - mapper.labelled_frames,
-        "entities": len(entities),
-        "segments": int(len(set(merged.tolist())) - 1),
+        "entities": len(closed.entities),
+        "segments": int(len(set(closed.merged.tolist())) - 1),
         "segment_merges": mapper.segment_merges,
         "instance_merges": mapper.instance_merges,
-        "vertices": len(surface.vertices),
+        "vertices": len(closed.surface.vertices),
         "blocks": mapper.blocks.count,
     }
-    return PanopticMap(context.output, outcome="ok" if len(surface.faces) else "empty", summary=summary)
+    return PanopticMap(context.output, outcome="ok" if len(closed.surface.faces) else "empty", summary=summary)
+
+
+def write_snapshot(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, context: Context) -> None:
+    """Write the map as it would be if this frame were the last. The map that is being built does not notice."""
+    with context.progress.step("snapshots"):
+        closed = close_map(mapper.held(), vocabulary, label, SilentProgress())
+        folder = context.output / SNAPSHOTS / f"{mapper.frames_integrated:06d}"
+        write_meshes(folder, closed.file, closed.entities, closed.surface)
 
 
 def _integrate_frames(
@@ -122,7 +160,12 @@ def _integrate_frames(
         mapper = PanopticMapper(parameters, things)
         total = -(-len(reader) // parameters.every)
         frames = reader.frames(streams=("color", "depth"), every=parameters.every)
+        kept = 0
         for frame in context.progress.track(frames, total=total, description="fuse"):
+            # Of the last frame the finished map is the snapshot, so one is taken when another frame comes.
+            if parameters.snapshot_every and mapper.frames_integrated >= kept + parameters.snapshot_every:
+                kept = mapper.frames_integrated
+                write_snapshot(mapper, vocabulary, label, context)
             pose = frame.world_from_camera if poses is None else poses[frame.index]
             if frame.depth is None or not (frame.depth > 0).any():
                 skipped["no_depth"] += 1

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import replace
+
 import numpy as np
 
 from schemas.errors import BadInput
@@ -27,12 +30,18 @@ PIECE_SHARE = 0.7
 """Share of its box that a piece has within the whole."""
 
 
+Kept = dict[str, Entity | str]
+"""What entities came to, by a digest of all that decides it."""
+
+
 def load_entities(
-    panoptic_map: PanopticMap, parameters: GraphParameters, context: Context
+    panoptic_map: PanopticMap, parameters: GraphParameters, context: Context, kept: Kept | None = None
 ) -> tuple[list[Entity], dict[str, str]]:
     """Return the nodes in the order of their instance labels, and why entities were dropped (name -> reason).
 
-    Raises BadInput for an entity whose class is not in the vocabulary or whose mesh cannot be read.
+    What `kept` holds of an earlier map is not looked at again, and what is new goes into it: most of a map stays as it
+    is while the camera is elsewhere. Raises BadInput for an entity whose class is not in the vocabulary or whose mesh
+    cannot be read.
     """
     entries = sorted(panoptic_map.info.entities, key=lambda entry: entry.instance)
     if len({entry.instance for entry in entries}) != len(entries):
@@ -40,7 +49,7 @@ def load_entities(
     entities: list[Entity] = []
     dropped: dict[str, str] = {}
     for entry in context.progress.track(entries, description="entities"):
-        entity = load_entity(panoptic_map, entry, parameters, context)
+        entity = _load_once(panoptic_map, entry, parameters, context, kept)
         if isinstance(entity, str):
             dropped[f"{entry.class_name}_{entry.instance}"] = entity
         else:
@@ -50,6 +59,19 @@ def load_entities(
             dropped[name] = f"a piece of {whole}"
         entities = [entity for entity in entities if entity.name not in dropped]
     return entities, dropped
+
+
+def _load_once(
+    panoptic_map: PanopticMap, entry: MapEntity, parameters: GraphParameters, context: Context, kept: Kept | None
+) -> Entity | str:
+    path = panoptic_map.path(entry.mesh)
+    if kept is None or not path.is_file():
+        return load_entity(panoptic_map, entry, parameters, context)
+    key = f"{entry.class_name}_{entry.instance} {hashlib.sha256(path.read_bytes()).hexdigest()}"
+    if key not in kept:
+        kept[key] = load_entity(panoptic_map, entry, parameters, context)
+    found = kept[key]
+    return found if isinstance(found, str) else replace(found, confidence=entry.confidence, mesh=entry.mesh)
 
 
 def fragments(entities: list[Entity]) -> dict[str, str]:
