@@ -1,4 +1,4 @@
-"""Declaration of the step `truth scenenn`."""
+"""Declarations of the steps `truth scenenn` and `truth supports`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Literal
 from pydantic import Field
 
 from schemas.ground_truth import GroundTruth
+from schemas.panoptic_map import PanopticMap
 from schemas.sequence import Sequence
-from stages.kit.stage import External, Parameters, Stage
+from stages.kit.stage import External, Optionally, Parameters, Stage
 
 WORDS = "annotations/scenenn.toml"
 """Which annotated words are which class (below data/)."""
@@ -28,7 +29,17 @@ class SceneNNParameters(Parameters):
     )
 
 
-STAGE = Stage(
+class SupportsParameters(Parameters):
+    """How the things of a support annotation are found."""
+
+    every: int = Field(1, ge=1, description="Use every how many-th frame")
+    maximum_depth: float = Field(4.0, gt=0, description="Farther depth is not used [m]")
+    point_reach: float = Field(
+        0.1, gt=0, le=1, description="A node that is given by a point is the entity of the map at most this far [m]"
+    )
+
+
+SCENENN = Stage(
     name="truth scenenn",
     version=2,
     summary="Make ground truth out of SceneNN's annotation, in the world frame of a sequence of that scene",
@@ -44,3 +55,22 @@ STAGE = Stage(
     example="scenewright truth scenenn --annotation scenenn/011/011.xml --mesh scenenn/011/011.ply "
     "--sequence outputs/011/sequence --out outputs/011/ground_truth",
 )
+
+SUPPORTS = Stage(
+    name="truth supports",
+    version=1,
+    summary="Make ground truth with a contact graph out of a support annotation (JSON) of a real sequence",
+    parameters=SupportsParameters,
+    reads={
+        "annotation": External("support annotation, JSON (docs/FORMATS.md)"),
+        "sequence": Sequence,
+        "panoptic_map": Optionally(PanopticMap),
+    },
+    writes=GroundTruth,
+    libraries=("numpy", "scipy"),
+    module="supports",
+    example="scenewright truth supports --annotation data/annotations/real/kitchen.json "
+    "--sequence outputs/kitchen/sequence --out outputs/kitchen/ground_truth",
+)
+
+STAGES = (SCENENN, SUPPORTS)

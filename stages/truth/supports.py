@@ -1,0 +1,149 @@
+"""`scenewright truth supports`: a support annotation becomes ground truth with a filled contact graph.
+
+Somebody looked at a real recording and wrote down what stands on what. `evaluate` then measures a contact graph of that
+recording as it does one of a generated room: edit distance with wrong supports, missing and wrong detections apart,
+and precision and recall of the edges by relation.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from schemas.base import as_transform
+from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from schemas.errors import BadInput
+from schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
+from schemas.panoptic_map import PanopticMap
+from schemas.scene_parts import Box, Relation
+from schemas.sequence import Sequence
+from schemas.vocabulary import load_vocabulary
+from stages.kit.formats.ply_files import ColoredMesh, write_ply
+from stages.kit.geometry.boxes import is_round, minimum_box
+from stages.kit.measurement.palette import instance_color
+from stages.kit.stage import Context
+from stages.truth.annotated_points import SPACING, instances_of, seen_points
+from stages.truth.parameters import SupportsParameters
+from stages.truth.support_annotation import SupportAnnotation, read_support_annotation
+
+NOT_SEEN = Box(center=(0.0, 0.0, 0.0), size=(SPACING, SPACING, SPACING))
+"""Stands in for the box of a node of which no point was seen; such nodes are optional."""
+
+
+def run(
+    annotation: Path,
+    sequence: Sequence,
+    panoptic_map: PanopticMap | None = None,
+    *,
+    parameters: SupportsParameters,
+    context: Context,
+) -> GroundTruth:
+    """Read the annotation, find its nodes in the frames (or the map), and write what evaluate reads.
+
+    Raises BadInput when the annotation is broken, when it takes label images or a map that are not there, or when
+    nothing of its nodes was seen.
+    """
+    told = read_support_annotation(annotation)
+    by_labels = any(node.find.labels for node in told.nodes)
+    with context.progress.step("surface of the frames"):
+        points, labels = seen_points(
+            sequence, every=parameters.every, maximum_depth=parameters.maximum_depth, with_labels=by_labels
+        )
+    with context.progress.step("find the nodes"):
+        try:
+            points, owner = instances_of(told, points, labels, panoptic_map, parameters.point_reach)
+        except BadInput as error:
+            raise BadInput(f"{annotation}: {error.message}", hint=error.hint) from None
+    if not owner.any():
+        raise BadInput(f"{annotation}: nothing of its nodes is seen in {sequence.root}", hint="is it this recording?")
+    objects = annotated_objects(told, points, owner)
+    optional = [k for k, node in enumerate(told.nodes, 1) if node.optional]
+    seen = np.where(np.isin(owner, optional), 0, owner)
+    info = sequence.info
+    low, high = points[owner > 0].min(axis=0), points[owner > 0].max(axis=0)
+    GroundTruthFile(
+        source="scan", seed=context.seed, recipe=told.scene, camera=info.camera, frame_count=info.frame_count,
+        room_size=(float(high[0] - low[0]), float(high[1] - low[1]), float(high[2] - low[2])),
+        depth_noise=True, objects=objects,
+    ).write(context.output / "ground_truth.json")  # fmt: skip
+    graph = annotated_graph(told, objects)
+    graph.write(context.output / "graph.json")
+    np.savez(context.output / "visible.npz", points=points.astype(np.float32), instance=seen.astype(np.int32))
+    write_ply(context.output / "mesh.ply", flakes(points, owner))
+    counts = np.bincount(seen, minlength=len(told.nodes) + 1)
+    unseen = [node.name for k, node in enumerate(told.nodes, 1) if not counts[k] and not node.optional]
+    for name in unseen:
+        context.logger.warning("no point of %s is seen; it counts neither way", name)
+    return GroundTruth(
+        context.output,
+        summary={
+            "scene": told.scene,
+            "nodes": len(told.nodes),
+            "unseen": len(unseen),
+            "optional": len(optional),
+            "relations": len(graph.links),
+            "second_carriers": sum(link.relation == "also_supports" for link in graph.links),
+            "leaning": sum(link.relation == "leans_on" for link in graph.links),
+            "points": len(points),
+        },
+    )
+
+
+def annotated_objects(told: SupportAnnotation, points: np.ndarray, owner: np.ndarray) -> tuple[TrueObject, ...]:
+    """Return the nodes as true objects, numbered 1, 2, ...: each with its annotated box, or that of its points.
+
+    points (N, 3) [m] in the sequence's world, owner (N,) node of each or 0.
+    """
+    result = []
+    for k, node in enumerate(told.nodes, 1):
+        own = points[owner == k]
+        where = node.find.box
+        box = where.box() if where is not None else (minimum_box(own) if len(own) else NOT_SEEN)
+        result.append(
+            TrueObject(
+                instance=k,
+                name=node.name,
+                class_name=node.class_name,
+                world_from_model=as_transform(np.eye(4)),
+                box=box,
+                round=len(own) >= 3 and is_round(own[:, :2]),
+                visible_pixels=0 if node.optional else len(own),
+            )
+        )
+    return tuple(result)
+
+
+def annotated_graph(told: SupportAnnotation, objects: tuple[TrueObject, ...]) -> ContactGraphFile:
+    """Return the contact graph of the annotation. Layout that no relation carries hangs on the scene."""
+    vocabulary = load_vocabulary()
+    nodes = [GraphNode(id=SCENE_NODE, instance=0, class_name=SCENE_NODE, node_type="scene")]
+    links: list[Relation] = []
+    for entry in objects:
+        kind = vocabulary.by_name(entry.class_name).node
+        nodes.append(
+            GraphNode(
+                id=entry.name, instance=entry.instance, class_name=entry.class_name, node_type=kind, box=entry.box
+            )
+        )
+        relation = told.relation_of(entry.name)
+        if relation is None:
+            links.append(Relation(source=SCENE_NODE, target=entry.name, relation="supports", confidence=1.0))
+            continue
+        links.append(Relation(source=relation.parent, target=entry.name, relation=relation.relation, confidence=1.0))
+        links += [
+            Relation(source=n, target=entry.name, relation="also_supports", confidence=1.0) for n in relation.also
+        ]
+        links += [Relation(source=n, target=entry.name, relation="leans_on", confidence=1.0) for n in relation.leans_on]
+    return ContactGraphFile(graph={"annotated": "by hand"}, nodes=tuple(nodes), links=tuple(links))
+
+
+def flakes(points: np.ndarray, owner: np.ndarray) -> ColoredMesh:
+    """Return a mesh with one small level triangle at each point (N, 3), in the colour of its node, grey where none."""
+    angles = np.radians([90.0, 210.0, 330.0])
+    corners = 0.5 * SPACING * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(3)])
+    vertices = (points[:, None, :] + corners).reshape(-1, 3)
+    numbers, inverse = np.unique(owner, return_inverse=True)
+    palette = np.array([instance_color(int(number)) for number in numbers])
+    colors = np.repeat(np.rint(255 * palette[inverse]).astype(np.uint8), 3, axis=0)
+    return ColoredMesh(vertices.astype(np.float32), np.arange(len(vertices), dtype=np.int32).reshape(-1, 3), colors)
