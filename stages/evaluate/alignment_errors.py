@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from stages.kit.measurement.shape_symmetry import Symmetry, symmetric_rotation_e
 
 SUCCESS_TRANSLATION = 0.20
 """[m] (Avetisyan et al. 2019, Scan2CAD, section 7)."""
-SUCCESS_ROTATION = np.radians(20.0)
+SUCCESS_ROTATION = math.radians(20.0)
 SUCCESS_SCALE = 0.20
 
 

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from schemas.errors import UsageError
 from schemas.kinds import (
+    CadLibrary,
     CadScene,
     ContactGraph,
     Evaluation,
@@ -56,7 +57,7 @@ def check_inputs(parameters: EvaluateParameters, inputs: Mapping[str, Any]) -> N
 
 STAGE = Stage(
     name="evaluate",
-    version=3,
+    version=4,
     summary="Measure a reconstruction against ground truth (PQ, AP, graph edit distance, ...), or count what is in it",
     parameters=EvaluateParameters,
     reads={
@@ -69,6 +70,7 @@ STAGE = Stage(
         "cad_scene": Optionally(CadScene),
         "interactive_scene": Optionally(InteractiveScene),
         "plan": Optionally(Plan),
+        "cad_library": Optionally(CadLibrary),
     },
     writes=Evaluation,
     libraries=("numpy", "scipy", "open3d", "trimesh", "matplotlib"),

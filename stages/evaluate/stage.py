@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene
 from schemas.contact_graph import ContactGraph, ContactGraphFile
 from schemas.errors import BadInput
@@ -32,6 +33,8 @@ from stages.evaluate.map_measures import (
 )
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.plan_measures import measure_plan
+from stages.evaluate.replacement_measures import replacements_of
+from stages.evaluate.replacement_record import record_replacements
 from stages.evaluate.results import Part
 from stages.evaluate.trajectory_measures import count_poses, measure_trajectory
 from stages.evaluate.truth import TrueRoom, load_truth
@@ -44,7 +47,8 @@ FAR_FROM_TRUTH = 0.3
 HEADLINES = (
     "map/pq", "map/pq_class_agnostic", "map/instance_ap50", "map/accuracy_mean_mm", "map/mesh_recall",
     "graph/edit_distance", "graph/any_support_f1", "graph/obb_ap50_refined", "cad/position_error_m_mean",
-    "plan/goal_reached", "counts/entities", "counts/support_edges",
+    "replacement/scan2cad_success", "replacement/functional", "replacement/max_penetration_mm",
+    "replacement/collisions", "plan/goal_reached", "counts/entities", "counts/support_edges",
 )  # fmt: skip
 
 
@@ -61,6 +65,7 @@ class Inputs:
     cad_scene: CadScene | None
     interactive_scene: InteractiveScene | None
     plan: Plan | None
+    cad_library: CadLibrary | None
     predicted_map: PredictedMap | None = None
     truth: TrueRoom | None = None
     overlaps: dict[tuple[int, int], float] | None = None
@@ -87,6 +92,7 @@ def run(
     cad_scene: CadScene | None = None,
     interactive_scene: InteractiveScene | None = None,
     plan: Plan | None = None,
+    cad_library: CadLibrary | None = None,
     *,
     parameters: EvaluateParameters,
     context: Context,
@@ -96,8 +102,9 @@ def run(
     Figures are shares in [0, 1] unless the measure's name ends in a unit. Writes metrics.json, tables and plots.
     """
     inputs = Inputs(
-        ground_truth, sequence, trajectory, segments, panoptic_map, contact_graph, cad_scene, interactive_scene, plan
-    )
+        ground_truth, sequence, trajectory, segments, panoptic_map, contact_graph, cad_scene, interactive_scene, plan,
+        cad_library,
+    )  # fmt: skip
     for folder in ("tables", "plots"):
         (context.output / folder).mkdir()
     if panoptic_map is not None:
@@ -205,6 +212,28 @@ def _evaluate_cad(inputs: Inputs, parameters: EvaluateParameters, context: Conte
     pairs = pair_replacements(inputs.truth, scene, graph, inputs.overlaps, parameters.node_match_iou, periods)
     joints = true_joints(inputs.ground_truth)
     measure_cad(inputs.part("cad"), inputs.truth, scene, pairs, joints, parameters, context.random(1))
+    _evaluate_replacement(inputs, parameters, inputs.cad_scene, inputs.ground_truth, inputs.truth)
+
+
+def _evaluate_replacement(
+    inputs: Inputs, parameters: EvaluateParameters, cad_scene: CadScene, ground_truth: GroundTruth, truth: TrueRoom
+) -> None:
+    """Measure the scene, and where the library is given and `cad` recorded it, the scene before the global check."""
+    measured = replacements_of(
+        ground_truth, truth, cad_scene, world_from_log=world_from_log(inputs.sequence), overlaps=inputs.overlaps,
+        minimum_iou=parameters.node_match_iou,
+    )  # fmt: skip
+    if measured is None:
+        return
+    record_replacements(inputs.part("replacement"), measured)
+    if inputs.cad_library is None or all(r.best_single is None for r in cad_scene.scene.replacements):
+        return
+    before = replacements_of(
+        ground_truth, truth, cad_scene, world_from_log=world_from_log(inputs.sequence), overlaps=inputs.overlaps,
+        minimum_iou=parameters.node_match_iou, library_models=inputs.cad_library.path("models"), best_single=True,
+    )  # fmt: skip
+    if before is not None:
+        record_replacements(inputs.part("replacement_before_check"), before)
 
 
 def _evaluate_trajectory(inputs: Inputs, parameters: EvaluateParameters, context: Context) -> None:
