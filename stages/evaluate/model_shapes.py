@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from schemas.cad_library import CadModel
 from schemas.scene_parts import Joint
-from stages.kit.geometry.transforms import apply, transform_from
+from stages.kit.formats.cad_models import part_transforms
+from stages.kit.geometry.transforms import apply
 from stages.kit.measurement.convex_overlap import ConvexPiece
 from stages.kit.measurement.shape_symmetry import NO_SYMMETRY, Symmetry, shape_symmetry
 
@@ -45,18 +46,14 @@ class ModelShape:
     movable: bool = False
     contains: bool = False
 
+    @cached_property
+    def _kinematics(self) -> CadModel:
+        """The part of a model's record that says how its parts hang together."""
+        return CadModel.model_construct(id=self.model_id, parts=tuple(self.parts), joints=self.joints)
+
     def part_poses(self, values: Mapping[str, float]) -> dict[str, np.ndarray]:
         """Part -> (4, 4) model_from_part at joint values [rad, m]; joints that are not named are closed."""
-        poses = {part: np.eye(4) for part in self.parts}
-        for joint in self.joints:
-            value, axis = values.get(joint.name, 0.0), np.asarray(joint.axis, dtype=float)
-            if joint.type == "revolute":
-                poses[joint.part] = transform_from(
-                    Rotation.from_rotvec(value * axis).as_matrix(), np.array(joint.origin)
-                )
-            else:
-                poses[joint.part] = transform_from(np.eye(3), np.array(joint.origin) + value * axis)
-        return poses
+        return part_transforms(self._kinematics, dict(values))
 
     @cached_property
     def closed_triangles(self) -> np.ndarray:

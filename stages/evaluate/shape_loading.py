@@ -82,7 +82,9 @@ def _shape_of_body(
 
 
 def _without_prefix(joint: Joint, prefix: str) -> Joint:
-    return joint.model_copy(update={"name": joint.name.removeprefix(prefix), "part": joint.part.removeprefix(prefix)})
+    above = None if joint.parent is None else joint.parent.removeprefix(prefix)
+    names = {"name": joint.name.removeprefix(prefix), "part": joint.part.removeprefix(prefix), "parent": above}
+    return joint.model_copy(update=names)
 
 
 def model_shape(folder: Path) -> ModelShape:
