@@ -12,6 +12,7 @@ from schemas.scene_parts import Box
 from stages.evaluate.graph_measures import GraphComparison, upright
 from stages.evaluate.truth import stuff_classes
 from stages.kit.geometry.boxes import footprint
+from stages.kit.measurement.edge_agreement import edge_errors
 from stages.kit.measurement.palette import instance_color
 from stages.kit.measurement.panoptic_quality import ClassQuality
 from stages.kit.measurement.plots import plot_bars, plot_floor_plan, plot_graphs, plot_histograms
@@ -48,18 +49,23 @@ def draw_surface(path: Path, to_truth: np.ndarray, to_map: np.ndarray, threshold
     )
 
 
-def draw_comparison(path: Path, comparison: GraphComparison, label: str) -> None:
-    """The true graph beside the reconstructed one; what is missing, extra or wrongly supported is coloured."""
+def draw_comparison(path: Path, comparison: GraphComparison, label: str, ignored: frozenset[str] = frozenset()) -> None:
+    """The true graph beside the reconstructed one, partners in the same order; what is missing, extra or wrongly
+    supported is coloured, nodes and edges."""
     distance = comparison.distance
     true_marks = dict.fromkeys(distance.missing, MISSED) | {t: WRONG for t, _ in distance.wrong_supports}
     predicted_marks = dict.fromkeys(distance.extra, MISSED) | {p: WRONG for _, p in distance.wrong_supports}
     predicted_marks |= {p: WRONG for _, p in distance.substituted}
+    partner = dict(distance.pairs)
+    missing, wrong = edge_errors(comparison.true, comparison.predicted, partner, ignored=ignored)
     plot_graphs(
         path,
         {"true": comparison.true, "reconstructed": comparison.predicted},
         marked={"true": true_marks, "reconstructed": predicted_marks},
+        edges={"true": dict.fromkeys(missing, MISSED), "reconstructed": dict.fromkeys(wrong, MISSED)},
+        partner=partner,
         title=f"Contact graphs, edit distance {distance.total} "
-        f"(red: missing or extra, orange: wrong support or class)\n{label}",
+        f"(red names and lines: missing or extra; orange: wrong support or class)\n{label}",
     )
 
 

@@ -22,7 +22,7 @@ from schemas.trajectory import Trajectory
 from stages.evaluate import counts, figures
 from stages.evaluate.cad_measures import measure_cad, model_periods, pair_replacements, true_joints
 from stages.evaluate.correspondence import point_overlaps
-from stages.evaluate.graph_measures import compare_graphs, measure_boxes, measure_graph
+from stages.evaluate.graph_measures import compare_graphs, measure_boxes, measure_graph, optional_nodes
 from stages.evaluate.map_measures import (
     PredictedMap,
     label_true_points,
@@ -46,9 +46,9 @@ FAR_FROM_TRUTH = 0.3
 """An aligned trajectory error from which on the reader is warned [m]."""
 HEADLINES = (
     "map/pq", "map/pq_class_agnostic", "map/instance_ap50", "map/accuracy_mean_mm", "map/mesh_recall",
-    "graph/edit_distance", "graph/any_support_f1", "graph/obb_ap50_refined", "cad/position_error_m_mean",
-    "replacement/scan2cad_success", "replacement/functional", "replacement/max_penetration_mm",
-    "replacement/collisions", "plan/goal_reached", "counts/entities", "counts/support_edges",
+    "graph/edit_distance", "graph/support_f1", "graph/any_support_f1", "graph/obb_ap50_refined",
+    "cad/position_error_m_mean", "replacement/scan2cad_success", "replacement/functional",
+    "replacement/max_penetration_mm", "replacement/collisions", "plan/goal_reached", "counts/entities", "counts/support_edges",
 )  # fmt: skip
 
 
@@ -197,7 +197,12 @@ def _evaluate_graph(inputs: Inputs, parameters: EvaluateParameters, context: Con
     comparison = compare_graphs(truth, graph, inputs.overlaps, parameters.node_match_iou)
     measure_graph(part, truth, comparison)
     if parameters.plots:
-        figures.draw_comparison(context.output / "plots" / "contact_graphs.png", comparison, inputs.label)
+        figures.draw_comparison(
+            context.output / "plots" / "contact_graphs.png",
+            comparison,
+            inputs.label,
+            optional_nodes(truth, comparison.true),
+        )
 
 
 def _vertices(predicted: PredictedMap | None) -> Mapping[int, int]:

@@ -9,6 +9,8 @@ from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import TREE_RELATIONS
 
 DIRECTED = TREE_RELATIONS
+Edge = tuple[str, str, str]
+"""Source, target, relation."""
 BESIDE_THE_TREE = ("also_supports", "leans_on", "proximal")
 
 
@@ -50,18 +52,65 @@ def edge_agreement(
     `partner`: true node id -> predicted node id (the scene roots pair by themselves). An edge agrees when both ends
     are partners and the relation is the same (proximal edges have no direction). True edges that touch an
     `ignored` true node (never seen by the camera), and predicted edges that touch its partner, do not count. Returns
-    each relation's counts and, as `any_support`, those of all directed edges whatever their relation is called.
+    each relation's counts; as `any_support` those of all directed edges whatever their relation is called; and as
+    `support` those of the directed edges of the tree, relation and all, without the edges that hang floor, walls and
+    ceiling on the scene, which cannot be wrong.
     """
-    names = dict(partner)
-    for node in true.nodes:
-        if node.node_type == "scene":
-            names[node.id] = next((n.id for n in predicted.nodes if n.node_type == "scene"), node.id)
+    names = _with_roots(true, predicted, partner)
     skipped = {names[name] for name in ignored if name in names}
     result: dict[str, EdgeAgreement] = {}
     for relation in relations:
         result[relation] = _agreement(true, predicted, names, ignored, skipped, (relation,))
     result["any_support"] = _agreement(true, predicted, names, ignored, skipped, DIRECTED)
+    below = [
+        _agreement(_below_root(true), _below_root(predicted), names, ignored, skipped, (relation,))
+        for relation in DIRECTED
+    ]
+    result["support"] = EdgeAgreement(
+        sum(a.true_count for a in below), sum(a.predicted_count for a in below), sum(a.agreed for a in below)
+    )
     return result
+
+
+def edge_errors(
+    true: ContactGraphFile,
+    predicted: ContactGraphFile,
+    partner: Mapping[str, str],
+    *,
+    ignored: frozenset[str] = frozenset(),
+) -> tuple[frozenset[Edge], frozenset[Edge]]:
+    """Return the true edges that were not found and the predicted edges that are not true, but for proximal ones.
+
+    `partner`, `ignored` as in `edge_agreement`.
+    """
+    names = _with_roots(true, predicted, partner)
+    skipped = {names[name] for name in ignored if name in names}
+    wanted = {(k.source, k.target, k.relation) for k in true.links if not {k.source, k.target} & ignored}
+    got = {(k.source, k.target, k.relation) for k in predicted.links if not {k.source, k.target} & skipped}
+    matched = {(s, t, r): (names.get(s, ""), names.get(t, ""), r) for s, t, r in wanted}
+    missing = {edge for edge, other in matched.items() if other not in got}
+    wrong = got - set(matched.values())
+    return (
+        frozenset(edge for edge in missing if edge[2] != "proximal"),
+        frozenset(edge for edge in wrong if edge[2] != "proximal"),
+    )
+
+
+def _with_roots(true: ContactGraphFile, predicted: ContactGraphFile, partner: Mapping[str, str]) -> dict[str, str]:
+    """`partner` and the pair of scene roots."""
+    names = dict(partner)
+    for node in true.nodes:
+        if node.node_type == "scene":
+            names[node.id] = next((n.id for n in predicted.nodes if n.node_type == "scene"), node.id)
+    return names
+
+
+def _below_root(graph: ContactGraphFile) -> ContactGraphFile:
+    """The graph without the edges of floor, walls and ceiling to the scene."""
+    roots = {node.id for node in graph.nodes if node.node_type == "scene"}
+    layout = {node.id for node in graph.nodes if node.node_type == "layout"}
+    kept = tuple(link for link in graph.links if not (link.source in roots and link.target in layout))
+    return graph.model_copy(update={"links": kept})
 
 
 def _agreement(

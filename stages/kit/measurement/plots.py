@@ -18,6 +18,7 @@ from matplotlib.figure import Figure  # noqa: E402
 from schemas.contact_graph import ContactGraphFile  # noqa: E402
 from schemas.scene_parts import TREE_RELATIONS  # noqa: E402
 from stages.kit.geometry.boxes import polygon_area  # noqa: E402
+from stages.kit.measurement.edge_agreement import Edge  # noqa: E402
 from stages.kit.measurement.palette import RELATION_COLORS  # noqa: E402
 from stages.kit.measurement.tree_layout import tree_layout  # noqa: E402
 
@@ -127,18 +128,43 @@ def plot_floor_plan(
 
 
 def plot_graphs(
-    path: Path, graphs: Mapping[str, ContactGraphFile], *, marked: Mapping[str, Mapping[str, str]], title: str
+    path: Path,
+    graphs: Mapping[str, ContactGraphFile],
+    *,
+    marked: Mapping[str, Mapping[str, str]],
+    title: str,
+    edges: Mapping[str, Mapping[Edge, str]] | None = None,
+    partner: Mapping[str, str] | None = None,
 ) -> None:
-    """Support trees side by side. `marked`: graph title -> node id -> colour of its name (red for errors, say)."""
+    """Support trees side by side. `marked`: graph title -> node id -> colour of its name (red for errors, say).
+
+    `edges`: graph title -> edge -> colour that it is drawn in instead of its relation's, and thicker. `partner`: node
+    of the first graph -> node of the others that stands for it: the others then take the order of the first.
+    """
     with plt.rc_context(STYLE):
-        layouts = {name: tree_layout(_parents(graph)) for name, graph in graphs.items()}
+        layouts: dict[str, dict[str, tuple[float, float]]] = {}
+        order: dict[str, float] | None = None
+        for name, graph in graphs.items():
+            layouts[name] = tree_layout(_parents(graph), order)
+            if order is None:
+                rows_of_first = {node: row for node, (_, row) in layouts[name].items()}
+                order = {(partner or {}).get(node, node): row for node, row in rows_of_first.items()}
         rows = max([1.0] + [row + 1 for layout in layouts.values() for _, row in layout.values()])
         figure, all_axes = plt.subplots(1, len(graphs), figsize=(5.0 * len(graphs), 0.9 + 0.24 * rows), squeeze=False)
         for axes, (name, graph) in zip(all_axes[0], graphs.items(), strict=True):
-            _draw_tree(axes, graph, layouts[name], marked.get(name, {}))
+            _draw_tree(axes, graph, layouts[name], marked.get(name, {}), (edges or {}).get(name, {}))
             axes.set_title(name)
         used = {link.relation for graph in graphs.values() for link in graph.links} - {"proximal"}
-        handles = [plt.Line2D([], [], color=RELATION_COLORS[r], label=r.replace("_", " ")) for r in sorted(used)]
+        handles = [
+            plt.Line2D(
+                [],
+                [],
+                color=RELATION_COLORS[r],
+                label=r.replace("_", " "),
+                linestyle="-" if r in TREE_RELATIONS else "--",
+            )
+            for r in sorted(used)
+        ]
         figure.suptitle(title, x=0.02, ha="left", size=10.5, weight="bold")
         if handles:
             figure.legend(handles=handles, loc="lower center", ncols=len(handles), bbox_to_anchor=(0.5, -0.04))
@@ -155,7 +181,11 @@ def _parents(graph: ContactGraphFile) -> dict[str, str | None]:
 
 
 def _draw_tree(
-    axes: Axes, graph: ContactGraphFile, layout: dict[str, tuple[float, float]], marked: Mapping[str, str]
+    axes: Axes,
+    graph: ContactGraphFile,
+    layout: dict[str, tuple[float, float]],
+    marked: Mapping[str, str],
+    colored: Mapping[Edge, str],
 ) -> None:
     # A column is as wide as its longest name; positions count letters.
     left = {0: 0.0}
@@ -164,14 +194,21 @@ def _draw_tree(
             left[depth] + max((len(name) for name, (x, _) in layout.items() if x == depth), default=0) + 4.0
         )
     places = {name: (left[int(x)], y) for name, (x, y) in layout.items()}
-    for link in graph.links:
+    # Marked edges are drawn last, over the trunk that they share with their siblings.
+    for link in sorted(graph.links, key=lambda k: (k.source, k.target, k.relation) in colored):
         if link.relation == "proximal" or link.source not in places or link.target not in places:
             continue
         (x0, y0), (x1, y1) = places[link.source], places[link.target]
         bend = x1 - 2.0
         style = "-" if link.relation in TREE_RELATIONS else "--"
-        color = RELATION_COLORS[link.relation]
-        axes.plot([x0, bend, bend, x1], [y0, y0, y1, y1], color=color, linewidth=1.2, linestyle=style)
+        mark = colored.get((link.source, link.target, link.relation))
+        color, width = (RELATION_COLORS[link.relation], 1.2) if mark is None else (mark, 2.2)
+        if link.relation in TREE_RELATIONS:
+            axes.plot([x0, bend, bend, x1], [y0, y0, y1, y1], color=color, linewidth=width, linestyle=style)
+        else:  # beside the tree: an arc at the left of both names, so that it covers no line of the tree
+            out = min(x0, x1) - 1.2
+            axes.plot([x0 - 0.3, out, out, x1 - 0.3], [y0 + 0.2, y0 + 0.2, y1, y1], color=color, linewidth=width,
+                      linestyle=style)  # fmt: skip
     for name, (x, y) in places.items():
         axes.annotate(
             name, (x, y), ha="left", va="center", size=7.5, color=marked.get(name, "#222222"),

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 
-def tree_layout(parents: Mapping[str, str | None]) -> dict[str, tuple[float, float]]:
+def tree_layout(
+    parents: Mapping[str, str | None], order: Mapping[str, float] | None = None
+) -> dict[str, tuple[float, float]]:
     """Return (depth, row) of every node. `parents`: node -> parent, None for a root.
 
     Leaves take rows 0, 1, ... in order of (subtree first by name); a parent stands at the mean of its first and last
-    child. A node whose parent is no key is a root. Raises ValueError for a circle.
+    child. `order`: node -> where it should stand among its siblings (rows of another tree, to draw two beside each
+    other); nodes that are not in it come last. A node whose parent is no key is a root. Raises ValueError for a circle.
     """
     children: dict[str | None, list[str]] = {}
-    for name in sorted(parents):
+    ranks = order or {}
+    for name in sorted(parents, key=lambda name: (ranks.get(name, math.inf), name)):
         above = parents[name]
         children.setdefault(above if above in parents else None, []).append(name)
     positions: dict[str, tuple[float, float]] = {}
