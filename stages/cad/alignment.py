@@ -39,12 +39,17 @@ class Alignment:
     """J (2.12) at the solution."""
 
 
+@njit(cache=True)
 def rectangle(center: np.ndarray, size: np.ndarray, yaw: float) -> np.ndarray:
-    """Return the corners (4, 2) of a ground rectangle, counter-clockwise."""
+    """Return the corners (4, 2) of a ground rectangle, counter-clockwise, from centre, full lengths and yaw [rad]."""
     cosine, sine = math.cos(yaw), math.sin(yaw)
-    half = np.asarray(size[:2]) / 2
-    local = np.array([[-half[0], -half[1]], [half[0], -half[1]], [half[0], half[1]], [-half[0], half[1]]])
-    return local @ np.array([[cosine, sine], [-sine, cosine]]) + np.asarray(center[:2])
+    corners = np.empty((4, 2))
+    for k in range(4):
+        x = 0.5 * size[0] * (-1.0 if k in (0, 3) else 1.0)
+        y = 0.5 * size[1] * (-1.0 if k in (0, 1) else 1.0)
+        corners[k, 0] = cosine * x - sine * y + center[0]
+        corners[k, 1] = sine * x + cosine * y + center[1]
+    return corners
 
 
 @njit(cache=True)
@@ -84,20 +89,31 @@ def convex_overlap_area(subject: np.ndarray, clip: np.ndarray) -> float:
     return max(0.0, 0.5 * area)
 
 
+@njit(cache=True)
 def turn_about_z(yaw: float) -> np.ndarray:
     """Return the (3, 3) rotation by `yaw` [rad] about z."""
     cosine, sine = math.cos(yaw), math.sin(yaw)
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
-def box_errors(frame: Observed, size_y: np.ndarray, scale: float, yaw: float, position: np.ndarray) -> np.ndarray:
+@njit(cache=True)
+def box_errors(
+    center_x: np.ndarray,
+    size_x: np.ndarray,
+    yaw_x: float,
+    size_y: np.ndarray,
+    scale: float,
+    yaw: float,
+    position: np.ndarray,
+) -> np.ndarray:
     """Equation 2.13: [A(T o y) - A(x n T o y), alpha s_y - s_x], with `size_y` (3,) of the oriented model."""
     mine = rectangle(position, scale * size_y, yaw)
-    theirs = rectangle(frame.center, frame.size, frame.yaw)
+    theirs = rectangle(center_x, size_x, yaw_x)
     outside = scale**2 * size_y[0] * size_y[1] - convex_overlap_area(mine, theirs)
-    return np.array([outside, scale * size_y[2] - frame.size[2]])
+    return np.array([outside, scale * size_y[2] - size_x[2]])
 
 
+@njit(cache=True)
 def plane_errors(
     normals_x: np.ndarray, offsets_x: np.ndarray, normals_y: np.ndarray, offsets_y: np.ndarray, shift: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -107,33 +123,61 @@ def plane_errors(
     that of y, which lies at `shift` (3,) from the centre of x: T^-T f(pi) has offset d_y - n . shift. The centre of x
     is the origin, as offsets from the far origin of the map would weigh every error of yaw by that distance.
     """
-    return offsets_y - normals_y @ shift - offsets_x, 1.0 - np.einsum("ij,ij->i", normals_x, normals_y)
+    along = normals_y[:, 0] * shift[0] + normals_y[:, 1] * shift[1] + normals_y[:, 2] * shift[2]
+    return offsets_y - along - offsets_x, 1.0 - (normals_x * normals_y).sum(axis=1)
+
+
+@njit(cache=True)
+def _residuals(
+    parameters: np.ndarray,
+    center_x: np.ndarray,
+    size_x: np.ndarray,
+    yaw_x: float,
+    support_height: float,
+    size_y: np.ndarray,
+    normals_x: np.ndarray,
+    offsets_x: np.ndarray,
+    normals_y: np.ndarray,
+    offsets_y: np.ndarray,
+    offset_weight: np.ndarray,
+    angle_weight: float,
+    box_weight: np.ndarray,
+) -> np.ndarray:
+    """e of equation 2.12, times the roots of the weights. Compiled, as every candidate asks for it 200 times."""
+    scale, yaw = parameters[0], parameters[1]
+    position = np.array([parameters[2], parameters[3], support_height + scale * size_y[2] / 2])
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    turned = np.empty_like(normals_y)
+    turned[:, 0] = cosine * normals_y[:, 0] - sine * normals_y[:, 1]
+    turned[:, 1] = sine * normals_y[:, 0] + cosine * normals_y[:, 1]
+    turned[:, 2] = normals_y[:, 2]
+    offset, angle = plane_errors(normals_x, offsets_x, turned, scale * offsets_y, position - center_x)
+    box = box_errors(center_x, size_x, yaw_x, size_y, scale, yaw, position)
+    return np.concatenate((box_weight * box, offset_weight * offset, angle_weight * angle))
 
 
 def residual_function(match: Match, weights: AlignmentWeights) -> Callable[[np.ndarray], np.ndarray]:
     """Return e(alpha, theta, px, py) with J = e^T e (2.12); p_z follows from the support: p = -d^s + alpha s_y / 2."""
     frame, shape = match.frame, match.shape
     rotation = CUBE_ROTATIONS[match.orientation]
-    size_y = np.abs(rotation) @ shape.size
     rows = np.array([pair[0] for pair in match.pairs], dtype=int)
     columns = np.array([pair[1] for pair in match.pairs], dtype=int)
-    normals_x, offsets_x = frame.planes.normals[rows], frame.planes.offsets[rows]
-    normals_y, offsets_y = shape.planes.normals[columns] @ rotation.T, shape.planes.offsets[columns]
     carries = frame.planes.supporting[rows]
-    offset_weight = np.sqrt(np.where(carries, weights.support, weights.offset))
-    angle_weight = math.sqrt(weights.angle)
-    box_weight = np.sqrt([weights.containment, weights.height])
-
-    def residuals(parameters: np.ndarray) -> np.ndarray:
-        scale, yaw = float(parameters[0]), float(parameters[1])
-        position = np.array([parameters[2], parameters[3], frame.support_height + scale * size_y[2] / 2])
-        turned = normals_y @ turn_about_z(yaw).T
-        offset, angle = plane_errors(normals_x, offsets_x, turned, scale * offsets_y, position - frame.center)
-        return np.concatenate(
-            [box_weight * box_errors(frame, size_y, scale, yaw, position), offset_weight * offset, angle_weight * angle]
-        )
-
-    return residuals
+    fixed = (
+        np.asarray(frame.center, dtype=float),
+        np.asarray(frame.size, dtype=float),
+        float(frame.yaw),
+        float(frame.support_height),
+        np.abs(rotation) @ shape.size,
+        np.ascontiguousarray(frame.planes.normals[rows]),
+        frame.planes.offsets[rows],
+        np.ascontiguousarray(shape.planes.normals[columns] @ rotation.T),
+        shape.planes.offsets[columns],
+        np.sqrt(np.where(carries, weights.support, weights.offset)),
+        math.sqrt(weights.angle),
+        np.sqrt([weights.containment, weights.height]),
+    )
+    return lambda parameters: _residuals(parameters, *fixed)
 
 
 def levenberg_marquardt(
