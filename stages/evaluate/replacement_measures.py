@@ -19,9 +19,10 @@ from stages.evaluate.correspondence import assign, merge_stuff_nodes, node_affin
 from stages.evaluate.functional_equivalence import Equivalence, equivalence, same_relation
 from stages.evaluate.joint_errors import JointError, joint_errors, placed_joints
 from stages.evaluate.model_shapes import ModelShape, PlacedShape
-from stages.evaluate.room_penetrations import Penetration, room_penetrations
-from stages.evaluate.shape_loading import layout_pieces, model_shapes, placed_candidate, true_shapes
+from stages.evaluate.shape_loading import model_shapes, placed_candidate, true_shapes
 from stages.evaluate.truth import TrueRoom
+from stages.kit.measurement.layout_pieces import layout_pieces
+from stages.kit.measurement.room_penetrations import Penetration, room_penetrations
 
 
 @dataclass(frozen=True, eq=False)

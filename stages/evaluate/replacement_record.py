@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.evaluate.replacement_measures import ObjectResult, RoomReplacements
 from stages.evaluate.results import Part
-from stages.evaluate.room_penetrations import Penetration
+from stages.kit.measurement.room_penetrations import Penetration
 from stages.kit.measurement.tables import Cell, Table
 
 NOTE = (

@@ -11,15 +11,12 @@ import trimesh
 from trimesh.visual.color import ColorVisuals
 
 from schemas.cad_scene import CadCandidate
-from schemas.contact_graph import ContactGraphFile
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveSceneFile, SceneBody
 from schemas.scene_parts import Joint
 from stages.evaluate.model_shapes import ModelShape, PartShape, PlacedShape
 from stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, read_model
-from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.geometry.layout_slabs import Slab, level_slab, surface_height, wall_slabs
-from stages.kit.measurement.convex_overlap import ConvexPiece, convex_piece
+from stages.kit.measurement.convex_overlap import convex_piece
 from stages.kit.simulation.shapes import link_shapes
 from stages.kit.simulation.urdf_split import PART_SEPARATOR, read_urdf, with_absolute_meshes
 
@@ -134,36 +131,3 @@ def _face_colors(mesh: trimesh.Trimesh) -> np.ndarray:
     if getattr(mesh.visual, "kind", None) in ("face", "vertex"):
         return np.asarray(cast(ColorVisuals, mesh.visual).face_colors, dtype=float)[:, :3]
     return np.tile(GREY, (len(mesh.faces), 1))
-
-
-def layout_pieces(graph: ContactGraphFile, layout_folder: Path) -> dict[str, list[ConvexPiece]]:
-    """Return layout node -> the slabs that it collides with in the exported scene, as convex pieces in the world.
-
-    Made of planes, mesh (`<node>.ply` in `layout_folder`, where there is one) and box, as the scene's files make them.
-    """
-    boxes = [node.box for node in graph.nodes if node.box is not None]
-    if not boxes:
-        return {}
-    centers = np.array([box.center for box in boxes])
-    middle = 0.5 * (centers.min(axis=0) + centers.max(axis=0))
-    found: dict[str, list[ConvexPiece]] = {}
-    for node in graph.nodes:
-        if node.node_type != "layout" or node.box is None:
-            continue
-        file = layout_folder / f"{node.id}.ply"
-        mesh = read_mesh(file, may_be_empty=True) if file.is_file() else None
-        if node.class_name in ("floor", "ceiling"):
-            used = [link.plane for link in graph.links if link.source == node.id and link.plane is not None]
-            planes = tuple(plane for k, plane in enumerate(node.planes) if k in used) or node.planes
-            upwards = node.class_name == "floor"
-            slabs = [level_slab(node.box, surface_height(planes, mesh, node.box, upwards=upwards), downwards=upwards)]
-        else:
-            slabs = wall_slabs(node.planes, mesh, node.box, middle)
-        found[node.id] = [piece for slab in slabs if (piece := _slab_piece(slab)) is not None]
-    return found
-
-
-def _slab_piece(slab: Slab) -> ConvexPiece | None:
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * slab.size
-    piece = convex_piece(corners)
-    return None if piece is None else piece.placed(slab.world_from_slab)

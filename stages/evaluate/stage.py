@@ -48,7 +48,8 @@ HEADLINES = (
     "map/pq", "map/pq_class_agnostic", "map/instance_ap50", "map/accuracy_mean_mm", "map/mesh_recall",
     "graph/edit_distance", "graph/support_f1", "graph/any_support_f1", "graph/obb_ap50_refined",
     "cad/position_error_m_mean", "replacement/scan2cad_success", "replacement/functional",
-    "replacement/max_penetration_mm", "replacement/collisions", "plan/goal_reached", "counts/entities", "counts/support_edges",
+    "replacement/max_penetration_mm", "replacement/collisions", "plan/goal_reached", "counts/entities",
+    "counts/support_edges",
 )  # fmt: skip
 
 

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from stages.evaluate.alignment_errors import alignment_error
 from stages.evaluate.joint_errors import joint_errors, placed_joints
 from stages.evaluate.model_shapes import PlacedShape, supporting_area
-from stages.evaluate.room_penetrations import room_penetrations
 from stages.kit.geometry.transforms import transform_from, transform_from_yaw
+from stages.kit.measurement.room_penetrations import room_penetrations
 from tests.unit.evaluate.shapes import box_model, cupboard
 
 TABLE = box_model("table_a", "table", (1.2, 0.8, 0.7))

@@ -1,0 +1,45 @@
+"""Floor, walls and ceiling of a CAD scene as the convex slabs that they collide with once it is exported."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from schemas.contact_graph import ContactGraphFile
+from stages.kit.formats.mesh_files import read_mesh
+from stages.kit.geometry.layout_slabs import Slab, level_slab, surface_height, wall_slabs
+from stages.kit.measurement.convex_overlap import ConvexPiece, convex_piece
+
+
+def layout_pieces(graph: ContactGraphFile, layout_folder: Path) -> dict[str, list[ConvexPiece]]:
+    """Return layout node -> the slabs that it collides with in the exported scene, as convex pieces in the world.
+
+    Made of planes, mesh (`<node>.ply` in `layout_folder`, where there is one) and box, as the scene's files make them.
+    """
+    boxes = [node.box for node in graph.nodes if node.box is not None]
+    if not boxes:
+        return {}
+    centers = np.array([box.center for box in boxes])
+    middle = 0.5 * (centers.min(axis=0) + centers.max(axis=0))
+    found: dict[str, list[ConvexPiece]] = {}
+    for node in graph.nodes:
+        if node.node_type != "layout" or node.box is None:
+            continue
+        file = layout_folder / f"{node.id}.ply"
+        mesh = read_mesh(file, may_be_empty=True) if file.is_file() else None
+        if node.class_name in ("floor", "ceiling"):
+            used = [link.plane for link in graph.links if link.source == node.id and link.plane is not None]
+            planes = tuple(plane for k, plane in enumerate(node.planes) if k in used) or node.planes
+            upwards = node.class_name == "floor"
+            slabs = [level_slab(node.box, surface_height(planes, mesh, node.box, upwards=upwards), downwards=upwards)]
+        else:
+            slabs = wall_slabs(node.planes, mesh, node.box, middle)
+        found[node.id] = [piece for slab in slabs if (piece := _slab_piece(slab)) is not None]
+    return found
+
+
+def _slab_piece(slab: Slab) -> ConvexPiece | None:
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * slab.size
+    piece = convex_piece(corners)
+    return None if piece is None else piece.placed(slab.world_from_slab)
