@@ -41,7 +41,21 @@ def read_model(folder: Path) -> CadModel:
     for joint in model.joints:
         if joint.part not in model.parts:
             raise BadInput(f"{path}: joint {joint.name!r} moves {joint.part!r}, which is no part", hint=REBUILD)
+    _check_parents(model, path)
     return model
+
+
+def _check_parents(model: CadModel, path: Path) -> None:
+    """Raise BadInput when a joint hangs on what is no part, or on itself in a circle."""
+    parents = {joint.part: joint.parent for joint in model.joints if joint.parent is not None}
+    for part, parent in parents.items():
+        if parent not in model.parts:
+            raise BadInput(f"{path}: part {part!r} hangs on {parent!r}, which is no part", hint=REBUILD)
+        above, steps = parent, 0
+        while above in parents and steps <= len(parents):
+            above, steps = parents[above], steps + 1
+        if steps > len(parents):
+            raise BadInput(f"{path}: part {part!r} hangs on itself in a circle", hint=REBUILD)
 
 
 def part_transforms(model: CadModel, joints: dict[str, float]) -> dict[str, np.ndarray]:
@@ -52,15 +66,26 @@ def part_transforms(model: CadModel, joints: dict[str, float]) -> dict[str, np.n
     unknown = set(joints) - {joint.name for joint in model.joints}
     if unknown:
         raise BadInput(f"model {model.id}: no joint {sorted(unknown)[0]!r}")
-    transforms = {part: np.eye(4) for part in model.parts}
+    own, origins, parents = {}, {}, {}
     for joint in model.joints:
         value = joints.get(joint.name, 0.0)
         axis, origin = np.asarray(joint.axis), np.asarray(joint.origin)
         if joint.type == "revolute":
-            transforms[joint.part] = transform_from(Rotation.from_rotvec(value * axis).as_matrix(), origin)
+            own[joint.part] = transform_from(Rotation.from_rotvec(value * axis).as_matrix(), origin)
         else:
-            transforms[joint.part] = transform_from(np.eye(3), origin + value * axis)
-    return transforms
+            own[joint.part] = transform_from(np.eye(3), origin + value * axis)
+        origins[joint.part], parents[joint.part] = origin, joint.parent
+
+    def placed(part: str) -> np.ndarray:
+        if part not in own:
+            return np.eye(4)
+        parent = parents[part]
+        if parent is None or parent not in own:
+            return own[part]
+        # part frames are parallel to the model frame at value 0, so that the parent's own pose then is its origin
+        return placed(parent) @ transform_from(np.eye(3), -origins[parent]) @ own[part]
+
+    return {part: placed(part) for part in model.parts}
 
 
 def load_visual_parts(folder: Path) -> dict[str, trimesh.Trimesh]:

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, number, numbers
+from stages.kit.geometry.substances import ROLLING_FRICTION, SPINNING_FRICTION
 from stages.kit.geometry.transforms import quaternion_of
 
 KEY_FRAME = "reconstructed"
@@ -26,7 +27,10 @@ def write_mjcf(path: Path, urdf: Urdf, joint_values: dict[str, float]) -> None:
     defaults = ElementTree.SubElement(root, "default")
     for name, attributes in (
         ("visual", {"group": "2", "contype": "0", "conaffinity": "0", "density": "0"}),
-        ("collision", {"group": "3", "rgba": "0.5 0.5 0.5 0.3", "friction": "0.8 0.005 0.0001"}),
+        (
+            "collision",
+            {"group": "3", "rgba": "0.5 0.5 0.5 0.3", "friction": f"0.45 {SPINNING_FRICTION} {ROLLING_FRICTION}"},
+        ),
     ):
         ElementTree.SubElement(ElementTree.SubElement(defaults, "default", {"class": name}), "geom", attributes)
     assets = ElementTree.SubElement(root, "asset")
@@ -126,6 +130,9 @@ def _fill(body: ElementTree.Element, link: Link, add_mesh: Callable[[Shape, bool
                 attributes |= {"type": "mesh", "mesh": add_mesh(shape, kind == "visual")}
             else:
                 attributes |= {"type": "box", "size": numbers(0.5 * np.asarray(shape.box_size))}
+            if kind == "collision" and link.friction is not None:
+                # MuJoCo takes the larger of the two values of a contact
+                attributes["friction"] = numbers((link.friction, SPINNING_FRICTION, ROLLING_FRICTION))
             if kind == "visual" and shape.color is not None:
                 attributes["rgba"] = numbers(shape.color)
             ElementTree.SubElement(body, "geom", attributes)

@@ -75,15 +75,17 @@ def write_model_folder(folder: Path, model: CadModel, parts: Sequence[PartGeomet
         links.append(Link(part.name, part.properties, tuple(visuals), tuple(collisions)))
     body = parts[0].name
     joints = []
+    origins = {joint.part: np.asarray(joint.origin, dtype=float) for joint in model.joints}
     for joint in model.joints:
+        parent = joint.parent or body
         revolute = joint.type == "revolute"
         joints.append(
             UrdfJoint(
                 name=joint.name,
                 type=joint.type,
-                parent=body,
+                parent=parent,
                 child=joint.part,
-                parent_from_child=transform_from(np.eye(3), np.asarray(joint.origin)),
+                parent_from_child=transform_from(np.eye(3), origins[joint.part] - origins.get(parent, np.zeros(3))),
                 axis=joint.axis,
                 lower=joint.lower,
                 upper=joint.upper,

@@ -16,11 +16,13 @@ from schemas.interactive_scene import InteractiveSceneFile, SceneBody
 from schemas.scene_parts import Box
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.mjcf_file import write_mjcf
-from stages.kit.formats.scene_links import BodyLinks, box_links, layout_links, mesh_links, model_links
+from stages.kit.formats.scene_links import BodyLinks, box_links, layout_links, mesh_links, model_links, still_mesh_links
+from stages.kit.formats.scene_supports import carried_by, resting_height
 from stages.kit.formats.urdf_check import NAME, require_sound
 from stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, write_urdf
 from stages.kit.geometry.boxes import box_yaw
 from stages.kit.geometry.layout_slabs import Slab, level_slab, surface_height, wall_slabs
+from stages.kit.geometry.substances import substance_of
 from stages.kit.geometry.transforms import inverse, is_rigid
 
 WORLD = "world"
@@ -142,16 +144,30 @@ def _room_center(bodies: list[BundleBody]) -> np.ndarray:
 def _links(
     root: Path, body: BundleBody, node: GraphNode | None, graph: ContactGraphFile, center: np.ndarray
 ) -> BodyLinks:
+    substance = substance_of(body.class_name)
     if body.model is not None and body.model_folder is not None:
         links = model_links(root, body.name, body.model, body.model_folder, body.scale, body.joint_values)
     elif load_vocabulary().by_name(body.class_name).is_layout:
-        return layout_links(root, body.name, body.world_from_body, body.mesh, _slabs(body, node, graph, center))
+        links = layout_links(root, body.name, body.world_from_body, body.mesh, _slabs(body, node, graph, center))
+        return links.with_friction(substance.friction)
     elif body.mesh is not None and len(body.mesh.faces):
-        world_yaw = box_yaw(body.box) - np.arctan2(body.world_from_body[1, 0], body.world_from_body[0, 0])
-        links = mesh_links(root, body.name, body.mesh, movable=body.movable, yaw=float(world_yaw))
+        links = _mesh_links(root, body, substance.hull_density, graph)
     else:
-        links = box_links(body.name, body.world_from_body, body.box)
+        links = box_links(body.name, body.world_from_body, body.box, substance.hull_density)
+    links = links.with_friction(substance.friction)
     return links if body.mass is None else links.with_mass(body.mass)
+
+
+def _mesh_links(root: Path, body: BundleBody, density: float, graph: ContactGraphFile) -> BodyLinks:
+    assert body.mesh is not None
+    nodes = {node.id: node for node in graph.nodes}
+    pose = body.world_from_body
+    if body.movable:
+        height = resting_height(graph, nodes, body.name)
+        rests_at = None if height is None else height - float(pose[2, 3])
+        return mesh_links(root, body.name, body.mesh, density, rests_at=rests_at)
+    yaw = float(box_yaw(body.box) - np.arctan2(pose[1, 0], pose[0, 0]))
+    return still_mesh_links(root, body.name, body.mesh, density, pose, yaw, carried_by(graph, nodes, body.name))
 
 
 def _slabs(body: BundleBody, node: GraphNode | None, graph: ContactGraphFile, center: np.ndarray) -> list[Slab]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,14 +16,13 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Box, Joint
 from stages.kit.formats.cad_models import URDF_FILE, load_visual_parts
 from stages.kit.formats.model_writer import write_obj
+from stages.kit.formats.scene_supports import Carried, levelled, pads, standing_points
 from stages.kit.formats.urdf_file import Link, Shape, UrdfJoint, parse_urdf
 from stages.kit.geometry.box_cover import cover_with_boxes
 from stages.kit.geometry.layout_slabs import Slab
-from stages.kit.geometry.solids import MassProperties, box, hull, mass_properties
+from stages.kit.geometry.solids import MassProperties, Solid, box, hull, mass_properties
 from stages.kit.geometry.transforms import inverse, transform_from_quaternion, transform_from_yaw
 
-MESH_DENSITY = 200.0
-"""Of the convex hull of a thing without CAD model [kg/m^3]: furniture is mostly air."""
 LAYOUT_DENSITY = 1000.0
 GREY = (0.6, 0.6, 0.6, 1.0)
 URDF_MESHES = (".obj", ".stl")
@@ -53,6 +53,11 @@ class BodyLinks:
             links.append(replace(link, inertial=new))
         return replace(self, links=tuple(links))
 
+    def with_friction(self, friction: float) -> BodyLinks:
+        """Return the same body with the sliding friction of all links set that have none of their own."""
+        links = tuple(link if link.friction is not None else replace(link, friction=friction) for link in self.links)
+        return replace(self, links=links)
+
 
 def model_links(
     root: Path, name: str, model: CadModel, folder: Path, scale: float, values: dict[str, float]
@@ -76,7 +81,7 @@ def model_links(
             _copied(root, model.id, part, folder, shape, scale, visual=False) for shape in link.collisions
         )
         inertial = None if link.inertial is None else link.inertial.scaled(scale)
-        links.append(Link(names[part], inertial, visuals, collisions))
+        links.append(Link(names[part], inertial, visuals, collisions, link.friction))
     by_name = {joint.name: joint for joint in urdf.joints}
     joints, records, placed = [], [], {}
     for record in model.joints:
@@ -90,7 +95,7 @@ def model_links(
             replace(
                 source,
                 name=f"{name}__{record.name}",
-                parent=names[model.parts[0]],
+                parent=names[record.parent or model.parts[0]],
                 child=names[record.part],
                 parent_from_child=frame,
                 lower=record.lower * length,
@@ -115,6 +120,7 @@ def scaled_joint(joint: Joint, body: str, scale: float) -> Joint:
         update={
             "name": f"{body}__{joint.name}",
             "part": f"{body}__{joint.part}",
+            "parent": None if joint.parent is None else f"{body}__{joint.parent}",
             "origin": grown(joint.origin),
             "lower": joint.lower * length,
             "upper": joint.upper * length,
@@ -149,45 +155,81 @@ def _copied(root: Path, model_id: str, part: str, folder: Path, shape: Shape, sc
     return Shape(target.relative_to(root).as_posix(), shape.scale * scale, None, frame, color)
 
 
-def mesh_links(root: Path, name: str, mesh: trimesh.Trimesh, *, movable: bool, yaw: float = 0.0) -> BodyLinks:
-    """Return the link of a thing without CAD model: its mesh (body frame) to look at.
+def mesh_links(
+    root: Path, name: str, mesh: trimesh.Trimesh, density: float, *, rests_at: float | None = None
+) -> BodyLinks:
+    """Return the link of a movable thing without CAD model: its mesh (body frame) to look at, its convex hull to
+    collide with, filled at `density` [kg/m^3].
 
-    A movable thing collides as its convex hull (too flat for one: as the box around it, at least 5 mm thick); one that
-    stays where it is as boxes over its surface, turned by `yaw` [rad], so that what lies in it or under it is free.
+    The hull is flat where the thing rests, at the height `rests_at` [m] of the body frame; too flat for a hull, it is
+    the box around it, at least 5 mm thick.
     """
     visual = _own_mesh(root, name, mesh)
-    try:
-        solid = hull(np.unique(np.asarray(mesh.vertices, dtype=float), axis=0))
-        properties = mass_properties([solid], [MESH_DENSITY])
-        if np.ptp(solid.vertices, axis=0).min() < 2e-3:
-            raise ValueError("flat")
-    except (QhullError, ValueError):
-        middle, half = mesh.bounds.mean(axis=0), np.maximum(0.5 * np.ptp(mesh.bounds, axis=0), 2.5e-3)
-        low, high = middle - half, middle + half
-        solid = box((low[0], high[0]), (low[1], high[1]), (low[2], high[2]))
-        properties = mass_properties([solid], [MESH_DENSITY])
-    if movable:
-        write_obj(root / "meshes" / name / "collision_0.obj", solid.vertices, solid.faces)
-        return BodyLinks((Link(name, properties, (visual,), (Shape(f"meshes/{name}/collision_0.obj"),)),))
+    points = np.asarray(mesh.vertices, dtype=float)
+    solid, properties = _hull(points if rests_at is None else standing_points(points, rests_at), density)
+    write_obj(root / "meshes" / name / "collision_0.obj", solid.vertices, solid.faces)
+    return BodyLinks((Link(name, properties, (visual,), (Shape(f"meshes/{name}/collision_0.obj"),)),))
+
+
+def still_mesh_links(
+    root: Path,
+    name: str,
+    mesh: trimesh.Trimesh,
+    density: float,
+    world_from_body: np.ndarray,
+    yaw: float,
+    carried: Sequence[Carried],
+) -> BodyLinks:
+    """Return the link of a thing without CAD model that stays where it is: its mesh (body frame) to look at, boxes over
+    its surface, turned by `yaw` [rad], to collide with, so that what lies in it or under it is free.
+
+    The boxes are level below what it carries.
+    """
+    visual = _own_mesh(root, name, mesh)
+    properties = _hull(np.asarray(mesh.vertices, dtype=float), density)[1]
     turned = transform_from_yaw(yaw, np.zeros(3))
     collisions = []
-    for center, size in cover_with_boxes(mesh, yaw):
+    for center, size in levelled(cover_with_boxes(mesh, yaw), yaw, world_from_body, carried):
         frame = turned.copy()
         frame[:3, 3] = turned[:3, :3] @ center
-        x, y, z = (float(v) for v in size)
-        collisions.append(Shape(box_size=(x, y, z), link_from_shape=frame))
+        collisions.append(Shape(box_size=_triple(size), link_from_shape=frame))
+    body_from_world = inverse(world_from_body)
+    for center, size, world_yaw in pads(carried):
+        frame = body_from_world @ transform_from_yaw(world_yaw, center)
+        collisions.append(Shape(box_size=_triple(size), link_from_shape=frame))
     return BodyLinks((Link(name, properties, (visual,), tuple(collisions)),))
 
 
-def box_links(name: str, world_from_body: np.ndarray, bounds: Box) -> BodyLinks:
-    """Return the link of a thing of which only the box (world frame) is known."""
+def _hull(points: np.ndarray, density: float) -> tuple[Solid, MassProperties]:
+    """Return the convex hull of points (N, 3), or the box around them when they are flatter than 2 mm, and its mass."""
+    try:
+        solid = hull(np.unique(points, axis=0))
+        properties = mass_properties([solid], [density])
+        if np.ptp(solid.vertices, axis=0).min() < 2e-3:
+            raise ValueError("flat")
+    except (QhullError, ValueError):
+        low, high = points.min(axis=0), points.max(axis=0)
+        middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 2.5e-3)
+        low, high = middle - half, middle + half
+        solid = box((low[0], high[0]), (low[1], high[1]), (low[2], high[2]))
+        properties = mass_properties([solid], [density])
+    return solid, properties
+
+
+def _triple(values: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return (x, y, z)
+
+
+def box_links(name: str, world_from_body: np.ndarray, bounds: Box, density: float) -> BodyLinks:
+    """Return the link of a thing of which only the box (world frame) is known, filled at `density` [kg/m^3]."""
     frame = inverse(world_from_body) @ transform_from_quaternion(
         np.asarray(bounds.orientation), np.asarray(bounds.center)
     )
     x, y, z = (max(float(v), 5e-3) for v in bounds.size)
     solid = box((-x / 2, x / 2), (-y / 2, y / 2), (-z / 2, z / 2)).moved(frame)
     shape = Shape(box_size=(x, y, z), link_from_shape=frame, color=GREY)
-    return BodyLinks((Link(name, mass_properties([solid], [MESH_DENSITY]), (shape,), (replace(shape, color=None),)),))
+    return BodyLinks((Link(name, mass_properties([solid], [density]), (shape,), (replace(shape, color=None),)),))
 
 
 def layout_links(

@@ -32,7 +32,7 @@ def check_urdf(path: Path, root: Path | None = None) -> list[Problem]:
 
     Mesh files must lie inside `root` (the folder of the URDF when None).
     Kinds: `unreadable`, `name`, `duplicate`, `dangling`, `cycle`, `roots`, `not_finite`, `axis`, `limits`,
-    `joint_type`, `mimic`, `mass`, `inertia`, `no_inertia`, `mesh_missing`, `mesh_outside`, `geometry`.
+    `joint_type`, `mimic`, `mass`, `inertia`, `no_inertia`, `friction`, `mesh_missing`, `mesh_outside`, `geometry`.
     """
     path = Path(path)
     try:
@@ -45,6 +45,8 @@ def check_urdf(path: Path, root: Path | None = None) -> list[Problem]:
         moving |= {link.name for link in urdf.links if link.visuals or link.collisions}
     for link in urdf.links:
         problems += _check_inertia(link, must_have=link.name in moving)
+        if link.friction is not None and not 0 <= link.friction < np.inf:
+            problems.append(Problem("friction", f"link {link.name!r}", "lateral friction is negative or not finite"))
         for shape in (*link.visuals, *link.collisions):
             problems += _check_shape(link.name, shape, path.parent, root or path.parent)
     for joint in urdf.joints:

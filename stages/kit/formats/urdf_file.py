@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from schemas.errors import BadInput
 from stages.kit.formats.xml_files import parse_xml
 from stages.kit.geometry.solids import MassProperties
+from stages.kit.geometry.substances import ROLLING_FRICTION, SPINNING_FRICTION
 from stages.kit.geometry.transforms import transform_from
 
 JOINT_TYPES = ("fixed", "floating", "revolute", "continuous", "prismatic")
@@ -41,6 +42,8 @@ class Link:
     inertial: MassProperties | None = None
     visuals: tuple[Shape, ...] = ()
     collisions: tuple[Shape, ...] = ()
+    friction: float | None = None
+    """Sliding friction of its surface on one of the same kind; None when the file says nothing."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +139,12 @@ def _link_element(link: Link) -> ElementTree.Element:
             f"i{a}{b}": f"{tensor['xyz'.index(a), 'xyz'.index(b)]:.9g}" for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")
         }
         ElementTree.SubElement(inertial, "inertia", entries)
+    if link.friction is not None and link.collisions:
+        # Bullet multiplies the two values of a contact
+        contact = ElementTree.SubElement(element, "contact")
+        ElementTree.SubElement(contact, "lateral_friction", value=number(link.friction**0.5))
+        ElementTree.SubElement(contact, "rolling_friction", value=number(ROLLING_FRICTION))
+        ElementTree.SubElement(contact, "spinning_friction", value=number(SPINNING_FRICTION))
     for index, shape in enumerate(link.visuals):
         visual = ElementTree.SubElement(element, "visual")
         _origin(visual, shape.link_from_shape)
@@ -250,7 +259,12 @@ def _parse_link(element: ElementTree.Element, path: Path) -> Link:
         properties = MassProperties(float(_floats(mass.get("value"), 1, f"{where}: mass")[0]), frame[:3, 3], matrix)
     visuals = [_parse_shape(child, where) for child in element.findall("visual")]
     collisions = [_parse_shape(child, where) for child in element.findall("collision")]
-    return Link(name, properties, tuple(s for s in visuals if s), tuple(s for s in collisions if s))
+    sliding = element.find("contact/lateral_friction")
+    friction = None
+    if sliding is not None:
+        value = float(_floats(sliding.get("value"), 1, f"{where}: lateral_friction")[0])
+        friction = value * abs(value)  # a negative one stays negative, for the check to find
+    return Link(name, properties, tuple(s for s in visuals if s), tuple(s for s in collisions if s), friction)
 
 
 def joint_ends(element: ElementTree.Element, where: str) -> tuple[str, str]:

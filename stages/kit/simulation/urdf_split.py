@@ -76,3 +76,9 @@ def without_visuals(text: str) -> str:
         for visual in link.findall("visual"):
             link.remove(visual)
     return ElementTree.tostring(robot, encoding="unicode")
+
+
+def links_with_friction(text: str) -> set[str]:
+    """Return the names of the links of URDF text that say how rough they are."""
+    links = ElementTree.fromstring(text).findall("link")
+    return {link.get("name", "") for link in links if link.find("contact/lateral_friction") is not None}

@@ -16,13 +16,21 @@ import numpy as np
 from schemas.errors import BadInput
 from schemas.interactive_scene import InteractiveSceneFile, SceneBody
 from stages.kit.formats.urdf_check import require_sound
+from stages.kit.geometry.substances import ROLLING_FRICTION, SPINNING_FRICTION
 from stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion
 from stages.kit.simulation.engine import engine, native_output_to_stderr
-from stages.kit.simulation.urdf_split import read_urdf, split_body, with_absolute_meshes, without_visuals
+from stages.kit.simulation.urdf_split import (
+    links_with_friction,
+    read_urdf,
+    split_body,
+    with_absolute_meshes,
+    without_visuals,
+)
 
 TIME_STEP = 1.0 / 240.0
 GRAVITY = 9.81
 FRICTION = 0.6
+"""Of links whose file has none; Bullet multiplies the values of the two links of a contact."""
 JOINT_FRICTION = 0.4
 """Torque [N m] or force [N] that holds an unpowered door or drawer where it was left."""
 
@@ -115,11 +123,13 @@ class PhysicsWorld:
                 body_id, index, engine.VELOCITY_CONTROL, targetVelocity=0.0, force=JOINT_FRICTION,
                 physicsClientId=self.client,
             )  # fmt: skip
-        for index in links.values():
-            engine.changeDynamics(
-                body_id, index, lateralFriction=FRICTION, spinningFriction=0.005, rollingFriction=0.0005,
-                physicsClientId=self.client,
-            )  # fmt: skip
+        with_friction = links_with_friction(text)
+        for link, index in links.items():
+            if link not in with_friction:
+                engine.changeDynamics(
+                    body_id, index, lateralFriction=FRICTION, spinningFriction=SPINNING_FRICTION,
+                    rollingFriction=ROLLING_FRICTION, physicsClientId=self.client,
+                )  # fmt: skip
         return body
 
     def remove_body(self, name: str) -> None:

@@ -52,7 +52,9 @@ def test_supports_become_joints_by_what_is_movable(cad_scene, tmp_path):
     counted = ("bodies", "movable", "joints", "cad_models", "settled", "unstable", "fell_through", "blocked_joints")
     assert [made.summary[key] for key in counted] == [8, 3, 1, 5, 0, 1, 0, 0]
     assert made.summary["largest_move_mm"] == pytest.approx(994, abs=5)
-    assert made.summary["collisions"] == 0 and made.summary["max_penetration_mm"] == pytest.approx(5)  # the sheet is the floor
+    assert made.summary["collisions"] == 0 and made.summary["max_penetration_mm"] == pytest.approx(
+        5
+    )  # the sheet is the floor
     joints = {joint.child: (joint.parent, joint.type) for joint in parse_urdf(made.path("scene.urdf")).joints}
     assert joints["cup_5"] == ("table_3", "floating")
     assert joints["table_3"] == ("floor_1", "fixed")

@@ -1,0 +1,120 @@
+"""Where things without CAD model rest: the planes of the contact graph, made exact in the collision shapes.
+
+A reconstructed table top is uneven by a voxel or two, and a reconstructed cup ends where the camera saw it end. The
+contact graph knows better: it says which plane carries what. So the boxes that stand for the table end at that plane
+below what it carries, and the hull that stands for the cup reaches down to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from shapely.geometry import Polygon
+
+from schemas.contact_graph import ContactGraphFile, GraphNode
+from schemas.scene_parts import Box
+from stages.kit.geometry.boxes import box_yaw
+
+LARGEST_STEP = 0.04
+"""What a surface may stick out of the plane that stands for it, or a thing hover over it [m]: twice the usual voxel."""
+PAD_THICKNESS = 0.02
+MARGIN = 0.01
+"""Room around a carried thing that is levelled too [m]."""
+
+
+@dataclass(frozen=True)
+class Carried:
+    """The footprint (world frame) of a thing that rests on a plane at `height` [m]."""
+
+    box: Box
+    height: float
+
+    def polygon(self, margin: float = 0.0) -> Polygon:
+        """Return the footprint, grown by `margin` [m] on all sides."""
+        half = 0.5 * np.array(self.box.size[:2]) + margin
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+        yaw = box_yaw(self.box)
+        turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+        return Polygon(corners @ turn.T + np.array(self.box.center[:2]))
+
+
+def resting_height(graph: ContactGraphFile, nodes: dict[str, GraphNode], name: str) -> float | None:
+    """Return the height [m] of the plane that a node stands or lies on.
+
+    None when the graph names no level plane, or one further than 4 cm from the bottom of the node's box.
+    """
+    link, node = graph.parent_link(name), nodes.get(name)
+    if link is None or link.plane is None or node is None or node.box is None or link.source not in nodes:
+        return None
+    if link.relation not in ("supports", "contains") or link.plane >= len(nodes[link.source].planes):
+        return None
+    plane = nodes[link.source].planes[link.plane]
+    normal = np.array(plane.normal)
+    if abs(normal[2]) < 0.9:
+        return None
+    x, y, z = node.box.center
+    height = float(-(plane.offset + normal[0] * x + normal[1] * y) / normal[2])
+    bottom = z - 0.5 * node.box.size[2]
+    return height if abs(bottom - height) <= LARGEST_STEP else None
+
+
+def carried_by(graph: ContactGraphFile, nodes: dict[str, GraphNode], name: str) -> list[Carried]:
+    """Return what rests on the level planes of a node, in the order of the graph's links."""
+    carried = []
+    for link in graph.links:
+        if link.source != name or link.relation not in ("supports", "contains") or link.target not in nodes:
+            continue
+        height, box = resting_height(graph, nodes, link.target), nodes[link.target].box
+        if height is not None and box is not None:
+            carried.append(Carried(box, height))
+    return carried
+
+
+def levelled(
+    boxes: Sequence[tuple[np.ndarray, np.ndarray]], yaw: float, world_from_body: np.ndarray, carried: Sequence[Carried]
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return boxes (centre, size; body frame turned by `yaw` [rad]) that end at the planes under what is carried.
+
+    Below each carried thing and 1 cm around it, a box that sticks out of the plane by up to 4 cm is cut there, or left
+    out when it lies above. `world_from_body` turns about z alone.
+    """
+    kept = []
+    turn = yaw + np.arctan2(world_from_body[1, 0], world_from_body[0, 0])
+    axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    areas = [(thing.polygon(MARGIN), thing.height - world_from_body[2, 3]) for thing in carried]
+    for center, size in boxes:
+        low, high = center[2] - 0.5 * size[2], center[2] + 0.5 * size[2]
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.5 * size[:2]
+        in_body = np.array([cosine * center[0] - sine * center[1], sine * center[0] + cosine * center[1], 0.0])
+        middle = (world_from_body[:3, :3] @ in_body + world_from_body[:3, 3])[:2]
+        footprint = Polygon(corners @ axes.T + middle)
+        for area, height in areas:
+            if height < high <= height + LARGEST_STEP and area.intersects(footprint):
+                high = height
+        if high - low > 1e-3:
+            kept.append((np.array([center[0], center[1], 0.5 * (low + high)]), np.array([*size[:2], high - low])))
+    return kept
+
+
+def pads(carried: Sequence[Carried]) -> list[tuple[np.ndarray, np.ndarray, float]]:
+    """Return a flat box (centre in the world frame, size, yaw) below each carried thing, its top in the plane: the
+    camera did not see what a thing stands on."""
+    found = []
+    for thing in carried:
+        x, y = thing.box.center[:2]
+        size = np.array([thing.box.size[0], thing.box.size[1], PAD_THICKNESS])
+        found.append((np.array([x, y, thing.height - 0.5 * PAD_THICKNESS]), size, box_yaw(thing.box)))
+    return found
+
+
+def standing_points(vertices: np.ndarray, height: float) -> np.ndarray:
+    """Return the vertices (V, 3), none below `height` [m], and their footprint at that height: the hull of all of them
+    stands there on a flat bottom."""
+    raised = np.array(vertices, dtype=float)
+    raised[:, 2] = np.maximum(raised[:, 2], height)
+    bottom = raised.copy()
+    bottom[:, 2] = height
+    return np.concatenate([raised, bottom])
