@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -23,10 +23,19 @@ def scene_bodies(cad_scene: CadScene, graph: ContactGraphFile, movable: Collecti
 
     `movable`: names of the classes that hang on floating joints. Raises BadInput for a missing model or mesh.
     """
-    return [_body(cad_scene, graph, node, movable) for node in graph.nodes if node.id != SCENE_NODE]
+    colors = {entry.node: entry.part_colors for entry in cad_scene.scene.replacements if entry.decision == "cad"}
+    return [
+        _body(cad_scene, graph, node, movable, colors.get(node.id, {})) for node in graph.nodes if node.id != SCENE_NODE
+    ]
 
 
-def _body(cad_scene: CadScene, graph: ContactGraphFile, node: GraphNode, movable: Collection[str]) -> BundleBody:
+def _body(
+    cad_scene: CadScene,
+    graph: ContactGraphFile,
+    node: GraphNode,
+    movable: Collection[str],
+    colors: Mapping[str, tuple[int, int, int]],
+) -> BundleBody:
     link = graph.parent_link(node.id)
     relation = "supports" if link is None else link.relation
     parent = None if link is None or link.source == SCENE_NODE else link.source
@@ -51,6 +60,7 @@ def _body(cad_scene: CadScene, graph: ContactGraphFile, node: GraphNode, movable
             model_folder=folder,
             scale=node.scale,
             joint_values=dict(node.joints),
+            part_colors=dict(colors),
         )
     mesh = _mesh(cad_scene, node)
     bounds = _box(node, mesh, cad_scene)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -49,6 +50,8 @@ class BundleBody:
     scale: float = 1.0
     joint_values: dict[str, float] = field(default_factory=dict)
     """The model's joint names -> values at scale 1."""
+    part_colors: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
+    """Part of the model -> mean colour that this body's is to have (sRGB, 0 to 255)."""
     mesh: trimesh.Trimesh | None = None
     """Body frame; for bodies without CAD model."""
     mass: float | None = None
@@ -146,7 +149,9 @@ def _links(
 ) -> BodyLinks:
     substance = substance_of(body.class_name)
     if body.model is not None and body.model_folder is not None:
-        links = model_links(root, body.name, body.model, body.model_folder, body.scale, body.joint_values)
+        links = model_links(
+            root, body.name, body.model, body.model_folder, body.scale, body.joint_values, body.part_colors
+        )
     elif load_vocabulary().by_name(body.class_name).is_layout:
         links = layout_links(root, body.name, body.world_from_body, body.mesh, _slabs(body, node, graph, center))
         return links.with_friction(substance.friction)

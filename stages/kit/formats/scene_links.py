@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Box, Joint
 from stages.kit.formats.cad_models import URDF_FILE, load_visual_parts
 from stages.kit.formats.model_writer import write_obj
+from stages.kit.formats.part_colors import recolored_shapes, vertex_colors
 from stages.kit.formats.scene_supports import Carried, levelled, pads, standing_points
 from stages.kit.formats.urdf_file import Link, Shape, UrdfJoint, parse_urdf
 from stages.kit.geometry.box_cover import cover_with_boxes
@@ -60,12 +61,18 @@ class BodyLinks:
 
 
 def model_links(
-    root: Path, name: str, model: CadModel, folder: Path, scale: float, values: dict[str, float]
+    root: Path,
+    name: str,
+    model: CadModel,
+    folder: Path,
+    scale: float,
+    values: dict[str, float],
+    part_colors: Mapping[str, tuple[int, int, int]] | None = None,
 ) -> BodyLinks:
     """Return the links of a CAD model under uniform scaling, and copy its meshes to `root`/meshes/<model id>/.
 
     Lengths and prismatic limits grow with the scale, angles stay, mass grows with its cube, inertia with its fifth
-    power.
+    power. `part_colors`: part -> mean colour (sRGB, 0..255) that it is to have.
     Raises BadInput for a model folder without a sound URDF, or whose meshes lie outside.
     """
     urdf = parse_urdf(folder / URDF_FILE)
@@ -77,6 +84,8 @@ def model_links(
     for part in model.parts:
         link = urdf.link(part)
         visuals = tuple(_copied(root, model.id, part, folder, shape, scale, visual=True) for shape in link.visuals)
+        if part_colors and part in part_colors:
+            visuals = recolored_shapes(root, name, visuals, part_colors[part])
         collisions = tuple(
             _copied(root, model.id, part, folder, shape, scale, visual=False) for shape in link.collisions
         )
@@ -149,7 +158,7 @@ def _copied(root: Path, model_id: str, part: str, folder: Path, shape: Shape, sc
             shutil.copyfile(source, target)
         else:
             mesh = load_visual_parts(folder)[part]
-            write_obj(target, mesh.vertices, mesh.faces, _vertex_colors(mesh))
+            write_obj(target, mesh.vertices, mesh.faces, vertex_colors(mesh))
     if visual and color is None:
         color = _mean_color(load_visual_parts(folder).get(part))
     return Shape(target.relative_to(root).as_posix(), shape.scale * scale, None, frame, color)
@@ -254,20 +263,12 @@ def layout_links(
 def _own_mesh(root: Path, name: str, mesh: trimesh.Trimesh) -> Shape:
     folder = root / "meshes" / name
     folder.mkdir(parents=True, exist_ok=True)
-    write_obj(folder / "visual.obj", mesh.vertices, mesh.faces, _vertex_colors(mesh))
+    write_obj(folder / "visual.obj", mesh.vertices, mesh.faces, vertex_colors(mesh))
     return Shape(f"meshes/{name}/visual.obj", color=_mean_color(mesh))
 
 
-def _vertex_colors(mesh: trimesh.Trimesh) -> np.ndarray | None:
-    """Return vertex colours (V, 3) uint8, or None for a mesh without any."""
-    visual = mesh.visual
-    if not isinstance(visual, trimesh.visual.ColorVisuals) or visual.kind not in ("vertex", "face"):
-        return None
-    return np.asarray(visual.vertex_colors)[:, :3]
-
-
 def _mean_color(mesh: trimesh.Trimesh | None) -> tuple[float, float, float, float]:
-    colors = None if mesh is None else _vertex_colors(mesh)
+    colors = None if mesh is None else vertex_colors(mesh)
     if colors is None or len(colors) == 0:
         return GREY
     red, green, blue = (float(v) for v in np.round(colors.mean(axis=0) / 255.0, 4))
