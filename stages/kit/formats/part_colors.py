@@ -24,7 +24,7 @@ def recolored(colors: np.ndarray, weights: np.ndarray, mean: np.ndarray) -> np.n
     if weights.sum() <= 0:
         weights = np.ones(len(colors))
     apart = colors - weights @ colors / weights.sum()
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):  # a difference of nothing has all the room
         room = np.where(apart > 0, (1.0 - mean) / apart, np.where(apart < 0, -mean / apart, np.inf))
     return np.asarray(np.clip(mean + min(1.0, float(room.min())) * apart, 0.0, 1.0))
 

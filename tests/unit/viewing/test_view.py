@@ -13,10 +13,10 @@ from schemas.artifact import KINDS
 from schemas.cad_library import CadLibrary
 from schemas.errors import BadInput, MissingDependency, UsageError
 from schemas.interactive_scene import InteractiveSceneFile
+from stages.kit.formats.link_poses import joint_motion, link_poses
 from stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
 from stages.kit.viewing.canvas import import_rerun
 from stages.kit.viewing.library_view import row_places
-from stages.kit.viewing.scene_view import joint_motion, link_poses
 from stages.kit.viewing.segments_view import segment_images
 from stages.kit.viewing.view import VIEWERS, view_artifact
 from tests.unit.viewing import artifacts
