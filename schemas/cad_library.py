@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from schemas.artifact import Artifact
 from schemas.base import Model, Name, Vector3
@@ -43,11 +43,83 @@ class CadModel(Model):
     """Generator and its parameters, or the source file of an import."""
 
 
+JointKind = Literal["door", "drawer", "lid", "knob", "lever", "slide"]
+"""Doors, drawers and lids open something; knobs turn about their own middle, levers are small and turn; the rest that
+slides is a `slide`."""
+
+
+class JointUse(Model):
+    """What a joint of a model is for."""
+
+    joint: str
+    part: str
+    kind: JointKind
+    behind: tuple[str, ...] = ()
+    """Joints that have to be open before this one can (a rack behind the door of an oven)."""
+
+
+class InnerVolume(Model):
+    """Room in a model where things can be put: a box in the model frame, closed, at scale 1."""
+
+    part: str
+    """On whose floor they stand; the room moves with it."""
+    box_minimum: Vector3
+    box_maximum: Vector3
+    plane: int
+    """Index of the floor in the planes of the closed state."""
+    reached_through: tuple[str, ...] = ()
+    """Joints to open before a hand gets in; empty for a bowl or an open shelf."""
+
+
+class SupportSurface(Model):
+    """A surface that things can stand on."""
+
+    plane: int
+    """Index in the planes of the closed state."""
+    part: str
+    area: float
+    """Of the region that nothing covers [m^2]."""
+    clearance: float | None = None
+    """Free height above its middle [m]; None up to the open air."""
+    inside: bool = False
+    """Whether it is the floor of an inner volume."""
+
+
+class GraspPlace(Model):
+    """Where a two-finger gripper can take hold, model frame, closed, at scale 1."""
+
+    part: str
+    joint: str | None = None
+    """The joint that is moved by it; None when the whole thing is lifted."""
+    point: Vector3
+    axis: Vector3 | None = None
+    """Direction of the bar that the fingers close around."""
+    width: float | None = None
+    """Between the fingers [m], where known."""
+
+
+class Affordances(Model):
+    """What can be done with a model, derived from its geometry and its joints."""
+
+    model: Name
+    movable: bool
+    openable: tuple[str, ...] = ()
+    """Names of the joints that open something: doors, drawers, lids."""
+    joints: tuple[JointUse, ...] = ()
+    contains: tuple[InnerVolume, ...] = ()
+    """Largest first."""
+    carries: tuple[SupportSurface, ...] = ()
+    """Largest first."""
+    grasps: tuple[GraspPlace, ...] = ()
+
+
 class LibraryFile(Model):
     """library.json."""
 
     seed: int
     models: tuple[CadModel, ...]
+    affordances: tuple[Affordances, ...] = ()
+    """One for each model, in their order; none in libraries from before they were derived."""
 
 
 class ImportedModel(Model):

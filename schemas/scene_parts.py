@@ -55,7 +55,7 @@ class Joint(Model):
     type: Literal["revolute", "prismatic"]
     part: str
     """Name of the moving link."""
-    parent: str | None = Field(None, exclude_if=lambda name: name is None)
+    parent: str | None = Field(default=None, exclude_if=lambda name: name is None)
     """Name of the part that it hangs on, a moving one itself (a drawer behind a door); None: the body. Absent from the
     file then."""
     origin: Vector3

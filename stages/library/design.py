@@ -82,6 +82,8 @@ class Moving:
 
     joint: Joint
     pieces: tuple[Piece, ...]
+    behind: str | None = None
+    """Name of the joint that has to be open before this one can (the rack behind the door of an oven)."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +140,7 @@ def centered(design: Design) -> Design:
         handle = None if joint.handle is None else as_vector(np.asarray(joint.handle) + shift)
         return joint.model_copy(update={"origin": as_vector(np.asarray(joint.origin) + shift), "handle": handle})
 
-    moving = tuple(Moving(moved_joint(link.joint), moved(link.pieces)) for link in design.moving)
+    moving = tuple(replace(link, joint=moved_joint(link.joint), pieces=moved(link.pieces)) for link in design.moving)
     return replace(design, body=moved(design.body), moving=moving)
 
 

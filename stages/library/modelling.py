@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -12,20 +14,30 @@ from stages.kit.formats.model_writer import PartGeometry
 from stages.kit.geometry.solids import Solid
 from stages.kit.geometry.transforms import transform_from
 from stages.library.design import Design, mass_of
+from stages.library.joint_kinds import joint_kind
 from stages.library.surfaces import surface_planes
 
 BODY = "body"
+TURNED = ("knob", "lever")
+"""Kinds of joints that change nothing of the shape: no state of their own."""
 
 
 def describe(design: Design, model_id: str, movable: bool) -> CadModel:
     """Return the library's record of a centred design."""
     joints = tuple(link.joint for link in design.moving)
+    whole = np.concatenate([piece.solid.vertices for piece in design.pieces()])
+    shaping = tuple(
+        link.joint
+        for link in design.moving
+        if joint_kind(link.joint, np.concatenate([piece.solid.vertices for piece in link.pieces]), whole) not in TURNED
+    )
+    behind = {link.joint.name: link.behind for link in design.moving if link.behind is not None}
     return CadModel(
         id=model_id,
         class_name=design.class_name,
         articulated=bool(joints),
         mass=round(sum(part.properties.mass for part in part_geometries(design)), 6),
-        states=tuple(_state(design, values) for values in joint_values(joints)),
+        states=tuple(_state(design, values) for values in joint_values(joints, shaping, behind)),
         joints=joints,
         movable=movable,
         contains=design.contains,
@@ -49,16 +61,22 @@ def part_geometries(design: Design) -> list[PartGeometry]:
     return parts
 
 
-def joint_values(joints: tuple[Joint, ...], opened: tuple[Joint, ...] | None = None) -> list[dict[str, float]]:
+def joint_values(
+    joints: tuple[Joint, ...], opened: tuple[Joint, ...] | None = None, behind: Mapping[str, str] | None = None
+) -> list[dict[str, float]]:
     """Return closed; every joint alone half and fully open; all fully open.
 
     With `opened` only those joints open, the others stay closed (the knobs of an oven change none of its shape).
+    `behind`: joint name -> name of the joint that is fully open whenever that one opens.
     """
     closed = {joint.name: 0.0 for joint in joints}
+    ranges = {joint.name: joint.upper for joint in joints}
     values = [closed]
     joints = joints if opened is None else opened
     for joint in joints:
-        values += [{**closed, joint.name: round(share * joint.upper, 6)} for share in (0.5, 1.0)]
+        first = (behind or {}).get(joint.name)
+        before = closed if first is None else {**closed, first: ranges[first]}
+        values += [{**before, joint.name: round(share * joint.upper, 6)} for share in (0.5, 1.0)]
     if len(joints) > 1:
         values.append({**closed, **{joint.name: joint.upper for joint in joints}})
     return values

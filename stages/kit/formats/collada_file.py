@@ -243,7 +243,7 @@ class _Reader:
             counts = [len(row) for row in rows]
             if element.tag == "polylist":
                 counts = np.array((element.findtext("vcount") or "").split(), dtype=np.int64).tolist()
-        except ValueError:
+        except (ValueError, OverflowError):  # an index of more than 64 bits
             raise BadInput(f"{self.where}: {element.tag}: indices are no numbers") from None
         joined = np.concatenate(rows) if rows else np.zeros((0, width), np.int64)
         if any(count < 0 for count in counts) or sum(counts) > len(joined):

@@ -196,9 +196,9 @@ class _Linear:
 
 
 def _library(parameters: Any, inputs: Inputs) -> Estimate:
-    share = (parameters.shapes_per_class + parameters.small_shapes_per_class) / 8
-    share = share if not parameters.classes else 0.1 * share
-    return Estimate(Amount(4.6 * share, 2 * share), 155 * MEBIBYTE)
+    classes = len(parameters.classes) or 51
+    models = classes * (parameters.shapes_per_class + parameters.small_shapes_per_class) / 2
+    return Estimate(Amount(0.08 * models, 0.01 * models), 190 * MEBIBYTE)
 
 
 def _synthesize(parameters: Any, inputs: Inputs) -> Estimate:

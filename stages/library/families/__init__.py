@@ -12,13 +12,20 @@ from stages.library.families.bedroom import bed, book, lamp
 from stages.library.families.carriers import board, tray
 from stages.library.families.containers import bin as waste_bin
 from stages.library.families.containers import box
+from stages.library.families.decoration import plant, utensil, vase
 from stages.library.families.drawers import drawer_unit
 from stages.library.families.electronics import keyboard, monitor
+from stages.library.families.fixtures import sink, toilet
+from stages.library.families.furniture import bench, stool, trolley, wall_shelf, wardrobe
 from stages.library.families.hanging import pendant_lamp, picture
+from stages.library.families.kitchenware import can, cooking_pot, jug, kettle, pan, plate
+from stages.library.families.lidded import chest, toolbox
+from stages.library.families.office import clock, laptop, mouse, printer, remote
 from stages.library.families.seating import chair, sofa
 from stages.library.families.storage import cabinet, shelf, wall_cabinet
 from stages.library.families.tables import desk, table
 from stages.library.families.tableware import bottle, bowl, cup
+from stages.library.families.white_goods import dishwasher, hob, oven, washing_machine
 
 Generator = Callable[[np.random.Generator, int], Design]
 
@@ -47,5 +54,32 @@ GENERATORS: dict[str, Generator] = {
     "board": board,
     "tray": tray,
     "drawer_unit": drawer_unit,
+    "plate": plate,
+    "pan": pan,
+    "cooking_pot": cooking_pot,
+    "jug": jug,
+    "can": can,
+    "kettle": kettle,
+    "oven": oven,
+    "hob": hob,
+    "dishwasher": dishwasher,
+    "washing_machine": washing_machine,
+    "printer": printer,
+    "laptop": laptop,
+    "mouse": mouse,
+    "remote": remote,
+    "clock": clock,
+    "stool": stool,
+    "bench": bench,
+    "wardrobe": wardrobe,
+    "chest": chest,
+    "toolbox": toolbox,
+    "trolley": trolley,
+    "wall_shelf": wall_shelf,
+    "sink": sink,
+    "toilet": toilet,
+    "plant": plant,
+    "vase": vase,
+    "utensil": utensil,
 }
 """Class name -> generator, in the order of their random streams: append only, so that seeds keep their meaning."""

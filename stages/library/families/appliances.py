@@ -38,13 +38,15 @@ def _hollow(x: tuple[float, float], y: tuple[float, float], z: tuple[float, floa
     ]
 
 
-def _lined(x: tuple[float, float], z: tuple[float, float], depth: float, wall: float, paint: Paint) -> list[Piece]:
-    """The hollow body of a chamber: outer walls in `paint`, a white liner inside."""
+def lined_chamber(
+    x: tuple[float, float], z: tuple[float, float], depth: float, wall: float, paint: Paint, liner: Paint = WHITE
+) -> list[Piece]:
+    """Return the hollow body of a chamber, open towards -y: outer walls in `paint`, a `liner` inside."""
     skin = 0.006
     outer = painted(paint, _hollow(x, (0.0, depth), z, wall - skin))
     inset = wall - skin
     inner = _hollow((x[0] + inset, x[1] - inset), (0.0, depth - inset), (z[0] + inset, z[1] - inset), skin)
-    return outer + painted(WHITE, inner)
+    return outer + painted(liner, inner)
 
 
 def _fridge_door(
@@ -109,7 +111,7 @@ def fridge(random: np.random.Generator, style: int) -> Design:
     pieces += painted(DARK_PLASTIC.sample(random), box((x[0] + 0.02, x[1] - 0.02), (0.04, depth - 0.02), (0.0, foot)))
     for number, z in enumerate(chambers):
         name = "door" if number == main else "freezer_door"
-        pieces += _lined(x, z, depth, wall, paint)
+        pieces += lined_chamber(x, z, depth, wall, paint)
         inner = (z[0] + wall, z[1] - wall)
         span = (x[0] + wall, x[1] - wall)
         shelves = (

@@ -23,7 +23,7 @@ from tests.unit.housekeeping.small_step import SMALL, SmallParameters
 DEMO = read_pipeline(pipeline_path("demo"))
 MEASURED = {
     ("24", "240", "180", "0.04"): {
-        "cad_library": (4.62, 153), "ground_truth": (9.80, 648), "sequence": (0.87, 111), "segments": (0.41, 223),
+        "cad_library": (16.23, 189), "ground_truth": (9.80, 648), "sequence": (0.87, 111), "segments": (0.41, 223),
         "panoptic_map": (5.57, 269), "contact_graph": (0.08, 286), "cad_scene": (2.17, 489),
         "interactive_scene": (3.26, 185), "evaluation": (0.30, 392), "report": (0.94, 863),
     },
@@ -112,7 +112,7 @@ def test_a_step_that_does_not_fit_does_not_start(
 def test_dry_runs_say_what_it_costs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["library", "build", "--out", str(tmp_path / "library"), "--dry-run", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert facts["estimate"]["disk_bytes"] == pytest.approx(4.6e6)
+    assert facts["estimate"]["disk_bytes"] == pytest.approx(16.32e6)
     assert run(["run", "demo", "--out", str(tmp_path / "run"), "--dry-run"]) == 0
     assert "to write" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
