@@ -6,7 +6,8 @@ import numpy as np
 
 from stages.kit.rendering.light_map import AreaLight
 from stages.kit.rendering.patterns import Material
-from stages.synthesize.arrangement import Arrangement, PlacedObject
+from stages.synthesize.arrangement import Arrangement
+from stages.synthesize.placement import PlacedObject
 from stages.synthesize.recipes import Shell
 from stages.synthesize.shell import Room
 

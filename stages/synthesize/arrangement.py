@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import trimesh
@@ -14,11 +13,12 @@ from schemas.errors import BadInput
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.synthesize.collision import CollisionWorld, PlacedShape, box_shape
 from stages.synthesize.furniture import Catalogue, Furnishing, main_joint
+from stages.synthesize.less_common import across_two, beside_its_like, from_ceiling, leaning
+from stages.synthesize.placement import Hanging, PlacedObject, Pose
 from stages.synthesize.recipes import CLUTTER_FACTOR, Place, Recipe
 from stages.synthesize.shell import Room, build_room
 from stages.synthesize.support import SupportSurfaces
 
-Hanging = Literal["supports", "contains", "carries_on_wall"]
 ATTEMPTS = 160
 """Poses tried for one object."""
 RESTARTS = 24
@@ -26,28 +26,6 @@ RESTARTS = 24
 HEADROOM = 1.9
 """Height of the space that must stay free for people and robots [m]."""
 WALL, CENTRE_MARGIN, FLOOR_MARGIN, TOUCH = 0.0, 0.8, 0.04, 4e-4
-
-
-@dataclass(frozen=True)
-class PlacedObject:
-    """An object in the room."""
-
-    name: str
-    """`<class>_<instance>`."""
-    instance: int
-    class_name: str
-    furnishing: Furnishing
-    world_from_model: np.ndarray
-    parent: str
-    relation: Hanging
-    plane: int | None = None
-    """Index of the supporting plane in the parent's planes."""
-
-    def world_mesh(self) -> trimesh.Trimesh:
-        """Visual mesh in the world frame."""
-        mesh = self.furnishing.mesh.copy()
-        mesh.apply_transform(self.world_from_model)
-        return mesh
 
 
 @dataclass(frozen=True)
@@ -64,18 +42,6 @@ def world_meshes(arrangement: Arrangement) -> list[tuple[int, trimesh.Trimesh]]:
     """Return (instance, mesh in the world frame) of layout and objects."""
     layout = [(k, entry.mesh) for k, entry in enumerate(arrangement.room.layouts, start=1)]
     return layout + [(thing.instance, thing.world_mesh()) for thing in arrangement.objects]
-
-
-@dataclass(frozen=True)
-class _Pose:
-    """A pose under trial and what it would hang on."""
-
-    world_from_model: np.ndarray
-    parent: str
-    relation: Hanging = "supports"
-    plane: int | None = None
-    at: str = ""
-    """Object whose free floor it may stand in (a chair at its desk) or over (a handle past the edge of its cabinet)."""
 
 
 class _Impossible(Exception):
@@ -147,11 +113,14 @@ class _Arranger:
 
     def _place_one(self, place: Place) -> bool:
         models = [m for m in self.catalogue.by_class.get(place.class_name, []) if _suits(m, place)]
+        if place.where == "beside":
+            standing = {thing.furnishing.model.id for thing in self.objects if thing.class_name in place.of}
+            models = [model for model in models if model.id in standing]
         if not models:
             return False
         for k in self.random.permutation(len(models))[:4]:
             furnishing = self._furnish(models[int(k)], place)
-            best: tuple[float, _Pose, PlacedShape] | None = None
+            best: tuple[float, Pose, PlacedShape] | None = None
             accepted = 0
             for pose in self._poses(furnishing, place):
                 shape = self._acceptable(furnishing, pose, place)
@@ -172,6 +141,8 @@ class _Arranger:
         joints: dict[str, float] = {}
         if place.open is not None and model.joints:
             joint = main_joint(model)
+            if place.any_joint:
+                joint = model.joints[int(self.random.integers(len(model.joints)))]
             share = self.random.uniform(*place.open)
             joints[joint.name] = round(joint.lower + share * (joint.upper - joint.lower), 4)
         scale = (
@@ -181,8 +152,8 @@ class _Arranger:
 
     # Candidate poses, rule by rule.
 
-    def _poses(self, furnishing: Furnishing, place: Place) -> Iterator[_Pose]:
-        rule = {
+    def _poses(self, furnishing: Furnishing, place: Place) -> Iterator[Pose]:
+        rules: dict[str, Callable[[Furnishing, Place], Pose | None]] = {
             "wall": self._at_wall,
             "mounted": self._on_wall,
             "centre": self._in_centre,
@@ -190,7 +161,12 @@ class _Arranger:
             "around": self._around,
             "front": self._around,
             "on": self._on_surface,
-        }[place.where]
+            "ceiling": lambda thing, by: from_ceiling(self.room, self.objects, thing, by, self.random),
+            "beside": lambda thing, by: beside_its_like(self.objects, thing, by, self.random),
+            "across": lambda thing, by: across_two(self.objects, thing, by, self.random),
+            "leaning": lambda thing, by: leaning(self.room, self.objects, thing, by, self.random),
+        }
+        rule = rules[place.where]
         for _ in range(ATTEMPTS):
             pose = rule(furnishing, place)
             if pose is not None:
@@ -199,7 +175,7 @@ class _Arranger:
     def _turn(self, place: Place) -> float:
         return float(self.random.uniform(-place.yaw_spread, place.yaw_spread)) if place.yaw_spread else 0.0
 
-    def _at_wall(self, furnishing: Furnishing, place: Place) -> _Pose | None:
+    def _at_wall(self, furnishing: Furnishing, place: Place) -> Pose | None:
         size = furnishing.closed_size
         wall = self.room.walls[int(self.random.integers(4))]
         inward = wall.inward[:2]
@@ -211,9 +187,9 @@ class _Arranger:
         depth = float(abs(inward) @ half_room) - size[1] / 2 - self.random.uniform(*place.gap)
         middle = along * self.random.uniform(-length, length) - inward * depth
         yaw = _yaw_facing(inward) + self._turn(place)
-        return _Pose(transform_from_yaw(yaw, np.array([*middle, 0.0])), "floor_1")
+        return Pose(transform_from_yaw(yaw, np.array([*middle, 0.0])), "floor_1")
 
-    def _on_wall(self, furnishing: Furnishing, place: Place) -> _Pose | None:
+    def _on_wall(self, furnishing: Furnishing, place: Place) -> Pose | None:
         size = furnishing.closed_size
         k = int(self.random.integers(4))
         inward = self.room.walls[k].inward[:2]
@@ -229,23 +205,23 @@ class _Arranger:
         if bottom + size[2] > self.room.size[2] - 0.02:
             return None
         pose = transform_from_yaw(_yaw_facing(inward), np.array([*middle, bottom]))
-        return _Pose(pose, f"wall_{2 + k}", "carries_on_wall", 0)
+        return Pose(pose, f"wall_{2 + k}", "carries_on_wall", 0)
 
-    def _in_centre(self, furnishing: Furnishing, place: Place) -> _Pose | None:
+    def _in_centre(self, furnishing: Furnishing, place: Place) -> Pose | None:
         spare = self.room.size[:2] / 2 - CENTRE_MARGIN - furnishing.closed_size[:2].min() / 2
         if np.any(spare <= 0):
             return None
         middle = self.random.uniform(-spare, spare)
         yaw = float(self.random.integers(4)) * np.pi / 2 + self._turn(place)
-        return _Pose(transform_from_yaw(yaw, np.array([*middle, 0.0])), "floor_1")
+        return Pose(transform_from_yaw(yaw, np.array([*middle, 0.0])), "floor_1")
 
-    def _on_floor(self, furnishing: Furnishing, place: Place) -> _Pose | None:
+    def _on_floor(self, furnishing: Furnishing, place: Place) -> Pose | None:
         spare = self.room.size[:2] / 2 - furnishing.closed_size[:2].max() / 2
         middle = self.random.uniform(-spare, spare)
         yaw = float(self.random.uniform(-np.pi, np.pi))
-        return _Pose(transform_from_yaw(yaw, np.array([*middle, 0.0])), "floor_1")
+        return Pose(transform_from_yaw(yaw, np.array([*middle, 0.0])), "floor_1")
 
-    def _around(self, furnishing: Furnishing, place: Place) -> _Pose | None:
+    def _around(self, furnishing: Furnishing, place: Place) -> Pose | None:
         targets = [o for o in self.objects if o.class_name in place.of]
         if not targets:
             return None
@@ -260,9 +236,9 @@ class _Arranger:
         world = target.world_from_model
         middle = world[:2, :2] @ at + world[:2, 3]
         yaw = _yaw_facing(world[:2, :2] @ -direction) + self._turn(place)
-        return _Pose(transform_from_yaw(yaw, np.array([*middle, 0.0])), "floor_1", at=target.name)
+        return Pose(transform_from_yaw(yaw, np.array([*middle, 0.0])), "floor_1", at=target.name)
 
-    def _on_surface(self, furnishing: Furnishing, place: Place) -> _Pose | None:
+    def _on_surface(self, furnishing: Furnishing, place: Place) -> Pose | None:
         targets = [o for o in self.objects if o.class_name in place.of]
         if not targets:
             return None
@@ -272,13 +248,13 @@ class _Arranger:
             return None
         pose, plane, inside = found
         relation: Hanging = "contains" if inside and target.furnishing.model.contains else "supports"
-        return _Pose(pose, target.name, relation, plane, at=target.name)
+        return Pose(pose, target.name, relation, plane, at=target.name)
 
     # Whether a pose is good.
 
-    def _acceptable(self, furnishing: Furnishing, pose: _Pose, place: Place) -> PlacedShape | None:
+    def _acceptable(self, furnishing: Furnishing, pose: Pose, place: Place) -> PlacedShape | None:
         """Return the shape at the pose, or None."""
-        on_something = place.where == "on"
+        on_something = place.where in ("on", "across")
         lift = np.eye(4)
         lift[2, 3] = 2.0 * TOUCH
         trial = furnishing.shape.placed(lift @ pose.world_from_model)
@@ -287,9 +263,12 @@ class _Arranger:
         margin = place.spare if on_something else 0.015
         if place.where == "floor":
             margin = FLOOR_MARGIN
-        if self.solid.conflict(trial, margin, margins={pose.parent: TOUCH}) is not None:
+        touching = {name: TOUCH for name in (pose.parent, *(entry.source for entry in pose.further))}
+        if self.solid.conflict(trial, margin, margins=touching) is not None:
             return None
         own = [name for name in self.kept_free.shapes if pose.at and name.startswith(f"{pose.at}/floor")]
+        if place.surface == "drawer":  # what lies in a drawer moves with it
+            own.append(f"{pose.at}/swing")
         if self.kept_free.conflict(trial, 0.0, without=own) is not None:
             return None
         swing = furnishing.swing
@@ -309,7 +288,7 @@ class _Arranger:
             return None
         return furnishing.shape.placed(pose.world_from_model)
 
-    def _free_spaces(self, furnishing: Furnishing, pose: _Pose, place: Place) -> list[PlacedShape]:
+    def _free_spaces(self, furnishing: Furnishing, pose: Pose, place: Place) -> list[PlacedShape]:
         """The free floor that the rule wants in front."""
         if place.room_in_front <= 0:
             return []
@@ -318,7 +297,7 @@ class _Arranger:
         high = np.array([size[0] / 2, -size[1] / 2 - 0.002, HEADROOM])
         return [box_shape(low, high).placed(pose.world_from_model)]
 
-    def _free_side(self, furnishing: Furnishing, pose: _Pose, place: Place) -> PlacedShape | None:
+    def _free_side(self, furnishing: Furnishing, pose: Pose, place: Place) -> PlacedShape | None:
         """A strip of free floor along one of the four sides, the first that is free, or None."""
         half, deep = furnishing.closed_size / 2, place.room_beside
         sides = [
@@ -333,7 +312,7 @@ class _Arranger:
                 return strip
         return None
 
-    def _roomy(self, furnishing: Furnishing, pose: _Pose, place: Place) -> bool:
+    def _roomy(self, furnishing: Furnishing, pose: Pose, place: Place) -> bool:
         """Whether the gripper's space beside and above an item is free (it may reach into other kept-free floor)."""
         if place.spare_beside <= 0 and place.spare_above <= 0:
             return True
@@ -346,11 +325,11 @@ class _Arranger:
         frame[:3, 3] = pose.world_from_model[:3, 3]
         return self.solid.conflict(box_shape(low, high).placed(frame)) is None
 
-    def _distance_to(self, class_name: str | None, pose: _Pose) -> float:
+    def _distance_to(self, class_name: str | None, pose: Pose) -> float:
         places = [o.world_from_model[:2, 3] for o in self.objects if o.class_name == class_name]
         return min((float(np.linalg.norm(p - pose.world_from_model[:2, 3])) for p in places), default=0.0)
 
-    def _commit(self, furnishing: Furnishing, pose: _Pose, shape: PlacedShape, place: Place) -> None:
+    def _commit(self, furnishing: Furnishing, pose: Pose, shape: PlacedShape, place: Place) -> None:
         instance = self.first_object + len(self.objects)
         name = f"{place.class_name}_{instance}"
         spaces = self._free_spaces(furnishing, pose, place)
@@ -373,6 +352,7 @@ class _Arranger:
                 pose.parent,
                 pose.relation,
                 pose.plane,
+                pose.further,
             )
         )
 
@@ -384,6 +364,8 @@ def _suits(model: CadModel, place: Place) -> bool:
     if place.largest_height is not None and size[2] > place.largest_height:
         return False
     if place.smallest_height is not None and size[2] < place.smallest_height:
+        return False
+    if place.style and model.recipe.get("style") not in place.style:
         return False
     if place.open is not None and not model.joints:
         return False

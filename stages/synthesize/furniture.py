@@ -76,6 +76,40 @@ class Furnishing:
                 kept = [plane for plane in kept if any(_same_plane(plane, other) for other in state.planes)]
         return tuple(_scaled(plane, self.scale) for plane in kept)
 
+    @cached_property
+    def drawer_floors(self) -> tuple[SurfacePlane, ...]:
+        """Horizontal planes of the drawers that stand open, in the model frame, scaled."""
+        found = []
+        for joint in self.model.joints:
+            value = self.joints.get(joint.name, 0.0)
+            if joint.type != "prismatic" or abs(value) < 1e-9:
+                continue
+            alone = [s for s in self.model.states if not any(v for name, v in s.joints.items() if name != joint.name)]
+            state = max(alone, key=lambda s: abs(s.joints.get(joint.name, 0.0)))
+            axis = np.asarray(joint.axis)
+            travel = state.joints.get(joint.name, 0.0) * axis
+            for plane in self.model.states[0].planes:
+                moved = _shifted(plane, travel)
+                went_along = any(_same_plane(moved, other) for other in state.planes)
+                if plane.horizontal and went_along and not any(_same_plane(plane, other) for other in state.planes):
+                    found.append(_scaled(_shifted(plane, value * axis), self.scale))
+        return tuple(found)
+
+    @property
+    def surfaces(self) -> tuple[SurfacePlane, ...]:
+        """`planes`, and after them `drawer_floors`: what indices of planes count."""
+        return (*self.planes, *self.drawer_floors)
+
+
+def _shifted(plane: SurfacePlane, shift: np.ndarray) -> SurfacePlane:
+    return plane.model_copy(
+        update={
+            "offset": plane.offset - float(np.asarray(plane.normal) @ shift),
+            "center": as_vector(np.asarray(plane.center) + shift),
+            "corners": tuple(as_vector(np.asarray(corner) + shift) for corner in plane.corners),
+        }
+    )
+
 
 def _same_plane(a: SurfacePlane, b: SurfacePlane) -> bool:
     return bool(

@@ -44,9 +44,13 @@ class Place(Model):
     """One rule: how many objects of a class stand where."""
 
     class_name: str = Field(alias="class")
-    where: Literal["wall", "centre", "floor", "around", "front", "mounted", "on"]
+    where: Literal[
+        "wall", "centre", "floor", "around", "front", "mounted", "on", "ceiling", "beside", "across", "leaning"
+    ]
     """`wall`: back to a wall; `centre`: clear of the walls; `floor`: anywhere; `around`, `front`: at the sides or the
-    front of `of`, facing it; `mounted`: hung on a wall; `on`: on a supporting surface of one of `of`."""
+    front of `of`, facing it; `mounted`: hung on a wall; `on`: on a supporting surface of one of `of`; `ceiling`: hung
+    from the ceiling, over one of `of` where that is given; `beside`: next to one of `of` of the same model, turned
+    alike; `across`: on two of `of` that stand so; `leaning`: against a wall, or a side of one of `of`."""
     count: tuple[int, int] = (1, 1)
     """Least and most. Fewer than the least starts the room afresh."""
     of: tuple[str, ...] = ()
@@ -63,7 +67,12 @@ class Place(Model):
     """Prefer places close to objects of this class."""
     height: Range | None = None
     """`mounted`: height of the bottom [m]; `on`: allowed heights of the supporting surface."""
-    surface: Literal["any", "inside", "top"] = "any"
+    surface: Literal["any", "inside", "top", "drawer"] = "any"
+    """`drawer`: the floor of an open one."""
+    style: tuple[str, ...] = ()
+    """Only models of these styles (`style` of their generator)."""
+    any_joint: bool = False
+    """`open` moves any one of the joints, not the widest door."""
     front: Range = (0.0, 1.0)
     """`on`: where on the surface, from its front edge (0) to its back (1)."""
     side: Range = (0.0, 1.0)

@@ -13,7 +13,7 @@ from stages.synthesize.furniture import Furnishing
 from stages.synthesize.recipes import Place
 
 if TYPE_CHECKING:
-    from stages.synthesize.arrangement import PlacedObject
+    from stages.synthesize.placement import PlacedObject
 
 CONTACT_BAND = 1.5e-3
 """Vertices this close to the lowest one are what a thing stands on [m]."""
@@ -68,14 +68,18 @@ class SupportSurfaces:
         """
         base = float(target.world_from_model[2, 3])
         top = float(np.asarray(target.furnishing.mesh.vertices)[:, 2].max())
+        surfaces = target.furnishing.surfaces
+        first_drawer = len(target.furnishing.planes)
         choices = [
-            k for k, plane in enumerate(target.furnishing.planes) if self._allowed(plane, base, top, item, place)
+            k
+            for k, plane in enumerate(surfaces)
+            if (k >= first_drawer) == (place.surface == "drawer") and self._allowed(plane, base, top, item, place)
         ]
         if not choices:
             return None
-        areas = np.sqrt([target.furnishing.planes[k].area for k in choices])
+        areas = np.sqrt([surfaces[k].area for k in choices])
         index = int(random.choice(choices, p=areas / areas.sum()))
-        plane = target.furnishing.planes[index]
+        plane = surfaces[index]
         corners = np.asarray(plane.corners)[:, :2]
         low, high = corners.min(axis=0), corners.max(axis=0)
         yaw = float(random.uniform(-place.yaw_spread, place.yaw_spread)) if place.yaw_spread else 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import trimesh
@@ -24,8 +24,9 @@ from stages.kit.geometry.boxes import (
     minimum_box,
     polygon_area,
 )
-from stages.synthesize.arrangement import Arrangement, PlacedObject, world_meshes
+from stages.synthesize.arrangement import Arrangement, world_meshes
 from stages.synthesize.furniture import plane_in_world
+from stages.synthesize.placement import Further, Hanging, PlacedObject
 from stages.synthesize.shell import Layout
 
 LEAST_SHARED_VOLUME = 1e-6
@@ -122,7 +123,7 @@ def true_graph(arrangement: Arrangement, boxes: dict[str, Box]) -> ContactGraphF
         )
         links.append(Relation(source=SCENE_NODE, target=name, relation="supports", confidence=1.0))
     for thing in arrangement.objects:
-        planes[thing.name] = tuple(plane_in_world(p, thing.world_from_model) for p in thing.furnishing.planes)
+        planes[thing.name] = tuple(plane_in_world(p, thing.world_from_model) for p in thing.furnishing.surfaces)
         kind = vocabulary.by_name(thing.class_name).node
         nodes.append(
             GraphNode(
@@ -140,6 +141,7 @@ def true_graph(arrangement: Arrangement, boxes: dict[str, Box]) -> ContactGraphF
         )
     for thing in arrangement.objects:
         links.append(_parent_link(thing, boxes, planes))
+        links += [_further_link(thing, entry, boxes, planes) for entry in thing.further]
     links += _proximal(arrangement, boxes, links)
     return ContactGraphFile(nodes=tuple(nodes), links=tuple(links))
 
@@ -154,17 +156,38 @@ def _parent_link(thing: PlacedObject, boxes: dict[str, Box], planes: dict[str, t
     top, parent_top = (b.center[2] + b.size[2] / 2 for b in (box, parent_box))
     if relation == "contains" and top > parent_top + 0.01:
         relation = "supports"  # it sticks out, as a bottle in a low crate does
-    if relation == "carries_on_wall":
+    if relation in ("carries_on_wall", "hangs_from"):
         return Relation(source=thing.parent, target=thing.name, relation=relation, confidence=1.0, plane=0, gap=0.0)
-    index = 0 if thing.plane is None else thing.plane
-    plane = planes[thing.parent][index]
+    return _on_plane(thing.parent, thing, relation, 0 if thing.plane is None else thing.plane, boxes, planes)
+
+
+def _further_link(
+    thing: PlacedObject, entry: Further, boxes: dict[str, Box], planes: dict[str, tuple[SurfacePlane, ...]]
+) -> Relation:
+    if entry.relation == "also_supports" and entry.plane is not None:
+        return _on_plane(entry.source, thing, entry.relation, entry.plane, boxes, planes)
+    return Relation(
+        source=entry.source, target=thing.name, relation=entry.relation, confidence=1.0, plane=entry.plane, gap=0.0
+    )
+
+
+def _on_plane(
+    source: str,
+    thing: PlacedObject,
+    relation: Hanging | Literal["also_supports"],
+    index: int,
+    boxes: dict[str, Box],
+    planes: dict[str, tuple[SurfacePlane, ...]],
+) -> Relation:
+    """The relation to a plane that carries the object or a part of it, with gap and overlap."""
+    box, plane = boxes[thing.name], planes[source][index]
     height = -plane.offset / plane.normal[2]
     gap = box.center[2] - box.size[2] / 2 - height
     outline = convex_hull(np.asarray(plane.corners)[:, :2])
     foot = footprint(box)
     overlap = polygon_area(clip_polygon(foot, outline)) / max(polygon_area(foot), 1e-12)
     return Relation(
-        source=thing.parent, target=thing.name, relation=relation, confidence=1.0, plane=index, gap=float(gap),
+        source=source, target=thing.name, relation=relation, confidence=1.0, plane=index, gap=float(gap),
         overlap=float(min(1.0, overlap)),
     )  # fmt: skip
 

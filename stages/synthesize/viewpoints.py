@@ -14,8 +14,9 @@ from schemas.scene_parts import Camera
 from stages.kit.geometry.cameras import project
 from stages.kit.geometry.transforms import apply, inverse, look_at
 from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.synthesize.arrangement import Arrangement, PlacedObject, world_meshes
+from stages.synthesize.arrangement import Arrangement, world_meshes
 from stages.synthesize.free_space import CELL, FreeSpace, find_free_space
+from stages.synthesize.placement import PlacedObject
 
 EYE_HEIGHT = 1.5
 """[m]"""
@@ -57,6 +58,8 @@ def required_views(arrangement: Arrangement, space: FreeSpace) -> list[View]:
                     views += _closely_at(item, thing, space)
         elif thing.class_name in ("table", "desk"):
             views += _onto(thing, space)
+        elif thing.relation == "hangs_from":
+            views += _up_at(thing, space)
     return views
 
 
@@ -105,6 +108,18 @@ def _closely_at(item: PlacedObject, container: PlacedObject, space: FreeSpace) -
         spot = _reachable(space, apply(pose, np.array([side, -size[1] / 2 - 0.65, 0.0]))[:2], 0.35)
         if spot is not None:
             views.append(View(np.array([*spot, np.clip(target[2] + 0.25, 0.8, EYE_HEIGHT)]), target))
+    return views
+
+
+def _up_at(thing: PlacedObject, space: FreeSpace) -> list[View]:
+    """Nobody looks at the ceiling otherwise: two looks from below at what hangs from it, and where."""
+    pose, size = thing.world_from_model, thing.furnishing.closed_size
+    views = []
+    for angle in (0.3, 2.4):
+        away = pose[:2, 3] + 1.8 * np.array([np.cos(angle), np.sin(angle)])
+        spot = _reachable(space, away, 0.6)
+        if spot is not None:
+            views.append(View(np.array([*spot, EYE_HEIGHT - 0.2]), apply(pose, np.array([0.0, 0.0, 0.8 * size[2]]))))
     return views
 
 
