@@ -46,7 +46,7 @@ class InteractiveSceneFile(Model):
 
 class InteractiveScene(Artifact):
     """`scene.urdf` (whole kinematic tree, root link `world`), `static.urdf`, `bodies/<name>.urdf`, `scene.json`,
-    `graph.json` (cg'), `scene.mjcf.xml`, `meshes/`."""
+    `graph.json` (cg'), `meshes/`; beside it `scene.mjcf.xml`, `scene.srdf`, `scene.glb` and `scene.mcap`."""
 
     kind: ClassVar[str] = "interactive_scene"
     description: ClassVar[str] = "URDF scene: whole kinematic tree, static tree, one file per movable body"

@@ -24,10 +24,10 @@ class UrdfParameters(Parameters):
 STAGE = Stage(
     name="urdf",
     version=3,
-    summary="Convert the CAD scene into a kinematic tree: URDF for simulators and robots, MJCF beside it",
+    summary="Convert the CAD scene into a kinematic tree: URDF for simulators and robots; MJCF, SRDF, GLB, MCAP",
     parameters=UrdfParameters,
     reads={"cad_scene": CadScene},
     writes=InteractiveScene,
-    libraries=("numpy", "scipy", "trimesh", "pybullet"),
+    libraries=("numpy", "scipy", "trimesh", "shapely", "pybullet", "mcap", "mcap-protobuf-support"),
     example="scenewright urdf --cad-scene outputs/demo/cad_scene --out outputs/demo/interactive_scene",
 )

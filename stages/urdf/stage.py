@@ -12,6 +12,7 @@ from stages.kit.formats.scene_bundle import write_scene_bundle
 from stages.kit.simulation.settle_report import settle_report
 from stages.kit.stage import Context
 from stages.urdf.bodies import scene_bodies
+from stages.urdf.exports import write_exports
 from stages.urdf.parameters import UrdfParameters
 
 
@@ -26,6 +27,8 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
         bodies = scene_bodies(cad_scene, graph, movable)
     with context.progress.step("write and check the kinematic tree"):
         scene = write_scene_bundle(context.output, bodies, graph)
+    with context.progress.step("write what stands beside it"):
+        write_exports(context.output, scene)
     summary: dict[str, float] = {
         "bodies": len(scene.bodies),
         "movable": sum(body.movable for body in scene.bodies),
