@@ -91,7 +91,7 @@ def draw_graph(
         if link.relation not in TREE_RELATIONS:
             proximal.append(DrawnEdge(_arc(boxes[link.source], boxes[link.target]), link.relation, _link_title(link)))
         else:
-            edges.append(DrawnEdge(_elbow(boxes[link.source], boxes[link.target]), link.relation, _link_title(link)))
+            edges.append(DrawnEdge(elbow(boxes[link.source], boxes[link.target]), link.relation, _link_title(link)))
     rows = max((row for _, row in layout.values()), default=0.0)
     return DrawnGraph(
         width=max((x + width for x, _, width in boxes.values()), default=0.0) + (70 if proximal else 12),
@@ -125,7 +125,8 @@ def _node_width(node: GraphNode) -> float:
     return LETTER * len(node.id) + 30
 
 
-def _elbow(parent: tuple[float, float, float], child: tuple[float, float, float]) -> str:
+def elbow(parent: tuple[float, float, float], child: tuple[float, float, float]) -> str:
+    """Return the SVG path from the right end of a box (x, y, width) to the left end of another, with round corners."""
     x0, y0, x1, y1 = parent[0] + parent[2], parent[1], child[0], child[1]
     bend = x1 - GAP / 2
     if abs(y1 - y0) < 0.5:

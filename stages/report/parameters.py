@@ -9,6 +9,7 @@ from pydantic import Field
 
 from schemas.errors import UsageError
 from schemas.kinds import (
+    CadLibrary,
     CadScene,
     ContactGraph,
     Evaluation,
@@ -31,6 +32,8 @@ class ReportParameters(Parameters):
     frames: int = Field(6, ge=0, le=24, description="Input frames shown")
     frame_width: int = Field(400, ge=120, le=1280, description="Width of frame pictures [px]")
     view_width: int = Field(960, ge=240, le=1920, description="Width of rendered views [px]")
+    candidates: int = Field(4, ge=0, le=12, description="CAD candidates shown of each object, 0: none")
+    candidate_width: int = Field(150, ge=60, le=480, description="Width of the pictures of candidates [px]")
     keyframes: int = Field(16, ge=0, le=40, description="Key frames of the plan shown at most")
 
 
@@ -44,7 +47,7 @@ def check_inputs(parameters: ReportParameters, inputs: Mapping[str, Any]) -> Non
 
 STAGE = Stage(
     name="report",
-    version=1,
+    version=2,
     summary="Write one self-contained HTML page about a run: pictures, graph, figures, times, how it was made",
     parameters=ReportParameters,
     reads={
@@ -55,13 +58,14 @@ STAGE = Stage(
         "panoptic_map": Optionally(PanopticMap),
         "contact_graph": Optionally(ContactGraph),
         "cad_scene": Optionally(CadScene),
+        "cad_library": Optionally(CadLibrary),
         "interactive_scene": Optionally(InteractiveScene),
         "plan": Optionally(Plan),
         "evaluation": Optionally(Evaluation),
         "baseline_evaluation": Optionally(Evaluation),
     },
     writes=Report,
-    libraries=("numpy", "jinja2", "pillow", "open3d"),
+    libraries=("numpy", "scipy", "jinja2", "pillow", "open3d"),
     check=check_inputs,
     example="scenewright report --sequence outputs/demo/sequence --panoptic-map outputs/demo/panoptic_map "
     "--evaluation outputs/demo/evaluation --out outputs/demo/report",

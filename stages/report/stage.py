@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from schemas.artifact import Artifact
+from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene, Replacement
 from schemas.contact_graph import ContactGraph
 from schemas.errors import BadInput
@@ -24,12 +25,16 @@ from schemas.trajectory import Trajectory
 from stages.kit.rendering.ray_casting import Rendering
 from stages.kit.stage import Context
 from stages.report.acting import body_rows, plan_view
+from stages.report.candidates import object_views
 from stages.report.figures import GROUPS, all_metrics, metric_groups, read_plots, read_tables
 from stages.report.frames import frame_views
+from stages.report.global_check import checked_scenes
 from stages.report.graph_drawing import draw_graph, marks_from_evaluation
 from stages.report.images import Picture, jpeg
+from stages.report.kinematic_tree import corresponding_trees, read_joints
 from stages.report.page import render_page
 from stages.report.parameters import ReportParameters
+from stages.report.placed_models import ModelShelf
 from stages.report.provenance import made_of
 from stages.report.surfaces import Model, cad_model, map_model, true_model
 from stages.report.views import Label, View, oblique_view, place_labels, render, top_view
@@ -69,6 +74,7 @@ def run(
     panoptic_map: PanopticMap | None = None,
     contact_graph: ContactGraph | None = None,
     cad_scene: CadScene | None = None,
+    cad_library: CadLibrary | None = None,
     interactive_scene: InteractiveScene | None = None,
     plan: Plan | None = None,
     evaluation: Evaluation | None = None,
@@ -81,8 +87,8 @@ def run(
     given: dict[str, Artifact | None] = {
         "ground_truth": ground_truth, "sequence": sequence, "trajectory": trajectory, "segments": segments,
         "panoptic_map": panoptic_map, "contact_graph": contact_graph, "cad_scene": cad_scene,
-        "interactive_scene": interactive_scene, "plan": plan, "evaluation": evaluation,
-        "baseline_evaluation": baseline_evaluation,
+        "cad_library": cad_library, "interactive_scene": interactive_scene, "plan": plan,
+        "evaluation": evaluation, "baseline_evaluation": baseline_evaluation,
     }  # fmt: skip
     artifacts = {role: artifact for role, artifact in given.items() if artifact is not None}
     values: dict[str, Any] = _empty_page()
@@ -92,11 +98,15 @@ def run(
         with context.progress.step("frames"):
             _add_frames(values, sequence, segments, parameters)
     with context.progress.step("views"):
-        _add_views(values, ground_truth, sequence, panoptic_map, cad_scene, parameters)
+        view = _add_views(values, ground_truth, sequence, panoptic_map, cad_scene, parameters)
+    if cad_scene is not None:
+        with context.progress.step("candidates"):
+            _add_candidates(values, cad_scene, cad_library, panoptic_map, view, parameters)
     if contact_graph is not None:
         _add_graph(values, contact_graph, evaluation)
     if interactive_scene is not None:
         _add_scene(values, interactive_scene)
+        _add_trees(values, interactive_scene)
     if plan is not None:
         with context.progress.step("plan"):
             values["plan"] = plan_view(plan, parameters.keyframes, 640)
@@ -115,7 +125,7 @@ def run(
 def _empty_page() -> dict[str, Any]:
     empty = (
         "frames legend map_views graph cad_views replacements bodies fixed_bodies groups notes plots tables metrics "
-        "tiles plan baseline has_intervals plan_ok"
+        "tiles plan baseline has_intervals plan_ok checked objects_changed objects_kept trees"
     )
     texts = "frames_text map_text graph_text graph_errors cad_text scene_text figures_text"
     values: dict[str, Any] = dict.fromkeys(empty.split(), None)
@@ -192,7 +202,8 @@ def _add_views(
     panoptic_map: PanopticMap | None,
     cad_scene: CadScene | None,
     parameters: ReportParameters,
-) -> None:
+) -> View | None:
+    """Draw map and CAD scene; returns the view of the whole room that they share, None when there is neither."""
     width = parameters.view_width
     height = round(0.62 * width)
     scanned = map_model(panoptic_map) if panoptic_map is not None else None
@@ -213,10 +224,10 @@ def _add_views(
             "color": _draw(scanned, oblique, "In the colours of the images"),
         }
     if cad_scene is None:
-        return
+        return oblique
     model = cad_model(cad_scene)
     if model is None:
-        return
+        return oblique
     view = oblique or oblique_view(model, width, height)
     pictures = [_draw(model, view, "CAD scene", 20.0 * width / 960)]
     if values["map_views"] is not None:
@@ -239,6 +250,7 @@ def _add_views(
         f"layout: {decisions.count('layout')}. The global check went from {scene.conflicts_before} to "
         f"{scene.conflicts_after} colliding pairs in {scene.iterations} iterations.",
     )
+    return view
 
 
 def _draw(model: Model, view: View, caption: str, font_size: float | None = None) -> DrawnView:
@@ -265,6 +277,39 @@ def _replacement_row(replacement: Replacement) -> dict[str, str]:
         "alignment": f"{1000 * chosen.alignment_error:.0f} mm" if chosen else "",
         "rest": "; ".join(text for text in (others, f"rejected: {rejected}" if rejected else "") if text),
     }
+
+
+def _add_candidates(
+    values: dict[str, Any],
+    cad_scene: CadScene,
+    library: CadLibrary | None,
+    panoptic_map: PanopticMap | None,
+    view: View | None,
+    parameters: ReportParameters,
+) -> None:
+    shelf = ModelShelf(cad_scene, library)
+    scenes = checked_scenes(cad_scene, shelf)
+    if scenes:
+        view = view or oblique_view(scenes[-1].model, parameters.view_width, round(0.62 * parameters.view_width))
+        size = 20.0 * parameters.view_width / 960
+        values["checked"] = [_draw(scene.model, view, scene.caption, size) for scene in scenes]
+    if parameters.candidates == 0:
+        return
+    objects = object_views(
+        cad_scene, shelf, panoptic_map, count=parameters.candidates, width=parameters.candidate_width
+    )
+    values["objects_changed"] = [entry for entry in objects if entry.changed]
+    values["objects_kept"] = [entry for entry in objects if not entry.changed]
+
+
+def _add_trees(values: dict[str, Any], interactive_scene: InteractiveScene) -> None:
+    path = interactive_scene.path(interactive_scene.scene.combined_file)
+    if not path.is_file():
+        return
+    try:
+        values["trees"] = corresponding_trees(interactive_scene.graph, *read_joints(path))
+    except ValueError as error:
+        raise BadInput(f"{interactive_scene.path('graph.json')}: {error}", hint="run `urdf` again") from None
 
 
 def _add_graph(values: dict[str, Any], contact_graph: ContactGraph, evaluation: Evaluation | None) -> None:

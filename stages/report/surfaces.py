@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import trimesh
 
-from schemas.cad_scene import CadScene
+from schemas.cad_scene import CadCandidate, CadScene
 from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth
 from schemas.panoptic_map import PanopticMap
 from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.cad_models import posed_mesh, read_model
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.measurement.palette import LAYOUT_COLORS, UNLABELLED, entity_color
 from stages.kit.rendering.surfaces import TriangleSoup, build_soup, srgb_to_linear
+from stages.report.placed_models import ModelShelf, after_check
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class Model:
     """Instance -> class name; instances that are missing are unlabelled."""
     names: dict[int, str]
     """Instance -> what to call it in pictures; floor, walls and ceiling need no name."""
+    nodes: dict[int, str] = field(default_factory=dict)
+    """Instance -> node of the graph, where it is one."""
 
     def _table(self, names: set[str], unlabelled: bool) -> np.ndarray:
         """(T,) bool: triangles of instances whose class is in `names`."""
@@ -118,24 +121,26 @@ def _vertex_colors(mesh: trimesh.Trimesh) -> np.ndarray:
     return np.full((len(mesh.vertices), 4), 170, dtype=np.uint8)
 
 
-def cad_model(cad_scene: CadScene) -> Model | None:
-    """The CAD scene: chosen models where they stand, reconstructed meshes where there is none, layout."""
+def cad_model(
+    cad_scene: CadScene, shelf: ModelShelf | None = None, candidates: Mapping[str, CadCandidate | None] | None = None
+) -> Model | None:
+    """The CAD scene: models where they stand, reconstructed meshes where there is none, layout.
+
+    `candidates`: node -> what stands for it, instead of what the scene chose; their models come from `shelf`.
+    """
+    shelf = shelf or ModelShelf(cad_scene)
     nodes = {node.id: node for node in cad_scene.graph.nodes}
     meshes: list[tuple[int, trimesh.Trimesh]] = []
     classes: dict[int, str] = {}
     names: dict[int, str] = {}
+    node_ids: dict[int, str] = {}
     for row, replacement in enumerate(cad_scene.scene.replacements, start=1):
         node = nodes.get(replacement.node)
         class_name = node.class_name if node is not None else "object"
         number = node.instance if node is not None and node.instance > 0 else 100_000 + row
-        if replacement.decision == "cad" and replacement.chosen is not None:
-            chosen = replacement.chosen
-            folder = cad_scene.path("models") / chosen.model_id
-            if not folder.is_dir():
-                continue
-            mesh: trimesh.Trimesh | None = posed_mesh(folder, read_model(folder), chosen.joints, chosen.scale)
-            if mesh is not None:
-                mesh.apply_transform(np.array(chosen.world_from_model))
+        chosen = after_check(replacement) if candidates is None else candidates.get(replacement.node)
+        if chosen is not None:
+            mesh: trimesh.Trimesh | None = shelf.mesh(chosen)
         else:
             where = "layout" if replacement.decision == "layout" else "meshes"
             mesh = _load(cad_scene, f"{where}/{replacement.node}.ply")
@@ -143,9 +148,10 @@ def cad_model(cad_scene: CadScene) -> Model | None:
             continue
         meshes.append((number, mesh))
         classes[number] = class_name
+        node_ids[number] = replacement.node
         if replacement.decision != "layout":
             names[number] = (f"{class_name} {number}" if node is not None else replacement.node).replace("_", " ")
-    return Model(build_soup(meshes), classes, names) if meshes else None
+    return Model(build_soup(meshes), classes, names, node_ids) if meshes else None
 
 
 def true_model(truth: GroundTruth, world_from_log: np.ndarray) -> Model | None:

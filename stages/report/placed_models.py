@@ -1,0 +1,69 @@
+"""CAD models where candidates put them: meshes to draw and convex pieces to compare."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from schemas.cad_library import CadLibrary, CadModel
+from schemas.cad_scene import CadCandidate, CadScene, Replacement
+from stages.kit.formats.cad_models import posed_collision, posed_mesh, read_model
+from stages.kit.measurement.convex_overlap import ConvexPiece, convex_piece
+from stages.kit.measurement.shape_symmetry import rotation_angle
+
+
+class ModelShelf:
+    """Finds models by id: the CAD scene has copies of the chosen ones, the library (where it is given) has all."""
+
+    def __init__(self, cad_scene: CadScene, library: CadLibrary | None = None) -> None:
+        self._roots = [cad_scene.path("models")] + ([library.path("models")] if library is not None else [])
+        self._models: dict[str, CadModel] = {}
+
+    def folder(self, model_id: str) -> Path | None:
+        """Return the folder of a model, None when nobody has it."""
+        return next((root / model_id for root in self._roots if (root / model_id).is_dir()), None)
+
+    def _model(self, folder: Path) -> CadModel:
+        if folder.name not in self._models:
+            self._models[folder.name] = read_model(folder)
+        return self._models[folder.name]
+
+    def mesh(self, candidate: CadCandidate) -> trimesh.Trimesh | None:
+        """Return the coloured mesh of a candidate in the world, None when its model is not there. Raises BadInput."""
+        folder = self.folder(candidate.model_id)
+        if folder is None:
+            return None
+        mesh = posed_mesh(folder, self._model(folder), candidate.joints, candidate.scale)
+        mesh.apply_transform(np.array(candidate.world_from_model))
+        return mesh
+
+    def pieces(self, candidate: CadCandidate) -> list[ConvexPiece]:
+        """Return the convex collision pieces of a candidate in the world, none when its model is not there."""
+        folder = self.folder(candidate.model_id)
+        if folder is None:
+            return []
+        pieces = posed_collision(folder, self._model(folder), candidate.joints, candidate.scale)
+        pose = np.array(candidate.world_from_model)
+        found = [convex_piece(np.asarray(piece.vertices)) for piece in pieces]
+        return [piece.placed(pose) for piece in found if piece is not None]
+
+
+def before_check(replacement: Replacement) -> CadCandidate | None:
+    """Return what stood for a node before the global check: its best single candidate; in older scenes its choice."""
+    return replacement.best_single or (replacement.chosen if replacement.decision == "cad" else None)
+
+
+def after_check(replacement: Replacement) -> CadCandidate | None:
+    """Return what stands for a node after the global check, None where it keeps its mesh."""
+    return replacement.chosen if replacement.decision == "cad" else None
+
+
+def same_placement(a: CadCandidate, b: CadCandidate, distance: float = 0.005, angle: float = 0.02) -> bool:
+    """Whether two candidates are the same model in the same place (within [m], [rad])."""
+    if a.model_id != b.model_id or abs(a.scale - b.scale) > 1e-3:
+        return False
+    first, second = np.array(a.world_from_model), np.array(b.world_from_model)
+    turn = rotation_angle(first[:3, :3].T @ second[:3, :3])
+    return bool(np.linalg.norm(first[:3, 3] - second[:3, 3]) <= distance) and turn <= angle
