@@ -15,21 +15,14 @@ from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.cad_models import model_folder
 from stages.kit.formats.model_writer import write_model_folder
 from stages.kit.stage import Context
-from stages.library.importing.assembly import (
-    Assembled,
-    assembled,
-    centered,
-    grouped,
-    placed_parts,
-    plain_name,
-    source_points,
-    told_front,
-    turned,
-)
+from stages.library.importing.assembly import Assembled, assembled
 from stages.library.importing.classes import class_of, usual_size
 from stages.library.importing.discovery import Unread, find_models
 from stages.library.importing.frames import AXES, UNITS, Choice, axis_name, choose, model_rotation, upright_rotation
+from stages.library.importing.fronts import told_front
+from stages.library.importing.grouping import grouped, source_points
 from stages.library.importing.mapping import SKIP, Entry, Mapping, read_mapping
+from stages.library.importing.placing import centered, placed_parts, plain_name, turned
 from stages.library.importing.report import table_lines
 from stages.library.importing.source_folder import SourceFolder
 from stages.library.importing.source_model import Declared, Direction, SourceModel

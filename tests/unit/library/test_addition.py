@@ -23,11 +23,12 @@ from stages.kit.geometry.transforms import apply
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.library.addition import run
-from stages.library.importing.assembly import grouped, normal_limits, source_points
 from stages.library.importing.classes import class_of
 from stages.library.importing.discovery import find_models
 from stages.library.importing.frames import AXES, model_rotation
+from stages.library.importing.grouping import grouped, source_points
 from stages.library.importing.pieces import convex_pieces
+from stages.library.importing.placing import normal_limits
 from stages.library.importing.source_folder import SourceFolder
 from stages.library.importing.source_model import SourceModel, Surface, painted_faces
 from stages.library.importing.versions import coacd_version, uses_coacd

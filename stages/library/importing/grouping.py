@@ -1,0 +1,112 @@
+"""The parts of a source that move: links that are fast to one another make one group, joints lie between groups.
+
+Parts hang on the body: what moves on a moving part is held fast on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from schemas.errors import BadInput
+from stages.kit.geometry.transforms import apply
+from stages.library.importing.source_model import SourceJoint, SourceLink, SourceModel
+from stages.library.modelling import BODY
+
+SMALLEST_RANGE = {"revolute": 1e-3, "prismatic": 1e-4}
+"""A joint that moves less is held fast [rad, m]."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """A part of the result: links that are fast to one another, in the frame of the source's root link."""
+
+    name: str
+    links: tuple[tuple[SourceLink, np.ndarray], ...]
+    """Each with root_from_link (4, 4)."""
+    joint: SourceJoint | None = None
+    root_from_child: np.ndarray | None = None
+
+
+def grouped(source: SourceModel) -> tuple[list[Group], list[str]]:
+    """Return the body and the moving parts of a source. Raises BadInput for joints that make no tree."""
+    links = {link.name: link for link in source.links}
+    where = source.source
+    if len(links) < len(source.links):
+        raise BadInput(f"{where}: two links have one name")
+    joint_of: dict[str, SourceJoint] = {}
+    for joint in source.joints:
+        if joint.parent not in links or joint.child not in links:
+            raise BadInput(f"{where}: joint {joint.name!r:.60} names a link that does not exist")
+        if joint.child in joint_of:
+            raise BadInput(f"{where}: link {joint.child!r:.60} has two parents")
+        joint_of[joint.child] = joint
+    roots = [name for name in links if name not in joint_of]
+    if len(roots) != 1:
+        raise BadInput(f"{where}: {len(roots)} root links, expected 1")
+    children: dict[str, list[SourceJoint]] = {}
+    for joint in source.joints:
+        children.setdefault(joint.parent, []).append(joint)
+    findings: list[str] = []
+    members: dict[str, list[tuple[SourceLink, np.ndarray]]] = {roots[0]: [(links[roots[0]], np.eye(4))]}
+    heads: dict[str, tuple[SourceJoint, np.ndarray]] = {}
+    waiting = [(roots[0], roots[0], np.eye(4))]
+    seen = {roots[0]}
+    while waiting:
+        name, head, root_from_link = waiting.pop(0)
+        for joint in children.get(name, []):
+            pose = root_from_link @ joint.parent_from_child
+            own = _kept(joint, findings)
+            if own is not None and head != roots[0]:
+                findings.append(f"joint {joint.name!r:.40} moves on a part that moves: held fast")
+                own = None
+            group = head if own is None else joint.child
+            if own is not None:
+                heads[group] = (own, pose)
+            members.setdefault(group, []).append((links[joint.child], pose))
+            seen.add(joint.child)
+            waiting.append((joint.child, group, pose))
+    if len(seen) < len(links):
+        raise BadInput(f"{where}: joints lead in a circle")
+    groups = [Group(BODY, tuple(members[roots[0]]))]
+    for head, (joint, pose) in heads.items():
+        groups.append(Group(head, tuple(members[head]), joint, pose))
+    return groups, findings
+
+
+def _kept(joint: SourceJoint, findings: list[str]) -> SourceJoint | None:
+    """Return the joint as one that moves, or None for one that does not."""
+    if joint.kind in ("fixed", "floating"):
+        return None
+    if joint.kind == "unknown":
+        findings.append(f"joint {joint.name!r:.40} is of a kind that is left out: held fast")
+        return None
+    if np.linalg.norm(joint.axis) < 1e-9:
+        findings.append(f"joint {joint.name!r:.40} has an axis of length 0: held fast")
+        return None
+    if joint.kind == "continuous":
+        return replace(joint, kind="revolute", lower=-np.pi, upper=np.pi)
+    if joint.lower > joint.upper:
+        findings.append(f"joint {joint.name!r:.40}: lower and upper limit changed places")
+        joint = replace(joint, lower=joint.upper, upper=joint.lower)
+    if joint.kind == "revolute" and max(-joint.lower, joint.upper) > 4 * np.pi:
+        findings.append(f"joint {joint.name!r:.40} turns by {max(-joint.lower, joint.upper):.0f} rad: degrees?")
+    if joint.upper - joint.lower < SMALLEST_RANGE[joint.kind]:
+        findings.append(f"joint {joint.name!r:.40} has no range: held fast")
+        return None
+    return joint
+
+
+def source_points(groups: Sequence[Group]) -> np.ndarray:
+    """Return the vertices (N, 3) of all parts as the file poses them, root frame and file's unit. Raises BadInput."""
+    points = [
+        apply(pose, surface.vertices)
+        for group in groups
+        for link, pose in group.links
+        for surface in link.visual or link.collision
+    ]
+    if not points:
+        raise BadInput("holds no shapes")
+    return np.concatenate(points)
