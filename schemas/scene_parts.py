@@ -92,7 +92,7 @@ class Relation(Model):
     """Share of the child's footprint over (`hangs_from`: under) the plane (equation 2.2); `carries_on_wall`: of its
     side before the plane; `leans_on`: height of the contact as a share of the child's; `proximal`: shared volume as a
     share of the smaller box."""
-    contact: Vector3 | None = Field(None, exclude_if=lambda value: value is None)
+    contact: Vector3 | None = Field(default=None, exclude_if=lambda value: value is None)
     """Where the two meet, world frame [m]: the middle of what they share. Absent where nothing says it."""
-    inside: float | None = Field(None, exclude_if=lambda value: value is None)
+    inside: float | None = Field(default=None, exclude_if=lambda value: value is None)
     """`contains`: share of the child's box that lies within the parent's."""

@@ -18,6 +18,10 @@ CLEARANCE = 0.02
 """How far outside of its footing the middle of an object must lie before it counts as unbalanced [m]."""
 CLEARANCE_SHARE = 0.1
 """... and in shares of its height: a board of 2 m that leans by less stands."""
+TILTED_SHARE = 0.04
+"""... of a thing whose largest face is seen to lean: 0.04 is a panel that leans by 5 degrees."""
+TILTED = (0.08, 0.8)
+"""Upward part of the normal of a face that leans: 5 to 53 degrees off upright."""
 TOUCH = 0.03
 """What an object leans on is at most this far from it [m]."""
 LEAST_HEIGHT = 0.3
@@ -42,12 +46,20 @@ def overhang(points: np.ndarray) -> float:
     return float(shapely.MultiPoint(hull).convex_hull.distance(middle))
 
 
+def is_tilted(child: Entity) -> bool:
+    """Whether the largest face of an object leans."""
+    largest = max((patch.plane for patch in child.patches), key=lambda plane: plane.area, default=None)
+    return largest is not None and TILTED[0] < abs(largest.normal[2]) < TILTED[1]
+
+
 def is_unbalanced(child: Entity) -> bool:
-    """Whether an object would fall over if nothing but its footing carried it."""
-    if len(child.points) < LEAST_TOUCHING:
+    """Whether an object would fall over if nothing but its footing carried it. Articulated furniture stands on its own:
+    an open door takes the middle of its surface outwards, and hardly its weight."""
+    if len(child.points) < LEAST_TOUCHING or child.node_type == "articulated":
         return False
     height = child.top - child.bottom
-    return overhang(child.points) > max(CLEARANCE, CLEARANCE_SHARE * height)
+    share = TILTED_SHARE if is_tilted(child) else CLEARANCE_SHARE
+    return overhang(child.points) > max(CLEARANCE, share * height)
 
 
 def leaning_relation(child: Entity, parent: str, entities: list[Entity]) -> Relation | None:

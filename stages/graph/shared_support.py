@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from stages.graph.nodes import Entity, plane_height
 from stages.graph.parameters import GraphParameters
-from stages.graph.support import Candidate, height_gap, hull_overlap, stands_inside, support_score
+from stages.graph.support import Candidate, height_gap, hull_overlap, inside_share, stands_inside, support_score
+from stages.kit.geometry.boxes import clip_polygon, footprint
 
 SAME_LEVEL = 0.02
 """Planes nearer than this in height carry one thing together [m]."""
@@ -44,6 +46,9 @@ def partial_supports(child: Entity, entities: list[Entity], parameters: GraphPar
                 continue
             share = hull_overlap(patch.hull, child.box)
             height = plane_height(patch.plane, np.asarray(child.box.center[:2]))
+            if abs(height - parent.top) <= SAME_LEVEL:
+                # What lies on a top hides it.
+                share = max(share, inside_share(child.box, parent.box))
             if share < PART_SHARE or stands_inside(child, parent, height):
                 continue
             if parent.name not in found or share > found[parent.name].share:
@@ -56,16 +61,33 @@ def together_with(main: PartialSupport, parts: list[PartialSupport]) -> list[Par
     return [p for p in parts if p.parent != main.parent and abs(p.height - main.height) <= SAME_LEVEL]
 
 
+def rests_between(child: Entity, carriers: list[str], entities: list[Entity]) -> bool:
+    """Whether the middle of an object lies in the hull of what its footprint shares with those of its carriers."""
+    own = footprint(child.box)
+    shared = [clip_polygon(footprint(entity.box), own) for entity in entities if entity.name in carriers]
+    corners = np.concatenate([polygon for polygon in shared if len(polygon)] or [np.zeros((0, 2))])
+    if len(corners) < 3:
+        return False
+    middle = shapely.Point(child.box.center[:2])
+    return bool(shapely.MultiPoint(corners).convex_hull.covers(middle))
+
+
 def shared_candidates(child: Entity, entities: list[Entity], parameters: GraphParameters) -> list[Candidate]:
     """Return relations to carriers of which none reaches b_th (2.2) alone and that do together: a board over two tables
-    (Han 2024, section 2.6.5). The one that carries most is the parent; the score counts the shares of all."""
+    (Han 2024, section 2.6.5), or between which its middle lies. The one that carries most is the parent; the score
+    counts the shares of all."""
     parts = partial_supports(child, entities, parameters)
     result = []
     for main in parts:
         others = together_with(main, parts)
         total = min(1.0, main.share + sum(p.share for p in others))
-        if not others or total < parameters.area_threshold or any(p.share > main.share for p in others):
+        if not others or any(p.share > main.share for p in others):
             continue
+        if total < parameters.area_threshold:
+            # A plank over two stools: little of it is carried, but its middle lies between them.
+            if not rests_between(child, [p.parent for p in (main, *others)], entities):
+                continue
+            total = parameters.area_threshold
         score = support_score(main.gap, total)
         if score >= parameters.minimum_score:
             result.append(

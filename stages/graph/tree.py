@@ -35,9 +35,10 @@ def ranked_candidates(entities: list[Entity], parameters: GraphParameters) -> di
     ranked: dict[str, list[Candidate]] = {}
     for child in objects:
         choices = candidates_for(child, entities, parameters)
-        if ours and not any(abs(c.gap) <= HIDDEN_TOP_DISTANCE for c in choices):
+        close = [c for c in choices if abs(c.gap) <= HIDDEN_TOP_DISTANCE and c.overlap >= parameters.area_threshold]
+        if ours and not close:
+            # Two in contact come before one that is deeper, and before one of them alone.
             choices = [*shared_candidates(child, entities, parameters), *choices]
-            choices.sort(key=lambda candidate: -candidate.score)
         reach = parameters.wall_distance
         if ours and child.movable:
             # A cup does not hang on the wall that the desk, which the map lacks, stands at.
