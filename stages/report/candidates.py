@@ -11,11 +11,12 @@ from schemas.cad_scene import CadCandidate, CadScene, Replacement
 from schemas.contact_graph import GraphNode
 from schemas.panoptic_map import PanopticMap
 from stages.kit.formats.mesh_files import read_mesh
+from stages.kit.measurement.cad_candidates import before_check, candidates_of, same_placement
 from stages.kit.measurement.shape_symmetry import rotation_angle
 from stages.kit.rendering.ray_casting import SceneRenderer
 from stages.kit.rendering.surfaces import build_soup
 from stages.report.images import Picture, jpeg
-from stages.report.placed_models import ModelShelf, before_check, same_placement
+from stages.report.placed_models import ModelShelf
 from stages.report.surfaces import Model
 from stages.report.views import Bounds, View, best_azimuth, direction_of, fitted_pose, page_camera
 
@@ -63,23 +64,6 @@ def object_views(
         for r in cad_scene.scene.replacements
         if r.decision != "layout"
     ]
-
-
-def candidates_of(replacement: Replacement) -> list[tuple[str, CadCandidate]]:
-    """Return (role, candidate), each placement once: the chosen one, the one that fitted best by itself, the others."""
-    listed: list[tuple[str, CadCandidate]] = []
-    best = replacement.best_single
-    if replacement.chosen is not None and replacement.decision == "cad":
-        both = best is not None and same_placement(best, replacement.chosen)
-        listed.append(("chosen, best by itself" if both else "chosen", replacement.chosen))
-    if best is not None:
-        listed.append(("best by itself", best))
-    listed += [("", candidate) for candidate in replacement.alternatives]
-    kept: list[tuple[str, CadCandidate]] = []
-    for role, candidate in listed:
-        if not any(same_placement(candidate, other) for _, other in kept):
-            kept.append((role, candidate))
-    return kept
 
 
 def _object_view(

@@ -8,10 +8,9 @@ import numpy as np
 import trimesh
 
 from schemas.cad_library import CadLibrary, CadModel
-from schemas.cad_scene import CadCandidate, CadScene, Replacement
+from schemas.cad_scene import CadCandidate, CadScene
 from stages.kit.formats.cad_models import posed_collision, posed_mesh, read_model
 from stages.kit.measurement.convex_overlap import ConvexPiece, convex_piece
-from stages.kit.measurement.shape_symmetry import rotation_angle
 
 
 class ModelShelf:
@@ -48,22 +47,3 @@ class ModelShelf:
         pose = np.array(candidate.world_from_model)
         found = [convex_piece(np.asarray(piece.vertices)) for piece in pieces]
         return [piece.placed(pose) for piece in found if piece is not None]
-
-
-def before_check(replacement: Replacement) -> CadCandidate | None:
-    """Return what stood for a node before the global check: its best single candidate; in older scenes its choice."""
-    return replacement.best_single or (replacement.chosen if replacement.decision == "cad" else None)
-
-
-def after_check(replacement: Replacement) -> CadCandidate | None:
-    """Return what stands for a node after the global check, None where it keeps its mesh."""
-    return replacement.chosen if replacement.decision == "cad" else None
-
-
-def same_placement(a: CadCandidate, b: CadCandidate, distance: float = 0.005, angle: float = 0.02) -> bool:
-    """Whether two candidates are the same model in the same place (within [m], [rad])."""
-    if a.model_id != b.model_id or abs(a.scale - b.scale) > 1e-3:
-        return False
-    first, second = np.array(a.world_from_model), np.array(b.world_from_model)
-    turn = rotation_angle(first[:3, :3].T @ second[:3, :3])
-    return bool(np.linalg.norm(first[:3, 3] - second[:3, 3]) <= distance) and turn <= angle

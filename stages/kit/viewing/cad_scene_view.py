@@ -1,26 +1,40 @@
-"""CAD scenes: chosen models where they stand, meshes that stayed, layout, and the graph over them."""
+"""CAD scenes: chosen models where they stand, what else was tried, meshes that stayed, layout, the graph over them."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
-from schemas.cad_scene import CadScene
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import CadCandidate, CadScene, Replacement
 from stages.kit.formats.cad_models import posed_mesh, read_model
+from stages.kit.measurement.cad_candidates import candidates_of
 from stages.kit.viewing.canvas import Canvas
 from stages.kit.viewing.graph_view import draw_graph
+from stages.kit.viewing.inputs import input_artifact
 from stages.kit.viewing.meshes import load_mesh
+
+CANDIDATES = "candidates"
+"""Candidates that were not chosen lie below this path: drawn, but hidden at first, as they stand in the chosen ones."""
+DRAWN_CANDIDATES = 3
+"""Of each object, beside the chosen one."""
 
 
 def draw_cad_scene(cad_scene: CadScene, canvas: Canvas) -> None:
-    """Draw what stands for every node, and a table of the decisions."""
+    """Draw what stands for every node and the next candidates, with tables of decisions and candidates.
+
+    Candidates whose model the scene has no copy of come from the library that it was made from, where that is still
+    there.
+    """
+    library = input_artifact(cad_scene, CadLibrary)
+    roots = [cad_scene.path("models")] + ([library.path("models")] if library is not None else [])
     rows = ["| node | decision | model | matching error | alignment error [m] |", "|---|---|---|---|---|"]
     for replacement in cad_scene.scene.replacements:
         chosen = replacement.chosen
+        _draw_candidates(replacement, roots, canvas)
         if replacement.decision == "cad" and chosen is not None:
-            folder = cad_scene.path("models") / chosen.model_id
-            mesh = posed_mesh(folder, read_model(folder), chosen.joints, chosen.scale)
-            canvas.transform(f"cad/{replacement.node}", np.array(chosen.world_from_model))
-            canvas.mesh(f"cad/{replacement.node}", mesh)
+            _draw_model(f"cad/{replacement.node}", chosen, roots[0] / chosen.model_id, canvas)
             errors = f"{chosen.matching_error:.3f} | {chosen.alignment_error:.3f}"
             rows.append(f"| {replacement.node} | cad | {chosen.model_id} | {errors} |")
             continue
@@ -29,5 +43,48 @@ def draw_cad_scene(cad_scene: CadScene, canvas: Canvas) -> None:
         if path.exists():
             canvas.mesh(f"{group}/{replacement.node}", load_mesh(path), front_only=True)
         rows.append(f"| {replacement.node} | {replacement.decision} | {replacement.reason} | | |")
-    draw_graph(cad_scene.graph, canvas)
+    draw_graph(cad_scene.graph, canvas, CANDIDATES)
     canvas.document("replacements", "\n".join(rows))
+    canvas.document(CANDIDATES, candidate_table(cad_scene))
+
+
+def _draw_candidates(replacement: Replacement, roots: list[Path], canvas: Canvas) -> None:
+    others = [candidate for role, candidate in candidates_of(replacement) if "chosen" not in role]
+    for number, candidate in enumerate(others[:DRAWN_CANDIDATES], start=1):
+        folder = next((root / candidate.model_id for root in roots if (root / candidate.model_id).is_dir()), None)
+        if folder is not None:
+            path = f"{CANDIDATES}/{replacement.node}/{number}_{candidate.model_id}"
+            _draw_model(path, candidate, folder, canvas)
+
+
+def _draw_model(path: str, candidate: CadCandidate, folder: Path, canvas: Canvas) -> None:
+    canvas.transform(path, np.array(candidate.world_from_model))
+    canvas.mesh(path, posed_mesh(folder, read_model(folder), candidate.joints, candidate.scale))
+
+
+def candidate_table(cad_scene: CadScene) -> str:
+    """Return the candidates of every object in Markdown: errors, scale, joints, what was rejected and why."""
+    lines: list[str] = []
+    for replacement in cad_scene.scene.replacements:
+        if replacement.decision == "layout":
+            continue
+        candidates = candidates_of(replacement)
+        lines += [f"### {replacement.node}", "", replacement.reason, ""] if replacement.reason else [
+            f"### {replacement.node}", ""
+        ]  # fmt: skip
+        if candidates:
+            lines += [
+                "| model | | matching error | alignment error [mm] | scale | joints |",
+                "|---|---|--:|--:|--:|---|",
+            ]
+        for role, candidate in candidates:
+            joints = ", ".join(f"{name} {value:.2f}" for name, value in sorted(candidate.joints.items()))
+            lines.append(
+                f"| {candidate.model_id} | {role} | {candidate.matching_error:.3f} | "
+                f"{1000 * candidate.alignment_error:.1f} | {candidate.scale:.3f} | {joints} |"
+            )
+        if replacement.rejected:
+            rejected = ", ".join(f"{count} {reason}" for reason, count in sorted(replacement.rejected.items()))
+            lines += ["", f"Rejected: {rejected}."]
+        lines.append("")
+    return "\n".join(lines)

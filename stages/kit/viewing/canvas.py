@@ -127,13 +127,26 @@ class Canvas:
             self._rerun.Points3D(np.asarray(points, dtype=np.float32), colors=colors, radii=radius),
         )
 
-    def line(self, path: str, strips: list[np.ndarray], colors: list[Color], radius: float = 0.004) -> None:
-        """Draw polylines, each (N, 3), in one colour each."""
+    def line(
+        self,
+        path: str,
+        strips: list[np.ndarray],
+        colors: list[Color],
+        radius: float = 0.004,
+        labels: list[str] | None = None,
+    ) -> None:
+        """Draw polylines, each (N, 3), in one colour each; `labels` are shown for what is selected."""
         self._arrangement.drawn = True
         strips = [np.asarray(strip, dtype=np.float32) for strip in strips]
         self._log(
             f"{WORLD}/{path}",
-            self._rerun.LineStrips3D(strips, colors=[bytes_of(color) for color in colors], radii=radius),
+            self._rerun.LineStrips3D(
+                strips,
+                colors=[bytes_of(color) for color in colors],
+                radii=radius,
+                labels=labels,
+                show_labels=None if labels is None else False,
+            ),
         )
 
     def boxes(

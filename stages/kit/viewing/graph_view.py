@@ -6,10 +6,10 @@ import numpy as np
 
 from schemas.contact_graph import ContactGraph, ContactGraphFile, GraphNode
 from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import TREE_RELATIONS
+from schemas.scene_parts import TREE_RELATIONS, Relation
 from stages.kit.geometry.boxes import box_corners
 from stages.kit.measurement.palette import RELATION_COLORS, UNLABELLED, instance_color
-from stages.kit.viewing.canvas import SHELL, Canvas, Color
+from stages.kit.viewing.canvas import SHELL, Canvas, Color, bytes_of
 from stages.kit.viewing.inputs import input_artifact
 from stages.kit.viewing.meshes import load_mesh
 
@@ -55,12 +55,55 @@ def draw_graph(graph: ContactGraphFile, canvas: Canvas, *hidden: str) -> None:
     _draw_planes(graph, canvas)
     centers = {node.id: np.array(node.box.center) for node in boxed if node.box is not None}
     for relation, color in RELATION_COLORS.items():
-        ends = [(link.source, link.target) for link in graph.links if link.relation == relation]
-        strips = [np.stack([centers[a], centers[b]]) for a, b in ends if a in centers and b in centers]
+        links = [k for k in graph.links if k.relation == relation and k.source in centers and k.target in centers]
+        strips = [np.stack([centers[link.source], centers[link.target]]) for link in links]
         if strips:
-            canvas.line(f"edges/{relation}", strips, [_rgb(color)] * len(strips), radius=0.008)
+            labels = [f"{link.source} {relation.replace('_', ' ')} {link.target}: {evidence(link)}" for link in links]
+            canvas.line(f"edges/{relation}", strips, [_rgb(color)] * len(strips), radius=0.008, labels=labels)
+    met = [link for link in graph.links if link.contact is not None]
+    if met:
+        colors = [bytes_of(_rgb(RELATION_COLORS[link.relation])) for link in met]
+        canvas.points("contacts", np.array([link.contact for link in met]), np.array(colors, np.uint8), radius=0.015)
     tree = [(link.source, link.target) for link in graph.links if link.relation in TREE_RELATIONS]
     canvas.graph([node.id for node in graph.nodes], [_color(node) for node in graph.nodes], tree)
+    canvas.document("relations", relation_table(graph))
+
+
+def evidence(link: Relation) -> str:
+    """Return confidence and evidence of a relation in words: plane, gap, overlap, share inside, where they meet."""
+    parts = [f"confidence {link.confidence:.2f}"]
+    if link.plane is not None:
+        parts.append(f"plane {link.plane} of {link.source}")
+    if link.gap is not None:
+        parts.append(f"gap {1000 * link.gap:.0f} mm")
+    if link.overlap is not None:
+        parts.append(f"overlap {100 * link.overlap:.0f} %")
+    if link.inside is not None:
+        parts.append(f"inside {100 * link.inside:.0f} %")
+    if link.contact is not None:
+        parts.append("meet at " + ", ".join(f"{value:.2f}" for value in link.contact))
+    return ", ".join(parts)
+
+
+def relation_table(graph: ContactGraphFile) -> str:
+    """Return all relations in Markdown with confidence and evidence, the least certain first."""
+    rows = [
+        "| relation | from | to | confidence | plane | gap [mm] | overlap [%] | inside [%] | meet at [m] |",
+        "|---|---|---|--:|--:|--:|--:|--:|---|",
+    ]
+    for link in sorted(graph.links, key=lambda k: (k.confidence, k.relation, k.source, k.target)):
+        contact = "" if link.contact is None else " ".join(f"{value:.2f}" for value in link.contact)
+        cells = (
+            link.relation.replace("_", " "), link.source, link.target, f"{link.confidence:.2f}",
+            "" if link.plane is None else str(link.plane), _scaled(link.gap, 1000), _scaled(link.overlap, 100),
+            _scaled(link.inside, 100), contact,
+        )  # fmt: skip
+        rows.append(f"| {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def _scaled(value: float | None, factor: float) -> str:
+    return "" if value is None else f"{factor * value:.0f}"
 
 
 def _draw_planes(graph: ContactGraphFile, canvas: Canvas) -> None:

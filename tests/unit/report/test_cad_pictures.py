@@ -10,7 +10,8 @@ import pytest
 from schemas.base import as_transform
 from schemas.cad_scene import CadCandidate, CadScene
 from schemas.scene_parts import Relation
-from stages.report.candidates import candidates_of, object_views
+from stages.kit.measurement.cad_candidates import candidates_of
+from stages.report.candidates import object_views
 from stages.report.global_check import CONFLICT, checked_scenes
 from stages.report.kinematic_tree import corresponding_trees, read_joints
 from stages.report.placed_models import ModelShelf

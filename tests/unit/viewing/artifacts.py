@@ -143,9 +143,22 @@ def make_cad_scene(run: Path, library) -> Path:
         matching_error=0.1,
         alignment_error=0.02,
     )
+    lifted = np.eye(4)
+    lifted[2, 3] = 0.1
+    others = (
+        chosen.model_copy(update={"world_from_model": as_transform(lifted), "matching_error": 0.3}),
+        chosen.model_copy(update={"model_id": "table_99"}),
+    )
     CadSceneFile(
         replacements=(
-            Replacement(node="table_3", decision="cad", chosen=chosen),
+            Replacement(
+                node="table_3",
+                decision="cad",
+                chosen=chosen,
+                best_single=chosen,
+                alternatives=others,
+                rejected={"scale out of range": 4},
+            ),
             Replacement(node="cup_5", decision="mesh", reason="nothing fits"),
             Replacement(node="floor_1", decision="layout"),
         ),

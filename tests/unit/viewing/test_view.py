@@ -11,11 +11,14 @@ import pytest
 
 from schemas.artifact import KINDS
 from schemas.cad_library import CadLibrary
+from schemas.contact_graph import ContactGraphFile
 from schemas.errors import BadInput, MissingDependency, UsageError
 from schemas.interactive_scene import InteractiveSceneFile
+from schemas.scene_parts import Relation
 from stages.kit.formats.link_poses import joint_motion, link_poses
 from stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
 from stages.kit.viewing.canvas import import_rerun
+from stages.kit.viewing.graph_view import evidence, relation_table
 from stages.kit.viewing.library_view import row_places
 from stages.kit.viewing.segments_view import segment_images
 from stages.kit.viewing.view import VIEWERS, view_artifact
@@ -51,9 +54,19 @@ EXPECTED = {
         "/world/edges/supports",
         "/world/edges/contains",
         "/graph",
+        "/relations",
         "/world/meshes/table_3",
     },
-    "cad_scene": {"/world/cad/table_3", "/world/meshes/cup_5", "/world/layout/floor_1", "/replacements", "/graph"},
+    "cad_scene": {
+        "/world/cad/table_3",
+        "/world/candidates/table_3/1_table_00",
+        "/world/meshes/cup_5",
+        "/world/layout/floor_1",
+        "/replacements",
+        "/candidates",
+        "/relations",
+        "/graph",
+    },
     "interactive_scene": {"/world/scene/table_3", "/world/scene/fridge_4", "/world/scene/fridge_4__door", "/graph"},
     "plan": {"/plan", "/world/scene/cup_5", "/world/robot/panda_hand", "/world/execution"},
     "ground_truth": {"/world/room/fridge_4", "/world/boxes", "/world/visible", "/world/camera/labels"},
@@ -100,6 +113,31 @@ def test_every_kind_that_steps_write_has_a_view() -> None:
     import schemas.kinds  # noqa: F401
 
     assert set(VIEWERS) == set(EXPECTED) == set(KINDS) - {"depth"}
+
+
+def test_relations_show_their_confidence_and_evidence(recordings: dict) -> None:
+    link = Relation(
+        source="shelf_2", target="cup_5", relation="contains", confidence=0.875, plane=3, gap=-0.004, overlap=0.9,
+        contact=(0.1, 0.25, 1.0), inside=0.66,
+    )  # fmt: skip
+    assert evidence(link) == (
+        "confidence 0.88, plane 3 of shelf_2, gap -4 mm, overlap 90 %, inside 66 %, meet at 0.10, 0.25, 1.00"
+    )
+    bare = Relation(source="floor_1", target="shelf_2", relation="supports", confidence=0.5)
+    table = relation_table(ContactGraphFile(nodes=(), links=(link, bare))).splitlines()
+    assert table[2] == "| supports | floor_1 | shelf_2 | 0.50 |  |  |  |  |  |"  # the least certain first
+    assert table[3] == "| contains | shelf_2 | cup_5 | 0.88 | 3 | -4 | 90 | 66 | 0.10 0.25 1.00 |"
+    edges = recordings["contact_graph"]["/world/edges/contains"]
+    assert any("contains" in text and "confidence" in text for row in _column(edges, "labels") for text in row)
+
+
+def test_candidates_of_each_object_are_listed(recordings: dict) -> None:
+    (text,) = _column(recordings["cad_scene"]["/candidates"], "text")[0]
+    rows = [line for line in text.splitlines() if line.startswith("| table")]
+    assert [row.split(" | ")[:3] for row in rows] == [
+        ["| table_00", "chosen, best by itself", "0.100"], ["| table_00", "", "0.300"], ["| table_99", "", "0.100"],
+    ]  # fmt: skip
+    assert "Rejected: 4 scale out of range." in text and "nothing fits" in text and "floor_1" not in text
 
 
 def test_camera_moves_with_the_frames(recordings: dict) -> None:
