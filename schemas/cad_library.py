@@ -119,7 +119,7 @@ class LibraryFile(Model):
     seed: int
     models: tuple[CadModel, ...]
     affordances: tuple[Affordances, ...] = ()
-    """One for each model, in their order; none in libraries from before they were derived."""
+    """In the order of the models; those of a library from before they were derived have none."""
 
 
 class ImportedModel(Model):

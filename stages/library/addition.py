@@ -73,6 +73,7 @@ def run(
     decompose = uses_coacd(parameters)
     said = read_mapping(mapping) if mapping is not None else Mapping()
     taken, records, seed = _kept_models(library, context)
+    uses = {} if library is None else {entry.model: entry for entry in library.library.affordances}
     names = {model.id.lower() for model in taken}
     folder = SourceFolder(models)
     imported = 0
@@ -90,13 +91,15 @@ def run(
             names.add(result.model.id.lower())
             write_model_folder(context.output / "models" / result.model.id, result.model, result.parts)
             taken.append(result.model)
+            uses[result.model.id] = result.affordances
             imported += 1
     for line in table_lines(records):
         context.logger.info(line)
     if imported == 0:
         why = records[-1].findings[0] if records and records[-1].findings else "it holds no model files"
         raise BadInput(f"{models}: nothing was imported: {why}", hint="see docs/LIBRARY.md; --class-name, --mapping")
-    LibraryFile(seed=seed, models=tuple(taken)).write(context.output / "library.json")
+    known = tuple(uses[model.id] for model in taken if model.id in uses)
+    LibraryFile(seed=seed, models=tuple(taken), affordances=known).write(context.output / "library.json")
     ImportFile(models=tuple(records)).write(context.output / IMPORTS_FILE)
     summary = {
         "models": len(taken),

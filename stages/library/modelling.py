@@ -47,6 +47,12 @@ def describe(design: Design, model_id: str, movable: bool) -> CadModel:
     )
 
 
+def closed_solids(design: Design) -> dict[str, list[Solid]]:
+    """Return part -> its pieces in the model frame at joint value 0, of a centred design."""
+    solids = {BODY: [piece.solid for piece in design.body]}
+    return solids | {link.joint.part: [piece.solid for piece in link.pieces] for link in design.moving}
+
+
 def part_geometries(design: Design) -> list[PartGeometry]:
     """Return the body and the moving links, each in its part frame (origin at its joint)."""
     parts = []

@@ -45,7 +45,7 @@ class AdditionParameters(Parameters):
 
 BUILD = Stage(
     name="library build",
-    version=1,
+    version=2,
     summary="Make a CAD library of parametric furniture, articulated, with collision shapes and masses",
     parameters=LibraryParameters,
     reads={},
@@ -56,7 +56,7 @@ BUILD = Stage(
 
 ADD = Stage(
     name="library add",
-    version=1,
+    version=2,
     summary="Import models of other people into a CAD library: URDF, MJCF, SDF, meshes, PartNet, ShapeNetSem",
     parameters=AdditionParameters,
     reads={

@@ -7,9 +7,10 @@ from schemas.errors import UsageError
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.model_writer import write_model_folder
 from stages.kit.stage import Context
+from stages.library.affordances import affordances
 from stages.library.design import centered
 from stages.library.families import GENERATORS
-from stages.library.modelling import describe, part_geometries
+from stages.library.modelling import closed_solids, describe, part_geometries
 from stages.library.parameters import LibraryParameters
 
 
@@ -29,13 +30,15 @@ def run(*, parameters: LibraryParameters, context: Context) -> CadLibrary:
         movable = vocabulary.by_name(class_name).movable
         count = parameters.small_shapes_per_class if movable else parameters.shapes_per_class
         work += [(stream, class_name, generate, movable, k) for k in range(count)]
-    models = []
+    models, found = [], []
     for stream, class_name, generate, movable, k in context.progress.track(work, description="drawing furniture"):
         design = centered(generate(context.random(stream, k), k))
         model = describe(design, f"{class_name}_{k:02d}", movable)
         write_model_folder(context.output / "models" / model.id, model, part_geometries(design))
         models.append(model)
-    LibraryFile(seed=context.seed, models=tuple(models)).write(context.output / "library.json")
+        found.append(affordances(model, closed_solids(design)))
+    library = LibraryFile(seed=context.seed, models=tuple(models), affordances=tuple(found))
+    library.write(context.output / "library.json")
     summary = {
         "models": len(models),
         "classes": len({model.class_name for model in models}),

@@ -39,10 +39,9 @@ def plant(random: np.random.Generator, style: int) -> Design:
     pieces = painted(clay.darker(0.9), cylinder(foot - 0.5 * wall, (0.0, 0.008), count=16))
     outer = [(foot, 0.0), (radius, pot)]
     pieces += painted(clay, shell([(r - wall, z) for r, z in outer], outer, count=16))
-    soil = 0.86 * pot
-    pieces += painted(
-        EARTH, cylinder(foot - wall, (0.008, soil), count=16, top_radius=radius - wall - 0.14 * (radius - foot))
-    )
+    soil, heap = 0.90 * pot, radius - wall - 0.10 * (radius - foot)
+    pieces += painted(EARTH, cylinder(foot - wall, (0.008, soil), count=16, top_radius=heap))
+    pieces += painted(EARTH, cylinder(heap, (soil, 1.02 * pot), count=16, top_radius=0.016))
     leaves = int(random.integers(8, 13))
     if not tree:
         for k in range(leaves):

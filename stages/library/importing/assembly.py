@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from schemas.base import as_vector
-from schemas.cad_library import CadModel, ModelState
+from schemas.cad_library import Affordances, CadModel, ModelState
 from schemas.scene_parts import Joint
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.model_writer import PartGeometry
 from stages.kit.geometry.solids import mass_properties, volume
 from stages.kit.geometry.transforms import apply
+from stages.library.affordances import affordances
 from stages.library.importing.painting import painted
 from stages.library.importing.placing import Part
 from stages.library.modelling import joint_values, motion
@@ -38,6 +39,7 @@ class Assembled:
 
     model: CadModel
     parts: tuple[PartGeometry, ...]
+    affordances: Affordances
     findings: tuple[str, ...]
     collision_pieces: int
 
@@ -82,7 +84,8 @@ def assembled(
         parts=tuple(part.name for part in parts),
         recipe=recipe,
     )
-    return Assembled(model, tuple(geometries), tuple(findings), sum(len(part.pieces) for part in parts))
+    uses = affordances(model, {part.name: part.pieces for part in parts})
+    return Assembled(model, tuple(geometries), uses, tuple(findings), sum(len(part.pieces) for part in parts))
 
 
 def _rounded(joint: Joint) -> Joint:

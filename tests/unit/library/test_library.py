@@ -310,3 +310,23 @@ def test_interior_surfaces_are_supports(models):
     closed = {round(p.center[2], 4): p.center[1] for p in drawers.states[0].planes if p.horizontal}
     shifts = [closed[z] - moved[z] for z in closed if z in moved]
     assert max(shifts) == pytest.approx(drawers.joints[0].upper, abs=1e-3)
+
+
+def test_affordances_of_the_first_classes(library):
+    """All shapes of a class can do the same: what opens, what contains, what carries."""
+    found: dict[str, list] = {}
+    for uses in library.library.affordances:
+        found.setdefault(uses.model.rsplit("_", 1)[0], []).append(uses)
+    assert {name for name, every in found.items() if all(uses.contains for uses in every)} == {
+        *("cabinet", "wall_cabinet", "fridge", "microwave", "cup", "bowl", "bin")
+    }
+    assert not [
+        name for name in ("chair", "table", "desk", "sofa", "bed", "book") if any(u.contains for u in found[name])
+    ]
+    assert all(u.carries for name in ("chair", "table", "desk", "shelf", "sofa", "bed") for u in found[name])
+    kinds = {name: {use.kind for uses in every for use in uses.joints} for name, every in found.items()}
+    assert kinds["cabinet"] == {"door", "drawer"} and kinds["fridge"] == {"door"} == kinds["microwave"]
+    for uses in (*found["fridge"], *found["microwave"]):
+        rooms = [room for room in uses.contains if room.part == "body"]
+        assert rooms and all(len(room.reached_through) == 1 for room in rooms)
+    assert all(len(uses.grasps) == len(uses.joints) for name in ("cabinet", "fridge") for uses in found[name])

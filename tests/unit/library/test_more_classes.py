@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 
 import numpy as np
 import pytest
 
 from schemas.cad_library import CadLibrary, CadModel
 from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.cad_models import load_collision_parts, model_folder
+from stages.kit.formats.cad_models import load_collision_parts, model_folder, posed_collision
 from stages.kit.formats.urdf_check import check_urdf
 from stages.library.design import Design, centered
 from stages.library.families import GENERATORS
 from tests.unit.library.clearance import depths_of_links
-from tests.unit.library.test_library import FIRST, build
+from tests.unit.library.test_library import FIRST, build, inside
 
 LATER = tuple(name for name in GENERATORS if name not in FIRST)
 FIRST_SHAPES = "2afa46f1d9626bdd7bf825105c2459f18effc8de897329a59269308f51aa23f5"
@@ -85,6 +86,84 @@ def test_closed_hulls_and_clear_joints(library, models):
         for state in model.states if model.articulated else ():
             for part, depth in depths_of_links(model, collision, state.joints).items():
                 assert depth < 1e-3, f"{model.id} {part} at {state.joints} is {depth:.4f} m in"
+
+
+KINDS = {
+    "cooking_pot": {"lid": 1},
+    "kettle": {"lid": 1},
+    "drawer_unit": {"drawer": 2},
+    "dishwasher": {"door": 1, "drawer": 2},
+    "hob": {"knob": 4},
+    "washing_machine": {"door": 1, "drawer": 1, "knob": 1},
+    "printer": {"drawer": 1, "lid": 1},
+    "laptop": {"lid": 1},
+    "wardrobe": {"door": 2},
+    "chest": {"lid": 1},
+    "toolbox": {"lid": 1},
+    "sink": {"lever": 1},
+    "toilet": {"lid": 1},
+}
+"""What the joints of the first shape of a class are for."""
+
+
+def test_affordances_tell_what_joints_are_for(library):
+    for uses in library.library.affordances:
+        kinds = Counter(use.kind for use in uses.joints)
+        class_name = uses.model.removesuffix("_00")
+        if class_name == "oven":
+            assert (kinds.pop("door"), kinds.pop("drawer")) == (1, 2) and 2 <= kinds.pop("knob") <= 6
+            assert not kinds
+        else:
+            assert kinds == KINDS.get(class_name, {}), uses.model
+        assert set(uses.openable) == {u.joint for u in uses.joints if u.kind in ("door", "drawer", "lid")}
+
+
+def test_what_stands_in_the_way_of_a_rack_is_what_was_drawn_there(library):
+    """Found by rays in the finished shape; the designs say the same."""
+    found = {uses.model: {use.joint: use.behind for use in uses.joints} for uses in library.library.affordances}
+    for class_name in LATER:
+        design = designs(class_name, 1, seed=3)[0]
+        drawn = {link.joint.name: () if link.behind is None else (link.behind,) for link in design.moving}
+        assert found[f"{class_name}_00"] == drawn
+    assert found["dishwasher_00"]["rack_1_slide"] == ("door_hinge",)
+
+
+def test_affordances_of_things_that_contain_carry_and_are_held(library):
+    by_class = {uses.model.removesuffix("_00"): uses for uses in library.library.affordances}
+    rooms = {name: uses.contains for name, uses in by_class.items()}
+    assert {name for name, found in rooms.items() if found} == {
+        *("drawer_unit", "pan", "cooking_pot", "jug", "kettle", "oven", "dishwasher", "washing_machine", "printer"),
+        *("wardrobe", "chest", "toolbox", "sink", "toilet", "vase"),
+    }
+    assert {room.part for room in rooms["drawer_unit"]} == {"drawer_1", "drawer_2"}
+    assert all(room.reached_through == (f"{room.part}_slide",) for room in rooms["drawer_unit"])
+    assert rooms["jug"][0].reached_through == () and rooms["chest"][0].reached_through == ("lid_hinge",)
+    racks = {room.part: room.reached_through for room in rooms["oven"] if room.part != "body"}
+    assert racks == {f"rack_{k}": ("door_hinge", f"rack_{k}_slide") for k in (1, 2)}
+    assert set(rooms["wardrobe"][0].reached_through) == {"door_1_hinge", "door_2_hinge"}
+    carriers = {name for name, uses in by_class.items() if any(not surface.inside for surface in uses.carries)}
+    assert {"tray", "plate", "board", "bench", "stool", "trolley", "wall_shelf", "chest", "hob"} <= carriers
+    assert not carriers & {"pan", "jug", "mouse", "utensil", "picture", "clock", "plant"}
+    held = {name for name, uses in by_class.items() if any(g.joint is None for g in uses.grasps)}
+    assert held == {"can", "mouse", "remote", "utensil"}
+    assert {name for name, uses in by_class.items() if uses.movable} == {
+        name for name in LATER if load_vocabulary().by_name(name).movable
+    }
+
+
+def test_rooms_are_empty_and_surfaces_are_solid(library, models):
+    """Against the collision meshes: a grid in every inner volume is free, and under every surface is something."""
+    by_id = {uses.model: uses for uses in library.library.affordances}
+    shares = np.stack(np.meshgrid(*[np.linspace(0.06, 0.94, 5)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    for model in models:
+        pieces = posed_collision(model_folder(library, model.id), model, {})
+        for room in by_id[model.id].contains:
+            low, high = np.array(room.box_minimum), np.array(room.box_maximum)
+            taken = sum(inside(pieces, low + share * (high - low)) for share in shares)
+            assert taken <= 0.12 * len(shares), f"{model.id}: {taken} of {len(shares)} points in {room.part} are solid"
+        for surface in by_id[model.id].carries:
+            middle = np.array(model.states[0].planes[surface.plane].center)
+            assert inside(pieces, middle - [0, 0, 0.0008]) and not inside(pieces, middle + [0, 0, 0.02]), model.id
 
 
 @pytest.mark.slow
