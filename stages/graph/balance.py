@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
@@ -27,6 +29,10 @@ TOUCH = 0.03
 LEAST_HEIGHT = 0.3
 """... and touches it at this share of its height or above."""
 LEAST_TOUCHING = 5
+UPRIGHT = math.sin(math.radians(6.0))
+"""A plane whose normal rises, or falls short of straight up, by no more than this belongs to an upright body."""
+LEAST_TILTED = 0.2
+"""Share of the area of its planes from which on a body counts as tilted."""
 
 
 def footing(points: np.ndarray) -> np.ndarray:

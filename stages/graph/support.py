@@ -10,6 +10,7 @@ import numpy as np
 from schemas.scene_parts import Box
 from stages.graph.nodes import Entity, Patch, level_patch, plane_height
 from stages.graph.parameters import GraphParameters
+from stages.graph.touching import SINKING, hidden_reach, seam_share, smaller_share, touches
 from stages.kit.geometry.boxes import (
     bottom,
     clip_polygon,
@@ -41,6 +42,12 @@ LEDGE_FACTOR = 0.7
 """A level surface labelled wall is a sill, or floor or furniture that was mislabelled: all else equal, the latter."""
 HIDDEN_TOP_DISTANCE = 0.15
 """A hidden supporting plane is looked for this close to the top of a box [m]."""
+NAMELESS = "object"
+"""Class of things that masks found and nobody named."""
+LEAST_SEAM = 0.2
+"""Share of its foot along which a plane must be seen to reach up to an object that is hardly over it."""
+LEAST_SMALLER_SHARE = 0.4
+"""Share of the smaller footprint that must lie in the other where an object lies on something narrower than itself."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +67,8 @@ class Candidate:
     patch: int | None
     """Index into the parent's patches; None when the plane is hidden and must be registered."""
     hidden: Patch | None = None
+    touching: bool = False
+    """Whether the plane is seen in contact with the child's bottom (stages/graph/touching.py)."""
 
 
 def height_gap(child: Box, patch: Patch) -> float:
@@ -137,7 +146,7 @@ def candidates_for(child: Entity, entities: list[Entity], parameters: GraphParam
                 found.append(hidden)
     order = {entity.name: entity.instance for entity in entities}
     found.sort(key=lambda c: (-c.score, order[c.parent], -1 if c.patch is None else c.patch))
-    return prefer_the_highest(found, parameters) if ours else found
+    return prefer_contact(prefer_the_highest(found, parameters)) if ours else found
 
 
 def _seen(child: Entity, parent: Entity, k: int, parameters: GraphParameters) -> Candidate | None:
@@ -145,6 +154,7 @@ def _seen(child: Entity, parent: Entity, k: int, parameters: GraphParameters) ->
     height = plane_height(patch.plane, np.asarray(child.box.center[:2]))
     gap = height_gap(child.box, patch)
     inside = stands_inside(child, parent, height)
+    touching, least = False, parameters.area_threshold
     if parameters.method == "thesis":
         overlap = effective = rectangle_overlap(patch.points, child.box)
     else:
@@ -164,7 +174,12 @@ def _seen(child: Entity, parent: Entity, k: int, parameters: GraphParameters) ->
         elif inside:
             # A board spans its container, though the camera saw the front edge only.
             effective = max(overlap, BOARD_FACTOR * inside_share(child.box, parent.box))
-    if effective < parameters.area_threshold:
+        touching = touches(gap)
+        if touching and effective < least and parent.node_type != "layout":
+            seam = seam_share(child, patch)
+            if seam >= LEAST_SEAM:
+                effective, least = max(effective, HIDDEN_FACTOR * seam), 0.0
+    if effective < least:
         return None
     score = support_score(gap, effective)
     if parameters.method == "ours" and parent.movable and not child.movable:
@@ -174,7 +189,7 @@ def _seen(child: Entity, parent: Entity, k: int, parameters: GraphParameters) ->
     if score < parameters.minimum_score:
         return None
     relation: Literal["supports", "contains"] = "contains" if inside else "supports"
-    return Candidate(child.name, parent.name, score, relation, gap, overlap, height, k)
+    return Candidate(child.name, parent.name, score, relation, gap, overlap, height, k, touching=touching)
 
 
 def hidden_candidate(child: Entity, parent: Entity, parameters: GraphParameters) -> Candidate | None:
@@ -185,6 +200,15 @@ def hidden_candidate(child: Entity, parent: Entity, parameters: GraphParameters)
     near the parent's top, or inside a container, or (worth less) within a parent that shows no horizontal plane at all.
     """
     share = inside_share(child.box, parent.box)
+    over_top = child.bottom - parent.top
+    touching = False
+    if parameters.method == "ours" and child.top > parent.top:
+        touching = touches(over_top)
+        if share < parameters.area_threshold and smaller_share(child.box, parent.box) >= LEAST_SMALLER_SHARE:
+            if child.movable or child.class_name == NAMELESS:
+                touching = -SINKING <= over_top <= min(HIDDEN_TOP_DISTANCE, hidden_reach(child.box, parent.box))
+            if touching:
+                share = max(parameters.area_threshold, HIDDEN_FACTOR * smaller_share(child.box, parent.box))
     if share < parameters.area_threshold:
         return None
     outline = clip_polygon(footprint(parent.box), footprint(child.box))
@@ -200,7 +224,6 @@ def hidden_candidate(child: Entity, parent: Entity, parameters: GraphParameters)
     else:
         if child.class_name in parameters.wall_classes and not inside:
             return None
-        over_top = height - parent.top
         if inside:
             score = HIDDEN_FACTOR * share
         elif abs(over_top) <= HIDDEN_TOP_DISTANCE and child.top > parent.top:
@@ -214,7 +237,18 @@ def hidden_candidate(child: Entity, parent: Entity, parameters: GraphParameters)
     if score < parameters.minimum_score:
         return None
     relation: Literal["supports", "contains"] = "contains" if inside else "supports"
-    return Candidate(child.name, parent.name, score, relation, 0.0, share, height, None, patch)
+    return Candidate(child.name, parent.name, score, relation, 0.0, share, height, None, patch, touching)
+
+
+def prefer_contact(ranked: list[Candidate]) -> list[Candidate]:
+    """Put the best relation in contact before one to a plane that lies deeper: nothing floats over what it touches.
+
+    Legs that a map misses make furniture float, but not onto something that ends just where the seat begins.
+    """
+    best = next((candidate for candidate in ranked if candidate.touching), None)
+    if best is None or best.height <= ranked[0].height:
+        return ranked
+    return [best, *(candidate for candidate in ranked if candidate is not best)]
 
 
 def prefer_the_highest(ranked: list[Candidate], parameters: GraphParameters) -> list[Candidate]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,7 @@ from stages.graph.support import (
     rectangle_overlap,
     support_score,
 )
+from stages.graph.touching import seam_share, smaller_share
 from stages.kit.geometry.boxes import box_from_bounds, gravity_aligned_box
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -141,8 +144,9 @@ def test_furniture_rather_stands_on_the_desk_than_on_the_keyboard():
 def test_among_near_equals_the_highest_surface_wins():
     table = solid("table_1", (0, 0, 0), (1, 1, 0.75), class_name="table", movable=False)
     book = solid("book_2", (0.3, 0.3, 0.75), (0.5, 0.5, 0.78), class_name="book")
-    # A cup on the book whose rim sticks out over it: (2.3) gives the table 0.97 and the book 0.9.
-    cup = solid("cup_3", (0.41, 0.35, 0.78), (0.51, 0.45, 0.88), class_name="cup")
+    # A cup on the book whose rim sticks out over it, and of which the map lacks the lowest 2.5 cm, so that it touches
+    # neither: (2.3) gives the table 0.945 and the book 0.88.
+    cup = solid("cup_3", (0.41, 0.35, 0.805), (0.51, 0.45, 0.905), class_name="cup")
     plain = candidates_for(cup, [table, book, cup], GraphParameters(tie_margin=0.0))
     assert plain[0].parent == "table_1"
     assert candidates_for(cup, [table, book, cup], GraphParameters())[0].parent == "book_2"
@@ -155,3 +159,62 @@ def test_prefer_the_highest_ignores_planes_that_the_child_sinks_into():
     ranked = [candidate("a_1", 0.97, 0.0, 0.75), candidate("b_2", 0.95, -0.04, 0.79)]
     assert prefer_the_highest(ranked, GraphParameters())[0].parent == "a_1"
     assert prefer_the_highest([], GraphParameters()) == []
+
+
+def with_foot(name, low, high, **kinds):
+    """A solid whose front and sides were seen, seen from -y: points along the lower front edge, 1 cm apart."""
+    front = np.arange(low[0], high[0] + 1e-9, 0.01)
+    foot = np.column_stack([front, np.full(len(front), low[1]), np.full(len(front), low[2])])
+    return replace(solid(name, low, high, **kinds), points=foot)
+
+
+def test_what_an_object_touches_carries_it_whatever_lies_deeper():
+    """A flat box on a flat box on a table: 5 cm cost nothing in (2.3), yet nothing floats over what it touches."""
+    table = solid("table_1", (0, 0, 0), (1, 1, 0.75), class_name="table", movable=False)
+    # Two thirds of the upper one lie over the lower one: 0.67 against 0.95 for the table.
+    lower = solid("object_2", (0.3, 0.3, 0.75), (0.5, 0.5, 0.8), class_name="object", movable=False)
+    upper = solid("object_3", (0.3, 0.3667, 0.8), (0.5, 0.5667, 0.85), class_name="object", movable=False)
+    ranked = candidates_for(upper, [table, lower, upper], GraphParameters())
+    assert [c.parent for c in ranked] == ["object_2", "table_1"] and ranked[0].score < ranked[1].score
+    # Where the lower one ends 3 cm below, it is no contact, and the better covered plane wins again.
+    low = solid("object_2", (0.3, 0.3, 0.75), (0.5, 0.5, 0.77), class_name="object", movable=False)
+    assert candidates_for(upper, [table, low, upper], GraphParameters())[0].parent == "table_1"
+
+
+@pytest.mark.parametrize(("rise", "parent"), [(0.0, "object_2"), (-0.03, "table_1")])
+def test_the_seam_before_the_foot_tells_what_a_hidden_top_cannot(rise, parent):
+    """The box hides the top behind its front: of what carries it 15 cm before it are seen. Sunk into it, it stands
+    behind it instead."""
+    table = solid("table_1", (0, 0, 0), (1, 1, 0.75), class_name="table", movable=False)
+    front = np.array([[0.3, 0.3], [0.5, 0.3], [0.5, 0.44], [0.3, 0.44]])
+    seen = level_patch(front, 0.8, hidden=False)
+    spread = np.stack(np.meshgrid(np.arange(0.3, 0.5, 0.01), np.arange(0.3, 0.44, 0.01)), axis=-1).reshape(-1, 2)
+    seen = replace(seen, points=np.column_stack([spread, np.full(len(spread), 0.8)]))
+    lower = entity("object_2", box_from_bounds((0.3, 0.3, 0.75), (0.5, 0.44, 0.8)), [seen], "object", movable=False)
+    upper = with_foot("object_3", (0.35, 0.45, 0.8 + rise), (0.45, 0.55, 1.0), class_name="object", movable=False)
+    assert seam_share(upper, seen) == 1.0
+    assert candidates_for(upper, [table, lower, upper], GraphParameters())[0].parent == parent
+
+
+def test_a_board_lies_on_a_post_that_is_narrower_than_itself():
+    table = solid("table_1", (0, 0, 0), (1, 1, 0.75), class_name="table", movable=False)
+    post = entity("object_2", box_from_bounds((0.45, 0.45, 0.75), (0.55, 0.55, 0.95)), (), "object", movable=False)
+    board = solid("object_3", (0.3, 0.35, 0.95), (0.7, 0.65, 1.0), class_name="object", movable=False)
+    assert smaller_share(board.box, post.box) == pytest.approx(1.0)
+    best = candidates_for(board, [table, post, board], GraphParameters())[0]
+    assert best.parent == "object_2" and best.hidden is not None
+    thesis = candidates_for(board, [table, post, board], GraphParameters(method="thesis"))
+    assert not [c for c in thesis if c.parent == "object_2"]
+
+
+@pytest.mark.parametrize(("gap", "parent"), [(0.0, "object_2"), (0.09, "object_2"), (0.13, "table_1")])
+def test_what_juts_out_hides_the_top_of_what_carries_it(gap, parent):
+    """A board that is 10 cm wider than its post, seen from 45 degrees above at most, hides 10 cm of it."""
+    table = solid("table_1", (0, 0, 0), (1, 1, 0.75), class_name="table", movable=False)
+    post = entity("object_2", box_from_bounds((0.45, 0.45, 0.75), (0.55, 0.55, 0.95)), (), "object", movable=False)
+    low = 0.95 + gap
+    board = solid("object_3", (0.45, 0.45, low), (0.65, 0.65, low + 0.05), class_name="object", movable=False)
+    assert candidates_for(board, [table, post, board], GraphParameters())[0].parent == parent
+    # Furniture lacks legs instead: a desk that is seen over a bin stands on the floor.
+    desk = solid("desk_3", (0.45, 0.45, low + 0.03), (0.65, 0.65, low + 0.05), class_name="desk", movable=False)
+    assert candidates_for(desk, [table, post, desk], GraphParameters())[0].parent == "table_1"
