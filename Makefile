@@ -109,6 +109,10 @@ bench-mapping: setup ## The panoptic map beside the thesis and Voxblox++, tables
 mosd: setup ## Objects of real tabletop frames against their labels (QUICK=1: every fifth frame; REAL_DATA=folder)
 	$(PYTHON) -m benchmarks.tables.mosd $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/mosd$(if $(QUICK),-quick)
 
+.PHONY: mosd-supports
+mosd-supports: setup ## Which object rests on which on real tabletop frames (QUICK=1: every fifth frame; REAL_DATA=folder)
+	$(PYTHON) -m benchmarks.tables.mosd_supports $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/mosd-supports$(if $(QUICK),-quick)
+
 # About a quarter of an hour on one core; stands in data/networks/tabletop_pairs.safetensors.
 train-pairs: setup ## Train the trees of `segment --backend objects` anew (QUICK=1: few generated frames)
 	$(PYTHON) -m benchmarks.training.tabletop_pairs $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/train-pairs$(if $(QUICK),-quick)

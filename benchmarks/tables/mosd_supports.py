@@ -116,19 +116,18 @@ def table_of(
 ) -> str:
     """Return table.md. results: method -> case -> score; by_kind: kind of test scene -> score of our method."""
     lines = [
-        "| case | frames | method | objects | P | R | F1 | on things P | R | F1 | second carriers: true, found, right "
-        "| leaning: true, found, right |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|",
+        "| case | frames | method | objects | P | R | F1 | on things P | R | F1 | second: true, found, right |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for case in results[METHODS[0]]:
         for method in METHODS:
             score = results[method][case]
             m = measures_of(score)
-            second = [", ".join(map(str, score.second[relation])) for relation in ("also_supports", "leans_on")]
+            second = ", ".join(map(str, score.second["second"]))
             lines.append(
                 f"| {case} | {frames[case]} | {method} | {score.true} | {m['support_precision']:.3f} "
                 f"| {m['support_recall']:.3f} | {m['support_f1']:.3f} | {m['on_things_precision']:.3f} "
-                f"| {m['on_things_recall']:.3f} | {m['on_things_f1']:.3f} | {second[0]} | {second[1]} |"
+                f"| {m['on_things_recall']:.3f} | {m['on_things_f1']:.3f} | {second} |"
             )
     lines += ["", "Objects whose carrier is right, by level (1 stands on the table):", ""]
     levels = sorted({level for cases in results.values() for score in cases.values() for level in score.levels})
@@ -146,7 +145,8 @@ def table_of(
         )
     lines += [
         "",
-        "An object that two things carry counts as right with either; `on things` leaves out the edges to the table. "
+        "An object that two things carry counts as right with either; `on things` leaves out the edges to the table; "
+        "`second` are further carriers and what things lean on. "
         "Objects whose predicted carrier the annotator could not rule out are left out: "
         + ", ".join(f"{results['ours'][case].doubtful} in {case}" for case in results["ours"])
         + ".",

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from schemas.contact_graph import ContactGraphFile
 from stages.truth.support_annotation import SupportAnnotation
 
+SECOND = ("second", "also_supports", "leans_on")
+
 
 @dataclass
 class SupportScore:
@@ -21,8 +23,8 @@ class SupportScore:
     agreed_to_things: int = 0
     doubtful: int = 0
     """Children whose predicted parent is one that the annotator could not rule out: they count neither way."""
-    second: dict[str, list[int]] = field(default_factory=lambda: {"also_supports": [0, 0, 0], "leans_on": [0, 0, 0]})
-    """Relation beside the tree -> true, predicted, agreed."""
+    second: dict[str, list[int]] = field(default_factory=lambda: {name: [0, 0, 0] for name in SECOND})
+    """Contacts beside the parent -> true, predicted, agreed; `second` takes both kinds together."""
     levels: dict[int, list[int]] = field(default_factory=dict)
     """Level of the child (1 on the table) -> children, children whose parent is right."""
     wrong: list[tuple[str, str, str, str]] = field(default_factory=list)
@@ -117,9 +119,14 @@ def score_graph(
         if not right:
             score.wrong.append((told.scene, child, " + ".join(carriers), found or "not in the map"))
         others = set(carriers) - {found} if right else set(relation.also)
-        for kind, wanted in (("also_supports", others), ("leans_on", set(relation.leans_on))):
-            got = {source for name, source, target in beside if name == kind and target == child}
-            got -= set(relation.uncertain)
-            counts = score.second[kind]
-            score.second[kind] = [counts[0] + len(wanted), counts[1] + len(got), counts[2] + len(got & wanted)]
+        wanted = {"also_supports": others, "leans_on": set(relation.leans_on)}
+        got = {
+            kind: {source for name, source, target in beside if (name, target) == (kind, child)}
+            - set(relation.uncertain)
+            for kind in wanted
+        }
+        wanted["second"], got["second"] = set().union(*wanted.values()), set().union(*got.values())
+        for kind, counts in score.second.items():
+            both = wanted[kind] & got[kind]
+            score.second[kind] = [counts[0] + len(wanted[kind]), counts[1] + len(got[kind]), counts[2] + len(both)]
     return score
