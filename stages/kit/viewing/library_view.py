@@ -1,4 +1,4 @@
-"""CAD libraries: every model on a grid by class; articulated ones open and close over time."""
+"""CAD libraries: every model on a grid by class; articulated ones open and close over time; what each is good for."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from stages.kit.formats.cad_models import load_visual_parts, model_folder, part_
 from stages.kit.geometry.boxes import box_from_bounds
 from stages.kit.geometry.transforms import transform_from
 from stages.kit.measurement.palette import instance_color
+from stages.kit.viewing.affordance_view import affordance_table, draw_affordances
 from stages.kit.viewing.canvas import Canvas
 
 GAP = 0.4
@@ -19,11 +20,14 @@ def draw_library(library: CadLibrary, canvas: Canvas) -> None:
     """Draw a row of models for each class; scrub `opening` (0..1) to move the joints."""
     models = library.library.models
     places = row_places(models)
+    uses = {entry.model: entry for entry in library.library.affordances}
     for model in models:
         entity = f"library/{model.class_name}/{model.id}"
         canvas.transform(entity, transform_from(np.eye(3), places[model.id]))
         for part, mesh in load_visual_parts(model_folder(library, model.id)).items():
             canvas.mesh(f"{entity}/{part}", mesh)
+        if model.id in uses:
+            draw_affordances(entity, model, uses[model.id], canvas)
         state = model.states[0]
         box = box_from_bounds(state.box_minimum, state.box_maximum)
         canvas.boxes(
@@ -31,6 +35,8 @@ def draw_library(library: CadLibrary, canvas: Canvas) -> None:
         )
     reach = np.array([places[m.id] + np.array(m.states[0].box_maximum) for m in models] or [np.ones(3)])
     canvas.enclose(np.zeros(3), reach.max(axis=0))
+    if table := affordance_table(library):
+        canvas.document("affordances", table)
     moving = [model for model in models if model.joints]
     for step in range(SWING_STEPS + 1) if moving else ():
         share = step / SWING_STEPS

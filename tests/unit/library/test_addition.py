@@ -123,6 +123,10 @@ def test_urdf_keeps_its_joints(tmp_path) -> None:
     np.testing.assert_allclose(hinge.origin, [-0.25, -0.30, 0.2], atol=1e-6)
     assert record.can_be_opened and record.can_contain and record.can_support and record.has_handle
     assert not record.can_be_carried
+    (uses,) = library.library.affordances
+    assert [(use.joint, use.kind) for use in uses.joints] == [("slide", "drawer"), ("hinge", "door")]
+    assert uses.openable == ("slide", "hinge") and not uses.movable and not uses.contains  # its drawer is solid
+    assert uses.carries[0].part == "body" and [grasp.joint for grasp in uses.grasps] == ["slide"]
     opened = posed_mesh(model_folder(library, model.id), model, {"slide": 0.3, "hinge": 0.0})
     assert opened.bounds[0][1] == pytest.approx(-(0.27 + 0.3 - 0.01), abs=1e-6)
     colors = posed_mesh(model_folder(library, model.id), model, {}).visual.vertex_colors
