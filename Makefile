@@ -129,6 +129,14 @@ bench: setup ## Speed beside named peers, medians (QUICK=1: fewer runs)
 bench-growth: setup ## What a frame costs as the map grows, and what holds the memory (QUICK=1: 300 frames)
 	$(PYTHON) -m benchmarks.speed.growth $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-growth
 
+.PHONY: bench-supports bench-timeline
+# Four studios of tuning and four of reporting seeds, on perfect maps.
+bench-supports: setup ## Hanging, leaning, contained, carried by two: edges by relation, ours and thesis (QUICK=1: one room)
+	$(PYTHON) -m benchmarks.graph.less_common_supports $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-supports$(if $(QUICK),-quick)
+
+bench-timeline: setup ## The contact graph while the map grows: edit distance and cost of every snapshot (QUICK=1: one room)
+	$(PYTHON) -m benchmarks.graph.growing_graph $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-timeline$(if $(QUICK),-quick)
+
 .PHONY: scenenn
 # DATA=folder with SceneNN's scenes (docs/DATA.md); OPTIONS are those of the module, for example
 # OPTIONS="--backend detector --weights yolox.onnx --arms ours thesis --sequences 011 030".

@@ -15,6 +15,7 @@ from cli.collection_command import gc
 from cli.comparison_command import diff
 from cli.inspect_command import inspect
 from cli.serve_command import serve
+from cli.timeline_command import timeline
 from cli.urdf_check_command import urdf_check
 from cli.urdf_settle_command import urdf_settle
 from schemas.errors import BadInput, UsageError
@@ -250,6 +251,7 @@ COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (urdf_settle, "Artifacts"),
     (migrate, "Artifacts"),
     (diff, "Artifacts"),
+    (timeline, "Artifacts"),
     (gc, "Artifacts"),
     (doctor, "Installation"),
     (schemas, "Installation"),
