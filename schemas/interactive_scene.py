@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from pydantic import Field
+
 from schemas.artifact import Artifact
 from schemas.base import Model, Name, RelativePath, Transform
 from schemas.contact_graph import ContactGraphFile
@@ -24,6 +26,8 @@ class SceneBody(Model):
     parent: str | None = None
     relation: str = "supports"
     world_from_body: Transform
+    world_from_reconstructed: Transform | None = Field(None, exclude_if=lambda pose: pose is None)
+    """Where the body frame was before physics laid the body down, when that changed its pose. Absent otherwise."""
     joints: tuple[Joint, ...] = ()
     """Scaled; `name` and `part` carry the `<name>__` prefix of the URDF; origin, axis, handle in the body frame."""
     joint_values: dict[str, float] = {}

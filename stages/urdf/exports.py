@@ -6,6 +6,7 @@ from pathlib import Path
 
 from schemas.interactive_scene import InteractiveSceneFile
 from schemas.vocabulary import load_vocabulary
+from stages.kit.formats.link_meshes import link_surfaces
 from stages.kit.formats.scene_glb import write_scene_glb
 from stages.kit.formats.scene_mcap import write_scene_mcap
 from stages.kit.formats.srdf_file import write_srdf
@@ -20,5 +21,6 @@ def write_exports(root: Path, scene: InteractiveSceneFile) -> None:
     values = {name: value for body in scene.bodies for name, value in body.joint_values.items()}
     layout = {body.name for body in scene.bodies if vocabulary.by_name(body.class_name).is_layout}
     write_srdf(root / "scene.srdf", urdf, resting_contacts(root), values)
-    write_scene_glb(root / "scene.glb", root, urdf, values, one_sided=layout)
-    write_scene_mcap(root / "scene.mcap", root, urdf, values)
+    surfaces = {link.name: link_surfaces(link, root) for link in urdf.links}
+    write_scene_glb(root / "scene.glb", urdf, surfaces, values, one_sided=layout)
+    write_scene_mcap(root / "scene.mcap", urdf, surfaces, values)

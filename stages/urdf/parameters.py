@@ -16,6 +16,7 @@ class UrdfParameters(Parameters):
         (), description="Further classes to put on floating joints (default: vocabulary)"
     )
     fixed_classes: tuple[str, ...] = Field((), description="Classes to fix although the vocabulary calls them movable")
+    rest: bool = Field(True, description="Lay movable bodies down that come to rest within 1 cm and 5 degrees")
     settle_seconds: float = Field(3.0, ge=0, le=30, description="Simulated time of the settle test, 0 for none [s]")
     settle_distance: float = Field(0.01, gt=0, description="A movable body that moves further does not stay [m]")
     settle_angle: float = Field(2.0, gt=0, le=180, description="A movable body that turns more does not stay [degrees]")

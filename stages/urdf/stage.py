@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from schemas.cad_scene import CadScene
 from schemas.errors import UsageError
@@ -14,6 +15,7 @@ from stages.kit.stage import Context
 from stages.urdf.bodies import scene_bodies
 from stages.urdf.exports import write_exports
 from stages.urdf.parameters import UrdfParameters
+from stages.urdf.resting import rested_bodies
 
 
 def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) -> InteractiveScene:
@@ -27,6 +29,14 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
         bodies = scene_bodies(cad_scene, graph, movable)
     with context.progress.step("write and check the kinematic tree"):
         scene = write_scene_bundle(context.output, bodies, graph)
+    rested = 0
+    if parameters.rest:
+        with context.progress.step("lay movable bodies down"):
+            laid = rested_bodies(context.output, bodies)
+            rested = sum(body.reconstructed is not None for body in laid)
+            if rested:
+                written = [replace(body, mesh_is_written=body.mesh is not None) for body in laid]
+                scene = write_scene_bundle(context.output, written, graph)
     with context.progress.step("write what stands beside it"):
         write_exports(context.output, scene)
     summary: dict[str, float] = {
@@ -34,6 +44,7 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
         "movable": sum(body.movable for body in scene.bodies),
         "joints": sum(len(body.joints) for body in scene.bodies),
         "cad_models": sum(body.model is not None for body in bodies),
+        "rested": rested,
     }
     if parameters.settle_seconds:
         with context.progress.step("settle in physics"):

@@ -17,7 +17,15 @@ from schemas.interactive_scene import InteractiveSceneFile, SceneBody
 from schemas.scene_parts import Box
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.mjcf_file import write_mjcf
-from stages.kit.formats.scene_links import BodyLinks, box_links, layout_links, mesh_links, model_links, still_mesh_links
+from stages.kit.formats.scene_links import (
+    BodyLinks,
+    box_links,
+    layout_links,
+    mesh_links,
+    model_links,
+    own_visual,
+    still_mesh_links,
+)
 from stages.kit.formats.scene_supports import carried_by, resting_height
 from stages.kit.formats.urdf_check import NAME, require_sound
 from stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, write_urdf
@@ -54,6 +62,10 @@ class BundleBody:
     """Part of the model -> mean colour that this body's is to have (sRGB, 0 to 255)."""
     mesh: trimesh.Trimesh | None = None
     """Body frame; for bodies without CAD model."""
+    reconstructed: np.ndarray | None = None
+    """(4, 4) world_from_body before the body came to rest in physics, when it was moved for that."""
+    mesh_is_written: bool = False
+    """Whether `mesh` lies in the folder already, from an earlier writing of the same scene."""
     mass: float | None = None
     """[kg]; from the model or the volume when None."""
 
@@ -148,31 +160,36 @@ def _links(
     root: Path, body: BundleBody, node: GraphNode | None, graph: ContactGraphFile, center: np.ndarray
 ) -> BodyLinks:
     substance = substance_of(body.class_name)
+    visual = None
+    if body.model is None and body.mesh is not None and len(body.mesh.faces):
+        visual = own_visual(root, body.name, body.mesh, write=not body.mesh_is_written)
     if body.model is not None and body.model_folder is not None:
         links = model_links(
             root, body.name, body.model, body.model_folder, body.scale, body.joint_values, body.part_colors
         )
     elif load_vocabulary().by_name(body.class_name).is_layout:
-        links = layout_links(root, body.name, body.world_from_body, body.mesh, _slabs(body, node, graph, center))
+        links = layout_links(body.name, body.world_from_body, visual, _slabs(body, node, graph, center))
         return links.with_friction(substance.friction)
-    elif body.mesh is not None and len(body.mesh.faces):
-        links = _mesh_links(root, body, substance.hull_density, graph)
+    elif body.mesh is not None and visual is not None:
+        links = _mesh_links(root, body, body.mesh, visual, substance.hull_density, graph)
     else:
         links = box_links(body.name, body.world_from_body, body.box, substance.hull_density)
     links = links.with_friction(substance.friction)
     return links if body.mass is None else links.with_mass(body.mass)
 
 
-def _mesh_links(root: Path, body: BundleBody, density: float, graph: ContactGraphFile) -> BodyLinks:
-    assert body.mesh is not None
+def _mesh_links(
+    root: Path, body: BundleBody, mesh: trimesh.Trimesh, visual: Shape, density: float, graph: ContactGraphFile
+) -> BodyLinks:
     nodes = {node.id: node for node in graph.nodes}
     pose = body.world_from_body
     if body.movable:
         height = resting_height(graph, nodes, body.name)
-        rests_at = None if height is None else height - float(pose[2, 3])
-        return mesh_links(root, body.name, body.mesh, density, rests_at=rests_at)
+        before = pose if body.reconstructed is None else body.reconstructed
+        rests_at = None if height is None else height - float(before[2, 3])
+        return mesh_links(root, body.name, mesh, visual, density, rests_at=rests_at)
     yaw = float(box_yaw(body.box) - np.arctan2(pose[1, 0], pose[0, 0]))
-    return still_mesh_links(root, body.name, body.mesh, density, pose, yaw, carried_by(graph, nodes, body.name))
+    return still_mesh_links(body.name, mesh, visual, density, pose, yaw, carried_by(graph, nodes, body.name))
 
 
 def _slabs(body: BundleBody, node: GraphNode | None, graph: ContactGraphFile, center: np.ndarray) -> list[Slab]:
@@ -259,4 +276,5 @@ def _record(body: BundleBody, own: BodyLinks) -> SceneBody:
         mass=own.mass,
         contains=model.contains if model is not None else False,
         grasp_width=width,
+        world_from_reconstructed=None if body.reconstructed is None else as_transform(body.reconstructed),
     )

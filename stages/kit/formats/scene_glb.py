@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from stages.kit.formats.link_meshes import Surface, link_surfaces
+from stages.kit.formats.link_meshes import Surface
 from stages.kit.formats.link_poses import joint_motion
 from stages.kit.formats.urdf_file import Urdf, UrdfJoint
 from stages.kit.geometry.transforms import quaternion_of
@@ -27,13 +27,16 @@ Y_UP_FROM_Z_UP = (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)
 
 
 def write_scene_glb(
-    path: Path, root: Path, urdf: Urdf, values: Mapping[str, float], one_sided: Collection[str] = ()
+    path: Path,
+    urdf: Urdf,
+    surfaces: Mapping[str, list[Surface]],
+    values: Mapping[str, float],
+    one_sided: Collection[str] = (),
 ) -> None:
-    """Write the visual shapes of a tree with its joints at `values` [rad, m]; mesh paths are relative to `root`.
+    """Write what the links of a tree look like (`surfaces`: link -> its triangles), its joints at `values` [rad, m].
 
     Nodes are called like the links and hang on each other as those do; a node that moves says its joint in `extras`.
-    The links in `one_sided` are seen from their front alone (a room without its near walls). Raises BadInput for a mesh
-    that is missing or torn.
+    The links in `one_sided` are seen from their front alone (a room without its near walls).
     """
     build = _Build()
     children: dict[str, list[UrdfJoint]] = {}
@@ -54,9 +57,8 @@ def write_scene_glb(
                 node["extras"] = {"joint": _joint(joint, value)}
         else:
             node = {"name": urdf.name, "rotation": list(Y_UP_FROM_Z_UP)}  # loaders keep the name `world` for themselves
-        surfaces = link_surfaces(link, root)
-        if surfaces:
-            node["mesh"] = build.mesh(link.name, surfaces, double_sided=link.name not in one_sided)
+        if surfaces.get(link.name):
+            node["mesh"] = build.mesh(link.name, surfaces[link.name], double_sided=link.name not in one_sided)
         if link.name in children:
             node["children"] = [numbers[below.child] for below in children[link.name]]
         nodes.append(node)

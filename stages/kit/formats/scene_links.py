@@ -165,15 +165,14 @@ def _copied(root: Path, model_id: str, part: str, folder: Path, shape: Shape, sc
 
 
 def mesh_links(
-    root: Path, name: str, mesh: trimesh.Trimesh, density: float, *, rests_at: float | None = None
+    root: Path, name: str, mesh: trimesh.Trimesh, visual: Shape, density: float, *, rests_at: float | None = None
 ) -> BodyLinks:
-    """Return the link of a movable thing without CAD model: its mesh (body frame) to look at, its convex hull to
-    collide with, filled at `density` [kg/m^3].
+    """Return the link of a movable thing without CAD model: `visual` to look at, the convex hull of its mesh (body
+    frame) to collide with, filled at `density` [kg/m^3].
 
     The hull is flat where the thing rests, at the height `rests_at` [m] of the body frame; too flat for a hull, it is
     the box around it, at least 5 mm thick.
     """
-    visual = _own_mesh(root, name, mesh)
     points = np.asarray(mesh.vertices, dtype=float)
     solid, properties = _hull(points if rests_at is None else standing_points(points, rests_at), density)
     write_obj(root / "meshes" / name / "collision_0.obj", solid.vertices, solid.faces)
@@ -181,20 +180,19 @@ def mesh_links(
 
 
 def still_mesh_links(
-    root: Path,
     name: str,
     mesh: trimesh.Trimesh,
+    visual: Shape,
     density: float,
     world_from_body: np.ndarray,
     yaw: float,
     carried: Sequence[Carried],
 ) -> BodyLinks:
-    """Return the link of a thing without CAD model that stays where it is: its mesh (body frame) to look at, boxes over
-    its surface, turned by `yaw` [rad], to collide with, so that what lies in it or under it is free.
+    """Return the link of a thing without CAD model that stays where it is: `visual` to look at, boxes over the surface
+    of its mesh (body frame), turned by `yaw` [rad], to collide with, so that what lies in it or under it is free.
 
     The boxes are level below what it carries.
     """
-    visual = _own_mesh(root, name, mesh)
     properties = _hull(np.asarray(mesh.vertices, dtype=float), density)[1]
     turned = transform_from_yaw(yaw, np.zeros(3))
     collisions = []
@@ -241,10 +239,8 @@ def box_links(name: str, world_from_body: np.ndarray, bounds: Box, density: floa
     return BodyLinks((Link(name, mass_properties([solid], [density]), (shape,), (replace(shape, color=None),)),))
 
 
-def layout_links(
-    root: Path, name: str, world_from_body: np.ndarray, mesh: trimesh.Trimesh | None, slabs: list[Slab]
-) -> BodyLinks:
-    """Return the link of a floor, wall or ceiling: its mesh (body frame) to look at, slabs to collide with."""
+def layout_links(name: str, world_from_body: np.ndarray, visual: Shape | None, slabs: list[Slab]) -> BodyLinks:
+    """Return the link of a floor, wall or ceiling: `visual` (None: the slabs) to look at, slabs to collide with."""
     body_from_world = inverse(world_from_body)
     collisions, solids = [], []
     for slab in slabs:
@@ -253,17 +249,16 @@ def layout_links(
         collisions.append(Shape(box_size=(x, y, z), link_from_shape=frame))
         solids.append(box((-x / 2, x / 2), (-y / 2, y / 2), (-z / 2, z / 2)).moved(frame))
     properties = mass_properties(solids, [LAYOUT_DENSITY] * len(solids)) if solids else None
-    if mesh is not None and len(mesh.faces):
-        visuals: tuple[Shape, ...] = (_own_mesh(root, name, mesh),)
-    else:
-        visuals = tuple(replace(shape, color=GREY) for shape in collisions)
+    visuals = tuple(replace(shape, color=GREY) for shape in collisions) if visual is None else (visual,)
     return BodyLinks((Link(name, properties, visuals, tuple(collisions)),))
 
 
-def _own_mesh(root: Path, name: str, mesh: trimesh.Trimesh) -> Shape:
+def own_visual(root: Path, name: str, mesh: trimesh.Trimesh, *, write: bool) -> Shape:
+    """Return the mesh of a body (body frame) as a visual shape; `write`: into `root`/meshes/`name`/, too."""
     folder = root / "meshes" / name
-    folder.mkdir(parents=True, exist_ok=True)
-    write_obj(folder / "visual.obj", mesh.vertices, mesh.faces, vertex_colors(mesh))
+    if write:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_obj(folder / "visual.obj", mesh.vertices, mesh.faces, vertex_colors(mesh))
     return Shape(f"meshes/{name}/visual.obj", color=_mean_color(mesh))
 
 

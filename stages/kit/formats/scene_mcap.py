@@ -15,18 +15,18 @@ from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import build_file_descriptor_set
 
 from stages.kit.formats import foxglove
-from stages.kit.formats.link_meshes import Surface, link_surfaces
+from stages.kit.formats.link_meshes import Surface
 from stages.kit.formats.link_poses import joint_motion
 from stages.kit.formats.urdf_file import Urdf
 
 TRANSFORMS, SCENE = "/tf", "/scene"
 
 
-def write_scene_mcap(path: Path, root: Path, urdf: Urdf, values: Mapping[str, float]) -> None:
+def write_scene_mcap(
+    path: Path, urdf: Urdf, surfaces: Mapping[str, list[Surface]], values: Mapping[str, float]
+) -> None:
     """Write `/tf` (FrameTransforms, parent link to link, joints at `values` [rad, m]) and `/scene` (SceneUpdate, one
-    entity a link, in its frame, with its triangles) at time 0; mesh paths are relative to `root`.
-
-    Raises BadInput for a mesh that is missing or torn.
+    entity a link, in its frame, with its triangles: `surfaces`) at time 0.
     """
     transforms = FrameTransforms()
     for joint in urdf.joints:
@@ -34,9 +34,8 @@ def write_scene_mcap(path: Path, root: Path, urdf: Urdf, values: Mapping[str, fl
         transforms.transforms.extend(foxglove.transforms_message(0, joint.parent, joint.child, pose).transforms)
     update = SceneUpdate()
     for link in urdf.links:
-        surfaces = link_surfaces(link, root)
-        if surfaces:
-            update.entities.append(_entity(link.name, surfaces))
+        if surfaces.get(link.name):
+            update.entities.append(_entity(link.name, surfaces[link.name]))
     messages: dict[str, Message] = {TRANSFORMS: transforms, SCENE: update}
     with Path(path).open("wb") as file:
         writer = McapWriter(file, chunk_size=1 << 20, compression=CompressionType.ZSTD)

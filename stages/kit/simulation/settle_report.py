@@ -116,10 +116,9 @@ def settle_report(
     return SettleReport(seconds, bodies, joints, overlaps)
 
 
-def _let_go(world: PhysicsWorld, seconds: float, moved_limit: float, turned_limit: float) -> list[BodyMotion]:
+def free_bodies(world: PhysicsWorld) -> list[str]:
+    """Forbid the movable bodies of a world to fall asleep, so that what creeps is seen, and return their names."""
     movable = [name for name, body in world.bodies.items() if body.record.movable]
-    ground = _ground(world)
-    before = {name: world.center_of_mass(name) for name in movable}
     for name in movable:
         engine.changeDynamics(
             world.bodies[name].body_id,
@@ -127,6 +126,13 @@ def _let_go(world: PhysicsWorld, seconds: float, moved_limit: float, turned_limi
             activationState=engine.ACTIVATION_STATE_DISABLE_SLEEPING,
             physicsClientId=world.client,
         )
+    return movable
+
+
+def _let_go(world: PhysicsWorld, seconds: float, moved_limit: float, turned_limit: float) -> list[BodyMotion]:
+    ground = _ground(world)
+    movable = free_bodies(world)
+    before = {name: world.center_of_mass(name) for name in movable}
     world.step(round(seconds / world.time_step))
     motions = []
     for name in movable:
