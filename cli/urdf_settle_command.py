@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 BAD_INPUT = 3
+Engine = Literal["bullet", "mujoco"]
 
 
 def urdf_settle(
@@ -20,6 +22,7 @@ def urdf_settle(
     turned: Annotated[
         float, typer.Option("--turned", min=0.0, max=180.0, help="Movable bodies may turn by this much [degrees].")
     ] = 2.0,
+    engine: Annotated[Engine, typer.Option("--engine", help="What lets go; pairs and joints are Bullet's.")] = "bullet",
     json_output: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> int:
@@ -29,7 +32,12 @@ def urdf_settle(
     """
     from stages.kit.simulation.settle_report import SettleReport, settle_report
 
-    report: SettleReport = settle_report(scene, seconds, moved_limit=moved, turned_limit=math.radians(turned))
+    limits = {"moved_limit": moved, "turned_limit": math.radians(turned)}
+    report: SettleReport = settle_report(scene, seconds if engine == "bullet" else 0.0, **limits)
+    if engine == "mujoco":
+        from stages.kit.simulation.mujoco_settle import mujoco_motions
+
+        report = replace(report, seconds=seconds, bodies=mujoco_motions(scene, seconds, **limits))
     lines = [f"{body.name}: falls through the floor" for body in report.unsettled if body.fell_through]
     lines += [
         f"{body.name}: does not stay: moves {1000 * body.moved:.1f} mm, turns {math.degrees(body.turned):.1f} degrees"

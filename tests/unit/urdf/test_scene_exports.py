@@ -15,12 +15,14 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from mcap.reader import make_reader
 
+from schemas.errors import BadInput
 from schemas.interactive_scene import InteractiveSceneFile
 from stages.kit.formats.foxglove import transform_matrix
 from stages.kit.formats.link_poses import link_poses
 from stages.kit.formats.scene_bundle import write_scene_bundle
 from stages.kit.formats.scene_glb import linear
 from stages.kit.formats.urdf_file import parse_urdf
+from stages.kit.simulation.mujoco_settle import mujoco_motions
 from stages.kit.simulation.settle_report import settle_report
 from stages.kit.simulation.world import load_scene
 from stages.urdf.exports import write_exports
@@ -150,3 +152,34 @@ def test_the_same_scene_gives_the_same_bytes(made: Path, tmp_path: Path) -> None
     for name in ("scene.srdf", "scene.glb", "scene.mcap"):
         assert (again / name).read_bytes() == (made / name).read_bytes()
     assert settle_report(made, 0.2) == settle_report(again, 0.2)
+
+
+def test_bullet_and_mujoco_agree_on_what_stays(scene: Path) -> None:
+    """One cup hangs in the air at 1 m, the other and the bottle stand."""
+    pytest.importorskip("mujoco")
+    by_bullet = settle_report(scene, 1.5).bodies
+    by_mujoco = mujoco_motions(scene, 1.5)
+    assert [body.name for body in by_bullet] == [body.name for body in by_mujoco] == ["cup_5", "bottle_6", "cup_7"]
+    assert [body.stays for body in by_bullet] == [body.stays for body in by_mujoco] == [True, True, False]
+    assert by_mujoco[2].moved == pytest.approx(by_bullet[2].moved, abs=0.02) == pytest.approx(0.99, abs=0.02)
+    assert not any(body.fell_through for body in by_mujoco)
+
+
+def test_mujoco_finds_what_falls_through(scene: Path) -> None:
+    pytest.importorskip("mujoco")
+    path = scene / "scene.mjcf.xml"
+    document = ElementTree.parse(path)
+    floor = document.find(".//body[@name='floor_1']")
+    assert floor is not None
+    slab = next(geom for geom in floor.findall("geom") if geom.get("class") == "collision")
+    slab.set("size", "0.01 0.01 0.05")
+    document.write(path)
+    fallen = {body.name: body.fell_through for body in mujoco_motions(scene, 1.5)}
+    assert fallen == {"cup_5": False, "bottle_6": False, "cup_7": True}
+
+
+def test_a_scene_that_mujoco_does_not_load_is_bad_input(scene: Path) -> None:
+    pytest.importorskip("mujoco")
+    (scene / "scene.mjcf.xml").write_text("<mujoco><worldbody/></mujoco>")
+    with pytest.raises(BadInput, match="MuJoCo does not load it"):
+        mujoco_motions(scene, 0.1)
