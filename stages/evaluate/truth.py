@@ -82,6 +82,8 @@ def load_truth(truth: GroundTruth, world_from_log: np.ndarray, minimum_visible_p
         raise BadInput(f"{truth.path('visible.npz')}: {points.shape} points for {len(instances)} instances")
     counts = {int(k): int(n) for k, n in zip(*np.unique(instances, return_counts=True), strict=True)}
     optional = {o.instance for o in file.objects if counts.get(o.instance, 0) < minimum_visible_points}
+    if file.source == "scan":  # an annotator may say that a thing counts neither way, though points of it are known
+        optional |= {o.instance for o in file.objects if not o.visible_pixels}
     surface = read_surface(truth.path("mesh.ply"))
     return TrueRoom(
         objects=tuple(_moved_object(entry, world_from_log) for entry in file.objects),

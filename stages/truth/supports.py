@@ -58,8 +58,7 @@ def run(
     if not owner.any():
         raise BadInput(f"{annotation}: nothing of its nodes is seen in {sequence.root}", hint="is it this recording?")
     objects = annotated_objects(told, points, owner)
-    optional = [k for k, node in enumerate(told.nodes, 1) if node.optional]
-    seen = np.where(np.isin(owner, optional), 0, owner)
+    optional = sum(node.optional for node in told.nodes)
     info = sequence.info
     low, high = points[owner > 0].min(axis=0), points[owner > 0].max(axis=0)
     GroundTruthFile(
@@ -69,9 +68,9 @@ def run(
     ).write(context.output / "ground_truth.json")  # fmt: skip
     graph = annotated_graph(told, objects)
     graph.write(context.output / "graph.json")
-    np.savez(context.output / "visible.npz", points=points.astype(np.float32), instance=seen.astype(np.int32))
+    np.savez(context.output / "visible.npz", points=points.astype(np.float32), instance=owner.astype(np.int32))
     write_ply(context.output / "mesh.ply", flakes(points, owner))
-    counts = np.bincount(seen, minlength=len(told.nodes) + 1)
+    counts = np.bincount(owner, minlength=len(told.nodes) + 1)
     unseen = [node.name for k, node in enumerate(told.nodes, 1) if not counts[k] and not node.optional]
     for name in unseen:
         context.logger.warning("no point of %s is seen; it counts neither way", name)
@@ -81,7 +80,7 @@ def run(
             "scene": told.scene,
             "nodes": len(told.nodes),
             "unseen": len(unseen),
-            "optional": len(optional),
+            "optional": optional,
             "relations": len(graph.links),
             "second_carriers": sum(link.relation == "also_supports" for link in graph.links),
             "leaning": sum(link.relation == "leans_on" for link in graph.links),

@@ -168,6 +168,25 @@ def test_evaluate_scores_a_graph_against_the_annotation(sequence, tmp_path, pare
     assert metrics["graph/leans_on_f1"] == 1.0
 
 
+def test_optional_things_are_neither_missed_nor_extra(sequence, tmp_path):
+    document = with_node(2, optional=True)
+    truth = make(document, sequence, tmp_path)
+    whole = predicted_graph(truth, tmp_path / "graph", "table")
+    without = ContactGraph(tmp_path / "without")
+    without.root.mkdir()
+    links = tuple(link for link in whole.graph.links if link.target != "tray")
+    nodes = tuple(node for node in whole.graph.nodes if node.id != "tray")
+    ContactGraphFile(nodes=nodes, links=links).write(without.root / "graph.json")
+    for number, graph in enumerate((whole, without)):
+        made = evaluate(
+            ground_truth=truth, contact_graph=graph, parameters=EvaluateParameters(plots=False),
+            context=context(tmp_path / f"evaluation{number}"),
+        )  # fmt: skip
+        metrics = json.loads((made.root / "metrics.json").read_text())["metrics"]
+        assert metrics["graph/missing_detections"] == metrics["graph/wrong_detections"] == 0
+        assert metrics["graph/supports_f1"] == 1.0
+
+
 def changed(**top) -> dict:
     return {**copy.deepcopy(BY_BOXES), **top}
 
