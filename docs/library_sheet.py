@@ -26,10 +26,11 @@ VIEW = np.array([-0.55, -1.0, 0.62])
 
 
 def shown_state(model: CadModel, library: CadLibrary) -> dict[str, float]:
-    """Return joint values: what opens something half open, knobs at 0."""
-    found = {entry.model: entry for entry in library.library.affordances}.get(model.id)
-    openable = {joint.name for joint in model.joints} if found is None else set(found.openable)
-    return {joint.name: 0.5 * joint.upper if joint.name in openable else 0.0 for joint in model.joints}
+    """Return joint values: what opens half open, what stands before something else fully; knobs and levers at 0."""
+    found = {entry.model: entry for entry in library.library.affordances}[model.id]
+    before = {name for use in found.joints for name in use.behind}
+    share = {name: 1.0 if name in before else 0.5 for name in found.openable}
+    return {joint.name: share.get(joint.name, 0.0) * joint.upper for joint in model.joints}
 
 
 def tile(library: CadLibrary, model: CadModel) -> np.ndarray:

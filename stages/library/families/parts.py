@@ -60,11 +60,12 @@ def lid(
 
 
 def flap(
-    pieces: list[Piece], x: Span, z: Span, front: float, metal: Paint, *, limit: float = 1.5, standoff: float = 0.05
+    pieces: list[Piece], x: Span, z: Span, front: float, metal: Paint, *, limit: float = 1.57, standoff: float = 0.05
 ) -> Moving:
     """Return a door that turns down about its lower edge, with a bar handle along its upper one.
 
-    `pieces` are its panel, behind whose outer face y = `front` [m] it lies closed, up to y = -GAP.
+    `pieces` are its panel, from its outer face y = `front` [m] back to y = -GAP. It turns about the lower edge of that
+    face, so that its own weight holds it closed.
     """
     handle = np.array([0.5 * (x[0] + x[1]), front - standoff, z[1] - 0.05])
     bars = bar_handle(handle, "x", 0.75 * (x[1] - x[0]), standoff, 0.009, metal)
@@ -72,7 +73,7 @@ def flap(
         name="door_hinge",
         type="revolute",
         part="door",
-        origin=(0.5 * (x[0] + x[1]), -GAP, z[0]),
+        origin=(0.5 * (x[0] + x[1]), front, z[0]),
         axis=(1.0, 0.0, 0.0),
         lower=0.0,
         upper=limit,
