@@ -8,6 +8,7 @@ from pathlib import Path
 
 from schemas.errors import BadInput
 from stages.kit.simulation.engine import engine, native_output_to_stderr
+from stages.kit.simulation.scene_penetration import link_padding
 from stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
 
 JOINED = ("fixed", "revolute", "continuous", "prismatic")
@@ -27,8 +28,8 @@ def resting_penetrations(path: Path, limit: float) -> list[Penetration]:
     """Return the pairs of links of a URDF that lie more than `limit` [m] in each other, deepest first.
 
     Joints stand at 0, or at the limit nearest to it; collision shapes are what the engine makes of them (meshes become
-    their convex hulls). Links that a joint connects are let through, but for floating joints: a cup may stand on a
-    table, not in it. Raises BadInput when the file cannot be read or loaded.
+    their convex hulls; what it pads them with is taken off). Links that a joint connects are let through, but for
+    floating joints: a cup may stand on a table, not in it. Raises BadInput when the file cannot be read or loaded.
     """
     robot = read_urdf(path)
     pairs = {
@@ -80,6 +81,7 @@ def _measure(body: int, joined: set[frozenset[str]], limit: float, client: int) 
                 continue
             points = engine.getClosestPoints(body, body, 0.0, first, second, physicsClientId=client)
             depth = max((-point[8] for point in points), default=0.0)
+            depth -= link_padding(client, body, first) + link_padding(client, body, second)
             if depth > limit:
                 found.append(Penetration(names[first], names[second], float(depth)))
     return sorted(found, key=lambda p: (-p.depth, p.first, p.second))

@@ -29,7 +29,7 @@ def resting_contacts(scene_folder: Path) -> list[tuple[str, str]]:
         for (body, index, name, bounds), (other, other_index, other_name, other_bounds) in combinations(links, 2):
             if (bounds[0] > other_bounds[1] + REACH).any() or (other_bounds[0] > bounds[1] + REACH).any():
                 continue
-            reach = REACH - link_padding(world, body, index) - link_padding(world, other, other_index)
+            reach = REACH - link_padding(world.client, body, index) - link_padding(world.client, other, other_index)
             if engine.getClosestPoints(body, other, reach, index, other_index, physicsClientId=world.client):
                 touching.append((name, other_name))
     return touching

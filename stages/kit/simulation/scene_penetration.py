@@ -57,12 +57,14 @@ def link_depth(world: PhysicsWorld, first: int, first_link: int, second: int, se
     if not points:
         return 0.0
     depth = max(-point[8] for point in points)
-    return float(depth) - link_padding(world, first, first_link) - link_padding(world, second, second_link)
+    return (
+        float(depth) - link_padding(world.client, first, first_link) - link_padding(world.client, second, second_link)
+    )
 
 
-def link_padding(world: PhysicsWorld, body: int, link: int) -> float:
-    """Return the padding of a link's shapes [m]: 0 when any is no mesh, as contacts do not tell shapes apart."""
-    shapes = engine.getCollisionShapeData(body, link, physicsClientId=world.client)
+def link_padding(client: int, body: int, link: int) -> float:
+    """Return what Bullet pads a link's shapes with [m]: 0 when any is no mesh, as contacts do not tell shapes apart."""
+    shapes = engine.getCollisionShapeData(body, link, physicsClientId=client)
     return MESH_PADDING if shapes and all(shape[2] == engine.GEOM_MESH for shape in shapes) else 0.0
 
 
