@@ -10,6 +10,7 @@ from pathlib import Path
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.scene_parts import TREE_RELATIONS, Relation
 from stages.kit.measurement.palette import entity_color, hex_color
+from stages.kit.measurement.relation_evidence import evidence
 from stages.kit.measurement.tree_layout import tree_layout
 
 ROW = 30
@@ -161,9 +162,4 @@ def _node_title(node: GraphNode) -> str:
 
 
 def _link_title(link: Relation) -> str:
-    text = f"{link.source} {link.relation.replace('_', ' ')} {link.target}, confidence {link.confidence:.2f}"
-    if link.gap is not None:
-        text += f", gap {1000 * link.gap:.0f} mm"
-    if link.overlap is not None:
-        text += f", overlap {100 * link.overlap:.0f} %"
-    return text
+    return f"{link.source} {link.relation.replace('_', ' ')} {link.target}, {evidence(link)}"

@@ -42,7 +42,8 @@ from stages.report.views import Label, View, oblique_view, place_labels, render,
 MAXIMUM_BYTES = 15_000_000
 HEADLINES = (
     "counts/frames", "counts/entities", "map/pq", "map/mesh_recall", "map/accuracy_mean_mm", "graph/edit_distance",
-    "counts/support_edges", "cad/replaced", "cad/position_error_m_mean", "counts/joints", "plan/goal_reached",
+    "graph/support_f1", "counts/support_edges", "cad/replaced", "replacement/scan2cad_success", "counts/joints",
+    "plan/goal_reached",
 )  # fmt: skip
 SECTIONS = (
     ("frames", "Frames", "frames"), ("map", "Map", "map_text"), ("graph", "Contact graph", "graph"),

@@ -6,9 +6,10 @@ import numpy as np
 
 from schemas.contact_graph import ContactGraph, ContactGraphFile, GraphNode
 from schemas.panoptic_map import PanopticMap
-from schemas.scene_parts import TREE_RELATIONS, Relation
+from schemas.scene_parts import TREE_RELATIONS
 from stages.kit.geometry.boxes import box_corners
 from stages.kit.measurement.palette import RELATION_COLORS, UNLABELLED, instance_color
+from stages.kit.measurement.relation_evidence import evidence
 from stages.kit.viewing.canvas import SHELL, Canvas, Color, bytes_of
 from stages.kit.viewing.inputs import input_artifact
 from stages.kit.viewing.meshes import load_mesh
@@ -67,22 +68,6 @@ def draw_graph(graph: ContactGraphFile, canvas: Canvas, *hidden: str) -> None:
     tree = [(link.source, link.target) for link in graph.links if link.relation in TREE_RELATIONS]
     canvas.graph([node.id for node in graph.nodes], [_color(node) for node in graph.nodes], tree)
     canvas.document("relations", relation_table(graph))
-
-
-def evidence(link: Relation) -> str:
-    """Return confidence and evidence of a relation in words: plane, gap, overlap, share inside, where they meet."""
-    parts = [f"confidence {link.confidence:.2f}"]
-    if link.plane is not None:
-        parts.append(f"plane {link.plane} of {link.source}")
-    if link.gap is not None:
-        parts.append(f"gap {1000 * link.gap:.0f} mm")
-    if link.overlap is not None:
-        parts.append(f"overlap {100 * link.overlap:.0f} %")
-    if link.inside is not None:
-        parts.append(f"inside {100 * link.inside:.0f} %")
-    if link.contact is not None:
-        parts.append("meet at " + ", ".join(f"{value:.2f}" for value in link.contact))
-    return ", ".join(parts)
 
 
 def relation_table(graph: ContactGraphFile) -> str:

@@ -17,8 +17,9 @@ from schemas.interactive_scene import InteractiveSceneFile
 from schemas.scene_parts import Relation
 from stages.kit.formats.link_poses import joint_motion, link_poses
 from stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
+from stages.kit.measurement.relation_evidence import evidence
 from stages.kit.viewing.canvas import import_rerun
-from stages.kit.viewing.graph_view import evidence, relation_table
+from stages.kit.viewing.graph_view import relation_table
 from stages.kit.viewing.library_view import row_places
 from stages.kit.viewing.segments_view import segment_images
 from stages.kit.viewing.view import VIEWERS, view_artifact
