@@ -77,22 +77,27 @@ def levelled(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return boxes (centre, size; body frame turned by `yaw` [rad]) that end at the planes under what is carried.
 
-    Below each carried thing and 1 cm around it, a box that sticks out of the plane by up to 4 cm is cut there, or left
-    out when it lies above. `world_from_body` turns about z alone.
+    Below each carried thing and 1 cm around it, a box that sticks out of the plane by up to 4 cm is cut there. One that
+    lies on the plane and is not higher than the thing is left out: it is a piece of the thing that the map gave to what
+    carries it. `world_from_body` turns about z alone.
     """
     kept = []
     turn = yaw + np.arctan2(world_from_body[1, 0], world_from_body[0, 0])
     axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     cosine, sine = np.cos(yaw), np.sin(yaw)
-    areas = [(thing.polygon(MARGIN), thing.height - world_from_body[2, 3]) for thing in carried]
+    areas = [
+        (thing.polygon(MARGIN), thing.height - world_from_body[2, 3], max(LARGEST_STEP, thing.box.size[2] + MARGIN))
+        for thing in carried
+    ]
     for center, size in boxes:
         low, high = center[2] - 0.5 * size[2], center[2] + 0.5 * size[2]
         corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.5 * size[:2]
         in_body = np.array([cosine * center[0] - sine * center[1], sine * center[0] + cosine * center[1], 0.0])
         middle = (world_from_body[:3, :3] @ in_body + world_from_body[:3, 3])[:2]
         footprint = Polygon(corners @ axes.T + middle)
-        for area, height in areas:
-            if height < high <= height + LARGEST_STEP and area.intersects(footprint):
+        for area, height, top in areas:
+            step = LARGEST_STEP if low < height - MARGIN else top
+            if height < high <= height + step and area.intersects(footprint):
                 high = height
         if high - low > 1e-3:
             kept.append((np.array([center[0], center[1], 0.5 * (low + high)]), np.array([*size[:2], high - low])))

@@ -49,6 +49,13 @@ def test_what_lies_above_the_plane_below_a_thing_is_left_out_wherever_the_body_i
     assert len(levelled(boxes, 0.0, np.eye(4), [CUP])) == 1
 
 
+@pytest.mark.parametrize(("low", "kept"), [(0.752, 0), (0.70, 1)])
+def test_a_lump_as_high_as_the_thing_on_the_plane_is_a_piece_of_it(low: float, kept: int) -> None:
+    """What reaches through the plane is a wall, which goes on beside the thing."""
+    boxes = [(np.array([0.36, 0.0, 0.5 * (low + 0.83)]), np.array([0.04, 0.04, 0.83 - low]))]
+    assert len(levelled(boxes, 0.0, np.eye(4), [CUP])) == kept
+
+
 def test_a_standing_hull_is_flat_where_it_rests() -> None:
     ball = trimesh.creation.icosphere(subdivisions=2, radius=0.1)
     solid = hull(standing_points(ball.vertices, -0.12))
