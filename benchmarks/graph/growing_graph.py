@@ -139,7 +139,7 @@ def plot(rooms: dict[str, dict[int, Figures]], path: Path) -> None:
             axes.plot(frames, nodes, color=color, linestyle="--", label=f"{name}: nodes")
         axes.set_xlabel("frames in the map")
         axes.set_ylim(bottom=0)
-        axes.legend()
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
         save(figure, path)
 
 
