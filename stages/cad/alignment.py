@@ -10,7 +10,6 @@ import numpy as np
 from numba import njit
 
 from stages.cad.matching import CUBE_ROTATIONS, Match
-from stages.cad.shapes import Observed
 
 STEP = 1e-6
 """Of the forward difference (the released code's)."""
@@ -217,11 +216,27 @@ def levenberg_marquardt(
     return x, cost
 
 
-def align(match: Match, weights: AlignmentWeights, evaluations: int) -> Alignment:
-    """Return the alignment of one oriented candidate (section 2.4.3), started at equal diagonals, yaw and centre."""
+def unaligned(match: Match, scale_range: tuple[float, float] = (0.0, math.inf)) -> Alignment:
+    """Return where the matching puts a candidate: equal diagonals (as far as `scale_range` allows), yaw and centre of
+    the object's frame, foot on the support. Its cost is not known."""
     frame, size_y = match.frame, np.abs(CUBE_ROTATIONS[match.orientation]) @ match.shape.size
-    scale = float(np.linalg.norm(frame.size) / np.linalg.norm(match.shape.size))
-    start = np.array([scale, frame.yaw, frame.center[0], frame.center[1]])
+    ratio = float(np.linalg.norm(frame.size) / np.linalg.norm(match.shape.size))
+    scale = min(max(ratio, scale_range[0]), scale_range[1])
+    height = frame.support_height + scale * size_y[2] / 2
+    return Alignment(scale, frame.yaw, np.array([*frame.center[:2], height]), math.inf)
+
+
+def align(
+    match: Match, weights: AlignmentWeights, evaluations: int, scale_range: tuple[float, float] = (0.0, math.inf)
+) -> Alignment:
+    """Return the alignment of one oriented candidate (section 2.4.3), started at equal diagonals, yaw and centre.
+
+    A scale outside `scale_range` is taken to its end: an object of which a part was seen, or that took a piece of its
+    neighbour, has a box that fits no model."""
+    frame, size_y = match.frame, np.abs(CUBE_ROTATIONS[match.orientation]) @ match.shape.size
+    first = unaligned(match, scale_range)
+    start = np.array([first.scale, first.yaw, *first.position[:2]])
     solution, cost = levenberg_marquardt(residual_function(match, weights), start, evaluations)
-    height = frame.support_height + solution[0] * size_y[2] / 2
-    return Alignment(float(solution[0]), float(solution[1]), np.array([solution[2], solution[3], height]), cost)
+    scale = min(max(float(solution[0]), scale_range[0]), scale_range[1])
+    height = frame.support_height + scale * size_y[2] / 2
+    return Alignment(scale, float(solution[1]), np.array([solution[2], solution[3], height]), cost)

@@ -11,33 +11,29 @@ import numpy as np
 from schemas.cad_library import CadModel
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.vocabulary import load_vocabulary
-from stages.cad.alignment import AlignmentWeights, align
+from stages.cad.alignment import AlignmentWeights, align, unaligned
 from stages.cad.fitting import QUICK_ITERATIONS, fitted, refine, shapes_of_model
 from stages.cad.matching import Match, rank_matches
-from stages.cad.model_surfaces import ModelSurface, alignment_error, robust_error, to_world
+from stages.cad.model_surfaces import ModelSurface, alignment_error, robust_error
 from stages.cad.parameters import CadParameters
 from stages.cad.placing import (
-    facing_wall,
-    placed_planes,
     placement_of,
     size_misfit,
-    supporting_surface,
-    surface_share,
-    wall_depth,
 )
+from stages.cad.scoring import Surroundings, score_of, unsupported_children, why_invalid
 from stages.cad.shapes import Placement, Shape, observed_frames, shape_of_state
 from stages.kit.geometry.boxes import bottom, points_in_box
 from stages.kit.geometry.point_clouds import thin_to_grid
 
 GRID = 0.01
+SCREENING_POINTS = 120
+"""Vertices that matches are screened with."""
 SCREENING_STEP = 5
 """Every so many vertices count when aligned candidates are screened."""
 QUICK_POINTS = 250
 """Vertices that the quick refinement looks at."""
 TRUNCATION = 0.05
 """Distances are cut off here when candidates are compared [m]."""
-MOST_MOVE = 0.2
-"""A child without any surface below or above it counts as if it moved this far [m]."""
 FULL_FITS = 4
 """Candidates that are refined thoroughly."""
 BOX_MARGIN = 0.01
@@ -90,10 +86,9 @@ def support_height_of(node: GraphNode, graph: ContactGraphFile) -> float:
 
 
 def shortlist(
-    node: GraphNode,
     points: np.ndarray,
     normals: np.ndarray,
-    graph: ContactGraphFile,
+    around: Surroundings,
     models: list[CadModel],
     surfaces: dict[str, ModelSurface],
     parameters: CadParameters,
@@ -102,6 +97,7 @@ def shortlist(
 
     `points`, `normals` (N, 3): vertices of the object; `surfaces`: model id -> surface for every model in `models`.
     """
+    node, graph = around.node, around.graph
     if not models:
         return Shortlist(node, (), {}, f"the library has no model of class {node.class_name}")
     ours = parameters.method == "ours"
@@ -114,15 +110,20 @@ def shortlist(
     else:
         shapes = [shape_of_state(model, state) for model in models for state in model.states]
     movable = load_vocabulary().by_name(node.class_name).movable
+    scale_range = (parameters.minimum_scale, parameters.maximum_scale)
     matches, counts = rank_matches(
         observed_frames(node, points, carrying, height, all_frames=ours),
         shapes,
         weights=(parameters.size_weight, parameters.plane_weight, parameters.upright_weight),
         unmatched=parameters.unmatched_plane if ours else None,
-        scale_range=(parameters.minimum_scale, parameters.maximum_scale),
-        keep=parameters.candidates * (parameters.screening if ours else 1),
+        scale_range=(0.0, math.inf) if ours else scale_range,
+        keep=parameters.matched if ours else parameters.candidates,
         upright_only=ours and not movable,
     )
+    if ours:
+        kept = screened(matches, surfaces, points, scale_range, parameters)
+        counts["screening rank"] = len(matches) - len(kept)
+        matches = kept
     rejected = Counter(counts)
     weights = AlignmentWeights(
         parameters.support_weight,
@@ -131,12 +132,10 @@ def shortlist(
         parameters.containment_weight,
         parameters.height_weight,
     )
-    walls = [entry for entry in graph.nodes if entry.class_name == "wall"]
-    link = graph.parent_link(node.id)
-    hangs = link is not None and link.relation in ("carries_on_wall", "hangs_from")
     aligned = []
     for match in matches:
-        placement = placement_of(match, align(match, weights, parameters.evaluations))
+        allowed_scales = scale_range if ours else (0.0, math.inf)
+        placement = placement_of(match, align(match, weights, parameters.evaluations, allowed_scales))
         if not parameters.minimum_scale <= placement.scale <= parameters.maximum_scale:
             rejected["aligned scale out of range"] += 1
             continue
@@ -151,16 +150,16 @@ def shortlist(
         aligned.sort(key=lambda entry: entry[1].alignment_error + parameters.tilt_weight * entry[0].tilt)
         rejected["alignment rank"] = max(0, len(aligned) - parameters.candidates)
         aligned = aligned[: parameters.candidates]
-        aligned = fit_the_best(aligned, surfaces, points, normals, node, graph, walls, parameters, free_height=hangs)
+        aligned = fit_the_best(aligned, surfaces, points, normals, around, parameters)
     placements: list[Placement] = []
-    for placement in aligned_placements(aligned, surfaces, points, normals, node, graph, walls, parameters):
-        reason = why_invalid(placement, surfaces[placement.shape.model.id], node, graph, parameters)
+    for placement in aligned_placements(aligned, surfaces, points, normals, around, parameters):
+        reason = why_invalid(placement, surfaces[placement.shape.model.id], around, parameters)
         if reason is None:
             placements.append(placement)
         else:
             rejected[reason] += 1
     fitting = len(placements)
-    missing = {id(p): unsupported_children(p, node, graph, parameters) for p in placements}
+    missing = {id(p): unsupported_children(p, around, parameters) for p in placements}
     # One child that was badly seen must not cost a shelf its model: the best that exists will do, and the child goes
     # on the nearest surface. The thesis discards all.
     allowed = min((len(names) for names in missing.values()), default=0) if ours else 0
@@ -178,17 +177,40 @@ def shortlist(
     return Shortlist(node, tuple(unique), counted, reason)
 
 
+def screened(
+    matches: list[Match],
+    surfaces: dict[str, ModelSurface],
+    points: np.ndarray,
+    scale_range: tuple[float, float],
+    parameters: CadParameters,
+) -> list[Match]:
+    """Ours: return the matches that come closest to the vertices (N, 3) where the matching puts them, best first.
+
+    Planes rank badly where they are few or misleading, the failure that the thesis names (section 2.6.6): a cup's side
+    gives as many as noise likes, and lying models with as many planes outrank the upright one.
+    """
+    some = points[:: max(1, len(points) // SCREENING_POINTS)]
+    scores = []
+    for match in matches:
+        placement = placement_of(match, unaligned(match, scale_range))
+        error = robust_error(surfaces[match.shape.model.id], placement, some, None, TRUNCATION)
+        scores.append(
+            error
+            + parameters.misfit_weight * size_misfit(match.frame.size, placement)
+            + parameters.tilt_weight * match.tilt
+            + parameters.scale_weight * abs(math.log(placement.scale))
+        )
+    order = np.argsort(scores, kind="stable")[: parameters.candidates * parameters.screening]
+    return [matches[k] for k in order]
+
+
 def fit_the_best(
     aligned: list[tuple[Match, Placement]],
     surfaces: dict[str, ModelSurface],
     points: np.ndarray,
     normals: np.ndarray,
-    node: GraphNode,
-    graph: ContactGraphFile,
-    walls: list[GraphNode],
+    around: Surroundings,
     parameters: CadParameters,
-    *,
-    free_height: bool,
 ) -> list[tuple[Match, Placement]]:
     """Ours: refine all candidates quickly on the vertices (N, 3), then the best `FULL_FITS` thoroughly, with joints."""
     some = slice(None, None, max(1, len(points) // QUICK_POINTS))
@@ -200,18 +222,22 @@ def fit_the_best(
                 placement,
                 points[some],
                 normals[some],
-                free_height=free_height,
+                free_height=around.hangs,
                 move_joints=False,
                 iterations=QUICK_ITERATIONS,
             ),
         )
         for match, placement in aligned
     ]
-    quick.sort(key=lambda entry: score_of(entry[0], entry[1], entry[1].alignment_error, node, graph, walls, parameters))
+    quick.sort(
+        key=lambda entry: score_of(
+            *entry, entry[1].alignment_error, surfaces[entry[1].shape.model.id], around, parameters
+        )
+    )
     return [
         (
             match,
-            fitted(surfaces[placement.shape.model.id], placement, points, normals, free_height=free_height)
+            fitted(surfaces[placement.shape.model.id], placement, points, normals, free_height=around.hangs)
             if k < FULL_FITS
             else placement,
         )
@@ -219,51 +245,12 @@ def fit_the_best(
     ]
 
 
-def score_of(
-    match: Match,
-    placement: Placement,
-    error: float,
-    node: GraphNode,
-    graph: ContactGraphFile,
-    walls: list[GraphNode],
-    parameters: CadParameters,
-) -> float:
-    """Ours: alignment error [m] plus what the vertices of a partial mesh do not tell: size, tilt, scale, children,
-    front."""
-    return (
-        error
-        + parameters.misfit_weight * size_misfit(match.frame.size, placement)
-        + parameters.tilt_weight * match.tilt
-        + parameters.scale_weight * abs(math.log(placement.scale))
-        + parameters.carrying_weight * carrying_misfit(placement, node, graph)
-        + parameters.facing_weight * (0.0 if node.box is None else facing_wall(placement, node.box, walls))
-    )
-
-
-def carrying_misfit(placement: Placement, node: GraphNode, graph: ContactGraphFile) -> float:
-    """Return the mean height [m] by which children would have to move to stand on the placed model's surfaces."""
-    children = [
-        graph.node(link.target).box
-        for link in graph.links
-        if link.source == node.id and link.relation in ("supports", "contains")
-    ]
-    level = [plane for plane in placed_planes(placement) if plane.horizontal] if children else []
-    moves = []
-    for child in children:
-        if child is not None:
-            heights = [abs(p.center[2] - bottom(child)) for p in level if surface_share(p, child) > 0.0]
-            moves.append(min([*heights, MOST_MOVE]))
-    return float(np.mean(moves)) if moves else 0.0
-
-
 def aligned_placements(
     aligned: list[tuple[Match, Placement]],
     surfaces: dict[str, ModelSurface],
     points: np.ndarray,
     normals: np.ndarray,
-    node: GraphNode,
-    graph: ContactGraphFile,
-    walls: list[GraphNode],
+    around: Surroundings,
     parameters: CadParameters,
 ) -> list[Placement]:
     """Return placements with the alignment error over all vertices (N, 3) and the score that the choice minimises."""
@@ -274,52 +261,9 @@ def aligned_placements(
         score = error
         if parameters.method == "ours":
             oriented = robust_error(surface, placement, points, normals, TRUNCATION)
-            score = score_of(match, placement, oriented, node, graph, walls, parameters)
+            score = score_of(match, placement, oriented, surface, around, parameters)
         result.append(replace(placement, alignment_error=error, score=score))
     return result
-
-
-def why_invalid(
-    placement: Placement,
-    surface: ModelSurface,
-    node: GraphNode,
-    graph: ContactGraphFile,
-    parameters: CadParameters,
-) -> str | None:
-    """Return why a placement is no candidate whatever it carries, or None: scale, error, walls."""
-    if not parameters.minimum_scale <= placement.scale <= parameters.maximum_scale:
-        return "refined scale out of range"
-    if parameters.method == "ours" and placement.alignment_error > parameters.maximum_alignment_error:
-        return "alignment error too large"
-    if node.box is None:
-        return None
-    walls = [entry for entry in graph.nodes if entry.class_name == "wall"]
-    points = to_world(placement, surface.hull_points(placement.shape.joints))
-    if wall_depth(points, np.asarray(node.box.center), walls) > parameters.wall_penetration:
-        return "stands in a wall"
-    return None
-
-
-def unsupported_children(
-    placement: Placement, node: GraphNode, graph: ContactGraphFile, parameters: CadParameters
-) -> tuple[str, ...]:
-    """Return the children for which no surface of the placed model satisfies (2.2) near where they stand."""
-    planes = placed_planes(placement)
-    missing = []
-    for link in graph.links:
-        child = graph.node(link.target).box
-        if link.source != node.id or link.relation not in ("supports", "contains") or child is None:
-            continue
-        found = supporting_surface(
-            planes,
-            child,
-            bottom(child),
-            area_threshold=parameters.area_threshold,
-            tolerance=parameters.support_tolerance,
-        )
-        if found is None:
-            missing.append(link.target)
-    return tuple(missing)
 
 
 def without_repeats(placements: list[Placement]) -> list[Placement]:

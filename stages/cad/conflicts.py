@@ -21,7 +21,14 @@ class Solid:
     low: np.ndarray
     """(P, 3) bounds of each piece [m]."""
     high: np.ndarray
+    shapes: tuple[fcl.Convex, ...]
     objects: tuple[fcl.CollisionObject, ...]
+
+    def shifted(self, offset: np.ndarray) -> Solid:
+        """Return the solid as it was built, moved by `offset` (3,) [m]; the shapes are shared."""
+        place = fcl.Transform(np.asarray(offset, dtype=float))
+        moved = tuple(fcl.CollisionObject(shape, place) for shape in self.shapes)
+        return Solid(self.low + offset, self.high + offset, self.shapes, moved)
 
 
 @dataclass(frozen=True)
@@ -39,13 +46,14 @@ APART = Penetration(0.0, np.array([0.0, 0.0, 1.0]))
 
 def convex_solid(pieces: list[tuple[np.ndarray, np.ndarray]]) -> Solid:
     """Return a solid of convex pieces, each vertices (V, 3) in the world frame and faces (F, 3)."""
-    objects, low, high = [], [], []
+    shapes, low, high = [], [], []
     for vertices, faces in pieces:
         table = np.concatenate([np.full((len(faces), 1), 3), faces], axis=1).astype(np.int32).ravel()
-        objects.append(fcl.CollisionObject(fcl.Convex(np.ascontiguousarray(vertices), len(faces), table)))
+        shapes.append(fcl.Convex(np.ascontiguousarray(vertices), len(faces), table))
         low.append(vertices.min(axis=0))
         high.append(vertices.max(axis=0))
-    return Solid(np.array(low).reshape(-1, 3), np.array(high).reshape(-1, 3), tuple(objects))
+    objects = tuple(fcl.CollisionObject(shape) for shape in shapes)
+    return Solid(np.array(low).reshape(-1, 3), np.array(high).reshape(-1, 3), tuple(shapes), objects)
 
 
 def placed_solid(placement: Placement, surface: ModelSurface) -> Solid:

@@ -14,6 +14,8 @@ from stages.cad.shapes import Placement
 from stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, part_transforms
 from stages.kit.geometry.transforms import apply, inverse
 
+SAMPLES = 300
+"""Points that stand for the surface of a model where it is compared with free space."""
 FACING = 0.5
 """Cosine within which a triangle belongs to a side."""
 
@@ -47,6 +49,8 @@ class ModelSurface:
     """Part -> hull vertices (K, 3) of the visual mesh, part frame; they bound the part in every pose."""
     pieces: dict[str, tuple[trimesh.Trimesh, ...]]
     """Part -> convex collision pieces, part frame."""
+    samples: dict[str, np.ndarray]
+    """Part -> points (K, 3) spread over its visual mesh by area, part frame; `SAMPLES` over all parts."""
 
     def closest(self, points: np.ndarray, joints: dict[str, float], normals: np.ndarray | None = None) -> Nearest:
         """Return the nearest surface points of points (N, 3) in the model frame at scale 1.
@@ -97,6 +101,21 @@ class ModelSurface:
         transforms = part_transforms(self.model, joints)
         return np.concatenate([apply(transforms[part], self.corners[part]) for part in self.model.parts])
 
+    def sample_points(self, joints: dict[str, float]) -> np.ndarray:
+        """Return points (K, 3) spread over the surface of the posed model, model frame at scale 1."""
+        transforms = part_transforms(self.model, joints)
+        return np.concatenate([apply(transforms[part], self.samples[part]) for part in self.model.parts])
+
+    def center_of_mass(self, joints: dict[str, float]) -> np.ndarray:
+        """Return the centre (3,) of the volume of the posed model's collision pieces, model frame at scale 1."""
+        transforms = part_transforms(self.model, joints)
+        total, moment = 1e-12, np.zeros(3)
+        for part, pieces in self.pieces.items():
+            for piece in pieces:
+                volume = abs(float(piece.volume))
+                total, moment = total + volume, moment + volume * apply(transforms[part], piece.center_mass[None])[0]
+        return moment / total
+
     def posed_pieces(self, joints: dict[str, float]) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return (vertices (V, 3), faces (F, 3)) of every convex piece in the model frame at scale 1."""
         transforms = part_transforms(self.model, joints)
@@ -131,7 +150,12 @@ def load_surface(folder: Path, model: CadModel) -> ModelSurface:
                 sides[part][side] = _scene(vertices, facing)
         corners[part] = np.asarray(visual[part].convex_hull.vertices)
     pieces = {part: tuple(collision.get(part, [])) for part in model.parts}
-    return ModelSurface(model, scenes, sides, corners, pieces)
+    areas = {part: float(visual[part].area) for part in model.parts}
+    samples = {}
+    for k, part in enumerate(model.parts):
+        count = max(1, round(SAMPLES * areas[part] / max(sum(areas.values()), 1e-12)))
+        samples[part] = np.asarray(trimesh.sample.sample_surface(visual[part], count, seed=k)[0])
+    return ModelSurface(model, scenes, sides, corners, pieces, samples)
 
 
 def _scene(vertices: np.ndarray, faces: np.ndarray) -> o3d.t.geometry.RaycastingScene:
@@ -166,12 +190,14 @@ def alignment_error(
 
 
 def robust_error(
-    surface: ModelSurface, placement: Placement, points: np.ndarray, normals: np.ndarray, truncation: float
+    surface: ModelSurface, placement: Placement, points: np.ndarray, normals: np.ndarray | None, truncation: float
 ) -> float:
-    """Return the alignment error [m] to surface that faces the same way, with distances cut off at `truncation` [m].
+    """Return the alignment error [m] with distances cut off at `truncation` [m]; with `normals` (N, 3, world) to
+    surface that faces the same way.
 
     Labels leak and rims of a fused mesh have arbitrary normals: a few vertices a decimetre away outweigh all others in
     a plain mean of squares.
     """
-    found = surface.closest(to_model(placement, points), placement.shape.joints, normals @ placement.rotation)
+    turned = None if normals is None else normals @ placement.rotation
+    found = surface.closest(to_model(placement, points), placement.shape.joints, turned)
     return float(np.sqrt(np.mean(np.minimum(placement.scale * found.distance, truncation) ** 2)))

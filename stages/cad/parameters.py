@@ -22,8 +22,11 @@ class CadParameters(Parameters):
         "refined on the vertices, and the choice also weighs the size",
     )
     candidates: int = Field(10, ge=1, description="Oriented candidates kept after matching")
+    matched: int = Field(
+        160, ge=1, description="ours: oriented candidates that are compared with the vertices where matching puts them"
+    )
     screening: int = Field(
-        4,
+        2,
         ge=1,
         description="ours: so many times more candidates are aligned, and those with the least alignment error kept",
     )
@@ -56,8 +59,14 @@ class CadParameters(Parameters):
         description="ours: not standing upright (2.10) counts this much beside the alignment error; "
         "furniture only stands upright",
     )
+    free_space_weight: float = Field(
+        0.5,
+        ge=0.0,
+        description="ours: metres by which the model's surface fills space that was seen empty count this much beside "
+        "the alignment error",
+    )
     scale_weight: float = Field(
-        0.01,
+        0.03,
         ge=0.0,
         description="ours: |ln(scale)| counts this much beside the alignment error, as the library's "
         "models have the size of real things",
@@ -93,13 +102,16 @@ class CadParameters(Parameters):
     )
     conflict_iterations: int = Field(50, ge=0, description="Most steps of min-conflicts")
     maximum_shift: float = Field(
-        0.05, ge=0.0, description="ours: objects still in conflict are moved apart sideways by at most this [m]"
+        0.08, ge=0.0, description="ours: objects that lie in others are moved aside by at most this, 0 for none [m]"
+    )
+    resting_tolerance: float = Field(
+        0.002, ge=0.0, description="ours: penetration that is left in the finished scene where there is any way [m]"
     )
 
 
 STAGE = Stage(
     name="cad",
-    version=2,
+    version=3,
     summary="Replace objects by CAD models that fit, stand on their supports and do not collide",
     parameters=CadParameters,
     reads={"contact_graph": ContactGraph, "panoptic_map": PanopticMap, "library": CadLibrary},

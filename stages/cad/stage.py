@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
+from collections.abc import Collection
 
 import numpy as np
 
@@ -14,12 +15,16 @@ from schemas.contact_graph import ContactGraph, ContactGraphFile, GraphNode
 from schemas.errors import BadInput, UsageError
 from schemas.panoptic_map import PanopticMap
 from schemas.scene_parts import TREE_RELATIONS
+from stages.cad.arranging import Arrangement, arrange
 from stages.cad.candidates import Shortlist, models_for, object_points, shortlist
+from stages.cad.coloring import part_colors
 from stages.cad.conflicts import Selection, Solid, min_conflicts, penetration, placed_solid
+from stages.cad.free_space import NOTHING_KNOWN, load_free_space
 from stages.cad.model_surfaces import ModelSurface, load_surface
+from stages.cad.obstacles import floor_levels, obstacles_of
 from stages.cad.parameters import CadParameters
 from stages.cad.placing import placed_box, placed_planes
-from stages.cad.settling import Settled, separate, settle
+from stages.cad.scoring import Surroundings
 from stages.cad.shapes import Placement
 from stages.kit.formats.cad_models import model_folder
 from stages.kit.formats.entity_meshes import load_entity_mesh
@@ -29,6 +34,8 @@ from stages.kit.stage import Context
 
 VERTICES, CONFLICTS, SAMPLES = 1, 2, 3
 """Random streams."""
+COLOR_STEP = 4
+"""Every so many vertices of a mesh say what colour it has."""
 
 
 def run(
@@ -48,16 +55,21 @@ def run(
         shortlists = find_candidates(graph, panoptic_map, library, surfaces, parameters, context)
     with context.progress.step("global check"):
         chosen, selection = select(graph, shortlists, surfaces, parameters, context)
-        settled, conflicts_after = adjust(graph, chosen, surfaces, parameters)
+        copy_meshes(graph, chosen, panoptic_map, context)
+        layout = context.output / "layout"
+        obstacles = obstacles_of(graph, layout, context.output / "meshes")
+        arranged, conflicts_after = adjust(
+            graph, chosen, shortlists, surfaces, obstacles, floor_levels(graph, layout), parameters
+        )
     with context.progress.step("writing"):
-        scene = scene_file(graph, shortlists, settled, selection, conflicts_after)
+        colors = colors_of_parts(graph, arranged, surfaces, panoptic_map)
+        scene = scene_file(graph, shortlists, arranged, colors, selection, conflicts_after)
         scene.write(context.output / "scene.json")
-        cad_graph(graph, settled, surfaces).write(context.output / "graph.json")
-        copy_models(settled, library, context)
-        copy_meshes(graph, settled, panoptic_map, context)
+        cad_graph(graph, arranged, surfaces).write(context.output / "graph.json")
+        copy_models(arranged, library, context)
 
     decisions = [replacement.decision for replacement in scene.replacements]
-    errors = [placement.alignment_error for placement in settled.placements.values()]
+    errors = [placement.alignment_error for placement in arranged.placements.values()]
     summary = {
         "cad": decisions.count("cad"),
         "mesh": decisions.count("mesh"),
@@ -80,6 +92,7 @@ def find_candidates(
     """Return the shortlist of every object; surfaces of the models that were needed are added to `surfaces`."""
     models = library.library.models
     objects = [node for node in graph.nodes if node.node_type in ("rigid", "articulated")]
+    free_space = load_free_space(panoptic_map) if parameters.method == "ours" else NOTHING_KNOWN
     found: dict[str, Shortlist] = {}
     for node in context.progress.track(objects, description="objects"):
         if node.mesh is None:
@@ -102,7 +115,9 @@ def find_candidates(
             parameters.vertices,
             context.random(VERTICES, node.instance),
         )
-        found[node.id] = shortlist(node, points, facing, graph, suitable, surfaces, parameters)
+        found[node.id] = shortlist(
+            points, facing, Surroundings(node, graph, free_space), suitable, surfaces, parameters
+        )
     return found
 
 
@@ -158,28 +173,34 @@ def select(
 def adjust(
     graph: ContactGraphFile,
     chosen: dict[str, Placement],
+    shortlists: dict[str, Shortlist],
     surfaces: dict[str, ModelSurface],
+    obstacles: dict[str, Solid],
+    levels: dict[str, float],
     parameters: CadParameters,
-) -> tuple[Settled, int]:
+) -> tuple[Arrangement, int]:
     """Put the chosen models on their supports and (ours) apart; returns the scene and the pairs still colliding."""
-    settled = settle(graph, chosen, surfaces, area_threshold=parameters.area_threshold)
+    margin = 2 * parameters.choice_margin
+    alternatives = {
+        name: [p for p in shortlists[name].placements if p.score <= shortlists[name].placements[0].score + margin]
+        for name in chosen
+    }
+    arranged = arrange(
+        graph,
+        chosen,
+        alternatives,
+        surfaces,
+        obstacles,
+        levels=levels,
+        area_threshold=parameters.area_threshold,
+        tolerance=parameters.resting_tolerance,
+        maximum_shift=parameters.maximum_shift if parameters.method == "ours" else 0.0,
+    )
     touching = may_touch(graph)
-    names = sorted(settled.placements)
+    solids = {name: placed_solid(p, surfaces[p.shape.model.id]) for name, p in arranged.placements.items()}
+    names = sorted(solids)
     pairs = [(a, b) for k, a in enumerate(names) for b in names[k + 1 :] if frozenset((a, b)) not in touching]
-    if parameters.method == "ours" and parameters.maximum_shift > 0:
-        carriers = frozenset(link.source for link in graph.links if link.relation in ("supports", "contains"))
-        apart = separate(
-            settled.placements,
-            surfaces,
-            pairs,
-            carriers,
-            tolerance=parameters.collision_tolerance,
-            maximum_shift=parameters.maximum_shift,
-        )
-        settled = Settled(apart, settled.relations)
-    solids = {name: placed_solid(p, surfaces[p.shape.model.id]) for name, p in settled.placements.items()}
-    after = sum(penetration(solids[a], solids[b]).depth > parameters.collision_tolerance for a, b in pairs)
-    return settled, after
+    return arranged, sum(penetration(solids[a], solids[b]).depth > parameters.collision_tolerance for a, b in pairs)
 
 
 def candidate_record(placement: Placement) -> CadCandidate:
@@ -197,25 +218,29 @@ def candidate_record(placement: Placement) -> CadCandidate:
 def scene_file(
     graph: ContactGraphFile,
     shortlists: dict[str, Shortlist],
-    settled: Settled,
+    arranged: Arrangement,
+    colors: dict[str, dict[str, tuple[int, int, int]]],
     selection: Selection,
     conflicts_after: int,
 ) -> CadSceneFile:
-    """Return scene.json: the decision on every node."""
+    """Return scene.json: the decision on every node. `colors`: node -> part -> colour in the map."""
     replacements = []
     for node in graph.nodes:
         if node.node_type == "layout":
             replacements.append(Replacement(node=node.id, decision="layout"))
-        elif node.id in settled.placements:
-            entry, placement = shortlists[node.id], settled.placements[node.id]
+        elif node.id in arranged.placements:
+            entry, placement = shortlists[node.id], arranged.placements[node.id]
             chosen = candidate_record(placement)
             others = [candidate_record(p) for p in entry.placements if p.score != placement.score]
+            first = candidate_record(entry.placements[0])
             replacements.append(
                 Replacement(
                     node=node.id,
                     decision="cad",
                     reason=entry.reason,
                     chosen=chosen,
+                    best_single=first,
+                    part_colors=colors[node.id],
                     alternatives=tuple(others),
                     rejected=entry.rejected,
                 )
@@ -233,11 +258,11 @@ def scene_file(
     )
 
 
-def cad_graph(graph: ContactGraphFile, settled: Settled, surfaces: dict[str, ModelSurface]) -> ContactGraphFile:
+def cad_graph(graph: ContactGraphFile, arranged: Arrangement, surfaces: dict[str, ModelSurface]) -> ContactGraphFile:
     """Return cg': the same nodes and relations, with model, pose, scale, joints, and the model's box and planes."""
     nodes: list[GraphNode] = []
     for node in graph.nodes:
-        placement = settled.placements.get(node.id)
+        placement = arranged.placements.get(node.id)
         if placement is None:
             nodes.append(node)
             continue
@@ -254,7 +279,7 @@ def cad_graph(graph: ContactGraphFile, settled: Settled, surfaces: dict[str, Mod
             )
         )
     links = tuple(
-        settled.relations.get(link.target, link)
+        arranged.relations.get(link.target, link)
         if link.relation in TREE_RELATIONS
         else link.model_copy(update={"plane": None})  # it counted the planes that were seen, not the model's
         for link in graph.links
@@ -262,16 +287,16 @@ def cad_graph(graph: ContactGraphFile, settled: Settled, surfaces: dict[str, Mod
     return graph.model_copy(update={"nodes": tuple(nodes), "links": links})
 
 
-def copy_models(settled: Settled, library: CadLibrary, context: Context) -> None:
+def copy_models(arranged: Arrangement, library: CadLibrary, context: Context) -> None:
     """Copy the folders of the chosen models, so that the scene needs no library."""
-    for model_id in sorted({placement.shape.model.id for placement in settled.placements.values()}):
+    for model_id in sorted({placement.shape.model.id for placement in arranged.placements.values()}):
         shutil.copytree(model_folder(library, model_id), context.output / "models" / model_id)
 
 
-def copy_meshes(graph: ContactGraphFile, settled: Settled, panoptic_map: PanopticMap, context: Context) -> None:
-    """Copy the meshes of layout nodes and of objects that keep theirs."""
+def copy_meshes(graph: ContactGraphFile, chosen: Collection[str], panoptic_map: PanopticMap, context: Context) -> None:
+    """Copy the meshes of layout nodes and of objects that keep theirs: those that no model was `chosen` for."""
     for node in graph.nodes:
-        if node.mesh is None or node.id in settled.placements:
+        if node.mesh is None or node.id in chosen:
             continue
         folder = context.output / ("layout" if node.node_type == "layout" else "meshes")
         folder.mkdir(exist_ok=True)
@@ -279,3 +304,20 @@ def copy_meshes(graph: ContactGraphFile, settled: Settled, panoptic_map: Panopti
         if not source.is_file():
             raise BadInput(f"{source}: mesh of node {node.id} is missing", hint="make the panoptic map again")
         shutil.copyfile(source, folder / f"{node.id}.ply")
+
+
+def colors_of_parts(
+    graph: ContactGraphFile, arranged: Arrangement, surfaces: dict[str, ModelSurface], panoptic_map: PanopticMap
+) -> dict[str, dict[str, tuple[int, int, int]]]:
+    """Return node -> part of its model -> colour that the map shows there."""
+    found = {}
+    for name, placement in arranged.placements.items():
+        node = graph.node(name)
+        if node.mesh is None:
+            continue
+        mesh = load_entity_mesh(panoptic_map.path(node.mesh))
+        used = np.unique(mesh.faces)[::COLOR_STEP]
+        normals = vertex_normals(mesh.vertices, mesh.faces)
+        surface = surfaces[placement.shape.model.id]
+        found[name] = part_colors(surface, placement, mesh.vertices[used], normals[used], mesh.colors[used])
+    return found

@@ -38,9 +38,13 @@ def test_overlap_matches_polygon_clipping(seed):
 
 def test_box_errors_are_2_13():
     frame = Observed(0.0, np.array([0, 0, 0.5]), np.array([2.0, 1, 1]), None, 0.0)
-    inside = box_errors(frame.center, frame.size, frame.yaw, np.array([1.0, 0.5, 0.5]), 1.2, 0.0, np.array([0.1, 0, 0.3]))
+    inside = box_errors(
+        frame.center, frame.size, frame.yaw, np.array([1.0, 0.5, 0.5]), 1.2, 0.0, np.array([0.1, 0, 0.3])
+    )
     assert inside == pytest.approx([0.0, 1.2 * 0.5 - 1.0])
-    outside = box_errors(frame.center, frame.size, frame.yaw, np.array([2.0, 1.0, 1.0]), 1.0, 0.0, np.array([0.5, 0, 0.5]))
+    outside = box_errors(
+        frame.center, frame.size, frame.yaw, np.array([2.0, 1.0, 1.0]), 1.0, 0.0, np.array([0.5, 0, 0.5])
+    )
     assert outside == pytest.approx([0.5, 0.0])
 
 

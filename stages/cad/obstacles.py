@@ -1,0 +1,65 @@
+"""What stands in a scene whatever models are chosen: layout, and things that keep their mesh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from schemas.contact_graph import ContactGraphFile, GraphNode
+from schemas.vocabulary import load_vocabulary
+from stages.cad.conflicts import Solid, convex_solid
+from stages.kit.formats.mesh_files import read_mesh
+from stages.kit.geometry.box_cover import cover_with_boxes
+from stages.kit.geometry.boxes import box_yaw
+from stages.kit.geometry.layout_slabs import surface_height
+from stages.kit.geometry.transforms import transform_from_yaw
+from stages.kit.measurement.layout_pieces import layout_pieces
+
+
+def obstacles_of(graph: ContactGraphFile, layout_folder: Path, mesh_folder: Path) -> dict[str, Solid]:
+    """Return node -> solid for layout (slabs) and for things that keep their mesh: the shapes that they have in the
+    exported scene, or nearly so. The folders hold their meshes, `<node>.ply`, world frame."""
+    solids = {}
+    for name, pieces in layout_pieces(graph, layout_folder).items():
+        solids[name] = convex_solid([_hull(piece.vertices) for piece in pieces])
+    for node in graph.nodes:
+        file = mesh_folder / f"{node.id}.ply"
+        mesh = read_mesh(file, may_be_empty=True) if file.is_file() else None
+        if mesh is None or len(mesh.faces) == 0:
+            continue
+        if load_vocabulary().by_name(node.class_name).movable:
+            solids[node.id] = convex_solid([_hull(np.asarray(mesh.vertices))])
+        else:
+            solids[node.id] = convex_solid(_cover(node, mesh))
+    return solids
+
+
+def floor_levels(graph: ContactGraphFile, layout_folder: Path) -> dict[str, float]:
+    """Return floor node -> height [m] of the level slab that it becomes in the exported scene."""
+    levels = {}
+    for node in graph.nodes:
+        if node.class_name != "floor" or node.box is None:
+            continue
+        file = layout_folder / f"{node.id}.ply"
+        mesh = read_mesh(file, may_be_empty=True) if file.is_file() else None
+        used = [link.plane for link in graph.links if link.source == node.id and link.plane is not None]
+        planes = tuple(plane for k, plane in enumerate(node.planes) if k in used) or node.planes
+        levels[node.id] = surface_height(planes, mesh, node.box, upwards=True)
+    return levels
+
+
+def _cover(node: GraphNode, mesh: trimesh.Trimesh) -> list[tuple[np.ndarray, np.ndarray]]:
+    yaw = 0.0 if node.box is None else box_yaw(node.box)
+    turn = transform_from_yaw(yaw, np.zeros(3))[:3, :3]
+    pieces = []
+    for center, size in cover_with_boxes(mesh, yaw):
+        solid = trimesh.creation.box(extents=size)
+        pieces.append(((np.asarray(solid.vertices) + center) @ turn.T, np.asarray(solid.faces)))
+    return pieces
+
+
+def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    hull = trimesh.convex.convex_hull(points, qhull_options="QbB Pp Qt QJ")
+    return np.asarray(hull.vertices, dtype=float), np.asarray(hull.faces)
