@@ -67,7 +67,7 @@ class GraphParameters(Parameters):
         0.12, ge=0.0, description="Objects without support hang on a wall that is at most this far from their mesh [m]"
     )
     wall_classes: tuple[str, ...] = Field(
-        ("wall_cabinet", "clock", "monitor", "shelf", "lamp"),
+        ("wall_cabinet", "wall_shelf", "clock", "picture", "monitor", "shelf", "lamp", "pendant_lamp"),
         description="ours: classes that rather hang on a near wall than float above a plane",
     )
     floating_gap: float = Field(0.15, ge=0.0, description="ours: gap above which `wall_classes` count as floating [m]")
@@ -86,7 +86,7 @@ class GraphParameters(Parameters):
 
 STAGE = Stage(
     name="graph",
-    version=6,
+    version=7,
     summary="Build the contact graph (who supports, contains, carries whom) from a panoptic map",
     parameters=GraphParameters,
     reads={"panoptic_map": PanopticMap},
