@@ -229,11 +229,13 @@ def fit_the_best(
         )
         for match, placement in aligned
     ]
-    quick.sort(
-        key=lambda entry: score_of(
-            *entry, entry[1].alignment_error, surfaces[entry[1].shape.model.id], around, parameters
-        )
-    )
+
+    def score(entry: tuple[Match, Placement]) -> float:
+        match, placement = entry
+        surface = surfaces[placement.shape.model.id]
+        return score_of(match, placement, placement.alignment_error, surface, around, parameters)
+
+    quick.sort(key=score)
     return [
         (
             match,
