@@ -94,6 +94,8 @@ def model_links(
     by_name = {joint.name: joint for joint in urdf.joints}
     joints, records, placed = [], [], {}
     for record in model.joints:
+        if record.parent == model.parts[0]:  # says the same as saying nothing
+            record = record.model_copy(update={"parent": None})
         length = scale if record.type == "prismatic" else 1.0
         source = by_name.get(record.name)
         if source is None:

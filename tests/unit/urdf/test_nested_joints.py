@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +86,17 @@ def test_bullet_and_mujoco_put_it_where_the_model_says(folder: Path, tmp_path: P
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
     np.testing.assert_allclose(data.body("cabinet_1__tray").xpos, expected_tray(scale)[:3, 3], atol=1e-6)
+
+
+def test_to_hang_on_the_body_by_name_is_to_hang_on_the_body(folder: Path, tmp_path: Path) -> None:
+    thing = body(folder, 1.0)
+    assert thing.model is not None
+    named = tuple(joint.model_copy(update={"parent": joint.parent or "body"}) for joint in thing.model.joints)
+    same = replace(thing, model=thing.model.model_copy(update={"joints": named}))
+    first = write_scene_bundle(tmp_path / "first", [thing], graph_of([thing]))
+    assert write_scene_bundle(tmp_path / "second", [same], graph_of([same])) == first
+    for name in ("scene.urdf", "scene.mjcf.xml"):
+        assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes()
 
 
 @pytest.mark.parametrize(("parent", "message"), [("lid", "which is no part"), ("tray", "in a circle")])
