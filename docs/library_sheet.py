@@ -1,6 +1,7 @@
 """A contact sheet of a CAD library, a tile a class: python docs/library_sheet.py LIBRARY PICTURE [MODEL_ID ...].
 
-Doors, drawers and lids stand half open. With model ids only those are shown.
+Doors, drawers and lids stand half open. With model ids only those are shown. The table of classes in docs/LIBRARY.md is
+printed.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from schemas.cad_library import CadLibrary, CadModel
+from schemas.cad_library import Affordances, CadLibrary, CadModel
 from schemas.scene_parts import Camera
 from stages.kit.formats.cad_models import model_folder, posed_mesh
 from stages.kit.geometry.transforms import look_at
@@ -48,6 +49,28 @@ def tile(library: CadLibrary, model: CadModel) -> np.ndarray:
     return np.vstack([color, caption])
 
 
+def class_table(library: CadLibrary) -> str:
+    """Return a Markdown table, a row a class: joints of its shapes, what they contain, carry and how they are held."""
+    rows = ["| class | joints | carried | contains | carries on top | grasped at |", "|---|---|---|---|---|---|"]
+    by_class: dict[str, list[Affordances]] = {}
+    for model, uses in zip(library.library.models, library.library.affordances, strict=True):
+        by_class.setdefault(model.class_name, []).append(uses)
+    for name, every in by_class.items():
+        kinds = sorted({use.kind for uses in every for use in uses.joints})
+        joints = [f"{_span([sum(u.kind == kind for u in uses.joints) for uses in every])} {kind}" for kind in kinds]
+        rooms = _span([len(uses.contains) for uses in every])
+        tops = _span([sum(not surface.inside for surface in uses.carries) for uses in every])
+        grasps = _span([len(uses.grasps) for uses in every])
+        carried = "yes" if every[0].movable else ""
+        cells = [", ".join(joints), carried, *("" if cell == "0" else cell for cell in (rooms, tops, grasps))]
+        rows.append(f"| `{name}` | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def _span(counts: list[int]) -> str:
+    return str(min(counts)) if min(counts) == max(counts) else f"{min(counts)}-{max(counts)}"
+
+
 def main(root: Path, picture: Path, names: list[str]) -> None:
     """Write the sheet: the first model of every class, or those named."""
     library = CadLibrary(root)
@@ -60,7 +83,8 @@ def main(root: Path, picture: Path, names: list[str]) -> None:
     tiles = [tile(library, model) for model in first.values()]
     tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % COLUMNS)
     sheet = np.vstack([np.hstack(tiles[k : k + COLUMNS]) for k in range(0, len(tiles), COLUMNS)])
-    cv2.imwrite(str(picture), sheet)
+    cv2.imwrite(str(picture), sheet, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    print(class_table(library))
 
 
 if __name__ == "__main__":

@@ -18,6 +18,8 @@ from stages.library.joint_kinds import joint_kind
 from stages.library.rays import SolidRays
 
 OPENING_KINDS = ("door", "drawer", "lid")
+LEVEL = 0.98
+"""Things stay on planes whose normal's z is at least this (11 degrees)."""
 LEAST_CLEARANCE = 0.03
 """Surfaces with less room above carry nothing [m]."""
 LEAST_WIDTH = 0.04
@@ -115,7 +117,7 @@ def _edges(plane: SurfacePlane) -> tuple[float, float]:
 
 def _support(index: int, plane: SurfacePlane, shape: _Shape) -> SupportSurface | None:
     """Return the surface that a plane is to things, None when it is too narrow or too low under something."""
-    if len(plane.corners) != 4 or _edges(plane)[0] < LEAST_WIDTH:
+    if plane.normal[2] < LEVEL or len(plane.corners) != 4 or _edges(plane)[0] < LEAST_WIDTH:
         return None
     samples = _samples(plane)
     below = shape.rays.distances(samples, -UP)

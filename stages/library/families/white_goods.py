@@ -98,7 +98,7 @@ def hob(random: np.random.Generator, style: int) -> Design:
         for column in (0.27, 0.73):
             for row in (0.28, 0.74):
                 at = (x[0] + column * width, y[0] + row * depth)
-                pieces += painted(dark, cylinder(0.045, (tall, tall + 0.015), at, count=16))
+                pieces += painted(dark, cylinder(0.05, (tall, tall + 0.034), at, count=16))  # level with the grid
         grid = Paint((36, 36, 38), 2400.0)
         for k in range(2):
             span = (x[0] + 0.02 + k * (width / 2 - 0.01), x[0] + width / 2 - 0.01 + k * (width / 2 - 0.01))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -177,3 +178,9 @@ def test_nothing_is_wrong_with_four_shapes_of_each_class(tmp_path):
         collision = load_collision_parts(folder)
         for state in model.states if model.articulated else ():
             assert max(depths_of_links(model, collision, state.joints).values()) < 1e-3, model.id
+
+
+def test_the_documentation_lists_every_class():
+    text = (Path(__file__).resolve().parents[3] / "docs" / "LIBRARY.md").read_text(encoding="utf-8")
+    listed = [line.split("`")[1] for line in text.splitlines() if line.startswith("| `")]
+    assert [name for name in listed if name in GENERATORS] == list(GENERATORS)
