@@ -81,11 +81,15 @@ def with_best_single(scene: CadSceneFile) -> CadSceneFile:
     Objects without `best_single` (scenes of older versions) keep their choice; one that the global check left as a
     mesh gets its candidate back.
     """
-    replacements = tuple(
-        r if r.best_single is None else r.model_copy(update={"chosen": r.best_single, "decision": "cad"})
-        for r in scene.replacements
-    )
-    return scene.model_copy(update={"replacements": replacements})
+    return scene.model_copy(update={"replacements": tuple(_before_check(r) for r in scene.replacements)})
+
+
+def _before_check(replacement: Replacement) -> Replacement:
+    if replacement.best_single is None:
+        return replacement
+    same = replacement.chosen is not None and replacement.chosen.model_id == replacement.best_single.model_id
+    colors = replacement.part_colors if same else {}  # they are those of the chosen model's parts
+    return replacement.model_copy(update={"chosen": replacement.best_single, "decision": "cad", "part_colors": colors})
 
 
 def pair_objects(

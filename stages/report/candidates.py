@@ -77,7 +77,10 @@ def _object_view(
 ) -> ObjectView:
     candidates = candidates_of(replacement)
     seen = _object_mesh(replacement, node, cad_scene, panoptic_map)
-    meshes = [shelf.mesh(candidate) for _, candidate in candidates[:count]]
+    meshes = [
+        shelf.mesh(candidate, replacement.part_colors if "chosen" in role else None)
+        for role, candidate in candidates[:count]
+    ]
     firsts = [m for (role, _), m in zip(candidates[:count], meshes, strict=True) if role] or meshes[:1]
     view = _common_view(seen, firsts, node.class_name if node is not None else "object", width)
     shown = tuple(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ import trimesh
 
 from schemas.cad_library import CadLibrary, CadModel
 from schemas.cad_scene import CadCandidate, CadScene
-from stages.kit.formats.cad_models import posed_collision, posed_mesh, read_model
+from stages.kit.formats.cad_models import posed_collision, read_model
+from stages.kit.formats.painted_models import painted_mesh
 from stages.kit.measurement.convex_overlap import ConvexPiece, convex_piece
 
 
@@ -29,12 +31,17 @@ class ModelShelf:
             self._models[folder.name] = read_model(folder)
         return self._models[folder.name]
 
-    def mesh(self, candidate: CadCandidate) -> trimesh.Trimesh | None:
-        """Return the coloured mesh of a candidate in the world, None when its model is not there. Raises BadInput."""
+    def mesh(
+        self, candidate: CadCandidate, colors: Mapping[str, tuple[int, int, int]] | None = None
+    ) -> trimesh.Trimesh | None:
+        """Return the mesh of a candidate in the world, in its own colours or, where `colors` has its part, in those.
+
+        None when its model is not there. Raises BadInput.
+        """
         folder = self.folder(candidate.model_id)
         if folder is None:
             return None
-        mesh = posed_mesh(folder, self._model(folder), candidate.joints, candidate.scale)
+        mesh = painted_mesh(folder, self._model(folder), candidate, colors)
         mesh.apply_transform(np.array(candidate.world_from_model))
         return mesh
 

@@ -141,7 +141,8 @@ def cad_model(
         number = node.instance if node is not None and node.instance > 0 else 100_000 + row
         chosen = after_check(replacement) if candidates is None else candidates.get(replacement.node)
         if chosen is not None:
-            mesh: trimesh.Trimesh | None = shelf.mesh(chosen)
+            own = replacement.chosen is not None and chosen.model_id == replacement.chosen.model_id
+            mesh: trimesh.Trimesh | None = shelf.mesh(chosen, replacement.part_colors if own else None)
         else:
             where = "layout" if replacement.decision == "layout" else "meshes"
             mesh = _load(cad_scene, f"{where}/{replacement.node}.ply")

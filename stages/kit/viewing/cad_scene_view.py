@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadCandidate, CadScene, Replacement
-from stages.kit.formats.cad_models import posed_mesh, read_model
+from stages.kit.formats.cad_models import read_model
+from stages.kit.formats.painted_models import painted_mesh
 from stages.kit.measurement.cad_candidates import candidates_of
 from stages.kit.viewing.canvas import Canvas
 from stages.kit.viewing.graph_view import draw_graph
@@ -34,7 +36,8 @@ def draw_cad_scene(cad_scene: CadScene, canvas: Canvas) -> None:
         chosen = replacement.chosen
         _draw_candidates(replacement, roots, canvas)
         if replacement.decision == "cad" and chosen is not None:
-            _draw_model(f"cad/{replacement.node}", chosen, roots[0] / chosen.model_id, canvas)
+            folder = roots[0] / chosen.model_id
+            _draw_model(f"cad/{replacement.node}", chosen, folder, canvas, replacement.part_colors)
             errors = f"{chosen.matching_error:.3f} | {chosen.alignment_error:.3f}"
             rows.append(f"| {replacement.node} | cad | {chosen.model_id} | {errors} |")
             continue
@@ -57,9 +60,15 @@ def _draw_candidates(replacement: Replacement, roots: list[Path], canvas: Canvas
             _draw_model(path, candidate, folder, canvas)
 
 
-def _draw_model(path: str, candidate: CadCandidate, folder: Path, canvas: Canvas) -> None:
+def _draw_model(
+    path: str,
+    candidate: CadCandidate,
+    folder: Path,
+    canvas: Canvas,
+    colors: Mapping[str, tuple[int, int, int]] | None = None,
+) -> None:
     canvas.transform(path, np.array(candidate.world_from_model))
-    canvas.mesh(path, posed_mesh(folder, read_model(folder), candidate.joints, candidate.scale))
+    canvas.mesh(path, painted_mesh(folder, read_model(folder), candidate, colors))
 
 
 def candidate_table(cad_scene: CadScene) -> str:

@@ -174,3 +174,13 @@ def test_places_of_models_follow_the_pose(tmp_path):
     assert piece.low == pytest.approx(np.array(TABLE.low)) and piece.high == pytest.approx(np.array(TABLE.high))
     assert np.allclose(ModelShelf(cad).mesh(chosen).bounds, [TABLE.low, TABLE.high], atol=1e-6)
     assert np.allclose(model_pose(TABLE)[:3, 3], np.array(chosen.world_from_model)[:3, 3])
+
+
+def test_chosen_models_wear_the_colours_of_the_map(tmp_path):
+    cad = make_scene(tmp_path / "cad")
+    chosen = next(r.chosen for r in cad.scene.replacements if r.node == TABLE.name)
+    shelf = ModelShelf(cad)
+    painted = shelf.mesh(chosen, {"body": (10, 200, 30), "door": (1, 2, 3)})
+    assert np.unique(painted.visual.vertex_colors[:, :3], axis=0).tolist() == [[10, 200, 30]]
+    assert np.unique(shelf.mesh(chosen).visual.vertex_colors[:, :3], axis=0).tolist() == [[180, 90, 40]]
+    assert np.allclose(painted.bounds, shelf.mesh(chosen).bounds)
