@@ -22,12 +22,7 @@ from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
 from stages.kit.formats.urdf_check import check_urdf
 from stages.kit.formats.urdf_file import parse_urdf
 from stages.kit.geometry.transforms import apply, quaternion_of
-from tests.unit.urdf.small_room import find, graph_of, layout, placed, room, small_library
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory):
-    return small_library(tmp_path_factory.mktemp("library"), "table", "cabinet", "fridge", "cup", "bottle")
+from tests.unit.urdf.small_room import find, graph_of, layout, placed, room
 
 
 @pytest.fixture(scope="module")

@@ -15,6 +15,7 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from mcap.reader import make_reader
 
+from schemas.cad_library import CadLibrary
 from schemas.errors import BadInput
 from schemas.interactive_scene import InteractiveSceneFile
 from stages.kit.formats.foxglove import transform_matrix
@@ -26,15 +27,12 @@ from stages.kit.simulation.mujoco_settle import mujoco_motions
 from stages.kit.simulation.settle_report import settle_report
 from stages.kit.simulation.world import load_scene
 from stages.urdf.exports import write_exports
-from tests.unit.urdf.small_room import graph_of, room, small_library
-
-OPEN = {"door_hinge": 1.1}
+from tests.unit.urdf.small_room import graph_of, room
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(library: CadLibrary, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The small room, its fridge ajar."""
-    library = small_library(tmp_path_factory.mktemp("library"), "table", "fridge", "cup", "bottle", shapes=2)
     bodies = room(library)
     root = tmp_path_factory.mktemp("scene")
     write_exports(root, write_scene_bundle(root, bodies, graph_of(bodies)))

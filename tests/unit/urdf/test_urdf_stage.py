@@ -15,12 +15,7 @@ from stages.kit.formats.cad_models import model_folder
 from stages.kit.formats.urdf_file import parse_urdf
 from stages.urdf.parameters import UrdfParameters
 from stages.urdf.stage import run
-from tests.unit.urdf.small_room import context, graph_of, placed, room, small_library
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory):
-    return small_library(tmp_path_factory.mktemp("library"), "table", "fridge", "cup", "bottle", "monitor")
+from tests.unit.urdf.small_room import context, graph_of, placed, room
 
 
 @pytest.fixture
@@ -68,15 +63,17 @@ def test_supports_become_joints_by_what_is_movable(cad_scene, tmp_path):
 
 
 def test_what_hangs_in_the_air_is_named(cad_scene, tmp_path, caplog):
-    run(cad_scene, parameters=UrdfParameters(), context=context(tmp_path / "out"))
+    run(cad_scene, parameters=UrdfParameters(settle_seconds=1.5, rest=False), context=context(tmp_path / "out"))
     messages = [record.getMessage() for record in caplog.records]
     assert [message.split()[0] for message in messages] == ["cup_7"]
-    made = run(cad_scene, parameters=UrdfParameters(settle_seconds=0), context=context(tmp_path / "unsettled"))
+    quick = UrdfParameters(settle_seconds=0, rest=False)
+    made = run(cad_scene, parameters=quick, context=context(tmp_path / "unsettled"))
     assert "unstable" not in made.summary  # what was not measured is not called 0
 
 
 def test_movability_can_be_overruled(cad_scene, tmp_path):
-    parameters = UrdfParameters(movable_classes=("monitor",), fixed_classes=("bottle",))
+    quick = {"settle_seconds": 0, "rest": False}
+    parameters = UrdfParameters(movable_classes=("monitor",), fixed_classes=("bottle",), **quick)
     made = run(cad_scene, parameters=parameters, context=context(tmp_path / "out"))
     movable = {body.name for body in made.scene.bodies if body.movable}
     assert movable == {"cup_5", "cup_7", "monitor_8"}
