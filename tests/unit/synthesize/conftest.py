@@ -9,6 +9,7 @@ import pytest
 from schemas.cad_library import CadLibrary
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
+from stages.library.families import GENERATORS
 from stages.library.parameters import LibraryParameters
 from stages.library.stage import run
 from stages.synthesize.furniture import Catalogue
@@ -17,7 +18,8 @@ from stages.synthesize.furniture import Catalogue
 @pytest.fixture(scope="session")
 def library(tmp_path_factory: pytest.TempPathFactory) -> CadLibrary:
     output: Path = tmp_path_factory.mktemp("library")
-    parameters = LibraryParameters(shapes_per_class=3, small_shapes_per_class=3)
+    # The classes that recipes name; others would only take time.
+    parameters = LibraryParameters(shapes_per_class=3, small_shapes_per_class=3, classes=tuple(GENERATORS)[:24])
     return run(parameters=parameters, context=Context(output=output, seed=5, device="cpu", progress=SilentProgress()))
 
 
