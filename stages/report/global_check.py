@@ -79,4 +79,4 @@ def _caption(title: str, conflicts: list[Penetration]) -> str:
         return f"{title}: nothing stands more than 5 mm in anything else"
     pairs = [f"{pair.first} in {pair.second} ({1000 * pair.depth:.0f} mm)" for pair in conflicts[:NAMED_PAIRS]]
     more = f" and {len(conflicts) - NAMED_PAIRS} more" if len(conflicts) > NAMED_PAIRS else ""
-    return f"{title}: {len(conflicts)} conflicts, red: {', '.join(pairs)}{more}"
+    return f"{title}: {len(conflicts)} conflict{'s' if len(conflicts) > 1 else ''}, red: {', '.join(pairs)}{more}"
