@@ -17,10 +17,21 @@ from stages.synthesize.arrangement import Arrangement, arrange
 from stages.synthesize.collision import CollisionWorld, box_shape, convex_shape
 from stages.synthesize.furniture import Catalogue, main_joint
 from stages.synthesize.placement import PlacedObject
-from stages.synthesize.recipes import load_recipe, recipe_names
+from stages.synthesize.recipes import Recipe, load_recipe, recipe_names
 from stages.synthesize.support import contact_points
 
 SEEDS = (0, 1, 2, 3)
+
+
+def recipe_for_few_shapes(name: str) -> Recipe:
+    """The recipe; none of the few shelves in the library of these tests is as low as those on the walls of a studio."""
+    recipe = load_recipe(name)
+    hung = [(place.class_name, place.where) == ("shelf", "mounted") for place in recipe.place]
+    places = [
+        p.model_copy(update={"largest_height": 1.3}) if is_hung else p
+        for p, is_hung in zip(recipe.place, hung, strict=True)
+    ]
+    return recipe.model_copy(update={"place": tuple(places)})
 
 
 @pytest.fixture(
@@ -28,7 +39,7 @@ SEEDS = (0, 1, 2, 3)
 )
 def arrangement(request: pytest.FixtureRequest, catalogue: Catalogue) -> Arrangement:
     name, seed = request.param
-    return arrange(load_recipe(name), catalogue, "medium", seed)
+    return arrange(recipe_for_few_shapes(name), catalogue, "medium", seed)
 
 
 def penetration(a: PlacedObject, b: PlacedObject) -> float:
@@ -112,7 +123,7 @@ def test_what_holds_a_thing_beside_its_parent_touches_it(arrangement: Arrangemen
 
 
 def test_a_studio_has_all_the_less_common_supports(catalogue: Catalogue) -> None:
-    objects = arrange(load_recipe("studio"), catalogue, "medium", 0).objects
+    objects = arrange(recipe_for_few_shapes("studio"), catalogue, "medium", 0).objects
     held = {thing.relation for thing in objects} | {entry.relation for t in objects for entry in t.further}
     assert held == {"supports", "contains", "carries_on_wall", "hangs_from", "also_supports", "leans_on"}
     in_drawers = [t for t in objects if t.parent.startswith("drawer_unit") and t.relation == "contains"]
