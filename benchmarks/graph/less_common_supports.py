@@ -167,14 +167,19 @@ def main() -> None:
         path = generated_room(arguments.out / "rooms", "studio", seed, FRAMES, SIZE)
         rooms[str(seed)], lines = judge_room(path, arguments.out / "work" / str(seed), counts)
         wrong += lines
+        write(arguments.out, counts, rooms, wrong)
         print(f"studio {seed}: edit distance {[rooms[str(seed)][m]['edit_distance'] for m in METHODS]}", flush=True)
+
+
+def write(out: Path, counts: dict[str, Counts], rooms: dict[str, dict[str, Figures]], wrong: list[str]) -> None:
+    """Write what the rooms so far come to."""
     flat = {f"{m}/{seed}/{k}": v for seed, own in rooms.items() for m, f in own.items() for k, v in f.items()}
     for method in METHODS:
         for relation, (true, predicted, agreed) in counts[method].items():
             flat[f"{method}/all/{relation}_f1"] = 2 * agreed / (true + predicted) if true + predicted else None
             flat[f"{method}/all/{relation}_edges"] = true
-    write_figures(arguments.out, flat, table_of(counts, rooms))
-    (arguments.out / "wrong.md").write_text("\n".join(wrong) + "\n", encoding="utf-8")
+    write_figures(out, flat, table_of(counts, rooms))
+    (out / "wrong.md").write_text("\n".join(wrong) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
