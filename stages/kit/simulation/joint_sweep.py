@@ -92,25 +92,37 @@ def _sweep(world: PhysicsWorld, body: LoadedBody, joint: str, riding: set[str]) 
         if other.name != body.name or (link not in moving and link != parent)
     ]
     before = world.joint_value(body.name, joint)
-    free, first = 0.0, None
-    for limit in (upper, lower):
-        for value in _positions(closed, limit, (upper - lower) / STEPS):
-            world.set_joint(body.name, joint, value)
-            hit = _hit(world, body, moving, still)
-            if hit is not None:
-                if first is None:
-                    first = (*hit, value)
-                break
-            reached = abs(value - closed)
-        else:
-            free += abs(limit - closed)
-            continue
-        free += 0.0 if value == closed else reached
+    step = (upper - lower) / STEPS
+    stretches = [_stretch(world, body, joint, closed, limit, step, moving, still) for limit in (upper, lower)]
     world.set_joint(body.name, joint, before)
+    free = sum(length for length, _ in stretches)
+    hit = next((met for _, met in stretches if met is not None), None)
     share = 1.0 if upper == lower else free / (upper - lower)
-    if first is None:
+    if hit is None:
         return JointRange(body.name, joint, closed, upper - lower, share)
-    return JointRange(body.name, joint, closed, upper - lower, share, first[0], first[2], first[1])
+    return JointRange(body.name, joint, closed, upper - lower, share, hit_link=hit[0], hit_at=hit[2], hit_depth=hit[1])
+
+
+def _stretch(
+    world: PhysicsWorld,
+    body: LoadedBody,
+    joint: str,
+    closed: float,
+    limit: float,
+    step: float,
+    moving: list[int],
+    still: list[tuple[int, int, np.ndarray]],
+) -> tuple[float, tuple[str, float, float] | None]:
+    """Return how far a joint goes from where it is closed towards a limit [rad, m] in steps, and what it meets: the
+    link, how deep [m], at which value."""
+    reached = closed
+    for value in _positions(closed, limit, step):
+        world.set_joint(body.name, joint, value)
+        hit = _hit(world, body, moving, still)
+        if hit is not None:
+            return abs(reached - closed), (*hit, value)
+        reached = value
+    return abs(limit - closed), None
 
 
 def _positions(start: float, end: float, step: float) -> Iterator[float]:
