@@ -22,7 +22,22 @@ from stages.library.surfaces import surface_planes
 
 KNOB_SHARE = 0.2
 """Moving parts smaller than this share of the model's diagonal get no states of their own."""
-CONTAINERS = ("cabinet", "wall_cabinet", "shelf", "fridge", "microwave", "oven", "bin", "cup", "bowl", "box", "sink")
+CONTAINERS = {
+    *(
+        "cabinet",
+        "wall_cabinet",
+        "wardrobe",
+        "drawer_unit",
+        "chest",
+        "shelf",
+        "fridge",
+        "microwave",
+        "oven",
+        "dishwasher",
+    ),
+    *("washing_machine", "bin", "box", "toolbox", "sink", "cup", "bowl", "pan", "cooking_pot", "jug", "kettle", "vase"),
+}
+"""Classes that contain things even where the collision shapes are solid."""
 WIDEST_GRASP = 0.08
 """Opening of a two-finger gripper [m]."""
 LARGEST_MASS = 1000.0
@@ -70,7 +85,6 @@ def assembled(
     )[:MOST_STATES_OF]
     states = tuple(_state(parts, joints, values) for values in joint_values(joints, opened))
     width = float(min(size[0], size[1]))
-    holds = contains if contains is not None else class_name in CONTAINERS
     model = CadModel(
         id=model_id,
         class_name=class_name,
@@ -79,12 +93,14 @@ def assembled(
         states=states,
         joints=joints,
         movable=movable,
-        contains=holds,
+        contains=bool(contains),
         grasp_width=round(width, 4) if movable and width <= WIDEST_GRASP else None,
         parts=tuple(part.name for part in parts),
         recipe=recipe,
     )
     uses = affordances(model, {part.name: part.pieces for part in parts})
+    if contains is None:
+        model = model.model_copy(update={"contains": class_name in CONTAINERS or bool(uses.contains)})
     return Assembled(model, tuple(geometries), uses, tuple(findings), sum(len(part.pieces) for part in parts))
 
 

@@ -273,6 +273,13 @@ def test_dae_agrees_with_pycollada() -> None:
     assert mine.volume == pytest.approx(6.0) and patch.color == (0.0, 1.0, 0.0)
 
 
+def test_a_dae_index_of_more_than_64_bits_is_bad_input() -> None:
+    text = dae(0.5, "Z_UP", (1.0, 2.0, 3.0))
+    start = text.index("<p>") + 3
+    with pytest.raises(BadInput, match="indices are no numbers"):
+        parse_collada((text[:start] + "9" * 30 + " " + text[start:]).encode(), "a.dae")
+
+
 def test_glb_gltf_stl_and_obj(tmp_path) -> None:
     folder = tmp_path / "in"
     folder.mkdir()
