@@ -105,9 +105,18 @@ bench-poses: setup ## Estimated camera paths: error, speed, effect on the map (Q
 bench-mapping: setup ## The panoptic map beside the thesis and Voxblox++, tables 2.1 to 2.4 (QUICK=1: three rooms)
 	$(PYTHON) -m benchmarks.mapping $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-mapping$(if $(QUICK),-quick)
 
+.PHONY: bench-scene
+# The rooms of bench-mapping and its maps (made where they are missing), then the logs of `make real` where it has run.
+bench-scene: setup ## Contact graphs, CAD replacement and physics beside the thesis (QUICK=1: three rooms)
+	$(PYTHON) -m benchmarks.scene $(if $(QUICK),--quick) --maps $(OUTPUTS)/experiments/bench-mapping$(if $(QUICK),-quick) --real $(OUTPUTS)/experiments/real --out $(OUTPUTS)/experiments/bench-scene$(if $(QUICK),-quick)
+
 .PHONY: mosd train-pairs pair-rules
 mosd: setup ## Objects of real tabletop frames against their labels (QUICK=1: every fifth frame; REAL_DATA=folder)
 	$(PYTHON) -m benchmarks.tables.mosd $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/mosd$(if $(QUICK),-quick)
+
+.PHONY: real-supports
+real-supports: setup ## Contact graphs of the real logs against what stands on what there, after `make real`
+	$(PYTHON) -m benchmarks.tables.real_supports --runs $(OUTPUTS)/experiments/real --out $(OUTPUTS)/experiments/real-supports
 
 .PHONY: mosd-supports
 mosd-supports: setup ## Which object rests on which on real tabletop frames (QUICK=1: every fifth frame; REAL_DATA=folder)
