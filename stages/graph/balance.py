@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
 from schemas.scene_parts import Relation
-from stages.graph.nodes import Entity
+from stages.graph.nodes import Entity, plane_height
 from stages.kit.geometry.boxes import convex_hull
 
 FOOT_HEIGHT = 0.03
@@ -29,10 +27,8 @@ TOUCH = 0.03
 LEAST_HEIGHT = 0.3
 """... and touches it at this share of its height or above."""
 LEAST_TOUCHING = 5
-UPRIGHT = math.sin(math.radians(6.0))
-"""A plane whose normal rises, or falls short of straight up, by no more than this belongs to an upright body."""
-LEAST_TILTED = 0.2
-"""Share of the area of its planes from which on a body counts as tilted."""
+FOOTING_GAP = 0.1
+"""Of an object whose bottom is seen higher than this over all planes of its carrier the feet are missing [m]."""
 
 
 def footing(points: np.ndarray) -> np.ndarray:
@@ -58,6 +54,14 @@ def is_tilted(child: Entity) -> bool:
     return largest is not None and TILTED[0] < abs(largest.normal[2]) < TILTED[1]
 
 
+def footing_seen(child: Entity, carrier: Entity) -> bool:
+    """Whether an object was seen down to its carrier. The back of a chair behind a table has a footing too, which
+    says nothing about the chair's."""
+    at = np.asarray(child.box.center[:2])
+    gaps = [child.bottom - plane_height(carrier.patches[k].plane, at) for k in carrier.supporting]
+    return not gaps or min(abs(gap) for gap in gaps) <= FOOTING_GAP
+
+
 def is_unbalanced(child: Entity) -> bool:
     """Whether an object would fall over if nothing but its footing carried it. Articulated furniture stands on its own:
     an open door takes the middle of its surface outwards, and hardly its weight."""
@@ -74,6 +78,9 @@ def leaning_relation(child: Entity, parent: str, entities: list[Entity]) -> Rela
     The contact must lie at LEAST_HEIGHT of its height or above, and on the side to which it would fall. The confidence
     falls from 1 at contact to 0.5 at TOUCH.
     """
+    carrier = next((entity for entity in entities if entity.name == parent), None)
+    if carrier is not None and not footing_seen(child, carrier):
+        return None
     if not is_unbalanced(child):
         return None
     middle = child.points[:, :2].mean(axis=0)

@@ -86,7 +86,7 @@ class GraphParameters(Parameters):
 
 STAGE = Stage(
     name="graph",
-    version=7,
+    version=8,
     summary="Build the contact graph (who supports, contains, carries whom) from a panoptic map",
     parameters=GraphParameters,
     reads={"panoptic_map": PanopticMap},
