@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from cli.timeline_command import timeline as timeline_command
 from schemas.contact_graph import ContactGraph, TimelineFile
+from schemas.errors import BadInput
 from schemas.panoptic_map import SNAPSHOTS, EntitiesFile, PanopticMap
 from stages.graph import entities as entities_module
 from stages.graph.parameters import GraphParameters
@@ -14,6 +16,7 @@ from stages.graph.stage import run
 from stages.graph.timeline import lasting_ids
 from stages.graph.tracks import CELL, cells_of
 from stages.kit.progress import SilentProgress
+from stages.kit.running import reading
 from stages.kit.stage import Context
 from tests.panoptic_maps import box_mesh, floor_mesh, table_mesh, write_map
 
@@ -110,3 +113,16 @@ def test_cells():
     points = np.array([[0.001, 0.001, 0.001], [0.002, 0.0, 0.0], [CELL + 0.001, 0.0, 0.0], [-0.001, 0.0, 0.0]])
     assert len(cells_of(points)) == 3 and len(cells_of(np.zeros((0, 3)))) == 0
     assert trimesh.util.allclose(cells_of(points), np.sort(cells_of(points[::-1])))
+
+
+def test_the_command_prints_changes_or_the_file(grown, monkeypatch, capsys, tmp_path):
+    artifact, timeline = grown
+    monkeypatch.setattr(reading, "open_artifact", lambda path, kind: ContactGraph(path))
+    assert timeline_command(artifact.root) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == f"10 frames: 3 nodes, {len(timeline.snapshots[0].links)} links"
+    assert "  + book_4" in lines and "  ~ book_4 was taken for box" in lines
+    assert timeline_command(artifact.root, json_output=True) == 0
+    assert TimelineFile.model_validate_json(capsys.readouterr().out) == timeline
+    with pytest.raises(BadInput, match="kept no snapshots"):
+        timeline_command(tmp_path)
