@@ -21,11 +21,13 @@ from stages.cad.placing import (
     size_misfit,
 )
 from stages.cad.scoring import Surroundings, score_of, unsupported_children, why_invalid
-from stages.cad.shapes import Placement, Shape, observed_frames, shape_of_state
+from stages.cad.shapes import Observed, Placement, Shape, observed_frames, shape_of_state, turned_frames
 from stages.kit.geometry.boxes import bottom, points_in_box
 from stages.kit.geometry.point_clouds import thin_to_grid
 
 GRID = 0.01
+TURNS = 3
+"""Standing movable things are tried at so many yaws within a quarter turn."""
 SCREENING_POINTS = 120
 """Vertices that matches are screened with."""
 SCREENING_STEP = 5
@@ -111,19 +113,23 @@ def shortlist(
         shapes = [shape_of_state(model, state) for model in models for state in model.states]
     movable = load_vocabulary().by_name(node.class_name).movable
     scale_range = (parameters.minimum_scale, parameters.maximum_scale)
-    matches, counts = rank_matches(
-        observed_frames(node, points, carrying, height, all_frames=ours),
-        shapes,
-        weights=(parameters.size_weight, parameters.plane_weight, parameters.upright_weight),
-        unmatched=parameters.unmatched_plane if ours else None,
-        scale_range=(0.0, math.inf) if ours else scale_range,
-        keep=parameters.matched if ours else parameters.candidates,
-        upright_only=ours and not movable,
-    )
+    frames = observed_frames(node, points, carrying, height, all_frames=ours)
+    weights_of_matching = (parameters.size_weight, parameters.plane_weight, parameters.upright_weight)
+    counts: dict[str, int]
     if ours:
+        matches, counts = matches_to_screen(frames, shapes, node, points, movable, weights_of_matching, parameters)
         kept = screened(matches, surfaces, points, scale_range, parameters)
         counts["screening rank"] = len(matches) - len(kept)
         matches = kept
+    else:
+        matches, counts = rank_matches(
+            frames,
+            shapes,
+            weights=weights_of_matching,
+            unmatched=None,
+            scale_range=scale_range,
+            keep=parameters.candidates,
+        )
     rejected = Counter(counts)
     weights = AlignmentWeights(
         parameters.support_weight,
@@ -175,6 +181,41 @@ def shortlist(
     elif missing[id(unique[0])]:
         reason = "does not quite support " + ", ".join(missing[id(unique[0])])
     return Shortlist(node, tuple(unique), counted, reason)
+
+
+def matches_to_screen(
+    frames: list[Observed],
+    shapes: list[Shape],
+    node: GraphNode,
+    points: np.ndarray,
+    movable: bool,
+    weights: tuple[float, float, float],
+    parameters: CadParameters,
+) -> tuple[list[Match], dict[str, int]]:
+    """Ours: return the best matches by planes and size, standing and lying ones apart, and what was left out.
+
+    Furniture only stands. Of movable things the standing ones are also tried between the quarter turns, and lying ones
+    have a share of their own, as either may have the planes that noise likes.
+    """
+
+    def rank(found: list[Observed], keep: int, upright: bool) -> tuple[list[Match], dict[str, int]]:
+        return rank_matches(
+            found,
+            shapes,
+            weights=weights,
+            unmatched=parameters.unmatched_plane,
+            scale_range=(0.0, math.inf),
+            keep=keep,
+            upright_only=upright,
+        )
+
+    if not movable:
+        matches, counts = rank(frames, parameters.matched, True)
+        return matches, counts
+    standing, counts = rank([*frames, *turned_frames(frames[0], node, points, TURNS)], parameters.matched, True)
+    lying, others = rank(frames, parameters.matched, False)
+    lying = [match for match in lying if match.tilt > 0][: parameters.matched // 3]
+    return [*standing, *lying], dict(Counter(counts) + Counter(others))
 
 
 def screened(

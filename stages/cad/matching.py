@@ -13,6 +13,8 @@ from stages.kit.geometry.transforms import transform_from_yaw
 
 FORBIDDEN = 1e6
 """Cost of assigning a supporting plane to one that does not support."""
+SUPPORTING_UNMATCHED = 3.0
+"""A supporting plane without partner costs so many times what another one costs."""
 UPWARD = 0.9
 """-a_th: a plane of the turned model supports when its normal points up at least this much."""
 
@@ -81,9 +83,10 @@ def assign_planes(
         return None
     costs = np.where(supporting_x[:, None] & ~supporting_y[None, :], FORBIDDEN, costs)
     if unmatched is not None:
-        # One private way out for each plane of x that carries nothing.
+        # One private way out for each plane of x. What carries something needs a partner more than the rest, but a
+        # plane that only noise or a misjudged support made must not cost a table every model.
         spare = np.full((count_x, count_x), FORBIDDEN)
-        np.fill_diagonal(spare, np.where(supporting_x, FORBIDDEN, unmatched))
+        np.fill_diagonal(spare, np.where(supporting_x, SUPPORTING_UNMATCHED * unmatched, unmatched))
         costs = np.concatenate([costs, spare], axis=1)
     rows, columns = linear_sum_assignment(costs)
     chosen = costs[rows, columns]

@@ -120,22 +120,38 @@ def observed_frames(
     frames = [Observed(yaw, center, size, relative_planes(node.planes, center, supporting), support_height)]
     if not all_frames:
         return frames
-    low, high = center[2] - size[2] / 2, center[2] + size[2] / 2
     largest_side = max(size[0], size[1]) * size[2]
     upright = [p for p in node.planes if abs(p.normal[2]) < 0.2 and p.area >= LEAST_PLANE_SHARE * largest_side]
     for plane in sorted(upright, key=lambda p: -p.area):
         turn = math.atan2(plane.normal[1], plane.normal[0])
         if any(abs((turn - f.yaw + math.pi / 4) % (math.pi / 2) - math.pi / 4) < SAME_YAW for f in frames):
             continue
-        cosine, sine = math.cos(turn), math.sin(turn)
-        flat = points[:, :2] @ np.array([[cosine, -sine], [sine, cosine]])
-        middle = (flat.min(axis=0) + flat.max(axis=0)) / 2
-        ground = np.array([[cosine, -sine], [sine, cosine]]) @ middle
-        frame_center = np.array([*ground, (low + high) / 2])
-        frame_size = np.array([*np.ptp(flat, axis=0), high - low])
-        frames.append(
-            Observed(
-                turn, frame_center, frame_size, relative_planes(node.planes, frame_center, supporting), support_height
-            )
-        )
+        frames.append(frame_at(turn, node, points, supporting, support_height))
     return frames
+
+
+def frame_at(
+    yaw: float, node: GraphNode, points: np.ndarray, supporting: np.ndarray, support_height: float
+) -> Observed:
+    """Return the object in the upright frame at `yaw` [rad]: as wide as its vertices (N, 3), as high as its box.
+
+    `supporting` (P,) bool: which of the node's planes carry something. Raises ValueError without a box.
+    """
+    if node.box is None:
+        raise ValueError(f"{node.id} has no box")
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    flat = points[:, :2] @ np.array([[cosine, -sine], [sine, cosine]])
+    ground = np.array([[cosine, -sine], [sine, cosine]]) @ ((flat.min(axis=0) + flat.max(axis=0)) / 2)
+    center = np.array([*ground, node.box.center[2]])
+    size = np.array([*np.ptp(flat, axis=0), node.box.size[2]])
+    return Observed(yaw, center, size, relative_planes(node.planes, center, supporting), support_height)
+
+
+def turned_frames(first: Observed, node: GraphNode, points: np.ndarray, steps: int) -> list[Observed]:
+    """Return the object in `steps` - 1 frames between `first` and a quarter turn from it.
+
+    A cup with a handle has no flat side that says how it is turned, and its box says nothing: it is round but for the
+    handle.
+    """
+    turns = first.yaw + 0.5 * math.pi * np.arange(1, steps) / steps
+    return [frame_at(float(yaw), node, points, first.planes.supporting, first.support_height) for yaw in turns]

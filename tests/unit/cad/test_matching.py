@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from stages.cad.matching import (
     CUBE_ROTATIONS,
+    SUPPORTING_UNMATCHED,
     assign_planes,
     matching_error,
     plane_costs,
@@ -72,9 +73,10 @@ def test_assignment_is_the_best_of_all(seed, count_x, count_y):
         best = np.inf
         targets = [*range(count_y)] + ([-1] * count_x if unmatched is not None else [])
         for choice in set(itertools.permutations(targets, count_x)):
-            if any(supporting_x[i] and (j < 0 or not supporting_y[j]) for i, j in enumerate(choice)):
+            if any(supporting_x[i] and j >= 0 and not supporting_y[j] for i, j in enumerate(choice)):
                 continue
-            best = min(best, sum(unmatched if j < 0 else costs[i, j] for i, j in enumerate(choice)))
+            alone = [SUPPORTING_UNMATCHED if supporting else 1.0 for supporting in supporting_x]
+            best = min(best, sum(alone[i] * unmatched if j < 0 else costs[i, j] for i, j in enumerate(choice)))
         found = assign_planes(costs, supporting_x, supporting_y, unmatched)
         if np.isinf(best):
             assert found is None
@@ -89,7 +91,8 @@ def test_no_planes_cost_nothing_and_supports_are_preserved():
     only = np.array([[0.0, 0.5]])
     carries = np.array([True])
     assert assign_planes(only, carries, np.array([False, True]), 1.0) == (0.5, ((0, 1),))
-    assert assign_planes(only, carries, np.array([False, False]), 1.0) is None
+    assert assign_planes(only, carries, np.array([False, False]), None) is None
+    assert assign_planes(only, carries, np.array([False, False]), 1.0) == (SUPPORTING_UNMATCHED, ())
 
 
 def test_a_model_matches_itself_only_as_it_stands(library):

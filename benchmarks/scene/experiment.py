@@ -1,0 +1,209 @@
+"""One generated room through all arms of a case: map, contact graph, CAD scene, URDF scene, each measured."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.mapping.rooms import RoomFolder
+from benchmarks.scene.arms import HELD_OUT, MASK_LEVEL, PERFECT, Arm
+from benchmarks.scene.perfect_maps import perfect_map
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import CadScene
+from schemas.contact_graph import ContactGraph
+from schemas.ground_truth import GroundTruth
+from schemas.kinds import Sequence as SequenceArtifact
+from schemas.panoptic_map import PanopticMap
+from stages.cad.stage import run as replace_objects
+from stages.evaluate.correspondence import point_overlaps
+from stages.evaluate.graph_measures import compare_graphs, optional_nodes
+from stages.evaluate.map_measures import label_true_points, load_map
+from stages.evaluate.parameters import EvaluateParameters
+from stages.evaluate.replacement_measures import ObjectResult, replacements_of
+from stages.evaluate.truth import TrueRoom, load_truth
+from stages.graph.stage import run as build_graph
+from stages.kit.measurement.edge_agreement import edge_agreement
+from stages.kit.progress import SilentProgress
+from stages.kit.running.reading import open_artifact
+from stages.kit.simulation.settle_report import SettleReport, settle_report
+from stages.kit.stage import Context
+from stages.urdf.parameters import UrdfParameters
+from stages.urdf.stage import run as write_urdf
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one arm made of one room in one case: plain numbers, so that rooms run in processes of their own."""
+
+    room: str
+    arm: str
+    case: str
+    graph: dict[str, float]
+    """Edit distance and its parts."""
+    edges: dict[str, tuple[int, int, int]]
+    """Relation -> (true, predicted, agreed)."""
+    cad: dict[str, float | None] = field(default_factory=dict)
+    """`room_summary`; empty where no models are true."""
+    failures: tuple[tuple[str, str, str], ...] = ()
+    """(object, class, why): objects that are no success."""
+    physics: dict[str, float] = field(default_factory=dict)
+    unsettled: tuple[str, ...] = ()
+    """What did not stay, in words."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """Truth and maps of one room."""
+
+    name: str
+    truth_artifact: GroundTruth
+    truth: TrueRoom
+    world_from_log: np.ndarray
+    maps: Path
+    """Folder of `make bench-mapping` with this room's maps: <level>/<arm>/panoptic_map."""
+    libraries: Mapping[bool, CadLibrary]
+    """Held out? -> library."""
+
+
+def load_room(folder: RoomFolder, maps: Path, libraries: Mapping[bool, CadLibrary]) -> Room:
+    """Read a room. Raises BadInput when its artifacts are missing or broken."""
+    sequence = open_artifact(folder.sequence, SequenceArtifact)
+    artifact = open_artifact(folder.ground_truth, GroundTruth)
+    assert isinstance(sequence, SequenceArtifact) and isinstance(artifact, GroundTruth)
+    world_from_log = np.array(sequence.info.gravity.world_from_log)
+    truth = load_truth(artifact, world_from_log, EvaluateParameters().minimum_visible_points)
+    return Room(folder.name, artifact, truth, world_from_log, maps, libraries)
+
+
+def run_case(room: Room, arms: Sequence[Arm], case: str, scratch: Path, seed: int, *, keep: bool) -> list[Outcome]:
+    """Return the outcome of every arm. Artifacts are written under `scratch` and deleted again unless `keep`."""
+    folder = scratch / room.name / case
+    shutil.rmtree(folder, ignore_errors=True)
+    if case == PERFECT:
+        perfect_map(room.truth_artifact, folder / "map")
+    outcomes = []
+    for arm in arms:
+        map_folder = folder / "map" if case == PERFECT else room.maps / MASK_LEVEL / arm.map_arm / "panoptic_map"
+        outcomes.append(_run_arm(room, arm, case, PanopticMap(map_folder), folder / arm.name, seed))
+    if not keep:
+        shutil.rmtree(folder)
+    return outcomes
+
+
+def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder: Path, seed: int) -> Outcome:
+    graph = build_graph(panoptic_map, parameters=arm.graph, context=_context(folder / "contact_graph", seed))
+    library = room.libraries[case == HELD_OUT]
+    start = time.process_time()
+    scene = replace_objects(
+        graph, panoptic_map, library, parameters=arm.cad, context=_context(folder / "cad_scene", seed)
+    )
+    seconds = time.process_time() - start
+    settled = settle(scene, folder / "interactive_scene", seed)
+    overlaps = overlaps_of(room.truth, panoptic_map)
+    measured = replacements_of(
+        room.truth_artifact,
+        room.truth,
+        scene,
+        world_from_log=room.world_from_log,
+        overlaps=overlaps,
+        minimum_iou=EvaluateParameters().node_match_iou,
+        library_models=library.path("models"),
+    )
+    assert measured is not None
+    objects = sum(node.node_type in ("rigid", "articulated") for node in graph.graph.nodes)
+    distance, edges = measure_graph(room.truth, graph, overlaps)
+    summary = scene.scene
+    extra = {
+        "seconds_per_object": seconds / max(1, objects),
+        "conflicts_before": float(summary.conflicts_before),
+        "conflicts_after": float(summary.conflicts_after),
+    }
+    return Outcome(
+        room=room.name,
+        arm=arm.name,
+        case=case,
+        graph=distance,
+        edges=edges,
+        cad={**measured.summary, **extra},
+        failures=tuple((r.name, r.class_name, why_no_success(r)) for r in measured.objects if not r.success),
+        physics=physics_of(settled),
+        unsettled=what_moved(settled),
+    )
+
+
+def _context(folder: Path, seed: int) -> Context:
+    folder.mkdir(parents=True, exist_ok=True)
+    return Context(folder, seed=seed, device="cpu", progress=SilentProgress())
+
+
+def settle(scene: CadScene, folder: Path, seed: int) -> SettleReport:
+    """Write the URDF scene and let it go."""
+    write_urdf(scene, parameters=UrdfParameters(), context=_context(folder, seed))
+    return settle_report(folder)
+
+
+def overlaps_of(truth: TrueRoom, panoptic_map: PanopticMap) -> dict[tuple[int, int], float]:
+    """IoU of true and predicted instances over the true points that were seen (`point_overlaps`)."""
+    predicted = load_map(panoptic_map)
+    labels = label_true_points(truth, predicted, EvaluateParameters().label_distance)
+    return point_overlaps(truth, labels, {entry.instance: entry.class_name for entry in predicted.info.entities})
+
+
+def measure_graph(
+    truth: TrueRoom, graph: ContactGraph, overlaps: Mapping[tuple[int, int], float] | None
+) -> tuple[dict[str, float], dict[str, tuple[int, int, int]]]:
+    """Return the edit distance with its parts, and (true, predicted, agreed) edges by relation."""
+    comparison = compare_graphs(truth, graph.graph, overlaps, EvaluateParameters().node_match_iou)
+    distance = comparison.distance
+    parts = {
+        "edit_distance": float(distance.total),
+        "edit_distance_exact": float(distance.exact),
+        "wrong_support": float(len(distance.wrong_supports)),
+        "missing_detection": float(len(distance.missing)),
+        "wrong_detection": float(distance.wrong_detections),
+        "true_nodes": float(len(comparison.true.nodes) - 1),
+    }
+    ignored = optional_nodes(truth, comparison.true)
+    edges = edge_agreement(comparison.true, comparison.predicted, dict(distance.pairs), ignored=ignored)
+    return parts, {name: (found.true_count, found.predicted_count, found.agreed) for name, found in edges.items()}
+
+
+def physics_of(report: SettleReport) -> dict[str, float]:
+    """Return the figures of a settle test."""
+    return {
+        "settled_rooms": float(report.settled),
+        "movable": float(len(report.bodies)),
+        "unsettled": float(len(report.unsettled)),
+        "joints": float(len(report.joints)),
+        "blocked_joints": float(len(report.blocked)),
+        "max_penetration_mm": report.max_penetration_mm,
+        "collisions": float(len(report.collisions)),
+    }
+
+
+def what_moved(report: SettleReport) -> tuple[str, ...]:
+    """Return what did not stay, what is blocked and what lies in what, in words."""
+    words = [f"{b.name} moved {1000 * b.moved:.0f} mm, {np.degrees(b.turned):.0f} deg" for b in report.unsettled]
+    words += [f"{j.joint} blocked by {j.hit_link}" for j in report.blocked]
+    words += [f"{o.first} lies {1000 * o.depth:.0f} mm in {o.second}" for o in report.collisions]
+    return tuple(words)
+
+
+def why_no_success(result: ObjectResult) -> str:
+    """Return the first reason that keeps an object from success."""
+    if not result.detected:
+        return "missed"
+    if result.model is None or result.alignment is None:
+        return "no model"
+    if not result.class_right:
+        return f"class {result.model_class}"
+    error = result.alignment
+    return (
+        f"{1000 * error.translation:.0f} mm, {np.degrees(error.rotation):.0f} deg, scale {100 * error.scale:.0f} %, "
+        f"{result.model} for {result.true_model}"
+    )

@@ -1,0 +1,75 @@
+"""The case `real`: maps of `make real`, contact graphs scored against the annotations, scenes let go in physics."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.scene.arms import REAL, Arm
+from benchmarks.scene.experiment import Outcome, measure_graph, overlaps_of, physics_of, settle, what_moved
+from schemas.cad_library import CadLibrary
+from schemas.errors import BadInput
+from schemas.ground_truth import GroundTruth
+from schemas.panoptic_map import PanopticMap
+from stages.cad.stage import run as replace_objects
+from stages.evaluate.parameters import EvaluateParameters
+from stages.evaluate.truth import load_truth
+from stages.graph.stage import run as build_graph
+from stages.kit.progress import SilentProgress
+from stages.kit.running.reading import open_artifact
+from stages.kit.stage import Context
+
+ANNOTATIONS = Path(__file__).resolve().parents[2] / "data" / "annotations" / "real"
+
+
+def run_real(real: Path, scratch: Path, arms: Sequence[Arm], seed: int) -> list[Outcome]:
+    """Return the outcomes of every arm for every annotated log whose map stands under `real` (`make real`).
+
+    All arms start from the one map that is there. No CAD model is true, so that only graph and physics are measured.
+    Raises BadInput when no map is there.
+    """
+    outcomes = []
+    for annotation in sorted(ANNOTATIONS.glob("*.json")):
+        folder = real / annotation.stem
+        if not (folder / "panoptic_map" / "manifest.json").is_file():
+            continue
+        where = scratch / annotation.stem
+        command = [sys.executable, "-m", "cli", "truth", "supports", "--annotation", str(annotation)]
+        command += ["--sequence", str(folder / "sequence"), "--panoptic-map", str(folder / "panoptic_map")]
+        subprocess.run([*command, "--out", str(where / "ground_truth")], check=True, stdout=subprocess.DEVNULL)
+        truth_artifact = open_artifact(where / "ground_truth", GroundTruth)
+        panoptic_map = open_artifact(folder / "panoptic_map", PanopticMap)
+        library = open_artifact(folder / "cad_library", CadLibrary)
+        assert isinstance(truth_artifact, GroundTruth) and isinstance(panoptic_map, PanopticMap)
+        assert isinstance(library, CadLibrary)
+        truth = load_truth(truth_artifact, np.eye(4), EvaluateParameters().minimum_visible_points)
+        overlaps = overlaps_of(truth, panoptic_map)
+        for arm in arms:
+            graph = build_graph(panoptic_map, parameters=arm.graph, context=_context(where / arm.name / "graph", seed))
+            context = _context(where / arm.name / "cad_scene", seed)
+            scene = replace_objects(graph, panoptic_map, library, parameters=arm.cad, context=context)
+            settled = settle(scene, where / arm.name / "interactive_scene", seed)
+            distance, edges = measure_graph(truth, graph, overlaps)
+            outcomes.append(
+                Outcome(
+                    room=annotation.stem,
+                    arm=arm.name,
+                    case=REAL,
+                    graph=distance,
+                    edges=edges,
+                    physics=physics_of(settled),
+                    unsettled=what_moved(settled),
+                )
+            )
+    if not outcomes:
+        raise BadInput(f"{real}: no map of an annotated log", hint="run `make real` first")
+    return outcomes
+
+
+def _context(folder: Path, seed: int) -> Context:
+    folder.mkdir(parents=True, exist_ok=True)
+    return Context(folder, seed=seed, device="cpu", progress=SilentProgress())
