@@ -21,8 +21,9 @@ from stages.kit.simulation.settle_report import free_bodies
 from stages.kit.simulation.world import load_scene
 
 SECONDS = 3.0
-SMALLEST_MOVE, SMALLEST_TURN = 0.0025, np.radians(0.5)
-"""Less is left alone [m], [rad]: Bullet pads the hulls of two meshes by 1 mm each."""
+PADDING, SMALLEST_MOVE, SMALLEST_TURN = 0.002, 0.0005, np.radians(0.5)
+"""Less is left alone [m], [rad]: Bullet pads the hulls of two meshes by 1 mm each, and lifts what stands on another by
+as much for every contact below it."""
 LARGEST_MOVE, LARGEST_TURN = 0.01, np.radians(5.0)
 """A body that goes further [m], [rad] was misplaced."""
 STILL = 0.005
@@ -44,7 +45,17 @@ def rested_bodies(root: Path, bodies: Sequence[BundleBody]) -> list[BundleBody]:
         moved, turned = _motion(body, poses)
         return moved <= LARGEST_MOVE and turned <= LARGEST_TURN and near(by_name.get(body.parent or ""))
 
-    return [_placed(body, poses[body.name]) if body.name in poses and near(body) else body for body in bodies]
+    def smallest_move(body: BundleBody) -> float:
+        """Return the least move that is no work of the padding [m]."""
+        contacts, carrier = 1, by_name.get(body.parent or "")
+        while carrier is not None and carrier.movable:
+            contacts, carrier = contacts + 1, by_name.get(carrier.parent or "")
+        return SMALLEST_MOVE + PADDING * contacts
+
+    return [
+        _placed(body, poses[body.name], smallest_move(body)) if body.name in poses and near(body) else body
+        for body in bodies
+    ]
 
 
 def _rest(root: Path) -> dict[str, np.ndarray]:
@@ -65,10 +76,10 @@ def _motion(body: BundleBody, poses: dict[str, np.ndarray]) -> tuple[float, floa
     return float(np.linalg.norm(apply(change, middle[None])[0] - middle)), turned
 
 
-def _placed(body: BundleBody, world_from_body: np.ndarray) -> BundleBody:
-    """Return the body at its new pose; the same one when that is hardly another."""
+def _placed(body: BundleBody, world_from_body: np.ndarray, smallest_move: float) -> BundleBody:
+    """Return the body at its new pose; the same one when it moved less than `smallest_move` [m] and hardly turned."""
     moved, turned = _motion(body, {body.name: world_from_body})
-    if moved < SMALLEST_MOVE and turned < SMALLEST_TURN:
+    if moved < smallest_move and turned < SMALLEST_TURN:
         return body
     change = world_from_body @ inverse(body.world_from_body)
     center = as_vector(apply(change, np.array(body.box.center)[None])[0])
