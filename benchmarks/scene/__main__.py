@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks.mapping.rooms import CLUTTER, REPORTING, TUNING_UNTRAINED, make_room
+from benchmarks.mapping.rooms import CLUTTER, REPORTING, TUNING_UNTRAINED, RoomFolder, make_room
 from benchmarks.scene.arms import ARMS, CASES, MASK_LEVEL, PERFECT, REAL
 from benchmarks.scene.experiment import Outcome, load_room, run_case
 from benchmarks.scene.figures_of_merit import FIGURES
@@ -48,6 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--tuning", action="store_true", help="the tuning rooms instead of those for reporting")
     parser.add_argument("--jobs", type=int, default=min(2, os.cpu_count() or 1))
     parser.add_argument("--cases", default="", help="comma-separated; default: all")
+    parser.add_argument("--as-is", action="store_true", help="take rooms and maps as they stand, even of older code")
     parser.add_argument("--keep", action="store_true", help="keep the artifacts (100 MB an arm and case)")
     parser.add_argument("--room", help="run this one room (recipe:seed) and stop")
     options = parser.parse_args(argv)
@@ -71,6 +72,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
+def room_folder(options: argparse.Namespace, room: tuple[str, int]) -> RoomFolder:
+    """Return the room's artifacts; they are made, or made again when they are not up to date, but with `--as-is`."""
+    folder = RoomFolder(f"{room[0]}-{room[1]}", options.maps / "rooms" / f"{room[0]}-{room[1]}-{frames_of(options)}")
+    if options.as_is and folder.ground_truth.is_dir() and folder.sequence.is_dir():
+        return folder
+    return make_room(options.maps / "rooms", *room, frames_of(options))
+
+
 def frames_of(options: argparse.Namespace) -> int:
     """Frames of every room."""
     return QUICK_FRAMES if options.quick else FRAMES
@@ -83,7 +92,7 @@ def held_out_library(options: argparse.Namespace) -> Path:
 
 def make_libraries(options: argparse.Namespace, room: tuple[str, int]) -> None:
     """Make the rooms' library and the other one, before rooms run beside each other."""
-    make_room(options.maps / "rooms", *room, frames_of(options))
+    room_folder(options, room)
     command = [sys.executable, "-m", "cli", "library", "build", "--seed", str(HELD_OUT_SEED)]
     subprocess.run([*command, "--out", str(held_out_library(options))], check=True, stdout=subprocess.DEVNULL)
 
@@ -96,7 +105,7 @@ def outcome_file(options: argparse.Namespace, room: tuple[str, int], case: str) 
 def one_room(options: argparse.Namespace, cases: Sequence[str], room: tuple[str, int]) -> int:
     """Run the cases of one room that are not there yet; maps that are missing are made first."""
     missing = [case for case in cases if not outcome_file(options, room, case).is_file()]
-    folder = make_room(options.maps / "rooms", *room, frames_of(options))
+    folder = room_folder(options, room)
     maps = options.maps / "maps" / folder.name
     wanted = sorted({arm.map_arm for arm in ARMS})
     if any(case != PERFECT for case in missing) and not all(
@@ -132,7 +141,7 @@ def _room_process(options: argparse.Namespace, cases: Sequence[str], room: tuple
         return 0
     command = [sys.executable, "-m", "benchmarks.scene", "--out", str(options.out), "--maps", str(options.maps)]
     command += ["--room", f"{room[0]}:{room[1]}", "--cases", ",".join(generated)]
-    command += [*(["--quick"] if options.quick else []), *(["--keep"] if options.keep else [])]
+    command += [f"--{name.replace('_', '-')}" for name in ("quick", "keep", "as_is") if getattr(options, name)]
     threads = str(max(1, (os.cpu_count() or 1) // options.jobs))
     found = subprocess.run(command, env={**os.environ, "NUMBA_NUM_THREADS": threads, "OMP_NUM_THREADS": threads})
     print(f"{room[0]}-{room[1]}: {'done' if found.returncode == 0 else 'failed'}", flush=True)

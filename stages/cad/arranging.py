@@ -75,7 +75,8 @@ def arrange(
             elif link is not None:
                 relations[name] = link
             continue
-        others = list(solids.values())
+        carried = _carried_by(graph, name)
+        others = [solid for other, solid in solids.items() if other not in carried]
         best: tuple[float, Placement, Stand | None, Solid] | None = None
         options = list(_options(chosen[name], alternatives.get(name, ()), surfaces, adjust=maximum_shift > 0))
         reaches = [maximum_shift] * len(options) + [FAR * maximum_shift] * (len(options) if maximum_shift > 0 else 0)
@@ -111,6 +112,17 @@ def arrange(
         if stand is not None:
             relations[name] = stand.relation.model_copy(update={"gap": 0.0} if stand.on_top else {})
     return Arrangement(placements, relations)
+
+
+def _carried_by(graph: ContactGraphFile, name: str) -> set[str]:
+    """Return everything that a node carries, and what that carries: it stands on it, or will, once it stands itself."""
+    found, waiting = set(), [name]
+    while waiting:
+        for child in graph.children(waiting.pop()):
+            if child not in found:
+                found.add(child)
+                waiting.append(child)
+    return found
 
 
 def _in_order(

@@ -10,9 +10,11 @@ import numpy as np
 
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile
 from schemas.scene_parts import Box, Relation, SurfacePlane
-from stages.cad.placing import supporting_surface, surface_outline
+from stages.cad.placing import supporting_surface, surface_outline, surface_share
 from stages.kit.geometry.boxes import bottom, footprint
 
+WELL_CARRIED = 0.85
+"""What stands on a surface with a smaller share of its footprint is moved onto it."""
 UNEXPLAINED_GAP = 0.05
 """A refined box that ends farther than this from its plane was not put on it by the graph [m]."""
 
@@ -95,7 +97,11 @@ def _surface_for(
     """Return (surface index, its height [m], sideways shift (2,)) for a child's box."""
     index = supporting_surface(planes, box, height, area_threshold=area_threshold, tolerance=math.inf)
     if index is not None:
-        return index, planes[index].center[2], np.zeros(2)
+        # On the model's surface (2.2) may hold where the thing would tip over the edge: models are not quite the real
+        # furniture.
+        share = surface_share(planes[index], box)
+        shift = np.zeros(2) if share >= WELL_CARRIED else shift_onto(surface_outline(planes[index]), box)
+        return index, planes[index].center[2], shift
     level = [k for k, plane in enumerate(planes) if plane.horizontal]
     if not level:
         return None, height, np.zeros(2)
