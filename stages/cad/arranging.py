@@ -11,6 +11,7 @@ import numpy as np
 
 from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import Box, Relation, SurfacePlane
+from stages.cad.bearing import shift_to_bearing
 from stages.cad.conflicts import Solid, placed_solid
 from stages.cad.fitting import shape_at
 from stages.cad.free_spots import free_spot
@@ -18,6 +19,7 @@ from stages.cad.model_surfaces import ModelSurface, to_world
 from stages.cad.placing import placed_box, placed_planes
 from stages.cad.settling import Stand, stand_on, tree_order
 from stages.cad.shapes import Placement
+from stages.kit.geometry.boxes import bottom
 
 SHRINKING = (0.97, 0.94, 0.9)
 """Scales that are tried, as shares of the fitted one, for what is nowhere free."""
@@ -88,6 +90,11 @@ def arrange(
             if stand is not None:
                 moved = replace(moved, translation=moved.translation + stand.move)
                 box = box.model_copy(update={"center": tuple(np.asarray(box.center) + stand.move)})
+            if maximum_shift > 0 and parent in placements and stand is not None and stand.outline is not None:
+                holder, middle = placements[parent], stand.outline.mean(axis=0)
+                aside = shift_to_bearing(holder, surfaces[holder.shape.model.id], box, bottom(box), middle)
+                moved = replace(moved, translation=moved.translation + [*aside, 0.0])
+                box = box.model_copy(update={"center": tuple(np.asarray(box.center) + [*aside, 0.0])})
             solid, depth = placed_solid(moved, surface), 0.0
             if maximum_shift > 0:
                 outline = None if stand is None else stand.outline
