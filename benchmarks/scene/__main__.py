@@ -14,7 +14,7 @@ from pathlib import Path
 
 from benchmarks.mapping.rooms import CLUTTER, REPORTING, TUNING_UNTRAINED, RoomFolder, make_room
 from benchmarks.scene.arms import ARMS, CASES, MASK_LEVEL, PERFECT, REAL
-from benchmarks.scene.experiment import Outcome, load_room, run_case
+from benchmarks.scene.experiment import Outcome, Shared, load_room, run_case
 from benchmarks.scene.figures_of_merit import FIGURES
 from benchmarks.scene.real_logs import run_real
 from benchmarks.scene.tables import (
@@ -49,6 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--jobs", type=int, default=min(2, os.cpu_count() or 1))
     parser.add_argument("--cases", default="", help="comma-separated; default: all")
     parser.add_argument("--as-is", action="store_true", help="take rooms and maps as they stand, even of older code")
+    parser.add_argument("--rooms", type=int, default=0, help="only so many of the rooms, in their order; 0: all")
     parser.add_argument("--keep", action="store_true", help="keep the artifacts (100 MB an arm and case)")
     parser.add_argument("--room", help="run this one room (recipe:seed) and stop")
     options = parser.parse_args(argv)
@@ -57,7 +58,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     if options.room:
         recipe, seed = options.room.split(":")
         return one_room(options, [case for case in cases if case != REAL], (recipe, int(seed)))
-    rooms = (TUNING_UNTRAINED if options.tuning else REPORTING)[: QUICK_ROOMS if options.quick else None]
+    rooms = (TUNING_UNTRAINED if options.tuning else REPORTING)[
+        : QUICK_ROOMS if options.quick else options.rooms or None
+    ]
     make_libraries(options, rooms[0])
     with ThreadPoolExecutor(options.jobs) as pool:
         codes = list(pool.map(lambda room: _room_process(options, cases, room), rooms))
@@ -128,8 +131,9 @@ def one_room(options: argparse.Namespace, cases: Sequence[str], room: tuple[str,
         True: CadLibrary(held_out_library(options)),
     }
     loaded = load_room(folder, maps, libraries)
+    shared = Shared()
     for case in missing:
-        outcomes = run_case(loaded, ARMS, case, options.out / "scenes", SEED, keep=options.keep)
+        outcomes = run_case(loaded, ARMS, case, options.out / "scenes", SEED, shared, keep=options.keep)
         write(outcome_file(options, room, case), outcomes)
     return 0
 

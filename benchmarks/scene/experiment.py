@@ -15,11 +15,13 @@ from benchmarks.scene.arms import HELD_OUT, MASK_LEVEL, PERFECT, Arm
 from benchmarks.scene.perfect_maps import perfect_map
 from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph
+from schemas.contact_graph import ContactGraphFile
 from schemas.ground_truth import GroundTruth
 from schemas.kinds import Sequence as SequenceArtifact
 from schemas.panoptic_map import PanopticMap
-from stages.cad.stage import run as replace_objects
+from stages.cad.candidates import Shortlist
+from stages.cad.model_surfaces import ModelSurface
+from stages.cad.stage import choose_and_write, find_candidates
 from stages.evaluate.correspondence import point_overlaps
 from stages.evaluate.graph_measures import compare_graphs, optional_nodes
 from stages.evaluate.map_measures import label_true_points, load_map
@@ -80,7 +82,27 @@ def load_room(folder: RoomFolder, maps: Path, libraries: Mapping[bool, CadLibrar
     return Room(folder.name, artifact, truth, world_from_log, maps, libraries)
 
 
-def run_case(room: Room, arms: Sequence[Arm], case: str, scratch: Path, seed: int, *, keep: bool) -> list[Outcome]:
+@dataclass(frozen=True)
+class Found:
+    """What arms that differ in the global check alone share of one map and library."""
+
+    shortlists: dict[str, Shortlist]
+    surfaces: dict[str, ModelSurface]
+    seconds: float
+
+
+class Shared:
+    """Contact graphs by map and method, candidates by case and method: made once, whichever arm asks first."""
+
+    def __init__(self) -> None:
+        self.graphs: dict[tuple[Path, str], ContactGraphFile] = {}
+        self.overlaps: dict[Path, dict[tuple[int, int], float]] = {}
+        self.found: dict[tuple[str, Path, str], Found] = {}
+
+
+def run_case(
+    room: Room, arms: Sequence[Arm], case: str, scratch: Path, seed: int, shared: Shared, *, keep: bool
+) -> list[Outcome]:
     """Return the outcome of every arm. Artifacts are written under `scratch` and deleted again unless `keep`."""
     folder = scratch / room.name / case
     shutil.rmtree(folder, ignore_errors=True)
@@ -89,22 +111,38 @@ def run_case(room: Room, arms: Sequence[Arm], case: str, scratch: Path, seed: in
     outcomes = []
     for arm in arms:
         map_folder = folder / "map" if case == PERFECT else room.maps / MASK_LEVEL / arm.map_arm / "panoptic_map"
-        outcomes.append(_run_arm(room, arm, case, PanopticMap(map_folder), folder / arm.name, seed))
+        outcomes.append(_run_arm(room, arm, case, PanopticMap(map_folder), folder / arm.name, seed, shared))
     if not keep:
         shutil.rmtree(folder)
     return outcomes
 
 
-def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder: Path, seed: int) -> Outcome:
-    graph = build_graph(panoptic_map, parameters=arm.graph, context=_context(folder / "contact_graph", seed))
-    library = room.libraries[case == HELD_OUT]
+def _run_arm(
+    room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder: Path, seed: int, shared: Shared
+) -> Outcome:
+    library, method = room.libraries[case == HELD_OUT], arm.graph.method
+    of_graph = (panoptic_map.root, method)
+    if of_graph not in shared.graphs:
+        context = _context(folder / "contact_graph", seed)
+        shared.graphs[of_graph] = build_graph(panoptic_map, parameters=arm.graph, context=context).graph
+    graph = shared.graphs[of_graph]
+    key = (case, panoptic_map.root, arm.cad.method)
+    context = _context(folder / "cad_scene", seed)
+    if key not in shared.found:
+        surfaces: dict[str, ModelSurface] = {}
+        start = time.process_time()
+        shortlists = find_candidates(graph, panoptic_map, library, surfaces, arm.cad, context)
+        shared.found[key] = Found(shortlists, surfaces, time.process_time() - start)
+    found = shared.found[key]
     start = time.process_time()
-    scene = replace_objects(
-        graph, panoptic_map, library, parameters=arm.cad, context=_context(folder / "cad_scene", seed)
+    scene = choose_and_write(
+        graph, panoptic_map, library, found.shortlists, found.surfaces, parameters=arm.cad, context=context
     )
-    seconds = time.process_time() - start
+    seconds = found.seconds + time.process_time() - start
     settled = settle(scene, folder / "interactive_scene", seed)
-    overlaps = overlaps_of(room.truth, panoptic_map)
+    if panoptic_map.root not in shared.overlaps:
+        shared.overlaps[panoptic_map.root] = overlaps_of(room.truth, panoptic_map)
+    overlaps = shared.overlaps[panoptic_map.root]
     measured = replacements_of(
         room.truth_artifact,
         room.truth,
@@ -115,7 +153,7 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
         library_models=library.path("models"),
     )
     assert measured is not None
-    objects = sum(node.node_type in ("rigid", "articulated") for node in graph.graph.nodes)
+    objects = sum(node.node_type in ("rigid", "articulated") for node in graph.nodes)
     distance, edges = measure_graph(room.truth, graph, overlaps)
     summary = scene.scene
     extra = {
@@ -155,10 +193,10 @@ def overlaps_of(truth: TrueRoom, panoptic_map: PanopticMap) -> dict[tuple[int, i
 
 
 def measure_graph(
-    truth: TrueRoom, graph: ContactGraph, overlaps: Mapping[tuple[int, int], float] | None
+    truth: TrueRoom, graph: ContactGraphFile, overlaps: Mapping[tuple[int, int], float] | None
 ) -> tuple[dict[str, float], dict[str, tuple[int, int, int]]]:
     """Return the edit distance with its parts, and (true, predicted, agreed) edges by relation."""
-    comparison = compare_graphs(truth, graph.graph, overlaps, EvaluateParameters().node_match_iou)
+    comparison = compare_graphs(truth, graph, overlaps, EvaluateParameters().node_match_iou)
     distance = comparison.distance
     parts = {
         "edit_distance": float(distance.total),

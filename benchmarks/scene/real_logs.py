@@ -53,7 +53,7 @@ def run_real(real: Path, scratch: Path, arms: Sequence[Arm], seed: int) -> list[
             context = _context(where / arm.name / "cad_scene", seed)
             scene = replace_objects(graph, panoptic_map, library, parameters=arm.cad, context=context)
             settled = settle(scene, where / arm.name / "interactive_scene", seed)
-            distance, edges = measure_graph(truth, graph, overlaps)
+            distance, edges = measure_graph(truth, graph.graph, overlaps)
             outcomes.append(
                 Outcome(
                     room=annotation.stem,

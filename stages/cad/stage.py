@@ -49,10 +49,25 @@ def run(
     """Replace every object by the CAD model that fits it best, such that the scene as a whole can exist."""
     if parameters.minimum_scale > parameters.maximum_scale:
         raise UsageError("minimum_scale is larger than maximum_scale")
-    graph = contact_graph.graph
     surfaces: dict[str, ModelSurface] = {}
     with context.progress.step("candidates"):
-        shortlists = find_candidates(graph, panoptic_map, library, surfaces, parameters, context)
+        shortlists = find_candidates(contact_graph.graph, panoptic_map, library, surfaces, parameters, context)
+    return choose_and_write(
+        contact_graph.graph, panoptic_map, library, shortlists, surfaces, parameters=parameters, context=context
+    )
+
+
+def choose_and_write(
+    graph: ContactGraphFile,
+    panoptic_map: PanopticMap,
+    library: CadLibrary,
+    shortlists: dict[str, Shortlist],
+    surfaces: dict[str, ModelSurface],
+    *,
+    parameters: CadParameters,
+    context: Context,
+) -> CadScene:
+    """Choose among the candidates of all objects, arrange the scene and write it (section 2.4.4)."""
     with context.progress.step("global check"):
         chosen, selection = select(graph, shortlists, surfaces, parameters, context)
         copy_meshes(graph, chosen, panoptic_map, context)
