@@ -11,11 +11,12 @@ HEIGHT ?= 480
 SEED ?= 7
 CORRUPTION ?= 0.2
 VOXEL_SIZE ?= 0.02
+SHAPES ?= 4
 .PHONY: all
 all: $(FOLDER)/cad_library/manifest.json $(FOLDER)/ground_truth/manifest.json $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/plan/manifest.json $(FOLDER)/geometric_segments/manifest.json $(FOLDER)/geometric_map/manifest.json $(FOLDER)/geometric_evaluation/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
 
 $(FOLDER)/cad_library/manifest.json: data/pipelines/demo.toml
-	$(PYTHON) -m cli library build --seed 1 --out $(FOLDER)/cad_library
+	$(PYTHON) -m cli library build --shapes-per-class '$(SHAPES)' --small-shapes-per-class '$(SHAPES)' --seed 1 --out $(FOLDER)/cad_library
 
 $(FOLDER)/ground_truth/manifest.json: data/pipelines/demo.toml $(FOLDER)/cad_library/manifest.json
 	$(PYTHON) -m cli synthesize --library $(FOLDER)/cad_library --recipe '$(RECIPE)' --frames '$(FRAMES)' --width '$(WIDTH)' --height '$(HEIGHT)' --seed '$(SEED)' --out $(FOLDER)/ground_truth

@@ -27,7 +27,7 @@ class SynthesizeParameters(Parameters):
 
 STAGE = Stage(
     name="synthesize",
-    version=2,
+    version=3,
     summary="Make a room by support rules and record it with a simulated RGB-D camera, with all ground truth",
     parameters=SynthesizeParameters,
     reads={"library": CadLibrary},

@@ -22,7 +22,7 @@ from tests.contract.test_command_line import scenewright
 from tests.reliability.kill_chain import SIGNALS, run_trial
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-SMALL = {"frames": "24", "width": "240", "height": "180", "voxel_size": "0.04", "seed": "3"}
+SMALL = {"frames": "24", "width": "240", "height": "180", "voxel_size": "0.04", "seed": "3", "shapes": "2"}
 PIPELINE = read_pipeline(pipeline_path("demo"))
 STEPS = [step.name for step in PIPELINE.step]
 
@@ -96,7 +96,13 @@ def test_make_gives_identical_digests_and_rebuilds_what_is_deleted(run_folder: P
         assert manifest(folder / name).key == manifest(run_folder / name).key, name
 
 
-@pytest.mark.parametrize("name", STEPS)
+# Unit tests repeat these three on small inputs; here they take a minute together.
+REPEATED_ELSEWHERE = ("cad_library", "ground_truth", "plan")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in REPEATED_ELSEWHERE else n for n in STEPS]
+)
 def test_same_seed_same_bytes(run_folder: Path, tmp_path: Path, name: str) -> None:
     """Every step made once more, elsewhere and on one thread, gives the same content digest."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "PYTHONHASHSEED": "7"}
