@@ -13,7 +13,7 @@ from stages.cad.conflicts import Solid, convex_solid
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.geometry.box_cover import cover_with_boxes
 from stages.kit.geometry.boxes import box_yaw
-from stages.kit.geometry.layout_slabs import surface_height
+from stages.kit.geometry.layout_slabs import level_of_layout
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.measurement.layout_pieces import layout_pieces
 
@@ -44,9 +44,7 @@ def floor_levels(graph: ContactGraphFile, layout_folder: Path) -> dict[str, floa
             continue
         file = layout_folder / f"{node.id}.ply"
         mesh = read_mesh(file, may_be_empty=True) if file.is_file() else None
-        used = [link.plane for link in graph.links if link.source == node.id and link.plane is not None]
-        planes = tuple(plane for k, plane in enumerate(node.planes) if k in used) or node.planes
-        levels[node.id] = surface_height(planes, mesh, node.box, upwards=True)
+        levels[node.id] = level_of_layout(node.id, node.class_name, node.planes, node.box, mesh, graph)
     return levels
 
 

@@ -30,12 +30,11 @@ from stages.kit.formats.scene_supports import carried_by, resting_height
 from stages.kit.formats.urdf_check import NAME, require_sound
 from stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, write_urdf
 from stages.kit.geometry.boxes import box_yaw
-from stages.kit.geometry.layout_slabs import Slab, level_slab, surface_height, wall_slabs
+from stages.kit.geometry.layout_slabs import Slab, slabs_of_layout
 from stages.kit.geometry.substances import substance_of
 from stages.kit.geometry.transforms import inverse, is_rigid
 
 WORLD = "world"
-THIN_LAYOUT = ("door", "window", "curtain")
 
 
 @dataclass(frozen=True)
@@ -198,14 +197,7 @@ def _slabs(body: BundleBody, node: GraphNode | None, graph: ContactGraphFile, ce
     if body.mesh is not None and len(body.mesh.faces):
         in_world = body.mesh.copy()
         in_world.apply_transform(body.world_from_body)
-    if body.class_name in ("floor", "ceiling"):
-        carrying = [link.plane for link in graph.links if link.source == body.name and link.plane is not None]
-        used = [plane for k, plane in enumerate(planes) if k in carrying]
-        upwards = body.class_name == "floor"
-        height = surface_height(used or planes, in_world, body.box, upwards=upwards)
-        return [level_slab(body.box, height, downwards=upwards)]
-    thickness = 0.05 if body.class_name in THIN_LAYOUT else 0.1
-    return wall_slabs(planes, in_world, body.box, center, thickness)
+    return slabs_of_layout(body.name, body.class_name, planes, body.box, in_world, graph, center)
 
 
 def _static_ancestor(body: BundleBody, by_name: dict[str, BundleBody]) -> str | None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
+from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import Box, SurfacePlane
 from stages.kit.geometry.transforms import transform_from, transform_from_quaternion
 
@@ -19,6 +20,8 @@ FLOOR_THICKNESS = 0.2
 FLOOR_MARGIN = 0.5
 """How far the floor goes on beyond what was seen of it [m]."""
 WALL_THICKNESS = 0.1
+THIN_LAYOUT = ("door", "window", "curtain")
+THIN_THICKNESS = 0.05
 MINIMUM_AREA = 0.2
 """Smaller upright surfaces get no slab [m^2]."""
 
@@ -29,6 +32,41 @@ class Slab:
 
     world_from_slab: np.ndarray
     size: np.ndarray
+
+
+def slabs_of_layout(
+    name: str,
+    class_name: str,
+    planes: Sequence[SurfacePlane],
+    box: Box,
+    mesh: trimesh.Trimesh | None,
+    graph: ContactGraphFile,
+    room_center: np.ndarray,
+) -> list[Slab]:
+    """Return the slabs that stand for a layout node in physics: one for a floor or ceiling, one for each surface of a
+    wall. `planes`, `mesh` (or None) and `box`: what is known of it, world frame; `graph` says which planes carry
+    something; `room_center` (3,): the side on which the room is."""
+    if class_name in ("floor", "ceiling"):
+        upwards = class_name == "floor"
+        height = level_of_layout(name, class_name, planes, box, mesh, graph)
+        return [level_slab(box, height, downwards=upwards)]
+    thickness = THIN_THICKNESS if class_name in THIN_LAYOUT else WALL_THICKNESS
+    return wall_slabs(planes, mesh, box, room_center, thickness)
+
+
+def level_of_layout(
+    name: str,
+    class_name: str,
+    planes: Sequence[SurfacePlane],
+    box: Box,
+    mesh: trimesh.Trimesh | None,
+    graph: ContactGraphFile,
+) -> float:
+    """Return the height [m] of the face towards the room that a floor's or ceiling's slab has: of the planes that carry
+    something, when any does (`surface_height`)."""
+    carrying = {link.plane for link in graph.links if link.source == name}
+    used = [plane for k, plane in enumerate(planes) if k in carrying]
+    return surface_height(used or planes, mesh, box, upwards=class_name == "floor")
 
 
 def level_slab(box: Box, height: float, *, downwards: bool) -> Slab:

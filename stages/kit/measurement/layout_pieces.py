@@ -8,7 +8,7 @@ import numpy as np
 
 from schemas.contact_graph import ContactGraphFile
 from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.geometry.layout_slabs import Slab, level_slab, surface_height, wall_slabs
+from stages.kit.geometry.layout_slabs import Slab, slabs_of_layout
 from stages.kit.measurement.convex_overlap import ConvexPiece, convex_piece
 
 
@@ -28,13 +28,7 @@ def layout_pieces(graph: ContactGraphFile, layout_folder: Path) -> dict[str, lis
             continue
         file = layout_folder / f"{node.id}.ply"
         mesh = read_mesh(file, may_be_empty=True) if file.is_file() else None
-        if node.class_name in ("floor", "ceiling"):
-            used = [link.plane for link in graph.links if link.source == node.id and link.plane is not None]
-            planes = tuple(plane for k, plane in enumerate(node.planes) if k in used) or node.planes
-            upwards = node.class_name == "floor"
-            slabs = [level_slab(node.box, surface_height(planes, mesh, node.box, upwards=upwards), downwards=upwards)]
-        else:
-            slabs = wall_slabs(node.planes, mesh, node.box, middle)
+        slabs = slabs_of_layout(node.id, node.class_name, node.planes, node.box, mesh, graph, middle)
         found[node.id] = [piece for slab in slabs if (piece := _slab_piece(slab)) is not None]
     return found
 
