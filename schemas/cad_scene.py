@@ -36,7 +36,7 @@ class Replacement(Model):
     best_single: CadCandidate | None = None
     """What fitted this node best by itself, before the global check and before it was put on its support."""
     part_colors: dict[str, tuple[int, int, int]] = {}
-    """Part of the chosen model -> colour (sRGB, 0 to 255) that the map shows there; parts that nobody saw are absent."""
+    """Part of the chosen model -> colour (sRGB, 0 to 255) that the map shows there; parts nobody saw are absent."""
     alternatives: tuple[CadCandidate, ...] = ()
     rejected: dict[str, int] = {}
     """Reason -> number of candidates discarded."""
