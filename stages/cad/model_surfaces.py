@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,35 @@ SAMPLES = 300
 """Points that stand for the surface of a model where it is compared with free space."""
 FACING = 0.5
 """Cosine within which a triangle belongs to a side."""
+LIVE_SCENES = 400
+"""Ray-casting scenes that exist at a time: each holds a thread-local key, and a process crashes near 1000 of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """Triangles ready for distance queries, compared by identity."""
+
+    vertices: np.ndarray
+    """(V, 3), float32."""
+    faces: np.ndarray
+    """(F, 3), uint32."""
+
+    @property
+    def scene(self) -> o3d.t.geometry.RaycastingScene:
+        """The ray-casting scene of the triangles, built again when `LIVE_SCENES` others were asked since."""
+        return _scene(self)
+
+
+@lru_cache(maxsize=LIVE_SCENES)
+def _scene(triangles: Triangles) -> o3d.t.geometry.RaycastingScene:
+    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+    scene.add_triangles(o3d.core.Tensor.from_numpy(triangles.vertices), o3d.core.Tensor.from_numpy(triangles.faces))
+    return scene
+
+
+def triangles_of(vertices: np.ndarray, faces: np.ndarray) -> Triangles:
+    """Return vertices (V, 3) and faces (F, 3) ready for distance queries."""
+    return Triangles(np.ascontiguousarray(vertices, dtype=np.float32), np.ascontiguousarray(faces, dtype=np.uint32))
 
 
 @dataclass(frozen=True)
@@ -42,8 +72,9 @@ class ModelSurface:
     """
 
     model: CadModel
-    scenes: dict[str, o3d.t.geometry.RaycastingScene]
-    sides: dict[str, dict[int, o3d.t.geometry.RaycastingScene]]
+    surfaces: dict[str, Triangles]
+    """Part -> its visual mesh."""
+    sides: dict[str, dict[int, Triangles]]
     """Part -> side (0 to 5: -x, +x, -y, +y, -z, +z of the part frame) -> the triangles that face that way."""
     corners: dict[str, np.ndarray]
     """Part -> hull vertices (K, 3) of the visual mesh, part frame; they bound the part in every pose."""
@@ -76,8 +107,11 @@ class ModelSurface:
                 side = facing_side(normals[asked] @ model_from_part[:3, :3])
                 groups = [(int(value), asked[side == value]) for value in np.unique(side)]
             for value, rows in groups:
-                scene = self.scenes[part] if value is None else self.sides[part].get(value, self.scenes[part])
-                answer = scene.compute_closest_points(o3d.core.Tensor.from_numpy(np.ascontiguousarray(local[rows])))
+                whole = self.surfaces[part]
+                asked_of = whole if value is None else self.sides[part].get(value, whole)
+                answer = asked_of.scene.compute_closest_points(
+                    o3d.core.Tensor.from_numpy(np.ascontiguousarray(local[rows]))
+                )
                 found = answer["points"].numpy().astype(float)
                 gap = np.linalg.norm(local[rows] - found, axis=1)
                 closer = gap < distance[rows]
@@ -91,10 +125,10 @@ class ModelSurface:
     def part_distance(self, points: np.ndarray, normal: np.ndarray, part: str) -> float:
         """Return the largest distance of points (N, 3), in the part's frame, to triangles of the part that face the
         way of `normal` (3,); inf when it has none."""
-        scene = self.sides[part].get(int(facing_side(normal[None])[0]))
-        if scene is None:
+        side = self.sides[part].get(int(facing_side(normal[None])[0]))
+        if side is None:
             return float("inf")
-        return float(scene.compute_distance(o3d.core.Tensor.from_numpy(points.astype(np.float32))).numpy().max())
+        return float(side.scene.compute_distance(o3d.core.Tensor.from_numpy(points.astype(np.float32))).numpy().max())
 
     def hull_points(self, joints: dict[str, float]) -> np.ndarray:
         """Return points (K, 3) in the model frame at scale 1 whose bounds are those of the posed model."""
@@ -135,11 +169,11 @@ def facing_side(normals: np.ndarray) -> np.ndarray:
 def load_surface(folder: Path, model: CadModel) -> ModelSurface:
     """Read a model folder of the library. Raises BadInput when meshes are missing."""
     visual, collision = load_visual_parts(folder), load_collision_parts(folder)
-    scenes, corners = {}, {}
-    sides: dict[str, dict[int, o3d.t.geometry.RaycastingScene]] = {}
+    surfaces, corners = {}, {}
+    sides: dict[str, dict[int, Triangles]] = {}
     for part in model.parts:
         vertices, faces = np.asarray(visual[part].vertices), np.asarray(visual[part].faces)
-        scenes[part] = _scene(vertices, faces)
+        surfaces[part] = triangles_of(vertices, faces)
         triangles = vertices[faces]
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-18)
@@ -147,7 +181,7 @@ def load_surface(folder: Path, model: CadModel) -> ModelSurface:
         for side in range(6):
             facing = faces[normals[:, side // 2] * (1.0 if side % 2 else -1.0) >= FACING]
             if len(facing):
-                sides[part][side] = _scene(vertices, facing)
+                sides[part][side] = triangles_of(vertices, facing)
         corners[part] = np.asarray(visual[part].convex_hull.vertices)
     pieces = {part: tuple(collision.get(part, [])) for part in model.parts}
     areas = {part: float(visual[part].area) for part in model.parts}
@@ -155,16 +189,7 @@ def load_surface(folder: Path, model: CadModel) -> ModelSurface:
     for k, part in enumerate(model.parts):
         count = max(1, round(SAMPLES * areas[part] / max(sum(areas.values()), 1e-12)))
         samples[part] = np.asarray(trimesh.sample.sample_surface(visual[part], count, seed=k)[0])
-    return ModelSurface(model, scenes, sides, corners, pieces, samples)
-
-
-def _scene(vertices: np.ndarray, faces: np.ndarray) -> o3d.t.geometry.RaycastingScene:
-    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-    scene.add_triangles(
-        o3d.core.Tensor.from_numpy(np.ascontiguousarray(vertices, dtype=np.float32)),
-        o3d.core.Tensor.from_numpy(np.ascontiguousarray(faces, dtype=np.uint32)),
-    )
-    return scene
+    return ModelSurface(model, surfaces, sides, corners, pieces, samples)
 
 
 def to_model(placement: Placement, points: np.ndarray) -> np.ndarray:
