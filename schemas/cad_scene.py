@@ -42,6 +42,10 @@ class Replacement(Model):
     """Reason -> number of candidates discarded."""
 
 
+SURROUNDINGS = "surroundings"
+"""The body that is made of what was mapped and has no name; it is no node of the graph."""
+
+
 class CadSceneFile(Model):
     """scene.json."""
 
@@ -56,7 +60,8 @@ class CadSceneFile(Model):
 class CadScene(Artifact):
     """`scene.json`, `graph.json` (cg': the contact graph with model, pose, scale, joints per node, boxes and
     planes of the CAD models), `models/<id>/` (copies of the chosen library models), `meshes/<node>.ply` (nodes
-    that keep their mesh), `layout/<node>.ply`."""
+    that keep their mesh), `layout/<node>.ply`, `meshes/surroundings.ply` (what the map shows and
+    has no name; absent when there is nothing)."""
 
     kind: ClassVar[str] = "cad_scene"
     description: ClassVar[str] = "CAD replacement: model, pose, scale, errors and alternatives per node"

@@ -17,7 +17,7 @@ class SceneBody(Model):
     the body link is `<name>`."""
 
     name: Name
-    """Node id of the contact graph."""
+    """Node id of the contact graph, or `surroundings`: what was mapped and has no name, static."""
     class_name: str
     movable: bool
     """Movable bodies hang on floating joints in scene.urdf and have a file of their own."""

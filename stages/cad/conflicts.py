@@ -57,8 +57,13 @@ def convex_solid(pieces: list[tuple[np.ndarray, np.ndarray]]) -> Solid:
 
 
 def placed_solid(placement: Placement, surface: ModelSurface) -> Solid:
-    """Return the convex collision pieces of a placed model."""
-    return convex_solid([(to_world(placement, v), f) for v, f in surface.posed_pieces(placement.shape.joints)])
+    """Return the convex collision pieces of a placed model, ready for collision queries."""
+    return convex_solid(placed_pieces(placement, surface))
+
+
+def placed_pieces(placement: Placement, surface: ModelSurface) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return vertices (V, 3) in the world and faces (F, 3) of the convex collision pieces of a placed model."""
+    return [(to_world(placement, v), f) for v, f in surface.posed_pieces(placement.shape.joints)]
 
 
 def penetration(a: Solid, b: Solid) -> Penetration:

@@ -9,7 +9,6 @@ import trimesh
 
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.vocabulary import load_vocabulary
-from stages.cad.conflicts import Solid, convex_solid
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.geometry.box_cover import cover_with_boxes
 from stages.kit.geometry.boxes import box_yaw
@@ -18,21 +17,24 @@ from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.measurement.layout_pieces import layout_pieces
 
 
-def obstacles_of(graph: ContactGraphFile, layout_folder: Path, mesh_folder: Path) -> dict[str, Solid]:
-    """Return node -> solid for layout (slabs) and for things that keep their mesh: the shapes that they have in the
-    exported scene, or nearly so. The folders hold their meshes, `<node>.ply`, world frame."""
+def obstacles_of(
+    graph: ContactGraphFile, layout_folder: Path, mesh_folder: Path
+) -> dict[str, list[tuple[np.ndarray, np.ndarray]]]:
+    """Return node -> convex pieces, vertices (V, 3) and faces (F, 3) in the world, of layout (slabs) and of things that
+    keep their mesh: the shapes that they have in the exported scene, or nearly so. The folders hold their meshes,
+    `<node>.ply`, world frame."""
     solids = {}
     for name, pieces in layout_pieces(graph, layout_folder).items():
-        solids[name] = convex_solid([_hull(piece.vertices) for piece in pieces])
+        solids[name] = [_hull(piece.vertices) for piece in pieces]
     for node in graph.nodes:
         file = mesh_folder / f"{node.id}.ply"
         mesh = read_mesh(file, may_be_empty=True) if file.is_file() else None
         if mesh is None or len(mesh.faces) == 0:
             continue
         if load_vocabulary().by_name(node.class_name).movable:
-            solids[node.id] = convex_solid([_hull(np.asarray(mesh.vertices))])
+            solids[node.id] = [_hull(np.asarray(mesh.vertices))]
         else:
-            solids[node.id] = convex_solid(_cover(node, mesh))
+            solids[node.id] = _cover(node, mesh)
     return solids
 
 

@@ -107,11 +107,20 @@ class CadParameters(Parameters):
     resting_tolerance: float = Field(
         0.002, ge=0.0, description="ours: penetration that is left in the finished scene where there is any way [m]"
     )
+    surroundings: bool = Field(
+        True, description="ours: what the map shows and nothing has a name for becomes a static body of the scene"
+    )
+    surroundings_clearance: float = Field(
+        0.03, ge=0.0, description="Nameless surface this near to something named counts as its rim [m]"
+    )
+    surroundings_area: float = Field(
+        0.02, ge=0.0, description="Connected nameless patches with less surface are noise [m²]"
+    )
 
 
 STAGE = Stage(
     name="cad",
-    version=3,
+    version=4,
     summary="Replace objects by CAD models that fit, stand on their supports and do not collide",
     parameters=CadParameters,
     reads={"contact_graph": ContactGraph, "panoptic_map": PanopticMap, "library": CadLibrary},

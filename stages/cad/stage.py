@@ -10,7 +10,7 @@ import numpy as np
 
 from schemas.base import as_transform
 from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadCandidate, CadScene, CadSceneFile, Replacement
+from schemas.cad_scene import SURROUNDINGS, CadCandidate, CadScene, CadSceneFile, Replacement
 from schemas.contact_graph import ContactGraph, ContactGraphFile, GraphNode
 from schemas.errors import BadInput, UsageError
 from schemas.panoptic_map import PanopticMap
@@ -18,7 +18,15 @@ from schemas.scene_parts import TREE_RELATIONS
 from stages.cad.arranging import Arrangement, arrange
 from stages.cad.candidates import Shortlist, models_for, object_points, shortlist
 from stages.cad.coloring import part_colors
-from stages.cad.conflicts import Selection, Solid, min_conflicts, penetration, placed_solid
+from stages.cad.conflicts import (
+    Selection,
+    Solid,
+    convex_solid,
+    min_conflicts,
+    penetration,
+    placed_pieces,
+    placed_solid,
+)
 from stages.cad.free_space import NOTHING_KNOWN, load_free_space
 from stages.cad.model_surfaces import ModelSurface, load_surface
 from stages.cad.obstacles import floor_levels, obstacles_of
@@ -26,8 +34,10 @@ from stages.cad.parameters import CadParameters
 from stages.cad.placing import placed_box, placed_planes
 from stages.cad.scoring import Surroundings
 from stages.cad.shapes import Placement
+from stages.cad.surroundings import footing
+from stages.cad.surroundings_files import area_of, surroundings_of, write_surroundings
 from stages.kit.formats.cad_models import model_folder
-from stages.kit.formats.entity_meshes import load_entity_mesh
+from stages.kit.formats.entity_meshes import EntityMesh, load_entity_mesh
 from stages.kit.geometry.point_clouds import sample_large_triangles, vertex_normals
 from stages.kit.geometry.transforms import transform_from
 from stages.kit.stage import Context
@@ -73,10 +83,21 @@ def choose_and_write(
         copy_meshes(graph, chosen, panoptic_map, context)
         layout = context.output / "layout"
         obstacles = obstacles_of(graph, layout, context.output / "meshes")
+        solids = {name: convex_solid(pieces) for name, pieces in obstacles.items()}
         arranged, conflicts_after = adjust(
-            graph, chosen, shortlists, surfaces, obstacles, floor_levels(graph, layout), parameters
+            graph, chosen, shortlists, surfaces, solids, floor_levels(graph, layout), parameters
         )
+    nameless: EntityMesh | None = None
+    if parameters.surroundings and parameters.method == "ours":
+        with context.progress.step("surroundings"):
+            pieces = [piece for some in obstacles.values() for piece in some]
+            for placement in arranged.placements.values():
+                placed = placed_pieces(placement, surfaces[placement.shape.model.id])
+                pieces += [*placed, footing(placed)]
+            nameless = surroundings_of(panoptic_map, pieces, parameters)
     with context.progress.step("writing"):
+        if nameless is not None:
+            write_surroundings(nameless, context.output / "meshes" / f"{SURROUNDINGS}.ply")
         colors = colors_of_parts(graph, arranged, surfaces, panoptic_map)
         scene = scene_file(graph, shortlists, arranged, colors, selection, conflicts_after)
         scene.write(context.output / "scene.json")
@@ -91,6 +112,7 @@ def choose_and_write(
         "layout": decisions.count("layout"),
         "conflicts_before": scene.conflicts_before,
         "conflicts_after": scene.conflicts_after,
+        "surroundings_m2": 0.0 if nameless is None else round(area_of(nameless), 2),
         "alignment_error_median": round(float(np.median(errors)), 4) if errors else None,
     }
     return CadScene(context.output, outcome="ok" if decisions else "empty", summary=summary)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from schemas.cad_scene import CadScene
+from schemas.cad_scene import SURROUNDINGS, CadScene
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from schemas.errors import BadInput
 from schemas.scene_parts import Box
@@ -17,16 +17,22 @@ from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.scene_bundle import BundleBody
 from stages.kit.geometry.boxes import box_from_bounds
 
+NAMELESS = "object"
+"""Class of what has no name."""
+
 
 def scene_bodies(cad_scene: CadScene, graph: ContactGraphFile, movable: Collection[str]) -> list[BundleBody]:
-    """Return one body for every node but the root: its CAD model, else its mesh, else its box.
+    """Return one body for every node but the root (its CAD model, else its mesh, else its box), and one for
+    the surroundings: what was mapped and has no name.
 
     `movable`: names of the classes that hang on floating joints. Raises BadInput for a missing model or mesh.
     """
     colors = {entry.node: entry.part_colors for entry in cad_scene.scene.replacements if entry.decision == "cad"}
-    return [
+    bodies = [
         _body(cad_scene, graph, node, movable, colors.get(node.id, {})) for node in graph.nodes if node.id != SCENE_NODE
     ]
+    nameless = cad_scene.path("meshes") / f"{SURROUNDINGS}.ply"
+    return [*bodies, _surroundings(nameless)] if nameless.is_file() else bodies
 
 
 def _body(
@@ -64,10 +70,7 @@ def _body(
         )
     mesh = _mesh(cad_scene, node)
     bounds = _box(node, mesh, cad_scene)
-    origin = np.eye(4)
-    if node.node_type != "layout":
-        # a body frame at the bottom of the thing, like that of a CAD model
-        origin[:3, 3] = np.array(bounds.center) - [0, 0, 0.5 * bounds.size[2]]
+    origin = np.eye(4) if node.node_type == "layout" else _bottom(bounds)
     if mesh is not None:
         mesh.apply_translation(-origin[:3, 3])
     return BundleBody(
@@ -80,6 +83,30 @@ def _body(
         box=bounds,
         mesh=mesh,
     )
+
+
+def _surroundings(file: Path) -> BundleBody:
+    mesh = read_mesh(file, hint="run `cad` again")
+    bounds = box_from_bounds(mesh.bounds[0], mesh.bounds[1])
+    origin = _bottom(bounds)
+    mesh.apply_translation(-origin[:3, 3])
+    return BundleBody(
+        name=SURROUNDINGS,
+        class_name=NAMELESS,
+        parent=None,
+        relation="supports",
+        world_from_body=origin,
+        movable=False,
+        box=bounds,
+        mesh=mesh,
+    )
+
+
+def _bottom(box: Box) -> np.ndarray:
+    """Return a body frame (4, 4) at the bottom of a thing, like that of a CAD model."""
+    origin = np.eye(4)
+    origin[:3, 3] = np.array(box.center) - [0, 0, 0.5 * box.size[2]]
+    return origin
 
 
 def _mesh(cad_scene: CadScene, node: GraphNode) -> trimesh.Trimesh | None:

@@ -11,20 +11,24 @@ import numpy as np
 import trimesh
 
 MINIMUM_THICKNESS = 0.01
+LEAST_MAXIMUM, BOXES_PER_AREA = 200, 100.0
+"""Most boxes of a mesh: at least so many, and so many for each square metre."""
 MINIMUM_AREA_SHARE = 0.1
 """Cuboids with less surface than this share of a voxel's face are noise."""
 
 
 def cover_with_boxes(
-    mesh: trimesh.Trimesh, yaw: float = 0.0, *, voxel_size: float = 0.04, maximum: int = 200
+    mesh: trimesh.Trimesh, yaw: float = 0.0, *, voxel_size: float = 0.04, maximum: int | None = None
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return boxes (centre (3,), full edge lengths (3,)) [m] over the surface, in the mesh's frame turned by `yaw`.
 
     A point p of the mesh is Rz(yaw) q for a point q of the boxes' frame. The voxels grow until there are at most
-    `maximum` boxes. Raises ValueError for a mesh without triangles.
+    `maximum` boxes (by default as many as the area needs, 200 for 2 m²). Raises ValueError for no triangles.
     """
     if len(mesh.faces) == 0:
         raise ValueError("mesh has no triangles")
+    if maximum is None:
+        maximum = max(LEAST_MAXIMUM, int(BOXES_PER_AREA * mesh.area))
     cosine, sine = np.cos(yaw), np.sin(yaw)
     turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1.0]])
     vertices = np.asarray(mesh.vertices, dtype=float) @ turn.T

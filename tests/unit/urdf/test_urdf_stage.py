@@ -62,6 +62,19 @@ def test_supports_become_joints_by_what_is_movable(cad_scene, tmp_path):
     assert (visual.bounds + pose[:3, 3])[0] == pytest.approx([-0.1, -0.3, 0.7], abs=0.01)
 
 
+def test_what_has_no_name_is_a_static_body(cad_scene, tmp_path):
+    counter = trimesh.creation.box(bounds=[(-1.4, 1.0, 0.0), (-0.9, 1.4, 0.9)])
+    counter.export(cad_scene.root / "meshes" / "surroundings.ply")
+    quick = UrdfParameters(settle_seconds=0, rest=False)
+    made = run(cad_scene, parameters=quick, context=context(tmp_path / "out"))
+    body = next(body for body in made.scene.bodies if body.name == "surroundings")
+    assert not body.movable and body.parent is None
+    joint = next(joint for joint in parse_urdf(made.path("static.urdf")).joints if joint.child == "surroundings")
+    assert (joint.parent, joint.type) == ("world", "fixed")
+    assert np.array(body.box.center) == pytest.approx([-1.15, 1.2, 0.45])
+    assert made.graph == cad_scene.graph, "it is no node"
+
+
 def test_what_hangs_in_the_air_is_named(cad_scene, tmp_path, caplog):
     run(cad_scene, parameters=UrdfParameters(settle_seconds=1.5, rest=False), context=context(tmp_path / "out"))
     messages = [record.getMessage() for record in caplog.records]
