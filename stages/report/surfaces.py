@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from schemas.cad_scene import CadCandidate, CadScene
+from schemas.cad_scene import SURROUNDINGS, CadCandidate, CadScene
 from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth
 from schemas.panoptic_map import PanopticMap
@@ -21,6 +21,9 @@ from stages.kit.measurement.cad_candidates import after_check
 from stages.kit.measurement.palette import LAYOUT_COLORS, UNLABELLED, entity_color
 from stages.kit.rendering.surfaces import TriangleSoup, build_soup, srgb_to_linear
 from stages.report.placed_models import ModelShelf
+
+NAMELESS = 99_999
+"""Instance of the surroundings; no node has it."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +128,7 @@ def _vertex_colors(mesh: trimesh.Trimesh) -> np.ndarray:
 def cad_model(
     cad_scene: CadScene, shelf: ModelShelf | None = None, candidates: Mapping[str, CadCandidate | None] | None = None
 ) -> Model | None:
-    """The CAD scene: models where they stand, reconstructed meshes where there is none, layout.
+    """The CAD scene: models where they stand, reconstructed meshes where there is none, layout, surroundings.
 
     `candidates`: node -> what stands for it, instead of what the scene chose; their models come from `shelf`.
     """
@@ -153,6 +156,9 @@ def cad_model(
         node_ids[number] = replacement.node
         if replacement.decision != "layout":
             names[number] = (f"{class_name} {number}" if node is not None else replacement.node).replace("_", " ")
+    nameless = _load(cad_scene, f"meshes/{SURROUNDINGS}.ply") if candidates is None else None
+    if nameless is not None:
+        meshes.append((NAMELESS, nameless))
     return Model(build_soup(meshes), classes, names, node_ids) if meshes else None
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadCandidate, CadScene, Replacement
+from schemas.cad_scene import SURROUNDINGS, CadCandidate, CadScene, Replacement
 from stages.kit.formats.cad_models import read_model
 from stages.kit.formats.painted_models import painted_mesh
 from stages.kit.measurement.cad_candidates import candidates_of
@@ -46,6 +46,9 @@ def draw_cad_scene(cad_scene: CadScene, canvas: Canvas) -> None:
         if path.exists():
             canvas.mesh(f"{group}/{replacement.node}", load_mesh(path), front_only=True)
         rows.append(f"| {replacement.node} | {replacement.decision} | {replacement.reason} | | |")
+    nameless = cad_scene.path("meshes") / f"{SURROUNDINGS}.ply"
+    if nameless.exists():
+        canvas.mesh(SURROUNDINGS, load_mesh(nameless), front_only=True)
     draw_graph(cad_scene.graph, canvas, CANDIDATES)
     canvas.document("replacements", "\n".join(rows))
     canvas.document(CANDIDATES, candidate_table(cad_scene))
