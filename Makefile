@@ -40,11 +40,12 @@ lock: ## Write requirements.lock from what is installed, but for the extras
 # ---- checks -------------------------------------------------------------------------------------------------------
 
 .PHONY: test test-all fuzz lint format rules
-test: setup ## Run the tests (under 12 minutes on 2 cores)
-	$(PYTHON) -m pytest
+TEST_JOBS ?= 2
+test: setup ## Run the tests (under 12 minutes on 2 cores; TEST_JOBS=2)
+	OMP_NUM_THREADS=1 $(PYTHON) -m pytest -n $(TEST_JOBS) --dist loadfile
 
 test-all: extras ## Run the slow tests and those of the extras too
-	$(PYTHON) -m pytest -m ''
+	OMP_NUM_THREADS=1 $(PYTHON) -m pytest -n $(TEST_JOBS) --dist loadfile -m ''
 
 SECONDS_EACH ?= 60
 fuzz: extras ## Fuzz every parser with coverage guidance (SECONDS_EACH=60)

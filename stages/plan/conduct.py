@@ -19,6 +19,9 @@ from stages.plan.pick_place import Budgets
 from stages.plan.refinement import Step, refine_action
 from stages.plan.world_model import RobotState, WorldModel
 
+JOINT_TOLERANCE = 0.05
+"""A joint further than this from where a motion should have left it is looked at again [rad or m]."""
+
 
 @dataclass(frozen=True)
 class Room:
@@ -83,6 +86,7 @@ class Conduct:
                 for offset, step in enumerate(steps):
                     self.physical.action = number + min(offset, len(group) - 1)
                     self._execute(step)
+                    self._check_joints(step)
                 self._check_effect(name, arguments)
                 return self._perceived(after)
             except MotionFailed as failed:
@@ -91,8 +95,19 @@ class Conduct:
                     return None
                 if state.holding is not None and self.physical.held is None:
                     return None  # what was held is gone: nothing left to place
-                state = self._recover(state)
+                recovered = self._recovered(state, name, arguments)
+                if recovered is None:
+                    return None
+                state = recovered
         return None
+
+    def _recovered(self, state: RobotState, name: str, arguments: tuple[str, ...]) -> RobotState | None:
+        """Return the state after the way back, None (and a note) when the arm does not get there either."""
+        try:
+            return self._recover(state)
+        except MotionFailed as failed:
+            self._note(failed, name, arguments)
+            return None
 
     def _note(self, failed: MotionFailed, name: str, arguments: tuple[str, ...]) -> None:
         action = f"{name}({', '.join(arguments)})"
@@ -160,6 +175,20 @@ class Conduct:
         for segment in step.segments:
             self.physical.follow(segment, item)
         self.physical.recording.keyframe(self.physical.action, step.name)
+
+    def _check_joints(self, step: Step) -> None:
+        """Raises MotionFailed `condition_not_met` when a joint is not where the motion should have brought it: what
+        follows was planned around it."""
+        for planned, goal in step.manipulation.joint_values.items() if step.manipulation is not None else ():
+            there, body = self.joint_names[planned], self._matched(self._owner(planned))
+            value = self.physical.world.joint_value(body, there)
+            if abs(value - goal) > JOINT_TOLERANCE:
+                raise MotionFailed(
+                    "condition_not_met",
+                    f"the joint {there} stands at {value:.3f} instead of {goal:.3f}",
+                    (planned,),
+                    {"value": value, "goal": goal},
+                )
 
     def _check_effect(self, name: str, arguments: tuple[str, ...]) -> None:
         """Raises MotionFailed `condition_not_met` when a door is not as the action should leave it."""

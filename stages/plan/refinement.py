@@ -99,9 +99,9 @@ def refine_action(
             )
             manipulation, path = _same_turns(manipulation, path)
             rows = np.concatenate([path, np.tile(state.arm, (len(path), 1))], axis=1)
-            opening = 0.0 if state.holding else model.description.opening
             if len(path) > 1:
-                steps.append(Step("drive", (origin, target), (Segment(rows, opening, 1.0, "", state.holding),), None))
+                # with the fingers together, though the way was checked with open ones: that much more clearance
+                steps.append(Step("drive", (origin, target), (Segment(rows, 0.0, 1.0, "", state.holding),), None))
             steps.append(Step(name, arguments, manipulation.segments, manipulation))
             state = apply_effect(model, state, name, arguments, manipulation)
             origin = target
