@@ -134,7 +134,7 @@ def _judge(answer: Answer) -> None:
     """Check the envelope. Raises BadInput for another kind of server, TryAgain for one that stumbled."""
     kind = answer.content_type.split(";")[0].strip().lower()
     if kind != "application/json":
-        raise BadInput(f"the answer's content type is {answer.content_type:.60!r}, not JSON", hint=REFUSED_HINT)
+        raise BadInput(f"the answer's content type is {answer.content_type[:60]!r}, not JSON", hint=REFUSED_HINT)
     try:
         envelope = json.loads(answer.body)
         content = envelope["choices"][0]["message"].get("content")
