@@ -133,7 +133,7 @@ def find_path(
         if confirm(query, path, checker, effort) is None:
             return path
         effort.rejected += 1
-    if effort.rejected or counts[UNCERTAIN_COUNT] or not _compiled_free(query, goals, checker):
+    if effort.rejected or may_differ(query, goals, checker, counts):
         return _mesh_path(query, goals, checker, random, samples, smoothing, effort)
     raise no_path(samples, blockers(counts, checker))
 
@@ -224,11 +224,15 @@ def is_free(query: Query, path: np.ndarray, checker: CollisionChecker, counts: n
     return True
 
 
-def _compiled_free(query: Query, goals: np.ndarray, checker: CollisionChecker) -> bool:
-    """Whether the start and all goals are free for the compiled check too."""
+def may_differ(query: Query, goals: np.ndarray, checker: CollisionChecker, counts: np.ndarray) -> bool:
+    """Whether the mesh checker might find a way where the compiled check does not.
+
+    So it is when a refusal was uncertain, or one of the ends, free for the meshes, is not for the compiled check.
+    """
     robot, scene = checker.arrays()
     ends = [query.start, *goals]
-    return all(find_collision(robot, scene, query.whole(end), 0)[0] == FREE for end in ends)
+    refused = any(find_collision(robot, scene, query.whole(end), 0)[0] != FREE for end in ends)
+    return refused or bool(counts[UNCERTAIN_COUNT])
 
 
 def _mesh_path(
