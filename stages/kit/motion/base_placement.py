@@ -89,14 +89,22 @@ def plan_drive(
 
     The yaw of the last point may differ from the goal's by whole turns. Raises MotionFailed as `find_path` does.
     """
-    turn = float(_wrapped(np.array(goal[2] - start[2])))
-    target = np.array([goal[0], goal[1], start[2] + turn])
-    low = np.array([*np.minimum(room[0], np.minimum(start, goal)[:2]), start[2] - np.pi - abs(turn)])
-    high = np.array([*np.maximum(room[1], np.maximum(start, goal)[:2]), start[2] + np.pi + abs(turn)])
-    space = SearchSpace(low, high, BASE_RESOLUTION)
-    query = Query(np.concatenate([start, arm]), np.arange(3), np.asarray(start, dtype=float), target[None], space)
+    query = base_query(np.asarray(start, dtype=float), goal, arm, room)
     try:
         return find_path(query, checker, random, samples=samples, smoothing=80)
     except MotionFailed as failed:
         what = failed.failure
         raise MotionFailed(what.kind, f"driving: {what.message}", what.objects, dict(what.numbers)) from None
+
+
+def base_query(start: np.ndarray, goal: np.ndarray, arm: np.ndarray, room: tuple[np.ndarray, np.ndarray]) -> Query:
+    """Return the search for a way of the base from `start` to `goal` (3,) with the arm (7,) held.
+
+    The yaw goes the shorter way round; start and goal may stand outside the floor's corners.
+    """
+    turn = float(_wrapped(np.array(goal[2] - start[2])))
+    target = np.array([goal[0], goal[1], start[2] + turn])
+    low = np.array([*np.minimum(room[0], np.minimum(start, goal)[:2]), start[2] - np.pi - abs(turn)])
+    high = np.array([*np.maximum(room[1], np.maximum(start, goal)[:2]), start[2] + np.pi + abs(turn)])
+    space = SearchSpace(low, high, BASE_RESOLUTION)
+    return Query(np.concatenate([start, arm]), np.arange(3), start, target[None], space)

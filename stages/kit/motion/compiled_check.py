@@ -112,9 +112,7 @@ def _pieces_meet(robot: RobotArrays, frames: np.ndarray, pair: int, centers: np.
 
 
 @njit(cache=True)
-def find_collision(
-    robot: RobotArrays, scene: SceneArrays, body: np.ndarray, first_frame: int
-) -> tuple[int, int, int]:
+def find_collision(robot: RobotArrays, scene: SceneArrays, body: np.ndarray, first_frame: int) -> tuple[int, int, int]:
     """Return FREE, UNCERTAIN or HIT of a configuration (3 + J,), the part, and the other: the first that is not free.
 
     The other is the index of a scene group, or -1 - part of another part of the robot. Pieces on frames before

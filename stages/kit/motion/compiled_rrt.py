@@ -101,7 +101,9 @@ def search(
         for k in range(dimension):
             sample[k] = lower[k] + (upper[k] - lower[k]) * random.random()
         near = _nearest(points_a, count_a, sample, resolution)
-        free, steps = last_free(robot, scene, body, moving, first_frame, points_a[near], sample, resolution, step, counts)
+        free, steps = last_free(
+            robot, scene, body, moving, first_frame, points_a[near], sample, resolution, step, counts
+        )
         if free > 0:
             if count_a + 1 >= points_a.shape[0]:
                 points_a, parents_a = _grown(points_a, parents_a)

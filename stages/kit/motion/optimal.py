@@ -22,6 +22,7 @@ from stages.kit.motion.path_search import (
     Query,
     blockers,
     check_ends,
+    compiled_free,
     confirm,
     find_path,
     is_free,
@@ -53,7 +54,11 @@ def optimal_path(
     effort = Effort() if effort is None else effort
     goals = check_ends(query, checker)
     counts = np.zeros(1 + len(checker.compiled.parts) + len(checker.compiled.groups), dtype=np.int64)
-    path = _solve(query, goals, checker, random, iterations, counts, effort)
+    # OMPL waits for ever for ends that it can use: it gets those that the compiled check frees.
+    usable = np.array([goal for goal in goals if compiled_free(query, goal, checker)])
+    path = None
+    if len(usable) and compiled_free(query, query.start, checker):
+        path = _solve(query, usable, checker, random, iterations, counts, effort)
     if path is not None:
         for candidate in (shorten_path(query, path, checker, random, smoothing), path):
             if is_free(query, candidate, checker, counts):

@@ -153,8 +153,7 @@ def no_path(samples: int, hits: Counter[str]) -> MotionFailed:
     worst, count = hits.most_common(1)[0] if hits else ("", 0)
     return MotionFailed(
         "no_path",
-        f"no path within {samples} samples; {worst or 'nothing'} blocked most "
-        f"({count} of {hits.total()} collisions)",
+        f"no path within {samples} samples; {worst or 'nothing'} blocked most ({count} of {hits.total()} collisions)",
         (worst,) if worst else (),
         {"samples": samples, "hits": count},
     )
@@ -229,10 +228,14 @@ def may_differ(query: Query, goals: np.ndarray, checker: CollisionChecker, count
 
     So it is when a refusal was uncertain, or one of the ends, free for the meshes, is not for the compiled check.
     """
-    robot, scene = checker.arrays()
-    ends = [query.start, *goals]
-    refused = any(find_collision(robot, scene, query.whole(end), 0)[0] != FREE for end in ends)
+    refused = any(not compiled_free(query, end, checker) for end in (query.start, *goals))
     return refused or bool(counts[UNCERTAIN_COUNT])
+
+
+def compiled_free(query: Query, values: np.ndarray, checker: CollisionChecker) -> bool:
+    """Whether moving values (D,) are free for the compiled check."""
+    robot, scene = checker.arrays()
+    return bool(find_collision(robot, scene, query.whole(values), 0)[0] == FREE)
 
 
 def _mesh_path(
