@@ -19,15 +19,17 @@ from stages.kit.motion.rrt_connect import SearchSpace, rrt_connect
 
 RESOLUTION = 0.05
 """Largest step of a joint between two checks [rad]."""
-OMPL_RESOLUTION = 0.08
-"""OMPL's steps are Euclidean: moving all joints, 0.08 rad there is about 0.05 rad of the joint that moves most."""
+OMPL_RESOLUTION = 0.05
+"""OMPL's steps are Euclidean, so that no joint moves by more than this."""
 SPACE = SearchSpace(CHAIN.lower, CHAIN.upper, np.full(7, RESOLUTION))
 SMOOTHING = 60
 """Attempts at a shortcut, for every planner."""
-SAMPLES = 2000
+SAMPLES = 20000
+"""Of ours; the old planner in Python gets the 2000 that it was used with."""
+PYTHON_SAMPLES = 2000
 BIT_ITERATIONS = 2000
 OMPL_SECONDS = 20.0
-"""Of CPU time, after which OMPL gives up: ten times what 2000 samples take the old planner at the median."""
+"""Of CPU time, after which OMPL gives up."""
 Arm = Callable[[CollisionChecker, MotionQuery, int], np.ndarray | None]
 
 
@@ -61,7 +63,7 @@ def python_pybullet(checker: CollisionChecker, query: MotionQuery, seed: int) ->
     try:
         return rrt_connect(
             query.start, query.goal, lambda arm: checker.check_meshes(np.concatenate([query.base, arm])), SPACE,
-            np.random.default_rng(seed), samples=SAMPLES, smoothing=SMOOTHING,
+            np.random.default_rng(seed), samples=PYTHON_SAMPLES, smoothing=SMOOTHING,
         )  # fmt: skip
     except MotionFailed:
         return None

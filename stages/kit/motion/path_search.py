@@ -7,7 +7,7 @@ not finding a path, the search goes on with the mesh checker deciding, so that n
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,10 +15,14 @@ from stages.kit.motion.collision import Collision, CollisionChecker
 from stages.kit.motion.compiled_check import FREE, find_collision
 from stages.kit.motion.compiled_rrt import UNCERTAIN_COUNT, last_free, search, shorten
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.rrt_connect import FINER, SearchSpace, densify, rrt_connect
+from stages.kit.motion.rrt_connect import FINER, SearchSpace, densify, first_collision, interpolate, rrt_connect
 
 STEP = 8
 """Longest extension of a tree, in resolutions."""
+MESH_SAMPLES = 2000
+"""At most so many samples are drawn when the mesh checker has taken over: one costs as much as ten compiled ones."""
+ESCAPES = 120
+"""Directions that are tried to leave a place too narrow for the compiled check."""
 REJECTIONS = 4
 """So many paths that the meshes reject, and the mesh checker takes over the search."""
 
@@ -124,18 +128,48 @@ def find_path(
     """
     effort = Effort() if effort is None else effort
     goals = check_ends(query, checker)
-    parts = checker.compiled.parts
-    counts = np.zeros(1 + len(parts) + len(checker.compiled.groups), dtype=np.int64)
-    while effort.samples < samples and effort.rejected < REJECTIONS:
-        path = _compiled_path(query, goals, checker, random, samples - effort.samples, smoothing, counts, effort)
+    counts = np.zeros(1 + len(checker.compiled.parts) + len(checker.compiled.groups), dtype=np.int64)
+    ways = [way for goal in goals if (way := leave_narrow(query, goal, checker, random, effort)) is not None]
+    start = leave_narrow(query, query.start, checker, random, effort)
+    while start is not None and ways and effort.samples < samples and effort.rejected < REJECTIONS:
+        path = _compiled_path(
+            replace(query, start=start[-1]), np.array([way[-1] for way in ways]), checker, random,
+            samples - effort.samples, smoothing, counts, effort,
+        )  # fmt: skip
         if path is None:
             break
+        last = next(way for way in ways if np.array_equal(way[-1], path[-1]))
+        path = without_repeats(np.concatenate([start, path[1:], last[::-1][1:]]))
         if confirm(query, path, checker, effort) is None:
             return path
         effort.rejected += 1
     if effort.rejected or may_differ(query, goals, checker, counts):
-        return _mesh_path(query, goals, checker, random, samples, smoothing, effort)
+        return _mesh_path(query, goals, checker, random, min(samples, MESH_SAMPLES), smoothing, effort)
     raise no_path(samples, blockers(counts, checker))
+
+
+def leave_narrow(
+    query: Query, end: np.ndarray, checker: CollisionChecker, random: np.random.Generator, effort: Effort
+) -> np.ndarray | None:
+    """Return a way (K, D) from an end (D,) to where the compiled check is free: the end alone when it is so there.
+
+    A straight piece in a random direction, free for the meshes at FINER times the resolution; None when none of
+    ESCAPES leads out.
+    """
+    if compiled_free(query, end, checker):
+        return end[None]
+    before = checker.checks
+    found = None
+    for number in range(ESCAPES):
+        reach = query.space.resolution * (1 + 5 * number / ESCAPES)
+        target = np.clip(end + random.uniform(-1, 1, len(end)) * reach, query.space.lower, query.space.upper)
+        if compiled_free(query, target, checker):
+            points = interpolate(end, target, query.space.resolution / FINER)
+            if first_collision(points, lambda values: checker.check(query.whole(values))) is None:
+                found = np.array([end, target])
+                break
+    effort.mesh_checks += checker.checks - before
+    return found
 
 
 def blockers(counts: np.ndarray, checker: CollisionChecker) -> Counter[str]:
@@ -179,10 +213,11 @@ def _compiled_path(
     robot, scene = checker.arrays()
     space = query.space
     used = 0
+    finer = 1
     while used < samples:
         path, spent = search(
             robot, scene, query.body.copy(), query.moving, query.first_frame, query.start, goals, space.lower,
-            space.upper, space.resolution, samples - used, STEP, random, counts,
+            space.upper, space.resolution / finer, samples - used, STEP * finer, random, counts,
         )  # fmt: skip
         used += spent
         effort.samples += spent
@@ -193,6 +228,7 @@ def _compiled_path(
             path = shorten_path(query, path, checker, random, smoothing)
         if is_free(query, path, checker, counts):
             return path
+        finer = FINER  # something thin lay between two checks; it will again
         used += 1
         effort.samples += 1
     return None
@@ -201,11 +237,11 @@ def _compiled_path(
 def shorten_path(
     query: Query, path: np.ndarray, checker: CollisionChecker, random: np.random.Generator, attempts: int
 ) -> np.ndarray:
-    """Return a shorter path (M, D) that is free for the compiled check at half the resolution."""
+    """Return a shorter path (M, D), its new pieces free for the compiled check at FINER times the resolution."""
     robot, scene = checker.arrays()
     return shorten(
-        robot, scene, query.body.copy(), query.moving, query.first_frame, path, query.space.resolution / 2, attempts,
-        random,
+        robot, scene, query.body.copy(), query.moving, query.first_frame, path, query.space.resolution / FINER,
+        attempts, random,
     )  # fmt: skip
 
 
