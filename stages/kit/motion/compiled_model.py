@@ -106,7 +106,7 @@ class CompiledModel:
                     pieces += shapes[link]
                     begin.append(len(pieces))
             self._group_range[name] = range(first, len(self.groups))
-        self._scene_pieces = pieces
+        self._box_from_link = np.array([inverse(piece.box[0]) for piece in pieces]).reshape(-1, 4, 4)
         count = len(self.groups)
         self.scene = SceneArrays(
             low=np.zeros((count, 3)),
@@ -125,16 +125,18 @@ class CompiledModel:
             self._seen_body[name] = self.world.revision
 
     def _place(self, name: str, groups: range) -> None:
+        """Put the groups of a body where its links are now; links that did not move are left alone."""
+        scene = self.scene
         for group in groups:
+            begin, end = int(scene.piece_begin[group]), int(scene.piece_begin[group + 1])
             world_from_link = self.world.link_pose(name, self.groups[group])
-            corners = []
-            for index in range(self.scene.piece_begin[group], self.scene.piece_begin[group + 1]):
-                piece = self._scene_pieces[index]
-                self.scene.pose[index] = world_from_link[:3]
-                self.scene.box[index] = inverse(world_from_link @ piece.box[0])[:3]
-                corners.append(piece.vertices @ world_from_link[:3, :3].T + world_from_link[:3, 3])
-            points = np.concatenate(corners)
-            self.scene.low[group], self.scene.high[group] = points.min(axis=0), points.max(axis=0)
+            if np.array_equal(scene.pose[begin], world_from_link[:3]):
+                continue
+            scene.pose[begin:end] = world_from_link[:3]
+            scene.box[begin:end] = (self._box_from_link[begin:end] @ inverse(world_from_link))[:, :3]
+            vertices = scene.vertices[scene.vertex_begin[begin] : scene.vertex_begin[end]]
+            points = vertices @ world_from_link[:3, :3].T + world_from_link[:3, 3]
+            scene.low[group], scene.high[group] = points.min(axis=0), points.max(axis=0)
 
     def _allow(self, carried: str | None, touchable: frozenset[str], rest_on: Mapping[str, float]) -> None:
         allowed = self.scene.allowed
