@@ -153,6 +153,12 @@ bench-timeline: setup ## The contact graph while the map grows: edit distance an
 scenenn: setup ## The thesis's tables on SceneNN: make scenenn DATA=folder (OPTIONS="--backend ... --arms ...")
 	$(PYTHON) -m benchmarks.tables.scenenn $(if $(DATA),--data $(DATA)) $(OPTIONS) --out $(OUTPUTS)/experiments/scenenn
 
+.PHONY: bench-planning
+# 100 reporting seeds a query set (QUICK=1: 10); SCENE is an interactive scene, for the case reconstructed_room.
+SCENE ?= $(OUTPUTS)/demo/interactive_scene
+bench-planning: setup ## Planning beside OMPL with pybullet checks (QUICK=1: 10 queries a set; SCENE=folder)
+	$(PYTHON) -m benchmarks.planning $(if $(QUICK),--quick) $(if $(wildcard $(SCENE)),--scene $(SCENE)) --out $(OUTPUTS)/experiments/bench-planning$(if $(QUICK),-quick)
+
 .PHONY: pictures
 pictures: setup ## Take the README's pictures out of the demo run
 	$(PYTHON) docs/pictures.py $(OUTPUTS)/demo

@@ -13,7 +13,8 @@ from stages.kit.motion.cartesian import follow, straight_poses
 from stages.kit.motion.collision import Collision
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.kinematics import forward, inverse_kinematics, random_starts, reach
-from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
+from stages.kit.motion.path_search import Query, find_path
+from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision
 from stages.kit.simulation.robot import base_pose
 from stages.plan.world_model import WorldModel
 
@@ -137,10 +138,9 @@ class ArmPlanner:
         return self.model.checker.check(np.concatenate([base, arm]))
 
     def path(self, base: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
-        """Return a free joint path (N, 7). Raises MotionFailed as rrt_connect does."""
-        return rrt_connect(
-            start, goal, lambda arm: self._check(base, arm), self.space, self.random, samples=self.samples
-        )
+        """Return a free joint path (N, 7). Raises MotionFailed as find_path does."""
+        query = Query(np.concatenate([base, start]), np.arange(3, 10), start, goal[None], self.space)
+        return find_path(query, self.model.checker, self.random, samples=self.samples)
 
     def folded(self, base: np.ndarray, arm: np.ndarray, tally: Tally) -> np.ndarray | None:
         """Return arm values (7,) with the tool drawn in over the pedestal; what is held stays upright."""

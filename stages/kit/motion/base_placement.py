@@ -9,7 +9,8 @@ import numpy as np
 from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.rrt_connect import SearchSpace, rrt_connect
+from stages.kit.motion.path_search import Query, find_path
+from stages.kit.motion.rrt_connect import SearchSpace
 from stages.kit.simulation.robot import base_pose
 from stages.kit.simulation.robot_description import RobotDescription
 
@@ -86,18 +87,24 @@ def plan_drive(
 ) -> np.ndarray:
     """Return a free path (N, 3) of the base from `start` to `goal`, x, y [m], yaw [rad], the arm (7,) held still.
 
-    The yaw of the last point may differ from the goal's by whole turns. Raises MotionFailed as `rrt_connect` does.
+    The yaw of the last point may differ from the goal's by whole turns. Raises MotionFailed as `find_path` does.
+    """
+    query = base_query(np.asarray(start, dtype=float), goal, arm, room)
+    try:
+        return find_path(query, checker, random, samples=samples, smoothing=80)
+    except MotionFailed as failed:
+        what = failed.failure
+        raise MotionFailed(what.kind, f"driving: {what.message}", what.objects, dict(what.numbers)) from None
+
+
+def base_query(start: np.ndarray, goal: np.ndarray, arm: np.ndarray, room: tuple[np.ndarray, np.ndarray]) -> Query:
+    """Return the search for a way of the base from `start` to `goal` (3,) with the arm (7,) held.
+
+    The yaw goes the shorter way round; start and goal may stand outside the floor's corners.
     """
     turn = float(_wrapped(np.array(goal[2] - start[2])))
     target = np.array([goal[0], goal[1], start[2] + turn])
     low = np.array([*np.minimum(room[0], np.minimum(start, goal)[:2]), start[2] - np.pi - abs(turn)])
     high = np.array([*np.maximum(room[1], np.maximum(start, goal)[:2]), start[2] + np.pi + abs(turn)])
     space = SearchSpace(low, high, BASE_RESOLUTION)
-    try:
-        return rrt_connect(
-            start, target, lambda base: checker.check(np.concatenate([base, arm])), space, random,
-            samples=samples, step=10.0, smoothing=80,
-        )  # fmt: skip
-    except MotionFailed as failed:
-        what = failed.failure
-        raise MotionFailed(what.kind, f"driving: {what.message}", what.objects, dict(what.numbers)) from None
+    return Query(np.concatenate([start, arm]), np.arange(3), start, target[None], space)

@@ -1,4 +1,7 @@
-"""Collision checks of a mobile arm, and of what it carries, with the bodies of a pybullet world."""
+"""Collision checks of a mobile arm, and of what it carries, with the bodies of a pybullet world.
+
+Two checkers of one meaning: pybullet's on the meshes, and a compiled one that says free only where the first does.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.kit.geometry.transforms import inverse
+from stages.kit.motion.compiled_arrays import RobotArrays, SceneArrays
+from stages.kit.motion.compiled_check import FREE, find_collision
+from stages.kit.motion.compiled_model import CompiledModel
 from stages.kit.simulation.engine import engine
 from stages.kit.simulation.robot import Robot
 from stages.kit.simulation.robot_description import PEDESTAL_LINK
@@ -30,6 +36,16 @@ class Collision:
     """Penetration [m]; negative when only the clearance is missed."""
 
 
+@dataclass(frozen=True)
+class CheckerState:
+    """What a checker was told of the hand."""
+
+    carried: str | None
+    tool_from_carried: np.ndarray
+    touchable: frozenset[str]
+    rest_on: Mapping[str, float]
+
+
 class CollisionChecker:
     """Asks whether configurations (10,) of base and arm are free.
 
@@ -41,6 +57,8 @@ class CollisionChecker:
         self.robot = robot
         self.clearance = clearance
         self.checks = 0
+        """Checks of the meshes so far."""
+        self.compiled = CompiledModel(world, robot, clearance)
         self.carried: str | None = None
         self._tool_from_carried = np.eye(4)
         self._touchable: frozenset[str] = frozenset()
@@ -90,6 +108,18 @@ class CollisionChecker:
         """Say which links (by name) hand and fingers may touch, and how deep [m] the carried body may be in which."""
         self._touchable, self._rest_on = frozenset(touch), dict(rest_on or {})
 
+    def state(self) -> CheckerState:
+        """Return what is carried and allowed, for `restore`."""
+        return CheckerState(self.carried, self._tool_from_carried, self._touchable, self._rest_on)
+
+    def restore(self, state: CheckerState) -> None:
+        """Carry and allow what was carried and allowed before."""
+        if state.carried is None:
+            self.put_down()
+        else:
+            self.carry(state.carried, state.tool_from_carried)
+        self.allow(state.touchable, state.rest_on)
+
     def overlaps(self, name: str) -> dict[str, float]:
         """Return the links that touch a scene body where it is now, with the deepest penetration [m] of each.
 
@@ -110,8 +140,27 @@ class CollisionChecker:
 
     # --- queries ----------------------------------------------------------------------------------------------
 
+    def arrays(self) -> tuple[RobotArrays, SceneArrays]:
+        """Return what the compiled checks read, as the world, the hand and the allowed touches are now."""
+        self.compiled.update(self.carried, self._tool_from_carried, self._touchable, self._rest_on)
+        return self.compiled.arm, self.compiled.scene
+
+    def other_name(self, index: int) -> str:
+        """Return the scene link or robot link behind what a compiled check says the collision is with."""
+        return self.compiled.other_name(index, self.carried)
+
     def check(self, body: np.ndarray) -> Collision | None:
-        """Return the worst collision of a configuration (10,), or None when it is free."""
+        """Return the worst collision of a configuration (10,), or None when it is free.
+
+        The compiled check answers where it can; whatever it refuses is for the meshes to decide.
+        """
+        robot, scene = self.arrays()
+        if find_collision(robot, scene, np.ascontiguousarray(body, dtype=float), 0)[0] == FREE:
+            return None
+        return self.check_meshes(body)
+
+    def check_meshes(self, body: np.ndarray) -> Collision | None:
+        """Return the worst collision of a configuration (10,) by the meshes alone, or None when it is free."""
         self.checks += 1
         self.robot.set_body(body)
         if self.carried is not None:

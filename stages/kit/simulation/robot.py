@@ -71,15 +71,10 @@ class Robot:
         """Switch off pairs of links that are near each other along the chain: their shapes overlap by design."""
         chain = [PEDESTAL_LINK, self.description.arm_base]
         chain += [self.world.link_name(self.body_id, self.joints[name]) for name in self.description.arm_joints]
-        place = {name: position for position, name in enumerate(chain)}
-        hand = {self.description.hand_link, *self.description.finger_links}
-        place.update({name: len(chain) for name in hand})
         names = list(self.links)
         for number, first in enumerate(names):
             for second in names[number + 1 :]:
-                near = abs(place.get(first, -99) - place.get(second, 99)) <= 2
-                wrist = {first, second} <= set(chain[-3:]) | hand
-                if near or wrist:
+                if always_near(first, second, chain, self.description):
                     engine.setCollisionFilterPair(
                         self.body_id, self.body_id, self.links[first], self.links[second], 0,
                         physicsClientId=self.world.client,
@@ -95,9 +90,8 @@ class Robot:
 
     def set_body(self, body: np.ndarray) -> None:
         """Put base and arm (10,) at values; the fingers stay."""
-        client = self.world.client
-        for index, value in zip(self.body_joints, body.tolist(), strict=True):
-            engine.resetJointState(self.body_id, index, value, physicsClientId=client)
+        values = [[value] for value in body.tolist()]
+        engine.resetJointStatesMultiDof(self.body_id, self.body_joints, values, physicsClientId=self.world.client)
 
     def configuration(self) -> Configuration:
         """Return where the joints stand."""
@@ -176,6 +170,15 @@ class Robot:
         if self.grip is not None:
             engine.removeConstraint(self.grip, physicsClientId=self.world.client)
             self.grip = None
+
+
+def always_near(first: str, second: str, chain: list[str], description: RobotDescription) -> bool:
+    """Whether two links are too near each other along the chain (pedestal to last arm link) to be checked."""
+    place = {name: position for position, name in enumerate(chain)}
+    hand = {description.hand_link, *description.finger_links}
+    place.update({name: len(chain) for name in hand})
+    near = abs(place.get(first, -99) - place.get(second, 99)) <= 2
+    return near or {first, second} <= set(chain[-3:]) | hand
 
 
 def base_pose(base: np.ndarray, description: RobotDescription) -> np.ndarray:

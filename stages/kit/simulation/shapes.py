@@ -27,16 +27,29 @@ def _placement(element: ElementTree.Element) -> np.ndarray:
     return pose
 
 
-def _mesh_of(geometry: ElementTree.Element) -> trimesh.Trimesh:
+def _around(mesh: trimesh.Trimesh, axes: list[int]) -> trimesh.Trimesh:
+    """Return the mesh widened along axes so that its faces touch the round shape that its vertices lay on."""
+    distances = np.einsum("ij,ij->i", mesh.triangles[:, 0], mesh.face_normals)
+    sides = np.abs(mesh.face_normals[:, axes]).sum(axis=1) > 0.5
+    radius = float(np.linalg.norm(mesh.vertices[:, axes], axis=1).max())
+    scale = np.ones(3)
+    scale[axes] = radius / float(distances[sides].min())
+    mesh.apply_scale(scale)
+    return mesh
+
+
+def _mesh_of(geometry: ElementTree.Element, around: bool = False) -> trimesh.Trimesh:
     shape = geometry[0]
     if shape.tag == "box":
         return trimesh.creation.box(extents=_numbers(shape.get("size"), "1 1 1"))
     if shape.tag == "cylinder":
-        return trimesh.creation.cylinder(
+        mesh = trimesh.creation.cylinder(
             radius=float(shape.get("radius", 1)), height=float(shape.get("length", 1)), sections=32
         )
+        return _around(mesh, [0, 1]) if around else mesh
     if shape.tag == "sphere":
-        return trimesh.creation.icosphere(subdivisions=2, radius=float(shape.get("radius", 1)))
+        mesh = trimesh.creation.icosphere(subdivisions=2, radius=float(shape.get("radius", 1)))
+        return _around(mesh, [0, 1, 2]) if around else mesh
     if shape.tag == "mesh":
         mesh = read_mesh(Path(shape.get("filename", "")), hint="make the scene again")
         mesh.apply_scale(_numbers(shape.get("scale"), "1 1 1"))
@@ -44,10 +57,13 @@ def _mesh_of(geometry: ElementTree.Element) -> trimesh.Trimesh:
     raise BadInput(f"URDF geometry <{shape.tag}> is not known", hint="box, cylinder, sphere and mesh are")
 
 
-def link_shapes(text: str, tag: Literal["collision", "visual"] = "collision") -> dict[str, list[trimesh.Trimesh]]:
+def link_shapes(
+    text: str, tag: Literal["collision", "visual"] = "collision", *, around: bool = False
+) -> dict[str, list[trimesh.Trimesh]]:
     """Return the shapes of each link of URDF text (absolute mesh paths), link frame, metres. Raises BadInput.
 
-    A URDF <material> colour is applied to shapes that have no colours of their own.
+    A URDF <material> colour is applied to shapes that have no colours of their own. The facets of round shapes lie
+    inside them, with `around` outside.
     """
     root = ElementTree.fromstring(text)
     colors = {
@@ -62,7 +78,7 @@ def link_shapes(text: str, tag: Literal["collision", "visual"] = "collision") ->
             geometry = element.find("geometry")
             if geometry is None or len(geometry) == 0:
                 continue
-            mesh = _mesh_of(geometry)
+            mesh = _mesh_of(geometry, around)
             mesh.apply_transform(_placement(element))
             material = element.find("material")
             rgba = None if material is None else colors.get(material.get("name"))

@@ -45,6 +45,8 @@ class LoadedBody:
     """Link name -> pybullet link index; -1 is the base link."""
     joints: dict[str, int]
     """Names of moving joints -> pybullet joint index."""
+    text: str = ""
+    """The URDF it was loaded from, without visual shapes."""
 
     @property
     def name(self) -> str:
@@ -72,6 +74,12 @@ class PhysicsWorld:
         self.client = engine.connect(engine.DIRECT)
         self.time_step = time_step
         self.bodies: dict[str, LoadedBody] = {}
+        self.revision = 0
+        """Grows whenever a body is put somewhere, comes or goes, and with every time step."""
+        self.revisions: dict[str, int] = {}
+        """Body -> `revision` of its last change by hand; time steps move everything."""
+        self.stepped = 0
+        """`revision` of the last time step."""
         self._base_from_inertial: dict[int, np.ndarray] = {}
         self.time = 0.0
         engine.setGravity(0, 0, -GRAVITY, physicsClientId=self.client)
@@ -110,11 +118,12 @@ class PhysicsWorld:
         """Load one scene body from URDF text at its pose and joint values."""
         # Things that lie still fall asleep: three times as fast in a room with thirty bodies. See `wake`.
         flags = engine.URDF_ENABLE_SLEEPING if record.movable else 0
-        body_id = self.load_urdf_text(without_visuals(text), fixed=not record.movable, flags=flags)
+        shapes = without_visuals(text)
+        body_id = self.load_urdf_text(shapes, fixed=not record.movable, flags=flags)
         info = engine.getDynamicsInfo(body_id, -1, physicsClientId=self.client)
         self._base_from_inertial[body_id] = transform_from_quaternion(np.array(info[4]), np.array(info[3]))
         links, joints = self._names(body_id)
-        body = LoadedBody(record, body_id, links, joints)
+        body = LoadedBody(record, body_id, links, joints, shapes)
         self.bodies[record.name] = body
         self.set_pose(record.name, np.array(record.world_from_body))
         for joint, index in joints.items():
@@ -134,6 +143,8 @@ class PhysicsWorld:
 
     def remove_body(self, name: str) -> None:
         """Take a scene body out of the world."""
+        self.revision += 1
+        self.revisions.pop(name, None)
         engine.removeBody(self.bodies.pop(name).body_id, physicsClientId=self.client)
 
     def _names(self, body_id: int) -> tuple[dict[str, int], dict[str, int]]:
@@ -150,12 +161,17 @@ class PhysicsWorld:
 
     def set_pose(self, name: str, world_from_body: np.ndarray) -> None:
         """Put a body at a pose (4, 4) of its base link frame, at rest."""
+        self._changed(name)
         body_id = self.bodies[name].body_id
         # pybullet's base pose is that of the centre of mass, not of the link frame.
         pose = world_from_body @ self._base_from_inertial[body_id]
         engine.resetBasePositionAndOrientation(
             body_id, pose[:3, 3].tolist(), quaternion_of(pose).tolist(), physicsClientId=self.client
         )
+
+    def _changed(self, name: str) -> None:
+        self.revision += 1
+        self.revisions[name] = self.revision
 
     def pose(self, name: str) -> np.ndarray:
         """Return world_from_body (4, 4) of the base link frame."""
@@ -185,6 +201,7 @@ class PhysicsWorld:
 
     def set_joint(self, name: str, joint: str, value: float) -> None:
         """Put a joint at a value [rad] or [m], at rest."""
+        self._changed(name)
         body = self.bodies[name]
         engine.resetJointState(body.body_id, body.joints[joint], value, physicsClientId=self.client)
 
@@ -208,6 +225,8 @@ class PhysicsWorld:
         for _ in range(count):
             engine.stepSimulation(physicsClientId=self.client)
         self.time += count * self.time_step
+        self.revision += 1
+        self.stepped = self.revision
 
     def wake(self) -> None:
         """Wake every movable body: what sleeps does not notice that its support was taken away."""

@@ -132,3 +132,22 @@ def test_times_keep_the_speed_and_acceleration_limits() -> None:
     np.testing.assert_array_equal(rows[-1], path[-1])
     assert times[-1] > 1.0 / 0.5 + 1.0 / 0.25
     assert np.abs(velocity[0]).max() < 0.1  # it starts from rest
+
+
+def test_a_straight_way_takes_the_time_of_a_trapezoid() -> None:
+    times, _ = time_path(np.array([[0.0], [2.0]]), np.array([0.5]), np.array([1.0]))
+    assert times[-1] == pytest.approx(2.0 / 0.5 + 0.5 / 1.0, rel=1e-3)
+
+
+def test_joints_keep_their_acceleration_at_bends() -> None:
+    random = np.random.default_rng(2)
+    speed, acceleration = np.full(7, 1.2), np.full(7, 4.0)
+    for _ in range(5):
+        path = np.cumsum(random.uniform(-0.6, 0.6, size=(8, 7)), axis=0)
+        times, points = time_path(path, speed, acceleration)
+        durations = np.diff(times)
+        velocity = np.diff(points, axis=0) / durations[:, None]
+        change = np.diff(velocity, axis=0) / ((durations[1:] + durations[:-1]) / 2)[:, None]
+        assert np.all(np.abs(velocity) <= speed * (1 + 1e-9))
+        assert np.all(np.abs(change) <= acceleration * 1.001)
+        assert set(map(tuple, path.round(9))) <= set(map(tuple, points.round(9)))  # no corner is cut

@@ -1,0 +1,1 @@
+"""Planning beside named peers: motion (and task and motion) queries, one table."""

@@ -1,0 +1,205 @@
+"""RRT-Connect (Kuffner & LaValle 2000) and shortcut smoothing, all loops compiled.
+
+A search moves some of the values of a configuration (3 + J,) and holds the others still. Motions are straight in the
+values that move; they are looked at in steps in which no value changes by more than its resolution.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from stages.kit.motion.compiled_arrays import RobotArrays, SceneArrays
+from stages.kit.motion.compiled_check import FREE, UNCERTAIN, find_collision
+
+UNCERTAIN_COUNT = 0
+"""Place in the counts of refusals that the mesh checker might not share; the others follow."""
+
+
+@njit(cache=True)
+def count_refusal(counts: np.ndarray, state: int, other: int, parts: int) -> None:
+    """Count what refused: counts are (1 + parts + groups,)."""
+    if state == UNCERTAIN:
+        counts[UNCERTAIN_COUNT] += 1
+    counts[1 + parts + other if other >= 0 else -other] += 1
+
+
+@njit(cache=True)
+def last_free(
+    robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, begin: np.ndarray,
+    end: np.ndarray, resolution: np.ndarray, most: int, counts: np.ndarray,
+) -> tuple[int, int]:  # fmt: skip
+    """Return how many steps from `begin` (D,) towards `end` are free, and how many the whole way has.
+
+    No more than `most` steps are looked at. `body` is scratch: the values that do not move are read from it.
+    """
+    steps = 1
+    for k in range(begin.shape[0]):
+        steps = max(steps, int(np.ceil(abs(end[k] - begin[k]) / resolution[k] - 1e-9)))
+    for number in range(1, min(steps, most) + 1):
+        share = number / steps
+        for k in range(begin.shape[0]):
+            body[moving[k]] = begin[k] + (end[k] - begin[k]) * share
+        state, _, other = find_collision(robot, scene, body, first_frame)
+        if state != FREE:
+            count_refusal(counts, state, other, scene.allowed.shape[0])
+            return number - 1, steps
+    return min(steps, most), steps
+
+
+@njit(cache=True)
+def _nearest(points: np.ndarray, count: int, target: np.ndarray, resolution: np.ndarray) -> int:
+    best, least = 0, np.inf
+    for index in range(count):
+        total = 0.0
+        for k in range(target.shape[0]):
+            value = (points[index, k] - target[k]) / resolution[k]
+            total += value * value
+        if total < least:
+            best, least = index, total
+    return best
+
+
+@njit(cache=True)
+def _grown(points: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    more_points = np.empty((2 * points.shape[0], points.shape[1]))
+    more_parents = np.empty(2 * parents.shape[0], dtype=np.int64)
+    more_points[: points.shape[0]] = points
+    more_parents[: parents.shape[0]] = parents
+    return more_points, more_parents
+
+
+@njit(cache=True)
+def search(
+    robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, start: np.ndarray,
+    goals: np.ndarray, lower: np.ndarray, upper: np.ndarray, resolution: np.ndarray, samples: int, step: int,
+    random: np.random.Generator, counts: np.ndarray,
+) -> tuple[np.ndarray, int]:  # fmt: skip
+    """Return a free path (N, D) from `start` (D,) to one of `goals` (G, D), and the samples used.
+
+    The path is empty when `samples` did not suffice. `step` is the longest extension in resolutions. All goals are
+    roots of the second tree. What refused is added to `counts`.
+    """
+    dimension = start.shape[0]
+    points_a, parents_a = np.empty((256, dimension)), np.empty(256, dtype=np.int64)
+    points_b, parents_b = np.empty((256 + goals.shape[0], dimension)), np.empty(256 + goals.shape[0], dtype=np.int64)
+    points_a[0], parents_a[0] = start, -1
+    for number in range(goals.shape[0]):
+        points_b[number], parents_b[number] = goals[number], -1
+    count_a, count_b = 1, goals.shape[0]
+    for number in range(goals.shape[0]):
+        free, steps = last_free(
+            robot, scene, body, moving, first_frame, start, goals[number], resolution, 1_000_000, counts
+        )
+        if free == steps:
+            path = np.empty((2, dimension))
+            path[0], path[1] = start, goals[number]
+            return path, 0
+    forward = True
+    sample = np.empty(dimension)
+    for used in range(1, samples + 1):
+        for k in range(dimension):
+            sample[k] = lower[k] + (upper[k] - lower[k]) * random.random()
+        near = _nearest(points_a, count_a, sample, resolution)
+        free, steps = last_free(
+            robot, scene, body, moving, first_frame, points_a[near], sample, resolution, step, counts
+        )
+        if free > 0:
+            if count_a + 1 >= points_a.shape[0]:
+                points_a, parents_a = _grown(points_a, parents_a)
+            points_a[count_a] = points_a[near] + (sample - points_a[near]) * (free / steps)
+            parents_a[count_a] = near
+            count_a += 1
+            target = points_a[count_a - 1].copy()
+            near = _nearest(points_b, count_b, target, resolution)
+            origin = points_b[near].copy()
+            free, steps = last_free(
+                robot, scene, body, moving, first_frame, origin, target, resolution, 1_000_000, counts
+            )
+            parent = near
+            done = 0
+            while done < free:
+                done = min(done + step, free)
+                if count_b + 1 >= points_b.shape[0]:
+                    points_b, parents_b = _grown(points_b, parents_b)
+                points_b[count_b] = origin + (target - origin) * (done / steps)
+                parents_b[count_b] = parent
+                parent = count_b
+                count_b += 1
+            if free == steps:
+                points_b[parent] = target
+                if forward:
+                    return _joined(points_a, parents_a, count_a - 1, points_b, parents_b, parent), used
+                return _joined(points_b, parents_b, parent, points_a, parents_a, count_a - 1), used
+        points_a, points_b = points_b, points_a
+        parents_a, parents_b = parents_b, parents_a
+        count_a, count_b = count_b, count_a
+        forward = not forward
+    return np.empty((0, dimension)), samples
+
+
+@njit(cache=True)
+def _joined(
+    points_a: np.ndarray, parents_a: np.ndarray, node_a: int, points_b: np.ndarray, parents_b: np.ndarray, node_b: int
+) -> np.ndarray:
+    """Return the path from the root of tree a to node_a, which is node_b, and on to a root of tree b."""
+    length_a, length_b = 0, 0
+    node = node_a
+    while node >= 0:
+        length_a += 1
+        node = parents_a[node]
+    node = parents_b[node_b]
+    while node >= 0:
+        length_b += 1
+        node = parents_b[node]
+    path = np.empty((length_a + length_b, points_a.shape[1]))
+    node = node_a
+    for row in range(length_a - 1, -1, -1):
+        path[row] = points_a[node]
+        node = parents_a[node]
+    node = parents_b[node_b]
+    for row in range(length_a, length_a + length_b):
+        path[row] = points_b[node]
+        node = parents_b[node]
+    return path
+
+
+@njit(cache=True)
+def shorten(
+    robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, path: np.ndarray,
+    resolution: np.ndarray, attempts: int, random: np.random.Generator,
+) -> np.ndarray:  # fmt: skip
+    """Return a shorter path (M, D): pairs of random points on it are joined by straight pieces where those are free."""
+    counts = np.zeros(1 + scene.allowed.shape[0] + scene.low.shape[0], dtype=np.int64)
+    rows = path.copy()
+    count = path.shape[0]
+    ends = np.zeros(count + 2 * attempts + 2)
+    first, second = np.empty(path.shape[1]), np.empty(path.shape[1])
+    for _ in range(attempts):
+        if count < 3:
+            break
+        for row in range(1, count):
+            ends[row] = ends[row - 1] + np.max(np.abs(rows[row] - rows[row - 1]) / resolution)
+        low, high = ends[count - 1] * random.random(), ends[count - 1] * random.random()
+        if low > high:
+            low, high = high, low
+        i = min(np.searchsorted(ends[:count], low, side="right") - 1, count - 2)
+        j = min(np.searchsorted(ends[:count], high, side="right") - 1, count - 2)
+        if i == j:
+            continue
+        along = (low - ends[i]) / max(ends[i + 1] - ends[i], 1e-12)
+        first[:] = rows[i] + (rows[i + 1] - rows[i]) * along
+        along = (high - ends[j]) / max(ends[j + 1] - ends[j], 1e-12)
+        second[:] = rows[j] + (rows[j + 1] - rows[j]) * along
+        if np.max(np.abs(second - first) / resolution) > high - low - 0.5:
+            continue  # hardly shorter
+        free, steps = last_free(robot, scene, body, moving, first_frame, first, second, resolution, 1_000_000, counts)
+        if free < steps:
+            continue
+        fresh = np.empty((count - (j - i) + 2, path.shape[1]))
+        fresh[: i + 1] = rows[: i + 1]
+        fresh[i + 1], fresh[i + 2] = first, second
+        fresh[i + 3 :] = rows[j + 1 : count]
+        rows = fresh
+        count = rows.shape[0]
+    return rows[:count].copy()

@@ -1,0 +1,136 @@
+"""The compiled collision model: covers cover, distances agree with a second implementation, free means free."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize
+
+from stages.kit.motion.collision import CollisionChecker
+from stages.kit.motion.compiled_check import FREE, HIT, find_collision
+from stages.kit.motion.convex_distance import convex_distance
+from stages.kit.motion.convex_pieces import link_pieces
+from stages.kit.motion.sphere_cover import enclosing_ball, hull_vertices, sphere_cover
+from stages.kit.simulation.robot_description import load_robot, mobile_robot_urdf
+
+PANDA = load_robot("panda")
+UNIT = np.eye(4)[:3]
+
+
+def test_balls_cover_the_hull_of_every_link() -> None:
+    random = np.random.default_rng(0)
+    for pieces in link_pieces(mobile_robot_urdf(PANDA)).values():
+        for piece in pieces:
+            weights = random.dirichlet(np.full(len(piece.vertices), 0.1), 400)
+            points = np.concatenate([weights @ piece.vertices, piece.vertices])
+            outside = np.linalg.norm(points[:, None] - piece.spheres[None, :, :3], axis=2) - piece.spheres[:, 3]
+            assert outside.min(axis=1).max() < 1e-9
+            assert piece.spheres[:, 3].max() <= piece.bound[3] + 1e-9
+
+
+def test_a_cover_with_more_balls_is_tighter_and_the_same_each_time() -> None:
+    box = np.array([[x, y, z] for x in (0, 1) for y in (0, 0.2) for z in (0, 0.1)], dtype=float)
+    covers = [sphere_cover(box, most, 0.01) for most in (1, 4, 12)]
+    radii = [cover[:, 3].max() for cover in covers]
+    assert radii[0] > radii[1] > radii[2]
+    np.testing.assert_array_equal(covers[2], sphere_cover(box, 12, 0.01))
+    assert enclosing_ball(box)[3] >= np.linalg.norm([0.5, 0.1, 0.05]) - 1e-12
+
+
+def _distance_by_optimiser(first: np.ndarray, second: np.ndarray) -> float:
+    """Distance of two hulls as a quadratic program over convex weights."""
+
+    def square(weights: np.ndarray) -> float:
+        gap = weights[: len(first)] @ first - weights[len(first) :] @ second
+        return float(gap @ gap)
+
+    count = len(first) + len(second)
+    start = np.concatenate([np.full(len(first), 1 / len(first)), np.full(len(second), 1 / len(second))])
+    sums = [
+        {"type": "eq", "fun": lambda w: w[: len(first)].sum() - 1},
+        {"type": "eq", "fun": lambda w: w[len(first) :].sum() - 1},
+    ]
+    found = minimize(square, start, bounds=[(0, 1)] * count, constraints=sums, method="SLSQP", options={"ftol": 1e-12})
+    return float(np.sqrt(found.fun))
+
+
+def test_distance_of_hulls_agrees_with_an_optimiser() -> None:
+    random = np.random.default_rng(3)
+    for _ in range(6):
+        first = hull_vertices(random.normal(size=(9, 3)) * 0.2)
+        second = hull_vertices(random.normal(size=(8, 3)) * 0.2 + random.uniform(-0.7, 0.7, 3))
+        lower, upper = convex_distance(first, 0, len(first), UNIT, second, 0, len(second), UNIT, np.inf, 0.0)
+        assert lower <= upper + 1e-12
+        assert abs(upper - _distance_by_optimiser(first, second)) < 1e-3
+
+
+def test_distance_of_boxes_in_closed_form_and_early_ends() -> None:
+    box = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    away = UNIT.copy()
+    away[:, 3] = [5.0, 6.0, 0.3]
+    lower, upper = convex_distance(box, 0, 8, UNIT, box, 0, 8, away, np.inf, 0.0)
+    assert abs(lower - 5.0) < 1e-4
+    assert abs(upper - 5.0) < 1e-4
+    assert 1.0 < convex_distance(box, 0, 8, UNIT, box, 0, 8, away, 1.0, 0.0)[0] <= 5.0
+    away[:, 3] = [1.5, 0.2, 0.1]
+    assert convex_distance(box, 0, 8, UNIT, box, 0, 8, away, np.inf, 0.0) == (0.0, 0.0)
+
+
+def _walk(count: int, seed: int) -> np.ndarray:
+    """Random configurations (count, 10) in the kitchen, half of them near one place."""
+    random = np.random.default_rng(seed)
+    base = random.uniform([-2.2, -2.2, -3.1], [2.2, 2.2, 3.1], (count, 3))
+    base[::2] = [0.75, 0.3, 0.4]
+    return np.column_stack([base, random.uniform(PANDA.lower, PANDA.upper, (count, 7))])
+
+
+def _compare(checker: CollisionChecker, count: int, seed: int) -> tuple[int, int, int]:
+    """Return how often compiled says free where the meshes do not, how often it refuses surely what they free, both."""
+    robot, scene = checker.arrays()
+    wrong, strict, free = 0, 0, 0
+    for body in _walk(count, seed):
+        state = find_collision(robot, scene, body, 0)[0]
+        mesh_free = checker.check_meshes(body) is None
+        wrong += state == FREE and not mesh_free
+        strict += state == HIT and mesh_free
+        free += mesh_free and state == FREE
+    return wrong, strict, free
+
+
+def test_free_means_free_for_the_meshes(checker: CollisionChecker) -> None:
+    wrong, strict, free = _compare(checker, 600, 0)
+    assert wrong == 0
+    assert strict <= 3  # nearly exact, not only on the safe side
+    assert free > 150
+
+
+def test_free_means_free_while_carrying_and_with_a_door_elsewhere(checker: CollisionChecker) -> None:
+    home = checker.world.pose("bottle_7")
+    joint = next(iter(checker.world.bodies["fridge_2"].joints))
+    value = checker.world.joint_value("fridge_2", joint)
+    before, _ = checker.arrays()
+    held = np.eye(4)
+    held[:3, 3] = [0.0, 0.0, 0.05]
+    checker.world.set_joint("fridge_2", joint, 1.2)
+    checker.carry("bottle_7", held)
+    try:
+        after, _ = checker.arrays()
+        assert len(after.frame) > len(before.frame)
+        wrong, strict, free = _compare(checker, 300, 1)
+    finally:
+        checker.put_down(home)
+        checker.world.set_joint("fridge_2", joint, value)
+    assert (wrong, strict <= 2, free > 50) == (0, True, True)
+    assert len(checker.arrays()[0].frame) == len(before.frame)
+
+
+def test_what_may_be_touched_is_not_in_the_way(checker: CollisionChecker) -> None:
+    names = checker.compiled.groups
+    checker.allow(touch=("bottle_7",))
+    _, scene = checker.arrays()
+    hand = checker.compiled.parts.index(PANDA.hand_link)
+    arm = checker.compiled.parts.index("panda_link4")
+    bottle = names.index("bottle_7")
+    assert scene.allowed[hand, bottle] != scene.allowed[arm, bottle]
+    checker.allow()
+    _, scene = checker.arrays()
+    assert scene.allowed[hand, bottle] == scene.allowed[arm, bottle]
