@@ -16,7 +16,8 @@ from stages.plan.door_motion import is_closed, is_open
 from stages.plan.execution import PhysicalRobot, true_record
 from stages.plan.motions import Segment
 from stages.plan.pick_place import Budgets
-from stages.plan.refinement import Step, refine_action
+from stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level
+from stages.plan.refinement import Step, grasp_style, refine_action
 from stages.plan.world_model import RobotState, WorldModel
 
 
@@ -51,8 +52,10 @@ class Conduct:
             return self._replay(steps)
         origin = "start"
         number = 0
-        for group in _by_action(steps):
-            carried_out = self._act(state, group, origin, number)
+        groups = _by_action(steps)
+        for place, group in enumerate(groups):
+            following = [(later[-1].name, later[-1].arguments) for later in groups[place + 1 :]]
+            carried_out = self._act(state, group, origin, number, following)
             if carried_out is None:
                 return False
             state = carried_out
@@ -63,7 +66,10 @@ class Conduct:
 
     # --- closed loop ------------------------------------------------------------------------------------------
 
-    def _act(self, state: RobotState, group: list[Step], origin: str, number: int) -> RobotState | None:
+    def _act(
+        self, state: RobotState, group: list[Step], origin: str, number: int,
+        following: list[tuple[str, tuple[str, ...]]],
+    ) -> RobotState | None:  # fmt: skip
         """Carry out one action with its drives, trying again after a look; return the state after it or None."""
         name, arguments = group[-1].name, group[-1].arguments
         for attempt in range(self.attempts):
@@ -73,8 +79,9 @@ class Conduct:
                 self._look(name, arguments)
                 if preferred is not None:
                     preferred = self._re_anchored(group[-1], *preferred)
+                style = grasp_style(self.model, arguments[0], following) if name == "pick" else "any"
                 steps, after = refine_action(
-                    self.model, state, name, arguments, origin, self.budgets, self.random, preferred
+                    self.model, state, name, arguments, origin, self.budgets, self.random, preferred, style
                 )
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
@@ -107,12 +114,9 @@ class Conduct:
 
     def _named_bodies(self, name: str, arguments: tuple[str, ...]) -> list[str]:
         if name in ("open", "close"):
-            return [self._owner(arguments[0])]
+            return [self.model.owner(arguments[0])]
         bodies = [arguments[1]] if name == "place" else [arguments[0], arguments[1]]
         return [body for body in bodies if body in self.model.records]
-
-    def _owner(self, joint: str) -> str:
-        return next(body for body, record in self.model.records.items() if any(j.name == joint for j in record.joints))
 
     def _look(self, name: str, arguments: tuple[str, ...]) -> None:
         """Take over pose, joints and shape of the bodies that an action names, as they are in the room now."""
@@ -146,11 +150,8 @@ class Conduct:
         assert manipulation.item_pose is not None
         place = manipulation.item_pose.copy()
         place[:3, 3] += shift
-        heights = [plane.center[2] for plane in self.model.planes[body] if plane.horizontal]
-        if heights:
-            bottom = place[2, 3] + float(self.model.points(step.arguments[0])[:, 2].min())
-            nearest = min(heights, key=lambda height: abs(height - bottom))
-            place[2, 3] += nearest - bottom + 0.006
+        bottom = place[2, 3] + float(self.model.points(step.arguments[0])[:, 2].min())
+        place[2, 3] += nearest_level(self.model, body, place[:2, 3], bottom) - bottom + PUT_DOWN_HEIGHT
         return base, place
 
     def _execute(self, step: Step) -> None:
@@ -166,7 +167,7 @@ class Conduct:
         if name not in ("open", "close"):
             return
         there = self.joint_names[arguments[0]]
-        body = self._matched(self._owner(arguments[0]))
+        body = self._matched(self.model.owner(arguments[0]))
         joint = next(joint for joint in self.room.records[body].joints if joint.name == there)
         value = self.physical.world.joint_value(body, there)
         if not (is_open if name == "open" else is_closed)(joint, value):

@@ -20,6 +20,9 @@ class PlanParameters(Parameters):
         description="Goal literals such as on(bottle_7,table_3) closed(fridge_2); predicates on, in, open, closed, "
         "holding. Empty: take an item out of furniture with a door, put it on a table, shut the door",
     )
+    task: Literal["", "fridge-to-microwave", "tidy-the-desk", "put-away-in-drawer", "stack-and-carry"] = Field(
+        "", description="A task by name; its goal is derived from what is in the scene. Not together with --goal"
+    )
     robot: str = Field("panda", description="Robot of data/robots/")
     heuristic: Literal["add", "max", "ff"] = Field("add", description="Heuristic of the task search; max is optimal")
     execute: bool = Field(True, description="Execute the plan in physics: in the true room when it is given")

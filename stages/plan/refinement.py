@@ -7,17 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from schemas.plan import Failure
-from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.base_placement import plan_drive
 from stages.kit.motion.failures import MotionFailed
+from stages.kit.tasks.strips import Domain, GroundAction, Problem, atom_text, ground
+from stages.kit.tasks.task_planner import Heuristic, plan_task
+from stages.plan.domain import PLAIN_NAMES, START
 from stages.plan.door_motion import plan_close, plan_open
 from stages.plan.motions import Manipulation, Segment
-from stages.plan.pick_place import Budgets, plan_pick, plan_place
-from stages.plan.strips import Domain, GroundAction, Problem, atom_text, ground
-from stages.plan.task_planner import Heuristic, plan_task
+from stages.plan.pick_place import Budgets, GraspStyle, plan_pick, plan_place
+from stages.plan.placements import placement_style
 from stages.plan.world_model import RobotState, WorldModel
-
-PLAIN_NAMES = {"take_out": "pick", "put_in": "place"}
 
 FINAL = ("no_grasp",)
 """Failures that no other draw of the random choices can avoid."""
@@ -57,15 +56,27 @@ def manipulate(
     budgets: Budgets,
     random: np.random.Generator,
     preferred: tuple[np.ndarray, np.ndarray] | None = None,
+    style: GraspStyle = "any",
 ) -> tuple[Manipulation, ...]:
-    """Return the manipulations of `pick`, `place`, `open` or `close` (plain names). Raises MotionFailed."""
+    """Return the manipulations of `pick`, `place`, `open` or `close` (plain names). Raises MotionFailed.
+
+    Arguments: pick(item, from, ...), place(item, target[, door]), open(joint), close(joint).
+    """
     if name == "pick":
-        return (plan_pick(model, state, arguments[0], arguments[1], budgets, random, preferred),)
+        return (plan_pick(model, state, arguments[0], arguments[1], budgets, random, preferred, style),)
     if name == "place":
-        return (plan_place(model, state, arguments[0], arguments[1], budgets, random, preferred),)
-    body = next(body for body, record in model.records.items() if any(j.name == arguments[0] for j in record.joints))
+        door = arguments[2] if len(arguments) > 2 else None
+        return (plan_place(model, state, arguments[0], arguments[1], door, budgets, random, preferred),)
     plan = plan_open if name == "open" else plan_close
-    return plan(model, state, body, arguments[0], budgets, random)
+    return plan(model, state, model.owner(arguments[0]), arguments[0], budgets, random)
+
+
+def grasp_style(model: WorldModel, item: str, following: list[tuple[str, tuple[str, ...]]]) -> GraspStyle:
+    """Return how an item is to be grasped for where it is put next: `following` are (plain name, arguments)."""
+    for name, arguments in following:
+        if name == "place" and arguments[0] == item:
+            return placement_style(model, item, arguments[1], arguments[2] if len(arguments) > 2 else None)
+    return "any"
 
 
 def refine_action(
@@ -77,6 +88,7 @@ def refine_action(
     budgets: Budgets,
     random: np.random.Generator,
     preferred: tuple[np.ndarray, np.ndarray] | None = None,
+    style: GraspStyle = "any",
 ) -> tuple[list[Step], RobotState]:
     """Return the drives and manipulations of one action, and the robot's state after it; the model is changed too.
 
@@ -85,7 +97,7 @@ def refine_action(
     snapshot = model.snapshot()
     steps: list[Step] = []
     try:
-        for manipulation in manipulate(model, state, name, arguments, budgets, random, preferred):
+        for manipulation in manipulate(model, state, name, arguments, budgets, random, preferred, style):
             target = arguments[1] if name == "place" else arguments[0]
             hold_for_checks(model, state)
             path = plan_drive(
@@ -161,19 +173,22 @@ def refine_plan(
     """
     snapshot = model.snapshot()
     steps: list[Step] = []
-    origin = "start"
+    origin = START
+    plain = [(PLAIN_NAMES.get(action.name, action.name), action.arguments) for action in actions]
     try:
-        for action in actions:
-            if action.name == "drive":
+        for place, (action, (name, arguments)) in enumerate(zip(actions, plain, strict=True)):
+            if name == "drive":
                 continue
-            name = PLAIN_NAMES.get(action.name, action.name)
+            style = grasp_style(model, arguments[0], plain[place + 1 :]) if name == "pick" else "any"
             try:
-                found, state = refine_action(model, state, name, action.arguments, origin, budgets, random)
+                found, state = refine_action(
+                    model, state, name, arguments, origin, budgets, random, style=style
+                )  # fmt: skip
             except MotionFailed as failed:
                 failure = failed.failure.model_copy(update={"action": action.text})
                 raise RefinementFailed(action, failure) from None
             steps += found
-            origin = action.arguments[1] if name == "place" else action.arguments[0]
+            origin = arguments[1] if name == "place" else arguments[0]
     finally:
         hold_for_checks(model, RobotState(state.base, state.arm))
         model.restore(snapshot)
@@ -249,9 +264,3 @@ def _no_task_plan(
         objects=tuple(objects),
         numbers={"expanded": float(expanded), "blocked": float(len(blocked))},
     )
-
-
-def relative_place(step: Step, model: WorldModel, surface: str) -> np.ndarray:
-    """Return surface_from_item (4, 4) of a planned place, to be used where the surface really is."""
-    assert step.manipulation is not None and step.manipulation.item_pose is not None
-    return inverse(model.pose(surface)) @ step.manipulation.item_pose

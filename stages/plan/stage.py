@@ -9,6 +9,7 @@ import numpy as np
 
 from schemas.base import as_transform
 from schemas.contact_graph import ContactGraphFile
+from schemas.errors import UsageError
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
 from schemas.plan import BodyMatch, Check, Failure, Plan, PlanFile, PlannedAction
@@ -18,21 +19,23 @@ from stages.kit.simulation.robot import Configuration
 from stages.kit.simulation.robot_description import load_robot
 from stages.kit.simulation.world import load_scene, read_scene_bodies
 from stages.kit.stage import Context
+from stages.kit.tasks.pddl import domain_text, problem_text
+from stages.kit.tasks.strips import Atom
 from stages.plan.checks import check_goal
 from stages.plan.conduct import Conduct, Room, joint_pairs
 from stages.plan.correspondence import match_bodies
+from stages.plan.domain import DOMAIN
 from stages.plan.execution import PhysicalRobot
 from stages.plan.execution_log import write_execution
 from stages.plan.goals import TABLE_CLASSES, default_goals
 from stages.plan.parameters import PlanParameters
-from stages.plan.pddl import domain_text, problem_text
 from stages.plan.pick_place import Budgets
 from stages.plan.pictures import RoomPictures, picture_camera
 from stages.plan.plan_text import plan_text
 from stages.plan.refinement import Attempt, Step, plan_and_refine
 from stages.plan.start_pose import start_base
-from stages.plan.strips import Atom
-from stages.plan.symbols import DOMAIN, parse_goal, symbolic_state, task_problem
+from stages.plan.symbols import parse_goal, symbolic_state, task_problem
+from stages.plan.tasks import task_goals
 from stages.plan.trajectories import executed_rows, planned_rows, write_trajectory
 from stages.plan.updated_graph import update_graph
 from stages.plan.world_model import RobotState, WorldModel, body_planes
@@ -67,6 +70,8 @@ def run(
     scene: InteractiveScene, ground_truth: GroundTruth | None, *, parameters: PlanParameters, context: Context
 ) -> Plan:
     """Plan in `scene`; execute in the true room of `ground_truth`, or in `scene` itself when there is none."""
+    if parameters.goal and parameters.task:
+        raise UsageError("--goal and --task cannot be given together", hint="leave one of them out")
     robot = load_robot(parameters.robot)
     budgets = Budgets(
         parameters.base_samples, parameters.pair_samples, parameters.path_samples, parameters.path_searches,
@@ -76,14 +81,9 @@ def run(
     with context.progress.step("load the scene"):
         model = WorldModel(scene.root, graph, robot, parameters.clearance)
     try:
-        objects, initial = symbolic_state(model, graph)
+        objects, initial = symbolic_state(model, graph, parameters.size_uncertainty)
         failures: list[Failure] = []
-        candidates = (
-            [parameters.goal]
-            if parameters.goal
-            else default_goals(model, initial, robot.opening + parameters.size_uncertainty)
-        )
-        goals = [parse_goal(literals, objects) for literals in candidates]
+        goals = [parse_goal(literals, objects) for literals in _candidates(model, initial, parameters, failures)]
         try:
             base = start_base(model, robot.carry, context.random(START))
         except MotionFailed as failed:
@@ -94,7 +94,7 @@ def run(
             goal, literals, attempt = _first_feasible(
                 model, state, goals if not failures else [], objects, initial, budgets, parameters, context, failures
             )
-        if not goals:
+        if not goals and not failures:
             failures.append(_nothing_to_do(model, graph, initial))
         problem = task_problem(objects, initial, goal)
         context.output.joinpath("domain.pddl").write_text(domain_text(DOMAIN), encoding="utf-8")
@@ -123,6 +123,21 @@ def run(
         return _write(parameters, context, literals, steps, ranges, failures, outcome, arrays, updated)
     finally:
         model.close()
+
+
+def _candidates(
+    model: WorldModel, initial: frozenset[Atom], parameters: PlanParameters, failures: list[Failure]
+) -> list[tuple[str, ...]]:
+    """Return the goals that may be tried, the preferred first; why a task has none goes to `failures`."""
+    if parameters.goal:
+        return [parameters.goal]
+    if not parameters.task:
+        return default_goals(model, initial, model.description.opening + parameters.size_uncertainty)
+    try:
+        return task_goals(parameters.task, model, initial)
+    except MotionFailed as failed:
+        failures.append(failed.failure)
+        return []
 
 
 def _first_feasible(

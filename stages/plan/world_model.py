@@ -23,6 +23,7 @@ from stages.kit.simulation.robot import Configuration, Robot
 from stages.kit.simulation.robot_description import RobotDescription
 from stages.kit.simulation.shapes import joined, link_shapes, surface_points
 from stages.kit.simulation.world import PhysicsWorld, read_scene_bodies
+from stages.plan.regions import Region, find_regions, region_under
 from stages.plan.support_planes import top_planes
 
 
@@ -69,6 +70,7 @@ class WorldModel:
         self.robot.set(Configuration(np.zeros(3), description.carry, description.opening))
         self.room = self._room()
         self._points: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self._regions: dict[str, tuple[Region, ...]] = {}
 
     def close(self) -> None:
         """End the pybullet world."""
@@ -90,6 +92,7 @@ class WorldModel:
         record = record.model_copy(update={"name": name})
         self.records[name], self._texts[name], self.planes[name] = record, text, planes
         self._points.pop(name, None)
+        self._regions.pop(name, None)
         self.world.add_body(record, text)
         self.checker.add_body(name)
 
@@ -98,6 +101,7 @@ class WorldModel:
         self.world.remove_body(name)
         del self.records[name], self._texts[name]
         self.planes.pop(name, None)
+        self._regions.pop(name, None)
 
     def pose(self, name: str) -> np.ndarray:
         """Return world_from_body (4, 4)."""
@@ -120,19 +124,36 @@ class WorldModel:
         self.records[item] = self.records[item].model_copy(update={"parent": parent})
 
     def move_joint(self, joint_name: str, value: float) -> None:
-        """Move a joint; what lies in a drawer goes with it."""
-        owner = next(name for name, record in self.records.items() if any(j.name == joint_name for j in record.joints))
+        """Move a joint; what stands on the moving part (in a drawer, on a shelf in a door) is carried along."""
+        owner = self.owner(joint_name)
         joint = self.joint(owner, joint_name)
-        if joint.type == "prismatic":
-            low, high = (np.asarray(bound) for bound in self.part_mesh(owner, joint.part).bounds)
-            before = self.pose(owner) @ body_from_moved(joint, self.joint_value(owner, joint_name))
-            after = self.pose(owner) @ body_from_moved(joint, value)
-            for item, record in self.records.items():
-                if record.movable and record.parent == owner:
-                    inside = apply(inverse(before), self.pose(item)[:3, 3])
-                    if np.all(inside > low - 0.02) and np.all(inside < high + 0.02):
-                        self.world.set_pose(item, after @ inverse(before) @ self.pose(item))
+        before = self.pose(owner) @ body_from_moved(joint, self.joint_value(owner, joint_name))
+        after = self.pose(owner) @ body_from_moved(joint, value)
+        along = set()
+        for item, record in self.records.items():
+            if record.movable and record.parent == owner:
+                region = region_under(self, item, owner)
+                if region is not None and region.joint is not None and region.joint.name == joint_name:
+                    along |= {item, *self.load(item)}
+        for item in sorted(along):
+            self.world.set_pose(item, after @ inverse(before) @ self.pose(item))
         self.world.set_joint(owner, joint_name, value)
+
+    def owner(self, joint_name: str) -> str:
+        """Return the body that a joint belongs to. Raises StopIteration."""
+        return next(name for name, record in self.records.items() if any(j.name == joint_name for j in record.joints))
+
+    def load(self, item: str) -> tuple[str, ...]:
+        """Return the movable bodies that stand on a body, and on those, in turn: what goes along when it is carried."""
+        found: list[str] = []
+        waiting = [item]
+        while waiting:
+            carrier = waiting.pop()
+            above = [name for name, record in self.records.items() if record.movable and record.parent == carrier]
+            fresh = [name for name in above if name not in found and name != item]
+            found += fresh
+            waiting += fresh
+        return tuple(found)
 
     def snapshot(self) -> Snapshot:
         """Return where everything is, for `restore`."""
@@ -163,6 +184,21 @@ class WorldModel:
             meshes = [mesh for entries in link_shapes(self._texts[name]).values() for mesh in entries]
             self._points[name] = surface_points(meshes, count, np.random.default_rng(0))
         return self._points[name]
+
+    def regions(self, name: str) -> tuple[Region, ...]:
+        """Return the level places of a body where things can stand, largest first."""
+        if name not in self._regions:
+            self._regions[name] = find_regions(self, name)
+        return self._regions[name]
+
+    def footprint(self, item: str) -> tuple[float, float]:
+        """Return radius of the upright foot about the body's origin and height [m] of a rigid body."""
+        points = self.points(item)
+        return float(np.linalg.norm(points[:, :2], axis=1).max()), float(np.ptp(points[:, 2]))
+
+    def shaped_links(self, name: str) -> tuple[str, ...]:
+        """Return the links of a body that have a collision shape."""
+        return tuple(link_shapes(self._texts[name]))
 
     def part_mesh(self, name: str, link: str) -> trimesh.Trimesh:
         """Return the collision mesh of a link in the body frame with all joints at 0. Raises KeyError."""

@@ -7,10 +7,10 @@ from itertools import product
 import pytest
 
 from schemas.errors import BadInput
-from stages.plan.pddl import domain_text, parse_domain, parse_problem, problem_text
-from stages.plan.strips import Domain, GroundAction, Problem, Schema, ground, validate
+from stages.kit.tasks.pddl import domain_text, parse_domain, parse_problem, problem_text
+from stages.kit.tasks.strips import Domain, GroundAction, Problem, Schema, ground, validate
 from stages.plan.symbols import DOMAIN
-from stages.plan.task_planner import plan_task
+from stages.kit.tasks.task_planner import plan_task
 
 BLOCKS = Domain(
     "blocks",

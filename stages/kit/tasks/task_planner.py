@@ -10,7 +10,7 @@ import heapq
 from dataclasses import dataclass
 from typing import Literal
 
-from stages.plan.strips import Atom, GroundAction, Problem
+from stages.kit.tasks.strips import Atom, GroundAction, Problem
 
 Heuristic = Literal["add", "max", "ff"]
 

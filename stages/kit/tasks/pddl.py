@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from schemas.errors import BadInput
-from stages.plan.strips import Atom, Domain, Problem, Schema
+from stages.kit.tasks.strips import Atom, Domain, Problem, Schema
 
 Expression = str | list["Expression"]
 
