@@ -115,7 +115,7 @@ class Conduct:
     def _named_bodies(self, name: str, arguments: tuple[str, ...]) -> list[str]:
         if name in ("open", "close"):
             return [self.model.owner(arguments[0])]
-        bodies = [arguments[1]] if name == "place" else [arguments[0], arguments[1]]
+        bodies = [arguments[1]] if name == "place" else [arguments[0], arguments[1], *self.model.load(arguments[0])]
         return [body for body in bodies if body in self.model.records]
 
     def _look(self, name: str, arguments: tuple[str, ...]) -> None:
@@ -182,6 +182,8 @@ class Conduct:
         """Correct what the robot believes of itself and of what it holds by what the joints and a look say."""
         base, arm = state.base, state.arm
         if self.physical.held is None:
+            self.model.checker.put_down()
+            self.model.set_down()
             return RobotState(base, arm)
         tool_from_item = self.physical.held_pose()
         if state.holding is not None:

@@ -1,7 +1,8 @@
 """The planning domain: what a mobile arm with one hand can do with the things of a contact graph (typed STRIPS).
 
 `carrier` things (trays, plates) are lifted with all that stands on them: `on(cup, tray)` stays true while the tray
-moves, so that its load is carried along. `reachable`, `graspable`, `fits`, `flat` and `entrance` are affordances, read
+moves. `carried_along(cup, tray)` says that the cup was put there before the tray was first lifted, so that it travels
+(or has travelled) with it. `reachable`, `graspable`, `fits`, `flat` and `entrance` are affordances, read
 off the geometry once; the other predicates change.
 """
 
@@ -10,7 +11,7 @@ from __future__ import annotations
 from stages.kit.tasks.strips import Domain, Schema
 
 START = "start"
-GOAL_PREDICATES = ("on", "in", "holding", "open", "closed")
+GOAL_PREDICATES = ("on", "in", "holding", "carried_along", "open", "closed")
 
 DOMAIN = Domain(
     name="mobile_manipulation",
@@ -28,6 +29,8 @@ DOMAIN = Domain(
         "on": ("item", "support"),
         "in": ("item", "container"),
         "behind": ("item", "door"),
+        "carried_along": ("item", "item"),
+        "unmoved": ("item",),
         "clear": ("support",),
         "holding": ("item",),
         "hand_empty": (),
@@ -46,11 +49,14 @@ DOMAIN = Domain(
         Schema("pick", (("?item", "item"), ("?from", "support")),
                (("graspable", "?item"), ("near", "?item"), ("on", "?item", "?from"), ("clear", "?item"),
                 ("hand_empty",)),
-               (("holding", "?item"), ("clear", "?from")), (("on", "?item", "?from"), ("hand_empty",))),
+               (("holding", "?item"), ("clear", "?from")),
+               (("on", "?item", "?from"), ("carried_along", "?item", "?from"), ("unmoved", "?item"),
+                ("hand_empty",))),
         Schema("lift", (("?item", "item"), ("?from", "support")),
                (("graspable", "?item"), ("carrier", "?item"), ("near", "?item"), ("on", "?item", "?from"),
                 ("hand_empty",)),
-               (("holding", "?item"), ("clear", "?from")), (("on", "?item", "?from"), ("hand_empty",))),
+               (("holding", "?item"), ("clear", "?from")),
+               (("on", "?item", "?from"), ("unmoved", "?item"), ("hand_empty",))),
         Schema("take_out", (("?item", "item"), ("?from", "container"), ("?door", "door")),
                (("graspable", "?item"), ("near", "?item"), ("in", "?item", "?from"), ("behind", "?item", "?door"),
                 ("open", "?door"), ("clear", "?item"), ("hand_empty",)),
@@ -59,6 +65,10 @@ DOMAIN = Domain(
         Schema("place", (("?item", "item"), ("?on", "support")),
                (("flat", "?on"), ("fits", "?item", "?on"), ("holding", "?item"), ("near", "?on")),
                (("on", "?item", "?on"), ("hand_empty",)), (("holding", "?item"), ("clear", "?on"))),
+        Schema("stack", (("?item", "item"), ("?on", "item")),
+               (("carrier", "?on"), ("unmoved", "?on"), ("flat", "?on"), ("fits", "?item", "?on"), ("holding", "?item"),
+                ("near", "?on")),
+               (("on", "?item", "?on"), ("carried_along", "?item", "?on"), ("hand_empty",)), (("holding", "?item"),)),
         Schema("put_in", (("?item", "item"), ("?in", "container"), ("?door", "door")),
                (("entrance", "?door", "?in"), ("fits", "?item", "?door"), ("holding", "?item"), ("near", "?in"),
                 ("open", "?door")),
@@ -69,7 +79,8 @@ DOMAIN = Domain(
                (("open", "?door"),)),
     ),
 )  # fmt: skip
-"""`take_out` and `put_in` are `pick` and `place` through a door, `lift` is a `pick` with a load."""
+"""`take_out` and `put_in` are `pick` and `place` through a door, `lift` is a `pick` with a load, `stack` a `place` on what is
+lifted later."""
 
-PLAIN_NAMES = {"take_out": "pick", "put_in": "place", "lift": "pick"}
+PLAIN_NAMES = {"take_out": "pick", "lift": "pick", "put_in": "place", "stack": "place"}
 """Names of the motions of the actions that have another name."""

@@ -97,6 +97,8 @@ def refine_action(
     snapshot = model.snapshot()
     steps: list[Step] = []
     try:
+        if name == "pick":
+            model.take_aboard(arguments[0])
         for manipulation in manipulate(model, state, name, arguments, budgets, random, preferred, style):
             target = arguments[1] if name == "place" else arguments[0]
             hold_for_checks(model, state)
@@ -158,6 +160,7 @@ def apply_effect(
     hold_for_checks(model, state)
     if name == "place" and manipulation.item_pose is not None:
         model.world.set_pose(arguments[0], manipulation.item_pose)
+        model.set_down()
         model.put_on(arguments[0], arguments[1])
     for joint, value in manipulation.joint_values.items():
         model.move_joint(joint, value)
@@ -190,8 +193,8 @@ def refine_plan(
             steps += found
             origin = arguments[1] if name == "place" else arguments[0]
     finally:
-        hold_for_checks(model, RobotState(state.base, state.arm))
         model.restore(snapshot)
+        hold_for_checks(model, RobotState(state.base, state.arm))
     return steps
 
 

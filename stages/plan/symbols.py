@@ -95,8 +95,11 @@ def symbolic_state(
         door = guarding_door(model, item, parent) if objects[parent] == "container" else None
         if door is None:
             atoms.add(("on", item, parent))
+            if objects[parent] == "item":
+                atoms.add(("carried_along", item, parent))
         else:
             atoms |= {("in", item, parent), ("behind", item, door)}
+    atoms |= {("unmoved", name) for name, kind in objects.items() if kind == "item"}
     atoms |= {("clear", name) for name, kind in objects.items() if kind == "item" and name not in loaded}
     return objects, frozenset(atoms | affordance_atoms(model, objects, size_uncertainty))
 

@@ -164,7 +164,7 @@ def stack_and_carry(facts: SceneFacts) -> Goals:
     for count in range(MOST_STACKED, 0, -1):
         for _, tray, target, near in sorted(ranked):
             if len(near) >= count:
-                stacked = tuple(atom_text(("on", item, tray)) for item in near[:count])
+                stacked = tuple(atom_text(("carried_along", item, tray)) for item in near[:count])
                 goals.append((*stacked, atom_text(("on", tray, target))))
     return goals
 

@@ -23,6 +23,7 @@ from stages.kit.simulation.robot import Configuration, Robot
 from stages.kit.simulation.robot_description import RobotDescription
 from stages.kit.simulation.shapes import joined, link_shapes, surface_points
 from stages.kit.simulation.world import PhysicsWorld, read_scene_bodies
+from stages.plan.joined_bodies import joined_text
 from stages.plan.regions import Region, find_regions, region_under
 from stages.plan.support_planes import top_planes
 
@@ -71,6 +72,8 @@ class WorldModel:
         self.room = self._room()
         self._points: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._regions: dict[str, tuple[Region, ...]] = {}
+        self._aboard: dict[str, tuple[str, np.ndarray]] = {}
+        """What is lifted with a carrier: item -> (carrier, carrier_from_item)."""
 
     def close(self) -> None:
         """End the pybullet world."""
@@ -105,6 +108,9 @@ class WorldModel:
 
     def pose(self, name: str) -> np.ndarray:
         """Return world_from_body (4, 4)."""
+        if name in self._aboard:
+            carrier, carrier_from_item = self._aboard[name]
+            return self.world.pose(carrier) @ carrier_from_item
         return self.world.pose(name)
 
     def joint_value(self, name: str, joint: str) -> float:
@@ -116,8 +122,8 @@ class WorldModel:
         return next(entry for entry in self.records[name].joints if entry.name == joint)
 
     def links(self, name: str) -> tuple[str, ...]:
-        """Return the link names of a body."""
-        return tuple(self.world.bodies[name].links)
+        """Return the link names of a body, without those of what is aboard."""
+        return tuple(link for link in self.world.bodies[name].links if link not in self._aboard)
 
     def put_on(self, item: str, parent: str) -> None:
         """Note that an item now stands on (or in) another body."""
@@ -155,6 +161,31 @@ class WorldModel:
             waiting += fresh
         return tuple(found)
 
+    def take_aboard(self, carrier: str) -> None:
+        """Make one rigid body of a carrier and what stands on it, so that its load counts in collision checks."""
+        load = self.load(carrier)
+        if not load:
+            return
+        pose = self.pose(carrier)
+        aboard = {item: (carrier, inverse(pose) @ self.pose(item)) for item in load}
+        text = joined_text(self._texts[carrier], {item: (self._texts[item], aboard[item][1]) for item in load})
+        for item in (carrier, *load):
+            self.world.remove_body(item)
+        self._aboard |= aboard
+        self.world.add_body(moved_record(self.records[carrier], pose, {}), text)
+        self.checker.add_body(carrier)
+
+    def set_down(self) -> None:
+        """Make bodies of their own again of what is aboard, where it is now."""
+        aboard, poses = dict(self._aboard), {item: self.pose(item) for item in self._aboard}
+        for carrier in {carrier for carrier, _ in aboard.values()}:
+            poses[carrier] = self.world.pose(carrier)
+            self.world.remove_body(carrier)
+        self._aboard = {}
+        for item, pose in sorted(poses.items()):
+            self.world.add_body(moved_record(self.records[item], pose, {}), self._texts[item])
+            self.checker.add_body(item)
+
     def snapshot(self) -> Snapshot:
         """Return where everything is, for `restore`."""
         poses = {name: self.pose(name) for name, record in self.records.items() if record.movable}
@@ -165,6 +196,7 @@ class WorldModel:
     def restore(self, snapshot: Snapshot) -> None:
         """Put everything where it was; nothing is carried afterwards."""
         self.checker.put_down()
+        self.set_down()
         for name, pose in snapshot.poses.items():
             self.world.set_pose(name, pose)
         for name, values in snapshot.joints.items():

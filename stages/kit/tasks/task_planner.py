@@ -1,7 +1,9 @@
-"""Forward search over grounded STRIPS actions: A* with the additive, FF or maximum heuristic of the relaxed problem.
+"""Search for task plans: greedy with two heuristics (default), or A* with the maximum heuristic (shortest plans).
 
-Bonet & Geffner 2001 (h_add, h_max), Hoffmann & Nebel 2001 (h_FF). h_max never overestimates, so that its plans are
-shortest; the other two find plans with fewer expansions.
+The default is after LAMA (Richter & Westphal 2010): greedy best-first search that takes turns between h_FF and the count
+of landmarks left, with queues of their own for preferred actions, evaluation deferred until a state is expanded; then
+weighted A* with falling weights looks for shorter plans within what is left of its share of the budget. h_add, h_max:
+Bonet & Geffner 2001. Everything is counted in expanded states, so that the same task gives the same plan.
 """
 
 from __future__ import annotations
@@ -10,9 +12,18 @@ import heapq
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
+from stages.kit.tasks.landmarks import find_landmarks
+from stages.kit.tasks.lazy_search import LazySearch
+from stages.kit.tasks.relaxed import FAR, Relaxed, applicable, costs, relax, relaxed_plan, successor
 from stages.kit.tasks.strips import Atom, GroundAction, Problem
 
-Heuristic = Literal["add", "max", "ff"]
+Heuristic = Literal["landmarks", "add", "max", "ff"]
+WEIGHTS = (5, 2, 1)
+"""Of the heuristic in the searches that shorten the first plan."""
+IMPROVEMENT = 600
+"""Most states expanded in each of them."""
 
 
 @dataclass(frozen=True)
@@ -28,127 +39,97 @@ class TaskPlan:
     """Goal atoms that no sequence of actions can make true, even when nothing is ever deleted."""
 
 
-class _Task:
-    """The problem as bit masks, with the relaxed exploration."""
+class _Estimator:
+    """Heuristic values of states (A,) of a task."""
 
-    def __init__(self, problem: Problem, actions: list[GroundAction]) -> None:
-        atoms = set(problem.initial | problem.goal)
-        for action in actions:
-            atoms |= action.preconditions | action.add | action.delete
-        self.number = {atom: place for place, atom in enumerate(sorted(atoms))}
-        self.actions = actions
-        self.preconditions = [[self.number[a] for a in sorted(action.preconditions)] for action in actions]
-        self.adds = [[self.number[a] for a in sorted(action.add)] for action in actions]
-        self.pre_masks = [self.mask(action.preconditions) for action in actions]
-        self.add_masks = [self.mask(action.add) for action in actions]
-        self.keep_masks = [~self.mask(action.delete) for action in actions]
-        self.needed_by: list[list[int]] = [[] for _ in atoms]
-        for place, needs in enumerate(self.preconditions):
-            for atom in needs:
-                self.needed_by[atom].append(place)
-        self.goal = [self.number[atom] for atom in sorted(problem.goal)]
-        self.goal_mask = self.mask(problem.goal)
+    def __init__(self, task: Relaxed, heuristic: Heuristic) -> None:
+        self.task, self.heuristic = task, heuristic
+        self.cost = np.empty(len(task.atoms), dtype=np.int64)
+        self.by = np.empty(len(task.atoms), dtype=np.int32)
+        self.preferred = np.zeros(len(task.actions), dtype=np.uint8)
 
-    def mask(self, atoms: frozenset[Atom]) -> int:
-        total = 0
-        for atom in atoms:
-            total |= 1 << self.number[atom]
-        return total
-
-    def relaxed_costs(self, state: int, use_max: bool) -> tuple[list[float], list[int]]:
-        """Return the cost of each atom when nothing is deleted, and its cheapest action (-1: none needed)."""
-        infinity = float("inf")
-        costs = [infinity] * len(self.number)
-        best = [-1] * len(self.number)
-        waiting = [len(needs) for needs in self.preconditions]
-        sums = [0.0] * len(self.actions)
-        queue: list[tuple[float, int]] = []
-
-        def offer(atom: int, cost: float, action: int) -> None:
-            if cost < costs[atom]:
-                costs[atom], best[atom] = cost, action
-                heapq.heappush(queue, (cost, atom))
-
-        for atom in range(len(self.number)):
-            if state >> atom & 1:
-                offer(atom, 0.0, -1)
-        for place, needs in enumerate(self.preconditions):
-            if not needs:
-                for atom in self.adds[place]:
-                    offer(atom, 1.0, place)
-        done = [False] * len(self.number)
-        while queue:
-            cost, atom = heapq.heappop(queue)
-            if done[atom]:
-                continue
-            done[atom] = True
-            for place in self.needed_by[atom]:
-                sums[place] = max(sums[place], cost) if use_max else sums[place] + cost
-                waiting[place] -= 1
-                if waiting[place] == 0:
-                    for added in self.adds[place]:
-                        offer(added, sums[place] + 1.0, place)
-        return costs, best
-
-    def estimate(self, state: int, heuristic: Heuristic) -> float:
-        costs, best = self.relaxed_costs(state, heuristic == "max")
-        values = [costs[atom] for atom in self.goal]
-        if heuristic == "max":
-            return max(values, default=0.0)
-        if heuristic == "add" or float("inf") in values:
-            return sum(values)
-        chosen: set[int] = set()
-        open_atoms = list(self.goal)
-        while open_atoms:
-            action = best[open_atoms.pop()]
-            if action >= 0 and action not in chosen:
-                chosen.add(action)
-                open_atoms.extend(self.preconditions[action])
-        return float(len(chosen))
+    def __call__(self, state: np.ndarray) -> int:
+        task = self.task
+        costs(
+            state, task.pre_at, task.add, task.add_at, task.user, task.user_at, -1, self.heuristic == "max", self.cost,
+            self.by,
+        )  # fmt: skip
+        values = self.cost[task.goal]
+        if len(values) == 0 or values.max() >= FAR:
+            return FAR if len(values) else 0
+        if self.heuristic == "max":
+            return int(values.max())
+        if self.heuristic == "add":
+            return int(values.sum())
+        return int(relaxed_plan(state, task.pre, task.pre_at, task.goal, self.cost, self.by, self.preferred))
 
 
 def plan_task(
-    problem: Problem, actions: list[GroundAction], *, heuristic: Heuristic = "add", limit: int = 50_000
+    problem: Problem, actions: list[GroundAction], *, heuristic: Heuristic = "landmarks", limit: int = 50_000
 ) -> TaskPlan:
-    """Search for a plan; every action costs 1. `limit` bounds the expanded states; ties fall to the older state."""
-    task = _Task(problem, actions)
-    start = task.mask(problem.initial)
-    costs, _ = task.relaxed_costs(start, True)
-    lost = tuple(sorted(atom for atom in problem.goal if costs[task.number[atom]] == float("inf")))
+    """Search for a plan; every action costs 1. `limit` bounds the expanded states; ties fall to the older state.
+
+    `max` gives a shortest plan; `landmarks` a good one fast.
+    """
+    task = relax(problem, actions)
+    estimate = _Estimator(task, "max")
+    estimate(task.initial)
+    lost = tuple(task.atoms[atom] for atom in task.goal if estimate.cost[atom] >= FAR)
     if lost:
         return TaskPlan(None, 0, True, lost)
-    best_cost = {start: 0}
-    parent: dict[int, tuple[int, int]] = {}
-    queue = [(task.estimate(start, heuristic), 0, 0, start)]
+    if heuristic == "landmarks":
+        return _landmark_plan(task, limit)
+    return _a_star(task, _Estimator(task, heuristic), limit)
+
+
+def _landmark_plan(task: Relaxed, limit: int) -> TaskPlan:
+    search = LazySearch(task, find_landmarks(task))
+    first = search.run(None, limit, None)
+    if first.plan is None:
+        return TaskPlan(None, first.expanded, first.exhausted)
+    plan, expanded = first.plan, first.expanded
+    for weight in WEIGHTS:
+        better = search.run(weight, min(IMPROVEMENT, limit), len(plan))
+        expanded += better.expanded
+        plan = plan if better.plan is None else better.plan
+    return TaskPlan([task.actions[action] for action in plan], expanded, False)
+
+
+def _a_star(task: Relaxed, estimate: _Estimator, limit: int) -> TaskPlan:
+    start = task.initial
+    key = start.tobytes()
+    best_cost = {key: 0}
+    parent: dict[bytes, tuple[bytes, int]] = {}
+    queue = [(estimate(start), 0, 0, key)]
     counter = expanded = 0
     while queue:
-        _, _, cost, state = heapq.heappop(queue)
+        _, _, cost, key = heapq.heappop(queue)
         cost = -cost
-        if cost > best_cost[state]:
+        if cost > best_cost[key]:
             continue
-        if state & task.goal_mask == task.goal_mask:
-            return TaskPlan(_trace(task, parent, state, start), expanded, False)
+        state = np.frombuffer(key, dtype=np.uint8).copy()
+        if state[task.goal].all():
+            return TaskPlan(_trace(task, parent, key), expanded, False)
         if expanded >= limit:
             return TaskPlan(None, expanded, False)
         expanded += 1
-        for place, needs in enumerate(task.pre_masks):
-            if state & needs != needs:
-                continue
-            after = (state & task.keep_masks[place]) | task.add_masks[place]
-            if cost + 1 < best_cost.get(after, 1 << 60):
-                estimate = task.estimate(after, heuristic)
-                if estimate == float("inf"):
+        for action in applicable(state, task.pre, task.pre_at).tolist():
+            after = successor(task, state, action)
+            after_key = after.tobytes()
+            if cost + 1 < best_cost.get(after_key, FAR):
+                value = estimate(after)
+                if value >= FAR:
                     continue
-                best_cost[after] = cost + 1
-                parent[after] = (state, place)
+                best_cost[after_key] = cost + 1
+                parent[after_key] = (key, action)
                 counter += 1
-                heapq.heappush(queue, (cost + 1 + estimate, counter, -(cost + 1), after))
+                heapq.heappush(queue, (cost + 1 + value, counter, -(cost + 1), after_key))
     return TaskPlan(None, expanded, True)
 
 
-def _trace(task: _Task, parent: dict[int, tuple[int, int]], state: int, start: int) -> list[GroundAction]:
+def _trace(task: Relaxed, parent: dict[bytes, tuple[bytes, int]], key: bytes) -> list[GroundAction]:
     plan = []
-    while state != start:
-        state, place = parent[state]
-        plan.append(task.actions[place])
+    while key in parent:
+        key, action = parent[key]
+        plan.append(task.actions[action])
     return plan[::-1]
