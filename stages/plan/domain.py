@@ -79,8 +79,8 @@ DOMAIN = Domain(
                (("open", "?door"),)),
     ),
 )  # fmt: skip
-"""`take_out` and `put_in` are `pick` and `place` through a door, `lift` is a `pick` with a load, `stack` a `place` on what is
-lifted later."""
+"""`take_out` and `put_in` are `pick` and `place` through a door, `lift` a `pick` with a load, `stack` a `place` on
+what is lifted later."""
 
 PLAIN_NAMES = {"take_out": "pick", "lift": "pick", "put_in": "place", "stack": "place"}
 """Names of the motions of the actions that have another name."""

@@ -14,6 +14,7 @@ from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.grasps import Grasp, narrowest_width, sample_grasps
 from stages.kit.simulation.robot import Configuration
 from stages.plan.arm_motion import ArmPlanner, Tally
+from stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
 from stages.plan.motions import Manipulation, Segment, whole_body
 from stages.plan.placements import Placement, place_regions, sample_placements
 from stages.plan.rim_grasps import rim_grasps
@@ -162,14 +163,18 @@ def _try_pick(
         link: depth for link, depth in within.items() if link not in rest
     }
     lifted = None
+    laden = model.laden(item)
     checker.carry(item, tool_from_item)
     checker.allow(touch=model.links(item), rest_on=rest)
     try:
-        for lift in (LIFT, 0.012):
+        for lift in (RAISE,) if laden else (LIFT, 0.012):
             up = arm_planner.line(base, arm, _shifted(world_from_tool, np.array([0, 0, lift])), tally)
             if up is None:
                 continue
             checker.allow(touch=model.links(item), rest_on=within)
+            if laden:
+                lifted = np.concatenate([up, drawn_in(model, arm_planner, base, up[-1], tally)[1:]])
+                break
             steep = grasp.pitch > 1.2
             for distance in (0.25, 0.15):
                 goal = _shifted(world_from_tool, np.array([0.0, 0.0, lift]))
@@ -185,11 +190,11 @@ def _try_pick(
         if lifted is None:
             return None
         checker.allow(touch=model.links(item))
-        folded = arm_planner.folded(base, lifted[-1], tally)
+        folded = lifted[-1] if laden else arm_planner.folded(base, lifted[-1], tally)
         if folded is None:
             return None
         try:
-            home = arm_planner.path(base, lifted[-1], folded)
+            home = lifted[-1:] if laden else arm_planner.path(base, lifted[-1], folded)
         except MotionFailed as failed:
             tally.failed(failed)
             return failed
@@ -208,7 +213,7 @@ def _try_pick(
         (
             Segment(whole_body(base, reach), opening),
             Segment(whole_body(base, approach), opening, SLOW, "grasp", item),
-            Segment(whole_body(base, lifted), 0.0, SLOW, "", item),
+            Segment(whole_body(base, lifted), 0.0, LEVEL_PACE if laden else SLOW, "", item),
             Segment(whole_body(base, home), 0.0, 0.6, "", item),
         ),
         tool_from_item=tool_from_item,
@@ -294,6 +299,9 @@ def _try_place(
     arm_planner: ArmPlanner, tally: Tally,
 ) -> Manipulation | MotionFailed | None:  # fmt: skip
     assert state.tool_from_item is not None
+    if model.laden(item):
+        rest_on = {link: RESTING_DEPTH for link in model.links(target)}
+        return level_place(model, state, item, base, placement, rest_on, arm_planner, tally)
     checker = model.checker
     item_from_tool = inverse(state.tool_from_item)
     model.robot.set(_open(state, model.description.opening))

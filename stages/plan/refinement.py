@@ -18,6 +18,8 @@ from stages.plan.pick_place import Budgets, GraspStyle, plan_pick, plan_place
 from stages.plan.placements import placement_style
 from stages.plan.world_model import RobotState, WorldModel
 
+LADEN_PACE = 0.5
+"""Share of the full speed at which the robot drives with a laden tray."""
 FINAL = ("no_grasp",)
 """Failures that no other draw of the random choices can avoid."""
 
@@ -114,8 +116,9 @@ def refine_action(
             manipulation, path = _same_turns(manipulation, path)
             rows = np.concatenate([path, np.tile(state.arm, (len(path), 1))], axis=1)
             opening = 0.0 if state.holding else model.description.opening
+            pace = LADEN_PACE if state.holding is not None and model.laden(state.holding) else 1.0
             if len(path) > 1:
-                steps.append(Step("drive", (origin, target), (Segment(rows, opening, 1.0, "", state.holding),), None))
+                steps.append(Step("drive", (origin, target), (Segment(rows, opening, pace, "", state.holding),), None))
             steps.append(Step(name, arguments, manipulation.segments, manipulation))
             state = apply_effect(model, state, name, arguments, manipulation)
             origin = target

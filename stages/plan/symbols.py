@@ -18,6 +18,8 @@ from stages.plan.door_motion import is_closed, is_open
 from stages.plan.regions import region_under
 from stages.plan.world_model import WorldModel
 
+COMFORT = 0.9
+"""Height at which the arm likes to work [m]."""
 BEHIND = 0.3
 """An item inside furniture counts as behind a part when its centre is at most this far beside the part [m]."""
 
@@ -101,7 +103,19 @@ def symbolic_state(
             atoms |= {("in", item, parent), ("behind", item, door)}
     atoms |= {("unmoved", name) for name, kind in objects.items() if kind == "item"}
     atoms |= {("clear", name) for name, kind in objects.items() if kind == "item" and name not in loaded}
-    return objects, frozenset(atoms | affordance_atoms(model, objects, size_uncertainty))
+    ordered = dict(sorted(objects.items(), key=lambda entry: (_discomfort(model, entry[0], entry[1]), entry[0])))
+    return ordered, frozenset(atoms | affordance_atoms(model, objects, size_uncertainty))
+
+
+def _discomfort(model: WorldModel, name: str, kind: str) -> float:
+    """Return how far [m] the handle of a door is from a comfortable height: task search tries those near it first."""
+    if kind != "door":
+        return 0.0
+    owner = model.owner(name)
+    handle = model.joint(owner, name).handle
+    if handle is None:
+        return np.inf
+    return round(abs(float(apply(model.pose(owner), np.array(handle))[2]) - COMFORT), 3)
 
 
 _LITERAL = re.compile(r"^\s*(\w+)\s*\(\s*([^()]*?)\s*\)\s*$")

@@ -175,6 +175,10 @@ class WorldModel:
         self.world.add_body(moved_record(self.records[carrier], pose, {}), text)
         self.checker.add_body(carrier)
 
+    def laden(self, carrier: str) -> bool:
+        """Whether something is lifted with a body."""
+        return any(owner == carrier for owner, _ in self._aboard.values())
+
     def set_down(self) -> None:
         """Make bodies of their own again of what is aboard, where it is now."""
         aboard, poses = dict(self._aboard), {item: self.pose(item) for item in self._aboard}

@@ -1,6 +1,6 @@
-"""Best-first search with deferred evaluation that takes turns between queues: two heuristics, all and preferred actions.
+"""Best-first search with deferred evaluation that takes turns between queues: two heuristics, with preferred actions.
 
-Richter & Westphal 2010, section 3: a state is evaluated when it is taken from a queue, and its successors wait under its
+Richter & Westphal 2010, section 3: a state is evaluated when it is taken from a queue; its successors wait under its
 values. Queues of preferred actions get 1000 turns more whenever a heuristic falls to a new low.
 """
 

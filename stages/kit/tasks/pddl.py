@@ -1,13 +1,13 @@
-"""Write and read the part of PDDL that typed STRIPS needs (requirements :strips :typing)."""
+"""Write and read PDDL: STRIPS, types, negative preconditions (McDermott et al. 1998; requirements of PDDL 1.2)."""
 
 from __future__ import annotations
 
-import re
-
-from schemas.errors import BadInput
+from stages.kit.tasks.pddl_expressions import Expression, entries, parse_expression, refuse, typed_names, word
 from stages.kit.tasks.strips import Atom, Domain, Problem, Schema
 
-Expression = str | list["Expression"]
+REQUIREMENTS = (":strips", ":typing", ":negative-preconditions")
+Literals = tuple[tuple[Atom, ...], tuple[Atom, ...]]
+"""Positive atoms and negated ones."""
 
 
 def _typed(pairs: list[tuple[str, str]]) -> str:
@@ -21,7 +21,8 @@ def _conjunction(atoms: list[Atom], negated: list[Atom] | None = None) -> str:
 
 def domain_text(domain: Domain) -> str:
     """Return the PDDL text of a domain."""
-    lines = [f"(define (domain {domain.name})", "  (:requirements :strips :typing)"]
+    negative = any(schema.negative for schema in domain.schemas)
+    lines = [f"(define (domain {domain.name})", f"  (:requirements {' '.join(REQUIREMENTS[: 3 if negative else 2])})"]
     types = [(name, parent or "object") for name, parent in domain.types.items()]
     lines.append(f"  (:types {_typed(types)})")
     lines.append("  (:predicates")
@@ -33,7 +34,7 @@ def domain_text(domain: Domain) -> str:
         lines += [
             f"  (:action {schema.name}",
             f"    :parameters ({_typed(list(schema.parameters))})",
-            f"    :precondition {_conjunction(list(schema.preconditions))}",
+            f"    :precondition {_conjunction(list(schema.preconditions), list(schema.negative))}",
             f"    :effect {_conjunction(list(schema.add), list(schema.delete))})",
         ]
     return "\n".join([*lines, ")", ""])
@@ -46,91 +47,164 @@ def problem_text(problem: Problem, domain_name: str) -> str:
         f"(define (problem {problem.name})\n  (:domain {domain_name})\n"
         f"  (:objects {_typed(sorted(problem.objects.items()))})\n"
         f"  (:init\n{initial})\n"
-        f"  (:goal {_conjunction(sorted(problem.goal))}))\n"
+        f"  (:goal {_conjunction(sorted(problem.goal), sorted(problem.negative_goal))}))\n"
     )
 
 
-def _parse(text: str) -> Expression:
-    tokens = re.findall(r"[()]|[^\s()]+", re.sub(r";[^\n]*", "", text).lower())
-    stack: list[list[Expression]] = [[]]
-    for token in tokens:
-        if token == "(":
-            stack.append([])
-        elif token == ")":
-            if len(stack) < 2:
-                raise BadInput("PDDL: a closing bracket too many")
-            closed = stack.pop()
-            stack[-1].append(closed)
-        else:
-            stack[-1].append(token)
-    if len(stack) != 1 or len(stack[0]) != 1:
-        raise BadInput("PDDL: brackets do not match")
-    return stack[0][0]
-
-
-def _pairs(terms: list[Expression], default: str = "") -> list[tuple[str, str]]:
-    """Read `a b - kind c - other d` as (name, type) pairs."""
-    pairs: list[tuple[str, str]] = []
-    waiting: list[str] = []
-    words = [str(term) for term in terms]
-    place = 0
-    while place < len(words):
-        if words[place] == "-":
-            pairs += [(name, words[place + 1]) for name in waiting]
-            waiting, place = [], place + 2
-        else:
-            waiting.append(words[place])
-            place += 1
-    return pairs + [(name, default) for name in waiting]
-
-
-def _literals(expression: Expression) -> tuple[tuple[Atom, ...], tuple[Atom, ...]]:
+def _literals(expression: Expression, what: str) -> Literals:
     """Return the positive and the negated atoms of a conjunction."""
-    items = expression[1:] if expression and expression[0] == "and" else [expression]
+    listed = entries(expression, what)
+    items = listed[1:] if listed and listed[0] == "and" else [listed] if listed else []
     positive: list[Atom] = []
     negative: list[Atom] = []
     for item in items:
-        if not isinstance(item, list):
-            raise BadInput(f"PDDL: expected an atom, found {item!r}")
-        if item and item[0] == "not":
-            negative.append(tuple(str(term) for term in item[1]))
+        inner = entries(item, f"a literal of {what}")
+        if inner and inner[0] == "not":
+            if len(inner) != 2:
+                raise refuse(f"`not` in {what} takes one atom")
+            negative.append(_atom(inner[1], what))
         else:
-            positive.append(tuple(str(term) for term in item))
+            positive.append(_atom(inner, what))
     return tuple(positive), tuple(negative)
 
 
-def _sections(expression: Expression) -> dict[str, list[Expression]]:
-    if not isinstance(expression, list) or not expression or expression[0] != "define":
-        raise BadInput("PDDL: the text does not begin with (define")
-    return {str(part[0]): part[1:] for part in expression[1:] if isinstance(part, list) and part[0] != ":action"}
+def _atom(expression: Expression, what: str) -> Atom:
+    terms = entries(expression, f"an atom of {what}")
+    if not terms:
+        raise refuse(f"an atom of {what} is empty")
+    atom = tuple(word(term, f"a term of {what}") for term in terms)
+    if atom[0] in ("and", "or", "not", "imply", "forall", "exists", "when", "=", "increase", "either"):
+        raise refuse(f"{what} has `{atom[0]}`, which typed STRIPS does not know")
+    return atom
+
+
+def _sections(text: str, kind: str) -> tuple[str, dict[str, list[Expression]], list[list[Expression]]]:
+    """Return name, sections and actions of `(define (<kind> name) ...)`."""
+    expression = parse_expression(text)
+    if len(expression) < 2 or expression[0] != "define":
+        raise refuse("the text does not begin with (define")
+    head = entries(expression[1], "the head")
+    if len(head) != 2 or head[0] != kind:
+        raise refuse(f"the text defines no {kind}")
+    sections: dict[str, list[Expression]] = {}
+    actions = []
+    for part in expression[2:]:
+        listed = entries(part, "a section")
+        if not listed:
+            raise refuse("a section is empty")
+        name = word(listed[0], "the name of a section")
+        if name == ":action":
+            actions.append(listed)
+        elif name in sections:
+            raise refuse(f"section {name} occurs twice")
+        else:
+            sections[name] = listed[1:]
+    return word(head[1], f"the name of the {kind}"), sections, actions
 
 
 def parse_domain(text: str) -> Domain:
-    """Read a domain of typed STRIPS. Raises BadInput."""
-    expression = _parse(text)
-    sections = _sections(expression)
-    types = {name: "" if parent in ("object", "") else parent for name, parent in _pairs(sections.get(":types", []))}
-    predicates = {
-        str(entry[0]): tuple(kind for _, kind in _pairs(list(entry[1:]), "object")) for entry in sections[":predicates"]
-    }
-    schemas = []
-    for part in expression[1:]:
-        if isinstance(part, list) and part[0] == ":action":
-            fields = {str(part[i]): part[i + 1] for i in range(2, len(part), 2)}
-            preconditions, negated = _literals(fields[":precondition"])
-            if negated:
-                raise BadInput(f"PDDL: action {part[1]} has a negative precondition, which :strips does not know")
-            add, delete = _literals(fields[":effect"])
-            parameters = tuple(_pairs(list(fields[":parameters"]), "object"))
-            schemas.append(Schema(str(part[1]), parameters, preconditions, add, delete))
-    return Domain(str(sections["domain"][0]), types, predicates, tuple(schemas))
+    """Read a domain. Raises BadInput for what is no PDDL, uses more than STRIPS, types and negative preconditions, or
+    names types, predicates or variables that are not declared."""
+    name, sections, actions = _sections(text, "domain")
+    for unknown in set(sections) - {":requirements", ":types", ":predicates"}:
+        raise refuse(f"section {unknown} is not read")
+    for requirement in sections.get(":requirements", []):
+        if requirement not in REQUIREMENTS:
+            raise refuse(f"requirement {requirement} is not met")
+    types = {kind: "" if parent in ("object", "") else parent for kind, parent in
+             typed_names(sections.get(":types", []), ":types") if kind != "object"}  # fmt: skip
+    for kind in types:
+        _check_ancestors(kind, types)
+    predicates = {}
+    for entry in sections.get(":predicates", []):
+        listed = entries(entry, "a predicate")
+        if not listed:
+            raise refuse("a predicate has no name")
+        predicate = word(listed[0], "a predicate's name")
+        kinds = [kind for _, kind in typed_names(listed[1:], f"predicate {predicate}")]
+        predicates[predicate] = tuple(_known_type(kind, types, f"predicate {predicate}") for kind in kinds)
+    schemas = tuple(_schema(part, types, predicates) for part in actions)
+    return Domain(name, types, predicates, schemas)
 
 
-def parse_problem(text: str) -> Problem:
-    """Read a problem of typed STRIPS. Raises BadInput."""
-    sections = _sections(_parse(text))
-    initial = frozenset(tuple(str(term) for term in atom) for atom in sections[":init"])
-    goal, negated = _literals(sections[":goal"][0])
-    if negated:
-        raise BadInput("PDDL: the goal has a negated atom, which :strips does not know")
-    return Problem(str(sections["problem"][0]), dict(_pairs(sections[":objects"])), initial, frozenset(goal))
+def _check_ancestors(kind: str, types: dict[str, str]) -> None:
+    seen = {kind}
+    while types[kind]:
+        kind = types[kind]
+        if kind not in types:
+            raise refuse(f"type {kind!r} is not declared")
+        if kind in seen:
+            raise refuse(f"type {kind!r} is below itself")
+        seen.add(kind)
+
+
+def _known_type(kind: str, types: dict[str, str], what: str) -> str:
+    if kind in ("", "object"):
+        return ""
+    if kind not in types:
+        raise refuse(f"{what}: type {kind!r} is not declared")
+    return kind
+
+
+def _schema(part: list[Expression], types: dict[str, str], predicates: dict[str, tuple[str, ...]]) -> Schema:
+    if len(part) < 2 or len(part) % 2:
+        raise refuse("an action lacks its name, or one of its fields has no value")
+    name = word(part[1], "the name of an action")
+    what = f"action {name}"
+    fields = {word(part[place], f"a field of {what}"): part[place + 1] for place in range(2, len(part), 2)}
+    for unknown in set(fields) - {":parameters", ":precondition", ":effect"}:
+        raise refuse(f"{what}: field {unknown} is not read")
+    parameters = tuple(
+        (variable, _known_type(kind, types, what))
+        for variable, kind in typed_names(entries(fields.get(":parameters", []), f"{what}: parameters"), what)
+    )
+    for variable, _ in parameters:
+        if not variable.startswith("?"):
+            raise refuse(f"{what}: parameter {variable!r} does not begin with ?")
+    positive, negative = _literals(fields.get(":precondition", []), f"{what}: precondition")
+    add, delete = _literals(fields.get(":effect", []), f"{what}: effect")
+    variables = {variable for variable, _ in parameters}
+    for atom in (*positive, *negative, *add, *delete):
+        _check_atom(atom, predicates, what)
+        for term in atom[1:]:
+            if term not in variables:
+                raise refuse(f"{what}: {term!r} is no parameter of it")
+    return Schema(name, parameters, positive, add, delete, negative)
+
+
+def _check_atom(atom: Atom, predicates: dict[str, tuple[str, ...]], what: str) -> None:
+    if atom[0] not in predicates:
+        raise refuse(f"{what}: predicate {atom[0]!r} is not declared")
+    if len(predicates[atom[0]]) != len(atom) - 1:
+        raise refuse(f"{what}: {atom[0]} takes {len(predicates[atom[0]])} arguments, not {len(atom) - 1}")
+
+
+def parse_problem(text: str, domain: Domain | None = None) -> Problem:
+    """Read a problem; with `domain`, its objects and atoms are checked against that. Raises BadInput."""
+    name, sections, actions = _sections(text, "problem")
+    if actions:
+        raise refuse("a problem has no actions")
+    for unknown in set(sections) - {":domain", ":requirements", ":objects", ":init", ":goal"}:
+        raise refuse(f"section {unknown} is not read")
+    if len(sections.get(":goal", [])) != 1:
+        raise refuse("a problem has one goal")
+    objects = dict(typed_names(sections.get(":objects", []), ":objects"))
+    initial = frozenset(_atom(entry, ":init") for entry in sections.get(":init", []))
+    goal, negated = _literals(sections[":goal"][0], ":goal")
+    problem = Problem(name, objects, initial, frozenset(goal), frozenset(negated))
+    if domain is not None:
+        check_problem(domain, problem)
+    return problem
+
+
+def check_problem(domain: Domain, problem: Problem) -> None:
+    """Raises BadInput when a problem names types, predicates or objects that there are not, or of a wrong type."""
+    for name, kind in problem.objects.items():
+        _known_type(kind, domain.types, f"object {name}")
+    for atom in sorted(problem.initial | problem.goal | problem.negative_goal):
+        _check_atom(atom, domain.predicates, "the problem")
+        for term, kind in zip(atom[1:], domain.predicates[atom[0]], strict=True):
+            if term not in problem.objects:
+                raise refuse(f"object {term!r} is not declared")
+            if not domain.is_a(problem.objects[term], kind):
+                raise refuse(f"{term} in {' '.join(atom)} is a {problem.objects[term] or 'object'}, not a {kind}")

@@ -54,9 +54,7 @@ def relax(problem: Problem, actions: list[GroundAction]) -> Relaxed:
     """
     changed = {atom for action in actions for atom in (*action.add, *action.delete)}
     static = problem.initial - changed
-    usable = [
-        action for action in actions if not any(a not in changed and a not in static for a in action.preconditions)
-    ]
+    usable = [action for action in actions if action.preconditions <= changed | static]
     atoms = sorted((problem.initial - static) | changed | problem.goal)
     number = {atom: place for place, atom in enumerate(atoms)}
     always = len(atoms)
@@ -101,8 +99,11 @@ def applicable(state, pre, pre_at):  # type: ignore[no-untyped-def]
     return found[:count]
 
 
-@njit("void(uint8[::1], int32[::1], int32[::1], int32[::1], int32[::1], int32[::1], int64, boolean, int64[::1], int32[::1])",
-      cache=True)  # fmt: skip
+@njit(
+    "void(uint8[::1], int32[::1], int32[::1], int32[::1], int32[::1], int32[::1], int64, boolean, int64[::1], "
+    "int32[::1])",
+    cache=True,
+)
 def costs(state, pre_at, add, add_at, user, user_at, without, use_max, cost, by):  # type: ignore[no-untyped-def]
     """Write the cost of every atom when nothing is ever deleted, and the action that gives it so (-1: none).
 

@@ -1,9 +1,9 @@
 """Search for task plans: greedy with two heuristics (default), or A* with the maximum heuristic (shortest plans).
 
-The default is after LAMA (Richter & Westphal 2010): greedy best-first search that takes turns between h_FF and the count
-of landmarks left, with queues of their own for preferred actions, evaluation deferred until a state is expanded; then
-weighted A* with falling weights looks for shorter plans within what is left of its share of the budget. h_add, h_max:
-Bonet & Geffner 2001. Everything is counted in expanded states, so that the same task gives the same plan.
+The default is after LAMA (Richter & Westphal 2010): greedy best-first search that takes turns between h_FF and the
+count of landmarks left, with queues of their own for preferred actions, evaluation deferred until a state is expanded;
+then weighted A* with falling weights looks for shorter plans, within a few hundred states each. h_add, h_max: Bonet &
+Geffner 2001. Everything is counted in expanded states, so that the same task gives the same plan.
 """
 
 from __future__ import annotations
