@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -45,6 +46,8 @@ class Conduct:
     relocalize: bool
     attempts: int
     failures: list[Failure] = field(default_factory=list)
+    observe: Callable[[int], None] = lambda number: None
+    """Called with the index of its last step when an action has been carried out."""
 
     def run(self, state: RobotState, steps: list[Step]) -> bool:
         """Execute the steps; return whether all were carried out. Failures are collected."""
@@ -62,6 +65,7 @@ class Conduct:
             name, arguments = group[-1].name, group[-1].arguments
             origin = arguments[1] if name == "place" else arguments[0]
             number += len(group)
+            self.observe(number - 1)
         return True
 
     # --- closed loop ------------------------------------------------------------------------------------------
@@ -218,6 +222,7 @@ class Conduct:
                 except MotionFailed as failed:
                     self._note(failed, step.name, step.arguments)
                     return False
+                self.observe(number)
         return True
 
 

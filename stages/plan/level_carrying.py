@@ -1,4 +1,4 @@
-"""Motions of the arm with a laden tray: the tool goes on straight lines and keeps its tilt, so that nothing slides off."""
+"""Motions of the arm with a laden tray: the tool goes on straight lines and keeps its tilt: nothing slides off."""
 
 from __future__ import annotations
 

@@ -23,8 +23,18 @@ class PlanParameters(Parameters):
     task: Literal["", "fridge-to-microwave", "tidy-the-desk", "put-away-in-drawer", "stack-and-carry"] = Field(
         "", description="A task by name; its goal is derived from what is in the scene. Not together with --goal"
     )
+    assume: tuple[str, ...] = Field(
+        (),
+        description="Named priors such as in(bottle,fridge_2): a thing of this class is believed to be there, hidden "
+        "by closed furniture; its pose and shape are seen once the furniture is open",
+    )
     robot: str = Field("panda", description="Robot of data/robots/")
-    heuristic: Literal["add", "max", "ff"] = Field("add", description="Heuristic of the task search; max is optimal")
+    planner: Literal["builtin", "fast-downward"] = Field(
+        "builtin", description="Task planner; fast-downward is a program of its own (extra planning-gpl)"
+    )
+    heuristic: Literal["landmarks", "add", "max", "ff"] = Field(
+        "landmarks", description="Heuristic of the built-in task planner; max finds shortest plans, slowly"
+    )
     execute: bool = Field(True, description="Execute the plan in physics: in the true room when it is given")
     relocalize: bool = Field(
         True,
@@ -52,7 +62,7 @@ class PlanParameters(Parameters):
 
 STAGE = Stage(
     name="plan",
-    version=1,
+    version=2,
     summary="Plan what a robot does in the scene, execute it in physics, check the goal or say why not",
     parameters=PlanParameters,
     reads={"scene": InteractiveScene, "ground_truth": Optionally(GroundTruth)},

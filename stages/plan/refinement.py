@@ -1,18 +1,21 @@
-"""Give every symbolic action its geometry; what fails is fed back to the task search as a blocked action."""
+"""Give every symbolic action its geometry; what fails is fed back to the task search as a lesson."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from schemas.plan import Failure
 from stages.kit.motion.base_placement import plan_drive
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.tasks.strips import Domain, GroundAction, Problem, atom_text, ground
-from stages.kit.tasks.task_planner import Heuristic, plan_task
+from stages.kit.tasks.fast_downward import plan_with_fast_downward
+from stages.kit.tasks.strips import Atom, Domain, GroundAction, Problem, apply_action, atom_text, ground
+from stages.kit.tasks.task_planner import Heuristic, TaskPlan, plan_task
 from stages.plan.domain import PLAIN_NAMES, START
 from stages.plan.door_motion import plan_close, plan_open
+from stages.plan.learning import Lessons
 from stages.plan.motions import Manipulation, Segment
 from stages.plan.pick_place import Budgets, GraspStyle, plan_pick, plan_place
 from stages.plan.placements import placement_style
@@ -44,8 +47,10 @@ class Step:
 class RefinementFailed(Exception):
     """An action of a task plan has no motion."""
 
-    def __init__(self, action: GroundAction, failure: Failure) -> None:
+    def __init__(self, place: int, action: GroundAction, failure: Failure) -> None:
         super().__init__(failure.message)
+        self.place = place
+        """Index in the task plan."""
         self.action = action
         self.failure = failure
 
@@ -192,7 +197,7 @@ def refine_plan(
                 )  # fmt: skip
             except MotionFailed as failed:
                 failure = failed.failure.model_copy(update={"action": action.text})
-                raise RefinementFailed(action, failure) from None
+                raise RefinementFailed(place, action, failure) from None
             steps += found
             origin = arguments[1] if name == "place" else arguments[0]
     finally:
@@ -208,6 +213,8 @@ class Attempt:
     actions: list[GroundAction] | None
     steps: list[Step] | None
     failures: list[Failure]
+    learned: tuple[str, ...] = ()
+    """What the failures taught the task search, in words."""
 
 
 def plan_and_refine(
@@ -221,52 +228,74 @@ def plan_and_refine(
     heuristic: Heuristic,
     task_attempts: int,
     refinement_attempts: int,
+    planner: Literal["builtin", "fast-downward"] = "builtin",
 ) -> Attempt:
     """Alternate between task search and geometry.
 
-    An action whose geometry fails in all `refinement_attempts` (the earlier choices are drawn anew each time) is
-    taken away from the task search, at most `task_attempts` times.
+    What an action's geometry fails of in all `refinement_attempts` (the earlier choices are drawn anew each time) is a
+    lesson for the task search (`learning`), at most `task_attempts` times.
     """
     actions = ground(domain, problem)
     failures: list[Failure] = []
-    blocked: list[GroundAction] = []
+    lessons = Lessons()
     for _ in range(task_attempts):
-        allowed = [action for action in actions if action not in blocked]
-        found = plan_task(problem, allowed, heuristic=heuristic)
+        allowed = lessons.apply(actions)
+        if planner == "builtin":
+            found = plan_task(problem, allowed, heuristic=heuristic)
+        else:
+            found = plan_with_fast_downward(domain, problem, allowed)
         if found.actions is None:
-            failures.append(_no_task_plan(problem, found.unreachable, found.exhausted, found.expanded, blocked))
-            return Attempt(None, None, failures)
-        worst: GroundAction | None = None
+            failures.append(_no_task_plan(problem, found, lessons))
+            return Attempt(None, None, failures, tuple(lessons.words))
+        worst: RefinementFailed | None = None
         for _ in range(refinement_attempts):
             try:
-                return Attempt(found.actions, refine_plan(model, state, found.actions, budgets, random), failures)
+                steps = refine_plan(model, state, found.actions, budgets, random)
+                return Attempt(found.actions, steps, failures, tuple(lessons.words))
             except RefinementFailed as failed:
                 failures.append(failed.failure)
-                worst = failed.action
+                worst = failed
                 if failed.failure.kind in FINAL:
                     break
         assert worst is not None
-        blocked.append(worst)
-    return Attempt(None, None, failures)
+        before = problem.initial
+        for action in found.actions[: worst.place]:
+            before = apply_action(before, action)
+        lessons.learn(worst.action, worst.failure, actions, before)
+    return Attempt(None, None, failures, tuple(lessons.words))
 
 
-def _no_task_plan(
-    problem: Problem, unreachable: tuple[tuple[str, ...], ...], exhausted: bool, expanded: int,
-    blocked: list[GroundAction],
-) -> Failure:  # fmt: skip
-    without = f" without {', '.join(action.text for action in blocked)}" if blocked else ""
-    if unreachable:
-        names = ", ".join(atom_text(atom) for atom in unreachable)
-        message = f"no sequence of actions{without} makes {names} true"
-    elif exhausted:
+def _no_task_plan(problem: Problem, found: TaskPlan, lessons: Lessons) -> Failure:
+    without = f" ({'; '.join(lessons.words)})" if lessons.words else ""
+    if found.unreachable:
+        names = ", ".join(atom_text(atom) for atom in found.unreachable)
+        message = f"no sequence of actions makes {names} true{without}{_lacking(problem, found.unreachable)}"
+    elif found.exhausted:
         names = ", ".join(sorted(atom_text(atom) for atom in problem.goal))
-        message = f"each of {names} can be reached, but not all together{without}"
+        message = f"{names} cannot all be true together{without}"
     else:
-        message = f"no task plan{without} within {expanded} expanded states"
-    objects = sorted({name for atom in unreachable or problem.goal for name in atom[1:]})
+        message = f"no task plan within {found.expanded} expanded states{without}"
+    objects = sorted({name for atom in found.unreachable or problem.goal for name in atom[1:]})
     return Failure(
-        kind="goal_unsatisfiable" if exhausted else "search_limit",
+        kind="goal_unsatisfiable" if found.exhausted else "search_limit",
         message=message,
         objects=tuple(objects),
-        numbers={"expanded": float(expanded), "blocked": float(len(blocked))},
+        numbers={"expanded": float(found.expanded), "lessons": float(len(lessons.words))},
     )
+
+
+def _lacking(problem: Problem, unreachable: tuple[Atom, ...]) -> str:
+    """Return the affordances that goals lack, in words: why they cannot be reached, as far as single things say it."""
+    words = []
+    for predicate, *names in unreachable:
+        item, target = names[0], names[-1]
+        if predicate in ("open", "closed"):
+            wanted: tuple[Atom, ...] = (("reachable", item),)
+        else:
+            wanted = (("graspable", item), ("reachable", item))
+        words += [f"{atom[1]} is not {atom[0]}" for atom in wanted if atom not in problem.initial]
+        doors = [atom[1] for atom in problem.initial if atom[0] == "entrance" and atom[2] == target]
+        places = {"on": [target], "in": doors}.get(predicate, [])
+        if places and not any(("fits", item, place) in problem.initial for place in places):
+            words.append(f"{target} has no room for {item}")
+    return f": {', '.join(dict.fromkeys(words))}" if words else ""
