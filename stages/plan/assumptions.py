@@ -76,8 +76,8 @@ def believe(model: WorldModel, graph: ContactGraphFile, beliefs: list[Belief]) -
         box = Box(center=as_vector(middle + [0.0, 0.0, height / 2]), size=(width, width, height))
         record = SceneBody(
             name=belief.name, class_name=belief.class_name, movable=True, parent=belief.container,
-            relation="contains" if region.doors else "supports", world_from_body=as_transform(pose), box=box, mass=mass,
-            grasp_width=width,
+            relation="contains" if region.doors else "supports", world_from_body=as_transform(pose),
+            world_from_reconstructed=None, box=box, mass=mass, grasp_width=width,
         )  # fmt: skip
         model.see(belief.name, record, _cylinder(belief.name, width / 2, height, mass), ())
         nodes.append(

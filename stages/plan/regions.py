@@ -15,6 +15,7 @@ import trimesh
 from schemas.scene_parts import Joint
 from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.motion.doors import body_from_moved
+from stages.kit.simulation.shapes import joined
 
 if TYPE_CHECKING:
     from stages.plan.world_model import WorldModel
@@ -134,7 +135,7 @@ def _shape(model: WorldModel, name: str) -> _Shape | None:
         return None
     owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
     moved = {number: joints[link] for number, link in enumerate(links) if link in joints}
-    return _Shape(trimesh.util.concatenate(meshes), owner, tuple(links), moved)
+    return _Shape(joined(meshes), owner, tuple(links), moved)
 
 
 def _levels(shape: _Shape, number: int) -> list[tuple[np.ndarray, np.ndarray, float]]:

@@ -21,6 +21,8 @@ THICKEST = 0.03
 """Walls are at most this thick [m]."""
 FINGER_ROOM = 0.045
 """Free width behind the wall for the inner finger [m]."""
+OFFSETS = (-0.09, -0.06, -0.03, 0.03, 0.06, 0.09)
+"""Straight walls are taken beside their middle too [m]: the palm has to pass what stands on the tray."""
 BREADTH = 0.011
 """Half the breadth of a finger tip [m]."""
 
@@ -30,8 +32,8 @@ def rim_grasps(
 ) -> list[Grasp]:
     """Return grasps straight from above with one finger outside and one inside of the outermost wall.
 
-    `points` (N, 3) are of the surface, body frame. Per heading through the middle the wall is where the outermost
-    points near the rim are; it must be thin and free behind. Headings along the body's axes come first.
+    `points` (N, 3) are of the surface, body frame. Per heading through the middle (along the body's axes also
+    beside it) the wall is where the outermost points near the rim are; it must be thin and free behind.
     """
     world = apply(world_from_body, points)
     low, high = world.min(axis=0), world.max(axis=0)
@@ -43,11 +45,12 @@ def rim_grasps(
     yaw = float(np.arctan2(world_from_body[1, 0], world_from_body[0, 0]))
     even = yaw + 2 * np.pi * np.arange(headings) / headings
     found: list[Grasp] = []
-    for heading in even:
+    beside = [(heading, offset) for heading in even[:: headings // 4] for offset in OFFSETS]
+    for heading, offset in [*((heading, 0.0) for heading in even), *beside]:
         outward = np.array([np.cos(heading), np.sin(heading)])
         across = np.array([-outward[1], outward[0]])
         relative = top[:, :2] - middle
-        near = top[(np.abs(relative @ across) < BREADTH) & (relative @ outward > 0)]
+        near = top[(np.abs(relative @ across - offset) < BREADTH) & (relative @ outward > 0)]
         if len(near) < 6:
             continue
         along = (near[:, :2] - middle) @ outward
@@ -60,7 +63,7 @@ def rim_grasps(
         approach = np.array([0.0, 0.0, -1.0])
         pose = np.eye(4)
         pose[:3, :3] = np.column_stack([np.cross(closing, approach), closing, approach])
-        pose[:2, 3] = middle + outward * (along.max() - thickness / 2)
+        pose[:2, 3] = middle + outward * (along.max() - thickness / 2) + across * offset
         pose[2, 3] = high[2] - depth
         for turned in (pose, pose @ np.diag([-1.0, -1.0, 1.0, 1.0])):
             found.append(Grasp(inverse(world_from_body) @ turned, thickness, np.pi / 2))

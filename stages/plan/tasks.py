@@ -162,9 +162,9 @@ def stack_and_carry(facts: SceneFacts) -> Goals:
         )
     goals = []
     for count in range(MOST_STACKED, 0, -1):
-        for _, tray, target, near in sorted(ranked):
-            if len(near) >= count:
-                stacked = tuple(atom_text(("carried_along", item, tray)) for item in near[:count])
+        for _, tray, target, stackable in sorted(ranked):
+            if len(stackable) >= count:
+                stacked = tuple(atom_text(("carried_along", item, tray)) for item in stackable[:count])
                 goals.append((*stacked, atom_text(("on", tray, target))))
     return goals
 

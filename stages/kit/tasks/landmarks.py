@@ -111,8 +111,8 @@ def _reasonable(
         chain = longer
     found = np.zeros((count, count), dtype=bool)
     closure = chain.copy()
-    for k in np.flatnonzero(goal):
-        for m in np.flatnonzero(goal):
+    for k in np.flatnonzero(goal).tolist():
+        for m in np.flatnonzero(goal).tolist():
             if k == m or closure[m, k]:
                 continue
             if any(int(atoms[x]) in deleted[k] for x in np.flatnonzero(chain[m])):

@@ -72,10 +72,9 @@ def _atom(expression: Expression, what: str) -> Atom:
     terms = entries(expression, f"an atom of {what}")
     if not terms:
         raise refuse(f"an atom of {what} is empty")
-    atom = tuple(word(term, f"a term of {what}") for term in terms)
-    if atom[0] in ("and", "or", "not", "imply", "forall", "exists", "when", "=", "increase", "either"):
-        raise refuse(f"{what} has `{atom[0]}`, which typed STRIPS does not know")
-    return atom
+    if terms[0] in ("and", "or", "not", "imply", "forall", "exists", "when", "=", "increase", "either"):
+        raise refuse(f"{what} has `{terms[0]}`, which typed STRIPS does not know")
+    return tuple(word(term, f"a term of {what}") for term in terms)
 
 
 def _sections(text: str, kind: str) -> tuple[str, dict[str, list[Expression]], list[list[Expression]]]:
