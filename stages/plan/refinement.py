@@ -272,7 +272,7 @@ def _no_task_plan(problem: Problem, found: TaskPlan, lessons: Lessons) -> Failur
         message = f"no sequence of actions makes {names} true{without}{_lacking(problem, found.unreachable)}"
     elif found.exhausted:
         names = ", ".join(sorted(atom_text(atom) for atom in problem.goal))
-        message = f"{names} cannot all be true together{without}"
+        message = f"each of {names} can be reached, but not all together{without}"
     else:
         message = f"no task plan within {found.expanded} expanded states{without}"
     objects = sorted({name for atom in found.unreachable or problem.goal for name in atom[1:]})
