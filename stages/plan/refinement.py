@@ -21,6 +21,8 @@ from stages.plan.pick_place import Budgets, GraspStyle, plan_pick, plan_place
 from stages.plan.placements import placement_style
 from stages.plan.world_model import RobotState, WorldModel
 
+TASK_STATES = (6000, 50_000)
+"""Most states of one task search, and of one for a shortest plan: tasks of rooms take some hundreds."""
 LADEN_PACE = 0.5
 """Share of the full speed at which the robot drives with a laden tray."""
 FINAL = ("no_grasp",)
@@ -241,7 +243,7 @@ def plan_and_refine(
     for _ in range(task_attempts):
         allowed = lessons.apply(actions)
         if planner == "builtin":
-            found = plan_task(problem, allowed, heuristic=heuristic)
+            found = plan_task(problem, allowed, heuristic=heuristic, limit=TASK_STATES[heuristic == "max"])
         else:
             found = plan_with_fast_downward(domain, problem, allowed)
         if found.actions is None:
