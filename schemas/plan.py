@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
+from pydantic import Field
+
 from schemas.artifact import Artifact
 from schemas.base import Model, Transform
 from schemas.contact_graph import ContactGraphFile
@@ -53,6 +55,20 @@ class BodyMatch(Model):
     """Between the centres of their boxes [m]."""
 
 
+class TreeDifference(Model):
+    """Where the kinematic tree after an action is not as planned."""
+
+    action: int
+    """Index into `actions`."""
+    node: str
+    """A body, or a joint."""
+    expected: str
+    """What was to carry the body (`hand`: held), or `open`, `closed`, `between`."""
+    observed: str
+    """The same in the room, read off contacts and joint values; `nothing` under it, `room:<name>` for a body of the
+    room that the planned scene does not have."""
+
+
 class PlanFile(Model):
     """plan.json."""
 
@@ -71,13 +87,22 @@ class PlanFile(Model):
     bumps: dict[str, float] = {}
     """Bodies of the room that something other than hand and fingers touched during execution -> largest force [N]."""
     assumptions: tuple[str, ...] = ()
-    """What the execution was allowed to know beyond the planned scene, in words."""
+    """What planning took for given and the execution was allowed to know beyond the planned scene, in words."""
+    task: str | None = Field(default=None, exclude_if=lambda value: value is None)
+    """The task by name whose goal this is. Absent for goals that were given as literals."""
+    planner: str | None = Field(default=None, exclude_if=lambda value: value is None)
+    """What searched for the task plan: `builtin` or `fast-downward`. Absent in plans from before there was a choice."""
+    learned: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
+    """What failed motions taught the task search, in words and in order."""
+    tree_differences: tuple[TreeDifference, ...] = Field(default=(), exclude_if=lambda value: not value)
+    """Where the kinematic tree in the room was not as planned after an action."""
 
 
 class Plan(Artifact):
     """`plan.json`, `domain.pddl`, `problem.pddl`, `plan.txt`, `trajectory.npz` (`time` (N,), `joints` (N, 9),
     `world_from_base` (N, 4, 4), `action` (N,)), `keyframes/<k>_<action>.png`, `execution.mcap` (FrameTransforms
-    of every body and link, a CompressedImage stream), `graph.json` (the updated contact graph)."""
+    of every body and link, a CompressedImage stream), `graph.json` (the updated contact graph), `graphs/<k>.json` (the
+    graph after action k; drives have none)."""
 
     kind: ClassVar[str] = "plan"
     description: ClassVar[str] = "task and motion plan, its execution and the updated contact graph"

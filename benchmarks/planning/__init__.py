@@ -1,1 +1,1 @@
-"""Planning beside named peers: motion (and task and motion) queries, one table."""
+"""Planning beside named peers: motion, and task and motion."""

@@ -97,7 +97,7 @@ def check_goal(
             checks.append(Check(condition=literal, holds=False, detail=detail))
             continue
         here = [matches[name].matched or "" for name in owners]
-        if predicate == "on":
+        if predicate in ("on", "carried_along"):
             checks.append(check_on(world, literal, here[0], here[1]))
         elif predicate == "in":
             checks.append(check_in(world, literal, here[0], here[1]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,7 +17,8 @@ from stages.plan.door_motion import is_closed, is_open
 from stages.plan.execution import PhysicalRobot, true_record
 from stages.plan.motions import Segment
 from stages.plan.pick_place import Budgets
-from stages.plan.refinement import Step, refine_action
+from stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level
+from stages.plan.refinement import Step, grasp_style, refine_action
 from stages.plan.world_model import RobotState, WorldModel
 
 JOINT_TOLERANCE = 0.05
@@ -47,6 +49,8 @@ class Conduct:
     relocalize: bool
     attempts: int
     failures: list[Failure] = field(default_factory=list)
+    observe: Callable[[int], None] = lambda number: None
+    """Called with the index of its last step when an action has been carried out."""
 
     def run(self, state: RobotState, steps: list[Step]) -> bool:
         """Execute the steps; return whether all were carried out. Failures are collected."""
@@ -54,19 +58,25 @@ class Conduct:
             return self._replay(steps)
         origin = "start"
         number = 0
-        for group in _by_action(steps):
-            carried_out = self._act(state, group, origin, number)
+        groups = _by_action(steps)
+        for place, group in enumerate(groups):
+            following = [(later[-1].name, later[-1].arguments) for later in groups[place + 1 :]]
+            carried_out = self._act(state, group, origin, number, following)
             if carried_out is None:
                 return False
             state = carried_out
             name, arguments = group[-1].name, group[-1].arguments
             origin = arguments[1] if name == "place" else arguments[0]
             number += len(group)
+            self.observe(number - 1)
         return True
 
     # --- closed loop ------------------------------------------------------------------------------------------
 
-    def _act(self, state: RobotState, group: list[Step], origin: str, number: int) -> RobotState | None:
+    def _act(
+        self, state: RobotState, group: list[Step], origin: str, number: int,
+        following: list[tuple[str, tuple[str, ...]]],
+    ) -> RobotState | None:  # fmt: skip
         """Carry out one action with its drives, trying again after a look; return the state after it or None."""
         name, arguments = group[-1].name, group[-1].arguments
         for attempt in range(self.attempts):
@@ -76,8 +86,9 @@ class Conduct:
                 self._look(name, arguments)
                 if preferred is not None:
                     preferred = self._re_anchored(group[-1], *preferred)
+                style = grasp_style(self.model, arguments[0], following) if name == "pick" else "any"
                 steps, after = refine_action(
-                    self.model, state, name, arguments, origin, self.budgets, self.random, preferred
+                    self.model, state, name, arguments, origin, self.budgets, self.random, preferred, style
                 )
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
@@ -122,12 +133,9 @@ class Conduct:
 
     def _named_bodies(self, name: str, arguments: tuple[str, ...]) -> list[str]:
         if name in ("open", "close"):
-            return [self._owner(arguments[0])]
-        bodies = [arguments[1]] if name == "place" else [arguments[0], arguments[1]]
+            return [self.model.owner(arguments[0])]
+        bodies = [arguments[1]] if name == "place" else [arguments[0], arguments[1], *self.model.load(arguments[0])]
         return [body for body in bodies if body in self.model.records]
-
-    def _owner(self, joint: str) -> str:
-        return next(body for body, record in self.model.records.items() if any(j.name == joint for j in record.joints))
 
     def _look(self, name: str, arguments: tuple[str, ...]) -> None:
         """Take over pose, joints and shape of the bodies that an action names, as they are in the room now."""
@@ -161,11 +169,8 @@ class Conduct:
         assert manipulation.item_pose is not None
         place = manipulation.item_pose.copy()
         place[:3, 3] += shift
-        heights = [plane.center[2] for plane in self.model.planes[body] if plane.horizontal]
-        if heights:
-            bottom = place[2, 3] + float(self.model.points(step.arguments[0])[:, 2].min())
-            nearest = min(heights, key=lambda height: abs(height - bottom))
-            place[2, 3] += nearest - bottom + 0.006
+        bottom = place[2, 3] + float(self.model.points(step.arguments[0])[:, 2].min())
+        place[2, 3] += nearest_level(self.model, body, place[:2, 3], bottom) - bottom + PUT_DOWN_HEIGHT
         return base, place
 
     def _execute(self, step: Step) -> None:
@@ -195,7 +200,7 @@ class Conduct:
         if name not in ("open", "close"):
             return
         there = self.joint_names[arguments[0]]
-        body = self._matched(self._owner(arguments[0]))
+        body = self._matched(self.model.owner(arguments[0]))
         joint = next(joint for joint in self.room.records[body].joints if joint.name == there)
         value = self.physical.world.joint_value(body, there)
         if not (is_open if name == "open" else is_closed)(joint, value):
@@ -210,6 +215,8 @@ class Conduct:
         """Correct what the robot believes of itself and of what it holds by what the joints and a look say."""
         base, arm = state.base, state.arm
         if self.physical.held is None:
+            self.model.checker.put_down()
+            self.model.set_down()
             return RobotState(base, arm)
         tool_from_item = self.physical.held_pose()
         if state.holding is not None:
@@ -244,6 +251,7 @@ class Conduct:
                 except MotionFailed as failed:
                     self._note(failed, step.name, step.arguments)
                     return False
+                self.observe(number)
         return True
 
 

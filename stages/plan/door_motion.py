@@ -173,7 +173,9 @@ def _push(
 ) -> Manipulation | None:  # fmt: skip
     world_from_body = model.pose(body)
     lift = float(world_from_body[2, 3])
-    contacts = push_points(joint, model.part_mesh(body, joint.part), random, 6, (0.45 - lift, 1.25 - lift))
+    part = model.part_mesh(body, joint.part)
+    lowest = min(0.45 - lift, float(part.bounds[1][2]) - 0.05)
+    contacts = push_points(joint, part, random, 6, (lowest, 1.25 - lift))
     values = _values(start, end)
     gap = model.description.tip_overhang - PRESS
     planner = ArmPlanner(model, random, budgets.path_samples)

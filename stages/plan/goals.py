@@ -6,7 +6,7 @@ import numpy as np
 
 from stages.kit.geometry.transforms import apply
 from stages.kit.motion.grasps import narrowest_width
-from stages.plan.strips import Atom, atom_text
+from stages.kit.tasks.strips import Atom, atom_text
 from stages.plan.world_model import WorldModel
 
 TABLE_CLASSES = ("table", "desk")

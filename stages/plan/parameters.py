@@ -20,8 +20,21 @@ class PlanParameters(Parameters):
         description="Goal literals such as on(bottle_7,table_3) closed(fridge_2); predicates on, in, open, closed, "
         "holding. Empty: take an item out of furniture with a door, put it on a table, shut the door",
     )
+    task: Literal["", "fridge-to-microwave", "tidy-the-desk", "put-away-in-drawer", "stack-and-carry"] = Field(
+        "", description="A task by name; its goal is derived from what is in the scene. Not together with --goal"
+    )
+    assume: tuple[str, ...] = Field(
+        (),
+        description="Named priors such as in(bottle,fridge_2): a thing of this class is believed to be there, hidden "
+        "by closed furniture; its pose and shape are seen once the furniture is open",
+    )
     robot: str = Field("panda", description="Robot of data/robots/")
-    heuristic: Literal["add", "max", "ff"] = Field("add", description="Heuristic of the task search; max is optimal")
+    planner: Literal["builtin", "fast-downward"] = Field(
+        "builtin", description="Task planner; fast-downward is a program of its own (extra planning-gpl)"
+    )
+    heuristic: Literal["landmarks", "add", "max", "ff"] = Field(
+        "landmarks", description="Heuristic of the built-in task planner; max finds shortest plans, slowly"
+    )
     execute: bool = Field(True, description="Execute the plan in physics: in the true room when it is given")
     relocalize: bool = Field(
         True,
@@ -49,7 +62,7 @@ class PlanParameters(Parameters):
 
 STAGE = Stage(
     name="plan",
-    version=2,
+    version=3,
     summary="Plan what a robot does in the scene, execute it in physics, check the goal or say why not",
     parameters=PlanParameters,
     reads={"scene": InteractiveScene, "ground_truth": Optionally(GroundTruth)},

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from schemas.scene_parts import SurfacePlane
 from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from stages.kit.motion.base_placement import free_bases, sample_bases
 from stages.kit.motion.collision import RESTING_DEPTH
@@ -14,14 +14,23 @@ from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.grasps import Grasp, narrowest_width, sample_grasps
 from stages.kit.simulation.robot import Configuration
 from stages.plan.arm_motion import ArmPlanner, Tally
+from stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
 from stages.plan.motions import Manipulation, Segment, whole_body
+from stages.plan.placements import Placement, place_regions, sample_placements
+from stages.plan.rim_grasps import rim_grasps
 from stages.plan.world_model import RobotState, WorldModel
 
 APPROACH = 0.10
 LIFT = 0.03
-PUT_DOWN_HEIGHT = 0.006
-EDGE_MARGIN = 0.03
+DRAWER_LIFT = 0.2
 SLOW = 0.35
+GraspStyle = Literal["any", "level", "steep"]
+"""How the hand may come: `level` from the side (for what is put under a cover), `steep` from above (into a drawer)."""
+PITCHES: dict[GraspStyle, tuple[float, ...]] = {
+    "any": (0.0, 0.35, 0.7, 1.1, np.pi / 2),
+    "level": (0.0, 0.35, 0.7),
+    "steep": (1.1, np.pi / 2),
+}
 
 
 @dataclass(frozen=True)
@@ -77,17 +86,22 @@ def plan_pick(
     budgets: Budgets,
     random: np.random.Generator,
     preferred: tuple[np.ndarray, np.ndarray] | None = None,
+    style: GraspStyle = "any",
 ) -> Manipulation:
     """Return the motion that takes `item` off (or out of) `source`, base pose included.
 
-    `preferred` (base (3,), body_from_tool (4, 4)) is tried first. Raises MotionFailed: `no_grasp` when the item is
-    too wide for the gripper, otherwise what ended most attempts.
+    `preferred` (base (3,), body_from_tool (4, 4)) is tried first. `style` is what the place where it goes next asks
+    for. Raises MotionFailed: `no_grasp` when the item is too wide for the gripper, otherwise what ended most attempts.
     """
     world_from_item = model.pose(item)
     points, normals = model.surface(item)
     # Fingers may touch the item, so that its believed shape, a little too wide, does not stop them.
     widest = model.description.opening + budgets.size_uncertainty
-    grasps = sample_grasps(points, normals, world_from_item, opening=widest, random=random)
+    grasps = sample_grasps(
+        points, normals, world_from_item, opening=widest, random=random, pitches=PITCHES[style]
+    )  # fmt: skip
+    if not grasps:
+        grasps = rim_grasps(points, world_from_item, random)
     if not grasps:
         width = narrowest_width(apply(world_from_item, points))
         raise MotionFailed(
@@ -149,14 +163,18 @@ def _try_pick(
         link: depth for link, depth in within.items() if link not in rest
     }
     lifted = None
+    laden = model.laden(item)
     checker.carry(item, tool_from_item)
     checker.allow(touch=model.links(item), rest_on=rest)
     try:
-        for lift in (LIFT, 0.012):
+        for lift in (RAISE,) if laden else (LIFT, 0.012):
             up = arm_planner.line(base, arm, _shifted(world_from_tool, np.array([0, 0, lift])), tally)
             if up is None:
                 continue
             checker.allow(touch=model.links(item), rest_on=within)
+            if laden:
+                lifted = np.concatenate([up, drawn_in(model, arm_planner, base, up[-1], tally)[1:]])
+                break
             steep = grasp.pitch > 1.2
             for distance in (0.25, 0.15):
                 goal = _shifted(world_from_tool, np.array([0.0, 0.0, lift]))
@@ -172,11 +190,11 @@ def _try_pick(
         if lifted is None:
             return None
         checker.allow(touch=model.links(item))
-        folded = arm_planner.folded(base, lifted[-1], tally)
+        folded = lifted[-1] if laden else arm_planner.folded(base, lifted[-1], tally)
         if folded is None:
             return None
         try:
-            home = arm_planner.path(base, lifted[-1], folded)
+            home = lifted[-1:] if laden else arm_planner.path(base, lifted[-1], folded)
         except MotionFailed as failed:
             tally.failed(failed)
             return failed
@@ -195,7 +213,7 @@ def _try_pick(
         (
             Segment(whole_body(base, reach), opening),
             Segment(whole_body(base, approach), opening, SLOW, "grasp", item),
-            Segment(whole_body(base, lifted), 0.0, SLOW, "", item),
+            Segment(whole_body(base, lifted), 0.0, LEVEL_PACE if laden else SLOW, "", item),
             Segment(whole_body(base, home), 0.0, 0.6, "", item),
         ),
         tool_from_item=tool_from_item,
@@ -217,41 +235,44 @@ def plan_place(
     model: WorldModel,
     state: RobotState,
     item: str,
-    surface: str,
+    target: str,
+    door: str | None,
     budgets: Budgets,
     random: np.random.Generator,
     preferred: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Manipulation:
-    """Return the motion that puts the held `item` down on (or in) `surface`, base pose included.
+    """Return the motion that puts the held `item` down on `target`, or in it behind `door`, base pose included.
 
     `preferred` (base (3,), world_from_item (4, 4)) is tried first. Raises MotionFailed: `no_placement` when no
-    horizontal plane of the surface carries the item's footprint, otherwise what ended most attempts.
+    free place there carries the item's footprint, otherwise what ended most attempts.
     """
     assert state.tool_from_item is not None
-    places = sample_placements(model, item, surface, random)
+    places = sample_placements(model, item, target, door, random)
     if not places and preferred is None:
-        planes = [plane for plane in model.planes[surface] if plane.horizontal]
+        regions = place_regions(model, item, target, door)
         raise MotionFailed(
             "no_placement",
-            f"{surface} has no free horizontal plane that carries {item} ({len(planes)} planes)",
-            (item, surface),
-            {"planes": len(planes)},
+            f"{target} has no free place that carries {item} ({len(regions)} places would be large enough)",
+            (item, target),
+            {"places": len(regions)},
         )
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
     paths = budgets.paths
     checker = model.checker
-    queue: list[tuple[np.ndarray, np.ndarray]] = [] if preferred is None else [preferred]
+    queue: list[tuple[np.ndarray, Placement]] = []
+    if preferred is not None:
+        queue.append((preferred[0], Placement(preferred[1], *_cover(places, preferred[1]))))
     model.robot.set(_open(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
     checker.allow(touch=model.links(item))
     for place in places[: max(4, budgets.bases // 16)]:
-        bases = sample_bases(place[:3, 3], model.room, budgets.bases // 8, random)
+        bases = sample_bases(place.world_from_item[:3, 3], model.room, budgets.bases // 8, random)
         bases = free_bases(bases, state.arm, checker, tally.blockers, 4)
         queue += [(base, place) for base in bases]
     try:
         for base, place in queue[: budgets.pairs]:
-            found = _try_place(model, state, item, surface, base, place, arm_planner, tally)
+            found = _try_place(model, state, item, target, base, place, arm_planner, tally)
             if isinstance(found, Manipulation):
                 return found
             if found is not None:
@@ -261,56 +282,32 @@ def plan_place(
     finally:
         checker.carry(item, state.tool_from_item)
         checker.allow()
-    tally.raise_for(f"place({item}, {surface})", (item, surface))
+    tally.raise_for(f"place({item}, {target})", (item, target))
     raise AssertionError("unreachable")
 
 
-def sample_placements(
-    model: WorldModel, item: str, surface: str, random: np.random.Generator, count: int = 48
-) -> list[np.ndarray]:
-    """Return poses world_from_item (4, 4), upright, a hair above the horizontal planes of `surface`.
-
-    The planes with the largest area come first; in furniture with doors, only those that leave room for the item below
-    its top; the item's footprint circle stays `EDGE_MARGIN` inside the rectangle.
-    """
-    points = model.points(item)
-    radius = float(np.linalg.norm(points[:, :2], axis=1).max())
-    bottom = float(points[:, 2].min())
-    places = []
-    planes = [plane for plane in model.planes[surface] if plane.horizontal and len(plane.corners) == 4]
-    if model.records[surface].joints:  # inside, not on top
-        top = model.world.bounds(surface)[1][2] - float(np.ptp(points[:, 2]))
-        planes = [plane for plane in planes if plane.center[2] < top]
-    for plane in sorted(planes, key=lambda entry: -entry.area):
-        corners = np.array(plane.corners)
-        origin, along, across = corners[0], corners[1] - corners[0], corners[3] - corners[0]
-        lengths = np.array([np.linalg.norm(along), np.linalg.norm(across)])
-        inset = (radius + EDGE_MARGIN) / np.maximum(lengths, 1e-6)
-        if (inset >= 0.5).any():
-            continue
-        for _ in range(count):
-            share = random.uniform(inset, 1 - inset)
-            position = origin + share[0] * along + share[1] * across
-            position[2] = _height(plane, position) - bottom + PUT_DOWN_HEIGHT
-            places.append(transform_from_yaw(random.uniform(-np.pi, np.pi), position))
-    return places
-
-
-def _height(plane: SurfacePlane, position: np.ndarray) -> float:
-    normal = np.array(plane.normal)
-    return float(-(plane.offset + normal[:2] @ position[:2]) / normal[2])
+def _cover(places: list[Placement], world_from_item: np.ndarray) -> tuple[bool, bool]:
+    """Return (covered, in_drawer) of a pose: as of the sampled place nearest to it; in the open when there is none."""
+    if not places:
+        return False, False
+    nearest = min(places, key=lambda place: float(np.linalg.norm((place.world_from_item - world_from_item)[:3, 3])))
+    return nearest.covered, nearest.in_drawer
 
 
 def _try_place(
-    model: WorldModel, state: RobotState, item: str, surface: str, base: np.ndarray, place: np.ndarray,
+    model: WorldModel, state: RobotState, item: str, target: str, base: np.ndarray, placement: Placement,
     arm_planner: ArmPlanner, tally: Tally,
 ) -> Manipulation | MotionFailed | None:  # fmt: skip
     assert state.tool_from_item is not None
+    if model.laden(item):
+        rest_on = {link: RESTING_DEPTH for link in model.links(target)}
+        return level_place(model, state, item, base, placement, rest_on, arm_planner, tally)
     checker = model.checker
     item_from_tool = inverse(state.tool_from_item)
     model.robot.set(_open(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
-    touch, rest = model.links(item), {link: RESTING_DEPTH for link in model.links(surface)}
+    place = placement.world_from_item
+    touch, rest = model.links(item), {link: RESTING_DEPTH for link in model.links(target)}
     checker.allow(touch=touch, rest_on=rest)
     # The yaw in which the hand points away from the base is the one an arm likes; the sampled yaw varies it.
     outward = np.arctan2(*(place[:2, 3] - base[:2])[::-1])
@@ -323,13 +320,13 @@ def _try_place(
         arm = arm_planner.reachable(base, world_from_tool, tally)
         if arm is None or not arm_planner.free(base, arm, tally):
             continue
-        inside = model.records[surface].contains
-        above = _shifted(world_from_tool, np.array([0, 0, LIFT if inside else APPROACH]))
+        height = LIFT if placement.covered else DRAWER_LIFT if placement.in_drawer else APPROACH
+        above = _shifted(world_from_tool, np.array([0, 0, height]))
         down = arm_planner.line(base, arm, above, tally)
         if down is None:
             continue
         checker.allow(touch=touch)
-        if inside:
+        if placement.covered:
             flat = above[:3, 2] * np.array([1, 1, 0])
             out = arm_planner.line(base, down[-1], _shifted(above, -0.25 * flat), tally)
             if out is None:

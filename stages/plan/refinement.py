@@ -1,24 +1,30 @@
-"""Give every symbolic action its geometry; what fails is fed back to the task search as a blocked action."""
+"""Give every symbolic action its geometry; what fails is fed back to the task search as a lesson."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from schemas.plan import Failure
-from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.base_placement import plan_drive
 from stages.kit.motion.failures import MotionFailed
+from stages.kit.tasks.fast_downward import plan_with_fast_downward
+from stages.kit.tasks.strips import Atom, Domain, GroundAction, Problem, apply_action, atom_text, ground
+from stages.kit.tasks.task_planner import Heuristic, TaskPlan, plan_task
+from stages.plan.domain import PLAIN_NAMES, START
 from stages.plan.door_motion import plan_close, plan_open
+from stages.plan.learning import Lessons
 from stages.plan.motions import Manipulation, Segment
-from stages.plan.pick_place import Budgets, plan_pick, plan_place
-from stages.plan.strips import Domain, GroundAction, Problem, atom_text, ground
-from stages.plan.task_planner import Heuristic, plan_task
+from stages.plan.pick_place import Budgets, GraspStyle, plan_pick, plan_place
+from stages.plan.placements import placement_style
 from stages.plan.world_model import RobotState, WorldModel
 
-PLAIN_NAMES = {"take_out": "pick", "put_in": "place"}
-
+TASK_STATES = (6000, 50_000)
+"""Most states of one task search, and of one for a shortest plan: tasks of rooms take some hundreds."""
+LADEN_PACE = 0.5
+"""Share of the full speed at which the robot drives with a laden tray."""
 FINAL = ("no_grasp",)
 """Failures that no other draw of the random choices can avoid."""
 
@@ -43,8 +49,10 @@ class Step:
 class RefinementFailed(Exception):
     """An action of a task plan has no motion."""
 
-    def __init__(self, action: GroundAction, failure: Failure) -> None:
+    def __init__(self, place: int, action: GroundAction, failure: Failure) -> None:
         super().__init__(failure.message)
+        self.place = place
+        """Index in the task plan."""
         self.action = action
         self.failure = failure
 
@@ -57,15 +65,27 @@ def manipulate(
     budgets: Budgets,
     random: np.random.Generator,
     preferred: tuple[np.ndarray, np.ndarray] | None = None,
+    style: GraspStyle = "any",
 ) -> tuple[Manipulation, ...]:
-    """Return the manipulations of `pick`, `place`, `open` or `close` (plain names). Raises MotionFailed."""
+    """Return the manipulations of `pick`, `place`, `open` or `close` (plain names). Raises MotionFailed.
+
+    Arguments: pick(item, from, ...), place(item, target[, door]), open(joint), close(joint).
+    """
     if name == "pick":
-        return (plan_pick(model, state, arguments[0], arguments[1], budgets, random, preferred),)
+        return (plan_pick(model, state, arguments[0], arguments[1], budgets, random, preferred, style),)
     if name == "place":
-        return (plan_place(model, state, arguments[0], arguments[1], budgets, random, preferred),)
-    body = next(body for body, record in model.records.items() if any(j.name == arguments[0] for j in record.joints))
+        door = arguments[2] if len(arguments) > 2 else None
+        return (plan_place(model, state, arguments[0], arguments[1], door, budgets, random, preferred),)
     plan = plan_open if name == "open" else plan_close
-    return plan(model, state, body, arguments[0], budgets, random)
+    return plan(model, state, model.owner(arguments[0]), arguments[0], budgets, random)
+
+
+def grasp_style(model: WorldModel, item: str, following: list[tuple[str, tuple[str, ...]]]) -> GraspStyle:
+    """Return how an item is to be grasped for where it is put next: `following` are (plain name, arguments)."""
+    for name, arguments in following:
+        if name == "place" and arguments[0] == item:
+            return placement_style(model, item, arguments[1], arguments[2] if len(arguments) > 2 else None)
+    return "any"
 
 
 def refine_action(
@@ -77,6 +97,7 @@ def refine_action(
     budgets: Budgets,
     random: np.random.Generator,
     preferred: tuple[np.ndarray, np.ndarray] | None = None,
+    style: GraspStyle = "any",
 ) -> tuple[list[Step], RobotState]:
     """Return the drives and manipulations of one action, and the robot's state after it; the model is changed too.
 
@@ -85,7 +106,9 @@ def refine_action(
     snapshot = model.snapshot()
     steps: list[Step] = []
     try:
-        for manipulation in manipulate(model, state, name, arguments, budgets, random, preferred):
+        if name == "pick":
+            model.take_aboard(arguments[0])
+        for manipulation in manipulate(model, state, name, arguments, budgets, random, preferred, style):
             target = arguments[1] if name == "place" else arguments[0]
             hold_for_checks(model, state)
             path = plan_drive(
@@ -99,9 +122,10 @@ def refine_action(
             )
             manipulation, path = _same_turns(manipulation, path)
             rows = np.concatenate([path, np.tile(state.arm, (len(path), 1))], axis=1)
+            pace = LADEN_PACE if state.holding is not None and model.laden(state.holding) else 1.0
             if len(path) > 1:
                 # with the fingers together, though the way was checked with open ones: that much more clearance
-                steps.append(Step("drive", (origin, target), (Segment(rows, 0.0, 1.0, "", state.holding),), None))
+                steps.append(Step("drive", (origin, target), (Segment(rows, 0.0, pace, "", state.holding),), None))
             steps.append(Step(name, arguments, manipulation.segments, manipulation))
             state = apply_effect(model, state, name, arguments, manipulation)
             origin = target
@@ -146,6 +170,7 @@ def apply_effect(
     hold_for_checks(model, state)
     if name == "place" and manipulation.item_pose is not None:
         model.world.set_pose(arguments[0], manipulation.item_pose)
+        model.set_down()
         model.put_on(arguments[0], arguments[1])
     for joint, value in manipulation.joint_values.items():
         model.move_joint(joint, value)
@@ -161,22 +186,25 @@ def refine_plan(
     """
     snapshot = model.snapshot()
     steps: list[Step] = []
-    origin = "start"
+    origin = START
+    plain = [(PLAIN_NAMES.get(action.name, action.name), action.arguments) for action in actions]
     try:
-        for action in actions:
-            if action.name == "drive":
+        for place, (action, (name, arguments)) in enumerate(zip(actions, plain, strict=True)):
+            if name == "drive":
                 continue
-            name = PLAIN_NAMES.get(action.name, action.name)
+            style = grasp_style(model, arguments[0], plain[place + 1 :]) if name == "pick" else "any"
             try:
-                found, state = refine_action(model, state, name, action.arguments, origin, budgets, random)
+                found, state = refine_action(
+                    model, state, name, arguments, origin, budgets, random, style=style
+                )  # fmt: skip
             except MotionFailed as failed:
                 failure = failed.failure.model_copy(update={"action": action.text})
-                raise RefinementFailed(action, failure) from None
+                raise RefinementFailed(place, action, failure) from None
             steps += found
-            origin = action.arguments[1] if name == "place" else action.arguments[0]
+            origin = arguments[1] if name == "place" else arguments[0]
     finally:
-        hold_for_checks(model, RobotState(state.base, state.arm))
         model.restore(snapshot)
+        hold_for_checks(model, RobotState(state.base, state.arm))
     return steps
 
 
@@ -187,6 +215,8 @@ class Attempt:
     actions: list[GroundAction] | None
     steps: list[Step] | None
     failures: list[Failure]
+    learned: tuple[str, ...] = ()
+    """What the failures taught the task search, in words."""
 
 
 def plan_and_refine(
@@ -200,58 +230,74 @@ def plan_and_refine(
     heuristic: Heuristic,
     task_attempts: int,
     refinement_attempts: int,
+    planner: Literal["builtin", "fast-downward"] = "builtin",
 ) -> Attempt:
     """Alternate between task search and geometry.
 
-    An action whose geometry fails in all `refinement_attempts` (the earlier choices are drawn anew each time) is
-    taken away from the task search, at most `task_attempts` times.
+    What an action's geometry fails of in all `refinement_attempts` (the earlier choices are drawn anew each time) is a
+    lesson for the task search (`learning`), at most `task_attempts` times.
     """
     actions = ground(domain, problem)
     failures: list[Failure] = []
-    blocked: list[GroundAction] = []
+    lessons = Lessons()
     for _ in range(task_attempts):
-        allowed = [action for action in actions if action not in blocked]
-        found = plan_task(problem, allowed, heuristic=heuristic)
+        allowed = lessons.apply(actions)
+        if planner == "builtin":
+            found = plan_task(problem, allowed, heuristic=heuristic, limit=TASK_STATES[heuristic == "max"])
+        else:
+            found = plan_with_fast_downward(domain, problem, allowed)
         if found.actions is None:
-            failures.append(_no_task_plan(problem, found.unreachable, found.exhausted, found.expanded, blocked))
-            return Attempt(None, None, failures)
-        worst: GroundAction | None = None
+            failures.append(_no_task_plan(problem, found, lessons))
+            return Attempt(None, None, failures, tuple(lessons.words))
+        worst: RefinementFailed | None = None
         for _ in range(refinement_attempts):
             try:
-                return Attempt(found.actions, refine_plan(model, state, found.actions, budgets, random), failures)
+                steps = refine_plan(model, state, found.actions, budgets, random)
+                return Attempt(found.actions, steps, failures, tuple(lessons.words))
             except RefinementFailed as failed:
                 failures.append(failed.failure)
-                worst = failed.action
+                worst = failed
                 if failed.failure.kind in FINAL:
                     break
         assert worst is not None
-        blocked.append(worst)
-    return Attempt(None, None, failures)
+        before = problem.initial
+        for action in found.actions[: worst.place]:
+            before = apply_action(before, action)
+        lessons.learn(worst.action, worst.failure, actions, before)
+    return Attempt(None, None, failures, tuple(lessons.words))
 
 
-def _no_task_plan(
-    problem: Problem, unreachable: tuple[tuple[str, ...], ...], exhausted: bool, expanded: int,
-    blocked: list[GroundAction],
-) -> Failure:  # fmt: skip
-    without = f" without {', '.join(action.text for action in blocked)}" if blocked else ""
-    if unreachable:
-        names = ", ".join(atom_text(atom) for atom in unreachable)
-        message = f"no sequence of actions{without} makes {names} true"
-    elif exhausted:
+def _no_task_plan(problem: Problem, found: TaskPlan, lessons: Lessons) -> Failure:
+    without = f" ({'; '.join(lessons.words)})" if lessons.words else ""
+    if found.unreachable:
+        names = ", ".join(atom_text(atom) for atom in found.unreachable)
+        message = f"no sequence of actions makes {names} true{without}{_lacking(problem, found.unreachable)}"
+    elif found.exhausted:
         names = ", ".join(sorted(atom_text(atom) for atom in problem.goal))
         message = f"each of {names} can be reached, but not all together{without}"
     else:
-        message = f"no task plan{without} within {expanded} expanded states"
-    objects = sorted({name for atom in unreachable or problem.goal for name in atom[1:]})
+        message = f"no task plan within {found.expanded} expanded states{without}"
+    objects = sorted({name for atom in found.unreachable or problem.goal for name in atom[1:]})
     return Failure(
-        kind="goal_unsatisfiable" if exhausted else "search_limit",
+        kind="goal_unsatisfiable" if found.exhausted else "search_limit",
         message=message,
         objects=tuple(objects),
-        numbers={"expanded": float(expanded), "blocked": float(len(blocked))},
+        numbers={"expanded": float(found.expanded), "lessons": float(len(lessons.words))},
     )
 
 
-def relative_place(step: Step, model: WorldModel, surface: str) -> np.ndarray:
-    """Return surface_from_item (4, 4) of a planned place, to be used where the surface really is."""
-    assert step.manipulation is not None and step.manipulation.item_pose is not None
-    return inverse(model.pose(surface)) @ step.manipulation.item_pose
+def _lacking(problem: Problem, unreachable: tuple[Atom, ...]) -> str:
+    """Return the affordances that goals lack, in words: why they cannot be reached, as far as single things say it."""
+    words = []
+    for predicate, *names in unreachable:
+        item, target = names[0], names[-1]
+        if predicate in ("open", "closed"):
+            wanted: tuple[Atom, ...] = (("reachable", item),)
+        else:
+            wanted = (("graspable", item), ("reachable", item))
+        words += [f"{atom[1]} is not {atom[0]}" for atom in wanted if atom not in problem.initial]
+        doors = [atom[1] for atom in problem.initial if atom[0] == "entrance" and atom[2] == target]
+        places = {"on": [target], "in": doors}.get(predicate, [])
+        if places and not any(("fits", item, place) in problem.initial for place in places):
+            words.append(f"{target} has no room for {item}")
+    return f": {', '.join(dict.fromkeys(words))}" if words else ""

@@ -2,39 +2,50 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from schemas.base import as_transform
 from schemas.contact_graph import ContactGraphFile
+from schemas.errors import UsageError
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
-from schemas.plan import BodyMatch, Check, Failure, Plan, PlanFile, PlannedAction
+from schemas.plan import BodyMatch, Check, Failure, Plan, PlanFile, PlannedAction, TreeDifference
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.simulation.robot import Configuration
 from stages.kit.simulation.robot_description import load_robot
 from stages.kit.simulation.world import load_scene, read_scene_bodies
 from stages.kit.stage import Context
+from stages.kit.tasks.pddl import domain_text, problem_text
+from stages.kit.tasks.strips import Atom
+from stages.plan.assumptions import Belief, believe, match_beliefs, parse_priors
 from stages.plan.checks import check_goal
 from stages.plan.conduct import Conduct, Room, joint_pairs
 from stages.plan.correspondence import match_bodies
+from stages.plan.domain import DOMAIN
 from stages.plan.execution import PhysicalRobot
 from stages.plan.execution_log import write_execution
 from stages.plan.goals import TABLE_CLASSES, default_goals
 from stages.plan.parameters import PlanParameters
-from stages.plan.pddl import domain_text, problem_text
 from stages.plan.pick_place import Budgets
 from stages.plan.pictures import RoomPictures, picture_camera
 from stages.plan.plan_text import plan_text
 from stages.plan.refinement import Attempt, Step, plan_and_refine
 from stages.plan.start_pose import start_base
-from stages.plan.strips import Atom
-from stages.plan.symbols import DOMAIN, parse_goal, symbolic_state, task_problem
+from stages.plan.symbols import parse_goal, symbolic_state, task_problem
+from stages.plan.tasks import task_goals
 from stages.plan.trajectories import executed_rows, planned_rows, write_trajectory
-from stages.plan.updated_graph import update_graph
+from stages.plan.tree_state import (
+    TreeState,
+    after_step,
+    graph_of_state,
+    observed_state,
+    start_state,
+    tree_differences,
+)
 from stages.plan.world_model import RobotState, WorldModel, body_planes
 
 Status = Literal["executed", "planned", "infeasible", "execution_failed"]
@@ -61,12 +72,27 @@ class Outcome:
     assumptions: tuple[str, ...]
     failures: tuple[Failure, ...]
     bumps: dict[str, float]
+    graphs: dict[int, ContactGraphFile] = field(default_factory=dict)
+    """Index of an action -> the graph after it."""
+    differences: tuple[TreeDifference, ...] = ()
+
+
+@dataclass(frozen=True)
+class Found:
+    """What planning found, beyond the steps."""
+
+    literals: tuple[str, ...]
+    steps: list[Step] | None
+    learned: tuple[str, ...]
+    assumptions: tuple[str, ...]
 
 
 def run(
     scene: InteractiveScene, ground_truth: GroundTruth | None, *, parameters: PlanParameters, context: Context
 ) -> Plan:
     """Plan in `scene`; execute in the true room of `ground_truth`, or in `scene` itself when there is none."""
+    if parameters.goal and parameters.task:
+        raise UsageError("--goal and --task cannot be given together", hint="leave one of them out")
     robot = load_robot(parameters.robot)
     budgets = Budgets(
         parameters.base_samples, parameters.pair_samples, parameters.path_samples, parameters.path_searches,
@@ -76,14 +102,11 @@ def run(
     with context.progress.step("load the scene"):
         model = WorldModel(scene.root, graph, robot, parameters.clearance)
     try:
-        objects, initial = symbolic_state(model, graph)
+        beliefs = parse_priors(parameters.assume, model)
+        graph = believe(model, graph, beliefs)
+        objects, initial = symbolic_state(model, graph, parameters.size_uncertainty)
         failures: list[Failure] = []
-        candidates = (
-            [parameters.goal]
-            if parameters.goal
-            else default_goals(model, initial, robot.opening + parameters.size_uncertainty)
-        )
-        goals = [parse_goal(literals, objects) for literals in candidates]
+        goals = [parse_goal(literals, objects) for literals in _candidates(model, initial, parameters, failures)]
         try:
             base = start_base(model, robot.carry, context.random(START))
         except MotionFailed as failed:
@@ -91,19 +114,20 @@ def run(
             failures.append(failed.failure)
         state = RobotState(base, robot.carry)
         with context.progress.step("plan"):
-            goal, literals, attempt = _first_feasible(
+            goal, literals, attempt, learned = _first_feasible(
                 model, state, goals if not failures else [], objects, initial, budgets, parameters, context, failures
             )
-        if not goals:
+        if not goals and not failures:
             failures.append(_nothing_to_do(model, graph, initial))
         problem = task_problem(objects, initial, goal)
         context.output.joinpath("domain.pddl").write_text(domain_text(DOMAIN), encoding="utf-8")
         context.output.joinpath("problem.pddl").write_text(problem_text(problem, DOMAIN.name), encoding="utf-8")
         steps = attempt.steps if attempt is not None else None
         rows, ranges = planned_rows(steps or [], robot)
-        outcome = Outcome(None, False, (), (), (), (), {})
+        believed = start_state(model)
+        outcome = _only_planned(model, graph, steps or [], believed)
         arrays = dict(rows)
-        updated = graph
+        updated = list(outcome.graphs.values())[-1] if outcome.graphs else graph
         if steps is not None and parameters.execute:
             with context.progress.step("execute"):
                 outcome, snapshots, updated = _execute(
@@ -118,28 +142,50 @@ def run(
                     parameters,
                     context,
                     failures,
+                    beliefs,
                 )
             arrays |= snapshots
-        return _write(parameters, context, literals, steps, ranges, failures, outcome, arrays, updated)
+        found = Found(literals, steps, learned, tuple(belief.words for belief in beliefs))
+        return _write(parameters, context, found, ranges, failures, outcome, arrays, updated)
     finally:
         model.close()
+
+
+def _candidates(
+    model: WorldModel, initial: frozenset[Atom], parameters: PlanParameters, failures: list[Failure]
+) -> list[tuple[str, ...]]:
+    """Return the goals that may be tried, the preferred first; why a task has none goes to `failures`."""
+    if parameters.goal:
+        return [parameters.goal]
+    if not parameters.task:
+        return default_goals(model, initial, model.description.opening + parameters.size_uncertainty)
+    try:
+        return task_goals(parameters.task, model, initial)
+    except MotionFailed as failed:
+        failures.append(failed.failure)
+        return []
 
 
 def _first_feasible(
     model: WorldModel, state: RobotState, goals: list[tuple[frozenset[Atom], tuple[str, ...]]], objects: dict[str, str],
     initial: frozenset[Atom], budgets: Budgets, parameters: PlanParameters, context: Context, failures: list[Failure],
-) -> tuple[frozenset[Atom], tuple[str, ...], Attempt | None]:  # fmt: skip
-    """Try the goals in order; return the first with a plan, or the first of all without one. Failures are collected."""
+) -> tuple[frozenset[Atom], tuple[str, ...], Attempt | None, tuple[str, ...]]:  # fmt: skip
+    """Try the goals in order; return the first with a plan, or the first of all without one, and what was learned.
+
+    Failures are collected.
+    """
+    learned: list[str] = []
     for number, (goal, literals) in enumerate(goals):
         attempt = plan_and_refine(
             model, state, DOMAIN, task_problem(objects, initial, goal), budgets, context.random(SEARCH, number),
             heuristic=parameters.heuristic, task_attempts=parameters.task_attempts,
-            refinement_attempts=parameters.refinement_attempts,
+            refinement_attempts=parameters.refinement_attempts, planner=parameters.planner,
         )  # fmt: skip
         failures += attempt.failures
+        learned += attempt.learned
         if attempt.steps is not None:
-            return goal, literals, attempt
-    return (*goals[0], None) if goals else (frozenset(), (), None)
+            return goal, literals, attempt, tuple(learned)
+    return (*goals[0], None, tuple(learned)) if goals else (frozenset(), (), None, tuple(learned))
 
 
 def _nothing_to_do(model: WorldModel, graph: ContactGraphFile, initial: frozenset[Atom]) -> Failure:
@@ -163,7 +209,7 @@ def _nothing_to_do(model: WorldModel, graph: ContactGraphFile, initial: frozense
 def _execute(
     model: WorldModel, scene: InteractiveScene, ground_truth: GroundTruth | None, graph: ContactGraphFile,
     state: RobotState, steps: list[Step], literals: tuple[str, ...], budgets: Budgets, parameters: PlanParameters,
-    context: Context, failures: list[Failure],
+    context: Context, failures: list[Failure], beliefs: list[Belief],
 ) -> tuple[Outcome, dict[str, np.ndarray], ContactGraphFile]:  # fmt: skip
     """Carry out the steps in the room, write pictures and log, and return what came of it."""
     root = scene.root if ground_truth is None else ground_truth.path("room")
@@ -177,27 +223,42 @@ def _execute(
         flat = any(plane.horizontal and len(plane.corners) == 4 for plane in known)
         planes[name] = known if flat else known + body_planes(records[name], texts[name])
     planned = dict(model.records)
-    matches = match_bodies(planned, records, parameters.match_radius)
+    matches = match_beliefs(beliefs, match_bodies(planned, records, parameters.match_radius), records)
+    believed = start_state(model)
     joint_names = joint_pairs(planned, records, matches)
     with load_scene(root) as world:
         start = Configuration(state.base, state.arm, model.description.opening)
         physical = PhysicalRobot(world, model.description, start, RECORD_RATE)
         free = _starts_free(physical, failures)
         physical.wait(SETTLE_SECONDS)
-        poses = {name: world.pose(name) for name, record in records.items() if record.movable}
+        observed = {-1: observed_state(world, matches, joint_names, None)}
         physical.recording.keyframe(-1, "start")
         conduct = Conduct(
             model, Room(records, texts, planes), physical, matches, joint_names, replace(budgets, size_uncertainty=0.0),
             context.random(EXECUTION), parameters.relocalize, parameters.execution_attempts,
+            observe=lambda number: observed.update({
+                number: observed_state(world, matches, joint_names, physical.held)
+            }),
         )  # fmt: skip
         carried_out = free and conduct.run(state, steps)
         world.wake()
         physical.wait(SETTLE_SECONDS)
         physical.recording.keyframe(len(steps) - 1, "end")
         checks = check_goal(world, literals, matches, joint_names, physical.held)
-        updated = _updated(graph, planned, matches, joint_names, conduct, poses, checks)
+        final = observed_state(world, matches, joint_names, physical.held)
         with context.progress.step("pictures"):
             _draw(RoomPictures(world, records, texts, model.description), physical, parameters, context)
+    graphs = {
+        number: graph_of_state(graph, observed[-1], state, believed, model)
+        for number, state in observed.items() if number >= 0
+    }  # fmt: skip
+    updated = graph_of_state(graph, observed[-1], final, believed, model)
+    differences: list[TreeDifference] = []
+    expected = replace(believed, parents={**believed.parents, **observed[-1].parents})
+    for number, step in enumerate(steps):
+        expected = after_step(expected, step)
+        if number in observed:
+            differences += tree_differences(number, expected, observed[number], model)
     named = {name for step in steps for name in step.arguments} | {
         name for name in planned for step in steps for argument in step.arguments if argument.startswith(f"{name}__")
     }
@@ -205,7 +266,7 @@ def _execute(
     outcome = Outcome(
         "reconstructed" if ground_truth is None else "ground_truth", carried_out, checks,
         tuple(match for name, match in matches.items() if name in named), assumptions, tuple(conduct.failures),
-        {name: round(force, 3) for name, force in sorted(physical.bumps.items())},
+        {name: round(force, 3) for name, force in sorted(physical.bumps.items())}, graphs, tuple(differences),
     )  # fmt: skip
     return outcome, executed_rows(physical.recording.snapshots), updated
 
@@ -219,36 +280,16 @@ def _starts_free(physical: PhysicalRobot, failures: list[Failure]) -> bool:
     return True
 
 
-def _updated(
-    graph: ContactGraphFile, planned: dict, matches: dict[str, BodyMatch], joint_names: dict[str, str],
-    conduct: Conduct, before: dict[str, np.ndarray], checks: tuple[Check, ...],
-) -> ContactGraphFile:  # fmt: skip
-    """Return the planned scene's graph with what the execution changed: moved items, their parents, joint values."""
-    world = conduct.physical.world
-    moved, joints = {}, {}
-    for name, match in matches.items():
-        if match.matched is None:
-            continue
-        if match.matched in before:
-            now = world.pose(match.matched)
-            change = now @ np.linalg.inv(before[match.matched])
-            if np.linalg.norm(now[:3, 3] - before[match.matched][:3, 3]) > 0.05:
-                old = np.array(planned[name].world_from_body)
-                moved[name] = (old, change @ old)
-        values = {
-            joint.name.removeprefix(f"{name}__"): round(world.joint_value(match.matched, joint_names[joint.name]), 6)
-            for joint in planned[name].joints
-            if joint.name in joint_names
-        }
-        if values:
-            joints[name] = values
-    parents = {}
-    for check in checks:
-        predicate, inner = check.condition.rstrip(")").split("(")
-        names = [word.strip() for word in inner.split(",")]
-        if check.holds and predicate in ("on", "in"):
-            parents[names[0]] = (names[1], "supports" if predicate == "on" else "contains")
-    return update_graph(graph, moved, parents, joints)
+def _only_planned(
+    model: WorldModel, graph: ContactGraphFile, steps: list[Step], believed: TreeState
+) -> Outcome:  # fmt: skip
+    """Return what a plan that is not executed leaves: the graphs as planned."""
+    graphs, state = {}, believed
+    for number, step in enumerate(steps):
+        state = after_step(state, step)
+        if step.manipulation is not None:
+            graphs[number] = graph_of_state(graph, believed, state, believed, model)
+    return Outcome(None, False, (), (), (), (), {}, graphs)
 
 
 def _draw(pictures: RoomPictures, physical: PhysicalRobot, parameters: PlanParameters, context: Context) -> None:
@@ -274,10 +315,10 @@ def _draw(pictures: RoomPictures, physical: PhysicalRobot, parameters: PlanParam
 
 
 def _write(
-    parameters: PlanParameters, context: Context, literals: tuple[str, ...], steps: list[Step] | None,
-    ranges: list[tuple[int, int]], failures: list[Failure], outcome: Outcome, arrays: dict[str, np.ndarray],
-    graph: ContactGraphFile,
+    parameters: PlanParameters, context: Context, found: Found, ranges: list[tuple[int, int]], failures: list[Failure],
+    outcome: Outcome, arrays: dict[str, np.ndarray], graph: ContactGraphFile,
 ) -> Plan:  # fmt: skip
+    literals, steps = found.literals, found.steps
     actions = tuple(
         PlannedAction(
             name=step.name, arguments=step.arguments, start=start, end=end, base_pose=as_transform(_base(step))
@@ -300,10 +341,16 @@ def _write(
     plan = PlanFile(
         goal=literals, planned_in="reconstructed", executed_in=outcome.executed_in, actions=actions,
         failures=(*failures, *outcome.failures, *unmet), checks=outcome.checks, status=status,
-        matches=outcome.matches, assumptions=outcome.assumptions, bumps=outcome.bumps,
+        matches=outcome.matches, assumptions=(*found.assumptions, *outcome.assumptions), bumps=outcome.bumps,
+        task=parameters.task or None, planner=parameters.planner, learned=found.learned,
+        tree_differences=outcome.differences,
     )  # fmt: skip
     plan.write(context.output / "plan.json")
     graph.write(context.output / "graph.json")
+    if outcome.graphs:
+        (context.output / "graphs").mkdir()
+    for number, after in outcome.graphs.items():
+        after.write(context.output / "graphs" / f"{number}.json")
     write_trajectory(context.output / "trajectory.npz", arrays)
     context.output.joinpath("plan.txt").write_text(plan_text(plan, steps or []), encoding="utf-8")
     ok = status in ("executed", "planned")

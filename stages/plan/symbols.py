@@ -9,85 +9,48 @@ import numpy as np
 
 from schemas.contact_graph import ContactGraphFile
 from schemas.errors import UsageError
+from schemas.scene_parts import Joint
 from stages.kit.geometry.transforms import apply, inverse
+from stages.kit.tasks.strips import Atom, Problem, atom_text
+from stages.plan.affordances import LAYOUT, affordance_atoms
+from stages.plan.domain import DOMAIN, GOAL_PREDICATES, START
 from stages.plan.door_motion import is_closed, is_open
-from stages.plan.strips import Atom, Domain, Problem, Schema, atom_text
+from stages.plan.regions import region_under
 from stages.plan.world_model import WorldModel
 
-START = "start"
-SURFACE_CLASSES = ("table", "desk", "shelf", "cabinet", "bench")
-
+COMFORT = 0.9
+"""Height at which the arm likes to work [m]."""
 BEHIND = 0.3
 """An item inside furniture counts as behind a part when its centre is at most this far beside the part [m]."""
 
-DOMAIN = Domain(
-    name="mobile_manipulation",
-    types={
-        "thing": "",
-        "support": "thing",
-        "item": "support",
-        "surface": "support",
-        "container": "support",
-        "door": "thing",
-        "spot": "thing",
-    },
-    predicates={
-        "near": ("thing",),
-        "on": ("item", "support"),
-        "in": ("item", "container"),
-        "behind": ("item", "door"),
-        "entrance": ("door", "container"),
-        "clear": ("support",),
-        "holding": ("item",),
-        "hand_empty": (),
-        "open": ("door",),
-        "closed": ("door",),
-    },
-    schemas=(
-        Schema("drive", (("?from", "thing"), ("?to", "thing")), (("near", "?from"),), (("near", "?to"),),
-               (("near", "?from"),)),
-        Schema("pick", (("?item", "item"), ("?from", "support")),
-               (("near", "?item"), ("on", "?item", "?from"), ("clear", "?item"), ("hand_empty",)),
-               (("holding", "?item"), ("clear", "?from")), (("on", "?item", "?from"), ("hand_empty",))),
-        Schema("take_out", (("?item", "item"), ("?from", "container"), ("?door", "door")),
-               (("near", "?item"), ("in", "?item", "?from"), ("behind", "?item", "?door"), ("open", "?door"),
-                ("clear", "?item"), ("hand_empty",)),
-               (("holding", "?item"),),
-               (("in", "?item", "?from"), ("behind", "?item", "?door"), ("hand_empty",))),
-        Schema("place", (("?item", "item"), ("?on", "surface")), (("holding", "?item"), ("near", "?on")),
-               (("on", "?item", "?on"), ("hand_empty",)), (("holding", "?item"),)),
-        Schema("put_in", (("?item", "item"), ("?in", "container"), ("?door", "door")),
-               (("holding", "?item"), ("near", "?in"), ("entrance", "?door", "?in"), ("open", "?door")),
-               (("in", "?item", "?in"), ("behind", "?item", "?door"), ("hand_empty",)), (("holding", "?item"),)),
-        Schema("open", (("?door", "door"),), (("near", "?door"), ("hand_empty",)), (("open", "?door"),),
-               (("closed", "?door"),)),
-        Schema("close", (("?door", "door"),), (("near", "?door"), ("hand_empty",)), (("closed", "?door"),),
-               (("open", "?door"),)),
-    ),
-)  # fmt: skip
-"""The domain. `take_out` and `put_in` are `pick` and `place` through a door."""
-
 
 def guarding_door(model: WorldModel, item: str, container: str) -> str | None:
-    """Return the joint of a container behind whose closed part an item lies, None for an open compartment.
+    """Return the joint of a container behind whose part an item lies, None for an open compartment.
 
-    The part that covers the item's centre, seen against the direction in which the part closes (for drawers: whose box
-    holds the centre), or comes nearest to doing so: reconstructed items are not always where they should be.
+    The item stands on a region of the container: of the joints to open before a hand gets there, the one whose part
+    covers the item's centre, seen against the direction in which it closes. An item that stands on no region (it was
+    not reconstructed where it is) is taken to be behind the part that comes nearest to covering it.
     """
+    region = region_under(model, item, container)
+    if region is not None and len(region.doors) < 2:
+        return region.doors[0] if region.doors else None
+    candidates = region.doors if region is not None else tuple(joint.name for joint in model.records[container].joints)
     centre = apply(inverse(model.pose(container)), _centre(model, item))
     best: tuple[float, str] | None = None
-    for joint in model.records[container].joints:
-        mesh = model.part_mesh(container, joint.part)
-        low, high = np.asarray(mesh.bounds)
-        if joint.type == "prismatic":
-            outside = float(np.maximum(low - centre, centre - high).max())
-        else:
-            thin = int(np.argmin(high - low))
-            others = [axis for axis in range(3) if axis != thin]
-            outside = float(np.maximum(low - centre, centre - high)[others].max())
-        if outside < BEHIND and (best is None or outside < best[0]):
-            best = (outside, joint.name)
+    for name in candidates:
+        outside = _beside(model, container, model.joint(container, name), centre)
+        if (outside < BEHIND or region is not None) and (best is None or outside < best[0]):
+            best = (outside, name)
     return None if best is None else best[1]
+
+
+def _beside(model: WorldModel, container: str, joint: Joint, point: np.ndarray) -> float:
+    """Return how far [m] a point (3,), body frame, lies beside a closed part; for a drawer, outside its box."""
+    low, high = np.asarray(model.part_mesh(container, joint.part).bounds)
+    outside = np.maximum(low - point, point - high)
+    if joint.type == "revolute":
+        outside = np.delete(outside, int(np.argmin(high - low)))
+    return float(outside.max())
 
 
 def _centre(model: WorldModel, item: str) -> np.ndarray:
@@ -95,11 +58,14 @@ def _centre(model: WorldModel, item: str) -> np.ndarray:
     return (points.min(axis=0) + points.max(axis=0)) / 2
 
 
-def symbolic_state(model: WorldModel, graph: ContactGraphFile) -> tuple[dict[str, str], frozenset[Atom]]:
+def symbolic_state(
+    model: WorldModel, graph: ContactGraphFile, size_uncertainty: float = 0.0
+) -> tuple[dict[str, str], frozenset[Atom]]:
     """Return the typed objects and the atoms that hold at the beginning.
 
     Movable bodies are items; bodies with moving parts are containers, each part a door; what has a horizontal plane
-    is a surface. Doors count as open or closed by their joint values; between the two they are neither.
+    is a surface. Doors count as open or closed by their joint values; between the two they are neither. Affordances
+    come from regions and grasps (`affordance_atoms`), relations from the contact graph.
     """
     objects = {START: "spot"}
     atoms: set[Atom] = {("near", START), ("hand_empty",)}
@@ -108,13 +74,12 @@ def symbolic_state(model: WorldModel, graph: ContactGraphFile) -> tuple[dict[str
             objects[name] = "item"
         elif record.joints:
             objects[name] = "container"
-        elif record.class_name in SURFACE_CLASSES and any(plane.horizontal for plane in model.planes[name]):
-            objects[name] = "surface"
+        elif record.class_name in LAYOUT:
+            objects[name] = "support" if record.class_name == "floor" else "thing"
         else:
-            objects[name] = "support" if record.class_name not in ("wall", "ceiling") else "thing"
+            objects[name] = "surface"
         for joint in record.joints:
             objects[joint.name] = "door"
-            atoms.add(("entrance", joint.name, name))
             value = model.joint_value(name, joint.name)
             if is_open(joint, value):
                 atoms.add(("open", joint.name))
@@ -129,13 +94,28 @@ def symbolic_state(model: WorldModel, graph: ContactGraphFile) -> tuple[dict[str
         if link.relation == "proximal" or objects.get(item) != "item" or parent not in model.records:
             continue
         loaded.add(parent)
-        door = guarding_door(model, item, parent) if link.relation == "contains" else None
+        door = guarding_door(model, item, parent) if objects[parent] == "container" else None
         if door is None:
             atoms.add(("on", item, parent))
+            if objects[parent] == "item":
+                atoms.add(("carried_along", item, parent))
         else:
             atoms |= {("in", item, parent), ("behind", item, door)}
+    atoms |= {("unmoved", name) for name, kind in objects.items() if kind == "item"}
     atoms |= {("clear", name) for name, kind in objects.items() if kind == "item" and name not in loaded}
-    return objects, frozenset(atoms)
+    ordered = dict(sorted(objects.items(), key=lambda entry: (_discomfort(model, entry[0], entry[1]), entry[0])))
+    return ordered, frozenset(atoms | affordance_atoms(model, objects, size_uncertainty))
+
+
+def _discomfort(model: WorldModel, name: str, kind: str) -> float:
+    """Return how far [m] the handle of a door is from a comfortable height: task search tries those near it first."""
+    if kind != "door":
+        return 0.0
+    owner = model.owner(name)
+    handle = model.joint(owner, name).handle
+    if handle is None:
+        return np.inf
+    return round(abs(float(apply(model.pose(owner), np.array(handle))[2]) - COMFORT), 3)
 
 
 _LITERAL = re.compile(r"^\s*(\w+)\s*\(\s*([^()]*?)\s*\)\s*$")
@@ -149,9 +129,7 @@ def parse_goal(literals: tuple[str, ...], objects: dict[str, str]) -> tuple[froz
     """
     atoms: set[Atom] = set()
     normal = []
-    allowed = {
-        name: kinds for name, kinds in DOMAIN.predicates.items() if name in ("on", "in", "holding", "open", "closed")
-    }
+    allowed = {name: kinds for name, kinds in DOMAIN.predicates.items() if name in GOAL_PREDICATES}
     for literal in literals:
         match = _LITERAL.match(literal)
         if match is None:

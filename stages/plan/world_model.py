@@ -23,6 +23,8 @@ from stages.kit.simulation.robot import Configuration, Robot
 from stages.kit.simulation.robot_description import RobotDescription
 from stages.kit.simulation.shapes import joined, link_shapes, surface_points
 from stages.kit.simulation.world import PhysicsWorld, read_scene_bodies
+from stages.plan.joined_bodies import joined_text
+from stages.plan.regions import Region, find_regions, region_under
 from stages.plan.support_planes import top_planes
 
 
@@ -69,6 +71,9 @@ class WorldModel:
         self.robot.set(Configuration(np.zeros(3), description.carry, description.opening))
         self.room = self._room()
         self._points: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self._regions: dict[str, tuple[Region, ...]] = {}
+        self._aboard: dict[str, tuple[str, np.ndarray]] = {}
+        """What is lifted with a carrier: item -> (carrier, carrier_from_item)."""
 
     def close(self) -> None:
         """End the pybullet world."""
@@ -90,6 +95,7 @@ class WorldModel:
         record = record.model_copy(update={"name": name})
         self.records[name], self._texts[name], self.planes[name] = record, text, planes
         self._points.pop(name, None)
+        self._regions.pop(name, None)
         self.world.add_body(record, text)
         self.checker.add_body(name)
 
@@ -98,9 +104,13 @@ class WorldModel:
         self.world.remove_body(name)
         del self.records[name], self._texts[name]
         self.planes.pop(name, None)
+        self._regions.pop(name, None)
 
     def pose(self, name: str) -> np.ndarray:
         """Return world_from_body (4, 4)."""
+        if name in self._aboard:
+            carrier, carrier_from_item = self._aboard[name]
+            return self.world.pose(carrier) @ carrier_from_item
         return self.world.pose(name)
 
     def joint_value(self, name: str, joint: str) -> float:
@@ -112,27 +122,73 @@ class WorldModel:
         return next(entry for entry in self.records[name].joints if entry.name == joint)
 
     def links(self, name: str) -> tuple[str, ...]:
-        """Return the link names of a body."""
-        return tuple(self.world.bodies[name].links)
+        """Return the link names of a body, without those of what is aboard."""
+        return tuple(link for link in self.world.bodies[name].links if link not in self._aboard)
 
     def put_on(self, item: str, parent: str) -> None:
         """Note that an item now stands on (or in) another body."""
         self.records[item] = self.records[item].model_copy(update={"parent": parent})
 
     def move_joint(self, joint_name: str, value: float) -> None:
-        """Move a joint; what lies in a drawer goes with it."""
-        owner = next(name for name, record in self.records.items() if any(j.name == joint_name for j in record.joints))
+        """Move a joint; what stands on the moving part (in a drawer, on a shelf in a door) is carried along."""
+        owner = self.owner(joint_name)
         joint = self.joint(owner, joint_name)
-        if joint.type == "prismatic":
-            low, high = (np.asarray(bound) for bound in self.part_mesh(owner, joint.part).bounds)
-            before = self.pose(owner) @ body_from_moved(joint, self.joint_value(owner, joint_name))
-            after = self.pose(owner) @ body_from_moved(joint, value)
-            for item, record in self.records.items():
-                if record.movable and record.parent == owner:
-                    inside = apply(inverse(before), self.pose(item)[:3, 3])
-                    if np.all(inside > low - 0.02) and np.all(inside < high + 0.02):
-                        self.world.set_pose(item, after @ inverse(before) @ self.pose(item))
+        before = self.pose(owner) @ body_from_moved(joint, self.joint_value(owner, joint_name))
+        after = self.pose(owner) @ body_from_moved(joint, value)
+        along = set()
+        for item, record in self.records.items():
+            if record.movable and record.parent == owner:
+                region = region_under(self, item, owner)
+                if region is not None and region.joint is not None and region.joint.name == joint_name:
+                    along |= {item, *self.load(item)}
+        for item in sorted(along):
+            self.world.set_pose(item, after @ inverse(before) @ self.pose(item))
         self.world.set_joint(owner, joint_name, value)
+
+    def owner(self, joint_name: str) -> str:
+        """Return the body that a joint belongs to. Raises StopIteration."""
+        return next(name for name, record in self.records.items() if any(j.name == joint_name for j in record.joints))
+
+    def load(self, item: str) -> tuple[str, ...]:
+        """Return the movable bodies that stand on a body, and on those, in turn: what goes along when it is carried."""
+        found: list[str] = []
+        waiting = [item]
+        while waiting:
+            carrier = waiting.pop()
+            above = [name for name, record in self.records.items() if record.movable and record.parent == carrier]
+            fresh = [name for name in above if name not in found and name != item]
+            found += fresh
+            waiting += fresh
+        return tuple(found)
+
+    def take_aboard(self, carrier: str) -> None:
+        """Make one rigid body of a carrier and what stands on it, so that its load counts in collision checks."""
+        load = self.load(carrier)
+        if not load:
+            return
+        pose = self.pose(carrier)
+        aboard = {item: (carrier, inverse(pose) @ self.pose(item)) for item in load}
+        text = joined_text(self._texts[carrier], {item: (self._texts[item], aboard[item][1]) for item in load})
+        for item in (carrier, *load):
+            self.world.remove_body(item)
+        self._aboard |= aboard
+        self.world.add_body(moved_record(self.records[carrier], pose, {}), text)
+        self.checker.add_body(carrier)
+
+    def laden(self, carrier: str) -> bool:
+        """Whether something is lifted with a body."""
+        return any(owner == carrier for owner, _ in self._aboard.values())
+
+    def set_down(self) -> None:
+        """Make bodies of their own again of what is aboard, where it is now."""
+        aboard, poses = dict(self._aboard), {item: self.pose(item) for item in self._aboard}
+        for carrier in {carrier for carrier, _ in aboard.values()}:
+            poses[carrier] = self.world.pose(carrier)
+            self.world.remove_body(carrier)
+        self._aboard = {}
+        for item, pose in sorted(poses.items()):
+            self.world.add_body(moved_record(self.records[item], pose, {}), self._texts[item])
+            self.checker.add_body(item)
 
     def snapshot(self) -> Snapshot:
         """Return where everything is, for `restore`."""
@@ -144,6 +200,7 @@ class WorldModel:
     def restore(self, snapshot: Snapshot) -> None:
         """Put everything where it was; nothing is carried afterwards."""
         self.checker.put_down()
+        self.set_down()
         for name, pose in snapshot.poses.items():
             self.world.set_pose(name, pose)
         for name, values in snapshot.joints.items():
@@ -163,6 +220,21 @@ class WorldModel:
             meshes = [mesh for entries in link_shapes(self._texts[name]).values() for mesh in entries]
             self._points[name] = surface_points(meshes, count, np.random.default_rng(0))
         return self._points[name]
+
+    def regions(self, name: str) -> tuple[Region, ...]:
+        """Return the level places of a body where things can stand, largest first."""
+        if name not in self._regions:
+            self._regions[name] = find_regions(self, name)
+        return self._regions[name]
+
+    def footprint(self, item: str) -> tuple[float, float]:
+        """Return radius of the upright foot about the body's origin and height [m] of a rigid body."""
+        points = self.points(item)
+        return float(np.linalg.norm(points[:, :2], axis=1).max()), float(np.ptp(points[:, 2]))
+
+    def shaped_links(self, name: str) -> tuple[str, ...]:
+        """Return the links of a body that have a collision shape."""
+        return tuple(link_shapes(self._texts[name]))
 
     def part_mesh(self, name: str, link: str) -> trimesh.Trimesh:
         """Return the collision mesh of a link in the body frame with all joints at 0. Raises KeyError."""

@@ -19,7 +19,8 @@ from stages.synthesize.furniture import Catalogue
 def library(tmp_path_factory: pytest.TempPathFactory) -> CadLibrary:
     output: Path = tmp_path_factory.mktemp("library")
     # The classes that recipes name; others would only take time.
-    parameters = LibraryParameters(shapes_per_class=3, small_shapes_per_class=3, classes=tuple(GENERATORS)[:24])
+    classes = (*tuple(GENERATORS)[:24], "can")
+    parameters = LibraryParameters(shapes_per_class=3, small_shapes_per_class=3, classes=classes)
     return run(parameters=parameters, context=Context(output=output, seed=5, device="cpu", progress=SilentProgress()))
 
 

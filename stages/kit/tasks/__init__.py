@@ -1,0 +1,1 @@
+"""Symbolic task planning: STRIPS, PDDL and search; knows no scenes."""

@@ -1,0 +1,135 @@
+"""Search for task plans: greedy with two heuristics (default), or A* with the maximum heuristic (shortest plans).
+
+The default is after LAMA (Richter & Westphal 2010): greedy best-first search that takes turns between h_FF and the
+count of landmarks left, with queues of their own for preferred actions, evaluation deferred until a state is expanded;
+then weighted A* with falling weights looks for shorter plans, within a few hundred states each. h_add, h_max: Bonet &
+Geffner 2001. Everything is counted in expanded states, so that the same task gives the same plan.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from stages.kit.tasks.landmarks import find_landmarks
+from stages.kit.tasks.lazy_search import LazySearch
+from stages.kit.tasks.relaxed import FAR, Relaxed, applicable, costs, relax, relaxed_plan, successor
+from stages.kit.tasks.strips import Atom, GroundAction, Problem
+
+Heuristic = Literal["landmarks", "add", "max", "ff"]
+WEIGHTS = (5, 2, 1)
+"""Of the heuristic in the searches that shorten the first plan."""
+IMPROVEMENT = 600
+"""Most states expanded in each of them."""
+
+
+@dataclass(frozen=True)
+class TaskPlan:
+    """What the search found."""
+
+    actions: list[GroundAction] | None
+    """None: no plan within the limit, or none at all (`exhausted`)."""
+    expanded: int
+    exhausted: bool
+    """The whole reachable space was searched: there is no plan."""
+    unreachable: tuple[Atom, ...] = ()
+    """Goal atoms that no sequence of actions can make true, even when nothing is ever deleted."""
+
+
+class _Estimator:
+    """Heuristic values of states (A,) of a task."""
+
+    def __init__(self, task: Relaxed, heuristic: Heuristic) -> None:
+        self.task, self.heuristic = task, heuristic
+        self.cost = np.empty(len(task.atoms), dtype=np.int64)
+        self.by = np.empty(len(task.atoms), dtype=np.int32)
+        self.preferred = np.zeros(len(task.actions), dtype=np.uint8)
+
+    def __call__(self, state: np.ndarray) -> int:
+        task = self.task
+        costs(
+            state, task.pre_at, task.add, task.add_at, task.user, task.user_at, -1, self.heuristic == "max", self.cost,
+            self.by,
+        )  # fmt: skip
+        values = self.cost[task.goal]
+        if len(values) == 0 or values.max() >= FAR:
+            return FAR if len(values) else 0
+        if self.heuristic == "max":
+            return int(values.max())
+        if self.heuristic == "add":
+            return int(values.sum())
+        return int(relaxed_plan(state, task.pre, task.pre_at, task.goal, self.cost, self.by, self.preferred))
+
+
+def plan_task(
+    problem: Problem, actions: list[GroundAction], *, heuristic: Heuristic = "landmarks", limit: int = 50_000
+) -> TaskPlan:
+    """Search for a plan; every action costs 1. `limit` bounds the expanded states; ties fall to the older state.
+
+    `max` gives a shortest plan; `landmarks` a good one fast.
+    """
+    task = relax(problem, actions)
+    estimate = _Estimator(task, "max")
+    estimate(task.initial)
+    lost = tuple(task.atoms[atom] for atom in task.goal if estimate.cost[atom] >= FAR)
+    if lost:
+        return TaskPlan(None, 0, True, lost)
+    if heuristic == "landmarks":
+        return _landmark_plan(task, limit)
+    return _a_star(task, _Estimator(task, heuristic), limit)
+
+
+def _landmark_plan(task: Relaxed, limit: int) -> TaskPlan:
+    search = LazySearch(task, find_landmarks(task))
+    first = search.run(None, limit, None)
+    if first.plan is None:
+        return TaskPlan(None, first.expanded, first.exhausted)
+    plan, expanded = first.plan, first.expanded
+    for weight in WEIGHTS:
+        better = search.run(weight, min(IMPROVEMENT, limit), len(plan))
+        expanded += better.expanded
+        plan = plan if better.plan is None else better.plan
+    return TaskPlan([task.actions[action] for action in plan], expanded, False)
+
+
+def _a_star(task: Relaxed, estimate: _Estimator, limit: int) -> TaskPlan:
+    start = task.initial
+    key = start.tobytes()
+    best_cost = {key: 0}
+    parent: dict[bytes, tuple[bytes, int]] = {}
+    queue = [(estimate(start), 0, 0, key)]
+    counter = expanded = 0
+    while queue:
+        _, _, cost, key = heapq.heappop(queue)
+        cost = -cost
+        if cost > best_cost[key]:
+            continue
+        state = np.frombuffer(key, dtype=np.uint8).copy()
+        if state[task.goal].all():
+            return TaskPlan(_trace(task, parent, key), expanded, False)
+        if expanded >= limit:
+            return TaskPlan(None, expanded, False)
+        expanded += 1
+        for action in applicable(state, task.pre, task.pre_at).tolist():
+            after = successor(task, state, action)
+            after_key = after.tobytes()
+            if cost + 1 < best_cost.get(after_key, FAR):
+                value = estimate(after)
+                if value >= FAR:
+                    continue
+                best_cost[after_key] = cost + 1
+                parent[after_key] = (key, action)
+                counter += 1
+                heapq.heappush(queue, (cost + 1 + value, counter, -(cost + 1), after_key))
+    return TaskPlan(None, expanded, True)
+
+
+def _trace(task: Relaxed, parent: dict[bytes, tuple[bytes, int]], key: bytes) -> list[GroundAction]:
+    plan = []
+    while key in parent:
+        key, action = parent[key]
+        plan.append(task.actions[action])
+    return plan[::-1]

@@ -1,0 +1,82 @@
+"""What can be done with what, as static atoms: within reach, graspable, carries a load, takes things, has room."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.kit.geometry.transforms import apply
+from stages.kit.motion.base_placement import SHOULDER_HEIGHT
+from stages.kit.motion.grasps import narrowest_width
+from stages.kit.motion.kinematics import reach
+from stages.kit.tasks.strips import Atom
+from stages.plan.regions import Region
+from stages.plan.rim_grasps import has_rim
+from stages.plan.world_model import WorldModel
+
+LAYOUT = ("floor", "wall", "ceiling")
+CARRIER_CLASSES = ("tray", "plate")
+"""What things are carried on."""
+
+
+def affordance_atoms(model: WorldModel, objects: dict[str, str], size_uncertainty: float) -> set[Atom]:
+    """Return the static atoms of a scene.
+
+    `reachable`: at a height that the arm reaches from its pedestal; that a base fits before it shows in the geometry.
+    `graspable`: narrower than the fingers open, give or take `size_uncertainty` [m], or with a rim for carriers.
+    `flat`: has a place to put things that no door hides. `fits(item, x)`: of a support, it has room on such a place;
+    of a door, behind it. `entrance(door, container)`: something behind this door takes things.
+    """
+    atoms: set[Atom] = set()
+    items = [name for name, kind in objects.items() if kind == "item"]
+    feet = {name: model.footprint(name) for name in items}
+    for name, kind in objects.items():
+        if kind == "item":
+            atoms |= _of_item(model, name, size_uncertainty)
+        if kind in ("surface", "container") or ("carrier", name) in atoms:
+            atoms |= _of_support(model, name, feet)
+    return atoms
+
+
+def within_height(model: WorldModel, height: float) -> bool:
+    """Whether the arm on its pedestal reaches a height [m] at some distance."""
+    shoulder = model.description.pedestal_height + SHOULDER_HEIGHT
+    return abs(height - shoulder) < 0.95 * reach(model.chain)
+
+
+def _of_item(model: WorldModel, name: str, size_uncertainty: float) -> set[Atom]:
+    atoms: set[Atom] = set()
+    points = apply(model.pose(name), model.points(name))
+    if within_height(model, float(points[:, 2].mean())):
+        atoms.add(("reachable", name))
+    carrier = model.records[name].class_name in CARRIER_CLASSES
+    if carrier:
+        atoms.add(("carrier", name))
+    if narrowest_width(points) < model.description.opening + size_uncertainty or (carrier and has_rim(model, name)):
+        atoms.add(("graspable", name))
+    return atoms
+
+
+def _of_support(model: WorldModel, name: str, feet: dict[str, tuple[float, float]]) -> set[Atom]:
+    atoms: set[Atom] = set()
+    for region in model.regions(name):
+        if not region.carries_things or not within_height(model, _height(model, region)):
+            continue
+        fitting = [item for item, (radius, height) in feet.items() if item != name and region.takes(radius, height)]
+        if not fitting:
+            continue
+        atoms.add(("reachable", name))
+        if not region.doors:
+            atoms |= {("flat", name)} | {("fits", item, name) for item in fitting}
+        for door in region.doors:
+            atoms |= {("entrance", door, name)} | {("fits", item, door) for item in fitting}
+    for joint in model.records[name].joints:
+        if joint.handle is not None:
+            handle = apply(model.pose(name), np.array(joint.handle))
+            if within_height(model, float(handle[2])):
+                atoms.add(("reachable", joint.name))
+    return atoms
+
+
+def _height(model: WorldModel, region: Region) -> float:
+    middle = np.array([*(region.low + region.high) / 2, region.level])
+    return float(apply(region.world_from_closed(model), middle)[2])

@@ -1,0 +1,94 @@
+"""Motions of the arm with a laden tray: the tool goes on straight lines and keeps its tilt: nothing slides off."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.kit.geometry.transforms import inverse, transform_from_yaw
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.kinematics import forward
+from stages.kit.simulation.robot import Configuration, base_pose
+from stages.plan.arm_motion import ArmPlanner, Tally
+from stages.plan.motions import Manipulation, Segment, whole_body
+from stages.plan.placements import Placement
+from stages.plan.world_model import RobotState, WorldModel
+
+RAISE = 0.12
+"""Height over the surface at which a laden tray is moved sideways [m]."""
+RETREAT = 0.14
+LEVEL_PACE = 0.25
+"""Share of the full speed with a load."""
+DRAWN_IN = (0.0, 0.1, 0.2)
+"""How far the tool is drawn in towards the pedestal before the robot drives, the farthest first that is free [m]."""
+
+
+def drawn_in(model: WorldModel, planner: ArmPlanner, base: np.ndarray, arm: np.ndarray, tally: Tally) -> np.ndarray:
+    """Return arm values (K, 7) from `arm` (7,) on a level line towards the pedestal, as far as it goes freely."""
+    pose = base_pose(base, model.description) @ forward(model.chain, arm)
+    inward = base[:2] - pose[:2, 3]
+    inward /= max(float(np.linalg.norm(inward)), 1e-9)
+    for distance in sorted(DRAWN_IN, reverse=True):
+        goal = pose.copy()
+        goal[:2, 3] += distance * inward
+        path = planner.line(base, arm, goal, tally) if distance else arm[None]
+        if path is not None:
+            return path
+    return arm[None]
+
+
+def level_place(
+    model: WorldModel, state: RobotState, item: str, base: np.ndarray, placement: Placement, rest: dict[str, float],
+    planner: ArmPlanner, tally: Tally,
+) -> Manipulation | None:  # fmt: skip
+    """Return the motion that puts a laden `item` down from how it is held, or None (counted in the tally).
+
+    The hand keeps its heading to the pedestal, give or take, goes level over the place, down, and away upwards; the arm
+    folds then as after every place. `rest`: links that the load may touch, with depths [m].
+    """
+    assert state.tool_from_item is not None
+    checker = model.checker
+    touch = model.links(item)
+    held = base_pose(base, model.description) @ forward(model.chain, state.arm) @ state.tool_from_item
+    yaw = float(np.arctan2(held[1, 0], held[0, 0]))
+    for turn in (0.0, 0.4, -0.4):
+        checker.carry(item, state.tool_from_item)
+        checker.allow(touch=touch)
+        upright = transform_from_yaw(yaw + turn, placement.world_from_item[:3, 3])
+        world_from_tool = upright @ inverse(state.tool_from_item)
+        if planner.reachable(base, world_from_tool, tally, starts=2) is None:
+            continue
+        above = world_from_tool.copy()
+        above[2, 3] += RAISE
+        over = planner.line(base, state.arm, above, tally)
+        if over is None:
+            continue
+        checker.allow(touch=touch, rest_on=rest)
+        down = planner.line(base, over[-1], world_from_tool, tally)
+        if down is None:
+            continue
+        checker.put_down(upright)
+        opening = model.description.opening
+        model.robot.set(Configuration(base, down[-1], opening))
+        checker.allow(touch=touch)
+        back = world_from_tool.copy()
+        back[:3, 3] -= RETREAT * back[:3, 2]
+        away = planner.line(base, down[-1], back, tally)
+        if away is None:
+            continue
+        checker.allow()
+        try:
+            home = planner.path(base, away[-1], model.description.carry)
+        except MotionFailed as failed:
+            tally.failed(failed)
+            continue
+        return Manipulation(
+            base,
+            (
+                Segment(whole_body(base, over), 0.0, LEVEL_PACE, "", item),
+                Segment(whole_body(base, down), 0.0, LEVEL_PACE, "release", item),
+                Segment(whole_body(base, away), opening, LEVEL_PACE),
+                Segment(whole_body(base, home), opening),
+            ),
+            item_pose=upright,
+        )
+    return None

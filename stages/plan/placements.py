@@ -1,0 +1,101 @@
+"""Where an item can be put down: upright poses on the regions of a body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from stages.plan.regions import NEAR_LEVEL, Region
+from stages.plan.world_model import WorldModel
+
+PUT_DOWN_HEIGHT = 0.006
+"""Items are let go this far over the surface [m]."""
+EDGE = 0.8
+"""Surface is wanted under a circle of this share of the item's radius, and under its middle."""
+COMFORT = 0.9
+"""Places near this height come first: the arm likes them [m]."""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """An upright pose a hair above a surface."""
+
+    world_from_item: np.ndarray
+    covered: bool
+    """Whether something above it makes the hand come from the side."""
+    in_drawer: bool
+
+
+def place_regions(model: WorldModel, item: str, target: str, door: str | None) -> list[Region]:
+    """Return the regions of `target` with room for `item`: behind `door` (it, at least, is open), or behind none."""
+    radius, height = model.footprint(item)
+    found = []
+    for region in model.regions(target):
+        if not region.takes(radius, height) or (door not in region.doors if door else region.doors):
+            continue
+        found.append(region)
+    return found
+
+
+def sample_placements(
+    model: WorldModel, item: str, target: str, door: str | None, random: np.random.Generator, count: int = 48
+) -> list[Placement]:
+    """Return up to `count` placements a region, those of regions at a comfortable height first, taking turns.
+
+    A place counts where the region has surface under the foot and room above it. Whether it is taken shows when the
+    item is put there in the collision checker.
+    """
+    radius, height = model.footprint(item)
+    bottom = float(model.points(item)[:, 2].min())
+    regions = place_regions(model, item, target, door)
+    turns: list[list[Placement]] = []
+    for region in sorted(regions, key=lambda region: abs(_height(model, region) - COMFORT)):
+        world_from_closed = region.world_from_closed(model)
+        low, high = region.low + 0.9 * radius, region.high - 0.9 * radius
+        places = []
+        drawer = region.joint is not None
+        for _ in range(count):
+            spot = np.array([*random.uniform(np.minimum(low, high), np.maximum(low, high)), region.level])
+            yaw = float(random.uniform(-np.pi, np.pi))
+            if not region.carries(spot[:2], EDGE * radius, height):
+                continue
+            position = apply(world_from_closed, spot)
+            position[2] += PUT_DOWN_HEIGHT - bottom
+            places.append(Placement(transform_from_yaw(yaw, position), region.covered, drawer))
+        turns.append(places)
+    longest = max((len(places) for places in turns), default=0)
+    return [places[turn] for turn in range(longest) for places in turns if turn < len(places)]
+
+
+def _height(model: WorldModel, region: Region) -> float:
+    middle = np.array([*(region.low + region.high) / 2, region.level])
+    return float(apply(region.world_from_closed(model), middle)[2])
+
+
+def placement_style(model: WorldModel, item: str, target: str, door: str | None) -> Literal["any", "level", "steep"]:
+    """Return the grasp style (`any`, `level`, `steep`) with which an item can be put there.
+
+    `level` when all its places are under a cover, `steep` when all are in drawers, `any` otherwise.
+    """
+    regions = place_regions(model, item, target, door)
+    if regions and all(region.covered for region in regions):
+        return "level"
+    if regions and all(region.joint is not None for region in regions):
+        return "steep"
+    return "any"
+
+
+def nearest_level(model: WorldModel, body: str, place: np.ndarray, height: float) -> float:
+    """Return the height [m] of the region of a body over which a place (2,) lies that is nearest to `height`; `height`
+    itself when there is none."""
+    found = [height + 1.0]
+    for region in model.regions(body):
+        world_from_closed = region.world_from_closed(model)
+        spot = apply(inverse(world_from_closed), np.array([*place, height]))
+        if np.all(spot[:2] > region.low) and np.all(spot[:2] < region.high):
+            found.append(height + region.level - float(spot[2]))
+    best = min(found, key=lambda level: abs(level - height))
+    return best if abs(best - height) < NEAR_LEVEL else height

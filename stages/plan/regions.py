@@ -1,0 +1,226 @@
+"""Affordances of a body from its shape: level places that carry things, and which doors to open to get a hand there.
+
+`library` derives the affordances of its models alike (docs/LIBRARY.md); here they are derived of bodies as they stand
+in a scene, so that generated rooms, reconstructed ones and what was looked at from near by are treated the same way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import trimesh
+
+from schemas.scene_parts import Joint
+from stages.kit.geometry.transforms import apply, inverse
+from stages.kit.motion.doors import body_from_moved
+from stages.kit.simulation.shapes import joined
+
+if TYPE_CHECKING:
+    from stages.plan.world_model import WorldModel
+
+LEVEL = 0.98
+MERGE_HEIGHT = 0.006
+LEAST_AREA = 0.005
+LEAST_WIDTH = 0.06
+LEAST_SURFACE = 0.2
+"""Share of the rectangle that has to have surface."""
+LEAST_CLEARANCE = 0.04
+"""Surfaces with less room above carry nothing [m]."""
+OPEN_AIR = 2.0
+"""Nothing within this above a surface counts as open air [m]."""
+LEVELS = (0.25, 0.5, 0.75)
+"""Shares of the free height at which a way out is looked for."""
+LEAST_WAY_OUT = 0.4
+"""Share of the lines sideways that have to be free (but for doors) for a way out."""
+NEAR_LEVEL = 0.06
+"""An item stands on a region when its bottom is at most this far from its level [m]."""
+BESIDE = 0.03
+CELL = 0.02
+"""Edge of the cells on which surface and free height are noted [m]."""
+CIRCLE = np.column_stack([np.cos(np.pi / 4 * np.arange(8)), np.sin(np.pi / 4 * np.arange(8))])
+
+
+@dataclass(frozen=True)
+class Region:
+    """A level rectangle of a body that things can stand on. Body frame with all joints at 0, metres."""
+
+    body: str
+    link: str
+    low: np.ndarray
+    """(2,)"""
+    high: np.ndarray
+    level: float
+    clearance: float
+    """Free height above; `OPEN_AIR` when nothing is there."""
+    doors: tuple[str, ...]
+    """Joints to open before a hand gets there."""
+    joint: Joint | None
+    """The joint that moves the region: of a drawer, or of a door with shelves."""
+    free: np.ndarray
+    """(X, Y) free height [m] over each cell of `CELL`; 0 where the rectangle has no surface at this level."""
+
+    def carries(self, spot: np.ndarray, radius: float, height: float) -> bool:
+        """Whether there is surface under, and room above, the middle and the rim of a round foot at `spot` (2,)."""
+        points = np.concatenate([spot[None], spot + radius * CIRCLE])
+        cells = np.floor((points - self.low) / CELL).astype(int)
+        inside = np.all((cells >= 0) & (cells < self.free.shape), axis=1)
+        return bool(inside.all() and (self.free[cells[:, 0], cells[:, 1]] > height).all())
+
+    @property
+    def covered(self) -> bool:
+        """Whether hands come from the side: something is above that does not go away."""
+        drawer = self.joint is not None and self.joint.type == "prismatic"
+        return self.clearance < OPEN_AIR and not drawer
+
+    @property
+    def carries_things(self) -> bool:
+        """Whether things can be put here: shelves in a swinging door are left alone."""
+        return self.joint is None or self.joint.type == "prismatic"
+
+    def world_from_closed(self, model: WorldModel) -> np.ndarray:
+        """Return (4, 4) from the closed body frame to the world, the region where it is now."""
+        pose = model.pose(self.body)
+        if self.joint is None:
+            return pose
+        return pose @ body_from_moved(self.joint, model.joint_value(self.body, self.joint.name))
+
+    def takes(self, radius: float, height: float) -> bool:
+        """Whether an upright thing of this footprint radius and height [m] has room here."""
+        wide = float((self.high - self.low).min())
+        return self.carries_things and wide > 2 * radius and self.clearance > height + 0.015
+
+
+@dataclass(frozen=True)
+class _Shape:
+    mesh: trimesh.Trimesh
+    owner: np.ndarray
+    """(F,) number of the link of each face."""
+    links: tuple[str, ...]
+    joints: dict[int, Joint]
+    """Number of a link -> the joint that moves it."""
+
+    def hits(self, start: np.ndarray, direction: np.ndarray) -> list[list[tuple[float, int]]]:
+        """Return, per ray from start (N, 3), (distance, link number) of everything that it meets."""
+        rays = np.tile(direction, (len(start), 1))
+        places, ray, faces = self.mesh.ray.intersects_location(start, rays, multiple_hits=True)
+        found: list[list[tuple[float, int]]] = [[] for _ in start]
+        for place, index, face in zip(places, ray, faces, strict=True):
+            found[index].append((float(np.linalg.norm(place - start[index])), int(self.owner[face])))
+        return found
+
+
+def find_regions(model: WorldModel, name: str) -> tuple[Region, ...]:
+    """Return the regions of a body, largest first."""
+    shape = _shape(model, name)
+    if shape is None:
+        return ()
+    found = []
+    for number, link in enumerate(shape.links):
+        for low, high, level in _levels(shape, number):
+            region = _region(shape, name, link, number, low, high, level)
+            if region is not None:
+                found.append(region)
+    return tuple(sorted(found, key=lambda region: -float(np.prod(region.high - region.low))))
+
+
+def _shape(model: WorldModel, name: str) -> _Shape | None:
+    joints = {joint.part: joint for joint in model.records[name].joints}
+    meshes, links = [], []
+    for link in model.shaped_links(name):
+        meshes.append(model.part_mesh(name, link))
+        links.append(link)
+    if not meshes:
+        return None
+    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
+    moved = {number: joints[link] for number, link in enumerate(links) if link in joints}
+    return _Shape(joined(meshes), owner, tuple(links), moved)
+
+
+def _levels(shape: _Shape, number: int) -> list[tuple[np.ndarray, np.ndarray, float]]:
+    """Return rectangles (low (2,), high (2,), height) of the upward faces of a link, one a height."""
+    up = np.flatnonzero((shape.owner == number) & (shape.mesh.face_normals[:, 2] > LEVEL))
+    triangles = shape.mesh.triangles[up]
+    heights, areas = triangles[:, :, 2].mean(axis=1), shape.mesh.area_faces[up]
+    left = np.ones(len(up), dtype=bool)
+    levels = []
+    for place in np.argsort(-heights, kind="stable"):
+        if not left[place]:
+            continue
+        group = left & (np.abs(heights - heights[place]) < MERGE_HEIGHT)
+        left &= ~group
+        corners = triangles[group].reshape(-1, 3)
+        low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
+        if areas[group].sum() > LEAST_AREA and float((high - low).min()) > LEAST_WIDTH:
+            levels.append((low, high, float(heights[place])))
+    return levels
+
+
+def _region(
+    shape: _Shape, body: str, link: str, number: int, low: np.ndarray, high: np.ndarray, level: float
+) -> Region | None:
+    points, counts = _cells(low, high, level + 0.002)
+    below = shape.hits(points, np.array([0.0, 0.0, -1.0]))
+    surface = np.array([bool(entries) and min(entries)[0] < 0.008 for entries in below])
+    if surface.mean() < LEAST_SURFACE or not surface.any():
+        return None
+    over = points[surface]
+    above = shape.hits(over, np.array([0.0, 0.0, 1.0]))
+    free = np.zeros(len(points))
+    free[surface] = [min((distance for distance, _ in entries), default=OPEN_AIR) for entries in above]
+    clearance = min(float(np.median(free[surface])), OPEN_AIR)
+    if clearance < LEAST_CLEARANCE:
+        return None
+    joint = shape.joints.get(number)
+    doors: tuple[str, ...] | None
+    if joint is not None:
+        doors = (joint.name,)
+    elif clearance >= OPEN_AIR:
+        doors = ()
+    else:
+        doors = _ways_in(shape, over[:: max(1, len(over) // 12)], clearance)
+    if doors is None:
+        return None
+    return Region(body, link, low, high, level, clearance, doors, joint, free.reshape(counts))
+
+
+def _cells(low: np.ndarray, high: np.ndarray, height: float) -> tuple[np.ndarray, tuple[int, int]]:
+    """Return the middles (N, 3) of the cells of a rectangle, and how many there are along x and y."""
+    counts = np.maximum(1, np.floor((high - low) / CELL).astype(int))
+    x, y = (low[axis] + CELL * (np.arange(counts[axis]) + 0.5) for axis in (0, 1))
+    grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    return np.column_stack([grid, np.full(len(grid), height)]), (int(counts[0]), int(counts[1]))
+
+
+def _ways_in(shape: _Shape, points: np.ndarray, clearance: float) -> tuple[str, ...] | None:
+    """Return the joints to open so that straight lines lead out sideways, the fewest; None: there is no way."""
+    best: tuple[str, ...] | None = None
+    for direction in ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
+        starts = np.concatenate([points + [0.0, 0.0, height * clearance] for height in LEVELS])
+        blocked: set[str] = set()
+        free = 0
+        for entries in shape.hits(starts, np.array(direction)):
+            owners = {number for _, number in entries}
+            if all(number in shape.joints for number in owners):
+                free += 1
+                blocked |= {shape.joints[number].name for number in owners}
+        names = tuple(sorted(blocked))
+        if free >= LEAST_WAY_OUT * len(starts) and (best is None or len(names) < len(best)):
+            best = names
+    return best
+
+
+def region_under(model: WorldModel, item: str, body: str) -> Region | None:
+    """Return the region of a body on which an item stands, None when it stands on none of them."""
+    points = apply(model.pose(item), model.points(item))
+    low, high = points.min(axis=0), points.max(axis=0)
+    foot = np.array([*(low + high)[:2] / 2, low[2]])
+    best: tuple[float, Region] | None = None
+    for region in model.regions(body):
+        place = apply(inverse(region.world_from_closed(model)), foot)
+        off = abs(float(place[2]) - region.level)
+        over = bool(np.all(place[:2] > region.low - BESIDE) and np.all(place[:2] < region.high + BESIDE))
+        if over and off < (NEAR_LEVEL if best is None else best[0]):
+            best = (off, region)
+    return None if best is None else best[1]

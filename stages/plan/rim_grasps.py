@@ -1,0 +1,75 @@
+"""Grasps of an upright wall by its rim, from above: how a tray or a bowl is lifted that is too wide for the fingers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from stages.kit.geometry.transforms import apply, inverse
+from stages.kit.motion.grasps import Grasp
+
+if TYPE_CHECKING:
+    from stages.plan.world_model import WorldModel
+
+DEPTH = 0.024
+"""How far the tool point goes below the rim [m]."""
+FOOT_ROOM = 0.012
+"""The tool point stays this far over the lowest point of the thing: the finger tips reach below it [m]."""
+LEAST_DEPTH = 0.012
+THICKEST = 0.03
+"""Walls are at most this thick [m]."""
+FINGER_ROOM = 0.045
+"""Free width behind the wall for the inner finger [m]."""
+OFFSETS = (-0.09, -0.06, -0.03, 0.03, 0.06, 0.09)
+"""Straight walls are taken beside their middle too [m]: the palm has to pass what stands on the tray."""
+BREADTH = 0.011
+"""Half the breadth of a finger tip [m]."""
+
+
+def rim_grasps(
+    points: np.ndarray, world_from_body: np.ndarray, random: np.random.Generator, headings: int = 24
+) -> list[Grasp]:
+    """Return grasps straight from above with one finger outside and one inside of the outermost wall.
+
+    `points` (N, 3) are of the surface, body frame. Per heading through the middle (along the body's axes also
+    beside it) the wall is where the outermost points near the rim are; it must be thin and free behind.
+    """
+    world = apply(world_from_body, points)
+    low, high = world.min(axis=0), world.max(axis=0)
+    depth = min(DEPTH, high[2] - low[2] - FOOT_ROOM)
+    if depth < LEAST_DEPTH:
+        return []
+    top = world[world[:, 2] > high[2] - depth - 0.004]
+    middle = (low + high)[:2] / 2
+    yaw = float(np.arctan2(world_from_body[1, 0], world_from_body[0, 0]))
+    even = yaw + 2 * np.pi * np.arange(headings) / headings
+    found: list[Grasp] = []
+    beside = [(heading, offset) for heading in even[:: headings // 4] for offset in OFFSETS]
+    for heading, offset in [*((heading, 0.0) for heading in even), *beside]:
+        outward = np.array([np.cos(heading), np.sin(heading)])
+        across = np.array([-outward[1], outward[0]])
+        relative = top[:, :2] - middle
+        near = top[(np.abs(relative @ across - offset) < BREADTH) & (relative @ outward > 0)]
+        if len(near) < 6:
+            continue
+        along = (near[:, :2] - middle) @ outward
+        wall = along[along > along.max() - THICKEST]
+        thickness = float(along.max() - wall.min())
+        behind = (along < wall.min() - 0.002) & (along > wall.min() - FINGER_ROOM)
+        if thickness > THICKEST - 0.002 or behind.any():
+            continue
+        closing = np.array([*outward, 0.0])
+        approach = np.array([0.0, 0.0, -1.0])
+        pose = np.eye(4)
+        pose[:3, :3] = np.column_stack([np.cross(closing, approach), closing, approach])
+        pose[:2, 3] = middle + outward * (along.max() - thickness / 2) + across * offset
+        pose[2, 3] = high[2] - depth
+        for turned in (pose, pose @ np.diag([-1.0, -1.0, 1.0, 1.0])):
+            found.append(Grasp(inverse(world_from_body) @ turned, thickness, np.pi / 2))
+    return [found[index] for index in random.permutation(len(found)).tolist()]
+
+
+def has_rim(model: WorldModel, item: str) -> bool:
+    """Whether a thing can be lifted by its rim."""
+    return bool(rim_grasps(model.points(item), model.pose(item), np.random.default_rng(0)))

@@ -1,0 +1,166 @@
+"""The kinematic tree as the state of a task: who stands on whom, joint values, what is held; predicted and observed."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from schemas.contact_graph import SCENE_NODE, ContactGraphFile
+from schemas.plan import BodyMatch, TreeDifference
+from stages.kit.simulation.world import PhysicsWorld
+from stages.plan.door_motion import is_closed, is_open
+from stages.plan.refinement import Step
+from stages.plan.updated_graph import update_graph
+from stages.plan.world_model import WorldModel
+
+HAND = "hand"
+"""Parent of what is held."""
+NOTHING = "nothing"
+"""Parent of what touches nothing from above."""
+MOVED = 0.05
+"""Things that moved less than this keep their place in the graph [m]."""
+STEEP = 0.5
+"""Least upward share of a contact normal of something that carries."""
+TOUCHING = 0.002
+
+
+@dataclass(frozen=True)
+class TreeState:
+    """Names are those of the plan."""
+
+    parents: dict[str, str]
+    """Movable body -> what carries it."""
+    poses: dict[str, np.ndarray]
+    """Movable body -> world_from_body (4, 4)."""
+    joints: dict[str, float]
+    held: str | None = None
+
+
+def start_state(model: WorldModel) -> TreeState:
+    """Return what is believed at the beginning."""
+    movable = [name for name, record in model.records.items() if record.movable]
+    joints = {joint.name: model.joint_value(name, joint.name)
+              for name, record in model.records.items() for joint in record.joints}  # fmt: skip
+    parents = {name: model.records[name].parent or SCENE_NODE for name in movable}
+    return TreeState(parents, {name: model.pose(name) for name in movable}, joints)
+
+
+def after_step(state: TreeState, step: Step) -> TreeState:
+    """Return the state after a step of the plan: what is carried takes along what stands on it."""
+    if step.manipulation is None:
+        return state
+    if step.name == "pick":
+        return replace(state, parents={**state.parents, step.arguments[0]: HAND}, held=step.arguments[0])
+    if step.name == "place" and step.manipulation.item_pose is not None:
+        item = step.arguments[0]
+        change = step.manipulation.item_pose @ np.linalg.inv(state.poses[item])
+        poses = {**state.poses, **{name: change @ state.poses[name] for name in (item, *_above(state, item))}}
+        return replace(state, parents={**state.parents, item: step.arguments[1]}, poses=poses, held=None)
+    return replace(state, joints={**state.joints, **step.manipulation.joint_values})
+
+
+def _above(state: TreeState, item: str) -> list[str]:
+    found: list[str] = []
+    waiting = [item]
+    while waiting:
+        below = waiting.pop()
+        fresh = [name for name, parent in state.parents.items() if parent == below and name not in found]
+        found += fresh
+        waiting += fresh
+    return found
+
+
+def observed_state(
+    world: PhysicsWorld, matches: dict[str, BodyMatch], joint_names: dict[str, str], held: str | None
+) -> TreeState:
+    """Return the state of a physics world: carriers are read off the contacts of the last step.
+
+    The carrier of a thing is the body whose contacts push it upwards most; `held` (a body of the world) is the hand's.
+    Bodies that no planned body was taken for are called `room:<name>`.
+    """
+    planned = {match.matched: name for name, match in matches.items() if match.matched is not None}
+    parents, poses = {}, {}
+    for name, match in matches.items():
+        if match.matched is None or not world.bodies[match.matched].record.movable:
+            continue
+        poses[name] = world.pose(match.matched)
+        parents[name] = HAND if match.matched == held else _carrier(world, match.matched, planned)
+    joints = {}
+    for joint, there in joint_names.items():
+        body = next(name for name, entry in world.bodies.items() if there in entry.joints)
+        joints[joint] = world.joint_value(body, there)
+    return TreeState(parents, poses, joints, planned.get(held) if held is not None else None)
+
+
+def _carrier(world: PhysicsWorld, name: str, planned: dict[str, str]) -> str:
+    push: dict[str, float] = defaultdict(float)
+    for contact in world.contacts(world.bodies[name].body_id):
+        other = world.name_of(contact.other_body)
+        if other is None or other == name or contact.normal[2] < STEEP or contact.depth < -TOUCHING:
+            continue
+        push[other] += float(contact.normal[2]) * (contact.force + 1e-3)  # what sleeps has no forces
+    if not push:
+        return NOTHING
+    best = max(sorted(push), key=lambda other: push[other])
+    return planned.get(best, f"room:{best}")
+
+
+def tree_differences(
+    action: int, expected: TreeState, observed: TreeState, model: WorldModel
+) -> tuple[TreeDifference, ...]:  # fmt: skip
+    """Return where an observed state is not as expected: carriers of things, doors that are open or shut."""
+    found = []
+    for name, parent in sorted(observed.parents.items()):
+        if expected.parents.get(name, parent) != parent:
+            found.append(TreeDifference(action=action, node=name, expected=expected.parents[name], observed=parent))
+    for record in model.records.values():
+        for joint in record.joints:
+            if joint.name not in observed.joints:
+                continue
+            words = [
+                "open" if is_open(joint, state.joints[joint.name])
+                else "closed" if is_closed(joint, state.joints[joint.name]) else "between"
+                for state in (expected, observed)
+            ]  # fmt: skip
+            if words[0] != words[1]:
+                found.append(TreeDifference(action=action, node=joint.name, expected=words[0], observed=words[1]))
+    return tuple(found)
+
+
+def graph_of_state(
+    graph: ContactGraphFile, start: TreeState, state: TreeState, believed: TreeState, model: WorldModel
+) -> ContactGraphFile:
+    """Return the planned scene's graph with what is different in a state from the start, in the same world.
+
+    Poses move along with the change since `start`, from where they are `believed` to be. What the hand holds hangs on
+    the scene's root, and the graph says `held`.
+    """
+    nodes = {node.id for node in graph.nodes}
+    moved, parents = {}, {}
+    for name, pose in state.poses.items():
+        change = pose @ np.linalg.inv(start.poses[name])
+        if np.linalg.norm(pose[:3, 3] - start.poses[name][:3, 3]) > MOVED:
+            moved[name] = (believed.poses[name], change @ believed.poses[name])
+        parent = SCENE_NODE if state.parents[name] == HAND else state.parents[name]
+        if state.parents[name] != start.parents[name] and parent in nodes:
+            parents[name] = (parent, _relation(model, name, parent))
+    joints: dict[str, dict[str, float]] = {}
+    for name, record in model.records.items():
+        values = {
+            joint.name.removeprefix(f"{name}__"): round(state.joints[joint.name], 6)
+            for joint in record.joints if joint.name in state.joints
+        }  # fmt: skip
+        if values:
+            joints[name] = values
+    updated = update_graph(graph, moved, parents, joints)
+    if state.held is None:
+        return updated
+    return updated.model_copy(update={"graph": {**updated.graph, "held": state.held}})
+
+
+def _relation(model: WorldModel, item: str, parent: str) -> str:
+    """`contains` for furniture that hides what stands on its regions behind doors, else `supports`."""
+    record = model.records.get(parent)
+    return "contains" if record is not None and record.contains and record.joints else "supports"

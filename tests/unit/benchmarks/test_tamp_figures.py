@@ -1,0 +1,33 @@
+"""Figures of tasks in rooms: what counts as a try, what as a success."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.planning.tamp import EXACT, RoomResult, figures, table
+
+
+def result(task: str, reason: str = "", seconds: float = 2.0) -> RoomResult:
+    status = "executed" if not reason else "infeasible"
+    return RoomResult(task, EXACT, 0, not reason, status, reason, 8, {"plan": seconds})
+
+
+def test_rooms_without_a_goal_are_no_tries_and_rooms_that_do_not_exist_do_not_count() -> None:
+    results = [result("tidy-the-desk", seconds=s) for s in (1.0, 2.0, 6.0)]
+    results += [
+        result("tidy-the-desk", "no_goal"),
+        result("tidy-the-desk", "no_room"),
+        result("tidy-the-desk", "no_path"),
+    ]
+    results += [result("stack-and-carry", "grasp_lost")]
+    metrics = figures(results)
+    key = f"tidy-the-desk/{EXACT}"
+    assert metrics[f"{key}/rooms"] == 5 and metrics[f"{key}/goals"] == 4
+    assert metrics[f"{key}/success"] == pytest.approx(3 / 4)
+    assert metrics[f"{key}/failed_no_path"] == 1 and metrics[f"{key}/failed_no_goal"] == 1
+    assert metrics[f"{key}/seconds_plan"] == 2.0  # the median of 1, 2, 2, 6
+    assert metrics[f"ours/{EXACT}/success"] == pytest.approx(3 / 5)
+    assert metrics[f"stack-and-carry/{EXACT}/success"] == 0.0
+    assert f"stack-and-carry/{EXACT}/actions" not in metrics
+    text = table(metrics)
+    assert text.count("\n") == 5 and "| tidy-the-desk | tamp_exact | 5 | 4 | 75 % |" in text
