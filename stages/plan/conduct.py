@@ -185,7 +185,7 @@ class Conduct:
         """Raises MotionFailed `condition_not_met` when a joint is not where the motion should have brought it: what
         follows was planned around it."""
         for planned, goal in step.manipulation.joint_values.items() if step.manipulation is not None else ():
-            there, body = self.joint_names[planned], self._matched(self._owner(planned))
+            there, body = self.joint_names[planned], self._matched(self.model.owner(planned))
             value = self.physical.world.joint_value(body, there)
             if abs(value - goal) > JOINT_TOLERANCE:
                 raise MotionFailed(
