@@ -9,7 +9,7 @@ that `joint_limit` is only said after it, and `no_inverse_kinematics` only beyon
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import atan2, cos, hypot, pi, sin, sqrt
+from math import acos, atan2, cos, hypot, pi, sin, sqrt
 from typing import Literal
 
 import numpy as np
@@ -21,7 +21,7 @@ from stages.kit.simulation.robot_description import RobotDescription, load_robot
 Limits = Literal["fr3", "panda"]
 FR3_LOWER = np.array([-5.3093, -1.5133, -2.4937, -2.7478, -2.48, 0.8521, -5.7995])
 FR3_UPPER = np.array([5.3093, 1.5133, 2.4937, -0.4461, 2.48, 4.2094, 5.7995])
-"""Joint limits [rad] of the published environment (PROTOCOLS section 1)."""
+"""Joint limits [rad] of the published environment (docs/LLM3.md)."""
 HOME = np.array([0.0, -pi / 4, 0.0, -3 * pi / 4, 0.0, pi / 2, pi / 4])
 SEARCHES = 10
 """Random seeds of the numeric search, beside the nearest planar configuration and the home one."""
@@ -72,12 +72,11 @@ class FixedArm:
         description = load_robot(robot)
         if limits == "fr3":
             description = replace(description, lower=FR3_LOWER, upper=FR3_UPPER)
+        self.limits = limits
         self.description: RobotDescription = description
         self.chain: ArmChain = arm_chain(description)
         self._lengths = _measures(self.chain)
-        self.span = hypot(self._lengths.upper, self._lengths.elbow) + hypot(
-            self._lengths.forearm, self._lengths.elbow
-        )
+        self.span = hypot(self._lengths.upper, self._lengths.elbow) + hypot(self._lengths.forearm, self._lengths.elbow)
         self._numeric: dict[tuple[float, float], np.ndarray | None] = {}
 
     def reach(self, z: float) -> float:
@@ -148,22 +147,20 @@ class FixedArm:
         return frames
 
     def _planar(self, radius: float, z: float) -> np.ndarray:
-        """Return the configuration (7,) in the plane y = 0 with the tool's yaw 0, limits not looked at."""
-        return self.planar(np.array([radius]), np.array([z]))[0]
+        """Return the configuration (7,) in the plane y = 0 with the tool's yaw 0, limits and reach not looked at."""
+        lengths = self._lengths
+        out, up = radius - lengths.wrist, z + lengths.hand - lengths.shoulder
+        first, second = hypot(lengths.upper, lengths.elbow), hypot(lengths.forearm, lengths.elbow)
+        cosine = (out * out + up * up - first**2 - second**2) / (2 * first * second)
+        bend = acos(min(1.0, max(-1.0, cosine)))
+        upper_offset, lower_offset = atan2(lengths.elbow, lengths.upper), atan2(lengths.elbow, lengths.forearm)
+        lean = atan2(out, up) - atan2(second * sin(bend), first + second * cos(bend)) - upper_offset
+        elbow = -(bend + upper_offset + lower_offset)
+        return np.array([0.0, lean, 0.0, elbow, 0.0, lean - elbow, lengths.yaw_offset])
 
     def planar(self, radii: np.ndarray, heights: np.ndarray) -> np.ndarray:
         """Return (N, 7) configurations in the plane y = 0, tool's yaw 0, limits and reach not looked at."""
-        lengths = self._lengths
-        out, up = radii - lengths.wrist, heights + lengths.hand - lengths.shoulder
-        first, second = hypot(lengths.upper, lengths.elbow), hypot(lengths.forearm, lengths.elbow)
-        cosine = (out * out + up * up - first**2 - second**2) / (2 * first * second)
-        bend = np.arccos(np.clip(cosine, -1.0, 1.0))
-        upper_offset, lower_offset = atan2(lengths.elbow, lengths.upper), atan2(lengths.elbow, lengths.forearm)
-        lean = np.arctan2(out, up) - np.arctan2(second * np.sin(bend), first + second * np.cos(bend)) - upper_offset
-        elbow = -(bend + upper_offset + lower_offset)
-        joints = np.zeros((len(out), 7))
-        joints[:, 1], joints[:, 3], joints[:, 5], joints[:, 6] = lean, elbow, lean - elbow, lengths.yaw_offset
-        return joints
+        return np.array([self._planar(*pair) for pair in zip(radii.tolist(), heights.tolist(), strict=True)])
 
     def _outside(self, arm: np.ndarray) -> tuple[int, float]:
         """Return the joint that is farthest outside its limits and by how much [rad]."""

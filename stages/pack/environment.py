@@ -12,19 +12,18 @@ from math import atan2
 import numpy as np
 
 from schemas.plan import Failure
-from stages.kit.motion.failures import MotionFailed
 from stages.pack.arm import Limits, ToolPose
 from stages.pack.hand import Named, release_height, tool_over_centre
-from stages.pack.instances import TABLE_TOP, Instance
+from stages.pack.instances import BASKET_TOP, TABLE_TOP, Instance
 from stages.pack.motion import HOME_STANCE, Motion, MotionPlanner, Stance
 from stages.pack.records import Action, BoxState
 from stages.pack.settling import Rest, SettlingTable, rest_of
-from stages.pack.solids import Block
+from stages.pack.solids import Block, flat_depth
 
 GOAL_MARGIN = 0.015
 """A box is in the basket when its bounds lie within the basket's grown by this on each side [m]."""
 X_RANGE, Y_RANGE, YAW_RANGE = (0.0, 1.4), (-1.0, 1.0), (-3.14, 3.14)
-"""Parameters of a place are clipped into these, not refused (PROTOCOLS section 1)."""
+"""Parameters of a place are clipped into these, not refused (docs/LLM3.md)."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +67,8 @@ class PackingWorld:
             )
             for obstacle in instance.obstacles
         )
+        self._seen: dict[tuple[str, Rest], BoxState] = {}
+        self._blocks: dict[tuple[str, Rest], Named] = {}
         self.initial = State({box.name: rest_of(box, TABLE_TOP) for box in instance.boxes}, HOME_STANCE)
 
     def __enter__(self) -> PackingWorld:
@@ -119,13 +120,52 @@ class PackingWorld:
         pose = ToolPose(x, y, centre + tool_over_centre(box.height), yaw)
         motion = self.planner.plan(state.stance, pose, box, self.standing(state, box.name))
         let_go = replace(box, x=x, y=y, yaw=yaw)
+        ground = self._even_ground(let_go)
+        if ground is not None and self._all_upright(state):
+            return State(state.rests | {box.name: rest_of(let_go, ground)}, motion.end), motion
         rests = state.rests | {box.name: rest_of(let_go, centre - box.height / 2)}
         return State(self._table.settle(rests), motion.end), motion
+
+    def confirm(self, plan: tuple[Action, ...]) -> tuple[str, ...]:
+        """Let physics run after every place of a feasible plan; return the boxes that are then not in the basket."""
+        rests = dict(self.initial.rests)
+        for action in plan:
+            if action.name == "place":
+                box = self._boxes[action.box]
+                x, y, yaw = clipped(action)
+                bottom = release_height(box.height) - box.height / 2
+                rests = self._table.settle(rests | {box.name: rest_of(replace(box, x=x, y=y, yaw=yaw), bottom)})
+        return self.outside(State(rests, HOME_STANCE))
+
+    def _even_ground(self, box: BoxState) -> float | None:
+        """Return the height [m] of the surface under all of a box that is let go; None when it is not one surface.
+
+        Over one surface an upright box comes straight down, as it overlaps nothing: physics would say nothing new.
+        """
+        low_x, low_y, high_x, high_y = _upright_block(box, 0.0).bounds
+        for fixed in self._fixed:
+            if flat_depth(_upright_block(box, 0.0), fixed.block) > 0:
+                return None
+        low, high = self.instance.basket.low, self.instance.basket.high
+        if low_x >= low[0] and low_y >= low[1] and high_x <= high[0] and high_y <= high[1]:
+            return BASKET_TOP
+        apart = high_x <= low[0] or low_x >= high[0] or high_y <= low[1] or low_y >= high[1]
+        return TABLE_TOP if apart else None
+
+    def _all_upright(self, state: State) -> bool:
+        return all(_upright(rest) for rest in state.rests.values())
 
     # --- what is seen -----------------------------------------------------------------------------------------
 
     def box(self, state: State, name: str) -> BoxState:
         """Return a box as it lies (its yaw that of its x axis)."""
+        rest = state.rests[name]
+        box = self._seen.get((name, rest))
+        if box is None:
+            box = self._seen[name, rest] = self._look(state, name)
+        return replace(box, in_basket=False) if name == state.held else box
+
+    def _look(self, state: State, name: str) -> BoxState:
         box, rest = self._boxes[name], state.rests[name]
         turn = _rotation(rest.quaternion)
         low, high = self.bounds(state, name)
@@ -134,7 +174,7 @@ class PackingWorld:
             low[k] >= basket.low[k] - GOAL_MARGIN and high[k] <= basket.high[k] + GOAL_MARGIN for k in range(2)
         )
         yaw = atan2(turn[1, 0], turn[0, 0])
-        return replace(box, x=rest.position[0], y=rest.position[1], yaw=yaw, in_basket=inside and name != state.held)
+        return replace(box, x=rest.position[0], y=rest.position[1], yaw=yaw, in_basket=inside)
 
     def bounds(self, state: State, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Return the axis-aligned bounds (3,), (3,) of a box as it lies [m]."""
@@ -144,25 +184,32 @@ class PackingWorld:
 
     def standing(self, state: State, held: str | None) -> tuple[Named, ...]:
         """Return all that stands on the table as blocks; a box that leans gets the block that holds it."""
-        blocks = []
-        for name in self._boxes:
-            if name == held:
-                continue
-            box, rest = self.box(state, name), state.rests[name]
-            low, high = self.bounds(state, name)
-            turn = _rotation(rest.quaternion)
-            upright = turn[2, 2] > 1 - 1e-5
-            if upright:
-                block = Block(box.x, box.y, box.yaw, box.width / 2, box.length / 2, float(low[2]), float(high[2]))
-            else:
+        names = (name for name in self._boxes if name != held)
+        return (*(self._block(state, name) for name in names), *self._fixed)
+
+    def _block(self, state: State, name: str) -> Named:
+        key = (name, state.rests[name])
+        if key not in self._blocks:
+            box, (low, high) = self.box(state, name), self.bounds(state, name)
+            block = replace(_upright_block(box, float(low[2])), top=float(high[2]))
+            if not _upright(state.rests[name]):
                 middle, half = (low + high) / 2, (high - low) / 2
                 block = Block(middle[0], middle[1], 0.0, half[0], half[1], float(low[2]), float(high[2]))
-            blocks.append(Named(name, block))
-        return (*blocks, *self._fixed)
+            self._blocks[key] = Named(name, block)
+        return self._blocks[key]
 
     def outside(self, state: State) -> tuple[str, ...]:
         """Return the boxes that are not in the basket; none: the goal holds."""
         return tuple(name for name in self._boxes if not self.box(state, name).in_basket)
+
+
+def _upright_block(box: BoxState, bottom: float) -> Block:
+    return Block(box.x, box.y, box.yaw, box.width / 2, box.length / 2, bottom, bottom + box.height)
+
+
+def _upright(rest: Rest) -> bool:
+    x, y, _, _ = rest.quaternion
+    return 2 * (x * x + y * y) < 1e-5
 
 
 def clipped(action: Action) -> tuple[float, float, float]:
@@ -188,6 +235,3 @@ def _rotation(quaternion: tuple[float, float, float, float]) -> np.ndarray:
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
-
-
-__all__ = ["GOAL_MARGIN", "MotionFailed", "PackingWorld", "State", "WrongAction", "clipped"]

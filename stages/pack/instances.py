@@ -54,7 +54,7 @@ def centred(name: str, x: float, y: float, width: float, length: float) -> Recta
     return Rectangle(name, (x - width / 2, y - length / 2), (x + width / 2, y + length / 2))
 
 
-# Extents in metres, in the order of the fixed plan of the sampler study (PROTOCOLS section 1; thesis figure 4.5).
+# Extents in metres, in the order of the fixed plan of the sampler study (docs/LLM3.md; thesis figure 4.5).
 BOX_SETS: dict[str, tuple[tuple[str, float, float, float], ...]] = {
     "easy": (
         ("red_box", 0.035, 0.035, 0.07), ("blue_box", 0.07, 0.07, 0.07),

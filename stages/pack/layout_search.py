@@ -213,9 +213,7 @@ def _candidates(
 
 
 @njit(cache=True)
-def _search(
-    extents, container, fixed, hand, over_fixed, over_boxes, reach, refused, preset, order, gap, corner, nodes
-):  # type: ignore[no-untyped-def]
+def _search(extents, container, fixed, hand, over_fixed, over_boxes, reach, refused, preset, order, gap, corner, nodes):  # type: ignore[no-untyped-def]
     """Depth first over `order`; return places (B, 3) and 1: found, 0: out of nodes, -1: there is none."""
     placed = np.full((extents.shape[0], 3), -1.0)
     for row in range(preset.shape[0]):

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from functools import cache
+from math import ceil, floor
 
 import numpy as np
 
 from stages.kit.simulation.shapes import link_shapes
 from stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
-from stages.pack.arm import FixedArm, planar_joints
+from stages.pack.arm import FixedArm, Limits, planar_joints
 
 STEP = 0.02
 MARGIN = 0.02
@@ -37,12 +38,12 @@ def _hulls(robot: str) -> tuple[np.ndarray, ...]:
 
 
 @cache
-def lowest_points(robot: str) -> np.ndarray:
+def lowest_points(robot: str, limits: Limits) -> np.ndarray:
     """Return (R, Z) world z [m] of the lowest point of links 3 to 7 over RADII and HEIGHTS, less the margin.
 
     -inf where the planar arm does not reach or folds further than its joints can.
     """
-    arm = FixedArm("fr3", robot)
+    arm = FixedArm(limits, robot)
     hulls = _hulls(robot)
     table = np.full((len(RADII), len(HEIGHTS)), -np.inf)
     for row, radius in enumerate(RADII):
@@ -58,9 +59,22 @@ def lowest_points(robot: str) -> np.ndarray:
     return table
 
 
-def lowest_on_path(robot: str, radii: np.ndarray, heights: np.ndarray) -> float:
+def lowest_within(arm: FixedArm, radii: tuple[float, float], heights: tuple[float, float]) -> float:
+    """Return a lower bound [m] of the links' height over a range of distances and heights of the tool.
+
+    -inf when the range leaves the table or holds a position that the planar arm cannot take.
+    """
+    table = lowest_points(arm.description.name, arm.limits)
+    rows = (radii[0] - RADII[0]) / STEP, (radii[1] - RADII[0]) / STEP
+    columns = (heights[0] - HEIGHTS[0]) / STEP, (heights[1] - HEIGHTS[0]) / STEP
+    if rows[0] < 0 or columns[0] < 0 or rows[1] > len(RADII) - 1 or columns[1] > len(HEIGHTS) - 1:
+        return -np.inf
+    return float(table[floor(rows[0]) : ceil(rows[1]) + 1, floor(columns[0]) : ceil(columns[1]) + 1].min())
+
+
+def lowest_on_path(arm: FixedArm, radii: np.ndarray, heights: np.ndarray) -> float:
     """Return a lower bound [m] of the links' height along tool positions (N,), (N,); -inf when one is off the table."""
-    table = lowest_points(robot)
+    table = lowest_points(arm.description.name, arm.limits)
     row = (radii - RADII[0]) / STEP
     column = (heights - HEIGHTS[0]) / STEP
     if row.min() < 0 or column.min() < 0 or row.max() >= len(RADII) - 1 or column.max() >= len(HEIGHTS) - 1:

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from schemas.plan import Failure
 from stages.kit.motion.failures import MotionFailed
 from stages.pack.environment import PackingWorld, State, WrongAction
+from stages.pack.motion import Motion
 from stages.pack.records import Action, Attempt, Proposer, StepFeedback
 
 ITERATIONS = 20
@@ -40,8 +39,8 @@ class PackingRun:
     attempts: tuple[Attempt, ...]
     states: tuple[State, ...]
     """The initial state and the one after each action of the last attempt that was carried out."""
-    paths: tuple[np.ndarray, ...]
-    """Joint values (N, 7) of the motions of that attempt."""
+    motions: tuple[Motion, ...]
+    """The motions of that attempt."""
 
     @property
     def plan(self) -> tuple[Action, ...]:
@@ -53,7 +52,7 @@ def run_loop(world: PackingWorld, proposer: Proposer, budget: Budget) -> Packing
     """Ask the proposer until a plan reaches the goal or a budget is spent."""
     observation = world.instance.observation
     attempts: list[Attempt] = []
-    kept: list[tuple[Action, State, np.ndarray]] = []
+    kept: list[tuple[Action, State, Motion]] = []
     """What the plan before carried out."""
     motion_calls = 0
     mesh_before = world.planner.mesh_calls
@@ -82,10 +81,11 @@ def run_loop(world: PackingWorld, proposer: Proposer, budget: Budget) -> Packing
             feedback.append(StepFeedback(action, failure))
             if failure is not None:
                 break
-            kept.append((action, state, motion.path))
+            kept.append((action, state, motion))
         task = None
         if failure is None:
-            outside = world.outside(state)
+            # A plan that seems to reach the goal is carried out once more with physics after every place.
+            outside = world.outside(state) or world.confirm(actions)
             success = not outside
             if outside:
                 task = Failure(

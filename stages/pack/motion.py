@@ -7,8 +7,10 @@ lower than the links come on it. Where it needs one, or is not free, meshes deci
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan2, ceil, cos, sin
+from functools import partial
+from math import atan2, ceil, cos, hypot, sin
 
 import numpy as np
 
@@ -17,17 +19,18 @@ from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision,
 from stages.pack.arm import HOME, FixedArm, Limits, ToolPose, planar_joints
 from stages.pack.arm_scene import ArmScene
 from stages.pack.hand import TIP_BELOW_TOOL, Named, end_collision, held_block, hand_blocks, tool_over_centre
-from stages.pack.link_heights import BASE_RADIUS, lowest_on_path
+from stages.pack.link_heights import BASE_RADIUS, lowest_on_path, lowest_within
 from stages.pack.records import BoxState
 from stages.pack.solids import overlap
 
 OVER = 0.015
 """What is carried over something passes this far above it [m]."""
-STRIDE = 0.02
+STRIDE = 0.03
 """Between two configurations of an up-over-down path [m]."""
 RESOLUTION = 0.05
 """Largest step of a joint between two mesh checks [rad]."""
-SAMPLES = 300
+SAMPLES = 60
+"""Samples of one search, as many as the published planner draws in its three tries."""
 HOME_POSE = ToolPose(0.306891, 0.0, 0.485302, 0.0)
 """Where the tool is at the home configuration."""
 
@@ -45,12 +48,17 @@ HOME_STANCE = Stance(HOME, HOME_POSE)
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion that is free: joint values (N, 7) of straight pieces, and where it ends."""
+    """A motion that is free: what makes its joint values (N, 7) of straight pieces, and where it ends."""
 
-    path: np.ndarray
+    make: Callable[[], np.ndarray]
     end: Stance
     searched: bool
     """Whether it took a search by RRT-Connect."""
+
+    @property
+    def path(self) -> np.ndarray:
+        """The joint values; made when they are asked for, as most motions are only counted."""
+        return self.make()
 
 
 class MotionPlanner:
@@ -58,7 +66,6 @@ class MotionPlanner:
 
     def __init__(self, limits: Limits = "fr3", seed: int = 0) -> None:
         self.arm = FixedArm(limits)
-        self._robot = self.arm.description.name
         self._scene: ArmScene | None = None
         self._seed = seed
         self.mesh_calls = 0
@@ -81,20 +88,34 @@ class MotionPlanner:
         failure = end_collision(goal, carried, others)
         if failure is not None:
             raise MotionFailed(failure.kind, failure.message, failure.objects, failure.numbers)
-        path = self._over(start, end, held, others)
+        tops = max((other.block.top for other in others), default=0.0)
+        height = _height_over(start, end, held, tops)
+        if self._surely_free(start, end, height, others):
+            return Motion(lambda: _known(self._over(start, end, height, held, others))[0], end, False)
+        path = self._over(start, end, height, held, others)
         if path is not None and path[1]:
-            return Motion(path[0], end, False)
+            return Motion(lambda: path[0], end, False)
         return self._with_meshes(start, end, held, others, None if path is None else path[0])
 
     # --- closed form ------------------------------------------------------------------------------------------
 
+    def _surely_free(self, start: Stance, end: Stance, height: float, others: tuple[Named, ...]) -> bool:
+        """Whether the up-over-down path is free wherever in its range of distances and heights it goes.
+
+        Straight up from a free pose is free, as everything stands on the ground; above `height` nothing stands; and the
+        links must be above all that stands in the whole range.
+        """
+        radii = sorted((start.pose.radius, end.pose.radius))
+        heights = min(start.pose.z, end.pose.z), height
+        tops = max((other.block.top for other in others), default=0.0)
+        lowest = lowest_within(self.arm, (radii[0], radii[1]), heights)
+        return lowest > tops and not _near_base(others)
+
     def _over(
-        self, start: Stance, end: Stance, held: BoxState | None, others: tuple[Named, ...]
+        self, start: Stance, end: Stance, height: float, held: BoxState | None, others: tuple[Named, ...]
     ) -> tuple[np.ndarray, bool] | None:
         """Return the up-over-down path (N, 7) and whether it is known to be free; None when the arm cannot follow."""
-        under = TIP_BELOW_TOOL if held is None else tool_over_centre(held.height) + held.height / 2
         tops = max((other.block.top for other in others), default=0.0)
-        height = max(tops + OVER + under, start.pose.z, end.pose.z)
         rise, fall = self._lift(start.pose, height), self._lift(end.pose, height)
         across = _arc(rise[-1], fall[-1])
         points = np.concatenate([rise, across, fall[::-1]])
@@ -112,12 +133,10 @@ class MotionPlanner:
             return None
         if np.abs(joints[0] - start.arm).max() > 0.02 or np.abs(joints[-1] - end.arm).max() > 0.02:
             return None
-        near_base = any(np.hypot(o.block.x, o.block.y) - o.block.half_width - o.block.half_length < BASE_RADIUS
-                        for o in others if o.block.top > 0.05)  # fmt: skip
-        lowest = -np.inf if near_base else lowest_on_path(self._robot, points[:, 0], points[:, 2])
-        free = lowest > tops and self._drawn_in_free(end, fall, held, others) and self._drawn_in_free(
-            start, rise, held, others
-        )  # fmt: skip
+        free = not _near_base(others) and lowest_on_path(self.arm, points[:, 0], points[:, 2]) > tops
+        free = free and all(
+            self._drawn_in_free(stance, way, held, others) for stance, way in ((start, rise), (end, fall))
+        )
         return joints, free
 
     def _lift(self, pose: ToolPose, height: float) -> np.ndarray:
@@ -163,7 +182,7 @@ class MotionPlanner:
                 continue
             whole = np.concatenate([start.arm[None], candidate, end.arm[None]])
             if first_collision(densify(whole, resolution), scene.check) is None:
-                return Motion(whole, end, False)
+                return Motion(partial(np.copy, whole), end, False)
         space = SearchSpace(self.arm.chain.lower, self.arm.chain.upper, resolution)
         if path is not None:
             space = _narrowed(space, whole_range=np.concatenate([path, start.arm[None]]))
@@ -171,7 +190,27 @@ class MotionPlanner:
             start.arm, end.arm, scene.check, space, np.random.default_rng([self._seed, 3]), samples=SAMPLES,
             smoothing=20,
         )  # fmt: skip
-        return Motion(found, end, True)
+        return Motion(lambda: found, end, True)
+
+
+def _height_over(start: Stance, end: Stance, held: BoxState | None, tops: float) -> float:
+    """Return the height [m] of the tool at which hand and held box pass over all that stands."""
+    under = TIP_BELOW_TOOL if held is None else tool_over_centre(held.height) + held.height / 2
+    return max(tops + OVER + under, start.pose.z, end.pose.z)
+
+
+def _near_base(others: tuple[Named, ...]) -> bool:
+    """Whether something stands where the links below the third could touch it."""
+    return any(
+        hypot(other.block.x, other.block.y) - other.block.half_width - other.block.half_length < BASE_RADIUS
+        for other in others
+    )
+
+
+def _known(path: tuple[np.ndarray, bool] | None) -> tuple[np.ndarray, bool]:
+    if path is None:
+        raise AssertionError("a path that is free everywhere in its range exists")
+    return path
 
 
 def _arc(first: np.ndarray, last: np.ndarray) -> np.ndarray:

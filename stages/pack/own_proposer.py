@@ -140,9 +140,7 @@ def solve_layout(
     return None
 
 
-def _far_first(
-    spots: list[Spot], boxes: dict[str, BoxState], limits: LearnedLimits, reorder: bool
-) -> tuple[Spot, ...]:
+def _far_first(spots: list[Spot], boxes: dict[str, BoxState], limits: LearnedLimits, reorder: bool) -> tuple[Spot, ...]:
     """Sort boxes of one height by distance: at the rim of its reach the hand comes in from the near side."""
     if not reorder or any(spot.box in pair for spot in spots for pair in limits.before):
         return tuple(spots)

@@ -20,7 +20,7 @@ def pick_and_place(box: str, x: float, y: float, yaw: float) -> tuple[Action, Ac
 class RandomSampler:
     """The published baseline: a fixed order; x, y uniform over the basket (no inset for the box), yaw U(-pi, pi).
 
-    All placements are drawn anew at each iteration; feedback is not read. Repaired (PROTOCOLS section 1): the order is
+    All placements are drawn anew at each iteration; feedback is not read. Repaired (docs/LLM3.md): the order is
     that of the instance's own boxes, whatever they are called.
     """
 

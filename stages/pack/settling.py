@@ -12,10 +12,7 @@ from stages.pack.records import BoxState
 
 TIME_STEP = 1 / 240
 STEPS = 100
-"""Physics steps after a place (PROTOCOLS section 1); fewer when everything lies still."""
-STILL = 1e-4
-"""A body slower than this [m/s and rad/s] lies still."""
-LEAST_STEPS = 30
+"""Physics steps after a place of the published environment."""
 MASS = 1.0
 
 
@@ -53,41 +50,30 @@ class SettlingTable:
         shape = engine.createCollisionShape(
             engine.GEOM_BOX, halfExtents=[float(v) for v in half], physicsClientId=self.client
         )
-        return int(
-            engine.createMultiBody(mass, shape, -1, [float(v) for v in centre], physicsClientId=self.client)
-        )
+        return int(engine.createMultiBody(mass, shape, -1, [float(v) for v in centre], physicsClientId=self.client))
 
     def close(self) -> None:
         """Disconnect; the table cannot be used afterwards."""
         engine.disconnect(physicsClientId=self.client)
 
-    def settle(self, rests: dict[str, Rest], away: str | None = None) -> dict[str, Rest]:
-        """Put every box at its pose, at rest, and let physics run; return where they lie. `away` is held: left out."""
+    def settle(self, rests: dict[str, Rest]) -> dict[str, Rest]:
+        """Put every box at its pose, at rest, and let physics run; return where they lie."""
         client = self.client
-        for number, (name, body) in enumerate(self.bodies.items()):
+        for name, body in self.bodies.items():
             rest = rests[name]
-            position = rest.position if name != away else (5.0 + number, 5.0, 0.5)
-            engine.resetBasePositionAndOrientation(body, position, rest.quaternion, physicsClientId=client)
+            engine.resetBasePositionAndOrientation(body, rest.position, rest.quaternion, physicsClientId=client)
             engine.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], physicsClientId=client)
-        moving = [body for name, body in self.bodies.items() if name != away]
-        for step in range(STEPS):
+        for _ in range(STEPS):
             engine.stepSimulation(physicsClientId=client)
-            if step >= LEAST_STEPS and step % 5 == 0 and all(self._still(body) for body in moving):
-                break
         after = {}
         for name, body in self.bodies.items():
-            if name == away:
-                after[name] = rests[name]
-                continue
             position, quaternion = engine.getBasePositionAndOrientation(body, physicsClientId=client)
             after[name] = Rest(position, quaternion)
         return after
 
-    def _still(self, body: int) -> bool:
-        linear, angular = engine.getBaseVelocity(body, physicsClientId=self.client)
-        return max(map(abs, linear)) < STILL and max(map(abs, angular)) < STILL
-
 
 def rest_of(box: BoxState, bottom: float) -> Rest:
     """Return a box that stands upright with its bottom at a world height [m]."""
-    return Rest((box.x, box.y, bottom + box.height / 2), (0.0, 0.0, float(np.sin(box.yaw / 2)), float(np.cos(box.yaw / 2))))
+    return Rest(
+        (box.x, box.y, bottom + box.height / 2), (0.0, 0.0, float(np.sin(box.yaw / 2)), float(np.cos(box.yaw / 2)))
+    )
