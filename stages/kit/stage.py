@@ -16,6 +16,9 @@ from schemas.artifact import Artifact
 
 Item = TypeVar("Item")
 
+NOT_SHOWN = "not_shown"
+"""Type of a PydanticCustomError whose input must not be printed: a key that was given where its name belongs."""
+
 
 class Parameters(BaseModel):
     """Options of a step. The command line, its help, its ranges and the config file come from these fields.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
-from urllib.parse import urlsplit
+
+from stages.kit.services.address import check_address
 
 BACKENDS = {
     "ground-truth": "the log's own labels",
@@ -31,22 +32,7 @@ def check_backend(backend: str) -> str:
     if backend in BACKENDS:
         return backend
     if is_service(backend):
-        return _check_address(backend)
+        return check_address(backend, form=SERVICE)
     close = get_close_matches(backend, BACKENDS, n=1)
     guess = f"did you mean {close[0]}? " if close else ""
     raise ValueError(f"no such backend; {guess}one of {', '.join(BACKENDS)}, {SERVICE}")
-
-
-def _check_address(address: str) -> str:
-    try:
-        parts = urlsplit(address)
-        port_is_sound = parts.port is None or parts.port > 0
-    except ValueError as error:  # a port that is no number, a torn IPv6 address
-        raise ValueError(f"not the address of a service: {error}") from None
-    if not parts.hostname or not port_is_sound or not address.isascii() or not address.isprintable() or " " in address:
-        raise ValueError(f"not the address of a service: it reads {SERVICE}")
-    if parts.username is not None or parts.password is not None:
-        raise ValueError("a user or password in the address would be written into every manifest")
-    if parts.query or parts.fragment:
-        raise ValueError("the address of a service ends with its path: no '?' and no '#'")
-    return address.rstrip("/")

@@ -154,8 +154,8 @@ def _onnx(request: BackendRequest) -> Backend:
 
 def _service(request: BackendRequest) -> Backend:
     # Imported here: the other backends do not need HTTP.
-    from stages.segment.service.backend import ServiceBackend
-    from stages.segment.service.connection import Connection
+    from stages.kit.services.connection import Connection
+    from stages.segment.service.backend import REFUSED_HINT, ServiceBackend
 
     parameters = request.parameters
     sequence, reader = request.log()
@@ -164,6 +164,7 @@ def _service(request: BackendRequest) -> Backend:
         timeout=parameters.request_timeout,
         retries=parameters.retries,
         retry_wait=parameters.retry_wait,
+        refused_hint=REFUSED_HINT,
     )
     return ServiceBackend(
         connection,

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from schemas.errors import UsageError
-from stages.kit.stage import Parameters, Stage
+from stages.kit.stage import NOT_SHOWN, Parameters, Stage
 
 LARGEST_TOML = 16 * 2**20
 """Bytes."""
@@ -52,4 +52,6 @@ def parameters_for(
         first = error.errors()[0]
         name = str(first["loc"][0]) if first["loc"] else "parameters"
         option = "--" + name.replace("_", "-")
-        raise UsageError(f"{stage.name}: {option}: {first['msg']}", hint=f"got {first.get('input')!r}") from None
+        # A value that may be a password, given for the name of one, is not said back.
+        got = "" if first["type"] == NOT_SHOWN else f"got {first.get('input')!r}"
+        raise UsageError(f"{stage.name}: {option}: {first['msg']}", hint=got) from None

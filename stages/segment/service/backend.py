@@ -10,11 +10,11 @@ from schemas.errors import BadInput, MachineFailure, MissingDependency
 from schemas.sequence import SequenceFile
 from schemas.vocabulary import Vocabulary
 from stages.kit.formats.frames import Frame, FrameReader
+from stages.kit.services.connection import Connection
 from stages.segment.geometric import GeometricFrame
 from stages.segment.labels import Label, LabelSet, match_labels
 from stages.segment.naming import NamedSegment, name_segments
 from stages.segment.panoptic import PanopticFrame, PanopticMask
-from stages.segment.service.connection import Connection
 from stages.segment.service.protocol import (
     INFO_PATH,
     SEGMENT_PATH,
@@ -27,6 +27,8 @@ from stages.segment.service.protocol import (
     parse_reply,
 )
 from stages.segment.service.reply_cache import ReplyCache, prune
+
+REFUSED_HINT = "is this a segmentation service? see docs/SEGMENTATION.md"
 
 logger = logging.getLogger("scenewright")
 

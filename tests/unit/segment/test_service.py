@@ -27,12 +27,12 @@ from stages.kit.formats.frames import Frame, FrameReader
 from stages.kit.formats.masks import encode_panoptic_png
 from stages.kit.progress import SilentProgress
 from stages.kit.running.keys import library_versions
+from stages.kit.services.connection import Connection
 from stages.kit.stage import Context
 from stages.segment.backend_names import BACKENDS, check_backend
 from stages.segment.choice import BUILDERS, BackendRequest, choose_backend
 from stages.segment.parameters import STAGE, SegmentParameters
 from stages.segment.service import reply_cache
-from stages.segment.service.connection import Connection
 from stages.segment.service.protocol import (
     PROTOCOL,
     Category,

@@ -1,4 +1,4 @@
-"""HTTP to a segmentation service: time-outs that hold for a whole answer, retries, and errors in one line."""
+"""HTTP to a service: time-outs that hold for a whole answer, retries, errors in one line, a key that is never shown."""
 
 from __future__ import annotations
 
@@ -11,15 +11,21 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from email.utils import parsedate_to_datetime
 from urllib.parse import urlsplit
 
 from schemas.errors import BadInput, MachineFailure
-from stages.segment.service.protocol import LARGEST_BODY
 
 RETRIED = frozenset({408, 425, 429, 500, 502, 503, 504})
 """Status codes of servers that are busy, starting or stumbling."""
 LONGEST_WAIT = 30.0
-"""Seconds between two tries."""
+"""Seconds between two tries, unless the client says otherwise."""
+LARGEST_BODY = 64 * 2**20
+"""Bytes of an answer, unless the client says otherwise."""
+SHORTEST_SECRET = 8
+"""Characters; shorter ones (`none`, `EMPTY`, which local servers accept) would be hidden in the midst of words."""
+HIDDEN = "[key]"
+"""Stands where a service says the key back."""
 LONGEST_EXCERPT = 200
 """Characters of a server's own words in an error."""
 
@@ -34,7 +40,7 @@ class Answer:
     content_type: str
 
 
-class _TryAgain(Exception):
+class TryAgain(Exception):
     """A fault that may pass; `wait` is what the server asks for [s]."""
 
     def __init__(self, reason: str, wait: float = 0.0) -> None:
@@ -42,11 +48,24 @@ class _TryAgain(Exception):
         self.wait = wait
 
 
+class Refused(BadInput):
+    """A service understood and said no: `status`, and what it `said` (an excerpt)."""
+
+    def __init__(self, message: str, *, status: int, said: str, hint: str = "") -> None:
+        super().__init__(message, hint=hint)
+        self.status, self.said = status, said
+
+
 class Connection:
     """A connection to the service at `address` (http://HOST:PORT/PATH), kept open between requests.
 
     One answer may take `timeout` seconds, from the first byte sent to the last one received: a server that trickles is
-    as late as one that is silent. Redirections and proxies are not followed. `sleep` waits between tries.
+    as late as one that is silent. Redirections and proxies are not followed. `sleep` waits between tries, `now` reads
+    the clock [s since 1970] for servers that say until when.
+
+    `key` goes into the Authorization header of every request and nowhere else: where the service says it back, HIDDEN
+    stands instead in answers, errors and the log. Raises BadInput for a key that no header can hold. `repeats` counts
+    the requests that were sent again.
     """
 
     def __init__(
@@ -56,20 +75,36 @@ class Connection:
         timeout: float,
         retries: int,
         retry_wait: float,
+        key: str = "",
+        refused_hint: str = "check the address",
+        largest_body: int = LARGEST_BODY,
+        longest_wait: float = LONGEST_WAIT,
         sleep: Callable[[float], None] = time.sleep,
+        now: Callable[[], float] = time.time,
     ) -> None:
+        if not (key.isascii() and key.isprintable() and " " not in key):
+            raise BadInput("the key holds white space or other characters that no key has", hint="check the variable")
         self.address = address
+        self.repeats = 0
+        self._key, self._refused_hint, self._now = key, refused_hint, now
+        self._largest_body, self._longest_wait = largest_body, longest_wait
         self._parts = urlsplit(address)
         self._timeout, self._retries, self._retry_wait, self._sleep = timeout, retries, retry_wait, sleep
         self._open: http.client.HTTPConnection | None = None
 
     def get(self, path: str) -> Answer:
-        """Return what the server answers. Raises MachineFailure after the last try, BadInput when it refuses."""
-        return self._patiently("GET", path, None, "")
+        """Return what the server answers. Raises MachineFailure after the last try, Refused when it says no."""
+        return self._patiently("GET", path, None, "", None)
 
-    def post(self, path: str, body: bytes, content_type: str) -> Answer:
-        """Send a body; otherwise as `get`."""
-        return self._patiently("POST", path, body, content_type)
+    def post(
+        self, path: str, body: bytes, content_type: str, *, judge: Callable[[Answer], None] | None = None
+    ) -> Answer:
+        """Send a body; otherwise as `get`. `judge` may raise TryAgain for an answer that cannot be used."""
+        return self._patiently("POST", path, body, content_type, judge)
+
+    def hide(self, text: str) -> str:
+        """Return the text with HIDDEN where the key stands."""
+        return text.replace(self._key, HIDDEN) if len(self._key) >= SHORTEST_SECRET else text
 
     def close(self) -> None:
         """Close the connection; the next request opens another one."""
@@ -77,22 +112,28 @@ class Connection:
             self._open.close()
         self._open = None
 
-    def _patiently(self, method: str, path: str, body: bytes | None, content_type: str) -> Answer:
+    def _patiently(
+        self, method: str, path: str, body: bytes | None, content_type: str, judge: Callable[[Answer], None] | None
+    ) -> Answer:
         for attempt in range(self._retries + 1):
             try:
-                return self._once(method, path, body, content_type)
+                answer = self._once(method, path, body, content_type)
+                if judge is not None:
+                    judge(answer)
+                return answer
             except BadInput:
                 self.close()
                 raise
-            except _TryAgain as error:
+            except TryAgain as error:
                 self.close()
                 reason, asked = str(error), error.wait
             if attempt < self._retries:
-                wait = min(LONGEST_WAIT, max(asked, self._retry_wait * 2**attempt))
+                wait = min(self._longest_wait, max(asked, self._retry_wait * 2**attempt))
                 logger.warning(
                     "%s: %s; asked again in %g s (%d of %d)", self.address, reason, wait, attempt + 1, self._retries
                 )
                 self._sleep(wait)
+                self.repeats += 1
         tries = f"{self._retries + 1} tries" if self._retries else "one try"
         raise MachineFailure(f"{self.address}: {reason}, after {tries}", hint="see --request-timeout and --retries")
 
@@ -106,6 +147,8 @@ class Connection:
             timer.daemon = True
             timer.start()
             headers = {"Accept": "application/json", "Connection": "keep-alive"}
+            if self._key:
+                headers["Authorization"] = f"Bearer {self._key}"
             if body is not None:
                 headers["Content-Type"] = content_type
             connection.request(method, self._parts.path + path, body, headers)
@@ -115,37 +158,49 @@ class Connection:
             if isinstance(error, ssl.SSLCertVerificationError):
                 raise BadInput(f"{self.address}: {error.verify_message}", hint="check the certificate") from None
             if late.is_set() or isinstance(error, TimeoutError):
-                raise _TryAgain(f"no answer within {self._timeout:g} s") from None
+                raise TryAgain(f"no answer within {self._timeout:g} s") from None
             if reused and isinstance(error, ConnectionError):
                 # Servers close connections that were idle for a while: not a fault, and not worth a wait.
                 self.close()
                 return self._once(method, path, body, content_type)
-            raise _TryAgain(_words(error)) from None
+            raise TryAgain(_words(error)) from None
         finally:
             if timer is not None:
                 timer.cancel()
         if late.is_set():
-            raise _TryAgain(f"no answer within {self._timeout:g} s")
+            raise TryAgain(f"no answer within {self._timeout:g} s")
+        if len(self._key) >= SHORTEST_SECRET:
+            data = data.replace(self._key.encode(), HIDDEN.encode())
+        said = _excerpt(data) or _printable(self.hide(response.reason))
         if response.status in RETRIED:
-            wait = response.getheader("Retry-After", "")
-            raise _TryAgain(
-                f"status {response.status} ({_excerpt(data) or response.reason})",
-                float(wait) if wait.isascii() and wait.isdigit() else 0.0,
+            raise TryAgain(
+                f"status {response.status} ({said})", self._asked_wait(response.getheader("Retry-After", ""))
             )
         if response.status != 200:
-            said = _excerpt(data) or response.reason
-            raise BadInput(
-                f"{self.address}{path}: status {response.status} ({said:.{LONGEST_EXCERPT}})",
-                hint="is this a segmentation service? see docs/SEGMENTATION.md",
+            raise Refused(
+                f"{self.address}{path}: status {response.status} ({said})",
+                status=response.status,
+                said=said,
+                hint=self._refused_hint,
             )
-        return Answer(data, response.getheader("Content-Type", ""))
+        return Answer(data, self.hide(response.getheader("Content-Type", "")))
+
+    def _asked_wait(self, text: str) -> float:
+        """Return the seconds of a Retry-After header, which holds a number or a date (RFC 9110, 10.2.3); else 0."""
+        if text.isascii() and text.isdigit():
+            return float(text[:9])
+        try:
+            return max(0.0, parsedate_to_datetime(text).timestamp() - self._now())
+        except (ValueError, TypeError, OverflowError):
+            return 0.0
 
     def _read(self, response: http.client.HTTPResponse) -> bytes:
         declared = response.getheader("Content-Length", "")
         length = int(declared[:20]) if declared.isascii() and declared.isdigit() else None
-        data = response.read(LARGEST_BODY + 1) if length is None or length <= LARGEST_BODY else b""
-        if len(data) > LARGEST_BODY or (length is not None and length > LARGEST_BODY):
-            raise BadInput(f"{self.address}: an answer of more than {LARGEST_BODY} bytes", hint="mend the service")
+        largest = self._largest_body
+        data = response.read(largest + 1) if length is None or length <= largest else b""
+        if len(data) > largest or (length is not None and length > largest):
+            raise BadInput(f"{self.address}: an answer of more than {largest} bytes", hint="mend the service")
         if length is not None and len(data) < length:
             raise http.client.IncompleteRead(data, length - len(data))
         return data
@@ -180,11 +235,16 @@ def _words(error: Exception) -> str:
 
 
 def _excerpt(data: bytes) -> str:
-    """Return what a server says is wrong: the `error` of a JSON object, else the beginning of the body."""
+    """Return what a service says is wrong: the `error` of a JSON object (its `message`), else how the body begins."""
     text = data[:4096].decode("utf-8", "replace")
     try:
         said = json.loads(text)
-        text = str(said.get("error", text)) if isinstance(said, dict) else text
+        said = said.get("error", text) if isinstance(said, dict) else text
+        text = str(said.get("message", said) if isinstance(said, dict) else said)
     except (ValueError, RecursionError):
         pass
+    return _printable(text)
+
+
+def _printable(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in " ".join(text.split()))[:LONGEST_EXCERPT]

@@ -1,0 +1,1 @@
+"""Language models: one chat, several backends, replies that are data (docs/LANGUAGE.md)."""

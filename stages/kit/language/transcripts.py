@@ -1,0 +1,175 @@
+"""Transcripts: what was asked of a language model and what it replied, one JSON object a line.
+
+A line holds the whole prompt, so that people can read it and its digest can be checked; images are named by sha256.
+Replies may be edited by hand, prompts may not.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import ValidationError
+
+from schemas.base import Model, canonical_json
+from schemas.errors import BadInput, MachineFailure
+from stages.kit.language.backend import RawReply, Request, Usage
+from stages.kit.language.messages import described
+
+LARGEST_TRANSCRIPT = 512 * 2**20
+"""Bytes."""
+FIRST_KEY = b'{"backend": '
+"""How a line of ours begins."""
+
+
+class Exchange(Model):
+    """One line of a transcript."""
+
+    format: Literal["scenewright-transcript/1"] = "scenewright-transcript/1"
+    digest: str
+    """Of the request: `Request.digest`."""
+    model: str
+    temperature: float
+    schema_name: str
+    schema_document: dict[str, Any]
+    messages: tuple[dict[str, Any], ...]
+    backend: str
+    """Who replied: `openai:<model>`."""
+    reply: str
+    finish: str
+    prompt_tokens: int
+    completion_tokens: int
+    estimated: bool
+
+    @property
+    def raw(self) -> RawReply:
+        """The reply as a backend gives it."""
+        usage = Usage(self.prompt_tokens, self.completion_tokens, self.estimated)
+        return RawReply(self.reply, self.finish, usage)
+
+
+def exchange_of(request: Request, raw: RawReply, backend: str) -> Exchange:
+    """Return the line of a transcript for a request and its reply."""
+    return Exchange(
+        digest=request.digest,
+        model=request.model,
+        temperature=request.temperature,
+        schema_name=request.schema.name,
+        schema_document=request.schema.document,
+        messages=tuple(described(request.messages)),
+        backend=backend,
+        reply=raw.text,
+        finish=raw.finish,
+        prompt_tokens=raw.usage.prompt_tokens,
+        completion_tokens=raw.usage.completion_tokens,
+        estimated=raw.usage.estimated,
+    )
+
+
+class Transcript:
+    """The exchanges of a file, by the digest of the request, in the order in which they were made."""
+
+    def __init__(self, name: str, exchanges: tuple[Exchange, ...] = ()) -> None:
+        self.name = name
+        self._by_digest: dict[str, list[Exchange]] = defaultdict(list)
+        for exchange in exchanges:
+            self.add(exchange)
+
+    def add(self, exchange: Exchange) -> None:
+        """Append an exchange."""
+        self._by_digest[exchange.digest].append(exchange)
+
+    def find(self, digest: str, occurrence: int) -> Exchange | None:
+        """Return what was replied when this request was made for the `occurrence`-th time (0 first), or None."""
+        found = self._by_digest.get(digest, [])
+        return found[occurrence] if occurrence < len(found) else None
+
+    def __iter__(self) -> Iterator[Exchange]:
+        return (exchange for found in self._by_digest.values() for exchange in found)
+
+    def __len__(self) -> int:
+        return sum(map(len, self._by_digest.values()))
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """The models that replied, sorted."""
+        return tuple(sorted({exchange.model for exchange in self}))
+
+
+def read_transcript(path: Path) -> Transcript:
+    """Read a transcript. Raises BadInput naming the line that is no exchange, or whose prompt was changed."""
+    hint = "record it again (docs/LANGUAGE.md)"
+    try:
+        if path.stat().st_size > LARGEST_TRANSCRIPT:
+            raise BadInput(f"{path}: larger than {LARGEST_TRANSCRIPT} bytes", hint=hint)
+        lines = path.read_bytes().split(b"\n")
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror}", hint=hint) from None
+    exchanges = []
+    for number, line in enumerate(lines, 1):
+        if line.strip():
+            exchanges.append(_exchange(line, f"{path}, line {number}", hint))
+    return Transcript(str(path), tuple(exchanges))
+
+
+def _exchange(line: bytes, where: str, hint: str) -> Exchange:
+    try:
+        exchange = Exchange.model_validate_json(line)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"])) or "line"
+        raise BadInput(f"{where}: {place}: {first['msg']}", hint=hint) from None
+    if _digest(exchange) != exchange.digest:
+        raise BadInput(f"{where}: the prompt is not the one that was recorded", hint=hint)
+    return exchange
+
+
+def _digest(exchange: Exchange) -> str:
+    parts = {
+        "messages": list(exchange.messages),
+        "schema": exchange.schema_document,
+        "model": exchange.model,
+        "temperature": exchange.temperature,
+    }
+    return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
+
+
+class TranscriptFile:
+    """Appends exchanges to a file, each written before the next question is asked. A last line that was cut when a
+    recording broke off is dropped. Raises BadInput for a file that is no transcript, MachineFailure when it cannot be
+    written."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if path.exists():
+            self._drop_torn_line()
+        self.transcript = read_transcript(path) if path.exists() else Transcript(str(path))
+
+    def append(self, exchange: Exchange) -> None:
+        """Write one line."""
+        line = json.dumps(exchange.model_dump(mode="json"), sort_keys=True, ensure_ascii=False, allow_nan=False)
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with self.path.open("a", encoding="utf-8") as file:
+                file.write(line + "\n")
+        except OSError as error:
+            raise MachineFailure(f"{self.path}: {error.strerror}", hint="choose another file") from None
+        self.transcript.add(exchange)
+
+    def _drop_torn_line(self) -> None:
+        try:
+            with self.path.open("rb+") as file:
+                data = file.read(LARGEST_TRANSCRIPT + 1)
+                whole = data.rfind(b"\n") + 1
+                last = data[whole:]
+                if last.startswith(FIRST_KEY) and not last.endswith(b"}"):
+                    file.truncate(whole)
+                elif last:  # edited by hand: whole, but for the end of its line
+                    file.seek(0, 2)
+                    file.write(b"\n")
+        except OSError as error:
+            raise MachineFailure(f"{self.path}: {error.strerror}", hint="choose another file") from None
