@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-
 import numpy as np
 
 from stages.pack.records import Action, Attempt, BoxState, Observation

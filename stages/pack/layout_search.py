@@ -16,6 +16,8 @@ from numba import njit
 UNPLACED = -1
 NODES = 500
 RESTARTS = 16
+DENSEST = 0.97
+"""Share of the container beyond which no layout is looked for."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +67,13 @@ def find_layout(
 
 
 def _area_allows(problem: LayoutProblem, gap: float) -> bool:
+    """Whether boxes and gaps take up no more of the container than rectangles with gaps seldom exceed."""
     low_x, low_y, high_x, high_y = problem.container
-    area = float(np.prod(problem.extents + gap, axis=1).sum())
-    return area <= (high_x - low_x + gap) * (high_y - low_y + gap)
+    free = (high_x - low_x + gap) * (high_y - low_y + gap)
+    for fixed in problem.fixed:
+        sides = np.minimum(fixed[2:], problem.container[2:]) - np.maximum(fixed[:2], problem.container[:2])
+        free -= float(np.prod(np.maximum(sides, 0.0)))
+    return float(np.prod(problem.extents + gap, axis=1).sum()) <= DENSEST * free
 
 
 @njit(cache=True)

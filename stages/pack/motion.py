@@ -18,7 +18,7 @@ from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
 from stages.pack.arm import HOME, FixedArm, Limits, ToolPose, planar_joints
 from stages.pack.arm_scene import ArmScene
-from stages.pack.hand import TIP_BELOW_TOOL, Named, end_collision, held_block, hand_blocks, tool_over_centre
+from stages.pack.hand import TIP_BELOW_TOOL, Named, end_collision, hand_blocks, held_block, tool_over_centre
 from stages.pack.link_heights import BASE_RADIUS, lowest_on_path, lowest_within
 from stages.pack.records import BoxState
 from stages.pack.solids import overlap

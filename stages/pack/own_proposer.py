@@ -22,6 +22,8 @@ from stages.pack.records import Action, Attempt, BoxState, Observation
 from stages.pack.sampling import pick_and_place
 
 QUARTER = pi / 2
+RESTARTS = (2, 2, 3, 6, 16, 16, 16)
+"""Orders of boxes tried at each spacing: a roomy layout is found soon or not at all."""
 SPACING = ((0.02, 0.0), (0.012, 0.0), (0.007, 0.0), (0.004, 0.0), (0.0025, 0.0), (0.0025, 0.006), (0.0015, 0.012))
 """Gap between boxes and how far they may stick out of the basket [m], the roomiest first."""
 
@@ -127,10 +129,10 @@ def solve_layout(
         if not reorder and sequence != order:
             continue
         problem_boxes = [boxes[name] for name in sequence]
-        for gap, out in SPACING:
+        for (gap, out), restarts in zip(SPACING, RESTARTS, strict=True):
             problem = _problem(observation, problem_boxes, limits, held, out - limits.inward)
             random = np.random.default_rng([seed, count])
-            found = find_layout(problem, gap + limits.wider, random, restarts=2 if held else 16)
+            found = find_layout(problem, gap + limits.wider, random, restarts=min(restarts, 3) if held else restarts)
             if found is not None:
                 spots = [
                     Spot(box.name, float(row[0]), float(row[1]), int(row[2]))
