@@ -74,8 +74,8 @@ def table(runs: list[Run]) -> str:
     seeds = sorted({run.seed for run in runs})
     parts = [
         f"# LLM3: {count} instances a cell (seeds {seeds[0]} to {seeds[-1]})\n",
-        "Success in % with its 95 % Wilson interval / proposer calls / motion-planner calls; means over all attempts, a "
-        "failed one counts with what it spent; ± is half the 95 % bootstrap interval.\n",
+        "Success in % with its 95 % Wilson interval / proposer calls / motion-planner calls; means over all attempts, "
+        "a failed one counts with what it spent; ± is half the 95 % bootstrap interval.\n",
         _layout_4_1(groups),
         _layout_4_2(groups),
         _hard(groups),

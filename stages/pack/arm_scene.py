@@ -29,10 +29,11 @@ class ArmScene:
                 flags=engine.URDF_USE_SELF_COLLISION | engine.URDF_USE_INERTIA_FROM_FILE,
             )  # fmt: skip
         names = {}
+        self._links = {-1: description.arm_base}
         for index in range(engine.getNumJoints(self._robot, physicsClientId=self.client)):
             info = engine.getJointInfo(self._robot, index, physicsClientId=self.client)
             names[info[1].decode()] = index
-            self._name_link(index, info[12].decode())
+            self._links[index] = info[12].decode()
         self._joints = [names[name] for name in description.arm_joints]
         for name in description.finger_joints:
             engine.resetJointState(self._robot, names[name], FINGER_OPENING, physicsClientId=self.client)
@@ -43,13 +44,6 @@ class ArmScene:
         self.checks = 0
         self._table = self._box((1.5, 1.5, 0.005), (0.0, 0.0, TABLE_TOP - 0.005), 0.0)
         engine.setCollisionFilterPair(self._robot, self._table, -1, -1, 0, physicsClientId=self.client)
-
-    _links: dict[int, str]
-
-    def _name_link(self, index: int, name: str) -> None:
-        if not hasattr(self, "_links"):
-            self._links = {-1: "panda_link0"}
-        self._links[index] = name
 
     def close(self) -> None:
         """Disconnect; the scene cannot be used afterwards."""

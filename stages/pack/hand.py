@@ -1,4 +1,4 @@
-"""The hand and what it holds as upright blocks: conservative boxes around the meshes of the Panda's hand and fingers."""
+"""The hand and what it holds as upright blocks: conservative boxes around the meshes of the Panda's hand."""
 
 from __future__ import annotations
 

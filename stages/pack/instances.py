@@ -88,7 +88,7 @@ GRIPPER_GAP = 0.09
 def published_instance(cell: str, seed: int) -> Instance:
     """Return an instance of a cell of table 4.1: start poses drawn as in the published environment.
 
-    x ~ U(.385, .395); box i has y ~ U(max(-.6 + .3 i, far edge of the one before with a gripper's gap), -.6 + .3 (i+1)).
+    x ~ U(.385, .395); box i has y ~ U(max(-.6 + .3 i, far edge of the one before and a hand's gap), -.6 + .3 (i+1)).
     """
     set_name, basket = PUBLISHED_CELLS[cell]
     random = np.random.default_rng([seed, 41, sorted(PUBLISHED_CELLS).index(cell)])

@@ -22,7 +22,7 @@ DENSEST = 0.97
 
 @dataclass(frozen=True)
 class LayoutProblem:
-    """B boxes, F fixed rectangles, K footprints of parts of the hand. Rectangles are low x, low y, high x, high y [m]."""
+    """B boxes, F fixed rectangles, K footprints of parts of the hand. Rectangles: low x, low y, high x, high y [m]."""
 
     extents: np.ndarray
     """(B, 2) width and length."""
@@ -92,9 +92,9 @@ def _allowed(extents, container, fixed, hand, over_fixed, over_boxes, reach, ref
     if x * x + y * y > reach * reach:
         return False
     for row in range(refused.shape[0]):
-        if int(refused[row, 0]) == box and int(refused[row, 3]) == turn:
-            if abs(refused[row, 1] - x) < refused[row, 4] and abs(refused[row, 2] - y) < refused[row, 4]:
-                return False
+        same = int(refused[row, 0]) == box and int(refused[row, 3]) == turn
+        if same and abs(refused[row, 1] - x) < refused[row, 4] and abs(refused[row, 2] - y) < refused[row, 4]:
+            return False
     for f in range(fixed.shape[0]):
         if not _apart(ax, ay, bx, by, fixed[f, 0], fixed[f, 1], fixed[f, 2], fixed[f, 3], gap):
             return False
@@ -162,9 +162,9 @@ def _lines(container, fixed, hand, over_fixed, over_boxes, extents, placed, box,
 
 
 @njit(cache=True)
-def _candidates(
+def _candidates(  # type: ignore[no-untyped-def]
     extents, container, fixed, hand, over_fixed, over_boxes, reach, refused, placed, box, gap, corner, rows
-):  # type: ignore[no-untyped-def]
+):
     """Write (score, x, y, turn) of the allowed touching positions into `rows`, best first; return how many."""
     size = 4 + 2 * (fixed.shape[0] + placed.shape[0]) * (1 + 2 * hand.shape[1])
     xs, ys = np.empty(size), np.empty(size)

@@ -19,6 +19,14 @@ ITERATIONS = 20
 """Cap of proposer calls of the thesis."""
 
 
+class GaveUp(Exception):
+    """Raised by a proposer that will propose nothing more: a language model's budget is spent, nobody answers."""
+
+    def __init__(self, failure: Failure) -> None:
+        super().__init__(failure.message)
+        self.failure = failure
+
+
 @dataclass(frozen=True)
 class Budget:
     """When the loop gives up."""
@@ -41,6 +49,8 @@ class PackingRun:
     """The initial state and the one after each action of the last attempt that was carried out."""
     motions: tuple[Motion, ...]
     """The motions of that attempt."""
+    stopped: Failure | None = None
+    """Why the proposer gave up."""
 
     @property
     def plan(self) -> tuple[Action, ...]:
@@ -57,11 +67,16 @@ def run_loop(world: PackingWorld, proposer: Proposer, budget: Budget) -> Packing
     motion_calls = 0
     mesh_before = world.planner.mesh_calls
     success = False
+    stopped: Failure | None = None
     calls_before = proposer.calls
     iterations = 0
     while not success and iterations < budget.iterations and motion_calls < budget.motion_calls:
         iterations += 1
-        actions = proposer.propose(observation, tuple(attempts))
+        try:
+            actions = proposer.propose(observation, tuple(attempts))
+        except GaveUp as end:
+            stopped = end.failure
+            break
         shared = 0
         while shared < min(len(kept), len(actions)) and kept[shared][0] == actions[shared]:
             shared += 1
@@ -102,4 +117,5 @@ def run_loop(world: PackingWorld, proposer: Proposer, budget: Budget) -> Packing
         tuple(attempts),
         (world.initial, *(entry[1] for entry in kept)),
         tuple(entry[2] for entry in kept),
+        stopped,
     )

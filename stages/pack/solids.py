@@ -8,7 +8,7 @@ from math import cos, inf, sin
 
 @dataclass(frozen=True)
 class Block:
-    """An upright block: centre (x, y) [m], yaw [rad], half extents along its own axes, world z of bottom and top [m]."""
+    """An upright block: centre (x, y) [m], yaw [rad], half extents along its own axes, world z of both faces [m]."""
 
     x: float
     y: float
