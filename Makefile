@@ -152,6 +152,11 @@ bench-timeline: setup ## The contact graph while the map grows: edit distance an
 scenenn: setup ## The thesis's tables on SceneNN: make scenenn DATA=folder (OPTIONS="--backend ... --arms ...")
 	$(PYTHON) -m benchmarks.tables.scenenn $(if $(DATA),--data $(DATA)) $(OPTIONS) --out $(OUTPUTS)/experiments/scenenn
 
+.PHONY: llm3
+# A hundred reporting seeds a cell, about ten minutes of one core; a stopped run goes on where it was.
+llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2, harder suites (QUICK=1: ten instances)
+	$(PYTHON) -m benchmarks.llm3 $(if $(QUICK),--quick) $(if $(FRESH),--fresh) --out $(OUTPUTS)/experiments/llm3$(if $(QUICK),-quick)
+
 .PHONY: pictures
 pictures: setup ## Take the README's pictures out of the demo run
 	$(PYTHON) docs/pictures.py $(OUTPUTS)/demo
