@@ -26,8 +26,11 @@ class Run(Model):
 
 
 def read_runs(path: Path) -> list[Run]:
-    """Return the attempts of a log, without a line that was cut off at the end."""
+    """Return the attempts of a log; a line that was cut off at the end is taken out of the file."""
     if not path.exists():
         return []
-    lines = path.read_text(encoding="utf-8").split("\n")
-    return [Run.model_validate_json(line) for line in lines[:-1] if line]
+    text = path.read_text(encoding="utf-8")
+    whole = text[: text.rfind("\n") + 1]
+    if whole != text:
+        path.write_text(whole, encoding="utf-8")
+    return [Run.model_validate_json(line) for line in whole.split("\n") if line]

@@ -73,7 +73,7 @@ def table(runs: list[Run]) -> str:
     count = max((len(group) for group in groups.values()), default=0)
     seeds = sorted({run.seed for run in runs})
     parts = [
-        f"# LLM3: {count} instances a cell (seeds {seeds[0]} to {seeds[-1]})\n",
+        f"# LLM3: {count} instances a cell where no other number is said (seeds {seeds[0]} to {seeds[-1]})\n",
         "Success in % with its 95 % Wilson interval / proposer calls / motion-planner calls; means over all attempts, "
         "a failed one counts with what it spent; ± is half the 95 % bootstrap interval.\n",
         _layout_4_1(groups),
@@ -84,7 +84,7 @@ def table(runs: list[Run]) -> str:
     return "\n".join(parts) + "\n"
 
 
-def _cell(group: dict[int, Run] | None) -> str:
+def _cell(group: dict[int, Run] | None, most: int) -> str:
     if not group:
         return "-"
     rows = list(group.values())
@@ -94,13 +94,15 @@ def _cell(group: dict[int, Run] | None) -> str:
     below, above = bootstrap(calls)
     share = f"{100 * successes / len(rows):.0f} [{100 * low:.0f}, {100 * high:.0f}]"
     proposals = float(np.mean([run.proposer_calls for run in rows]))
-    return f"{share} / {proposals:.1f} / {calls.mean():.1f} ± {(above - below) / 2:.1f}"
+    fewer = f" (n = {len(rows)})" if len(rows) < most else ""
+    return f"{share} / {proposals:.1f} / {calls.mean():.1f} ± {(above - below) / 2:.1f}{fewer}"
 
 
 def _rows(groups: Runs, cases: tuple[str, ...]) -> list[str]:
     lines = []
+    most = max((len(group) for group in groups.values()), default=0)
     for arm in ARMS:
-        cells = [_cell(groups.get((arm, case))) for case in cases]
+        cells = [_cell(groups.get((arm, case)), most) for case in cases]
         if any(cell != "-" for cell in cells):
             lines.append(f"| `{arm}` | " + " | ".join(cells) + " |")
     return lines
@@ -126,7 +128,7 @@ def _layout_4_2(groups: Runs) -> str:
                 values = np.array([float(getattr(run, measure)) for run in group.values()])
                 low, high = bootstrap(values)
                 columns.append(f"{values.mean():.1f} [{low:.1f}, {high:.1f}]")
-            lines.append(f"| {name} (`{arm}`) | {columns[0]} | {columns[1]} |")
+            lines.append(f"| {name} (`{arm}`, n = {len(group)}) | {columns[0]} | {columns[1]} |")
     lines += [f"| thesis: {name} | {a} | {b} |" for name, (a, b) in THESIS_4_2.items()]
     return "\n".join([*lines, ""])
 
