@@ -9,7 +9,7 @@ from pydantic import Field
 
 from schemas.base import Model
 from schemas.plan import Failure
-from stages.kit.language.actions import ActionCall, quoted
+from stages.kit.language.actions import LONGEST_NAME, ActionCall, quoted
 from stages.kit.language.chat import Chat
 from stages.kit.language.failures import LanguageFailed
 from stages.kit.language.messages import say
@@ -134,7 +134,9 @@ def wrong_order(order: Sequence[str], observation: Observation) -> Failure | Non
     names = {box.name for box in observation.boxes}
     strange = next((name for name in order if name not in names), None)
     if strange is not None:
-        return Failure(kind="unknown_object", message=f"there is no box {quoted(strange)}", objects=(strange[:60],))
+        return Failure(
+            kind="unknown_object", message=f"there is no box {quoted(strange)}", objects=(strange[:LONGEST_NAME],)
+        )
     twice = next((name for k, name in enumerate(order) if name in order[:k]), None)
     if twice is not None:
         return Failure(kind="wrong_arguments", message=f"{quoted(twice)} comes twice", objects=(twice,))

@@ -20,6 +20,7 @@ MODULES = {
         "layout_nerfstudio", "layout_replica", "layout_colmap", "layout_images", "depth_array", "calibration_file",
     ),
     "tests.fuzz.networks": ("service_reply", "service_info", "service_request", "label_table", "onnx_sidecar"),
+    "tests.fuzz.language": ("model_reply", "model_answer", "transcript"),
 }  # fmt: skip
 NAMES = tuple(name for names in MODULES.values() for name in names)
 INSTRUMENTED = [
@@ -28,6 +29,7 @@ INSTRUMENTED = [
     "stages.segment.onnx",
     "stages.segment.service",
     "stages.kit.formats",
+    "stages.kit.language",
     "stages.kit.running",
     "schemas",
 ]

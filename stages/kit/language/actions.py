@@ -17,8 +17,8 @@ from pydantic import Field
 from schemas.base import Model
 from schemas.plan import Failure
 
-LONGEST_NAME = 60
-"""Characters of a model's own names that are said back."""
+LONGEST_NAME = 200
+"""Characters of a name that are said: as many as a scene's names may have; a model's own may be of any length."""
 MOST_CALLS = 200
 
 
@@ -105,7 +105,8 @@ def check_call(call: ActionCall, language: ActionLanguage) -> Failure | None:
 
 def quoted(name: str) -> str:
     """Return a name as a JSON string on one line, cut when long: no name can end a line or leave its quotes."""
-    return json.dumps(name if len(name) <= LONGEST_NAME else name[:LONGEST_NAME] + "...")
+    cut = name if len(name) <= LONGEST_NAME else name[:LONGEST_NAME] + "..."
+    return json.dumps(cut).replace("\x7f", "\\u007f")  # the one unprintable character that JSON leaves as it is
 
 
 def _check_numbers(call: ActionCall, action: ActionType) -> Failure | None:

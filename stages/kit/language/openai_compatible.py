@@ -10,11 +10,11 @@ import base64
 import json
 from typing import Any, Literal, TypeGuard
 
-from schemas.errors import BadInput, MachineFailure
+from schemas.errors import BadInput
 from stages.kit.language.backend import RawReply, Request, Usage, estimated_usage
 from stages.kit.language.failures import LanguageFailed
 from stages.kit.language.messages import Image, Message, Text, say
-from stages.kit.services.connection import Answer, Connection, Refused, TryAgain
+from stages.kit.services.connection import Answer, Connection, GivenUp, Refused, TryAgain
 
 PATH = "/chat/completions"
 LARGEST_BODY = 8 * 2**20
@@ -24,6 +24,9 @@ LONGEST_WAIT = 120.0
 MOST_TOKENS = 10**9
 """Of one exchange: a larger count is no count."""
 NOT_UNDERSTOOD = frozenset({400, 422})
+STUMBLED = 500
+"""llama.cpp answers so when a reply that it holds to a schema is cut at the largest number of tokens. The same question
+is then asked in a lower form, that once, so that the cut reply comes back and the model is told."""
 REFUSED_HINT = "see docs/LANGUAGE.md: does --base-url end with /v1, is --model one that it serves, is the key set?"
 
 Form = Literal["json_schema", "json_object", "text"]
@@ -46,7 +49,7 @@ class OpenAICompatibleBackend:
 
     def ask(self, request: Request) -> RawReply:
         """Return the reply. Raises LanguageFailed: `refused`, `unreachable`."""
-        before, form = self._connection.repeats, self.form
+        before, form, lowered = self._connection.repeats, self.form, False
         while True:
             body = json.dumps(encode_request(request, self.form, self._limit_name)).encode()
             try:
@@ -58,10 +61,17 @@ class OpenAICompatibleBackend:
                 self.form = form  # it was something else that the server did not like
                 raise LanguageFailed("refused", error.message, numbers=numbers, hint=error.hint) from None
             except BadInput as error:  # a certificate, an answer of another kind or size
+                self.form = form
                 raise LanguageFailed("refused", error.message, hint=error.hint) from None
-            except MachineFailure as error:
+            except GivenUp as error:
+                if error.status == STUMBLED and self._lower_form():
+                    lowered = True
+                    continue
+                self.form = form
                 numbers = {"repeats": float(self._connection.repeats - before)}
                 raise LanguageFailed("unreachable", error.message, numbers=numbers, hint=error.hint) from None
+            if lowered:
+                self.form = form
             return self._raw(answer, request, self._connection.repeats - before)
 
     def _give_way(self, said: str) -> bool:
@@ -69,11 +79,12 @@ class OpenAICompatibleBackend:
         if self._limit_name == "max_tokens" and "max_completion_tokens" in said:
             self._limit_name = "max_completion_tokens"
             return True
+        return "temperature" not in said and self._lower_form()
+
+    def _lower_form(self) -> bool:
         at = FORMS.index(self.form)
-        if at + 1 == len(FORMS) or "temperature" in said:
-            return False
-        self.form = FORMS[at + 1]
-        return True
+        self.form = FORMS[min(at + 1, len(FORMS) - 1)]
+        return at + 1 < len(FORMS)
 
     def _raw(self, answer: Answer, request: Request, repeats: int) -> RawReply:
         envelope = json.loads(answer.body)

@@ -123,7 +123,11 @@ def _exchange(line: bytes, where: str, hint: str) -> Exchange:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"])) or "line"
         raise BadInput(f"{where}: {place}: {first['msg']}", hint=hint) from None
-    if _digest(exchange) != exchange.digest:
+    try:
+        digest = _digest(exchange)
+    except (ValueError, RecursionError):  # NaN, or a number of thousands of digits, within the schema or a message
+        raise BadInput(f"{where}: the prompt holds what no JSON can", hint=hint) from None
+    if digest != exchange.digest:
         raise BadInput(f"{where}: the prompt is not the one that was recorded", hint=hint)
     return exchange
 

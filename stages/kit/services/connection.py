@@ -41,11 +41,19 @@ class Answer:
 
 
 class TryAgain(Exception):
-    """A fault that may pass; `wait` is what the server asks for [s]."""
+    """A fault that may pass; `wait` is what the server asks for [s], `status` its code when it gave one."""
 
-    def __init__(self, reason: str, wait: float = 0.0) -> None:
+    def __init__(self, reason: str, wait: float = 0.0, status: int | None = None) -> None:
         super().__init__(reason)
-        self.wait = wait
+        self.wait, self.status = wait, status
+
+
+class GivenUp(MachineFailure):
+    """A fault that did not pass within the retries; `status` is the last code, None when there was none."""
+
+    def __init__(self, message: str, *, status: int | None, hint: str = "") -> None:
+        super().__init__(message, hint=hint)
+        self.status = status
 
 
 class Refused(BadInput):
@@ -93,7 +101,7 @@ class Connection:
         self._open: http.client.HTTPConnection | None = None
 
     def get(self, path: str) -> Answer:
-        """Return what the server answers. Raises MachineFailure after the last try, Refused when it says no."""
+        """Return what the server answers. Raises GivenUp after the last try, Refused when it says no."""
         return self._patiently("GET", path, None, "", None)
 
     def post(
@@ -126,7 +134,7 @@ class Connection:
                 raise
             except TryAgain as error:
                 self.close()
-                reason, asked = str(error), error.wait
+                reason, asked, status = str(error), error.wait, error.status
             if attempt < self._retries:
                 wait = min(self._longest_wait, max(asked, self._retry_wait * 2**attempt))
                 logger.warning(
@@ -135,7 +143,9 @@ class Connection:
                 self._sleep(wait)
                 self.repeats += 1
         tries = f"{self._retries + 1} tries" if self._retries else "one try"
-        raise MachineFailure(f"{self.address}: {reason}, after {tries}", hint="see --request-timeout and --retries")
+        raise GivenUp(
+            f"{self.address}: {reason}, after {tries}", status=status, hint="see --request-timeout and --retries"
+        )
 
     def _once(self, method: str, path: str, body: bytes | None, content_type: str) -> Answer:
         late = threading.Event()
@@ -174,7 +184,9 @@ class Connection:
         said = _excerpt(data) or _printable(self.hide(response.reason))
         if response.status in RETRIED:
             raise TryAgain(
-                f"status {response.status} ({said})", self._asked_wait(response.getheader("Retry-After", ""))
+                f"status {response.status} ({said})",
+                self._asked_wait(response.getheader("Retry-After", "")),
+                response.status,
             )
         if response.status != 200:
             raise Refused(

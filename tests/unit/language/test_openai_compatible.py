@@ -190,6 +190,18 @@ def test_a_400_for_another_reason_changes_nothing() -> None:
     assert server.asked[3].body["response_format"]["type"] == "json_schema"
 
 
+def test_a_server_that_stumbles_over_its_own_form_is_asked_in_a_lower_one_once() -> None:
+    """As llama.cpp does (seen with its server of October 2026): 500 when constrained output is cut."""
+    stumbles = status(500, b'{"error": {"message": "output that does not match the expected format"}}')
+    with serving(stumbles, stumbles, replies('{"answ', finish="length"), replies(GOOD), replies(GOOD)) as server:
+        chat = opened(server.base_url, retries=1)
+        assert chat.ask(QUESTION, SCHEMA).answer == 4
+        chat.ask(QUESTION, SCHEMA)
+    forms = [asked.body["response_format"]["type"] for asked in server.asked]
+    assert forms == ["json_schema", "json_schema", "json_object", "json_schema", "json_schema"]
+    assert (chat.record.calls, chat.record.re_prompts, chat.record.repeats) == (2, 1, 1)
+
+
 def test_the_newer_name_of_the_limit() -> None:
     words = b'{"error": {"message": "Unsupported parameter: use \'max_completion_tokens\' instead"}}'
     with serving(status(400, words), replies(GOOD)) as server:
