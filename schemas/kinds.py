@@ -8,6 +8,7 @@ from schemas.evaluation import Evaluation, Report
 from schemas.exported_sequence import ExportedSequence
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
+from schemas.packing import Packing
 from schemas.panoptic_map import PanopticMap
 from schemas.plan import Plan
 from schemas.segments import Segments
@@ -25,6 +26,7 @@ __all__ = [
     "ExportedSequence",
     "GroundTruth",
     "InteractiveScene",
+    "Packing",
     "PanopticMap",
     "Plan",
     "Report",

@@ -1,0 +1,122 @@
+"""Mesh collision checks of the bolted-down arm with upright blocks, in pybullet: where closed forms do not decide."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.kit.motion.collision import Collision
+from stages.kit.simulation.engine import engine, native_output_to_stderr
+from stages.pack.arm import FixedArm
+from stages.pack.hand import Named
+from stages.pack.instances import TABLE_TOP
+from stages.pack.solids import Block
+
+FINGER_OPENING = 0.04
+"""Each finger from the middle [m]."""
+TOUCH = 1e-4
+"""Penetration that counts as touching [m]: what is held may slide along what it stands beside."""
+
+
+class ArmScene:
+    """The arm, the table and blocks. Blocks stand; one of them may be held. Close it after use."""
+
+    def __init__(self, arm: FixedArm) -> None:
+        self.client = engine.connect(engine.DIRECT)
+        description = arm.description
+        with native_output_to_stderr():
+            self._robot = engine.loadURDF(
+                str(description.urdf), useFixedBase=True, physicsClientId=self.client,
+                flags=engine.URDF_USE_SELF_COLLISION | engine.URDF_USE_INERTIA_FROM_FILE,
+            )  # fmt: skip
+        names = {}
+        self._links = {-1: description.arm_base}
+        for index in range(engine.getNumJoints(self._robot, physicsClientId=self.client)):
+            info = engine.getJointInfo(self._robot, index, physicsClientId=self.client)
+            names[info[1].decode()] = index
+            self._links[index] = info[12].decode()
+        self._joints = [names[name] for name in description.arm_joints]
+        for name in description.finger_joints:
+            engine.resetJointState(self._robot, names[name], FINGER_OPENING, physicsClientId=self.client)
+        self._choose_self_collisions(names, description.arm_joints)
+        self._bodies: list[tuple[int, str]] = []
+        self._held: tuple[int, np.ndarray] | None = None
+        self._tool = next(index for index, name in self._links.items() if name == description.tool_link)
+        self.checks = 0
+        self._table = self._box((1.5, 1.5, 0.005), (0.0, 0.0, TABLE_TOP - 0.005), 0.0)
+        engine.setCollisionFilterPair(self._robot, self._table, -1, -1, 0, physicsClientId=self.client)
+
+    def close(self) -> None:
+        """Disconnect; the scene cannot be used afterwards."""
+        engine.disconnect(physicsClientId=self.client)
+
+    def _choose_self_collisions(self, joints: dict[str, int], arm_joints: tuple[str, ...]) -> None:
+        """Switch off pairs that are near along the chain, and those of the wrist: their meshes overlap by design."""
+        order = [-1, *(joints[name] for name in arm_joints)]
+        rank = {index: place for place, index in enumerate(order)}
+        for first in self._links:
+            for second in self._links:
+                a, b = rank.get(first, 7), rank.get(second, 7)
+                if first < second and (abs(a - b) <= 2 or min(a, b) >= 5):
+                    engine.setCollisionFilterPair(
+                        self._robot, self._robot, first, second, 0, physicsClientId=self.client
+                    )
+
+    def _box(self, half: tuple[float, float, float], centre: tuple[float, float, float], yaw: float) -> int:
+        shape = engine.createCollisionShape(engine.GEOM_BOX, halfExtents=list(half), physicsClientId=self.client)
+        return int(
+            engine.createMultiBody(
+                0, shape, -1, list(centre), engine.getQuaternionFromEuler([0, 0, yaw]), physicsClientId=self.client
+            )
+        )
+
+    def _stand(self, block: Block) -> int:
+        half = (block.half_width, block.half_length, (block.top - block.bottom) / 2)
+        return self._box(half, (block.x, block.y, (block.top + block.bottom) / 2), block.yaw)
+
+    def arrange(self, others: tuple[Named, ...], held: tuple[str, Block, float] | None) -> None:
+        """Put blocks into the scene in place of those of the last time.
+
+        `held`: its name, a block whose extents count, and how far the tool is above its centre [m].
+        """
+        for body, _ in self._bodies:
+            engine.removeBody(body, physicsClientId=self.client)
+        self._bodies = [(self._stand(other.block), other.name) for other in others]
+        self._held = None
+        if held is not None:
+            name, block, above = held
+            body = self._stand(block)
+            self._bodies.append((body, name))
+            self._held = (body, np.array([0.0, 0.0, above]))
+
+    def check(self, arm: np.ndarray) -> Collision | None:
+        """Return the worst collision of joint values (7,), None when they are free."""
+        self.checks += 1
+        client = self.client
+        for index, value in zip(self._joints, arm.tolist(), strict=True):
+            engine.resetJointState(self._robot, index, value, physicsClientId=client)
+        bodies = [self._robot]
+        if self._held is not None:
+            body, offset = self._held
+            state = engine.getLinkState(self._robot, self._tool, computeForwardKinematics=1, physicsClientId=client)
+            position, turn = engine.multiplyTransforms(state[4], state[5], offset.tolist(), [0, 0, 0, 1])
+            # The tool's z axis points down, the box's up.
+            turn = engine.multiplyTransforms([0, 0, 0], turn, [0, 0, 0], [1, 0, 0, 0])[1]
+            engine.resetBasePositionAndOrientation(body, position, turn, physicsClientId=client)
+            bodies.append(body)
+        engine.performCollisionDetection(physicsClientId=client)
+        worst: Collision | None = None
+        for own in bodies:
+            for entry in engine.getContactPoints(bodyA=own, physicsClientId=client):
+                collision = self._collision(own, entry)
+                if collision is not None and (worst is None or collision.depth > worst.depth):
+                    worst = collision
+        return worst
+
+    def _collision(self, own: int, entry: tuple) -> Collision | None:
+        other, depth = entry[2], -entry[8]
+        held = self._held[0] if self._held is not None else None
+        if depth <= TOUCH or {own, other} == {self._robot, held}:
+            return None
+        names = dict(self._bodies) | {self._table: "table"}
+        part = self._links[entry[3]] if own == self._robot else names[own]
+        return Collision(part, self._links[entry[4]] if other == self._robot else names[other], depth)

@@ -1,0 +1,86 @@
+"""How low the links of the arm come, so that a motion over low things needs no collision check of meshes.
+
+A table over distance from the axis and height of the tool, for the planar configurations of `arm`: lowest point of the
+meshes of links 3 to 7. An entry answers for its cell with `MARGIN`; tests compare it with pybullet's checks.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from functools import cache
+from math import ceil, floor
+
+import numpy as np
+
+from stages.kit.simulation.shapes import link_shapes
+from stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
+from stages.pack.arm import FixedArm, Limits, planar_joints
+
+STEP = 0.02
+MARGIN = 0.02
+"""Between two entries the lowest point moves by less than this [m]."""
+RADII = np.arange(0.20, 0.83, STEP)
+HEIGHTS = np.arange(0.04, 0.56, STEP)
+BASE_RADIUS = 0.27
+"""Links 0 to 2 stay within this distance of the axis, up to the shoulder [m]; link 3 begins there."""
+LINKS = tuple(f"panda_link{number}" for number in range(3, 8))
+
+
+@cache
+def _hulls(robot: str) -> tuple[np.ndarray, ...]:
+    description = FixedArm("fr3", robot).description
+    root = read_urdf(description.urdf)
+    keep = [link for link in root.findall("link") if link.get("name") in LINKS]
+    wanted = ElementTree.Element("robot", {"name": "links"})
+    wanted.extend(keep)
+    shapes = link_shapes(without_visuals(with_absolute_meshes(wanted, description.urdf.parent)))
+    return tuple(np.concatenate([mesh.convex_hull.vertices for mesh in shapes[name]]) for name in LINKS)
+
+
+@cache
+def lowest_points(robot: str, limits: Limits) -> np.ndarray:
+    """Return (R, Z) world z [m] of the lowest point of links 3 to 7 over RADII and HEIGHTS, less the margin.
+
+    -inf where the planar arm does not reach or folds further than its joints can.
+    """
+    arm = FixedArm(limits, robot)
+    hulls = _hulls(robot)
+    table = np.full((len(RADII), len(HEIGHTS)), -np.inf)
+    for row, radius in enumerate(RADII):
+        for column, height in enumerate(HEIGHTS):
+            joints = planar_joints(arm, np.array([radius]), np.array([height]))
+            if joints is None:
+                continue
+            frames = arm.frames(joints[0])
+            lows = [
+                (points @ frame[2, :3]).min() + frame[2, 3] for points, frame in zip(hulls, frames[2:7], strict=True)
+            ]
+            table[row, column] = min(lows) - MARGIN
+    return table
+
+
+def lowest_within(arm: FixedArm, radii: tuple[float, float], heights: tuple[float, float]) -> float:
+    """Return a lower bound [m] of the links' height over a range of distances and heights of the tool.
+
+    -inf when the range leaves the table or holds a position that the planar arm cannot take.
+    """
+    table = lowest_points(arm.description.name, arm.limits)
+    rows = (radii[0] - RADII[0]) / STEP, (radii[1] - RADII[0]) / STEP
+    columns = (heights[0] - HEIGHTS[0]) / STEP, (heights[1] - HEIGHTS[0]) / STEP
+    if rows[0] < 0 or columns[0] < 0 or rows[1] > len(RADII) - 1 or columns[1] > len(HEIGHTS) - 1:
+        return -np.inf
+    return float(table[floor(rows[0]) : ceil(rows[1]) + 1, floor(columns[0]) : ceil(columns[1]) + 1].min())
+
+
+def lowest_on_path(arm: FixedArm, radii: np.ndarray, heights: np.ndarray) -> float:
+    """Return a lower bound [m] of the links' height along tool positions (N,), (N,); -inf when one is off the table."""
+    table = lowest_points(arm.description.name, arm.limits)
+    row = (radii - RADII[0]) / STEP
+    column = (heights - HEIGHTS[0]) / STEP
+    if row.min() < 0 or column.min() < 0 or row.max() >= len(RADII) - 1 or column.max() >= len(HEIGHTS) - 1:
+        return -np.inf
+    i, j = row.astype(int), column.astype(int)
+    # Beyond the last row that can be reached the arm is stretched: the nearer entry answers.
+    corners = np.stack([table[i, j], table[i + 1, j], table[i, j + 1], table[i + 1, j + 1]])
+    finite = np.where(np.isfinite(corners), corners, np.inf).min(axis=0)
+    return float(finite.min()) if np.isfinite(finite).all() else -np.inf

@@ -1,0 +1,229 @@
+"""The motion planner of the packing scene: one call asks for a motion of the arm to a tool pose.
+
+Checks in the published order: inverse kinematics, collision at the goal, path. The path goes up, over and down in
+cylinder coordinates, where every configuration is known in closed form; it needs no mesh check when all that stands is
+lower than the links come on it. Where it needs one, or is not free, meshes decide and RRT-Connect searches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from math import atan2, ceil, cos, hypot, sin
+
+import numpy as np
+
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
+from stages.pack.arm import HOME, FixedArm, Limits, ToolPose, planar_joints
+from stages.pack.arm_scene import ArmScene
+from stages.pack.hand import TIP_BELOW_TOOL, Named, end_collision, hand_blocks, held_block, tool_over_centre
+from stages.pack.link_heights import BASE_RADIUS, lowest_on_path, lowest_within
+from stages.pack.records import BoxState
+from stages.pack.solids import overlap
+
+OVER = 0.015
+"""What is carried over something passes this far above it [m]."""
+STRIDE = 0.03
+"""Between two configurations of an up-over-down path [m]."""
+RESOLUTION = 0.05
+"""Largest step of a joint between two mesh checks [rad]."""
+SAMPLES = 60
+"""Samples of one search, as many as the published planner draws in its three tries."""
+HOME_POSE = ToolPose(0.306891, 0.0, 0.485302, 0.0)
+"""Where the tool is at the home configuration."""
+
+
+@dataclass(frozen=True)
+class Stance:
+    """Where the arm stands."""
+
+    arm: np.ndarray
+    pose: ToolPose
+
+
+HOME_STANCE = Stance(HOME, HOME_POSE)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion that is free: what makes its joint values (N, 7) of straight pieces, and where it ends."""
+
+    make: Callable[[], np.ndarray]
+    end: Stance
+    searched: bool
+    """Whether it took a search by RRT-Connect."""
+
+    @property
+    def path(self) -> np.ndarray:
+        """The joint values; made when they are asked for, as most motions are only counted."""
+        return self.make()
+
+
+class MotionPlanner:
+    """Plans motions of the arm among upright blocks. Holds a pybullet client once one was needed; close it."""
+
+    def __init__(self, limits: Limits = "fr3", seed: int = 0) -> None:
+        self.arm = FixedArm(limits)
+        self._scene: ArmScene | None = None
+        self._seed = seed
+        self.mesh_calls = 0
+        """Calls in which closed forms did not decide the path."""
+
+    def close(self) -> None:
+        """Release the physics client."""
+        if self._scene is not None:
+            self._scene.close()
+            self._scene = None
+
+    def plan(self, start: Stance, goal: ToolPose, held: BoxState | None, others: tuple[Named, ...]) -> Motion:
+        """Return a motion from a stance to a tool pose with a held box (or none) among what stands in the way.
+
+        Raises MotionFailed: no_inverse_kinematics, joint_limit, goal_in_collision, no_path.
+        """
+        arm = self.arm.solve(goal, start.arm)
+        end = Stance(arm, goal)
+        carried = None if held is None else Named(held.name, held_block(goal, held.width, held.length, held.height))
+        failure = end_collision(goal, carried, others)
+        if failure is not None:
+            raise MotionFailed(failure.kind, failure.message, failure.objects, failure.numbers)
+        tops = max((other.block.top for other in others), default=0.0)
+        height = _height_over(start, end, held, tops)
+        if self._surely_free(start, end, height, others):
+            return Motion(lambda: _known(self._over(start, end, height, held, others))[0], end, False)
+        path = self._over(start, end, height, held, others)
+        if path is not None and path[1]:
+            return Motion(lambda: path[0], end, False)
+        return self._with_meshes(start, end, held, others, None if path is None else path[0])
+
+    # --- closed form ------------------------------------------------------------------------------------------
+
+    def _surely_free(self, start: Stance, end: Stance, height: float, others: tuple[Named, ...]) -> bool:
+        """Whether the up-over-down path is free wherever in its range of distances and heights it goes.
+
+        Straight up from a free pose is free, as everything stands on the ground; above `height` nothing stands; and the
+        links must be above all that stands in the whole range.
+        """
+        radii = sorted((start.pose.radius, end.pose.radius))
+        heights = min(start.pose.z, end.pose.z), height
+        tops = max((other.block.top for other in others), default=0.0)
+        lowest = lowest_within(self.arm, (radii[0], radii[1]), heights)
+        return lowest > tops and not _near_base(others)
+
+    def _over(
+        self, start: Stance, end: Stance, height: float, held: BoxState | None, others: tuple[Named, ...]
+    ) -> tuple[np.ndarray, bool] | None:
+        """Return the up-over-down path (N, 7) and whether it is known to be free; None when the arm cannot follow."""
+        tops = max((other.block.top for other in others), default=0.0)
+        rise, fall = self._lift(start.pose, height), self._lift(end.pose, height)
+        across = _arc(rise[-1], fall[-1])
+        points = np.concatenate([rise, across, fall[::-1]])
+        joints = planar_joints(self.arm, points[:, 0], points[:, 2])
+        if joints is None:
+            return None
+        joints[:, 0] += points[:, 1]
+        joints[: len(rise), 6] = start.arm[6]
+        turn = np.linspace(0.0, 1.0, len(across) + 1)[1:]
+        joints[len(rise) : len(rise) + len(across), 6] = start.arm[6] + turn * (end.arm[6] - start.arm[6])
+        joints[len(rise) + len(across) :, 6] = end.arm[6]
+        # Joint 7 holds the yaw against the plane's turn: on the way up and down it does not turn.
+        limits = self.arm.chain
+        if np.any(joints < limits.lower) or np.any(joints > limits.upper):
+            return None
+        if np.abs(joints[0] - start.arm).max() > 0.02 or np.abs(joints[-1] - end.arm).max() > 0.02:
+            return None
+        free = not _near_base(others) and lowest_on_path(self.arm, points[:, 0], points[:, 2]) > tops
+        free = free and all(
+            self._drawn_in_free(stance, way, held, others) for stance, way in ((start, rise), (end, fall))
+        )
+        return joints, free
+
+    def _lift(self, pose: ToolPose, height: float) -> np.ndarray:
+        """Return (N, 3) distance, azimuth and height from a pose upwards; drawn in where it is too far up there."""
+        count = max(1, ceil((height - pose.z) / STRIDE))
+        heights = np.linspace(pose.z, height, count + 1)
+        radii = np.minimum(pose.radius, self.arm.reaches(heights) - 1e-6)
+        return np.column_stack([radii, np.full(count + 1, atan2(pose.y, pose.x)), heights])
+
+    def _drawn_in_free(
+        self, stance: Stance, rise: np.ndarray, held: BoxState | None, others: tuple[Named, ...]
+    ) -> bool:
+        """Whether hand and held box are free on the way up: over a free end, straight up is; drawn in may be not."""
+        pose = stance.pose
+        if rise[:, 0].min() > pose.radius - 1e-4:
+            return True
+        for radius, azimuth, height in rise.tolist():
+            at = ToolPose(radius * cos(azimuth), radius * sin(azimuth), height, pose.yaw)
+            blocks = list(hand_blocks(at))
+            if held is not None:
+                blocks.append(held_block(at, held.width, held.length, held.height))
+            if any(overlap(block, other.block) > 0 for block in blocks for other in others):
+                return False
+        return True
+
+    # --- meshes -----------------------------------------------------------------------------------------------
+
+    def _with_meshes(
+        self, start: Stance, end: Stance, held: BoxState | None, others: tuple[Named, ...], path: np.ndarray | None
+    ) -> Motion:
+        self.mesh_calls += 1
+        if self._scene is None:
+            self._scene = ArmScene(self.arm)
+        scene = self._scene
+        grasp = None
+        if held is not None:
+            block = held_block(end.pose, held.width, held.length, held.height)
+            grasp = (held.name, block, tool_over_centre(held.height))
+        scene.arrange(others, grasp)
+        resolution = np.full(7, RESOLUTION)
+        for candidate in (path, np.array([start.arm, end.arm])):
+            if candidate is None:
+                continue
+            whole = np.concatenate([start.arm[None], candidate, end.arm[None]])
+            if first_collision(densify(whole, resolution), scene.check) is None:
+                return Motion(partial(np.copy, whole), end, False)
+        space = SearchSpace(self.arm.chain.lower, self.arm.chain.upper, resolution)
+        if path is not None:
+            space = _narrowed(space, whole_range=np.concatenate([path, start.arm[None]]))
+        found = rrt_connect(
+            start.arm, end.arm, scene.check, space, np.random.default_rng([self._seed, 3]), samples=SAMPLES,
+            smoothing=20,
+        )  # fmt: skip
+        return Motion(lambda: found, end, True)
+
+
+def _height_over(start: Stance, end: Stance, held: BoxState | None, tops: float) -> float:
+    """Return the height [m] of the tool at which hand and held box pass over all that stands."""
+    under = TIP_BELOW_TOOL if held is None else tool_over_centre(held.height) + held.height / 2
+    return max(tops + OVER + under, start.pose.z, end.pose.z)
+
+
+def _near_base(others: tuple[Named, ...]) -> bool:
+    """Whether something stands where the links below the third could touch it."""
+    return any(
+        hypot(other.block.x, other.block.y) - other.block.half_width - other.block.half_length < BASE_RADIUS
+        for other in others
+    )
+
+
+def _known(path: tuple[np.ndarray, bool] | None) -> tuple[np.ndarray, bool]:
+    if path is None:
+        raise AssertionError("a path that is free everywhere in its range exists")
+    return path
+
+
+def _arc(first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Return (N, 3) points in cylinder coordinates between two, both excluded from nothing but the first."""
+    change = np.abs(last - first)
+    count = max(2, ceil(max(change[0] / STRIDE, change[1] / RESOLUTION, change[2] / STRIDE)))
+    return first + (last - first) * (np.arange(1, count + 1) / count)[:, None]
+
+
+def _narrowed(space: SearchSpace, whole_range: np.ndarray) -> SearchSpace:
+    """Keep joints 1 and 7, which could go round more than once, near where the motion needs them."""
+    lower, upper = space.lower.copy(), space.upper.copy()
+    for joint in (0, 6):
+        lower[joint] = max(lower[joint], whole_range[:, joint].min() - 1.0)
+        upper[joint] = min(upper[joint], whole_range[:, joint].max() + 1.0)
+    return SearchSpace(lower, upper, space.resolution)

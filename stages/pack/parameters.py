@@ -1,0 +1,71 @@
+"""Declaration of the step `pack`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import Field
+
+from schemas.errors import UsageError
+from schemas.packing import Packing
+from stages.kit.language.options import LanguageParameters
+from stages.kit.stage import External, Optionally, Stage
+
+Suite = Literal[
+    "published/easy", "published/medium", "published/hard", "published/hard_medium_basket",
+    "published/hard_large_basket", "hard/fill", "hard/unreachable", "hard/obstacles", "hard/mixed_heights",
+    "hard/boxes_6", "hard/boxes_8", "hard/boxes_10",
+]  # fmt: skip
+ProposerName = Literal[
+    "ours", "backtrack", "scratch", "symbolic", "random", "random_restarts", "backtracking", "backtracking_corners",
+    "fixed_layout",
+]  # fmt: skip
+LANGUAGE_PROPOSERS = ("backtrack", "scratch", "symbolic")
+
+
+class PackParameters(LanguageParameters):
+    """Options of `pack`. Budgets count calls, never seconds."""
+
+    suite: Suite = Field("published/easy", description="Where the problem comes from; --problem replaces it")
+    instance: int = Field(0, ge=0, le=2**31, description="Number of the problem in the suite: its seed")
+    proposer: ProposerName = Field(
+        "ours",
+        description="Who proposes plans: `ours` (geometry and typed feedback, no language model); a language model as "
+        "`backtrack` or `scratch` (LLM3's variants, all numbers by the model) or `symbolic` (its order, our geometry); "
+        "samplers that read no reasons",
+    )
+    reasons: bool = Field(True, description="The proposer sees why an action failed, not only that it did")
+    trace_length: int = Field(5, ge=1, le=100, description="Attempts that a language model is shown (k)")
+    iterations: int = Field(20, ge=1, le=1_000_000, description="Plans proposed at most")
+    motion_calls: int = Field(20_000, ge=1, le=10_000_000, description="Motion-planner calls at most")
+    limits: Literal["fr3", "panda"] = Field(
+        "fr3", description="Joint limits: as published for LLM3, or the Panda's own"
+    )
+    image_width: int = Field(900, ge=200, le=4000, description="Width of the pictures [px]")
+
+
+def check_inputs(parameters: PackParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError when a transcript is given that nobody reads."""
+    if inputs.get("transcript") is not None and parameters.proposer not in LANGUAGE_PROPOSERS:
+        raise UsageError(
+            f"--proposer {parameters.proposer} reads no --transcript",
+            hint=f"proposers that ask a language model: {', '.join(LANGUAGE_PROPOSERS)}",
+        )
+
+
+STAGE = Stage(
+    name="pack",
+    version=1,
+    summary="Pack boxes into a basket with an arm: plans are proposed, motion planning says what is wrong (LLM3)",
+    parameters=PackParameters,
+    reads={
+        "problem": Optionally(External("a packing problem of your own, JSON (docs/LLM3.md)")),
+        "transcript": Optionally(External("transcript.jsonl of an earlier run, for --language recorded or openai")),
+    },
+    writes=Packing,
+    libraries=("numpy", "scipy", "numba", "pybullet", "trimesh", "matplotlib"),
+    data_files=lambda parameters: ("robots/panda.toml",),
+    check=check_inputs,
+    example="scenewright pack --suite hard/unreachable --instance 3 --proposer ours --out outputs/pack",
+)

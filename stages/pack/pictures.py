@@ -1,0 +1,169 @@
+"""Pictures of a run: the basket from above with every placement that was tried, the plans as a tree with the reason at
+each branch that was cut, the scene at the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon, Rectangle
+from PIL import Image
+
+from stages.pack.environment import PackingWorld, clipped
+from stages.pack.hand import release_height, tool_over_centre
+from stages.pack.loop import PackingRun
+from stages.pack.records import Action, Attempt, BoxState
+from stages.pack.scene_picture import render_scene
+
+BOX_COLORS = {
+    "red": "#c8553d", "blue": "#3d6cb9", "green": "#5b9a5f", "tan": "#cdb18a", "cyan": "#5fb8c4", "yellow": "#dfc04e",
+    "purple": "#8a6bb1", "orange": "#dd8a45", "white": "#dddddd", "brown": "#8a6a52",
+}  # fmt: skip
+OTHER = "#9aa5ad"
+REFUSED = "#b3261e"
+MOST_REFUSED, MOST_LEAVES = 60, 28
+DOTS = 100
+
+
+def box_color(name: str) -> str:
+    """Return the colour that a box's name says."""
+    return BOX_COLORS.get(name.split("_")[0], OTHER)
+
+
+def _corners(box: BoxState, x: float, y: float, yaw: float) -> np.ndarray:
+    c, s = np.cos(yaw), np.sin(yaw)
+    half = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [box.width / 2, box.length / 2]
+    return half @ np.array([[c, s], [-s, c]]) + [x, y]
+
+
+def _save(figure: Figure, path: Path) -> None:
+    FigureCanvasAgg(figure)
+    figure.savefig(path, metadata={"Software": None})
+
+
+def draw_layout(path: Path, world: PackingWorld, run: PackingRun, width: int) -> None:
+    """Draw the table from above: starts, the boxes at the end, refused placements in red, the rim of the reach."""
+    instance = world.instance
+    figure = Figure(figsize=(width / DOTS, 0.8 * width / DOTS), dpi=DOTS, layout="constrained")
+    axes = figure.add_subplot()
+    low, high = instance.basket.low, instance.basket.high
+    axes.add_patch(Rectangle(low, high[0] - low[0], high[1] - low[1], facecolor="#efe6d6", edgecolor="#7a6a4f"))
+    for obstacle in instance.obstacles:
+        corner, end = obstacle.rectangle.low, obstacle.rectangle.high
+        axes.add_patch(
+            Rectangle(corner, end[0] - corner[0], end[1] - corner[1], facecolor="#555555", hatch="//", edgecolor="w")
+        )
+        axes.text((corner[0] + end[0]) / 2, (corner[1] + end[1]) / 2, f"{1000 * obstacle.top:.0f} mm", ha="center",
+                  va="center", fontsize=7, color="w")  # fmt: skip
+    boxes = {box.name: box for box in instance.boxes}
+    for box in instance.boxes:
+        axes.add_patch(Polygon(_corners(box, box.x, box.y, box.yaw), fill=False, linestyle=":", edgecolor="#777777"))
+    refused = [
+        step.action
+        for attempt in run.attempts
+        for step in attempt.feedback
+        if step.failure is not None and step.action.name == "place" and step.action.box in boxes
+    ]
+    for action in refused[-MOST_REFUSED:]:
+        corners = _corners(boxes[action.box], *clipped(action))
+        axes.add_patch(Polygon(corners, fill=False, edgecolor=REFUSED, linewidth=0.8, alpha=0.7))
+    for name in boxes:
+        box = world.box(run.states[-1], name)
+        patch = Polygon(_corners(box, box.x, box.y, box.yaw), facecolor=box_color(name), edgecolor="k", alpha=0.9)
+        axes.add_patch(patch)
+        axes.text(box.x, box.y, f"{name.removesuffix('_box')}\n{1000 * box.height:.0f}", ha="center", va="center",
+                  fontsize=7)  # fmt: skip
+    lowest = min(release_height(box.height) + tool_over_centre(box.height) for box in instance.boxes)
+    reach = world.planner.arm.reach(lowest)
+    angles = np.linspace(-0.5, 0.5, 100)
+    axes.plot(reach * np.cos(angles), reach * np.sin(angles), color="#3d6cb9", linestyle="--", linewidth=1)
+    margin = 0.06
+    axes.set_xlim(low[0] - margin, max(high[0], reach) + margin)
+    axes.set_ylim(low[1] - margin, high[1] + margin)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x [m]; dashed: rim of the arm's reach; red: placements refused")
+    axes.set_ylabel("y [m]")
+    axes.set_title(
+        f"{instance.name}: {'packed' if run.success else 'not packed'}, {run.proposer_calls} proposals, "
+        f"{run.motion_calls} motion-planner calls", fontsize=10,
+    )  # fmt: skip
+    _save(figure, path)
+
+
+@dataclass
+class _Node:
+    label: str
+    children: dict[Action, _Node] = field(default_factory=dict)
+    ends: list[tuple[str, str]] = field(default_factory=list)
+    """(text, colour) of plans that end here."""
+
+
+def _tree(attempts: tuple[Attempt, ...]) -> _Node:
+    root = _Node("start")
+    for number, attempt in enumerate(attempts, start=1):
+        node = root
+        reason, color = (attempt.task.message, "#a86400") if attempt.task else ("goal reached", "#2e7d32")
+        for step in attempt.feedback:
+            if step.failure is not None:
+                told = f"{step.action.name} {step.action.box}: {step.failure.message}"
+                reason, color = told, REFUSED
+                break
+            if step.action.name == "place":
+                label = f"{step.action.box.removesuffix('_box')} ({step.action.x:.2f}, {step.action.y:.2f})"
+                node = node.children.setdefault(step.action, _Node(label))
+        node.ends.append((f"{number}: {reason}", color))
+    return root
+
+
+def draw_attempts(path: Path, attempts: tuple[Attempt, ...], width: int) -> None:
+    """Draw the plans as one tree: shared placements once, and at each end why the plan was cut there."""
+    shown = attempts[-MOST_LEAVES:]
+    root = _tree(shown)
+    leaves = len(shown)
+    deepest = max((len(attempt.feedback) // 2 for attempt in shown), default=0)
+    height = max(240, 60 + 34 * leaves)
+    figure = Figure(figsize=(1.6 * width / DOTS, 1.1 * height / DOTS), dpi=DOTS)
+    axes = figure.add_axes((0.01, 0.01, 0.98, 0.93))
+    _draw_node(axes, root, 0, 0.0)
+    axes.set_xlim(-0.5, deepest + 4.5)
+    axes.set_ylim(leaves - 0.3, -0.7)
+    axes.axis("off")
+    hidden = len(attempts) - len(shown)
+    figure.suptitle("Plans that were proposed" + (f" (the last {len(shown)}, {hidden} before)" if hidden else ""),
+                    fontsize=10)  # fmt: skip
+    _save(figure, path)
+
+
+def _draw_node(axes: Axes, node: _Node, depth: int, row: float) -> float:
+    """Draw a node and what follows it from a row down; return how many rows it took."""
+    axes.text(depth, row, node.label, fontsize=7, va="center", ha="center",
+              bbox={"boxstyle": "round,pad=0.2", "facecolor": "#eef2f6", "edgecolor": "#90a0b0"})  # fmt: skip
+    used = 0.0
+    for child in node.children.values():
+        axes.plot([depth, depth + 1], [row, row + used], color="#90a0b0", linewidth=0.8, zorder=0)
+        used += _draw_node(axes, child, depth + 1, row + used)
+    for text, color in node.ends:
+        axes.plot([depth, depth + 0.55], [row, row + used], color=color, linewidth=0.8, zorder=0)
+        axes.text(depth + 0.6, row + used, text if len(text) < 110 else text[:107] + "...", fontsize=7, va="center",
+                  color=color)  # fmt: skip
+        used += 1
+    return max(used, 1.0)
+
+
+def draw_scene(path: Path, world: PackingWorld, run: PackingRun, width: int) -> None:
+    """Render the scene as it is after the last action that was carried out."""
+    state = run.states[-1]
+    blocks = [(entry.name, entry.block) for entry in world.standing(state, state.held)]
+    held = None
+    if state.held is not None:
+        box = world.box(state, state.held)
+        held = (state.held, box, tool_over_centre(box.height))
+    colors = {name: box_color(name) for name, _ in blocks} | ({state.held: box_color(state.held)} if state.held else {})
+    for obstacle in world.instance.obstacles:
+        colors[obstacle.rectangle.name] = "#555555"
+    image = render_scene(world.planner.arm, state.stance, blocks, held, colors, world.instance.basket, width)
+    Image.fromarray(image).save(path)

@@ -1,0 +1,95 @@
+"""A packing problem as JSON: the user's own in, any instance out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from schemas.errors import BadInput
+from schemas.packing import PackingArea, PackingBox, PackingInstanceFile, PackingObstacle
+from stages.kit.motion.failures import MotionFailed
+from stages.pack.arm import HOME, FixedArm, Limits, ToolPose
+from stages.pack.hand import tool_over_centre
+from stages.pack.instances import TABLE_TOP, Instance, Obstacle
+from stages.pack.records import BoxState, Rectangle
+from stages.pack.solids import Block, overlap
+
+LARGEST_FILE = 1_000_000
+FORM = "docs/LLM3.md shows the form"
+
+
+def read_problem(path: Path, limits: Limits) -> Instance:
+    """Read and check a problem. Raises BadInput: unreadable, a wrong field, boxes in each other, a box out of reach."""
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise BadInput(f"{path}: larger than {LARGEST_FILE} bytes", hint=FORM)
+        told = PackingInstanceFile.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror}", hint=FORM) from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "document"
+        raise BadInput(f"{path}: {where}: {first['msg']}", hint=FORM) from None
+    instance = from_file(told, path.stem)
+    _check_starts(instance, path, FixedArm(limits))
+    return instance
+
+
+def from_file(told: PackingInstanceFile, name: str) -> Instance:
+    """Return the instance that a file tells."""
+    boxes = tuple(
+        BoxState(box.name, box.width, box.length, box.height, box.x, box.y, box.yaw, False) for box in told.boxes
+    )
+    obstacles = tuple(
+        Obstacle(Rectangle(obstacle.name, obstacle.low, obstacle.high), obstacle.top) for obstacle in told.obstacles
+    )
+    return Instance(name, boxes, Rectangle("basket", told.basket.low, told.basket.high), obstacles)
+
+
+def to_file(instance: Instance) -> PackingInstanceFile:
+    """Return the payload instance.json of an instance."""
+    return PackingInstanceFile(
+        boxes=tuple(
+            PackingBox(
+                name=box.name, width=box.width, length=box.length, height=box.height, x=box.x, y=box.y, yaw=box.yaw
+            )
+            for box in instance.boxes
+        ),
+        basket=PackingArea(low=instance.basket.low, high=instance.basket.high),
+        obstacles=tuple(
+            PackingObstacle(
+                name=entry.rectangle.name, low=entry.rectangle.low, high=entry.rectangle.high, top=entry.top
+            )
+            for entry in instance.obstacles
+        ),
+    )
+
+
+def _check_starts(instance: Instance, path: Path, arm: FixedArm) -> None:
+    blocks = [(box.name, _block(box)) for box in instance.boxes]
+    for obstacle in instance.obstacles:
+        low, high = obstacle.rectangle.low, obstacle.rectangle.high
+        half = ((high[0] - low[0]) / 2, (high[1] - low[1]) / 2)
+        middle = ((high[0] + low[0]) / 2, (high[1] + low[1]) / 2)
+        blocks.append((obstacle.rectangle.name, Block(*middle, 0.0, *half, 0.0, obstacle.top)))
+    for number, (name, block) in enumerate(blocks[: len(instance.boxes)]):
+        for other, other_block in blocks[number + 1 :]:
+            depth = overlap(block, other_block)
+            if depth > 1e-6:
+                raise BadInput(
+                    f"{path}: {name} and {other} start {1000 * depth:.1f} mm in each other", hint="move one of them"
+                )
+    for box in instance.boxes:
+        pose = ToolPose(box.x, box.y, TABLE_TOP + box.height / 2 + tool_over_centre(box.height), box.yaw)
+        try:
+            arm.solve(pose, HOME)
+        except MotionFailed as failed:
+            raise BadInput(
+                f"{path}: {box.name} cannot be picked where it starts: {failed.failure.message}",
+                hint="the arm stands at (0, 0); move the box nearer or farther",
+            ) from None
+
+
+def _block(box: BoxState) -> Block:
+    return Block(box.x, box.y, box.yaw, box.width / 2, box.length / 2, TABLE_TOP, TABLE_TOP + box.height)

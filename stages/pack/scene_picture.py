@@ -1,0 +1,74 @@
+"""A picture of the arm over table, basket and boxes: pybullet's own software renderer."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.colors import to_rgba
+
+from stages.kit.simulation.engine import engine, native_output_to_stderr
+from stages.pack.arm import FixedArm
+from stages.pack.arm_scene import FINGER_OPENING
+from stages.pack.instances import BASKET_TOP, TABLE_TOP
+from stages.pack.motion import Stance
+from stages.pack.records import BoxState, Rectangle
+from stages.pack.solids import Block
+
+TABLE_COLOR, BASKET_COLOR = "#d8d2c4", "#a98d5f"
+FACTOR = 2
+"""Rendered so many times larger and averaged."""
+
+
+def render_scene(
+    arm: FixedArm, stance: Stance, blocks: list[tuple[str, Block]], held: tuple[str, BoxState, float] | None,
+    colors: dict[str, str], basket: Rectangle, width: int,
+) -> np.ndarray:  # fmt: skip
+    """Return (H, W, 3) uint8. `held`: name, its extents, how far the tool is above its centre [m]."""
+    client = engine.connect(engine.DIRECT)
+    try:
+        with native_output_to_stderr():
+            robot = engine.loadURDF(str(arm.description.urdf), useFixedBase=True, physicsClientId=client)
+        values = dict(zip(arm.description.arm_joints, stance.arm.tolist(), strict=True))
+        values |= dict.fromkeys(arm.description.finger_joints, FINGER_OPENING)
+        for index in range(engine.getNumJoints(robot, physicsClientId=client)):
+            name = engine.getJointInfo(robot, index, physicsClientId=client)[1].decode()
+            if name in values:
+                engine.resetJointState(robot, index, values[name], physicsClientId=client)
+        _block(client, Block(0.45, 0.0, 0.0, 0.75, 0.9, TABLE_TOP - 0.01, TABLE_TOP), TABLE_COLOR)
+        middle = [(basket.low[k] + basket.high[k]) / 2 for k in range(2)]
+        half = [(basket.high[k] - basket.low[k]) / 2 for k in range(2)]
+        _block(client, Block(middle[0], middle[1], 0.0, half[0], half[1], 0.0, BASKET_TOP), BASKET_COLOR)
+        for name, block in blocks:
+            _block(client, block, colors[name])
+        if held is not None:
+            name, box, above = held
+            pose = stance.pose
+            centre = pose.z - above
+            block = Block(pose.x, pose.y, pose.yaw, box.width / 2, box.length / 2, centre - box.height / 2,
+                          centre + box.height / 2)  # fmt: skip
+            _block(client, block, colors[name])
+        return _render(client, width)
+    finally:
+        engine.disconnect(physicsClientId=client)
+
+
+def _block(client: int, block: Block, color: str) -> None:
+    half = [block.half_width, block.half_length, (block.top - block.bottom) / 2]
+    shape = engine.createVisualShape(
+        engine.GEOM_BOX, halfExtents=half, rgbaColor=list(to_rgba(color)), physicsClientId=client
+    )
+    centre = [block.x, block.y, (block.top + block.bottom) / 2]
+    turn = engine.getQuaternionFromEuler([0, 0, block.yaw])
+    engine.createMultiBody(0, -1, shape, centre, turn, physicsClientId=client)
+
+
+def _render(client: int, width: int) -> np.ndarray:
+    height = round(width * 2 / 3)
+    view = engine.computeViewMatrix([1.55, -0.75, 0.95], [0.42, 0.02, 0.12], [0, 0, 1])
+    projection = engine.computeProjectionMatrixFOV(42, width / height, 0.05, 5.0)
+    image = engine.getCameraImage(
+        FACTOR * width, FACTOR * height, view, projection, lightDirection=[0.6, -0.9, 1.6], shadow=1,
+        renderer=engine.ER_TINY_RENDERER, physicsClientId=client,
+    )[2]  # fmt: skip
+    pixels = np.asarray(image, dtype=np.uint8).reshape(FACTOR * height, FACTOR * width, 4)[:, :, :3]
+    blocks = pixels.reshape(height, FACTOR, width, FACTOR, 3).astype(np.uint16)
+    return ((blocks.sum(axis=(1, 3)) + FACTOR**2 // 2) // FACTOR**2).astype(np.uint8)

@@ -1,0 +1,156 @@
+"""The step `pack`: one packing problem, one proposer, the loop of LLM3, pictures of what happened."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from schemas.packing import Packing, PackingAttempt, PackingFile, PackingStep
+from stages.kit.language.failures import LanguageFailed
+from stages.kit.language.opening import open_chat
+from stages.kit.stage import Context
+from stages.pack.backtracking import Backtracking
+from stages.pack.environment import PackingWorld
+from stages.pack.hard_suites import hard_instance
+from stages.pack.instances import Instance, published_instance
+from stages.pack.language_proposer import LanguageProposer, SymbolicProposer
+from stages.pack.language_scripted import scripted_backend
+from stages.pack.loop import Budget, GaveUp, PackingRun, run_loop
+from stages.pack.motion import MotionPlanner
+from stages.pack.own_proposer import OwnProposer, placement_solver
+from stages.pack.parameters import LANGUAGE_PROPOSERS, PackParameters
+from stages.pack.pictures import draw_attempts, draw_layout, draw_scene
+from stages.pack.problem_file import read_problem, to_file
+from stages.pack.records import Action, Attempt, Observation, Proposer
+from stages.pack.sampling import FixedLayout, RandomRestarts, RandomSampler
+
+
+def run(problem: Path | None, transcript: Path | None, *, parameters: PackParameters, context: Context) -> Packing:
+    """Pack the boxes of the user's problem, or of an instance of a suite."""
+    planner = MotionPlanner(parameters.limits, context.seed)
+    try:
+        instance = _instance(problem, parameters, planner)
+        proposer = _proposer(parameters, transcript, context)
+        with PackingWorld(instance, planner=planner) as world:
+            with context.progress.step("propose and check"):
+                result = run_loop(world, _Guarded(proposer), Budget(parameters.iterations, parameters.motion_calls))
+            _write(context.output, _told(instance, proposer, result), instance, result)
+            with context.progress.step("pictures"):
+                draw_layout(context.output / "layout.png", world, result, parameters.image_width)
+                draw_attempts(context.output / "attempts.png", result.attempts, parameters.image_width)
+                draw_scene(context.output / "scene.png", world, result, parameters.image_width)
+    finally:
+        planner.close()
+    summary = {
+        "problem": instance.name,
+        "proposer": proposer.name,
+        "success": result.success,
+        "proposer_calls": result.proposer_calls,
+        "motion_planner_calls": result.motion_calls,
+    }
+    return Packing(root=context.output, outcome="ok" if result.success else "not_packed", summary=summary)
+
+
+class _Guarded:
+    """A proposer whose language model may stop answering: the loop then ends with what there is."""
+
+    def __init__(self, proposer: Proposer) -> None:
+        self.name, self.calls, self._proposer = proposer.name, proposer.calls, proposer
+
+    def propose(self, observation: Observation, trace: Sequence[Attempt]) -> tuple[Action, ...]:
+        """Return the proposer's plan; raises GaveUp."""
+        try:
+            return self._proposer.propose(observation, trace)
+        except LanguageFailed as error:
+            raise GaveUp(error.failure) from None
+        finally:
+            self.calls = self._proposer.calls
+
+
+def _instance(problem: Path | None, parameters: PackParameters, planner: MotionPlanner) -> Instance:
+    if problem is not None:
+        return read_problem(problem, parameters.limits)
+    suite, cell = parameters.suite.split("/")
+    if suite == "published":
+        return published_instance(cell, parameters.instance)
+    return hard_instance(cell, parameters.instance, planner)
+
+
+def _proposer(parameters: PackParameters, transcript: Path | None, context: Context) -> Proposer:
+    name, seed = parameters.proposer, context.seed
+    if name in LANGUAGE_PROPOSERS:
+        chat = open_chat(
+            parameters, scripted=scripted_backend(name, seed), transcript=transcript,  # type: ignore[arg-type]
+            record=context.output / "transcript.jsonl",
+        )  # fmt: skip
+        if name == "symbolic":
+            return SymbolicProposer(
+                chat, placement_solver, trace_length=parameters.trace_length, reasons=parameters.reasons
+            )
+        return LanguageProposer(
+            chat, variant=name, reasons=parameters.reasons, trace_length=parameters.trace_length  # type: ignore[arg-type]
+        )  # fmt: skip
+    samplers: dict[str, Proposer] = {
+        "ours": OwnProposer(seed, reasons=parameters.reasons),
+        "random": RandomSampler(seed),
+        "random_restarts": RandomRestarts(seed),
+        "backtracking": Backtracking(seed),
+        "backtracking_corners": Backtracking(seed, corners=True),
+        "fixed_layout": FixedLayout(),
+    }
+    return samplers[name]
+
+
+def _attempt(attempt: Attempt) -> PackingAttempt:
+    steps = []
+    for number, action in enumerate(attempt.actions):
+        tried = number < len(attempt.feedback)
+        steps.append(
+            PackingStep(
+                name=action.name, box=action.box, x=action.x, y=action.y, yaw=action.yaw, tried=tried,
+                failure=attempt.feedback[number].failure if tried else None,
+            )
+        )  # fmt: skip
+    return PackingAttempt(steps=tuple(steps), task=attempt.task)
+
+
+def _told(instance: Instance, proposer: Proposer, result: PackingRun) -> PackingFile:
+    return PackingFile(
+        name=instance.name,
+        proposer=proposer.name,
+        success=result.success,
+        proposer_calls=result.proposer_calls,
+        motion_planner_calls=result.motion_calls,
+        attempts=tuple(_attempt(attempt) for attempt in result.attempts),
+        stopped=result.stopped,
+    )
+
+
+def _write(output: Path, told: PackingFile, instance: Instance, result: PackingRun) -> None:
+    told.write(output / "packing.json")
+    to_file(instance).write(output / "instance.json")
+    output.joinpath("plan.txt").write_text(plan_text(told), encoding="utf-8")
+    paths = [motion.path for motion in result.motions] if result.success else []
+    joints = np.concatenate(paths) if paths else np.zeros((0, 7))
+    action = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
+    np.savez(output / "trajectory.npz", joints=joints, action=action.astype(np.int64))
+
+
+def plan_text(told: PackingFile) -> str:
+    """Return the attempts as people read them: each action with what motion planning said."""
+    lines = [f"{told.name}, proposed by {told.proposer}"]
+    for number, attempt in enumerate(told.attempts, start=1):
+        lines.append(f"\nattempt {number}")
+        for step in attempt.steps:
+            where = "" if step.x is None else f" at ({step.x:.3f}, {step.y:.3f}), yaw {step.yaw:.2f}"
+            said = "not tried" if not step.tried else "feasible" if step.failure is None else step.failure.message
+            lines.append(f"  {step.name} {step.box}{where}: {said}")
+        if attempt.task is not None:
+            lines.append(f"  {attempt.task.message}")
+    end = "packed" if told.success else "not packed"
+    if told.stopped is not None:
+        end += f": {told.stopped.message}"
+    calls = f"{told.proposer_calls} proposer calls, {told.motion_planner_calls} motion-planner calls"
+    return "\n".join([*lines, f"\n{end}; {calls}"]) + "\n"

@@ -1,0 +1,132 @@
+"""The step: its files, the same bytes twice, problems of the user's own and what is wrong with them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from benchmarks.llm3.arms import ARMS, HARD, PUBLISHED
+from benchmarks.llm3.records import Run
+from benchmarks.llm3.tables import bootstrap, metrics, table, wilson
+from schemas.errors import BadInput, UsageError
+from schemas.packing import Packing
+from stages.kit.progress import SilentProgress
+from stages.kit.stage import Context
+from stages.pack.parameters import STAGE, PackParameters, Suite
+from stages.pack.problem_file import from_file, read_problem, to_file
+from stages.pack.stage import run
+
+PROBLEM: dict[str, Any] = {
+    "boxes": [
+        {"name": "tin", "width": 0.08, "length": 0.06, "height": 0.1, "x": 0.4, "y": -0.2},
+        {"name": "carton", "width": 0.12, "length": 0.09, "height": 0.05, "x": 0.42, "y": 0.25, "yaw": 0.3},
+    ],
+    "basket": {"low": [0.55, -0.08], "high": [0.75, 0.08]},
+}
+
+
+def pack(folder: Path, problem: Path | None = None, **options: Any) -> Packing:
+    folder.mkdir()
+    context = Context(output=folder, seed=0, device="cpu", progress=SilentProgress())
+    return run(problem, None, parameters=PackParameters(**({"image_width": 240} | options)), context=context)
+
+
+def test_the_step_writes_the_same_bytes_twice(tmp_path: Path) -> None:
+    results = [pack(tmp_path / name, suite="hard/unreachable", instance=1) for name in ("a", "b")]
+    assert results[0].outcome == "ok" and results[0].packing.success
+    names = sorted(path.name for path in (tmp_path / "a").iterdir())
+    assert {"packing.json", "instance.json", "plan.txt", "trajectory.npz", "layout.png", "scene.png"} <= set(names)
+    for name in names:
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
+    with np.load(tmp_path / "a" / "trajectory.npz", allow_pickle=False) as arrays:
+        actions = sum(len(attempt.steps) for attempt in results[0].packing.attempts[-1:])
+        assert arrays["joints"].shape == (len(arrays["action"]), 7)
+        assert set(arrays["action"].tolist()) == set(range(actions))
+
+
+def test_a_problem_of_ones_own_and_one_without_a_solution(tmp_path: Path) -> None:
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(PROBLEM))
+    solved = pack(tmp_path / "a", path)
+    assert solved.outcome == "ok" and solved.packing.name == "mine"
+    path.write_text(json.dumps(PROBLEM | {"basket": {"low": [0.55, -0.03], "high": [0.63, 0.03]}}))
+    unsolved = pack(tmp_path / "b", path, iterations=2)
+    assert unsolved.outcome == "not_packed" and not unsolved.packing.success
+    assert "not packed" in (tmp_path / "b" / "plan.txt").read_text()
+
+
+def test_the_scripted_stand_in_is_recorded(tmp_path: Path) -> None:
+    result = pack(tmp_path / "a", proposer="backtrack")
+    assert result.packing.proposer_calls >= 1 and (tmp_path / "a" / "transcript.jsonl").stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"boxes": []}, "boxes"),
+        ({"basket": {"low": [0.5, 0.0], "high": [0.5, 0.2]}}, "basket"),
+        ({"boxes": [PROBLEM["boxes"][0], PROBLEM["boxes"][0]]}, "tin"),
+        ({"boxes": [PROBLEM["boxes"][0] | {"width": -1}]}, "width"),
+        ({"boxes": [PROBLEM["boxes"][0] | {"x": 1.2}]}, "tin cannot be picked where it starts"),
+        ({"boxes": [PROBLEM["boxes"][0], PROBLEM["boxes"][1] | {"x": 0.41, "y": -0.2}]}, "start"),
+        ({"surprise": 1}, "surprise"),
+        ({"boxes": [PROBLEM["boxes"][0] | {"name": "../x"}]}, "name"),
+    ],
+)
+def test_wrong_problems_are_refused_in_one_line(tmp_path: Path, change: dict[str, Any], said: str) -> None:
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(PROBLEM | change))
+    with pytest.raises(BadInput) as refused:
+        read_problem(path, "fr3")
+    assert said in str(refused.value) and "\n" not in str(refused.value) and refused.value.hint
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.binary(max_size=200))
+def test_any_bytes_are_a_problem_or_bad_input(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
+    path = tmp_path_factory.mktemp("problem") / "p.json"
+    path.write_bytes(data)
+    with pytest.raises(BadInput):
+        read_problem(path, "fr3")
+
+
+def test_a_problem_is_the_same_after_a_round_trip(tmp_path: Path) -> None:
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(PROBLEM))
+    instance = read_problem(path, "fr3")
+    assert from_file(to_file(instance), "mine") == instance
+
+
+def test_the_declaration_names_every_suite_and_refuses_idle_transcripts() -> None:
+    assert set(get_args(Suite)) == {*PUBLISHED, *HARD}
+    assert STAGE.check is not None
+    with pytest.raises(UsageError):
+        STAGE.check(PackParameters(), {"transcript": Path("t.jsonl")})
+    STAGE.check(PackParameters(proposer="symbolic"), {"transcript": Path("t.jsonl")})
+
+
+def _run(arm: str, seed: int, calls: int, success: bool = True) -> Run:
+    return Run(
+        arm=arm, case="hard/fill", seed=seed, success=success, proposer_calls=1, motion_planner_calls=calls,
+        mesh_calls=0, iterations=1, seconds=0.1, boxes=4, fill=0.7,
+    )  # fmt: skip
+
+
+def test_figures_and_tables_of_known_runs() -> None:
+    runs = [_run("ours", seed, 10) for seed in range(4)]
+    runs += [_run("backtracking", seed, 30, seed != 3) for seed in range(4)]
+    figures = metrics(runs)
+    assert figures["backtracking/hard/fill/success"] == 0.75
+    assert figures["ours/hard/fill/motion_planner_calls"] == 10
+    text = table(runs)
+    assert "| hard/fill | `backtracking` | 3.0 [3.0, 3.0] | 3 | 1 | 0 |" in text
+    assert wilson(50, 100) == pytest.approx((0.4038, 0.5962), abs=1e-4)  # Wilson 1927, worked example of many books
+    low, high = bootstrap(np.array([1.0, 2.0, 3.0, 4.0]))
+    assert 1.0 <= low < 2.5 < high <= 4.0
+    assert set(ARMS) >= {"random", "scripted_backtrack", "scripted_scratch", "ours", "fixed_layout"}
