@@ -117,3 +117,8 @@ class Packing(Artifact):
     def packing(self) -> PackingFile:
         """The parsed packing.json."""
         return PackingFile.read(self.path("packing.json"))
+
+    @property
+    def instance(self) -> PackingInstanceFile:
+        """The parsed instance.json."""
+        return PackingInstanceFile.read(self.path("instance.json"))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from google.protobuf.message import DecodeError
@@ -15,13 +14,10 @@ from schemas.interactive_scene import InteractiveScene
 from schemas.plan import Plan
 from stages.kit.formats.foxglove import JPEG_START, stamp_nanoseconds, transform_matrix
 from stages.kit.formats.mcap_log import McapLog
-from stages.kit.formats.urdf_file import parse_urdf
 from stages.kit.viewing.canvas import SHELL, Canvas
 from stages.kit.viewing.inputs import input_artifact
-from stages.kit.viewing.meshes import merged, shape_mesh
+from stages.kit.viewing.robot_view import ROBOT, draw_robot
 from stages.kit.viewing.scene_view import draw_scene_folder
-
-ROBOT = "robot/"
 
 
 def draw_plan(plan: Plan, canvas: Canvas) -> None:
@@ -35,7 +31,7 @@ def draw_plan(plan: Plan, canvas: Canvas) -> None:
     if not path.exists():
         return
     with McapLog(path) as log:
-        _draw_robot(log, canvas)
+        draw_robot(canvas)
         _animate(log, canvas)
 
 
@@ -85,26 +81,3 @@ def _animate(log: McapLog, canvas: Canvas) -> None:
 
 def _entity(frame: str) -> str:
     return frame if frame.startswith(ROBOT) else f"scene/{frame}"
-
-
-def _draw_robot(log: McapLog, canvas: Canvas) -> None:
-    """Draw the robot's links where its description is installed; without it only the room moves."""
-    from stages.kit.simulation.robot_description import load_robot
-
-    try:
-        robot = load_robot("panda")
-        links = parse_urdf(robot.urdf).links
-    except Exception as error:  # noqa: BLE001 (a view without the robot is better than none)
-        canvas.document("robot", f"not drawn: {error}")
-        return
-    for link in links:
-        meshes = []
-        for shape in link.visuals:
-            try:
-                meshes.append(shape_mesh(shape, robot.urdf.parent))
-            except BadInput:
-                continue
-        if meshes:
-            mesh = merged(meshes)
-            colors = np.tile(np.array([225, 225, 230], np.uint8), (len(mesh.vertices), 1))
-            canvas.mesh(f"{ROBOT}{link.name}", mesh, colors)

@@ -18,6 +18,7 @@ VIEWERS = {
     "contact_graph": ("graph_view", "draw_contact_graph"),
     "cad_scene": ("cad_scene_view", "draw_cad_scene"),
     "interactive_scene": ("scene_view", "draw_scene"),
+    "packing": ("packing_view", "draw_packing"),
     "plan": ("plan_view", "draw_plan"),
     "ground_truth": ("truth_view", "draw_ground_truth"),
     "cad_library": ("library_view", "draw_library"),

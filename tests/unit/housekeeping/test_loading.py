@@ -130,6 +130,9 @@ def test_scenes(run: dict) -> None:
 
 
 def test_results(run: dict) -> None:
+    packing = run["packing"]
+    assert packing.success and len(packing.attempts) == 2 and packing.problem.boxes[0].name == "red"
+    assert {name: len(rows) for name, rows in packing.trajectory.items()} == {"joints": 3, "action": 3}
     plan = run["plan"]
     assert plan.status == "executed" and [action.name for action in plan.actions] == ["pick"] and plan.failures == ()
     assert {name: len(rows) for name, rows in plan.trajectory.items()} == dict.fromkeys(

@@ -30,6 +30,7 @@ def make_tiny_run(folder: Path) -> Path:
         world_from_base=np.tile(np.eye(4), (rows, 1, 1)),
     )  # fmt: skip
     artifacts.seal(folder / "plan", "plan", scene=folder / "interactive_scene")
+    artifacts.make_packing(folder)
     trimesh.creation.box((4, 3, 2.5)).export(artifacts.make_ground_truth(folder, library) / "mesh.ply")
     artifacts.seal(folder / "ground_truth", "ground_truth", library=folder / "cad_library")
     artifacts.make_evaluation(folder)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import trimesh
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -15,8 +16,17 @@ from schemas.contact_graph import ContactGraphFile
 from schemas.evaluation import MetricsFile, ReportFile
 from schemas.ground_truth import GroundTruthFile, TrueObject
 from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
+from schemas.packing import (
+    PackingArea,
+    PackingAttempt,
+    PackingBox,
+    PackingFile,
+    PackingInstanceFile,
+    PackingObstacle,
+    PackingStep,
+)
 from schemas.panoptic_map import EntitiesFile, Entity
-from schemas.plan import PlanFile, PlannedAction
+from schemas.plan import Failure, PlanFile, PlannedAction
 from schemas.segments import FrameSegment, FrameSegments, SegmentsFile
 from schemas.sequence import Sequence
 from stages.kit.formats.frames import FrameWriter
@@ -198,6 +208,30 @@ def make_plan(run: Path) -> Path:
     ).write(root / "plan.json")
     ContactGraphFile(nodes=(), links=()).write(root / "graph.json")
     return seal(root, "plan", scene=run / "interactive_scene")
+
+
+def make_packing(run: Path) -> Path:
+    """A packing of one box beside an obstacle, after a plan that failed; the arm moves by its first joint."""
+    root = run / "packing"
+    root.mkdir()
+    box = PackingBox(name="red", width=0.04, length=0.04, height=0.07, x=0.39, y=-0.4)
+    area = {"low": (0.54, -0.1), "high": (0.76, 0.1)}
+    block = PackingObstacle(name="block", low=(0.6, 0.0), high=(0.65, 0.05), top=0.1)
+    PackingInstanceFile(boxes=(box,), basket=PackingArea(**area), obstacles=(block,)).write(root / "instance.json")
+    hit = Failure(kind="goal_in_collision", message="red is in collision with block", objects=("block", "red"))
+    pick = PackingStep(name="pick", box="red", tried=True)
+    bad, good = (PackingStep(name="place", box="red", x=x, y=0.0, yaw=0.0, tried=True) for x in (0.61, 0.7))
+    PackingFile(
+        name="mine", proposer="ours", success=True, proposer_calls=2, motion_planner_calls=3,
+        attempts=(
+            PackingAttempt(steps=(pick, bad.model_copy(update={"failure": hit}))), PackingAttempt(steps=(pick, good)),
+        ),
+    ).write(root / "packing.json")  # fmt: skip
+    joints = np.zeros((3, 7))
+    joints[:, 0] = [0.0, 0.1, 0.2]
+    np.savez(root / "trajectory.npz", joints=joints, action=np.array([0, 0, 1], np.int32))
+    (root / "layout.png").write_bytes(cv2.imencode(".png", np.zeros((4, 4, 3), np.uint8))[1].tobytes())
+    return seal(root, "packing")
 
 
 def make_ground_truth(run: Path, library) -> Path:

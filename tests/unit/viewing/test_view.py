@@ -37,6 +37,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     artifacts.make_cad_scene(folder, library)
     artifacts.make_interactive_scene(folder, library)
     artifacts.make_plan(folder)
+    artifacts.make_packing(folder)
     artifacts.make_ground_truth(folder, library)
     artifacts.make_evaluation(folder)
     artifacts.make_report(folder)
@@ -70,6 +71,14 @@ EXPECTED = {
     },
     "interactive_scene": {"/world/scene/table_3", "/world/scene/fridge_4", "/world/scene/fridge_4__door", "/graph"},
     "plan": {"/plan", "/world/scene/cup_5", "/world/robot/panda_hand", "/world/execution"},
+    "packing": {
+        "/plans",
+        "/world/start",
+        "/world/packed",
+        "/world/obstacles",
+        "/world/robot/panda_hand",
+        "/world/layout",
+    },
     "ground_truth": {"/world/room/fridge_4", "/world/boxes", "/world/visible", "/world/camera/labels"},
     "cad_library": {
         "/world/library/table/table_00/body",

@@ -9,7 +9,7 @@ from stages.kit.running.loading.perception import (
     LoadedSegments,
     LoadedSequence,
 )
-from stages.kit.running.loading.results import LoadedEvaluation, LoadedExport, LoadedPlan, LoadedReport
+from stages.kit.running.loading.results import LoadedEvaluation, LoadedExport, LoadedPacking, LoadedPlan, LoadedReport
 from stages.kit.running.loading.scenes import (
     LoadedCadLibrary,
     LoadedCadScene,
@@ -28,6 +28,7 @@ __all__ = [
     "LoadedGroundTruth",
     "LoadedInteractiveScene",
     "LoadedMap",
+    "LoadedPacking",
     "LoadedPlan",
     "LoadedReport",
     "LoadedSegments",

@@ -8,7 +8,7 @@ from typing import TypeVar
 from schemas.errors import BadInput
 from stages.kit.running.loading.artifact import LoadedArtifact
 from stages.kit.running.loading.perception import LoadedGroundTruth, LoadedMap, LoadedSegments, LoadedSequence
-from stages.kit.running.loading.results import LoadedEvaluation, LoadedExport, LoadedPlan, LoadedReport
+from stages.kit.running.loading.results import LoadedEvaluation, LoadedExport, LoadedPacking, LoadedPlan, LoadedReport
 from stages.kit.running.loading.scenes import (
     LoadedCadLibrary,
     LoadedCadScene,
@@ -27,6 +27,7 @@ CLASSES: dict[str, type[LoadedArtifact]] = {
     "ground_truth": LoadedGroundTruth,
     "interactive_scene": LoadedInteractiveScene,
     "panoptic_map": LoadedMap,
+    "packing": LoadedPacking,
     "plan": LoadedPlan,
     "report": LoadedReport,
     "segments": LoadedSegments,

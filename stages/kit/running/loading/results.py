@@ -1,4 +1,4 @@
-"""Plans, evaluations, reports and exports."""
+"""Plans, packings, evaluations, reports and exports."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ import numpy as np
 
 from schemas.evaluation import MetricsFile
 from schemas.exported_sequence import ExportFile
+from schemas.packing import PackingAttempt, PackingFile, PackingInstanceFile
 from schemas.plan import Failure, PlanFile, PlannedAction
 from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.running.loading.artifact import LoadedArtifact
 
 TRAJECTORY_ARRAYS = ("time", "joints", "world_from_base", "action")
+PACKING_ARRAYS = ("joints", "action")
 
 
 class LoadedPlan(LoadedArtifact):
@@ -47,6 +49,38 @@ class LoadedPlan(LoadedArtifact):
             return {}
         arrays = read_arrays(self.path / "trajectory.npz", *TRAJECTORY_ARRAYS)
         return dict(zip(TRAJECTORY_ARRAYS, arrays, strict=True))
+
+
+class LoadedPacking(LoadedArtifact):
+    """Kind `packing`."""
+
+    @cached_property
+    def info(self) -> PackingFile:
+        """packing.json."""
+        return PackingFile.read(self.path / "packing.json")
+
+    @cached_property
+    def problem(self) -> PackingInstanceFile:
+        """instance.json: boxes, basket, obstacles."""
+        return PackingInstanceFile.read(self.path / "instance.json")
+
+    @property
+    def success(self) -> bool:
+        """Whether every box ended in the basket."""
+        return self.info.success
+
+    @property
+    def attempts(self) -> tuple[PackingAttempt, ...]:
+        """Every proposed plan with what motion planning said to it."""
+        return self.info.attempts
+
+    @cached_property
+    def trajectory(self) -> dict[str, np.ndarray]:
+        """`joints` (N, 7) [rad], `action` (N,) row of the last plan; empty without one."""
+        if "trajectory.npz" not in self.files:
+            return {}
+        arrays = read_arrays(self.path / "trajectory.npz", *PACKING_ARRAYS)
+        return dict(zip(PACKING_ARRAYS, arrays, strict=True))
 
 
 class LoadedEvaluation(LoadedArtifact):
