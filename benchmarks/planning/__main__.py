@@ -5,12 +5,17 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from benchmarks.planning import motion
+from benchmarks.planning import motion, tamp
 
-PART_NAMES = ("motion",)
+PART_NAMES = ("motion", "tamp")
+ROOMS, QUICK_ROOMS = 50, 2
+LIBRARY_SEED = 1
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -21,8 +26,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--quick", action="store_true", help=f"{motion.QUICK_QUERIES} queries a case")
     parser.add_argument("--tuning", action="store_true", help="the tuning seeds instead of those for reporting")
     parser.add_argument("--parts", default=",".join(PART_NAMES), help="comma-separated; default: all")
+    parser.add_argument(
+        "--rooms", type=int, help=f"rooms of the part tamp; default {ROOMS}, {QUICK_ROOMS} with --quick"
+    )
+    parser.add_argument("--cases", default=",".join(tamp.CASES), help="cases of the part tamp, comma-separated")
+    parser.add_argument("--jobs", type=int, default=min(2, os.cpu_count() or 1), help="rooms at a time")
     options = parser.parse_args(argv)
-    parts: dict[str, Callable[[], tuple[dict[str, float], str]]] = {"motion": lambda: _motion(options)}
+    parts: dict[str, Callable[[], tuple[dict[str, float], str]]] = {
+        "motion": lambda: _motion(options),
+        "tamp": lambda: _tamp(options),
+    }
     metrics: dict[str, float] = {}
     texts = []
     for name in options.parts.split(","):
@@ -39,6 +52,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _motion(options: argparse.Namespace) -> tuple[dict[str, float], str]:
     metrics = motion.run(options.scene, quick=options.quick, tuning=options.tuning)
     return metrics, motion.table(metrics)
+
+
+def _tamp(options: argparse.Namespace) -> tuple[dict[str, float], str]:
+    library = options.out / "cad_library"
+    command = [sys.executable, "-m", "cli", "library", "build", "--seed", str(LIBRARY_SEED), "--out", str(library)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    rooms = options.rooms or (QUICK_ROOMS if options.quick else ROOMS)
+    seeds = (tamp.TUNING if options.tuning else tamp.REPORTING)[:rooms]
+    metrics = tamp.run(library, options.out / "rooms", seeds=seeds, cases=options.cases.split(","), jobs=options.jobs)
+    return metrics, tamp.table(metrics)
 
 
 if __name__ == "__main__":

@@ -7,12 +7,14 @@ One room is `room_results`. Seconds are of CPU, one process; rooms of a case are
 from __future__ import annotations
 
 import json
+import multiprocessing
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -158,15 +160,17 @@ def room_results(
 
 
 def run(
-    library: Path, folder: Path, *, seeds: Sequence[int], cases: Sequence[str] = (EXACT,),
-    tasks: Sequence[TaskName] = TASKS,
+    library: Path, folder: Path, *, seeds: Sequence[int], cases: Sequence[str] = CASES,
+    tasks: Sequence[TaskName] = TASKS, jobs: int = 1,
 ) -> dict[str, float]:  # fmt: skip
-    """Return the figures over the rooms of some seeds; rooms and results go to `folder` and are used again."""
-    results = []
-    for case in cases:
-        for seed in seeds:
-            results += room_results(case, seed, library, folder / case / str(seed), tasks)
-    return figures(results)
+    """Return the figures over the rooms of some seeds, `jobs` of them at a time; rooms and results go to `folder` and
+    are used again."""
+    rooms = [(case, seed) for case in cases for seed in seeds]
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        found = [
+            pool.submit(room_results, case, seed, library, folder / case / str(seed), tasks) for case, seed in rooms
+        ]
+        return figures([result for room in found for result in room.result()])
 
 
 def figures(results: Sequence[RoomResult]) -> dict[str, float]:
