@@ -23,6 +23,15 @@ class Failure(Model):
     numbers: dict[str, float] = {}
 
 
+class TriedPlan(Model):
+    """A plan that the task search gave to geometry."""
+
+    actions: tuple[str, ...]
+    failed_action: int | None = None
+    """Index of the first action without a motion; None: every action has one."""
+    failure: Failure | None = None
+
+
 class PlannedAction(Model):
     """One step of the plan with its motion."""
 
@@ -80,6 +89,8 @@ class PlanFile(Model):
     actions: tuple[PlannedAction, ...]
     failures: tuple[Failure, ...] = ()
     """Every failure met on the way, the last is the one that ended the search when there is no plan."""
+    tried: tuple[TriedPlan, ...] = ()
+    """Task plans in the order in which geometry tried them."""
     checks: tuple[Check, ...] = ()
     status: Literal["executed", "planned", "infeasible", "execution_failed"]
     matches: tuple[BodyMatch, ...] = ()

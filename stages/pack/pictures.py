@@ -3,16 +3,15 @@ each branch that was cut, the scene at the end."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 from PIL import Image
 
+from stages.kit.measurement.plan_tree import CUT, REACHED, UNMET, Branch, plan_tree
 from stages.pack.environment import PackingWorld, clipped
 from stages.pack.hand import release_height, tool_over_centre
 from stages.pack.loop import PackingRun
@@ -24,8 +23,8 @@ BOX_COLORS = {
     "purple": "#8a6bb1", "orange": "#dd8a45", "white": "#dddddd", "brown": "#8a6a52",
 }  # fmt: skip
 OTHER = "#9aa5ad"
-REFUSED = "#b3261e"
-MOST_REFUSED, MOST_LEAVES = 60, 28
+REFUSED = CUT
+MOST_REFUSED = 60
 DOTS = 100
 
 
@@ -94,64 +93,22 @@ def draw_layout(path: Path, world: PackingWorld, run: PackingRun, width: int) ->
     _save(figure, path)
 
 
-@dataclass
-class _Node:
-    label: str
-    children: dict[Action, _Node] = field(default_factory=dict)
-    ends: list[tuple[str, str]] = field(default_factory=list)
-    """(text, colour) of plans that end here."""
-
-
-def _tree(attempts: tuple[Attempt, ...]) -> _Node:
-    root = _Node("start")
-    for number, attempt in enumerate(attempts, start=1):
-        node = root
-        reason, color = (attempt.task.message, "#a86400") if attempt.task else ("goal reached", "#2e7d32")
-        for step in attempt.feedback:
-            if step.failure is not None:
-                told = f"{step.action.name} {step.action.box}: {step.failure.message}"
-                reason, color = told, REFUSED
-                break
-            if step.action.name == "place":
-                label = f"{step.action.box.removesuffix('_box')} ({step.action.x:.2f}, {step.action.y:.2f})"
-                node = node.children.setdefault(step.action, _Node(label))
-        node.ends.append((f"{number}: {reason}", color))
-    return root
+def _branch(attempt: Attempt) -> Branch:
+    """Return the placements of an attempt that went through, and what ended it."""
+    steps: list[tuple[Action, str]] = []
+    for step in attempt.feedback:
+        if step.failure is not None:
+            return Branch(tuple(steps), f"{step.action.name} {step.action.box}: {step.failure.message}")
+        if step.action.name == "place":
+            label = f"{step.action.box.removesuffix('_box')} ({step.action.x:.2f}, {step.action.y:.2f})"
+            steps.append((step.action, label))
+    end, color = (attempt.task.message, UNMET) if attempt.task else ("goal reached", REACHED)
+    return Branch(tuple(steps), end, color)
 
 
 def draw_attempts(path: Path, attempts: tuple[Attempt, ...], width: int) -> None:
     """Draw the plans as one tree: shared placements once, and at each end why the plan was cut there."""
-    shown = attempts[-MOST_LEAVES:]
-    root = _tree(shown)
-    leaves = len(shown)
-    deepest = max((len(attempt.feedback) // 2 for attempt in shown), default=0)
-    height = max(240, 60 + 34 * leaves)
-    figure = Figure(figsize=(1.6 * width / DOTS, 1.1 * height / DOTS), dpi=DOTS)
-    axes = figure.add_axes((0.01, 0.01, 0.98, 0.93))
-    _draw_node(axes, root, 0, 0.0)
-    axes.set_xlim(-0.5, deepest + 4.5)
-    axes.set_ylim(leaves - 0.3, -0.7)
-    axes.axis("off")
-    hidden = len(attempts) - len(shown)
-    figure.suptitle("Plans that were proposed" + (f" (the last {len(shown)}, {hidden} before)" if hidden else ""),
-                    fontsize=10)  # fmt: skip
-    _save(figure, path)
-
-
-def _draw_node(axes: Axes, node: _Node, depth: int, row: float) -> float:
-    """Draw a node and what follows it from a row down; return how many rows it took."""
-    axes.text(depth, row, node.label, fontsize=7, va="center", ha="center",
-              bbox={"boxstyle": "round,pad=0.2", "facecolor": "#eef2f6", "edgecolor": "#90a0b0"})  # fmt: skip
-    used = 0.0
-    for child in node.children.values():
-        axes.plot([depth, depth + 1], [row, row + used], color="#90a0b0", linewidth=0.8, zorder=0)
-        used += _draw_node(axes, child, depth + 1, row + used)
-    for text, color in node.ends:
-        axes.plot([depth, depth + 0.55], [row, row + used], color=color, linewidth=0.8, zorder=0)
-        axes.text(depth + 0.6, row + used, text if len(text) < 110 else text[:107] + "...", fontsize=7, va="center",
-                  color=color)  # fmt: skip
-        used += 1
-    return max(used, 1.0)
+    _save(plan_tree([_branch(attempt) for attempt in attempts], "Plans that were proposed", width), path)
 
 
 def draw_scene(path: Path, world: PackingWorld, run: PackingRun, width: int) -> None:

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from schemas.plan import Failure
+from schemas.plan import Failure, TriedPlan
 from stages.kit.motion.base_placement import plan_drive
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.tasks.fast_downward import plan_with_fast_downward
@@ -215,6 +215,7 @@ class Attempt:
     actions: list[GroundAction] | None
     steps: list[Step] | None
     failures: list[Failure]
+    tried: tuple[TriedPlan, ...] = ()
     learned: tuple[str, ...] = ()
     """What the failures taught the task search, in words."""
 
@@ -240,6 +241,7 @@ def plan_and_refine(
     actions = ground(domain, problem)
     failures: list[Failure] = []
     lessons = Lessons()
+    tried: list[TriedPlan] = []
     for _ in range(task_attempts):
         allowed = lessons.apply(actions)
         if planner == "builtin":
@@ -248,14 +250,17 @@ def plan_and_refine(
             found = plan_with_fast_downward(domain, problem, allowed)
         if found.actions is None:
             failures.append(_no_task_plan(problem, found, lessons))
-            return Attempt(None, None, failures, tuple(lessons.words))
+            return Attempt(None, None, failures, tuple(tried), tuple(lessons.words))
+        texts = tuple(action.text for action in found.actions)
         worst: RefinementFailed | None = None
         for _ in range(refinement_attempts):
             try:
                 steps = refine_plan(model, state, found.actions, budgets, random)
-                return Attempt(found.actions, steps, failures, tuple(lessons.words))
+                tried.append(TriedPlan(actions=texts))
+                return Attempt(found.actions, steps, failures, tuple(tried), tuple(lessons.words))
             except RefinementFailed as failed:
                 failures.append(failed.failure)
+                tried.append(TriedPlan(actions=texts, failed_action=failed.place, failure=failed.failure))
                 worst = failed
                 if failed.failure.kind in FINAL:
                     break
@@ -264,7 +269,7 @@ def plan_and_refine(
         for action in found.actions[: worst.place]:
             before = apply_action(before, action)
         lessons.learn(worst.action, worst.failure, actions, before)
-    return Attempt(None, None, failures, tuple(lessons.words))
+    return Attempt(None, None, failures, tuple(tried), tuple(lessons.words))
 
 
 def _no_task_plan(problem: Problem, found: TaskPlan, lessons: Lessons) -> Failure:

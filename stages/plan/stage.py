@@ -12,7 +12,7 @@ from schemas.contact_graph import ContactGraphFile
 from schemas.errors import UsageError
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
-from schemas.plan import BodyMatch, Check, Failure, Plan, PlanFile, PlannedAction, TreeDifference
+from schemas.plan import BodyMatch, Check, Failure, Plan, PlanFile, PlannedAction, TreeDifference, TriedPlan
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.simulation.robot import Configuration
@@ -78,12 +78,20 @@ class Outcome:
 
 
 @dataclass(frozen=True)
+class Search:
+    """How the plan was found, or not: the task plans that geometry tried, and what their failures taught."""
+
+    tried: tuple[TriedPlan, ...]
+    learned: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Found:
     """What planning found, beyond the steps."""
 
     literals: tuple[str, ...]
     steps: list[Step] | None
-    learned: tuple[str, ...]
+    search: Search
     assumptions: tuple[str, ...]
 
 
@@ -114,7 +122,7 @@ def run(
             failures.append(failed.failure)
         state = RobotState(base, robot.carry)
         with context.progress.step("plan"):
-            goal, literals, attempt, learned = _first_feasible(
+            goal, literals, attempt, search = _first_feasible(
                 model, state, goals if not failures else [], objects, initial, budgets, parameters, context, failures
             )
         if not goals and not failures:
@@ -145,7 +153,7 @@ def run(
                     beliefs,
                 )
             arrays |= snapshots
-        found = Found(literals, steps, learned, tuple(belief.words for belief in beliefs))
+        found = Found(literals, steps, search, tuple(belief.words for belief in beliefs))
         return _write(parameters, context, found, ranges, failures, outcome, arrays, updated)
     finally:
         model.close()
@@ -169,12 +177,13 @@ def _candidates(
 def _first_feasible(
     model: WorldModel, state: RobotState, goals: list[tuple[frozenset[Atom], tuple[str, ...]]], objects: dict[str, str],
     initial: frozenset[Atom], budgets: Budgets, parameters: PlanParameters, context: Context, failures: list[Failure],
-) -> tuple[frozenset[Atom], tuple[str, ...], Attempt | None, tuple[str, ...]]:  # fmt: skip
-    """Try the goals in order; return the first with a plan, or the first of all without one, and what was learned.
+) -> tuple[frozenset[Atom], tuple[str, ...], Attempt | None, Search]:  # fmt: skip
+    """Try the goals in order; return the first with a plan, or the first of all without one, and the search.
 
     Failures are collected.
     """
     learned: list[str] = []
+    tried: list[TriedPlan] = []
     for number, (goal, literals) in enumerate(goals):
         attempt = plan_and_refine(
             model, state, DOMAIN, task_problem(objects, initial, goal), budgets, context.random(SEARCH, number),
@@ -183,9 +192,11 @@ def _first_feasible(
         )  # fmt: skip
         failures += attempt.failures
         learned += attempt.learned
+        tried += attempt.tried
         if attempt.steps is not None:
-            return goal, literals, attempt, tuple(learned)
-    return (*goals[0], None, tuple(learned)) if goals else (frozenset(), (), None, tuple(learned))
+            return goal, literals, attempt, Search(tuple(tried), tuple(learned))
+    search = Search(tuple(tried), tuple(learned))
+    return (*goals[0], None, search) if goals else (frozenset(), (), None, search)
 
 
 def _nothing_to_do(model: WorldModel, graph: ContactGraphFile, initial: frozenset[Atom]) -> Failure:
@@ -342,8 +353,8 @@ def _write(
         goal=literals, planned_in="reconstructed", executed_in=outcome.executed_in, actions=actions,
         failures=(*failures, *outcome.failures, *unmet), checks=outcome.checks, status=status,
         matches=outcome.matches, assumptions=(*found.assumptions, *outcome.assumptions), bumps=outcome.bumps,
-        task=parameters.task or None, planner=parameters.planner, learned=found.learned,
-        tree_differences=outcome.differences,
+        task=parameters.task or None, planner=parameters.planner, learned=found.search.learned,
+        tried=found.search.tried, tree_differences=outcome.differences,
     )  # fmt: skip
     plan.write(context.output / "plan.json")
     graph.write(context.output / "graph.json")

@@ -11,7 +11,8 @@ from schemas.contact_graph import SCENE_NODE
 from schemas.interactive_scene import InteractiveScene
 from schemas.plan import Check, Failure, Plan
 from stages.kit.formats.numpy_files import read_arrays
-from stages.report.images import Picture, from_file
+from stages.report.images import Picture, from_figure, from_file
+from stages.report.motion_figures import motion_figure, tried_tree
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,10 @@ class PlanView:
     failures: tuple[tuple[Failure, int], ...]
     """Each kind of failure of each action once, with how often it was met; in order of the last time."""
     seconds: str
+    tree: Picture | None = None
+    """Task plans that geometry tried, with the reason at each that was given up."""
+    joints: Picture | None = None
+    """Base and arm over the time of the motion."""
 
 
 def body_rows(scene: InteractiveScene) -> list[BodyRow]:
@@ -112,6 +117,8 @@ def plan_view(plan: Plan, most: int, width: int) -> PlanView:
         checks=file.checks,
         failures=_together(file.failures),
         seconds="" if times is None or not len(times) else f"{times[-1] - times[0]:.0f} s",
+        tree=from_figure(tried_tree(file), "task plans that were tried") if file.tried else None,
+        joints=from_figure(motion_figure(plan), "joints over time") if times is not None and len(times) > 1 else None,
     )
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from PIL import Image
 
 from schemas.errors import BadInput
@@ -66,6 +68,16 @@ def plot(path: Path, alt: str, width: int = 1100) -> Picture:
         raise BadInput(f"{path}: {error}", hint="make the artifact again") from None
     buffer = io.BytesIO()
     image.quantize(240, method=Image.Quantize.MAXCOVERAGE).save(buffer, "PNG", optimize=True)
+    return _picture("png", buffer, image, alt)
+
+
+def from_figure(figure: Figure, alt: str, width: int = 1100) -> Picture:
+    """Embed a matplotlib figure as PNG with a reduced palette."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    image = _fit(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"), width)
+    buffer = io.BytesIO()
+    image.quantize(128).save(buffer, "PNG", optimize=True)
     return _picture("png", buffer, image, alt)
 
 
