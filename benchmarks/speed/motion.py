@@ -144,7 +144,7 @@ def measure_paths(robot: Robot, queries: int) -> dict[str, float]:
     random = np.random.default_rng(1)
 
     def check(arm: np.ndarray):  # noqa: ANN202 (a Collision or None)
-        return checker.check(np.concatenate([BASE, arm]))
+        return checker.check_meshes(np.concatenate([BASE, arm]))
 
     samples = random_starts(chain, 2000, random)
     seconds, collisions = timed(lambda: [check(arm) for arm in samples])
