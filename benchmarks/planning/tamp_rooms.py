@@ -2,17 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from schemas.cad_library import CadLibrary
+from schemas.errors import BadInput
 from schemas.interactive_scene import InteractiveScene
+from schemas.scene_parts import SurfacePlane
 from stages.kit.formats.scene_bundle import write_scene_bundle
 from stages.synthesize.arrangement import arrange
 from stages.synthesize.furniture import Catalogue
+from stages.synthesize.placement import PlacedObject
 from stages.synthesize.recipes import load_recipe
 from stages.synthesize.truth import object_boxes, scene_bodies, true_graph
 from stages.synthesize.viewpoints import blocked_floor
+
+
+def shut_furniture(things: Sequence[PlacedObject], catalogue: Catalogue) -> tuple[PlacedObject, ...]:
+    """Return the things with all doors and drawers closed; what stands on a surface keeps it under its new number."""
+    before = {thing.name: thing.furnishing for thing in things}
+    closed = {name: catalogue.furnishing(was.model, {}, was.scale) for name, was in before.items()}
+    found = []
+    for thing in things:
+        plane = thing.plane
+        if plane is not None and thing.parent in closed:
+            plane = same_surface(before[thing.parent].surfaces[plane], closed[thing.parent].surfaces)
+        found.append(replace(thing, furnishing=closed[thing.name], plane=plane))
+    return tuple(found)
+
+
+def same_surface(plane: SurfacePlane, surfaces: Sequence[SurfacePlane]) -> int:
+    """Return the number of the level surface nearest to `plane`. Raises BadInput when there is none."""
+    level = [number for number, surface in enumerate(surfaces) if surface.horizontal]
+    if not level:
+        raise BadInput("closed furniture has no level surface where it carries something")
+    center = np.asarray(plane.center)
+    return min(level, key=lambda number: float(np.linalg.norm(np.asarray(surfaces[number].center) - center)))
 
 
 def exact_room(
@@ -26,11 +54,7 @@ def exact_room(
     catalogue = Catalogue(library)
     arrangement = arrange(load_recipe(recipe), catalogue, clutter, seed, blocked_floor)
     if shut:
-        closed = [
-            replace(thing, furnishing=catalogue.furnishing(thing.furnishing.model, {}, thing.furnishing.scale))
-            for thing in arrangement.objects
-        ]
-        arrangement = replace(arrangement, objects=tuple(closed))
+        arrangement = replace(arrangement, objects=shut_furniture(arrangement.objects, catalogue))
     boxes = object_boxes(arrangement)
     graph = true_graph(arrangement, boxes)
     root.mkdir(parents=True, exist_ok=True)

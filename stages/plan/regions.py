@@ -37,6 +37,8 @@ LEAST_WAY_OUT = 0.4
 NEAR_LEVEL = 0.06
 """An item stands on a region when its bottom is at most this far from its level [m]."""
 BESIDE = 0.03
+SLIDE_STEP = 0.015
+"""Of a drawer, between two looks at what is over it [m]: rails are not thinner."""
 CELL = 0.02
 """Edge of the cells on which surface and free height are noted [m]."""
 CIRCLE = np.column_stack([np.cos(np.pi / 4 * np.arange(8)), np.sin(np.pi / 4 * np.arange(8))])
@@ -59,7 +61,8 @@ class Region:
     joint: Joint | None
     """The joint that moves the region: of a drawer, or of a door with shelves."""
     free: np.ndarray
-    """(X, Y) free height [m] over each cell of `CELL`; 0 where the rectangle has no surface at this level."""
+    """(X, Y) free height [m] over each cell of `CELL`, in a drawer the least while it slides; 0 where the rectangle has
+    no surface at this level."""
 
     def carries(self, spot: np.ndarray, radius: float, height: float) -> bool:
         """Whether there is surface under, and room above, the middle and the rim of a round foot at `spot` (2,)."""
@@ -169,10 +172,12 @@ def _region(
     above = shape.hits(over, np.array([0.0, 0.0, 1.0]))
     free = np.zeros(len(points))
     free[surface] = [min((distance for distance, _ in entries), default=OPEN_AIR) for entries in above]
+    joint = shape.joints.get(number)
+    if joint is not None and joint.type == "prismatic":
+        free[surface] = np.minimum(free[surface], _room_on_the_way(shape, over, number, joint))
     clearance = min(float(np.median(free[surface])), OPEN_AIR)
     if clearance < LEAST_CLEARANCE:
         return None
-    joint = shape.joints.get(number)
     doors: tuple[str, ...] | None
     if joint is not None:
         doors = (joint.name,)
@@ -183,6 +188,18 @@ def _region(
     if doors is None:
         return None
     return Region(body, link, low, high, level, clearance, doors, joint, free.reshape(counts))
+
+
+def _room_on_the_way(shape: _Shape, points: np.ndarray, number: int, joint: Joint) -> np.ndarray:
+    """Return the least free height [m] over points (N, 3) of a drawer while it slides: what stands in it passes under
+    the rail that its front hides."""
+    least = np.full(len(points), OPEN_AIR)
+    for value in np.arange(SLIDE_STEP, joint.upper + SLIDE_STEP, SLIDE_STEP):
+        moved = points + body_from_moved(joint, min(float(value), joint.upper))[:3, 3]
+        for row, entries in enumerate(shape.hits(moved, np.array([0.0, 0.0, 1.0]))):
+            over = (distance for distance, owner in entries if owner != number)
+            least[row] = min(least[row], min(over, default=OPEN_AIR))
+    return least
 
 
 def _cells(low: np.ndarray, high: np.ndarray, height: float) -> tuple[np.ndarray, tuple[int, int]]:
