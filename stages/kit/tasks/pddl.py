@@ -11,7 +11,8 @@ Literals = tuple[tuple[Atom, ...], tuple[Atom, ...]]
 
 
 def _typed(pairs: list[tuple[str, str]]) -> str:
-    return " ".join(f"{name} - {kind}" if kind else name for name, kind in pairs)
+    # Every name gets its type: a bare one before `b - kind` would read back as a kind.
+    return " ".join(f"{name} - {kind or 'object'}" for name, kind in pairs)
 
 
 def _conjunction(atoms: list[Atom], negated: list[Atom] | None = None) -> str:
@@ -23,8 +24,7 @@ def domain_text(domain: Domain) -> str:
     """Return the PDDL text of a domain."""
     negative = any(schema.negative for schema in domain.schemas)
     lines = [f"(define (domain {domain.name})", f"  (:requirements {' '.join(REQUIREMENTS[: 3 if negative else 2])})"]
-    types = [(name, parent or "object") for name, parent in domain.types.items()]
-    lines.append(f"  (:types {_typed(types)})")
+    lines.append(f"  (:types {_typed(list(domain.types.items()))})")
     lines.append("  (:predicates")
     for name, kinds in domain.predicates.items():
         arguments = _typed([(f"?{chr(97 + place)}", kind) for place, kind in enumerate(kinds)])
@@ -102,27 +102,31 @@ def _sections(text: str, kind: str) -> tuple[str, dict[str, list[Expression]], l
 
 
 def parse_domain(text: str) -> Domain:
-    """Read a domain. Raises BadInput for what is no PDDL, uses more than STRIPS, types and negative preconditions, or
-    names types, predicates or variables that are not declared."""
+    """Read a domain. Raises BadInput for what is no PDDL, uses more than STRIPS, types and negative preconditions, names
+    types, predicates or variables that are not declared, or declares one of them, or an action, twice."""
     name, sections, actions = _sections(text, "domain")
     for unknown in set(sections) - {":requirements", ":types", ":predicates"}:
         raise refuse(f"section {unknown} is not read")
     for requirement in sections.get(":requirements", []):
         if requirement not in REQUIREMENTS:
             raise refuse(f"requirement {requirement} is not met")
-    types = {kind: "" if parent in ("object", "") else parent for kind, parent in
-             typed_names(sections.get(":types", []), ":types") if kind != "object"}  # fmt: skip
+    types = {kind: parent for kind, parent in typed_names(sections.get(":types", []), ":types") if kind != "object"}
     for kind in types:
         _check_ancestors(kind, types)
-    predicates = {}
+    predicates: dict[str, tuple[str, ...]] = {}
     for entry in sections.get(":predicates", []):
         listed = entries(entry, "a predicate")
         if not listed:
             raise refuse("a predicate has no name")
         predicate = word(listed[0], "a predicate's name")
+        if predicate in predicates:
+            raise refuse(f"predicate {predicate} is declared twice")
         kinds = [kind for _, kind in typed_names(listed[1:], f"predicate {predicate}")]
         predicates[predicate] = tuple(_known_type(kind, types, f"predicate {predicate}") for kind in kinds)
     schemas = tuple(_schema(part, types, predicates) for part in actions)
+    for schema in schemas:
+        if sum(other.name == schema.name for other in schemas) > 1:
+            raise refuse(f"action {schema.name} occurs twice")
     return Domain(name, types, predicates, schemas)
 
 
@@ -138,9 +142,7 @@ def _check_ancestors(kind: str, types: dict[str, str]) -> None:
 
 
 def _known_type(kind: str, types: dict[str, str], what: str) -> str:
-    if kind in ("", "object"):
-        return ""
-    if kind not in types:
+    if kind and kind not in types:
         raise refuse(f"{what}: type {kind!r} is not declared")
     return kind
 
@@ -151,6 +153,8 @@ def _schema(part: list[Expression], types: dict[str, str], predicates: dict[str,
     name = word(part[1], "the name of an action")
     what = f"action {name}"
     fields = {word(part[place], f"a field of {what}"): part[place + 1] for place in range(2, len(part), 2)}
+    if len(fields) != (len(part) - 2) // 2:
+        raise refuse(f"{what}: a field occurs twice")
     for unknown in set(fields) - {":parameters", ":precondition", ":effect"}:
         raise refuse(f"{what}: field {unknown} is not read")
     parameters = tuple(

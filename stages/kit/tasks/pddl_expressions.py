@@ -56,8 +56,8 @@ def entries(expression: Expression, what: str) -> list[Expression]:
 
 
 def typed_names(terms: list[Expression], what: str) -> list[tuple[str, str]]:
-    """Read `a b - kind c` as (name, type) pairs; the type of what has none is "". Raises BadInput, also for a name that
-    occurs twice."""
+    """Read `a b - kind c` as (name, type) pairs; what has no type, or `object`, has "". Raises BadInput, also for a name
+    that occurs twice."""
     pairs: list[tuple[str, str]] = []
     waiting: list[str] = []
     words = [word(term, f"an entry of {what}") for term in terms]
@@ -69,7 +69,8 @@ def typed_names(terms: list[Expression], what: str) -> list[tuple[str, str]]:
             continue
         if place + 1 >= len(words) or words[place + 1] == "-" or not waiting:
             raise refuse(f"a dash in {what} is not between names and a type")
-        pairs += [(name, words[place + 1]) for name in waiting]
+        kind = "" if words[place + 1] == "object" else words[place + 1]
+        pairs += [(name, kind) for name in waiting]
         waiting, place = [], place + 2
     pairs += [(name, "") for name in waiting]
     names = [name for name, _ in pairs]

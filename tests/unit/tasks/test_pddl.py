@@ -66,7 +66,7 @@ NAMES = st.sampled_from(("p", "q", "r_1", "long-name"))
 
 @st.composite
 def domains(draw: st.DrawFn) -> Domain:
-    predicates = draw(st.dictionaries(NAMES, st.sampled_from(((), ("k",), ("k", ""))), min_size=1, max_size=4))
+    predicates = draw(st.dictionaries(NAMES, st.sampled_from(((), ("k",), ("k", ""), ("", "k"))), min_size=1, max_size=4))
     variables = ("?x", "?y")
 
     def atoms() -> tuple[Atom, ...]:
@@ -78,6 +78,16 @@ def domains(draw: st.DrawFn) -> Domain:
         for number in range(draw(st.integers(0, 3)))
     )
     return Domain("drawn", {"k": "", "l": "k"}, predicates, schemas)
+
+
+def test_an_object_of_no_type_beside_a_typed_one_reads_back_and_is_checked() -> None:
+    domain = Domain("d", {"k": ""}, {"p": ("k",), "q": ("", "k")}, ())
+    atoms = frozenset({("p", "b"), ("q", "a", "b")})
+    problem = Problem("mixed", {"a": "", "b": "k"}, atoms, frozenset({("q", "b", "b")}))
+    text = problem_text(problem, "d")
+    assert parse_problem(text, domain) == problem
+    with pytest.raises(BadInput, match="a in p a is a object, not a k"):
+        parse_problem(text.replace("(p b)", "(p a)"), domain)
 
 
 @settings(max_examples=60, deadline=None)
@@ -115,6 +125,9 @@ def test_damaged_text_is_refused_in_one_line_or_read(data: st.DataObject) -> Non
         (("?l ?n - lamp", "?l ?l - lamp"), "occurs twice"),
         ((":effect (lit ?l)", ":effect"), "lacks its name, or one of its fields"),
         (("(define (domain", "(define (problem"), "defines no domain"),
+        (("(lit ?l - lamp)", "(lit ?l - lamp) (lit ?l)"), "predicate lit is declared twice"),
+        (("switch_off", "switch_on"), "action switch_on occurs twice"),
+        ((":effect (lit ?l)", ":effect (lit ?l) :effect (lit ?n)"), "a field occurs twice"),
     ],
 )
 def test_reasons(change: tuple[str, str], reason: str) -> None:
