@@ -59,10 +59,12 @@ def find_landmarks(task: Relaxed) -> Landmarks:
         return cost
 
     usual = explore(-1).copy()
-    found = []
+    found: list[int] = []
+    possible: list[np.ndarray] = []  # for each, what (A,) can be true before it is for the first time
     for atom in range(len(task.atoms) - 1):
         if usual[atom] < FAR and (explore(atom)[task.goal] >= FAR).any():
             found.append(atom)
+            possible.append(cost < FAR)
     atoms = np.array(found, dtype=np.int32)
     place = {atom: k for k, atom in enumerate(found)}
     needed = np.zeros((len(found), len(found)), dtype=bool)
@@ -74,11 +76,10 @@ def find_landmarks(task: Relaxed) -> Landmarks:
     for k, atom in enumerate(found):
         if task.initial[atom]:
             continue
-        possible = explore(atom) < FAR  # what can be true before the landmark is for the first time
         common: set[int] | None = None
         for action in achievers[k]:
             needs = task.pre[task.pre_at[action] : task.pre_at[action + 1]]
-            if possible[needs].all():
+            if possible[k][needs].all():
                 common = set(needs.tolist()) if common is None else common & set(needs.tolist())
         for other in common or ():
             if other in place:

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from stages.kit.tasks.estimator import Estimator
 from stages.kit.tasks.landmarks import Landmarks
-from stages.kit.tasks.relaxed import FAR, Relaxed, applicable, costs, relaxed_plan, successor
+from stages.kit.tasks.relaxed import FAR, Relaxed, applicable, successor
 
 BOOST = 1000
 
@@ -71,9 +72,7 @@ class LazySearch:
 
     def __init__(self, task: Relaxed, landmarks: Landmarks) -> None:
         self.task, self.landmarks = task, landmarks
-        self._cost = np.empty(len(task.atoms), dtype=np.int64)
-        self._by = np.empty(len(task.atoms), dtype=np.int32)
-        self._preferred = np.zeros(len(task.actions), dtype=np.uint8)
+        self._estimate = Estimator(task, "ff")
         adds: list[set[int]] = [set() for _ in task.atoms]
         for action in range(len(task.actions)):
             for atom in task.add[task.add_at[action] : task.add_at[action + 1]].tolist():
@@ -100,7 +99,7 @@ class LazySearch:
                     return Found(_trace(nodes, number), expanded, False)
                 if expanded >= limit:
                     return Found(None, expanded, False)
-                values = self._evaluate(node)
+                values = self._estimate(node.state), self.landmarks.left(node.accepted, node.state)
                 if values[0] < FAR:
                     expanded += 1
                     if any(value < low for value, low in zip(values, lows, strict=True)):
@@ -133,24 +132,14 @@ class LazySearch:
         seen[key] = len(nodes) - 1
         return len(nodes) - 1
 
-    def _evaluate(self, node: _Node) -> tuple[int, int]:
-        task = self.task
-        costs(
-            node.state, task.pre_at, task.add, task.add_at, task.user, task.user_at, -1, False, self._cost, self._by
-        )  # fmt: skip
-        plan = relaxed_plan(node.state, task.pre, task.pre_at, task.goal, self._cost, self._by, self._preferred)
-        return int(plan), self.landmarks.left(node.accepted, node.state)
-
-    def _expand(
-        self, queues: _Queues, node: _Node, number: int, values: tuple[int, int], weight: int | None
-    ) -> None:  # fmt: skip
+    def _expand(self, queues: _Queues, node: _Node, number: int, values: tuple[int, int], weight: int | None) -> None:
         task = self.task
         wanted: set[int] = set()
         for atom in self.landmarks.achievers_wanted(node.accepted).tolist():
             wanted |= self._achievers[atom]
         key = values if weight is None else (node.cost + weight * values[0], node.cost + weight * values[1])
         for action in applicable(node.state, task.pre, task.pre_at).tolist():
-            queues.push(key, number, action, bool(self._preferred[action]) or action in wanted)
+            queues.push(key, number, action, bool(self._estimate.preferred[action]) or action in wanted)
 
 
 def _trace(nodes: list[_Node], number: int) -> list[int]:

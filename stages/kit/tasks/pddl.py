@@ -102,8 +102,8 @@ def _sections(text: str, kind: str) -> tuple[str, dict[str, list[Expression]], l
 
 
 def parse_domain(text: str) -> Domain:
-    """Read a domain. Raises BadInput for what is no PDDL, uses more than STRIPS, types and negative preconditions, names
-    types, predicates or variables that are not declared, or declares one of them, or an action, twice."""
+    """Read a domain. Raises BadInput for what is no PDDL, uses more than STRIPS, types and negative preconditions,
+    names types, predicates or variables that are not declared, or declares one of them, or an action, twice."""
     name, sections, actions = _sections(text, "domain")
     for unknown in set(sections) - {":requirements", ":types", ":predicates"}:
         raise refuse(f"section {unknown} is not read")

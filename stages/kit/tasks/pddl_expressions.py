@@ -56,8 +56,8 @@ def entries(expression: Expression, what: str) -> list[Expression]:
 
 
 def typed_names(terms: list[Expression], what: str) -> list[tuple[str, str]]:
-    """Read `a b - kind c` as (name, type) pairs; what has no type, or `object`, has "". Raises BadInput, also for a name
-    that occurs twice."""
+    """Read `a b - kind c` as (name, type) pairs; what has no type, or `object`, has "". Raises BadInput, also for a
+    name that occurs twice."""
     pairs: list[tuple[str, str]] = []
     waiting: list[str] = []
     words = [word(term, f"an entry of {what}") for term in terms]

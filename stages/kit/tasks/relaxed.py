@@ -108,14 +108,14 @@ def costs(state, pre_at, add, add_at, user, user_at, without, use_max, cost, by)
     """Write the cost of every atom when nothing is ever deleted, and the action that gives it so (-1: none).
 
     Sums of precondition costs, or maxima with `use_max`. Actions that add the atom `without` are left out (-1: none).
-    Bellman-Ford over a queue of atoms whose cost fell, so that no heap is needed.
+    Dijkstra with a list of atoms for every whole cost, so that no heap is needed.
     """
     atoms, actions = len(state), len(pre_at) - 1
     waiting = np.empty(actions, dtype=np.int32)
     total = np.zeros(actions, dtype=np.int64)
     for action in range(actions):
         waiting[action] = pre_at[action + 1] - pre_at[action]
-    # Buckets by cost: a generalised Dijkstra with integer costs. Lists are linked through `following`.
+    # The lists begin in `head` and are linked through `following`; an entry whose atom got cheaper is passed over.
     size = 64
     head = np.full(size, -1, dtype=np.int32)
     entry_atom = np.empty(4 * atoms + 16, dtype=np.int32)
@@ -123,7 +123,7 @@ def costs(state, pre_at, add, add_at, user, user_at, without, use_max, cost, by)
     used = 0
     highest = 0
     for atom in range(atoms):
-        cost[atom] = 1 << 30
+        cost[atom] = FAR
         by[atom] = -1
         if state[atom] == 1:
             cost[atom] = 0
@@ -184,14 +184,14 @@ def costs(state, pre_at, add, add_at, user, user_at, without, use_max, cost, by)
 
 @njit("int64(uint8[::1], int32[::1], int32[::1], int32[::1], int64[::1], int32[::1], uint8[::1])", cache=True)
 def relaxed_plan(state, pre, pre_at, goal, cost, by, preferred):  # type: ignore[no-untyped-def]
-    """Return the number of actions of a relaxed plan (2**30: there is none) and mark those that can be done now.
+    """Return the number of actions of a relaxed plan (FAR: there is none) and mark those that can be done now.
 
     `cost` and `by` come from `costs`; `preferred` (N,) is written.
     """
     preferred[:] = 0
     for place in range(len(goal)):
-        if cost[goal[place]] >= (1 << 30):
-            return 1 << 30
+        if cost[goal[place]] >= FAR:
+            return FAR
     wanted = np.zeros(len(state), dtype=np.uint8)
     chosen = np.zeros(len(pre_at) - 1, dtype=np.uint8)
     stack = np.empty(len(state), dtype=np.int32)

@@ -14,9 +14,10 @@ from typing import Literal
 
 import numpy as np
 
+from stages.kit.tasks.estimator import Estimator
 from stages.kit.tasks.landmarks import find_landmarks
 from stages.kit.tasks.lazy_search import LazySearch
-from stages.kit.tasks.relaxed import FAR, Relaxed, applicable, costs, relax, relaxed_plan, successor
+from stages.kit.tasks.relaxed import FAR, Relaxed, applicable, relax, successor
 from stages.kit.tasks.strips import Atom, GroundAction, Problem
 
 Heuristic = Literal["landmarks", "add", "max", "ff"]
@@ -39,31 +40,6 @@ class TaskPlan:
     """Goal atoms that no sequence of actions can make true, even when nothing is ever deleted."""
 
 
-class _Estimator:
-    """Heuristic values of states (A,) of a task."""
-
-    def __init__(self, task: Relaxed, heuristic: Heuristic) -> None:
-        self.task, self.heuristic = task, heuristic
-        self.cost = np.empty(len(task.atoms), dtype=np.int64)
-        self.by = np.empty(len(task.atoms), dtype=np.int32)
-        self.preferred = np.zeros(len(task.actions), dtype=np.uint8)
-
-    def __call__(self, state: np.ndarray) -> int:
-        task = self.task
-        costs(
-            state, task.pre_at, task.add, task.add_at, task.user, task.user_at, -1, self.heuristic == "max", self.cost,
-            self.by,
-        )  # fmt: skip
-        values = self.cost[task.goal]
-        if len(values) == 0 or values.max() >= FAR:
-            return FAR if len(values) else 0
-        if self.heuristic == "max":
-            return int(values.max())
-        if self.heuristic == "add":
-            return int(values.sum())
-        return int(relaxed_plan(state, task.pre, task.pre_at, task.goal, self.cost, self.by, self.preferred))
-
-
 def plan_task(
     problem: Problem, actions: list[GroundAction], *, heuristic: Heuristic = "landmarks", limit: int = 50_000
 ) -> TaskPlan:
@@ -72,14 +48,14 @@ def plan_task(
     `max` gives a shortest plan; `landmarks` a good one fast.
     """
     task = relax(problem, actions)
-    estimate = _Estimator(task, "max")
+    estimate = Estimator(task, "max")
     estimate(task.initial)
     lost = tuple(task.atoms[atom] for atom in task.goal if estimate.cost[atom] >= FAR)
     if lost:
         return TaskPlan(None, 0, True, lost)
     if heuristic == "landmarks":
         return _landmark_plan(task, limit)
-    return _a_star(task, _Estimator(task, heuristic), limit)
+    return _a_star(task, Estimator(task, heuristic), limit)
 
 
 def _landmark_plan(task: Relaxed, limit: int) -> TaskPlan:
@@ -95,7 +71,7 @@ def _landmark_plan(task: Relaxed, limit: int) -> TaskPlan:
     return TaskPlan([task.actions[action] for action in plan], expanded, False)
 
 
-def _a_star(task: Relaxed, estimate: _Estimator, limit: int) -> TaskPlan:
+def _a_star(task: Relaxed, estimate: Estimator, limit: int) -> TaskPlan:
     start = task.initial
     key = start.tobytes()
     best_cost = {key: 0}

@@ -66,7 +66,9 @@ NAMES = st.sampled_from(("p", "q", "r_1", "long-name"))
 
 @st.composite
 def domains(draw: st.DrawFn) -> Domain:
-    predicates = draw(st.dictionaries(NAMES, st.sampled_from(((), ("k",), ("k", ""), ("", "k"))), min_size=1, max_size=4))
+    predicates = draw(
+        st.dictionaries(NAMES, st.sampled_from(((), ("k",), ("k", ""), ("", "k"))), min_size=1, max_size=4)
+    )
     variables = ("?x", "?y")
 
     def atoms() -> tuple[Atom, ...]:
