@@ -14,7 +14,8 @@ from benchmarks.planning.motion_queries import CHAIN, MotionQuery
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.optimal import optimal_path
-from stages.kit.motion.path_search import Query, find_path
+from stages.kit.motion.path_query import Query
+from stages.kit.motion.path_search import find_path
 from stages.kit.motion.rrt_connect import SearchSpace, rrt_connect
 
 RESOLUTION = 0.05

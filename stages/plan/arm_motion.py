@@ -13,7 +13,8 @@ from stages.kit.motion.cartesian import follow, straight_poses
 from stages.kit.motion.collision import Collision
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.kinematics import forward, inverse_kinematics, random_starts, reach
-from stages.kit.motion.path_search import Query, find_path
+from stages.kit.motion.path_query import Query
+from stages.kit.motion.path_search import find_path
 from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision
 from stages.kit.simulation.robot import base_pose
 from stages.plan.world_model import WorldModel

@@ -9,7 +9,8 @@ import numpy as np
 from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.path_search import Query, find_path
+from stages.kit.motion.path_query import Query
+from stages.kit.motion.path_search import find_path
 from stages.kit.motion.rrt_connect import SearchSpace
 from stages.kit.simulation.robot import base_pose
 from stages.kit.simulation.robot_description import RobotDescription

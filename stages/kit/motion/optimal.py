@@ -17,20 +17,21 @@ from schemas.errors import MissingDependency
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.compiled_check import FREE, find_collision
 from stages.kit.motion.compiled_rrt import count_refusal, last_free
-from stages.kit.motion.path_search import (
+from stages.kit.motion.failures import no_path
+from stages.kit.motion.path_query import (
     Effort,
     Query,
     blockers,
     check_ends,
     compiled_free,
     confirm,
-    find_path,
     is_free,
     may_differ,
-    no_path,
+    refusal_counts,
     shorten_path,
-    without_repeats,
 )
+from stages.kit.motion.path_search import find_path
+from stages.kit.motion.rrt_connect import without_repeats
 
 BATCH = 100
 """Samples of one batch of BIT*."""
@@ -53,7 +54,7 @@ def optimal_path(
     """
     effort = Effort() if effort is None else effort
     goals = check_ends(query, checker)
-    counts = np.zeros(1 + len(checker.compiled.parts) + len(checker.compiled.groups), dtype=np.int64)
+    counts = refusal_counts(checker)
     # OMPL waits for ever for ends that it can use: it gets those that the compiled check frees.
     usable = np.array([goal for goal in goals if compiled_free(query, goal, checker)])
     path = None

@@ -20,7 +20,8 @@ from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.kinematics import ArmChain, arm_chain, forward, inverse_kinematics, random_starts
 from stages.kit.motion.optimal import optimal_path
-from stages.kit.motion.path_search import Effort, Query, find_path
+from stages.kit.motion.path_query import Effort, Query
+from stages.kit.motion.path_search import find_path
 from stages.kit.motion.rrt_connect import SearchSpace
 from stages.kit.simulation.robot import base_pose
 

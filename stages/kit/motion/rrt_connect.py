@@ -9,10 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.kit.motion.collision import Collision
-from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.failures import end_in_collision, joint_limit, no_path
 
 FINER = 3
 """A path is accepted when it is free at this many times the resolution of the search."""
+LIMIT_TOLERANCE = 1e-6
+"""An end may be this far outside the bounds: inverse kinematics rounds."""
 Check = Callable[[np.ndarray], Collision | None]
 
 
@@ -25,6 +27,14 @@ class SearchSpace:
     upper: np.ndarray
     resolution: np.ndarray
     """(D,) largest change of each joint between two checks."""
+
+    def outside(self, point: np.ndarray) -> np.ndarray:
+        """Return by how much each value of a point (D,) is outside its bounds, negative inside."""
+        return np.maximum(self.lower - point, point - self.upper)
+
+    def holds(self, point: np.ndarray) -> bool:
+        """Whether a point (D,) is within the bounds, to LIMIT_TOLERANCE."""
+        return bool(self.outside(point).max() <= LIMIT_TOLERANCE)
 
 
 def interpolate(start: np.ndarray, end: np.ndarray, resolution: np.ndarray) -> np.ndarray:
@@ -92,23 +102,11 @@ def rrt_connect(
     `goal_in_collision` (with the pair and its depth), `no_path` (with the samples used and the body that blocked most).
     """
     for name, point in (("start", start), ("goal", goal)):
-        outside = np.maximum(space.lower - point, point - space.upper)
-        if outside.max() > 1e-6:
-            joint = int(outside.argmax())
-            raise MotionFailed(
-                "joint_limit",
-                f"the {name} puts joint {joint} {outside[joint]:.4f} outside its limits",
-                numbers={"joint": joint, "value": point[joint], "outside": outside[joint]},
-            )
+        if not space.holds(point):
+            raise joint_limit(name, point, space.outside(point))
         collision = check(point)
         if collision is not None:
-            raise MotionFailed(
-                f"{name}_in_collision",
-                f"at the {name}, {collision.part} is in collision with {collision.other} "
-                f"(depth {1000 * collision.depth:.1f} mm)",
-                (collision.part, collision.other),
-                {"depth": collision.depth},
-            )
+            raise end_in_collision(name, collision.part, collision.other, collision.depth)
     blockers: Counter[str] = Counter()
     used = 0
     while used < samples:
@@ -123,14 +121,7 @@ def rrt_connect(
             return path
         blockers[found[1].other] += 1
         used += 1
-    worst, hits = blockers.most_common(1)[0] if blockers else ("", 0)
-    raise MotionFailed(
-        "no_path",
-        f"no path within {samples} samples; {worst or 'nothing'} blocked most "
-        f"({hits} of {blockers.total()} collisions)",
-        (worst,) if worst else (),
-        {"samples": samples, "hits": hits},
-    )
+    raise no_path(samples, blockers)
 
 
 def _grow(
@@ -185,7 +176,7 @@ def shortcut(
     path: np.ndarray, check: Check, space: SearchSpace, random: np.random.Generator, attempts: int
 ) -> np.ndarray:
     """Return a shorter path (M, D): random pairs of points on it are joined by straight pieces where those are free."""
-    path = _without_repeats(path)
+    path = without_repeats(path)
     for _ in range(attempts):
         if len(path) < 3:
             break
@@ -199,10 +190,11 @@ def shortcut(
         first = path[i] + (path[i + 1] - path[i]) * (low - ends[i]) / lengths[i]
         second = path[j] + (path[j + 1] - path[j]) * (high - ends[j]) / lengths[j]
         if first_collision(interpolate(first, second, space.resolution / 2), check) is None:
-            path = _without_repeats(np.concatenate([path[: i + 1], [first, second], path[j + 1 :]]))
+            path = without_repeats(np.concatenate([path[: i + 1], [first, second], path[j + 1 :]]))
     return path
 
 
-def _without_repeats(path: np.ndarray) -> np.ndarray:
+def without_repeats(path: np.ndarray) -> np.ndarray:
+    """Return the path (M, D) without points equal to the one before."""
     keep = np.concatenate([[True], np.any(np.abs(np.diff(path, axis=0)) > 1e-12, axis=1)])
     return path[keep]

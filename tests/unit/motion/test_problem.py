@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from stages.kit.motion.all_branches import all_solutions, panda_lengths, unlimited_solutions
-from stages.kit.motion.base_placement import in_arm_frame
+from stages.kit.motion.base_placement import base_query, in_arm_frame
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.kinematics import arm_chain, forward
+from stages.kit.motion.path_query import Effort
+from stages.kit.motion.path_search import find_path
 from stages.kit.motion.problem import ArmGoal, Attachment, BaseGoal, MotionProblem, Planner, ToolGoal, solve
 from stages.kit.motion.rrt_connect import densify
 from stages.kit.simulation.robot import base_pose
@@ -111,3 +113,13 @@ def test_failures_have_kinds_and_numbers(checker: CollisionChecker) -> None:
     assert failure.kind == "no_path"
     assert failure.objects == ("table_3",)
     assert failure.numbers["samples"] == 1
+
+
+def test_what_an_earlier_search_took_is_no_part_of_the_budget(checker: CollisionChecker) -> None:
+    query = base_query(np.array([-1.3, 0.0, 0.0]), np.array([-1.3, -2.0, 1.0]), PANDA.carry, ROOM)
+    fresh, used = Effort(), Effort(samples=5000, rejected=9)
+    paths = [find_path(query, checker, np.random.default_rng(0), samples=500, effort=entry) for entry in (fresh, used)]
+    np.testing.assert_array_equal(*paths)
+    assert (used.samples, used.rejected) == (5000 + fresh.samples, 9)
+    assert 0 < fresh.samples < 500
+    assert not used.by_meshes
