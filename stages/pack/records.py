@@ -1,5 +1,4 @@
-"""Agreed between PACK and LANGUAGE. This text is `stages/pack/records.py`, byte for byte: copy it there; PACK owns it
-from then on (changes go into this file first)."""
+"""What the loop and its proposers say to each other: what is seen, plans, what motion planning said to them."""
 
 from __future__ import annotations
 
@@ -64,6 +63,9 @@ class StepFeedback:
 
     action: Action
     failure: Failure | None = None
+    """Kinds: `goal_in_collision` (objects: what is hit, then what hits it; numbers: depth [m]), `no_inverse_kinematics`
+    (numbers: distance [m] to the nearest point in reach, nearest_x, nearest_y [m]), `joint_limit`, `no_path`,
+    `unknown_object` (objects: the invented name), `wrong_order` (a place of what is not held, a pick while holding)."""
 
 
 @dataclass(frozen=True)
@@ -87,23 +89,3 @@ class Proposer(Protocol):
         """A full plan, given every attempt so far, oldest first (the proposer keeps to its last k itself). An empty
         plan is allowed: no action could be read from the reply; the loop gives it the task feedback."""
         ...
-
-
-# Failure kinds of StepFeedback (schemas.plan.Failure.kind) that the prompt and the proposers know; anything else is
-# shown by its message:
-#   goal_in_collision    objects = (offender, ...): a box, "basket", an obstacle, "table"; numbers depth [m]
-#   no_inverse_kinematics numbers distance [m] (to the nearest reachable pose), nearest_x, nearest_y [m]
-#   joint_limit, no_path, unknown_object (objects: the invented name), out_of_range, wrong_order (place of a box that is
-#   not held, pick while holding)
-# Language side (LANGUAGE writes it, signatures fixed here):
-#   stages/pack/language_proposer.py
-#       class LanguageProposer(Proposer):
-#           def __init__(self, chat: stages.kit.language.chat.Chat, *, variant: Literal["backtrack", "scratch"],
-#                        reasons: bool = True, trace_length: int = 5, name: str | None = None) -> None
-#       class SymbolicProposer(Proposer):  # the model says only the order; geometry fills x, y, yaw
-#           def __init__(self, chat, solve: PlacementSolver, *, trace_length: int = 5, reasons: bool = True) -> None
-#       PlacementSolver = Callable[[Observation, tuple[str, ...], Sequence[Attempt]], tuple[Action, ...] | Failure]
-#           observation, box names in the order to pack, the trace -> the full pick/place plan, or why there is none
-#   stages/pack/language_scripted.py
-#       scripted_chat(variant: Literal["backtrack", "scratch", "symbolic"], seed: int) -> Chat  (the stand-in)
-#   so: LanguageProposer(scripted_chat("backtrack", seed), variant="backtrack") is the arm `scripted_backtrack`.
