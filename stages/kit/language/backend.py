@@ -31,13 +31,16 @@ class Request:
     @property
     def digest(self) -> str:
         """sha256 over canonical JSON of messages (images by their own sha256), schema, model and temperature."""
-        parts = {
-            "messages": described(self.messages),
-            "schema": self.schema.document,
-            "model": self.model,
-            "temperature": float(self.temperature),
-        }
-        return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
+        return request_digest(described(self.messages), self.schema.document, self.model, self.temperature)
+
+
+def request_digest(messages: list[dict[str, Any]], schema: dict[str, Any], model: str, temperature: float) -> str:
+    """Return the digest of a request, of one that is asked as of one that was recorded. `messages`: as `described`.
+
+    Raises ValueError for what no JSON can hold.
+    """
+    parts = {"messages": messages, "schema": schema, "model": model, "temperature": float(temperature)}
+    return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ Replies may be edited by hand, prompts may not.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections import defaultdict
 from collections.abc import Iterator
@@ -15,9 +14,9 @@ from typing import Any, Literal
 
 from pydantic import ValidationError
 
-from schemas.base import Model, canonical_json
+from schemas.base import Model
 from schemas.errors import BadInput, MachineFailure
-from stages.kit.language.backend import RawReply, Request, Usage
+from stages.kit.language.backend import RawReply, Request, Usage, request_digest
 from stages.kit.language.messages import described
 
 LARGEST_TRANSCRIPT = 512 * 2**20
@@ -124,22 +123,12 @@ def _exchange(line: bytes, where: str, hint: str) -> Exchange:
         place = ".".join(map(str, first["loc"])) or "line"
         raise BadInput(f"{where}: {place}: {first['msg']}", hint=hint) from None
     try:
-        digest = _digest(exchange)
+        digest = request_digest(list(exchange.messages), exchange.schema_document, exchange.model, exchange.temperature)
     except (ValueError, RecursionError):  # NaN, or a number of thousands of digits, within the schema or a message
         raise BadInput(f"{where}: the prompt holds what no JSON can", hint=hint) from None
     if digest != exchange.digest:
         raise BadInput(f"{where}: the prompt is not the one that was recorded", hint=hint)
     return exchange
-
-
-def _digest(exchange: Exchange) -> str:
-    parts = {
-        "messages": list(exchange.messages),
-        "schema": exchange.schema_document,
-        "model": exchange.model,
-        "temperature": exchange.temperature,
-    }
-    return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
 
 
 class TranscriptFile:
