@@ -54,16 +54,19 @@ def run(problem: Path | None, transcript: Path | None, *, parameters: PackParame
 
 
 class _Guarded:
-    """A proposer whose language model may stop answering: the loop then ends with what there is."""
+    """A proposer whose language model may stop answering: the loop then ends with what there is, so that the replies
+    that were paid for are kept. Before the first plan there is nothing to keep: the error ends the step."""
 
     def __init__(self, proposer: Proposer) -> None:
         self.name, self.calls, self._proposer = proposer.name, proposer.calls, proposer
 
     def propose(self, observation: Observation, trace: Sequence[Attempt]) -> tuple[Action, ...]:
-        """Return the proposer's plan; raises GaveUp."""
+        """Return the proposer's plan; raises GaveUp, and LanguageFailed before the first plan."""
         try:
             return self._proposer.propose(observation, trace)
         except LanguageFailed as error:
+            if not trace:
+                raise
             raise GaveUp(error.failure) from None
         finally:
             self.calls = self._proposer.calls

@@ -16,11 +16,13 @@ from benchmarks.llm3.records import Run
 from benchmarks.llm3.tables import bootstrap, metrics, table, wilson
 from schemas.errors import BadInput, UsageError
 from schemas.packing import Packing
+from stages.kit.language.failures import LanguageFailed
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.pack.parameters import STAGE, PackParameters, Suite
 from stages.pack.problem_file import from_file, read_problem, to_file
 from stages.pack.stage import run
+from tests.unit.language.stub_server import replies, serving, status
 
 PROBLEM: dict[str, Any] = {
     "boxes": [
@@ -64,6 +66,18 @@ def test_a_problem_of_ones_own_and_one_without_a_solution(tmp_path: Path) -> Non
 def test_the_scripted_stand_in_is_recorded(tmp_path: Path) -> None:
     result = pack(tmp_path / "a", proposer="backtrack")
     assert result.packing.proposer_calls >= 1 and (tmp_path / "a" / "transcript.jsonl").stat().st_size > 0
+
+
+def test_a_model_that_never_answered_ends_the_step_and_one_that_stopped_leaves_what_there_is(tmp_path: Path) -> None:
+    asked: dict[str, Any] = {"proposer": "scratch", "language": "openai", "model": "stub", "retries": 0}
+    with serving(status(401)) as server, pytest.raises(LanguageFailed) as failed:
+        pack(tmp_path / "a", base_url=server.base_url, **asked)
+    assert failed.value.exit_code == BadInput.exit_code and not (tmp_path / "a" / "packing.json").exists()
+    with serving(replies({"reasoning": "", "plan": []}), status(401)) as server:
+        result = pack(tmp_path / "b", base_url=server.base_url, **asked)
+    assert result.outcome == "not_packed" and len(result.packing.attempts) == 1
+    assert result.packing.stopped is not None and result.packing.stopped.kind == "refused"
+    assert len((tmp_path / "b" / "transcript.jsonl").read_text().splitlines()) == 1
 
 
 @pytest.mark.parametrize(
