@@ -17,7 +17,7 @@ from stages.kit.measurement.average_precision import (
     match_greedily,
     mean_precision,
 )
-from stages.kit.measurement.bootstrap import Interval
+from stages.kit.measurement.bootstrap import Interval, figure_interval, paired_interval
 from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, average_quality_thesis_code
 
 Measure = Callable[[Sequence[Outcome]], float | None]
@@ -134,32 +134,11 @@ MEASURES: dict[str, Measure] = {
 
 def interval(outcomes: Sequence[Outcome], measure: Measure, random: np.random.Generator) -> Interval | None:
     """Return a measure with its 95 % percentile bootstrap interval over rooms; None where it is undefined."""
-    value = measure(outcomes)
-    if value is None:
-        return None
-    drawn = [measure([outcomes[k] for k in rows]) for rows in _draws(len(outcomes), random)]
-    return _interval(value, [v for v in drawn if v is not None])
+    return figure_interval(measure, outcomes, random, resamples=RESAMPLES)
 
 
 def difference(
     first: Sequence[Outcome], second: Sequence[Outcome], measure: Measure, random: np.random.Generator
 ) -> Interval | None:
     """Return first minus second with the interval over rooms, both on the same draws (paired)."""
-    a, b = measure(first), measure(second)
-    if a is None or b is None:
-        return None
-    drawn = []
-    for rows in _draws(len(first), random):
-        x, y = measure([first[k] for k in rows]), measure([second[k] for k in rows])
-        if x is not None and y is not None:
-            drawn.append(x - y)
-    return _interval(a - b, drawn)
-
-
-def _draws(count: int, random: np.random.Generator) -> np.ndarray:
-    return random.integers(0, count, size=(RESAMPLES, count))
-
-
-def _interval(value: float, drawn: list[float]) -> Interval:
-    low, high = np.quantile(drawn, [0.025, 0.975]) if drawn else (value, value)
-    return Interval(float(value), float(low), float(high))
+    return paired_interval(measure, first, second, random, resamples=RESAMPLES)

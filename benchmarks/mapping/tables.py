@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from stages.kit.measurement.panoptic_quality import ClassQuality
 PRINTED = Path(__file__).resolve().parent.parent / "expectations" / "thesis_mapping.toml"
 Results = Mapping[tuple[str, str], Sequence[Outcome]]
 """(arm, case) -> outcomes, one a room, rooms in the same order everywhere."""
+AnyOutcome = TypeVar("AnyOutcome")
 
 
 def percent(value: float | None) -> str:
@@ -45,6 +47,16 @@ def markdown(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> 
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows), ""])
 
 
+def rows_of(
+    results: Mapping[tuple[str, str], Sequence[AnyOutcome]], arms: Mapping[str, str], cases: Sequence[str]
+) -> Iterator[tuple[str, str, Sequence[AnyOutcome]]]:
+    """Yield (case, title of the arm, its outcomes), case by case, for all that were run. `arms`: name -> title."""
+    for case in cases:
+        for arm, title in arms.items():
+            if outcomes := results.get((arm, case)):
+                yield case, title, outcomes
+
+
 def headline(results: Results, arms: Mapping[str, str], cases: Sequence[str]) -> str:
     """Every arm in every case, PQ and the average precisions with intervals over rooms."""
     head = (
@@ -61,19 +73,15 @@ def headline(results: Results, arms: Mapping[str, str], cases: Sequence[str]) ->
         "frames/s",
     )
     rows = []
-    for case in cases:
-        for arm, title in arms.items():
-            outcomes = results.get((arm, case))
-            if not outcomes:
-                continue
-            random = np.random.default_rng(0)
-            cells = [with_interval(interval(outcomes, MEASURES["pq"], random))]
-            cells += [percent(MEASURES[name](outcomes)) for name in ("sq", "rq")]
-            cells += [with_interval(interval(outcomes, MEASURES["instance_ap"], random))]
-            cells += [percent(MEASURES["instance_ap_thesis_code"](outcomes)), percent(MEASURES["box_ap"](outcomes))]
-            cells += [with_interval(interval(outcomes, MEASURES["box_ap_refined"], random))]
-            cells += [f"{MEASURES['frames_per_second'](outcomes) or 0:.1f}"]
-            rows.append((case, title, str(len(outcomes)), *cells))
+    for case, title, outcomes in rows_of(results, arms, cases):
+        random = np.random.default_rng(0)
+        cells = [with_interval(interval(outcomes, MEASURES["pq"], random))]
+        cells += [percent(MEASURES[name](outcomes)) for name in ("sq", "rq")]
+        cells += [with_interval(interval(outcomes, MEASURES["instance_ap"], random))]
+        cells += [percent(MEASURES["instance_ap_thesis_code"](outcomes)), percent(MEASURES["box_ap"](outcomes))]
+        cells += [with_interval(interval(outcomes, MEASURES["box_ap_refined"], random))]
+        cells += [f"{MEASURES['frames_per_second'](outcomes) or 0:.1f}"]
+        rows.append((case, title, str(len(outcomes)), *cells))
     return markdown("All arms, all cases", head, rows)
 
 

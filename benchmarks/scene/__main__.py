@@ -16,7 +16,7 @@ from benchmarks.mapping.rooms import CLUTTER, REPORTING, TUNING_UNTRAINED, RoomF
 from benchmarks.scene.arms import ARMS, CASES, MASK_LEVEL, PERFECT, REAL
 from benchmarks.scene.experiment import Outcome, Shared, load_room, run_case
 from benchmarks.scene.figures_of_merit import FIGURES
-from benchmarks.scene.real_logs import run_real
+from benchmarks.scene.real_logs import annotated_runs, run_real
 from benchmarks.scene.tables import (
     PRINTED,
     Results,
@@ -43,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--maps", type=Path, required=True, help="folder of `make bench-mapping`: its rooms and maps")
-    parser.add_argument("--real", type=Path, help="folder of `make real`: its maps; the case `real` needs it")
+    parser.add_argument("--real", type=Path, help="folder of `make real`; the case `real` needs its maps")
     parser.add_argument("--quick", action="store_true", help=f"{QUICK_ROOMS} rooms of {QUICK_FRAMES} frames")
     parser.add_argument("--tuning", action="store_true", help="the tuning rooms instead of those for reporting")
     parser.add_argument("--jobs", type=int, default=min(2, os.cpu_count() or 1))
@@ -53,7 +53,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--keep", action="store_true", help="keep the artifacts (100 MB an arm and case)")
     parser.add_argument("--room", help="run this one room (recipe:seed) and stop")
     options = parser.parse_args(argv)
-    cases = options.cases.split(",") if options.cases else [*CASES, *([REAL] if options.real else [])]
+    has_real = options.real is not None and bool(annotated_runs(options.real))
+    cases = options.cases.split(",") if options.cases else [*CASES, *([REAL] if has_real else [])]
+    if REAL in cases and not has_real:
+        parser.error(f"case {REAL}: no map of an annotated log under --real; run `make real` first")
     options.out.mkdir(parents=True, exist_ok=True)
     if options.room:
         recipe, seed = options.room.split(":")
@@ -114,18 +117,21 @@ def one_room(options: argparse.Namespace, cases: Sequence[str], room: tuple[str,
     if any(case != PERFECT for case in missing) and not all(
         (maps / MASK_LEVEL / arm / "panoptic_map" / "volume.npz").is_file() for arm in wanted
     ):
-        command = [
-            sys.executable,
-            "-m",
-            "benchmarks.mapping",
-            "--out",
-            str(options.maps),
+        command = [sys.executable, "-m", "benchmarks.mapping", "--out", str(options.maps)]
+        command += [
             "--room",
-            ":".join(map(str, room)),
+            f"{room[0]}:{room[1]}",
+            "--cases",
+            MASK_LEVEL,
+            "--arms",
+            ",".join(wanted),
+            *(["--quick"] if options.quick else []),
         ]
-        command += ["--cases", MASK_LEVEL, "--arms", ",".join(wanted), *(["--quick"] if options.quick else [])]
-        (options.maps / "outcomes" / f"{folder.name}-{MASK_LEVEL}.json").unlink(missing_ok=True)
+        # `make bench-mapping` takes a room for done where this file stands; it would hold these arms alone.
+        outcome = options.maps / "outcomes" / f"{folder.name}-{MASK_LEVEL}.json"
+        outcome.unlink(missing_ok=True)
         subprocess.run(command, check=True)
+        outcome.unlink()
     libraries = {
         False: CadLibrary(options.maps / "rooms" / "cad_library"),
         True: CadLibrary(held_out_library(options)),

@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from benchmarks.scene.experiment import Outcome
-from stages.kit.measurement.bootstrap import Interval
+from stages.kit.measurement.bootstrap import Interval, figure_interval, paired_interval
 
 Figure = Callable[[Sequence[Outcome]], float | None]
 RESAMPLES = 2000
+SEED_OF_INTERVALS = 0
 
 
 def edge_f1(relation: str) -> Figure:
@@ -100,30 +101,12 @@ def _ratio(outcomes: Sequence[Outcome], part: str, whole: str) -> float | None:
     return sum(o.cad.get(part) or 0.0 for o in outcomes) / total if total else None
 
 
-def interval(figure: Figure, outcomes: Sequence[Outcome], seed: int = 0) -> Interval | None:
+def interval(figure: Figure, outcomes: Sequence[Outcome]) -> Interval | None:
     """Percentile bootstrap over rooms, 95 %; None where the figure is."""
-    value = figure(outcomes)
-    if value is None:
-        return None
-    random = np.random.default_rng(seed)
-    found = [figure([outcomes[k] for k in random.integers(0, len(outcomes), len(outcomes))]) for _ in range(RESAMPLES)]
-    low, high = np.quantile([v for v in found if v is not None], [0.025, 0.975])
-    return Interval(value, float(low), float(high))
+    return figure_interval(figure, outcomes, np.random.default_rng(SEED_OF_INTERVALS), resamples=RESAMPLES)
 
 
-def paired_difference(
-    figure: Figure, first: Sequence[Outcome], second: Sequence[Outcome], seed: int = 0
-) -> Interval | None:
+def paired_difference(figure: Figure, first: Sequence[Outcome], second: Sequence[Outcome]) -> Interval | None:
     """`first` minus `second` over the same rooms in the same order, with its 95 % interval; None where either is."""
-    a, b = figure(first), figure(second)
-    if a is None or b is None:
-        return None
-    random = np.random.default_rng(seed)
-    found = []
-    for _ in range(RESAMPLES):
-        rows = random.integers(0, len(first), len(first))
-        x, y = figure([first[k] for k in rows]), figure([second[k] for k in rows])
-        if x is not None and y is not None:
-            found.append(x - y)
-    low, high = np.quantile(found, [0.025, 0.975])
-    return Interval(a - b, float(low), float(high))
+    random = np.random.default_rng(SEED_OF_INTERVALS)
+    return paired_interval(figure, first, second, random, resamples=RESAMPLES)

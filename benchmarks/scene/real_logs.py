@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -12,7 +13,6 @@ import numpy as np
 from benchmarks.scene.arms import REAL, Arm
 from benchmarks.scene.experiment import Outcome, measure_graph, overlaps_of, physics_of, settle, what_moved
 from schemas.cad_library import CadLibrary
-from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth
 from schemas.panoptic_map import PanopticMap
 from stages.cad.stage import run as replace_objects
@@ -26,18 +26,21 @@ from stages.kit.stage import Context
 ANNOTATIONS = Path(__file__).resolve().parents[2] / "data" / "annotations" / "real"
 
 
+def annotated_runs(real: Path) -> list[Path]:
+    """Return the annotations of the logs whose map stands under `real` (`make real`), by name."""
+    found = sorted(ANNOTATIONS.glob("*.json"))
+    return [file for file in found if (real / file.stem / "panoptic_map" / "manifest.json").is_file()]
+
+
 def run_real(real: Path, scratch: Path, arms: Sequence[Arm], seed: int) -> list[Outcome]:
-    """Return the outcomes of every arm for every annotated log whose map stands under `real` (`make real`).
+    """Return the outcomes of every arm for every log of `annotated_runs`.
 
     All arms start from the one map that is there. No CAD model is true, so that only graph and physics are measured.
-    Raises BadInput when no map is there.
+    Raises BadInput when sequence, map or library of a run are broken.
     """
     outcomes = []
-    for annotation in sorted(ANNOTATIONS.glob("*.json")):
-        folder = real / annotation.stem
-        if not (folder / "panoptic_map" / "manifest.json").is_file():
-            continue
-        where = scratch / annotation.stem
+    for annotation in annotated_runs(real):
+        folder, where = real / annotation.stem, scratch / annotation.stem
         command = [sys.executable, "-m", "cli", "truth", "supports", "--annotation", str(annotation)]
         command += ["--sequence", str(folder / "sequence"), "--panoptic-map", str(folder / "panoptic_map")]
         subprocess.run([*command, "--out", str(where / "ground_truth")], check=True, stdout=subprocess.DEVNULL)
@@ -49,6 +52,8 @@ def run_real(real: Path, scratch: Path, arms: Sequence[Arm], seed: int) -> list[
         truth = load_truth(truth_artifact, np.eye(4), EvaluateParameters().minimum_visible_points)
         overlaps = overlaps_of(truth, panoptic_map)
         for arm in arms:
+            # `cad` takes every mesh that it finds in its folder for a thing of the scene, those of an earlier run too.
+            shutil.rmtree(where / arm.name, ignore_errors=True)
             graph = build_graph(panoptic_map, parameters=arm.graph, context=_context(where / arm.name / "graph", seed))
             context = _context(where / arm.name / "cad_scene", seed)
             scene = replace_objects(graph, panoptic_map, library, parameters=arm.cad, context=context)
@@ -65,8 +70,6 @@ def run_real(real: Path, scratch: Path, arms: Sequence[Arm], seed: int) -> list[
                     unsettled=what_moved(settled),
                 )
             )
-    if not outcomes:
-        raise BadInput(f"{real}: no map of an annotated log", hint="run `make real` first")
     return outcomes
 
 

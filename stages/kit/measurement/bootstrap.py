@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
+
+Sample = TypeVar("Sample")
 
 
 @dataclass(frozen=True)
@@ -38,3 +41,56 @@ def bootstrap_interval(
     tail = (1.0 - level) / 2.0
     low, high = np.quantile(resampled, [tail, 1.0 - tail])
     return Interval(float(statistic(values, axis=0)), float(low), float(high))
+
+
+def figure_interval(
+    figure: Callable[[Sequence[Sample]], float | None],
+    samples: Sequence[Sample],
+    random: np.random.Generator,
+    *,
+    resamples: int,
+) -> Interval | None:
+    """95 % percentile interval of any figure over whole samples (rooms), drawn with replacement.
+
+    None where the figure is None of the samples as they are; draws of which it is None are left out, and without any
+    other the interval has no width.
+    """
+    value = figure(samples)
+    if value is None:
+        return None
+    drawn = [figure([samples[k] for k in rows]) for rows in _draws(len(samples), random, resamples)]
+    return _around(value, [found for found in drawn if found is not None])
+
+
+def paired_interval(
+    figure: Callable[[Sequence[Sample]], float | None],
+    first: Sequence[Sample],
+    second: Sequence[Sample],
+    random: np.random.Generator,
+    *,
+    resamples: int,
+) -> Interval | None:
+    """95 % percentile interval of a figure of `first` minus that of `second`, both on the same draws.
+
+    Both hold the same rooms in the same order; ValueError when they are not as many. None where either figure is.
+    """
+    if len(first) != len(second):
+        raise ValueError(f"{len(first)} and {len(second)} samples are no pairs")
+    value, other = figure(first), figure(second)
+    if value is None or other is None:
+        return None
+    drawn = []
+    for rows in _draws(len(first), random, resamples):
+        a, b = figure([first[k] for k in rows]), figure([second[k] for k in rows])
+        if a is not None and b is not None:
+            drawn.append(a - b)
+    return _around(value - other, drawn)
+
+
+def _draws(count: int, random: np.random.Generator, resamples: int) -> np.ndarray:
+    return random.integers(0, count, size=(resamples, count))
+
+
+def _around(value: float, drawn: Sequence[float]) -> Interval:
+    low, high = np.quantile(drawn, [0.025, 0.975]) if drawn else (value, value)
+    return Interval(float(value), float(low), float(high))

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from stages.kit.measurement.bootstrap import bootstrap_interval
+from stages.kit.measurement.bootstrap import bootstrap_interval, figure_interval, paired_interval
 from stages.kit.measurement.mesh_distance import distances_to_mesh, surface_agreement
 from stages.kit.measurement.palette import hex_color, instance_color
 from stages.kit.measurement.plots import plot_bars, plot_graphs
@@ -144,6 +144,27 @@ def test_bootstrap_is_repeatable_and_handles_little_data():
     assert bootstrap_interval(np.zeros(0), np.random.default_rng(0)) is None
     middle = bootstrap_interval(values, np.random.default_rng(3), statistic=np.median)
     assert middle.value == 2.0
+
+
+def test_intervals_of_any_figure_are_those_of_the_mean_for_the_mean():
+    values = [0.0, 1.0, 1.0, 3.0, 7.0]
+    found = figure_interval(lambda rooms: float(np.mean(rooms)), values, np.random.default_rng(3), resamples=500)
+    assert found == bootstrap_interval(np.array(values), np.random.default_rng(3), resamples=500)
+    assert figure_interval(lambda rooms: None, values, np.random.default_rng(3), resamples=5) is None
+    first_alone = figure_interval(
+        lambda rooms: 2.0 if rooms == values else None, values, np.random.default_rng(3), resamples=5
+    )
+    assert first_alone is not None and (first_alone.low, first_alone.high) == (2.0, 2.0)
+
+
+def test_paired_intervals_are_those_of_the_differences():
+    first, second = [3.0, 5.0, 4.0, 9.0], [1.0, 2.0, 4.0, 6.0]
+    found = paired_interval(lambda rooms: float(np.mean(rooms)), first, second, np.random.default_rng(3), resamples=500)
+    expected = bootstrap_interval(np.array(first) - np.array(second), np.random.default_rng(3), resamples=500)
+    assert found is not None and expected is not None
+    assert (found.value, found.low, found.high) == pytest.approx((expected.value, expected.low, expected.high))
+    with pytest.raises(ValueError, match="no pairs"):
+        paired_interval(lambda rooms: 1.0, first, second[1:], np.random.default_rng(3), resamples=5)
 
 
 def test_tables():
