@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -13,41 +12,13 @@ import trimesh
 from schemas.cad_library import CadModel
 from stages.cad.shapes import Placement
 from stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, part_transforms
+from stages.kit.geometry.ray_scenes import Triangles, triangles_of
 from stages.kit.geometry.transforms import apply, inverse
 
 SAMPLES = 300
 """Points that stand for the surface of a model where it is compared with free space."""
 FACING = 0.5
 """Cosine within which a triangle belongs to a side."""
-LIVE_SCENES = 400
-"""Ray-casting scenes that exist at a time: each holds a thread-local key, and a process crashes near 1000 of them."""
-
-
-@dataclass(frozen=True, eq=False)
-class Triangles:
-    """Triangles ready for distance queries, compared by identity."""
-
-    vertices: np.ndarray
-    """(V, 3), float32."""
-    faces: np.ndarray
-    """(F, 3), uint32."""
-
-    @property
-    def scene(self) -> o3d.t.geometry.RaycastingScene:
-        """The ray-casting scene of the triangles, built again when `LIVE_SCENES` others were asked since."""
-        return _scene(self)
-
-
-@lru_cache(maxsize=LIVE_SCENES)
-def _scene(triangles: Triangles) -> o3d.t.geometry.RaycastingScene:
-    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-    scene.add_triangles(o3d.core.Tensor.from_numpy(triangles.vertices), o3d.core.Tensor.from_numpy(triangles.faces))
-    return scene
-
-
-def triangles_of(vertices: np.ndarray, faces: np.ndarray) -> Triangles:
-    """Return vertices (V, 3) and faces (F, 3) ready for distance queries."""
-    return Triangles(np.ascontiguousarray(vertices, dtype=np.float32), np.ascontiguousarray(faces, dtype=np.uint32))
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from stages.synthesize.less_common import across_two, beside_its_like, from_ceil
 from stages.synthesize.placement import Hanging, PlacedObject, Pose
 from stages.synthesize.recipes import CLUTTER_FACTOR, Place, Recipe
 from stages.synthesize.shell import Room, build_room
-from stages.synthesize.support import SupportSurfaces
+from stages.synthesize.support import sample_stand
 
 ATTEMPTS = 160
 """Poses tried for one object."""
@@ -95,7 +95,6 @@ class _Arranger:
         self.solid = CollisionWorld()
         self.kept_free = CollisionWorld()
         """Floor that must stay free, and what doors sweep; named by the owner."""
-        self.surfaces = SupportSurfaces()
 
     def run(self) -> Arrangement:
         """Apply all rules in order. Raises _Impossible."""
@@ -243,7 +242,7 @@ class _Arranger:
         if not targets:
             return None
         target = targets[int(self.random.integers(len(targets)))]
-        found = self.surfaces.sample(target, furnishing, place, self.random)
+        found = sample_stand(target, furnishing, place, self.random)
         if found is None:
             return None
         pose, plane, inside = found

@@ -19,10 +19,13 @@ from stages.kit.formats.cad_models import (
     posed_collision,
     posed_mesh,
 )
+from stages.kit.geometry.ray_scenes import Triangles, triangles_of
 from stages.kit.geometry.transforms import apply
 from stages.synthesize.collision import ConvexShape, convex_shape
 
 SWEEP_STEPS = 9
+CONTACT_BAND = 1.5e-3
+"""Vertices this close to the lowest one are what a thing stands on [m]."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,18 @@ class Furnishing:
     def mesh(self) -> trimesh.Trimesh:
         """Visual mesh in the model frame [m], scaled."""
         return posed_mesh(self.folder, self.model, self.joints, self.scale)
+
+    @cached_property
+    def triangles(self) -> Triangles:
+        """`mesh`, ready for rays."""
+        return triangles_of(np.asarray(self.mesh.vertices), np.asarray(self.mesh.faces))
+
+    @cached_property
+    def contacts(self) -> np.ndarray:
+        """Vertices (K, 3) of the model frame that it stands on [m]."""
+        points = np.asarray(self.mesh.vertices)
+        lowest = points[points[:, 2] < points[:, 2].min() + CONTACT_BAND]
+        return np.unique(np.round(lowest, 6), axis=0)
 
     @cached_property
     def shape(self) -> ConvexShape:

@@ -18,7 +18,6 @@ from stages.synthesize.collision import CollisionWorld, box_shape, convex_shape
 from stages.synthesize.furniture import Catalogue, main_joint
 from stages.synthesize.placement import PlacedObject
 from stages.synthesize.recipes import Recipe, load_recipe, recipe_names
-from stages.synthesize.support import contact_points
 
 SEEDS = (0, 1, 2, 3)
 
@@ -75,7 +74,7 @@ def test_everything_rests_on_its_parent(arrangement: Arrangement) -> None:
         if thing.parent == "floor_1":
             assert abs(bottom) < 1e-6
         elif thing.parent in by_name:
-            contacts = apply(thing.world_from_model, contact_points(thing.furnishing))
+            contacts = apply(thing.world_from_model, thing.furnishing.contacts)
             up = np.tile([0.0, 0.0, -1.0], (len(contacts), 1))
             rays = np.concatenate([contacts + [0, 0, 0.005], up], axis=1).astype(np.float32)
             gap = ray_scene(by_name[thing.parent]).cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy() - 0.005

@@ -1,4 +1,4 @@
-"""Distances to models when a library has more parts than ray-casting scenes may exist at a time."""
+"""Distances to more meshes than ray-casting scenes may exist at a time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import open3d as o3d
 import pytest
 import trimesh
 
-from stages.cad.model_surfaces import LIVE_SCENES, triangles_of
+from stages.kit.geometry.ray_scenes import LIVE_SCENES, triangles_of
 
 BEYOND_ANY_PROCESS = 1100
 """Scenes alive at once at which the process used to crash."""
