@@ -26,7 +26,7 @@ FOOTING = 0.05
 """Depth [m] below a thing in which the exported scene may put a pad that bears it."""
 ROUNDS = 6
 """Times that boxes are laid over what is left, as other boxes come of it."""
-PIECES_AT_ONCE = 4096
+POINTS_AT_ONCE = 4096
 """Points whose distance to a convex piece is computed in one go."""
 
 
@@ -60,8 +60,8 @@ def near_any(points: np.ndarray, pieces: Iterable[Convex], distance: float) -> n
     for piece in pieces:
         asked = ~near & np.all((points > piece.low - distance) & (points < piece.high + distance), axis=1)
         rows = np.flatnonzero(asked)
-        for start in range(0, len(rows), PIECES_AT_ONCE):
-            some = rows[start : start + PIECES_AT_ONCE]
+        for start in range(0, len(rows), POINTS_AT_ONCE):
+            some = rows[start : start + POINTS_AT_ONCE]
             near[some] = np.all(points[some] @ piece.normals.T - piece.offsets < distance, axis=1)
     return near
 

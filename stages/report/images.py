@@ -54,9 +54,7 @@ def from_file(path: Path, alt: str, width: int) -> Picture:
     image = _fit(image, width)
     if image.getcolors(4096) is None:
         return jpeg(np.asarray(image), alt, width)
-    buffer = io.BytesIO()
-    image.quantize(128).save(buffer, "PNG", optimize=True)
-    return _picture("png", buffer, image, alt)
+    return _png(image.quantize(128), alt)
 
 
 def plot(path: Path, alt: str, width: int = 1100) -> Picture:
@@ -66,9 +64,7 @@ def plot(path: Path, alt: str, width: int = 1100) -> Picture:
             image = _fit(opened.convert("RGB"), width)
     except (OSError, SyntaxError, Image.DecompressionBombError) as error:
         raise BadInput(f"{path}: {error}", hint="make the artifact again") from None
-    buffer = io.BytesIO()
-    image.quantize(240, method=Image.Quantize.MAXCOVERAGE).save(buffer, "PNG", optimize=True)
-    return _picture("png", buffer, image, alt)
+    return _png(image.quantize(240, method=Image.Quantize.MAXCOVERAGE), alt)
 
 
 def from_figure(figure: Figure, alt: str, width: int = 1100) -> Picture:
@@ -76,8 +72,12 @@ def from_figure(figure: Figure, alt: str, width: int = 1100) -> Picture:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     image = _fit(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"), width)
+    return _png(image.quantize(128), alt)
+
+
+def _png(image: Image.Image, alt: str) -> Picture:
     buffer = io.BytesIO()
-    image.quantize(128).save(buffer, "PNG", optimize=True)
+    image.save(buffer, "PNG", optimize=True)
     return _picture("png", buffer, image, alt)
 
 

@@ -12,6 +12,8 @@ from stages.kit.measurement.plan_tree import REACHED, Branch, plan_tree
 WIDTH, HEIGHT = 10.0, 5.4
 """[inch]"""
 SHADE = "#f0f3f6"
+ARM_JOINTS = 7
+"""Columns of `joints` before those of the fingers."""
 
 
 def tried_tree(file: PlanFile) -> Figure:
@@ -43,8 +45,8 @@ def motion_figure(plan: Plan) -> Figure:
     for values, name in ((base[:, 0, 3], "x [m]"), (base[:, 1, 3], "y [m]"), (yaw, "yaw [rad]")):
         above.plot(time, values, linewidth=1.0, label=name)
     for number in range(joints.shape[1]):
-        finger = number >= 7
-        scale, name = (100.0, f"finger {number - 6} [cm]") if finger else (1.0, f"joint {number + 1}")
+        finger = number >= ARM_JOINTS
+        scale, name = (100.0, f"finger {number - ARM_JOINTS + 1} [cm]") if finger else (1.0, f"joint {number + 1}")
         below.plot(time, scale * joints[:, number], linewidth=0.8 if finger else 1.0, label=name)
     for axes, unit in ((above, "base"), (below, "arm [rad]")):
         for number, action in enumerate(plan.plan.actions):
