@@ -177,7 +177,7 @@ class FixedArm:
 
     def _search(self, radius: float, z: float) -> np.ndarray | None:
         """Look for a configuration outside the planar family, with fixed seeds; the answer is kept."""
-        key = (round(radius, 4), round(z, 4))
+        key = (radius, z)  # not rounded: an answer must not depend on which pose near it was asked for first
         if key not in self._numeric:
             # The planar answer, pushed into the limits and out of its plane, is near: neighbouring poses then get
             # neighbouring answers.

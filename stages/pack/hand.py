@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from schemas.plan import Failure
 from stages.kit.motion.failures import MotionFailed
 from stages.pack.arm import ToolPose
+from stages.pack.records import BoxState
 from stages.pack.solids import Block, overlap
 
 # Measured on the collision meshes with the fingers 8 cm apart; heights from the tool point, metres.
@@ -40,6 +40,11 @@ def release_height(height: float) -> float:
     return max(PLACE_CENTRE, RELEASE_BOTTOM + height / 2)
 
 
+def place_tool_pose(box: BoxState, x: float, y: float, yaw: float) -> ToolPose:
+    """Return the tool's pose when a box is let go at (x, y) [m] and a yaw [rad]."""
+    return ToolPose(x, y, release_height(box.height) + tool_over_centre(box.height), yaw)
+
+
 def hand_blocks(pose: ToolPose) -> tuple[Block, ...]:
     """Return palm and both fingers at a tool pose; the fingers lie along the tool's y axis."""
     half_x, half_y, low, high = PALM
@@ -57,8 +62,11 @@ def held_block(pose: ToolPose, width: float, length: float, height: float) -> Bl
     return Block(pose.x, pose.y, pose.yaw, width / 2, length / 2, centre - height / 2, centre + height / 2)
 
 
-def end_collision(pose: ToolPose, held: Named | None, others: tuple[Named, ...]) -> Failure | None:
-    """Return the deepest collision of the held box (at its block), palm and fingers at a pose, None when it is free."""
+def end_collision(pose: ToolPose, held: Named | None, others: tuple[Named, ...]) -> MotionFailed | None:
+    """Return the deepest collision of the held box (at its block), palm and fingers at a pose, None when it is free.
+
+    `goal_in_collision`: objects what is hit and what hits it (`hand` or the held box), numbers depth [m].
+    """
     worst: tuple[float, str, str] | None = None
     parts = [(held.name, held.block)] if held is not None else []
     parts += [("hand", block) for block in hand_blocks(pose)]
@@ -76,4 +84,4 @@ def end_collision(pose: ToolPose, held: Named | None, others: tuple[Named, ...])
         f"at the goal, {who} is in collision with {other_name} (depth {1000 * depth:.1f} mm)",
         (other_name, part),
         {"depth": depth},
-    ).failure
+    )

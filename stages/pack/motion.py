@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from math import atan2, ceil, cos, hypot, sin
+from math import atan2, ceil, cos, hypot, pi, sin
 
 import numpy as np
 
-from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
 from stages.pack.arm import HOME, FixedArm, Limits, ToolPose, planar_joints
 from stages.pack.arm_scene import ArmScene
@@ -87,19 +86,19 @@ class MotionPlanner:
         carried = None if held is None else Named(held.name, held_block(goal, held.width, held.length, held.height))
         failure = end_collision(goal, carried, others)
         if failure is not None:
-            raise MotionFailed(failure.kind, failure.message, failure.objects, failure.numbers)
+            raise failure
         tops = max((other.block.top for other in others), default=0.0)
         height = _height_over(start, end, held, tops)
-        if self._surely_free(start, end, height, others):
-            return Motion(lambda: _known(self._over(start, end, height, held, others))[0], end, False)
-        path = self._over(start, end, height, held, others)
+        if self._surely_free(start, end, height, tops, others):
+            return Motion(lambda: _known(self._over(start, end, height, held, tops, others))[0], end, False)
+        path = self._over(start, end, height, held, tops, others)
         if path is not None and path[1]:
             return Motion(lambda: path[0], end, False)
         return self._with_meshes(start, end, held, others, None if path is None else path[0])
 
     # --- closed form ------------------------------------------------------------------------------------------
 
-    def _surely_free(self, start: Stance, end: Stance, height: float, others: tuple[Named, ...]) -> bool:
+    def _surely_free(self, start: Stance, end: Stance, height: float, tops: float, others: tuple[Named, ...]) -> bool:
         """Whether the up-over-down path is free wherever in its range of distances and heights it goes.
 
         Straight up from a free pose is free, as everything stands on the ground; above `height` nothing stands; and the
@@ -107,16 +106,14 @@ class MotionPlanner:
         """
         radii = sorted((start.pose.radius, end.pose.radius))
         heights = min(start.pose.z, end.pose.z), height
-        tops = max((other.block.top for other in others), default=0.0)
         lowest = lowest_within(self.arm, (radii[0], radii[1]), heights)
         return lowest > tops and not _near_base(others)
 
     def _over(
-        self, start: Stance, end: Stance, height: float, held: BoxState | None, others: tuple[Named, ...]
+        self, start: Stance, end: Stance, height: float, held: BoxState | None, tops: float, others: tuple[Named, ...]
     ) -> tuple[np.ndarray, bool] | None:
         """Return the up-over-down path (N, 7) and whether it is known to be free; None when the arm cannot follow."""
-        tops = max((other.block.top for other in others), default=0.0)
-        rise, fall = self._lift(start.pose, height), self._lift(end.pose, height)
+        rise, fall = self._lift(start, height), self._lift(end, height)
         across = _arc(rise[-1], fall[-1])
         points = np.concatenate([rise, across, fall[::-1]])
         joints = planar_joints(self.arm, points[:, 0], points[:, 2])
@@ -139,12 +136,15 @@ class MotionPlanner:
         )
         return joints, free
 
-    def _lift(self, pose: ToolPose, height: float) -> np.ndarray:
-        """Return (N, 3) distance, azimuth and height from a pose upwards; drawn in where it is too far up there."""
+    def _lift(self, stance: Stance, height: float) -> np.ndarray:
+        """Return (N, 3) distance, azimuth and height from a stance upwards; drawn in where it is too far up there."""
+        pose = stance.pose
+        azimuth = atan2(pose.y, pose.x)
+        azimuth += 2 * pi * round((stance.arm[0] - azimuth) / (2 * pi))  # joint 1 may have gone past the half turn
         count = max(1, ceil((height - pose.z) / STRIDE))
         heights = np.linspace(pose.z, height, count + 1)
         radii = np.minimum(pose.radius, self.arm.reaches(heights) - 1e-6)
-        return np.column_stack([radii, np.full(count + 1, atan2(pose.y, pose.x)), heights])
+        return np.column_stack([radii, np.full(count + 1, azimuth), heights])
 
     def _drawn_in_free(
         self, stance: Stance, rise: np.ndarray, held: BoxState | None, others: tuple[Named, ...]

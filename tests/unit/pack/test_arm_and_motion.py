@@ -116,6 +116,17 @@ def test_motions_that_closed_forms_call_free_are_free_for_meshes(planner: Motion
     assert planner.mesh_calls == searched
 
 
+def test_joint_1_may_turn_past_the_half_turn_on_the_way(planner: MotionPlanner) -> None:
+    """From behind the robot the shorter way to its right side passes azimuth pi: joint 1 ends a whole turn further."""
+    height = 0.03 + tool_over_centre(0.05)
+    behind = planner.plan(HOME_STANCE, ToolPose(-0.5, 0.15, height, 0.0), None, ())
+    beside = planner.plan(behind.end, ToolPose(0.12, -0.5, height, 0.0), None, ())
+    assert beside.end.arm[0] > np.pi
+    np.testing.assert_allclose(beside.path[0], behind.end.arm, atol=1e-3)
+    np.testing.assert_allclose(beside.path[-1], beside.end.arm, atol=1e-3)
+    assert np.abs(np.diff(beside.path, axis=0)).max() < 0.5
+
+
 def test_a_box_over_even_ground_settles_as_physics_says(planner: MotionPlanner) -> None:
     with PackingWorld(published_instance("hard", 5), planner=planner) as world:
         state, _ = world.step(world.initial, Action("pick", "green_box"))
