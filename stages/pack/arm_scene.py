@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from schemas.packing import TABLE_TOP
 from stages.kit.motion.collision import Collision
 from stages.kit.simulation.engine import engine, native_output_to_stderr
 from stages.pack.arm import FixedArm
 from stages.pack.hand import Named
-from stages.pack.instances import TABLE_TOP
 from stages.pack.solids import Block
 
 FINGER_OPENING = 0.04
@@ -41,7 +41,6 @@ class ArmScene:
         self._bodies: list[tuple[int, str]] = []
         self._held: tuple[int, np.ndarray] | None = None
         self._tool = next(index for index, name in self._links.items() if name == description.tool_link)
-        self.checks = 0
         self._table = self._box((1.5, 1.5, 0.005), (0.0, 0.0, TABLE_TOP - 0.005), 0.0)
         engine.setCollisionFilterPair(self._robot, self._table, -1, -1, 0, physicsClientId=self.client)
 
@@ -90,7 +89,6 @@ class ArmScene:
 
     def check(self, arm: np.ndarray) -> Collision | None:
         """Return the worst collision of joint values (7,), None when they are free."""
-        self.checks += 1
         client = self.client
         for index, value in zip(self._joints, arm.tolist(), strict=True):
             engine.resetJointState(self._robot, index, value, physicsClientId=client)

@@ -11,14 +11,15 @@ from math import atan2
 
 import numpy as np
 
+from schemas.packing import BASKET_TOP, TABLE_TOP
 from schemas.plan import Failure
 from stages.pack.arm import Limits, ToolPose
-from stages.pack.hand import Named, release_height, tool_over_centre
-from stages.pack.instances import BASKET_TOP, TABLE_TOP, Instance
+from stages.pack.hand import Named, place_tool_pose, release_height, tool_over_centre
+from stages.pack.instances import Instance
 from stages.pack.motion import HOME_STANCE, Motion, MotionPlanner, Stance
 from stages.pack.records import Action, BoxState
 from stages.pack.settling import Rest, SettlingTable, rest_of
-from stages.pack.solids import Block, flat_depth
+from stages.pack.solids import Block, block_over, flat_depth
 
 GOAL_MARGIN = 0.015
 """A box is in the basket when its bounds lie within the basket's grown by this on each side [m]."""
@@ -52,21 +53,7 @@ class PackingWorld:
         self.planner = planner or MotionPlanner(limits)
         self._table = SettlingTable(instance)
         self._boxes = {box.name: box for box in instance.boxes}
-        self._fixed = tuple(
-            Named(
-                obstacle.rectangle.name,
-                Block(
-                    (obstacle.rectangle.low[0] + obstacle.rectangle.high[0]) / 2,
-                    (obstacle.rectangle.low[1] + obstacle.rectangle.high[1]) / 2,
-                    0.0,
-                    (obstacle.rectangle.high[0] - obstacle.rectangle.low[0]) / 2,
-                    (obstacle.rectangle.high[1] - obstacle.rectangle.low[1]) / 2,
-                    0.0,
-                    obstacle.top,
-                ),
-            )
-            for obstacle in instance.obstacles
-        )
+        self._fixed = tuple(Named(obstacle.rectangle.name, obstacle.block) for obstacle in instance.obstacles)
         self._seen: dict[tuple[str, Rest], BoxState] = {}
         self._blocks: dict[tuple[str, Rest], Named] = {}
         self.initial = State({box.name: rest_of(box, TABLE_TOP) for box in instance.boxes}, HOME_STANCE)
@@ -116,14 +103,13 @@ class PackingWorld:
     def _place(self, state: State, action: Action) -> tuple[State, Motion]:
         box = self._boxes[action.box]
         x, y, yaw = clipped(action)
-        centre = release_height(box.height)
-        pose = ToolPose(x, y, centre + tool_over_centre(box.height), yaw)
+        pose = place_tool_pose(box, x, y, yaw)
         motion = self.planner.plan(state.stance, pose, box, self.standing(state, box.name))
         let_go = replace(box, x=x, y=y, yaw=yaw)
         ground = self._even_ground(let_go)
         if ground is not None and self._all_upright(state):
             return State(state.rests | {box.name: rest_of(let_go, ground)}, motion.end), motion
-        rests = state.rests | {box.name: rest_of(let_go, centre - box.height / 2)}
+        rests = state.rests | {box.name: rest_of(let_go, release_height(box.height) - box.height / 2)}
         return State(self._table.settle(rests), motion.end), motion
 
     def confirm(self, plan: tuple[Action, ...]) -> tuple[str, ...]:
@@ -142,10 +128,10 @@ class PackingWorld:
 
         Over one surface an upright box comes straight down, as it overlaps nothing: physics would say nothing new.
         """
-        low_x, low_y, high_x, high_y = _upright_block(box, 0.0).bounds
-        for fixed in self._fixed:
-            if flat_depth(_upright_block(box, 0.0), fixed.block) > 0:
-                return None
+        under = upright_block(box, 0.0)
+        low_x, low_y, high_x, high_y = under.bounds
+        if any(flat_depth(under, fixed.block) > 0 for fixed in self._fixed):
+            return None
         low, high = self.instance.basket.low, self.instance.basket.high
         if low_x >= low[0] and low_y >= low[1] and high_x <= high[0] and high_y <= high[1]:
             return BASKET_TOP
@@ -191,10 +177,10 @@ class PackingWorld:
         key = (name, state.rests[name])
         if key not in self._blocks:
             box, (low, high) = self.box(state, name), self.bounds(state, name)
-            block = replace(_upright_block(box, float(low[2])), top=float(high[2]))
-            if not _upright(state.rests[name]):
-                middle, half = (low + high) / 2, (high - low) / 2
-                block = Block(middle[0], middle[1], 0.0, half[0], half[1], float(low[2]), float(high[2]))
+            if _upright(state.rests[name]):
+                block = replace(upright_block(box, float(low[2])), top=float(high[2]))
+            else:
+                block = block_over(low[:2].tolist(), high[:2].tolist(), float(low[2]), float(high[2]))
             self._blocks[key] = Named(name, block)
         return self._blocks[key]
 
@@ -203,7 +189,8 @@ class PackingWorld:
         return tuple(name for name in self._boxes if not self.box(state, name).in_basket)
 
 
-def _upright_block(box: BoxState, bottom: float) -> Block:
+def upright_block(box: BoxState, bottom: float) -> Block:
+    """Return the block of a box that stands upright with its bottom at a world height [m]."""
     return Block(box.x, box.y, box.yaw, box.width / 2, box.length / 2, bottom, bottom + box.height)
 
 

@@ -7,11 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.pack.records import Action, BoxState, Observation, Rectangle
-
-TABLE_TOP = 0.005
-"""World z [m] of the table's surface: a slab of 1 cm centred at 0."""
-BASKET_TOP = 0.007
-"""World z [m] of the basket's surface: a slab of 1 cm centred at 0.002, without walls."""
+from stages.pack.solids import Block, block_over
 
 
 @dataclass(frozen=True)
@@ -21,6 +17,11 @@ class Obstacle:
     rectangle: Rectangle
     top: float
     """World z [m] of its upper face."""
+
+    @property
+    def block(self) -> Block:
+        """The space that it fills, from the ground up."""
+        return block_over(self.rectangle.low, self.rectangle.high, 0.0, self.top)
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import hypot, inf
 
-from stages.pack.arm import ToolPose
-from stages.pack.hand import hand_blocks, release_height, tool_over_centre
+from stages.pack.hand import hand_blocks, place_tool_pose
 from stages.pack.records import Action, Attempt, BoxState, Observation, Rectangle
-from stages.pack.solids import Block, flat_depth
+from stages.pack.solids import block_over, flat_depth
 
 REACH_MARGIN = 0.001
 REFUSED_SIDE = 0.012
@@ -37,11 +36,6 @@ class LearnedLimits:
     """How much farther inside the basket boxes go [m]."""
     culprit: str | None = None
     """The box whose place the last failure blames, when it is not that of the failed action."""
-
-
-def place_tool_pose(box: BoxState, x: float, y: float, yaw: float) -> ToolPose:
-    """Return the tool's pose when a box is let go at (x, y) [m] and a yaw [rad]."""
-    return ToolPose(x, y, release_height(box.height) + tool_over_centre(box.height), yaw)
 
 
 def learn(observation: Observation, trace: Sequence[Attempt], reasons: bool) -> LearnedLimits:
@@ -111,9 +105,7 @@ def _collision(
 
 def _lowest_part_over(box: BoxState, action: Action, obstacle: Rectangle) -> float | None:
     """Return the lowest bottom [m] of the parts of the hand over an obstacle: it is higher than that."""
-    middle = ((obstacle.low[0] + obstacle.high[0]) / 2, (obstacle.low[1] + obstacle.high[1]) / 2)
-    half = ((obstacle.high[0] - obstacle.low[0]) / 2, (obstacle.high[1] - obstacle.low[1]) / 2)
-    under = Block(middle[0], middle[1], 0.0, half[0], half[1], 0.0, 0.0)
+    under = block_over(obstacle.low, obstacle.high, 0.0, 0.0)
     pose = place_tool_pose(box, action.x or 0.0, action.y or 0.0, action.yaw or 0.0)
     bottoms = [part.bottom for part in hand_blocks(pose) if flat_depth(part, under) > 0]
     return min(bottoms, default=None)

@@ -69,9 +69,7 @@ def run_loop(world: PackingWorld, proposer: Proposer, budget: Budget) -> Packing
     success = False
     stopped: Failure | None = None
     calls_before = proposer.calls
-    iterations = 0
-    while not success and iterations < budget.iterations and motion_calls < budget.motion_calls:
-        iterations += 1
+    while not success and len(attempts) < budget.iterations and motion_calls < budget.motion_calls:
         try:
             actions = proposer.propose(observation, tuple(attempts))
         except GaveUp as end:

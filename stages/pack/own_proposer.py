@@ -13,11 +13,11 @@ from math import hypot, pi
 
 import numpy as np
 
+from schemas.packing import BASKET_TOP
 from schemas.plan import Failure
-from stages.pack.hand import hand_blocks
-from stages.pack.instances import BASKET_TOP
+from stages.pack.hand import hand_blocks, place_tool_pose
 from stages.pack.layout_search import LayoutProblem, find_layout
-from stages.pack.learned_limits import LearnedLimits, learn, place_tool_pose
+from stages.pack.learned_limits import LearnedLimits, learn
 from stages.pack.records import Action, Attempt, BoxState, Observation
 from stages.pack.sampling import pick_and_place
 

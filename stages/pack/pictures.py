@@ -13,7 +13,7 @@ from PIL import Image
 
 from stages.kit.measurement.plan_tree import CUT, REACHED, UNMET, Branch, plan_tree
 from stages.pack.environment import PackingWorld, clipped
-from stages.pack.hand import release_height, tool_over_centre
+from stages.pack.hand import held_block, place_tool_pose
 from stages.pack.loop import PackingRun
 from stages.pack.records import Action, Attempt, BoxState
 from stages.pack.scene_picture import render_scene
@@ -76,7 +76,7 @@ def draw_layout(path: Path, world: PackingWorld, run: PackingRun, width: int) ->
         axes.add_patch(patch)
         axes.text(box.x, box.y, f"{name.removesuffix('_box')}\n{1000 * box.height:.0f}", ha="center", va="center",
                   fontsize=7)  # fmt: skip
-    lowest = min(release_height(box.height) + tool_over_centre(box.height) for box in instance.boxes)
+    lowest = min(place_tool_pose(box, 0.0, 0.0, 0.0).z for box in instance.boxes)
     reach = world.planner.arm.reach(lowest)
     angles = np.linspace(-0.5, 0.5, 100)
     axes.plot(reach * np.cos(angles), reach * np.sin(angles), color="#3d6cb9", linestyle="--", linewidth=1)
@@ -115,12 +115,11 @@ def draw_scene(path: Path, world: PackingWorld, run: PackingRun, width: int) -> 
     """Render the scene as it is after the last action that was carried out."""
     state = run.states[-1]
     blocks = [(entry.name, entry.block) for entry in world.standing(state, state.held)]
-    held = None
     if state.held is not None:
         box = world.box(state, state.held)
-        held = (state.held, box, tool_over_centre(box.height))
-    colors = {name: box_color(name) for name, _ in blocks} | ({state.held: box_color(state.held)} if state.held else {})
+        blocks.append((state.held, held_block(state.stance.pose, box.width, box.length, box.height)))
+    colors = {name: box_color(name) for name, _ in blocks}
     for obstacle in world.instance.obstacles:
         colors[obstacle.rectangle.name] = "#555555"
-    image = render_scene(world.planner.arm, state.stance, blocks, held, colors, world.instance.basket, width)
+    image = render_scene(world.planner.arm, state.stance.arm, blocks, colors, world.instance.basket, width)
     Image.fromarray(image).save(path)

@@ -7,13 +7,14 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from schemas.errors import BadInput
-from schemas.packing import PackingArea, PackingBox, PackingInstanceFile, PackingObstacle
+from schemas.packing import TABLE_TOP, PackingArea, PackingBox, PackingInstanceFile, PackingObstacle
 from stages.kit.motion.failures import MotionFailed
 from stages.pack.arm import HOME, FixedArm, Limits, ToolPose
+from stages.pack.environment import upright_block
 from stages.pack.hand import tool_over_centre
-from stages.pack.instances import TABLE_TOP, Instance, Obstacle
+from stages.pack.instances import Instance, Obstacle
 from stages.pack.records import BoxState, Rectangle
-from stages.pack.solids import Block, overlap
+from stages.pack.solids import overlap
 
 LARGEST_FILE = 1_000_000
 FORM = "docs/LLM3.md shows the form"
@@ -67,12 +68,8 @@ def to_file(instance: Instance) -> PackingInstanceFile:
 
 
 def _check_starts(instance: Instance, path: Path, arm: FixedArm) -> None:
-    blocks = [(box.name, _block(box)) for box in instance.boxes]
-    for obstacle in instance.obstacles:
-        low, high = obstacle.rectangle.low, obstacle.rectangle.high
-        half = ((high[0] - low[0]) / 2, (high[1] - low[1]) / 2)
-        middle = ((high[0] + low[0]) / 2, (high[1] + low[1]) / 2)
-        blocks.append((obstacle.rectangle.name, Block(*middle, 0.0, *half, 0.0, obstacle.top)))
+    blocks = [(box.name, upright_block(box, TABLE_TOP)) for box in instance.boxes]
+    blocks += [(obstacle.rectangle.name, obstacle.block) for obstacle in instance.obstacles]
     for number, (name, block) in enumerate(blocks[: len(instance.boxes)]):
         for other, other_block in blocks[number + 1 :]:
             depth = overlap(block, other_block)
@@ -89,7 +86,3 @@ def _check_starts(instance: Instance, path: Path, arm: FixedArm) -> None:
                 f"{path}: {box.name} cannot be picked where it starts: {failed.failure.message}",
                 hint="the arm stands at (0, 0); move the box nearer or farther",
             ) from None
-
-
-def _block(box: BoxState) -> Block:
-    return Block(box.x, box.y, box.yaw, box.width / 2, box.length / 2, TABLE_TOP, TABLE_TOP + box.height)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.colors import to_rgba
 
+from schemas.packing import BASKET_TOP, TABLE_TOP
 from stages.kit.simulation.engine import engine, native_output_to_stderr
 from stages.pack.arm import FixedArm
 from stages.pack.arm_scene import FINGER_OPENING
-from stages.pack.instances import BASKET_TOP, TABLE_TOP
-from stages.pack.motion import Stance
-from stages.pack.records import BoxState, Rectangle
-from stages.pack.solids import Block
+from stages.pack.records import Rectangle
+from stages.pack.solids import Block, block_over
 
 TABLE_COLOR, BASKET_COLOR = "#d8d2c4", "#a98d5f"
 FACTOR = 2
@@ -19,32 +18,23 @@ FACTOR = 2
 
 
 def render_scene(
-    arm: FixedArm, stance: Stance, blocks: list[tuple[str, Block]], held: tuple[str, BoxState, float] | None,
-    colors: dict[str, str], basket: Rectangle, width: int,
+    arm: FixedArm, joints: np.ndarray, blocks: list[tuple[str, Block]], colors: dict[str, str], basket: Rectangle,
+    width: int,
 ) -> np.ndarray:  # fmt: skip
-    """Return (H, W, 3) uint8. `held`: name, its extents, how far the tool is above its centre [m]."""
+    """Return (H, W, 3) uint8 of the arm at joint values (7,) among blocks, with each block's name -> colour."""
     client = engine.connect(engine.DIRECT)
     try:
         with native_output_to_stderr():
             robot = engine.loadURDF(str(arm.description.urdf), useFixedBase=True, physicsClientId=client)
-        values = dict(zip(arm.description.arm_joints, stance.arm.tolist(), strict=True))
+        values = dict(zip(arm.description.arm_joints, joints.tolist(), strict=True))
         values |= dict.fromkeys(arm.description.finger_joints, FINGER_OPENING)
         for index in range(engine.getNumJoints(robot, physicsClientId=client)):
             name = engine.getJointInfo(robot, index, physicsClientId=client)[1].decode()
             if name in values:
                 engine.resetJointState(robot, index, values[name], physicsClientId=client)
         _block(client, Block(0.45, 0.0, 0.0, 0.75, 0.9, TABLE_TOP - 0.01, TABLE_TOP), TABLE_COLOR)
-        middle = [(basket.low[k] + basket.high[k]) / 2 for k in range(2)]
-        half = [(basket.high[k] - basket.low[k]) / 2 for k in range(2)]
-        _block(client, Block(middle[0], middle[1], 0.0, half[0], half[1], 0.0, BASKET_TOP), BASKET_COLOR)
+        _block(client, block_over(basket.low, basket.high, 0.0, BASKET_TOP), BASKET_COLOR)
         for name, block in blocks:
-            _block(client, block, colors[name])
-        if held is not None:
-            name, box, above = held
-            pose = stance.pose
-            centre = pose.z - above
-            block = Block(pose.x, pose.y, pose.yaw, box.width / 2, box.length / 2, centre - box.height / 2,
-                          centre + box.height / 2)  # fmt: skip
             _block(client, block, colors[name])
         return _render(client, width)
     finally:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from schemas.packing import BASKET_SLAB, BASKET_TOP, TABLE_TOP
 from stages.kit.simulation.engine import engine
-from stages.pack.instances import BASKET_TOP, TABLE_TOP, Instance
+from stages.pack.instances import Instance
 from stages.pack.records import BoxState
 
 TIME_STEP = 1 / 240
@@ -36,7 +37,7 @@ class SettlingTable:
         self._box((1.5, 1.5, 0.005), (0, 0, TABLE_TOP - 0.005), 0.0)
         low, high = np.array(instance.basket.low), np.array(instance.basket.high)
         middle, half = (low + high) / 2, (high - low) / 2
-        self._box((half[0], half[1], 0.005), (middle[0], middle[1], BASKET_TOP - 0.005), 0.0)
+        self._box((half[0], half[1], BASKET_SLAB / 2), (middle[0], middle[1], BASKET_TOP - BASKET_SLAB / 2), 0.0)
         for obstacle in instance.obstacles:
             low, high = np.array(obstacle.rectangle.low), np.array(obstacle.rectangle.high)
             middle, half = (low + high) / 2, (high - low) / 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, inf, sin
 
@@ -30,6 +31,13 @@ class Block:
         half_x = c * self.half_width + s * self.half_length
         half_y = s * self.half_width + c * self.half_length
         return self.x - half_x, self.y - half_y, self.x + half_x, self.y + half_y
+
+
+def block_over(low: Sequence[float], high: Sequence[float], bottom: float, top: float) -> Block:
+    """Return the block over an axis-aligned rectangle, corners (x, y) [m], between two world heights [m]."""
+    return Block(
+        (low[0] + high[0]) / 2, (low[1] + high[1]) / 2, 0.0, (high[0] - low[0]) / 2, (high[1] - low[1]) / 2, bottom, top
+    )
 
 
 def flat_depth(first: Block, second: Block) -> float:

@@ -6,15 +6,13 @@ import math
 
 import numpy as np
 
-from schemas.packing import Packing, PackingArea, PackingBox, PackingStep
+from schemas.packing import BASKET_SLAB, BASKET_TOP, TABLE_TOP, Packing, PackingArea, PackingBox, PackingStep
 from schemas.scene_parts import Box
 from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.viewing.canvas import Canvas
 from stages.kit.viewing.robot_view import animate_arm, draw_robot
 
 PICTURES = ("layout", "attempts", "scene")
-TABLE_TOP, SLAB = 0.005, 0.01
-"""Height of the table's surface and thickness of the basket [m] (the environment of `pack`)."""
 PERIOD = 0.05
 """Time from one row of the trajectory to the next [s]; it has no times of its own."""
 BASKET_COLOR, BLOCK_COLOR = (0.85, 0.75, 0.55), (0.4, 0.4, 0.4)
@@ -29,18 +27,19 @@ def draw_packing(packing: Packing, canvas: Canvas) -> None:
         path = packing.path(f"{name}.png")
         if path.is_file():
             canvas.picture(name, path.read_bytes())
-    canvas.boxes("basket", [area_box(instance.basket, TABLE_TOP - SLAB, TABLE_TOP)], ["basket"], [BASKET_COLOR])
+    basket = area_box(instance.basket, BASKET_TOP - BASKET_SLAB, BASKET_TOP)
+    canvas.boxes("basket", [basket], ["basket"], [BASKET_COLOR])
     blocks = instance.obstacles
     if blocks:
         solids = [area_box(block, TABLE_TOP, block.top) for block in blocks]
         canvas.boxes("obstacles", solids, [block.name for block in blocks], [BLOCK_COLOR] * len(blocks))
-    starts = [standing_box(box, box.x, box.y, box.yaw) for box in instance.boxes]
+    starts = [standing_box(box, box.x, box.y, box.yaw, TABLE_TOP) for box in instance.boxes]
     names = [box.name for box in instance.boxes]
     canvas.boxes("start", starts, names, [START_COLOR] * len(starts))
     by_name = {box.name: box for box in instance.boxes}
     places = [step for step in found.attempts[-1].steps if placed(step, by_name)] if found.attempts else []
     if places:
-        solids = [standing_box(by_name[p.box], p.x or 0.0, p.y or 0.0, p.yaw or 0.0) for p in places]
+        solids = [standing_box(by_name[p.box], p.x or 0.0, p.y or 0.0, p.yaw or 0.0, BASKET_TOP) for p in places]
         canvas.boxes("packed", solids, [place.box for place in places], [PACKED_COLOR] * len(places))
     urdf = draw_robot(canvas)
     if urdf is not None and packing.path("trajectory.npz").is_file():
@@ -79,10 +78,10 @@ def area_box(area: PackingArea, bottom: float, top: float) -> Box:
     return Box(center=_triple(middle), orientation=(0.0, 0.0, 0.0, 1.0), size=_triple(size))
 
 
-def standing_box(box: PackingBox, x: float, y: float, yaw: float) -> Box:
-    """Return a box of the problem standing at x, y [m], yaw [rad]; quaternion x, y, z, w."""
+def standing_box(box: PackingBox, x: float, y: float, yaw: float, ground: float) -> Box:
+    """Return a box of the problem standing at x, y [m], yaw [rad] on a surface at height `ground` [m]."""
     return Box(
-        center=(x, y, TABLE_TOP + 0.5 * box.height),
+        center=(x, y, ground + 0.5 * box.height),
         orientation=(0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw)),
         size=(box.width, box.length, box.height),
     )

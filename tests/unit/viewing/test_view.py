@@ -175,6 +175,16 @@ def test_lifted_cup_is_animated(recordings: dict) -> None:
     assert len(_column(doors, "Transform3D:translation")) == 13
 
 
+def test_boxes_start_on_the_table_and_end_in_the_basket(recordings: dict) -> None:
+    """The red box of the artifact is 7 cm high; the table's surface is at 5 mm, the basket's at 7 mm."""
+    (start,), (packed,) = (
+        _column(recordings["packing"][f"/world/{name}"], "centers")[0] for name in ("start", "packed")
+    )
+    assert start == pytest.approx((0.39, -0.4, 0.005 + 0.035)) and packed == pytest.approx((0.7, 0.0, 0.007 + 0.035))
+    (basket,) = _column(recordings["packing"]["/world/basket"], "centers")[0]
+    assert basket == pytest.approx((0.65, 0.0, 0.002))
+
+
 def test_map_is_coloured_by_instance_and_by_itself(recordings: dict) -> None:
     assert set(_column(recordings["panoptic_map"]["/world/color"], "vertex_colors")[0]) == {0x0A141EFF}
     assert len(set(_column(recordings["panoptic_map"]["/world/instance"], "vertex_colors")[0])) == 1
