@@ -13,7 +13,6 @@ from pathlib import Path
 
 from benchmarks.planning import motion, tamp
 
-PART_NAMES = ("motion", "tamp")
 ROOMS, QUICK_ROOMS = 50, 2
 LIBRARY_SEED = 1
 
@@ -25,21 +24,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--scene", type=Path, help="interactive scene for the case reconstructed_room")
     parser.add_argument("--quick", action="store_true", help=f"{motion.QUICK_QUERIES} queries a case")
     parser.add_argument("--tuning", action="store_true", help="the tuning seeds instead of those for reporting")
-    parser.add_argument("--parts", default=",".join(PART_NAMES), help="comma-separated; default: all")
+    parser.add_argument("--parts", default=",".join(PARTS), help="comma-separated; default: all")
     parser.add_argument(
         "--rooms", type=int, help=f"rooms of the part tamp; default {ROOMS}, {QUICK_ROOMS} with --quick"
     )
     parser.add_argument("--cases", default=",".join(tamp.CASES), help="cases of the part tamp, comma-separated")
     parser.add_argument("--jobs", type=int, default=min(2, os.cpu_count() or 1), help="rooms at a time")
     options = parser.parse_args(argv)
-    parts: dict[str, Callable[[], tuple[dict[str, float], str]]] = {
-        "motion": lambda: _motion(options),
-        "tamp": lambda: _tamp(options),
-    }
+    for option, known in (("parts", PARTS), ("cases", tamp.CASES)):
+        for name in getattr(options, option).split(","):
+            if name not in known:
+                parser.error(f"--{option}: {name!r} is none of {', '.join(known)}")
     metrics: dict[str, float] = {}
     texts = []
     for name in options.parts.split(","):
-        figures, text = parts[name]()
+        figures, text = PARTS[name](options)
         metrics |= {key: value for key, value in figures.items() if math.isfinite(value)}
         texts.append(text)
     options.out.mkdir(parents=True, exist_ok=True)
@@ -62,6 +61,9 @@ def _tamp(options: argparse.Namespace) -> tuple[dict[str, float], str]:
     seeds = (tamp.TUNING if options.tuning else tamp.REPORTING)[:rooms]
     metrics = tamp.run(library, options.out / "rooms", seeds=seeds, cases=options.cases.split(","), jobs=options.jobs)
     return metrics, tamp.table(metrics)
+
+
+PARTS: dict[str, Callable[[argparse.Namespace], tuple[dict[str, float], str]]] = {"motion": _motion, "tamp": _tamp}
 
 
 if __name__ == "__main__":

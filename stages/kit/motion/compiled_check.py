@@ -19,16 +19,19 @@ UNSURE = 0.004
 
 
 @njit(cache=True)
-def link_frames(robot: RobotArrays, body: np.ndarray, frames: np.ndarray) -> None:
-    """Write world_from_frame (J + 1, 3, 4) for base x, y, yaw and joint values (3 + J,)."""
+def link_frames(chain: np.ndarray, mount_height: float, body: np.ndarray, frames: np.ndarray) -> None:
+    """Write world_from_frame (J + 1, 3, 4) for base x, y, yaw and joint values (3 + J,).
+
+    `chain` (J, 4, 4) and `mount_height` [m] are `fixed` and `mount_height` of RobotArrays.
+    """
     cosine, sine = np.cos(body[2]), np.sin(body[2])
     frames[0] = 0.0
     frames[0, 0, 0], frames[0, 0, 1] = cosine, -sine
     frames[0, 1, 0], frames[0, 1, 1] = sine, cosine
     frames[0, 2, 2] = 1.0
-    frames[0, 0, 3], frames[0, 1, 3], frames[0, 2, 3] = body[0], body[1], robot.mount_height
-    for joint in range(robot.fixed.shape[0]):
-        parent, fixed, child = frames[joint], robot.fixed[joint], frames[joint + 1]
+    frames[0, 0, 3], frames[0, 1, 3], frames[0, 2, 3] = body[0], body[1], mount_height
+    for joint in range(chain.shape[0]):
+        parent, fixed, child = frames[joint], chain[joint], frames[joint + 1]
         cosine, sine = np.cos(body[3 + joint]), np.sin(body[3 + joint])
         for row in range(3):
             x = parent[row, 0] * fixed[0, 0] + parent[row, 1] * fixed[1, 0] + parent[row, 2] * fixed[2, 0]
@@ -119,7 +122,7 @@ def find_collision(robot: RobotArrays, scene: SceneArrays, body: np.ndarray, fir
     `first_frame` are not compared with the scene (they do not move in this query).
     """
     frames = np.empty((robot.fixed.shape[0] + 1, 3, 4))
-    link_frames(robot, body, frames)
+    link_frames(robot.fixed, robot.mount_height, body, frames)
     count = robot.frame.shape[0]
     middles = np.empty((count, 3))
     centers = np.empty((robot.spheres.shape[0], 3))

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from stages.kit.geometry.transforms import inverse
+from stages.kit.geometry.transforms import apply, inverse, transform_from
 from stages.kit.motion.compiled_arrays import CHECK, RESTING, SKIP, RobotArrays, SceneArrays
 from stages.kit.motion.compiled_check import link_frames
 from stages.kit.motion.convex_pieces import ConvexPiece, link_pieces
 from stages.kit.motion.kinematics import arm_chain
-from stages.kit.simulation.robot import Robot, always_near
+from stages.kit.simulation.robot import Robot
 from stages.kit.simulation.robot_description import PEDESTAL_LINK, mobile_robot_urdf
 from stages.kit.simulation.world import PhysicsWorld
 
@@ -31,11 +31,11 @@ class CompiledModel:
         description = robot.description
         self._chain = arm_chain(description)
         self._pieces = link_pieces(mobile_robot_urdf(description))
-        moved = [world.link_name(robot.body_id, robot.joints[name]) for name in description.arm_joints]
-        self._order = [PEDESTAL_LINK, description.arm_base, *moved]
-        frame_of = {PEDESTAL_LINK: 0, description.arm_base: 0} | {name: j + 1 for j, name in enumerate(moved)}
+        joints = len(self._chain.fixed)
+        # Pedestal and arm base stand on frame 0, hand and fingers on the last.
+        frame_of = {name: max(0, place - 1) for place, name in enumerate(robot.chain)}
         links = [name for name in robot.links if self._pieces.get(name)]
-        self._frame_of = {name: frame_of.get(name, len(moved)) for name in links}
+        self._frame_of = {name: frame_of.get(name, joints) for name in links}
         self.parts = [*links, CARRIED]
         self.groups: list[str] = []
         """Names of the scene's links, by index of the group."""
@@ -135,7 +135,7 @@ class CompiledModel:
             scene.pose[begin:end] = world_from_link[:3]
             scene.box[begin:end] = (self._box_from_link[begin:end] @ inverse(world_from_link))[:, :3]
             vertices = scene.vertices[scene.vertex_begin[begin] : scene.vertex_begin[end]]
-            points = vertices @ world_from_link[:3, :3].T + world_from_link[:3, 3]
+            points = apply(world_from_link, vertices)
             scene.low[group], scene.high[group] = points.min(axis=0), points.max(axis=0)
 
     def _allow(self, carried: str | None, touchable: frozenset[str], rest_on: Mapping[str, float]) -> None:
@@ -160,18 +160,13 @@ class CompiledModel:
         """Fix all pieces to their frames with the fingers where they are, and what is carried to the last frame."""
         count = len(self._chain.fixed)
         description = self.robot.description
-        empty = np.zeros((0, 2), dtype=np.int64)
-        bare = RobotArrays(
-            self._chain.fixed, description.pedestal_height, *(np.zeros(0, dtype=np.int64),) * 2, np.zeros((0, 4)),
-            np.zeros(1, dtype=np.int64), np.zeros((0, 4)), np.zeros(1, dtype=np.int64), np.zeros((0, 3)), empty,
-            np.zeros(0),
-        )  # fmt: skip
         frames = np.zeros((count + 1, 3, 4))
-        link_frames(bare, body, frames)
+        link_frames(self._chain.fixed, description.pedestal_height, body, frames)
         entries: list[tuple[int, int, ConvexPiece, np.ndarray]] = []
         for part, link in enumerate(self.parts[:-1]):
             frame = self._frame_of[link]
-            frame_from_link = inverse(_square(frames[frame])) @ self.robot.link_pose(self.robot.links[link])
+            world_from_frame = transform_from(frames[frame, :, :3], frames[frame, :, 3])
+            frame_from_link = inverse(world_from_frame) @ self.robot.link_pose(self.robot.links[link])
             entries += [(frame, part, piece, frame_from_link) for piece in self._pieces[link]]
         if carried is not None:
             last_from_body = self._chain.tool @ tool_from_carried
@@ -184,7 +179,7 @@ class CompiledModel:
                     ]
         pairs, apart = self._pairs([part for _, part, _, _ in entries])
         spheres = [_moved(pose, piece.spheres) for _, _, piece, pose in entries]
-        vertices = [piece.vertices @ pose[:3, :3].T + pose[:3, 3] for _, _, piece, pose in entries]
+        vertices = [apply(pose, piece.vertices) for _, _, piece, pose in entries]
         self.arm = RobotArrays(
             fixed=self._chain.fixed,
             mount_height=description.pedestal_height,
@@ -212,18 +207,14 @@ class CompiledModel:
                     if self.robot.links[first] not in hand:
                         pairs.append((i, j))
                         apart.append(self.clearance + APART)
-                elif not always_near(first, second, self._order, self.robot.description):
+                elif not self.robot.always_near(first, second):
                     pairs.append((i, j))
                     apart.append(APART)
         return np.array(pairs, dtype=np.int64).reshape(-1, 2), np.array(apart)
 
 
-def _square(pose: np.ndarray) -> np.ndarray:
-    return np.concatenate([pose, [[0.0, 0.0, 0.0, 1.0]]])
-
-
 def _moved(pose: np.ndarray, balls: np.ndarray) -> np.ndarray:
-    return np.column_stack([balls[:, :3] @ pose[:3, :3].T + pose[:3, 3], balls[:, 3]])
+    return np.column_stack([apply(pose, balls[:, :3]), balls[:, 3]])
 
 
 def _begins(rows: list[np.ndarray]) -> np.ndarray:

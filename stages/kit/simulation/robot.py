@@ -54,6 +54,9 @@ class Robot:
             self.links[info[12].decode()] = index
             self.joints[info[1].decode()] = index
         self.link_names = {index: name for name, index in self.links.items()}
+        arm_links = [self.link_names[self.joints[name]] for name in description.arm_joints]
+        self.chain = [PEDESTAL_LINK, description.arm_base, *arm_links]
+        """Names of the links from the pedestal to the last that an arm joint moves."""
         self.body_joints = [self.joints[name] for name in (*BASE_JOINTS, *description.arm_joints)]
         self.finger_joints = [self.joints[name] for name in description.finger_joints]
         self.fingers = tuple(self.links[name] for name in description.finger_links)
@@ -69,16 +72,21 @@ class Robot:
 
     def _choose_self_collisions(self) -> None:
         """Switch off pairs of links that are near each other along the chain: their shapes overlap by design."""
-        chain = [PEDESTAL_LINK, self.description.arm_base]
-        chain += [self.world.link_name(self.body_id, self.joints[name]) for name in self.description.arm_joints]
         names = list(self.links)
         for number, first in enumerate(names):
             for second in names[number + 1 :]:
-                if always_near(first, second, chain, self.description):
+                if self.always_near(first, second):
                     engine.setCollisionFilterPair(
                         self.body_id, self.body_id, self.links[first], self.links[second], 0,
                         physicsClientId=self.world.client,
                     )  # fmt: skip
+
+    def always_near(self, first: str, second: str) -> bool:
+        """Whether two links, by name, are too near each other along the chain to be checked."""
+        hand = {self.description.hand_link, *self.description.finger_links}
+        place = {name: position for position, name in enumerate(self.chain)} | dict.fromkeys(hand, len(self.chain))
+        near = abs(place.get(first, -99) - place.get(second, 99)) <= 2
+        return near or {first, second} <= set(self.chain[-3:]) | hand
 
     # --- kinematic --------------------------------------------------------------------------------------------
 
@@ -170,15 +178,6 @@ class Robot:
         if self.grip is not None:
             engine.removeConstraint(self.grip, physicsClientId=self.world.client)
             self.grip = None
-
-
-def always_near(first: str, second: str, chain: list[str], description: RobotDescription) -> bool:
-    """Whether two links are too near each other along the chain (pedestal to last arm link) to be checked."""
-    place = {name: position for position, name in enumerate(chain)}
-    hand = {description.hand_link, *description.finger_links}
-    place.update({name: len(chain) for name in hand})
-    near = abs(place.get(first, -99) - place.get(second, 99)) <= 2
-    return near or {first, second} <= set(chain[-3:]) | hand
 
 
 def base_pose(base: np.ndarray, description: RobotDescription) -> np.ndarray:
