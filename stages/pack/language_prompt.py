@@ -68,38 +68,35 @@ def prompt(
     variant: Variant,
     *,
     reasons: bool,
-    numbers: bool = False,
-    decimals: int = 2,
 ) -> tuple[Message, ...]:
     """Return the messages of one call. `trace`: the attempts that are shown, oldest first.
 
     `reasons`: an action that failed is shown with the cause, else only that it failed (the ablation of table 4.1).
-    `numbers`: the cause with its measured numbers, which the published prompt lacks. `decimals` of the observation:
-    the published prompt rounds to 2.
     """
     system = f"You plan the actions of a robot so that they reach a goal. {STRATEGY[variant]}"
     parts = [
         TASK,
-        "Initial state\n" + observation_text(observation, decimals),
-        "Plans so far, with what the motion planner said\n" + trace_text(trace, reasons=reasons, numbers=numbers),
+        "Initial state\n" + observation_text(observation),
+        "Plans so far, with what the motion planner said\n" + trace_text(trace, reasons=reasons),
         QUESTIONS[variant] + "\n" + (ORDER_FORM if variant == "symbolic" else PLAN_FORM),
     ]
     return say("system", system), say("user", "\n\n".join(parts))
 
 
-def observation_text(observation: Observation, decimals: int = 2) -> str:
-    """Return basket, obstacles and boxes, one a line [m], as the published prompt: extents along x and y, no reach."""
-    lines = [f"basket {_extent(observation.basket, decimals)}"]
-    lines += [f"obstacle {_extent(obstacle, decimals)}" for obstacle in observation.obstacles]
-    lines += [_box(box, decimals) for box in observation.boxes]
+def observation_text(observation: Observation) -> str:
+    """Return basket, obstacles and boxes, one a line [m], as the published prompt: extents along x and y to two
+    decimals, no reach."""
+    lines = [f"basket {_extent(observation.basket)}"]
+    lines += [f"obstacle {_extent(obstacle)}" for obstacle in observation.obstacles]
+    lines += [_box(box) for box in observation.boxes]
     return "\n".join(lines)
 
 
-def trace_text(trace: Sequence[Attempt], *, reasons: bool, numbers: bool = False) -> str:
+def trace_text(trace: Sequence[Attempt], *, reasons: bool) -> str:
     """Return each attempt's actions with what became of them."""
     if not trace:
         return "(none)"
-    return "\n".join(_attempt(k, attempt, reasons, numbers) for k, attempt in enumerate(trace, 1))
+    return "\n".join(_attempt(k, attempt, reasons) for k, attempt in enumerate(trace, 1))
 
 
 def action_text(action: Action) -> str:
@@ -110,7 +107,7 @@ def action_text(action: Action) -> str:
     return f"place({quoted(action.box)}, x={x}, y={y}, theta={yaw})"
 
 
-def failure_text(failure: Failure, *, numbers: bool = False) -> str:
+def failure_text(failure: Failure) -> str:
     """Return the cause in the words of the three published categories; other kinds by their own message."""
     what = ", ".join(quoted(name) for name in failure.objects)
     known = {
@@ -119,11 +116,7 @@ def failure_text(failure: Failure, *, numbers: bool = False) -> str:
         "no_path": "no collision-free trajectory was found",
         "unknown_object": f"there is no box {what}",
     }
-    text = known.get(failure.kind) or " ".join(failure.message.split())
-    if numbers and failure.numbers:
-        measured = ", ".join(f"{name} {value:.3f}" for name, value in sorted(failure.numbers.items()))
-        return f"{text} ({measured})"
-    return text
+    return known.get(failure.kind) or " ".join(failure.message.split())
 
 
 def refused_order_text(order: Sequence[str], failure: Failure, *, reasons: bool) -> str:
@@ -132,24 +125,24 @@ def refused_order_text(order: Sequence[str], failure: Failure, *, reasons: bool)
     return f"{line}; why: {' '.join(failure.message.split())}" if reasons else line
 
 
-def _extent(rectangle: Rectangle, decimals: int) -> str:
+def _extent(rectangle: Rectangle) -> str:
     low, high = rectangle.low, rectangle.high
-    x = f"x from {low[0]:.{decimals}f} to {high[0]:.{decimals}f}"
-    return f"{quoted(rectangle.name)}: {x}, y from {low[1]:.{decimals}f} to {high[1]:.{decimals}f}"
+    x = f"x from {low[0]:.2f} to {high[0]:.2f}"
+    return f"{quoted(rectangle.name)}: {x}, y from {low[1]:.2f} to {high[1]:.2f}"
 
 
-def _box(box: BoxState, decimals: int) -> str:
-    size = f"{box.width:.{decimals}f} along x and {box.length:.{decimals}f} along y at theta 0"
+def _box(box: BoxState) -> str:
+    size = f"{box.width:.2f} along x and {box.length:.2f} along y at theta 0"
     where = "in the basket" if box.in_basket else "not in the basket"
-    centre = f"centre ({box.x:.{decimals}f}, {box.y:.{decimals}f}), theta {box.yaw:.{decimals}f}"
+    centre = f"centre ({box.x:.2f}, {box.y:.2f}), theta {box.yaw:.2f}"
     return f"box {quoted(box.name)}: {size}, {centre}, {where}"
 
 
-def _attempt(number: int, attempt: Attempt, reasons: bool, numbers: bool) -> str:
+def _attempt(number: int, attempt: Attempt, reasons: bool) -> str:
     lines = [f"{ATTEMPT} {number}:"]
     for k, action in enumerate(attempt.actions):
         said = attempt.feedback[k] if k < len(attempt.feedback) else None
-        lines.append(f"  {k + 1}. {action_text(action)}: {_outcome(said, reasons, numbers)}")
+        lines.append(f"  {k + 1}. {action_text(action)}: {_outcome(said, reasons)}")
     if not attempt.actions:
         lines.append("  (no plan could be read from the reply)")
     if attempt.task is not None:
@@ -157,9 +150,9 @@ def _attempt(number: int, attempt: Attempt, reasons: bool, numbers: bool) -> str
     return "\n".join(lines)
 
 
-def _outcome(said: StepFeedback | None, reasons: bool, numbers: bool) -> str:
+def _outcome(said: StepFeedback | None, reasons: bool) -> str:
     if said is None:
         return NOT_TRIED
     if said.failure is None:
         return FEASIBLE
-    return f"{FAILS}; {failure_text(said.failure, numbers=numbers)}" if reasons else FAILS
+    return f"{FAILS}; {failure_text(said.failure)}" if reasons else FAILS

@@ -42,14 +42,11 @@ class LanguageProposer:
         *,
         variant: Literal["backtrack", "scratch"],
         reasons: bool = True,
-        numbers: bool = False,
-        decimals: int = 2,
         trace_length: int = TRACE_LENGTH,
         name: str | None = None,
     ) -> None:
         self.chat = chat
-        self._variant, self._reasons, self._numbers, self._decimals = variant, reasons, numbers, decimals
-        self._trace_length = trace_length
+        self._variant, self._reasons, self._trace_length = variant, reasons, trace_length
         self.name = name or f"{chat.backend.label} {variant}{'' if reasons else ' without reasons'}"
         self.calls = 0
 
@@ -57,9 +54,7 @@ class LanguageProposer:
         """Return the plan of one call of the model."""
         self.calls += 1
         shown = trace[max(0, len(trace) - self._trace_length) :]
-        messages = prompt(
-            observation, shown, self._variant, reasons=self._reasons, numbers=self._numbers, decimals=self._decimals
-        )
+        messages = prompt(observation, shown, self._variant, reasons=self._reasons)
         try:
             reply = self.chat.ask(messages, plan_schema(packing_language(observation)))
         except LanguageFailed as error:
