@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.graph.rooms import distance_figures, judge
 from benchmarks.mapping.rooms import RoomFolder
 from benchmarks.scene.arms import HELD_OUT, MASK_LEVEL, PERFECT, Arm
 from benchmarks.scene.perfect_maps import perfect_map
@@ -23,13 +24,11 @@ from stages.cad.candidates import Shortlist
 from stages.cad.model_surfaces import ModelSurface
 from stages.cad.stage import choose_and_write, find_candidates
 from stages.evaluate.correspondence import point_overlaps
-from stages.evaluate.graph_measures import compare_graphs, optional_nodes
 from stages.evaluate.map_measures import label_true_points, load_map
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.replacement_measures import ObjectResult, replacements_of
 from stages.evaluate.truth import TrueRoom, load_truth
 from stages.graph.stage import run as build_graph
-from stages.kit.measurement.edge_agreement import edge_agreement
 from stages.kit.progress import SilentProgress
 from stages.kit.running.reading import open_artifact
 from stages.kit.simulation.settle_report import SettleReport, settle_report
@@ -123,11 +122,11 @@ def _run_arm(
     library, method = room.libraries[case == HELD_OUT], arm.graph.method
     of_graph = (panoptic_map.root, method)
     if of_graph not in shared.graphs:
-        context = _context(folder / "contact_graph", seed)
+        context = context_in(folder / "contact_graph", seed)
         shared.graphs[of_graph] = build_graph(panoptic_map, parameters=arm.graph, context=context).graph
     graph = shared.graphs[of_graph]
     key = (case, panoptic_map.root, arm.cad.method)
-    context = _context(folder / "cad_scene", seed)
+    context = context_in(folder / "cad_scene", seed)
     if key not in shared.found:
         surfaces: dict[str, ModelSurface] = {}
         start = time.process_time()
@@ -174,14 +173,15 @@ def _run_arm(
     )
 
 
-def _context(folder: Path, seed: int) -> Context:
+def context_in(folder: Path, seed: int) -> Context:
+    """Return a context that writes into `folder`, which is made where it is missing, without a word."""
     folder.mkdir(parents=True, exist_ok=True)
     return Context(folder, seed=seed, device="cpu", progress=SilentProgress())
 
 
 def settle(scene: CadScene, folder: Path, seed: int) -> SettleReport:
     """Write the URDF scene and let it go."""
-    write_urdf(scene, parameters=UrdfParameters(), context=_context(folder, seed))
+    write_urdf(scene, parameters=UrdfParameters(), context=context_in(folder, seed))
     return settle_report(folder)
 
 
@@ -193,21 +193,11 @@ def overlaps_of(truth: TrueRoom, panoptic_map: PanopticMap) -> dict[tuple[int, i
 
 
 def measure_graph(
-    truth: TrueRoom, graph: ContactGraphFile, overlaps: Mapping[tuple[int, int], float] | None
+    truth: TrueRoom, graph: ContactGraphFile, overlaps: Mapping[tuple[int, int], float]
 ) -> tuple[dict[str, float], dict[str, tuple[int, int, int]]]:
     """Return the edit distance with its parts, and (true, predicted, agreed) edges by relation."""
-    comparison = compare_graphs(truth, graph, overlaps, EvaluateParameters().node_match_iou)
-    distance = comparison.distance
-    parts = {
-        "edit_distance": float(distance.total),
-        "edit_distance_exact": float(distance.exact),
-        "wrong_support": float(len(distance.wrong_supports)),
-        "missing_detection": float(len(distance.missing)),
-        "wrong_detection": float(distance.wrong_detections),
-        "true_nodes": float(len(comparison.true.nodes) - 1),
-    }
-    ignored = optional_nodes(truth, comparison.true)
-    edges = edge_agreement(comparison.true, comparison.predicted, dict(distance.pairs), ignored=ignored)
+    comparison, edges = judge(truth, graph, overlaps)
+    parts = {name: float(value) for name, value in distance_figures(comparison).items() if value is not None}
     return parts, {name: (found.true_count, found.predicted_count, found.agreed) for name, found in edges.items()}
 
 

@@ -11,7 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.scene.arms import REAL, Arm
-from benchmarks.scene.experiment import Outcome, measure_graph, overlaps_of, physics_of, settle, what_moved
+from benchmarks.scene.experiment import (
+    Outcome,
+    context_in,
+    measure_graph,
+    overlaps_of,
+    physics_of,
+    settle,
+    what_moved,
+)
 from schemas.cad_library import CadLibrary
 from schemas.ground_truth import GroundTruth
 from schemas.panoptic_map import PanopticMap
@@ -19,9 +27,7 @@ from stages.cad.stage import run as replace_objects
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.truth import load_truth
 from stages.graph.stage import run as build_graph
-from stages.kit.progress import SilentProgress
 from stages.kit.running.reading import open_artifact
-from stages.kit.stage import Context
 
 ANNOTATIONS = Path(__file__).resolve().parents[2] / "data" / "annotations" / "real"
 
@@ -54,8 +60,10 @@ def run_real(real: Path, scratch: Path, arms: Sequence[Arm], seed: int) -> list[
         for arm in arms:
             # `cad` takes every mesh that it finds in its folder for a thing of the scene, those of an earlier run too.
             shutil.rmtree(where / arm.name, ignore_errors=True)
-            graph = build_graph(panoptic_map, parameters=arm.graph, context=_context(where / arm.name / "graph", seed))
-            context = _context(where / arm.name / "cad_scene", seed)
+            graph = build_graph(
+                panoptic_map, parameters=arm.graph, context=context_in(where / arm.name / "graph", seed)
+            )
+            context = context_in(where / arm.name / "cad_scene", seed)
             scene = replace_objects(graph, panoptic_map, library, parameters=arm.cad, context=context)
             settled = settle(scene, where / arm.name / "interactive_scene", seed)
             distance, edges = measure_graph(truth, graph.graph, overlaps)
@@ -71,8 +79,3 @@ def run_real(real: Path, scratch: Path, arms: Sequence[Arm], seed: int) -> list[
                 )
             )
     return outcomes
-
-
-def _context(folder: Path, seed: int) -> Context:
-    folder.mkdir(parents=True, exist_ok=True)
-    return Context(folder, seed=seed, device="cpu", progress=SilentProgress())
