@@ -14,6 +14,8 @@ from stages.kit.motion.compiled_check import FREE, UNCERTAIN, find_collision
 
 UNCERTAIN_COUNT = 0
 """Place in the counts of refusals that the mesh checker might not share; the others follow."""
+WHOLE_WAY = 1_000_000
+"""As `most` of `last_free`: more steps than any way has."""
 
 
 @njit(cache=True)
@@ -89,7 +91,7 @@ def search(
     count_a, count_b = 1, goals.shape[0]
     for number in range(goals.shape[0]):
         free, steps = last_free(
-            robot, scene, body, moving, first_frame, start, goals[number], resolution, 1_000_000, counts
+            robot, scene, body, moving, first_frame, start, goals[number], resolution, WHOLE_WAY, counts
         )
         if free == steps:
             path = np.empty((2, dimension))
@@ -114,7 +116,7 @@ def search(
             near = _nearest(points_b, count_b, target, resolution)
             origin = points_b[near].copy()
             free, steps = last_free(
-                robot, scene, body, moving, first_frame, origin, target, resolution, 1_000_000, counts
+                robot, scene, body, moving, first_frame, origin, target, resolution, WHOLE_WAY, counts
             )
             parent = near
             done = 0
@@ -193,7 +195,7 @@ def shorten(
         second[:] = rows[j] + (rows[j + 1] - rows[j]) * along
         if np.max(np.abs(second - first) / resolution) > high - low - 0.5:
             continue  # hardly shorter
-        free, steps = last_free(robot, scene, body, moving, first_frame, first, second, resolution, 1_000_000, counts)
+        free, steps = last_free(robot, scene, body, moving, first_frame, first, second, resolution, WHOLE_WAY, counts)
         if free < steps:
             continue
         fresh = np.empty((count - (j - i) + 2, path.shape[1]))

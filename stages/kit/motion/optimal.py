@@ -16,7 +16,7 @@ import numpy as np
 from schemas.errors import MissingDependency
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.compiled_check import FREE, find_collision
-from stages.kit.motion.compiled_rrt import count_refusal, last_free
+from stages.kit.motion.compiled_rrt import WHOLE_WAY, count_refusal, last_free
 from stages.kit.motion.failures import no_path
 from stages.kit.motion.path_query import (
     Effort,
@@ -125,7 +125,7 @@ def _solve(
 
     def look(begin: Any, end: Any) -> bool:
         free, steps = last_free(
-            robot, scene, body, query.moving, query.first_frame, values(begin), values(end), resolution, 1_000_000,
+            robot, scene, body, query.moving, query.first_frame, values(begin), values(end), resolution, WHOLE_WAY,
             counts,
         )  # fmt: skip
         return bool(free == steps)

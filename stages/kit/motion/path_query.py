@@ -11,7 +11,7 @@ import numpy as np
 
 from stages.kit.motion.collision import Collision, CollisionChecker
 from stages.kit.motion.compiled_check import FREE, find_collision
-from stages.kit.motion.compiled_rrt import UNCERTAIN_COUNT, last_free, shorten
+from stages.kit.motion.compiled_rrt import UNCERTAIN_COUNT, WHOLE_WAY, last_free, shorten
 from stages.kit.motion.failures import end_in_collision, joint_limit
 from stages.kit.motion.rrt_connect import FINER, SearchSpace, densify, first_collision
 
@@ -115,7 +115,7 @@ def is_free(query: Query, path: np.ndarray, checker: CollisionChecker, counts: n
     body = query.body.copy()
     for begin, end in zip(path[:-1], path[1:], strict=True):
         free, steps = last_free(
-            robot, scene, body, query.moving, query.first_frame, begin, end, query.space.resolution / FINER, 1_000_000,
+            robot, scene, body, query.moving, query.first_frame, begin, end, query.space.resolution / FINER, WHOLE_WAY,
             counts,
         )  # fmt: skip
         if free < steps:

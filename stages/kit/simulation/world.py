@@ -45,7 +45,7 @@ class LoadedBody:
     """Link name -> pybullet link index; -1 is the base link."""
     joints: dict[str, int]
     """Names of moving joints -> pybullet joint index."""
-    text: str = ""
+    text: str
     """The URDF it was loaded from, without visual shapes."""
 
     @property
