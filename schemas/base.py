@@ -69,18 +69,24 @@ class Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, protected_namespaces=())
 
     @classmethod
-    def read(cls, path: Path) -> Self:
-        """Read and validate a JSON file. Raises BadInput naming the file and the first wrong field."""
+    def read(cls, path: Path, *, largest: int | None = None, hint: str = "make the artifact again") -> Self:
+        """Read and validate a JSON file of at most `largest` bytes.
+
+        Raises BadInput naming the file and the first wrong field; `hint` says what to do about it.
+        """
+        path = Path(path)
         try:
-            return cls.model_validate_json(Path(path).read_bytes())
+            if largest is not None and path.stat().st_size > largest:
+                raise BadInput(f"{path}: larger than {largest} bytes", hint=hint)
+            return cls.model_validate_json(path.read_bytes())
         except FileNotFoundError:
-            raise BadInput(f"{path}: file is missing", hint="make the artifact again") from None
+            raise BadInput(f"{path}: file is missing", hint=hint) from None
         except OSError as error:
-            raise BadInput(f"{path}: {error.strerror}", hint="make the artifact again") from None
+            raise BadInput(f"{path}: {error.strerror}", hint=hint) from None
         except ValidationError as error:
             first = error.errors()[0]
             where = ".".join(str(part) for part in first["loc"]) or "document"
-            raise BadInput(f"{path}: {where}: {first['msg']}", hint="make the artifact again") from None
+            raise BadInput(f"{path}: {where}: {first['msg']}", hint=hint) from None
 
     def write(self, path: Path) -> None:
         """Write the model as indented JSON with sorted keys and a final newline."""

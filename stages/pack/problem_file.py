@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from schemas.errors import BadInput
 from schemas.packing import TABLE_TOP, PackingArea, PackingBox, PackingInstanceFile, PackingObstacle
 from stages.kit.motion.failures import MotionFailed
@@ -22,17 +20,7 @@ FORM = "docs/LLM3.md shows the form"
 
 def read_problem(path: Path, limits: Limits) -> Instance:
     """Read and check a problem. Raises BadInput: unreadable, a wrong field, boxes in each other, a box out of reach."""
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise BadInput(f"{path}: larger than {LARGEST_FILE} bytes", hint=FORM)
-        told = PackingInstanceFile.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}", hint=FORM) from None
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "document"
-        raise BadInput(f"{path}: {where}: {first['msg']}", hint=FORM) from None
-    instance = from_file(told, path.stem)
+    instance = from_file(PackingInstanceFile.read(path, largest=LARGEST_FILE, hint=FORM), path.stem)
     _check_starts(instance, path, FixedArm(limits))
     return instance
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from schemas.base import Model, Name
 from schemas.contact_graph import SCENE_NODE
@@ -118,16 +118,7 @@ def read_support_annotation(path: Path) -> SupportAnnotation:
     Raises BadInput when it is missing, too large, no JSON of this format and version, or says what cannot be: a name or
     label twice, an unknown class or node, an object that nothing carries or that carries itself by way of others.
     """
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise BadInput(f"{path}: larger than {LARGEST_FILE} bytes", hint=HINT)
-        annotation = SupportAnnotation.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}", hint=HINT) from None
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "document"
-        raise BadInput(f"{path}: {where}: {first['msg']}", hint=HINT) from None
+    annotation = SupportAnnotation.read(path, largest=LARGEST_FILE, hint=HINT)
     problem = next(contradictions(annotation), None)
     if problem is not None:
         raise BadInput(f"{path}: {problem}", hint=HINT)

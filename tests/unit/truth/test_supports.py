@@ -242,7 +242,7 @@ def test_files_that_are_no_annotation(tmp_path, content):
     (tmp_path / "a.json").write_bytes(content)
     with pytest.raises(BadInput, match="a.json"):
         read_support_annotation(tmp_path / "a.json")
-    with pytest.raises(BadInput, match="No such file"):
+    with pytest.raises(BadInput, match="file is missing"):
         read_support_annotation(tmp_path / "b.json")
 
 
