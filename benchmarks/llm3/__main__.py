@@ -56,6 +56,8 @@ def main() -> None:
     parser.add_argument("--arms", nargs="+", default=list(ARMS), choices=list(ARMS))
     parser.add_argument("--cases", nargs="+", default=list(EVERYWHERE), choices=list(EVERYWHERE))
     options = parser.parse_args()
+    if not any(case in ARMS[arm].cases for arm in options.arms for case in options.cases):
+        parser.error("none of these arms runs on any of these cases")
     options.out.mkdir(parents=True, exist_ok=True)
     log = options.out / "runs.jsonl"
     if options.fresh:

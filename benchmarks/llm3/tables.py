@@ -81,7 +81,7 @@ def table(runs: list[Run]) -> str:
         _hard(groups),
         _paired(groups),
     ]
-    return "\n".join(parts) + "\n"
+    return "\n".join(part for part in parts if part) + "\n"
 
 
 def _cell(group: dict[int, Run] | None, most: int) -> str:
@@ -135,6 +135,8 @@ def _layout_4_2(groups: Runs) -> str:
 
 def _hard(groups: Runs) -> str:
     cases = tuple(case for case in HARD if any((arm, case) in groups for arm in ARMS))
+    if not cases:
+        return ""
     names = [case.removeprefix("hard/") for case in cases]
     lines = ["## Harder suites\n", "| method | " + " | ".join(names) + " |", "|---|" + "---|" * len(names)]
     about = []
