@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from schemas.errors import BadInput, MissingDependency, UsageError
 from stages.kit.language.backend import Backend
@@ -101,7 +102,7 @@ def _key(parameters: LanguageParameters, environment: Mapping[str, str]) -> str:
             f"${parameters.key_variable} is empty, and --key-variable says that it holds the key",
             hint=f"export {parameters.key_variable}=..., or leave --key-variable out",
         )
-    if parameters.base_url.startswith("http://") and not stays_on_this_machine(parameters.base_url):
+    if urlsplit(parameters.base_url).scheme != "https" and not stays_on_this_machine(parameters.base_url):
         raise UsageError(
             f"{parameters.base_url}: the key would cross the network readable by all",
             hint="use https, or a tunnel to this machine",

@@ -181,7 +181,8 @@ class Connection:
             raise TryAgain(f"no answer within {self._timeout:g} s")
         if len(self._key) >= SHORTEST_SECRET:
             data = data.replace(self._key.encode(), HIDDEN.encode())
-        said = _excerpt(data) or _printable(self.hide(response.reason))
+        # Hidden once more, as escapes may have hidden the key among the bytes; before the words are cut.
+        said = _printable(self.hide(_own_words(data))) or _printable(self.hide(response.reason))
         if response.status in RETRIED:
             raise TryAgain(
                 f"status {response.status} ({said})",
@@ -246,16 +247,16 @@ def _words(error: Exception) -> str:
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 
-def _excerpt(data: bytes) -> str:
-    """Return what a service says is wrong: the `error` of a JSON object (its `message`), else how the body begins."""
-    text = data[:4096].decode("utf-8", "replace")
+def _own_words(data: bytes) -> str:
+    """Return what a service says is wrong: the `error` of a JSON object (its `message`), other JSON without escapes,
+    else how the body begins."""
     try:
-        said = json.loads(text)
-        said = said.get("error", text) if isinstance(said, dict) else text
-        text = str(said.get("message", said) if isinstance(said, dict) else said)
+        said = json.loads(data)
+        for key in ("error", "message"):
+            said = said.get(key, said) if isinstance(said, dict) else said
+        return said if isinstance(said, str) else json.dumps(said, ensure_ascii=False)
     except (ValueError, RecursionError):
-        pass
-    return _printable(text)
+        return data[:4096].decode("utf-8", "replace")
 
 
 def _printable(text: str) -> str:
