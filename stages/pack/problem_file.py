@@ -8,7 +8,7 @@ from schemas.errors import BadInput
 from schemas.packing import TABLE_TOP, PackingArea, PackingBox, PackingInstanceFile, PackingObstacle
 from stages.kit.motion.failures import MotionFailed
 from stages.pack.arm import HOME, FixedArm, Limits, ToolPose
-from stages.pack.environment import upright_block
+from stages.pack.environment import X_RANGE, Y_RANGE, upright_block
 from stages.pack.hand import tool_over_centre
 from stages.pack.instances import Instance, Obstacle
 from stages.pack.records import BoxState, Rectangle
@@ -19,8 +19,10 @@ FORM = "docs/LLM3.md shows the form"
 
 
 def read_problem(path: Path, limits: Limits) -> Instance:
-    """Read and check a problem. Raises BadInput: unreadable, a wrong field, boxes in each other, a box out of reach."""
+    """Read and check a problem. Raises BadInput: unreadable, a wrong field, boxes in each other, a box out of reach, a
+    basket in which nothing can be placed."""
     instance = from_file(PackingInstanceFile.read(path, largest=LARGEST_FILE, hint=FORM), path.stem)
+    _check_basket(instance, path)
     _check_starts(instance, path, FixedArm(limits))
     return instance
 
@@ -53,6 +55,16 @@ def to_file(instance: Instance) -> PackingInstanceFile:
             for entry in instance.obstacles
         ),
     )
+
+
+def _check_basket(instance: Instance, path: Path) -> None:
+    for axis, (least, most) in zip((0, 1), (X_RANGE, Y_RANGE), strict=True):
+        # Parameters of a place are clipped: every plan would fail without a reason that says why.
+        if instance.basket.high[axis] <= least or instance.basket.low[axis] >= most:
+            raise BadInput(
+                f"{path}: basket: places are within x {X_RANGE}, y {Y_RANGE} m, and none of them is in it",
+                hint="move the basket",
+            )
 
 
 def _check_starts(instance: Instance, path: Path, arm: FixedArm) -> None:

@@ -89,6 +89,7 @@ def test_a_model_that_never_answered_ends_the_step_and_one_that_stopped_leaves_w
         ({"boxes": [PROBLEM["boxes"][0] | {"width": -1}]}, "width"),
         ({"boxes": [PROBLEM["boxes"][0] | {"x": 1.2}]}, "tin cannot be picked where it starts"),
         ({"boxes": [PROBLEM["boxes"][0], PROBLEM["boxes"][1] | {"x": 0.41, "y": -0.2}]}, "start"),
+        ({"basket": {"low": [-0.6, -0.1], "high": [-0.5, 0.1]}}, "basket: places are within"),
         ({"surprise": 1}, "surprise"),
         ({"boxes": [PROBLEM["boxes"][0] | {"name": "../x"}]}, "name"),
     ],
