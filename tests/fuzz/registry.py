@@ -30,6 +30,7 @@ INSTRUMENTED = [
     "stages.segment.service",
     "stages.kit.formats",
     "stages.kit.language",
+    "stages.kit.services",
     "stages.kit.running",
     "schemas",
 ]
