@@ -105,6 +105,8 @@ class PlanFile(Model):
     """What searched for the task plan: `builtin` or `fast-downward`. Absent in plans from before there was a choice."""
     learned: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
     """What failed motions taught the task search, in words and in order."""
+    replanned: tuple[int, ...] = Field(default=(), exclude_if=lambda value: not value)
+    """Indices of the actions at which the robot looked around and planned anew, as something had gone otherwise."""
     tree_differences: tuple[TreeDifference, ...] = Field(default=(), exclude_if=lambda value: not value)
     """Where the kinematic tree in the room was not as planned after an action."""
 

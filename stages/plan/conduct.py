@@ -19,8 +19,11 @@ from stages.plan.motions import Segment
 from stages.plan.pick_place import Budgets
 from stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level
 from stages.plan.refinement import Step, grasp_style, refine_action
+from stages.plan.tree_state import carrier
 from stages.plan.world_model import RobotState, WorldModel
 
+UPRIGHT = 0.35
+"""What was put down stands when it is tilted by less [rad]."""
 JOINT_TOLERANCE = 0.05
 """A joint further than this from where a motion should have left it is looked at again [rad or m]."""
 
@@ -49,35 +52,66 @@ class Conduct:
     relocalize: bool
     attempts: int
     failures: list[Failure] = field(default_factory=list)
-    observe: Callable[[int], None] = lambda number: None
+    observe: Callable[[int], object] = lambda number: None
     """Called with the index of its last step when an action has been carried out."""
+    steps: list[Step] = field(default_factory=list)
+    """The plan; what was planned anew stands in the place of what could not be carried out."""
 
-    def run(self, state: RobotState, steps: list[Step]) -> bool:
-        """Execute the steps; return whether all were carried out. Failures are collected."""
+    def run(
+        self, state: RobotState, steps: list[Step], replans: int = 0,
+        replan: Callable[[RobotState, int], list[Step] | None] = lambda state, number: None,
+        reached: Callable[[], bool] = lambda: True,
+    ) -> bool:  # fmt: skip
+        """Execute the steps; return whether all were carried out. Failures are collected.
+
+        When an action fails in all its attempts, or when the goal is not `reached` at the end, `replan` is asked for
+        other steps, at most `replans` times: it gets the robot's state and the index of the first of them.
+        """
+        self.steps = list(steps)
         if not self.relocalize:
             return self._replay(steps)
+        done = 0
+        for turn in range(replans + 1):
+            after, done = self._carry_out(state, done)
+            if after is None:
+                return False
+            state = after
+            complete = done == len(self.steps)
+            if (complete and reached()) or turn == replans:
+                return complete
+            self.look_around()
+            further = replan(state, done)
+            if further is None:
+                return complete
+            self.steps[done:] = further
+        return False
+
+    def _carry_out(self, state: RobotState, start: int) -> tuple[RobotState | None, int]:
+        """Execute the steps from an index on until an action fails; return the robot's state (None: it stands where it
+        cannot get back from) and the index of the first step that was not carried out."""
         origin = "start"
-        number = 0
-        groups = _by_action(steps)
+        number = start
+        groups = _by_action(self.steps[start:])
         for place, group in enumerate(groups):
             following = [(later[-1].name, later[-1].arguments) for later in groups[place + 1 :]]
-            carried_out = self._act(state, group, origin, number, following)
-            if carried_out is None:
-                return False
-            state = carried_out
+            after, carried_out = self._act(state, group, origin, number, following)
+            if not carried_out or after is None:
+                return after, number
+            state = after
             name, arguments = group[-1].name, group[-1].arguments
             origin = arguments[1] if name == "place" else arguments[0]
             number += len(group)
             self.observe(number - 1)
-        return True
+        return state, number
 
     # --- closed loop ------------------------------------------------------------------------------------------
 
     def _act(
         self, state: RobotState, group: list[Step], origin: str, number: int,
         following: list[tuple[str, tuple[str, ...]]],
-    ) -> RobotState | None:  # fmt: skip
-        """Carry out one action with its drives, trying again after a look; return the state after it or None."""
+    ) -> tuple[RobotState | None, bool]:  # fmt: skip
+        """Carry out one action with its drives, trying again after a look; return the state after it (None: the arm
+        does not get back) and whether it was carried out."""
         name, arguments = group[-1].name, group[-1].arguments
         for attempt in range(self.attempts):
             self.physical.action = number
@@ -98,19 +132,23 @@ class Conduct:
                     self.physical.action = number + min(offset, len(group) - 1)
                     self._execute(step)
                     self._check_joints(step)
-                self._check_effect(name, arguments)
-                return self._perceived(after)
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
-                if state.holding is not None and self.physical.held is None and name != "place":
-                    return None
-                if state.holding is not None and self.physical.held is None:
-                    return None  # what was held is gone: nothing left to place
+                lost = state.holding is not None and self.physical.held is None
                 recovered = self._recovered(state, name, arguments)
-                if recovered is None:
-                    return None
+                if recovered is None or lost:  # what was held is gone: nothing left to place
+                    return recovered, False
                 state = recovered
-        return None
+                continue
+            state = self._perceived(after)
+            try:
+                self._check_effect(name, arguments)
+                return state, True
+            except MotionFailed as failed:
+                self._note(failed, name, arguments)
+                if name == "place":
+                    return state, False
+        return state, False
 
     def _recovered(self, state: RobotState, name: str, arguments: tuple[str, ...]) -> RobotState | None:
         """Return the state after the way back, None (and a note) when the arm does not get there either."""
@@ -139,15 +177,24 @@ class Conduct:
 
     def _look(self, name: str, arguments: tuple[str, ...]) -> None:
         """Take over pose, joints and shape of the bodies that an action names, as they are in the room now."""
-        world = self.physical.world
         for body in self._named_bodies(name, arguments):
-            here = self._matched(body)
-            parent = self.model.records[body].parent
-            record = true_record(world, here, self.room.records[here])
-            names = {there: planned for planned, there in self.joint_names.items() if planned.startswith(f"{body}__")}
-            record, text = renamed(record, self.room.texts[here], body, names)
-            record = record.model_copy(update={"parent": parent, "movable": self.model.records[body].movable})
-            self.model.see(body, record, text, self.room.planes[here])
+            self._see(body, self._matched(body))
+
+    def _see(self, body: str, here: str) -> None:
+        """Take over a body of the room: pose, joints and shape; what it stands on stays as believed."""
+        parent = self.model.records[body].parent
+        record = true_record(self.physical.world, here, self.room.records[here])
+        names = {there: planned for planned, there in self.joint_names.items() if planned.startswith(f"{body}__")}
+        record, text = renamed(record, self.room.texts[here], body, names)
+        record = record.model_copy(update={"parent": parent, "movable": self.model.records[body].movable})
+        self.model.see(body, record, text, self.room.planes[here])
+
+    def look_around(self) -> None:
+        """Take over everything that moves or has joints and has a counterpart in the room."""
+        for body, match in sorted(self.matches.items()):
+            record = self.model.records.get(body)
+            if match.matched is not None and record is not None and (record.movable or record.joints):
+                self._see(body, match.matched)
 
     def _anchor(self, step: Step) -> tuple[np.ndarray, np.ndarray] | None:
         """Return the pose of what a planned motion is tied to, before the look: (world_from_body, empty)."""
@@ -196,7 +243,10 @@ class Conduct:
                 )
 
     def _check_effect(self, name: str, arguments: tuple[str, ...]) -> None:
-        """Raises MotionFailed `condition_not_met` when a door is not as the action should leave it."""
+        """Raises MotionFailed `condition_not_met` when a door, or what was put down, is not as the action should leave
+        it."""
+        if name == "place":
+            self._check_place(*arguments[:2])
         if name not in ("open", "close"):
             return
         there = self.joint_names[arguments[0]]
@@ -209,6 +259,19 @@ class Conduct:
                 f"after {name} the joint {there} stands at {value:.3f} of {joint.upper:.3f}",
                 (arguments[0],),
                 {"value": value, "upper": joint.upper},
+            )
+
+    def _check_place(self, item: str, target: str) -> None:
+        world, here, there = self.physical.world, self._matched(item), self._matched(target)
+        parent = carrier(world, here)
+        tilt = float(np.arccos(np.clip(world.pose(here)[2, 2], -1.0, 1.0)))
+        if parent != there or tilt > UPRIGHT:
+            raise MotionFailed(
+                "condition_not_met",
+                f"{item} was let go over {target} and now stands on {parent or 'nothing'}, {np.degrees(tilt):.0f} "
+                "degrees from upright",
+                (item, target),
+                {"tilt": tilt},
             )
 
     def _perceived(self, state: RobotState) -> RobotState:

@@ -110,7 +110,7 @@ class PhysicalRobot:
             self.check_hold()
         if segment.event == "grasp" and item is not None:
             self.world.wake()
-            self.grasp(item)
+            self.grasp(item, firm=segment.firm)
             self.recording.keyframe(self.action, "grasp")
         elif segment.event == "release":
             self.release()
@@ -152,8 +152,10 @@ class PhysicalRobot:
 
     # --- gripper ----------------------------------------------------------------------------------------------
 
-    def grasp(self, item: str) -> None:
+    def grasp(self, item: str, *, firm: bool = False) -> None:
         """Close the fingers on an item. Raises MotionFailed `grasp_lost` when not both of them press on it."""
+        description = self.description
+        self.robot.finger_force = description.firm_finger_force if firm else description.finger_force
         self._opening = 0.0
         self.wait(GRIP_SECONDS)
         if not self.robot.grasps(item):
@@ -185,6 +187,7 @@ class PhysicalRobot:
     def release(self) -> None:
         """Open the fingers and let the item come to rest."""
         self.held = None
+        self.robot.finger_force = self.description.finger_force
         self._opening = self.description.opening
         self.wait(RELEASE_SECONDS)
 

@@ -21,6 +21,8 @@ class Segment:
     event: Literal["", "grasp", "release"] = ""
     item: str | None = None
     """What is grasped or released."""
+    firm: bool = False
+    """Whether a grasp takes all the force that the fingers have."""
     label: str = ""
     """Name of the key frame to be taken at the end; "" takes none."""
 

@@ -56,13 +56,17 @@ class PlanParameters(Parameters):
     refinement_attempts: int = Field(3, ge=1, le=100, description="Times the geometry of one task plan is tried")
     task_attempts: int = Field(4, ge=1, le=100, description="Task plans tried, each without what failed before")
     execution_attempts: int = Field(3, ge=1, le=20, description="Times an action is tried when it fails physically")
+    replans: int = Field(
+        2, ge=0, le=20, description="Times the robot looks around and plans anew when an action fails in all its "
+        "attempts, or when the goal does not hold at the end"
+    )  # fmt: skip
     video_rate: float = Field(1.0, ge=0, le=30, description="Images per second in execution.mcap [1/s]; 0: none")
     image_width: int = Field(640, ge=64, le=4096, description="Width of the key frames [px]")
 
 
 STAGE = Stage(
     name="plan",
-    version=4,
+    version=5,
     summary="Plan what a robot does in the scene, execute it in physics, check the goal or say why not",
     parameters=PlanParameters,
     reads={"scene": InteractiveScene, "ground_truth": Optionally(GroundTruth)},

@@ -18,16 +18,19 @@ from stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
 from stages.plan.motions import Manipulation, Segment, whole_body
 from stages.plan.placements import Placement, place_regions, sample_placements
 from stages.plan.rim_grasps import rim_grasps
+from stages.plan.tray_loading import lifts_left, load_moments
 from stages.plan.world_model import RobotState, WorldModel
 
 APPROACH = 0.10
 LIFT = 0.03
 DRAWER_LIFT = 0.2
 SLOW = 0.35
-GraspStyle = Literal["any", "level", "steep"]
-"""How the hand may come: `level` from the side (for what is put under a cover), `steep` from above (into a drawer)."""
+GraspStyle = Literal["any", "rather_level", "level", "steep"]
+"""How the hand may come: `level` from the side (for what is put under a cover), `steep` from above (into a drawer);
+`rather_level` tries the ways from the side first."""
 PITCHES: dict[GraspStyle, tuple[float, ...]] = {
     "any": (0.0, 0.35, 0.7, 1.1, np.pi / 2),
+    "rather_level": (0.0, 0.35, 0.7, 1.1, np.pi / 2),
     "level": (0.0, 0.35, 0.7),
     "steep": (1.1, np.pi / 2),
 }
@@ -52,6 +55,24 @@ def _pairs(bases: np.ndarray, others: int, random: np.random.Generator, most: in
     """Return at most `most` (base, other) index pairs in random order, each once."""
     order = random.permutation(len(bases) * others)[:most]
     return [(int(index) // others, int(index) % others) for index in order]
+
+
+def _bearable(model: WorldModel, item: str, grasps: list[Grasp]) -> list[Grasp]:
+    """Return the grasps in which the fingers bear the moment of a carrier and its load. Raises MotionFailed `no_grasp`
+    when it turns in all of them."""
+    if not grasps:
+        return []
+    world_from_item = model.pose(item)
+    moments = load_moments(model, item, np.array([world_from_item @ grasp.body_from_tool for grasp in grasps]))
+    most = model.description.holding_moment
+    if moments.min() > most:
+        raise MotionFailed(
+            "no_grasp",
+            f"{item} and what stands on it turn in the fingers with {moments.min():.2f} N m at least, they bear {most}",
+            (item,),
+            {"moment": float(moments.min()), "holding_moment": most},
+        )
+    return [grasp for grasp, moment in zip(grasps, moments, strict=True) if moment <= most]
 
 
 def _retreat(world_from_tool: np.ndarray, distance: float) -> np.ndarray:
@@ -97,9 +118,12 @@ def plan_pick(
     points, normals = model.surface(item)
     # Fingers may touch the item, so that its believed shape, a little too wide, does not stop them.
     widest = model.description.opening + budgets.size_uncertainty
-    grasps = sample_grasps(
-        points, normals, world_from_item, opening=widest, random=random, pitches=PITCHES[style]
-    )  # fmt: skip
+    # what is laden is held straight from above: the load stays level while the arm moves
+    grasps = _bearable(model, item, rim_grasps(points, world_from_item, random)) if model.laden(item) else []
+    if not grasps:
+        grasps = sample_grasps(
+            points, normals, world_from_item, opening=widest, random=random, pitches=PITCHES[style]
+        )  # fmt: skip
     if not grasps:
         grasps = rim_grasps(points, world_from_item, random)
     if not grasps:
@@ -117,6 +141,11 @@ def plan_pick(
     paths = budgets.paths
     bases = _bases_around(model, state, world_from_item[:3, 3], budgets, random, tally, None)
     queue = [(bases[i], grasps[j]) for i, j in _pairs(bases, len(grasps), random, budgets.pairs)]
+    if model.laden(item):
+        moments = load_moments(model, item, np.array([world_from_item @ grasp.body_from_tool for _, grasp in queue]))
+        queue = [queue[index] for index in np.argsort(moments.round(1), kind="stable")]
+    if style == "rather_level":
+        queue.sort(key=lambda entry: entry[1].pitch > max(PITCHES["level"]))
     if preferred is not None:
         queue.insert(0, (preferred[0], Grasp(preferred[1], 0.0, 0.0)))
     checker.allow(touch=model.links(item))
@@ -212,7 +241,7 @@ def _try_pick(
         base,
         (
             Segment(whole_body(base, reach), opening),
-            Segment(whole_body(base, approach), opening, SLOW, "grasp", item),
+            Segment(whole_body(base, approach), opening, SLOW, "grasp", item, firm=laden),
             Segment(whole_body(base, lifted), 0.0, LEVEL_PACE if laden else SLOW, "", item),
             Segment(whole_body(base, home), 0.0, 0.6, "", item),
         ),
@@ -256,6 +285,10 @@ def plan_place(
             (item, target),
             {"places": len(regions)},
         )
+    if model.records[target].movable and places:
+        left = lifts_left(model, target, item, np.array([place.world_from_item for place in places]))
+        order = sorted(range(len(places)), key=lambda index: (not places[index].roomy, -left[index]))
+        places = [places[index] for index in order]
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
     paths = budgets.paths
@@ -266,7 +299,7 @@ def plan_place(
     model.robot.set(_open(state, model.description.opening))
     checker.carry(item, state.tool_from_item)
     checker.allow(touch=model.links(item))
-    for place in places[: max(4, budgets.bases // 16)]:
+    for place in places[: max(4, budgets.bases // 6)]:
         bases = sample_bases(place.world_from_item[:3, 3], model.room, budgets.bases // 8, random)
         bases = free_bases(bases, state.arm, checker, tally.blockers, 4)
         queue += [(base, place) for base in bases]

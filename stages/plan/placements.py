@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
-from stages.plan.regions import NEAR_LEVEL, Region
+from stages.plan.regions import CELL, NEAR_LEVEL, Region
 from stages.plan.world_model import WorldModel
 
 PUT_DOWN_HEIGHT = 0.006
@@ -27,6 +27,8 @@ class Placement:
     covered: bool
     """Whether something above it makes the hand come from the side."""
     in_drawer: bool
+    roomy: bool = True
+    """Whether the whole foot has surface under it, a cell to spare: walls and edges are that far."""
 
 
 def place_regions(model: WorldModel, item: str, target: str, door: str | None) -> list[Region]:
@@ -43,7 +45,8 @@ def place_regions(model: WorldModel, item: str, target: str, door: str | None) -
 def sample_placements(
     model: WorldModel, item: str, target: str, door: str | None, random: np.random.Generator, count: int = 48
 ) -> list[Placement]:
-    """Return up to `count` placements a region, those of regions at a comfortable height first, taking turns.
+    """Return up to `count` placements a region, those of regions at a comfortable height first, taking turns; tight
+    ones come last.
 
     A place counts where the region has surface under the foot and room above it. Whether it is taken shows when the
     item is put there in the collision checker.
@@ -64,10 +67,12 @@ def sample_placements(
                 continue
             position = apply(world_from_closed, spot)
             position[2] += PUT_DOWN_HEIGHT - bottom
-            places.append(Placement(transform_from_yaw(yaw, position), region.covered, drawer))
+            roomy = region.carries(spot[:2], radius + CELL / 2, height)
+            places.append(Placement(transform_from_yaw(yaw, position), region.covered, drawer, roomy))
         turns.append(places)
     longest = max((len(places) for places in turns), default=0)
-    return [places[turn] for turn in range(longest) for places in turns if turn < len(places)]
+    mixed = [places[turn] for turn in range(longest) for places in turns if turn < len(places)]
+    return sorted(mixed, key=lambda place: not place.roomy)
 
 
 def _height(model: WorldModel, region: Region) -> float:
@@ -75,16 +80,21 @@ def _height(model: WorldModel, region: Region) -> float:
     return float(apply(region.world_from_closed(model), middle)[2])
 
 
-def placement_style(model: WorldModel, item: str, target: str, door: str | None) -> Literal["any", "level", "steep"]:
-    """Return the grasp style (`any`, `level`, `steep`) with which an item can be put there.
+def placement_style(
+    model: WorldModel, item: str, target: str, door: str | None
+) -> Literal["any", "rather_level", "level", "steep"]:
+    """Return the grasp style with which an item can be put there.
 
-    `level` when all its places are under a cover, `steep` when all are in drawers, `any` otherwise.
+    `level` when all its places are under a cover, `rather_level` when some are, `steep` when all are in drawers, `any`
+    otherwise.
     """
     regions = place_regions(model, item, target, door)
     if regions and all(region.covered for region in regions):
         return "level"
     if regions and all(region.joint is not None for region in regions):
         return "steep"
+    if any(region.covered for region in regions):
+        return "rather_level"
     return "any"
 
 

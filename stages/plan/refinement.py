@@ -23,7 +23,7 @@ from stages.plan.world_model import RobotState, WorldModel
 
 TASK_STATES = (6000, 50_000)
 """Most states of one task search, and of one for a shortest plan: tasks of rooms take some hundreds."""
-LADEN_PACE = 0.5
+LADEN_PACE = 0.25
 """Share of the full speed at which the robot drives with a laden tray."""
 FINAL = ("no_grasp",)
 """Failures that no other draw of the random choices can avoid."""

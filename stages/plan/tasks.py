@@ -94,7 +94,7 @@ def fridge_to_microwave(facts: SceneFacts) -> Goals:
 
 
 def tidy_the_desk(facts: SceneFacts) -> Goals:
-    """Everything small on one desk goes onto one shelf (or cabinet), else each thing onto the first that takes it."""
+    """Everything small on one desk goes onto one shelf (or cabinet), else half onto each of two."""
     desks = facts.bodies("desk")
     targets = facts.bodies(*SHELVES)
     ranked = []
@@ -111,7 +111,19 @@ def tidy_the_desk(facts: SceneFacts) -> Goals:
             f"{len(desks)} desks and {len(targets)} shelves within reach: nothing small on a desk fits on one",
             {"desks": len(desks), "shelves": len(targets)},
         )
-    return [tuple(atom_text(("on", item, target)) for item in fitting) for _, _, _, fitting, target in sorted(ranked)]
+    goals = [tuple(atom_text(("on", item, target)) for item in fitting) for _, _, _, fitting, target in sorted(ranked)]
+    return goals[:2] + _shared_out(sorted(ranked)[:2]) + goals[2:]
+
+
+def _shared_out(ranked: list[tuple[int, bool, float, tuple[str, ...], str]]) -> Goals:
+    """Return goals in which the things of one desk that fit on either of two targets are shared between them."""
+    if len(ranked) < 2 or ranked[0][3] != ranked[1][3] or len(ranked[0][3]) < 2:
+        return []
+    things, targets = ranked[0][3], [entry[4] for entry in ranked]
+    return [
+        tuple(atom_text(("on", item, targets[(number + turn) % 2])) for number, item in enumerate(things))
+        for turn in range(2)
+    ]
 
 
 def put_away_in_drawer(facts: SceneFacts) -> Goals:

@@ -86,7 +86,10 @@ def observed_state(
         if match.matched is None or not world.bodies[match.matched].record.movable:
             continue
         poses[name] = world.pose(match.matched)
-        parents[name] = HAND if match.matched == held else _carrier(world, match.matched, planned)
+        below = carrier(world, match.matched)
+        parents[name] = (
+            HAND if match.matched == held else NOTHING if below is None else planned.get(below, f"room:{below}")
+        )
     joints = {}
     for joint, there in joint_names.items():
         body = next(name for name, entry in world.bodies.items() if there in entry.joints)
@@ -94,17 +97,15 @@ def observed_state(
     return TreeState(parents, poses, joints, planned.get(held) if held is not None else None)
 
 
-def _carrier(world: PhysicsWorld, name: str, planned: dict[str, str]) -> str:
+def carrier(world: PhysicsWorld, name: str) -> str | None:
+    """Return the body of a world that pushes a thing upwards most, by the contacts of the last step; None: nothing."""
     push: dict[str, float] = defaultdict(float)
     for contact in world.contacts(world.bodies[name].body_id):
         other = world.name_of(contact.other_body)
         if other is None or other == name or contact.normal[2] < STEEP or contact.depth < -TOUCHING:
             continue
         push[other] += float(contact.normal[2]) * (contact.force + 1e-3)  # what sleeps has no forces
-    if not push:
-        return NOTHING
-    best = max(sorted(push), key=lambda other: push[other])
-    return planned.get(best, f"room:{best}")
+    return max(sorted(push), key=lambda other: push[other]) if push else None
 
 
 def tree_differences(

@@ -71,6 +71,13 @@ def sample_grasps(
     return [found[index] for index in random.permutation(len(found)).tolist()]
 
 
+def _square(facing: np.ndarray) -> bool:
+    """Whether the outside of a surface faces a finger: (N,) cosines of normals there with the way out. The inner side
+    of a thin wall, which faces away, does not count."""
+    outside = facing[facing > 0]
+    return len(outside) > 0 and float(outside.mean()) >= SQUARE
+
+
 def narrowest_width(points: np.ndarray) -> float:
     """Return the smallest horizontal extent [m] of points (N, 3) over all directions: why no grasp was found."""
     directions = np.linspace(0, np.pi, 36, endpoint=False)
@@ -106,9 +113,8 @@ def _grasp_at(
     if width > opening - MARGIN:
         return None
     facing = normals[between] @ closing
-    if (
-        facing[along > along.max() - CONTACT_BAND].mean() < SQUARE
-        or facing[along < along.min() + CONTACT_BAND].mean() > -SQUARE
+    if not _square(facing[along > along.max() - CONTACT_BAND]) or not _square(
+        -facing[along < along.min() + CONTACT_BAND]
     ):
         return None
     pose = np.eye(4)

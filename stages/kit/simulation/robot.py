@@ -63,6 +63,7 @@ class Robot:
         self.hand = self.links[description.hand_link]
         self.tool = self.links[description.tool_link]
         self.grip: int | None = None
+        self.finger_force = description.finger_force
         for finger in self.fingers:
             engine.changeDynamics(
                 self.body_id, finger, lateralFriction=FINGER_FRICTION, spinningFriction=0.02,
@@ -130,7 +131,7 @@ class Robot:
         )  # fmt: skip
         engine.setJointMotorControlArray(
             self.body_id, self.finger_joints, engine.POSITION_CONTROL, targetPositions=[opening / 2] * 2,
-            forces=[self.description.finger_force] * 2, positionGains=[0.1] * 2, velocityGains=[1.0] * 2,
+            forces=[self.finger_force] * 2, positionGains=[0.1] * 2, velocityGains=[1.0] * 2,
             physicsClientId=client,
         )  # fmt: skip
 

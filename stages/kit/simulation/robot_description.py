@@ -39,7 +39,14 @@ class RobotDescription:
     carry: np.ndarray
     tip_overhang: float
     opening: float
+    palm: tuple[float, float]
+    """Length along which the fingers close, and breadth."""
     finger_force: float
+    """Of each finger, for things held between both [N]."""
+    firm_finger_force: float
+    """For things that would turn in the fingers [N]."""
+    holding_moment: float
+    """Largest moment about the fingers that such a hold bears [N m]."""
     pedestal_height: float
     pedestal_radius: float
     base_speed: float
@@ -62,7 +69,7 @@ def load_robot(name: str) -> RobotDescription:
         raise MissingDependency(f"{urdf}: the robot's URDF is missing", hint="install pybullet again")
     fields: dict[str, Any] = {"urdf": urdf, **values}
     fields |= {key: np.array(fields[key], dtype=float) for key in ("lower", "upper", "carry")}
-    fields |= {key: tuple(fields[key]) for key in ("arm_joints", "finger_joints", "finger_links")}
+    fields |= {key: tuple(fields[key]) for key in ("arm_joints", "finger_joints", "finger_links", "palm")}
     return RobotDescription(**fields)
 
 

@@ -1,0 +1,244 @@
+"""Carry a plan out in the physics of a room, and tell what came of it: checks, graphs, pictures, the log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from schemas.contact_graph import ContactGraphFile
+from schemas.ground_truth import GroundTruth
+from schemas.interactive_scene import InteractiveScene, SceneBody
+from schemas.plan import BodyMatch, Check, Failure, TreeDifference, TriedPlan
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.simulation.robot import Configuration
+from stages.kit.simulation.world import load_scene, read_scene_bodies
+from stages.kit.stage import Context
+from stages.plan.assumptions import Belief, match_beliefs
+from stages.plan.checks import check_goal
+from stages.plan.conduct import Conduct, Room, joint_pairs
+from stages.plan.correspondence import match_bodies
+from stages.plan.execution import PhysicalRobot
+from stages.plan.execution_log import write_execution
+from stages.plan.parameters import PlanParameters
+from stages.plan.pick_place import Budgets
+from stages.plan.pictures import RoomPictures, picture_camera
+from stages.plan.refinement import Step
+from stages.plan.replanning import Replanning, Search
+from stages.plan.trajectories import executed_rows
+from stages.plan.tree_state import TreeState, after_step, graph_of_state, observed_state, start_state, tree_differences
+from stages.plan.world_model import RobotState, WorldModel, body_planes
+
+RECORD_RATE = 10.0
+SETTLE_SECONDS = 1.0
+START = -1
+"""Index of what is observed before the first action."""
+LOOK = (
+    "before each action the robot saw pose, joint values and shape of the bodies that the action names, as they are in "
+    "the room (stands for a wrist camera's look); everything else it knew from the planned scene"
+)
+LOOK_AROUND = (
+    "before planning anew it saw all bodies of the planned scene that can move, as they are in the room, and what they "
+    "stand on"
+)
+PROPRIOCEPTION = "the pose of a held item in the hand was read from the simulation"
+GRIP = "items are held by friction of the two fingers alone; no constraint is added"
+
+
+@dataclass(frozen=True)
+class Order:
+    """What is to be carried out, and what is known of it."""
+
+    scene: InteractiveScene
+    ground_truth: GroundTruth | None
+    graph: ContactGraphFile
+    beliefs: list[Belief]
+    literals: tuple[str, ...]
+    state: RobotState
+    steps: list[Step]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a plan."""
+
+    steps: list[Step] | None
+    """As carried out: what was planned anew on the way stands in the place of what failed."""
+    executed_in: str | None = None
+    checks: tuple[Check, ...] = ()
+    matches: tuple[BodyMatch, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    failures: tuple[Failure, ...] = ()
+    tried: tuple[TriedPlan, ...] = ()
+    learned: tuple[str, ...] = ()
+    replanned: tuple[int, ...] = ()
+    bumps: dict[str, float] = field(default_factory=dict)
+    graphs: dict[int, ContactGraphFile] = field(default_factory=dict)
+    """Index of an action -> the graph after it."""
+    graph: ContactGraphFile | None = None
+    """The graph in the end; None: as it was."""
+    differences: tuple[TreeDifference, ...] = ()
+    arrays: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+def only_planned(model: WorldModel, graph: ContactGraphFile, steps: list[Step] | None) -> Outcome:
+    """Return what a plan leaves that is not executed (or, `steps` None, not found): the graphs as planned."""
+    believed = start_state(model)
+    graphs, state = {}, believed
+    for number, step in enumerate(steps or []):
+        state = after_step(state, step)
+        if step.manipulation is not None:
+            graphs[number] = graph_of_state(graph, believed, state, believed, model)
+    return Outcome(steps, graphs=graphs, graph=graphs[max(graphs)] if graphs else None)
+
+
+def execute(
+    model: WorldModel, order: Order, budgets: Budgets, search: Search, parameters: PlanParameters, context: Context,
+    random: np.random.Generator,
+) -> Outcome:  # fmt: skip
+    """Carry out the steps in the room, write pictures and log, and return what came of it.
+
+    The room is that of the ground truth, else the planned scene itself. `search` plans anew when that is needed.
+    """
+    root = order.scene.root if order.ground_truth is None else order.ground_truth.path("room")
+    room = _read_room(root, order)
+    planned = dict(model.records)
+    matches = match_beliefs(
+        order.beliefs, match_bodies(planned, room.records, parameters.match_radius), room.records
+    )  # fmt: skip
+    joint_names = joint_pairs(planned, room.records, matches)
+    believed = start_state(model)
+    replanning = Replanning(model, order.graph, believed, order.literals, search)
+    observed: dict[int, TreeState] = {}
+    anew: dict[int, TreeState] = {}
+    with load_scene(root) as world:
+        start = Configuration(order.state.base, order.state.arm, model.description.opening)
+        physical = PhysicalRobot(world, model.description, start, RECORD_RATE)
+        failures = _start_failures(physical)
+        physical.wait(SETTLE_SECONDS)
+
+        def observe(number: int) -> TreeState:
+            observed[number] = observed_state(world, matches, joint_names, physical.held)
+            return observed[number]
+
+        def settled_checks() -> tuple[Check, ...]:
+            world.wake()
+            physical.wait(SETTLE_SECONDS)
+            return check_goal(world, order.literals, matches, joint_names, physical.held)
+
+        def replan(state: RobotState, number: int) -> list[Step] | None:
+            anew[number] = observed_state(world, matches, joint_names, physical.held)
+            return replanning.plan(state, observed[START], anew[number], number)
+
+        observe(START)
+        physical.recording.keyframe(START, "start")
+        conduct = Conduct(
+            model, room, physical, matches, joint_names, replace(budgets, size_uncertainty=0.0), random,
+            parameters.relocalize, parameters.execution_attempts, observe=observe,
+        )  # fmt: skip
+        if failures:
+            conduct.steps = order.steps
+        else:
+            conduct.run(
+                order.state, order.steps, parameters.replans, replan,
+                reached=lambda: all(check.holds for check in settled_checks()),
+            )  # fmt: skip
+        checks = settled_checks()
+        physical.recording.keyframe(len(conduct.steps) - 1, "end")
+        final = observed_state(world, matches, joint_names, physical.held)
+        with context.progress.step("pictures"):
+            draw(RoomPictures(world, room.records, room.texts, model.description), physical, parameters, context)
+    graphs = {
+        number: graph_of_state(order.graph, observed[START], state, believed, model)
+        for number, state in observed.items() if number >= 0
+    }  # fmt: skip
+    used = (LOOK, PROPRIOCEPTION, GRIP) if parameters.relocalize else ("the planned motion was replayed", GRIP)
+    return Outcome(
+        conduct.steps,
+        executed_in="reconstructed" if order.ground_truth is None else "ground_truth",
+        checks=checks,
+        matches=tuple(match for name, match in matches.items() if name in _named(conduct.steps, planned)),
+        assumptions=(*used, LOOK_AROUND) if replanning.places else used,
+        failures=(*failures, *conduct.failures, *replanning.failures),
+        tried=tuple(replanning.tried),
+        learned=tuple(replanning.learned),
+        replanned=tuple(replanning.places),
+        bumps={name: round(force, 3) for name, force in sorted(physical.bumps.items())},
+        graphs=graphs,
+        graph=graph_of_state(order.graph, observed[START], final, believed, model),
+        differences=_differences(model, believed, conduct.steps, observed, anew),
+        arrays=executed_rows(physical.recording.snapshots),
+    )
+
+
+def _read_room(root: Path, order: Order) -> Room:
+    nodes = {node.id: node for node in (order.graph if order.ground_truth is None else order.ground_truth.graph).nodes}
+    bodies = read_scene_bodies(root)
+    records = {name: record for name, (record, _) in bodies.items()}
+    texts = {name: text for name, (_, text) in bodies.items()}
+    planes = {}
+    for name, record in records.items():
+        known = nodes[name].planes if name in nodes else ()
+        flat = any(plane.horizontal and len(plane.corners) == 4 for plane in known)
+        planes[name] = known if flat else known + body_planes(record, texts[name])
+    return Room(records, texts, planes)
+
+
+def _start_failures(physical: PhysicalRobot) -> list[Failure]:
+    """Return why the robot cannot begin where it stands: nothing, or that it stands in something."""
+    try:
+        physical.check_start()
+    except MotionFailed as failed:
+        return [failed.failure]
+    return []
+
+
+def _named(steps: list[Step], planned: dict[str, SceneBody]) -> set[str]:
+    """Return the names in the steps' arguments, and the owners of joints among them."""
+    arguments = {argument for step in steps for argument in step.arguments}
+    return arguments | {name for name in planned for argument in arguments if argument.startswith(f"{name}__")}
+
+
+def _differences(
+    model: WorldModel, believed: TreeState, steps: list[Step], observed: dict[int, TreeState],
+    anew: dict[int, TreeState],
+) -> tuple[TreeDifference, ...]:  # fmt: skip
+    """Return where the tree was not as the steps say; what was planned anew began with the tree as it was then."""
+    found: list[TreeDifference] = []
+    expected = replace(believed, parents={**believed.parents, **observed[START].parents})
+    for number, step in enumerate(steps):
+        if number in anew:
+            seen = anew[number]
+            expected = replace(
+                expected, parents={**expected.parents, **seen.parents}, poses={**expected.poses, **seen.poses},
+                joints={**expected.joints, **seen.joints}, held=seen.held,
+            )  # fmt: skip
+        expected = after_step(expected, step)
+        if number in observed:
+            found += tree_differences(number, expected, observed[number], model)
+    return tuple(found)
+
+
+def draw(pictures: RoomPictures, physical: PhysicalRobot, parameters: PlanParameters, context: Context) -> None:
+    """Write the key frames as PNG files, and the log with its video, into the artifact's folder."""
+
+    import cv2
+
+    recording = physical.recording
+    folder = context.output / "keyframes"
+    folder.mkdir()
+    camera = picture_camera(parameters.image_width)
+    for number, (index, label) in enumerate(context.progress.track(recording.keyframes, description="key frames")):
+        image = pictures.near(recording.snapshots[index], camera)
+        cv2.imwrite(str(folder / f"{number:02d}_{label}.png"), cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+    small = picture_camera(min(400, parameters.image_width), 0.8)
+    images: dict[int, np.ndarray] = {}
+    if parameters.video_rate > 0:
+        every = max(1, round(RECORD_RATE / parameters.video_rate))
+        wanted = list(range(0, len(recording.snapshots), every))
+        for index in context.progress.track(wanted, description="video"):
+            images[index] = pictures.overview(recording.snapshots[index], small)
+    write_execution(
+        context.output / "execution.mcap", recording.snapshots, images, small, pictures.overview_pose(small)
+    )
