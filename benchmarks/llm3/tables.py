@@ -6,10 +6,10 @@ from collections import defaultdict
 from collections.abc import Iterable
 
 import numpy as np
-from scipy import stats
 
 from benchmarks.llm3.arms import ARMS, HARD, PUBLISHED
 from benchmarks.llm3.records import Run
+from stages.kit.measurement.proportions import wilson_interval
 
 MEASURES = ("success", "proposer_calls", "motion_planner_calls", "seconds")
 SEEDS_OF_INTERVALS, DRAWS = 0, 2000
@@ -41,12 +41,6 @@ def grouped(runs: Iterable[Run]) -> Runs:
     for run in runs:
         groups[run.arm, run.case][run.seed] = run
     return groups
-
-
-def wilson(successes: int, count: int) -> tuple[float, float]:
-    """Return the 95 % interval of a share (Wilson 1927)."""
-    interval = stats.binomtest(successes, count).proportion_ci(method="wilson")
-    return float(interval.low), float(interval.high)
 
 
 def bootstrap(values: np.ndarray) -> tuple[float, float]:
@@ -89,7 +83,7 @@ def _cell(group: dict[int, Run] | None, most: int) -> str:
         return "-"
     rows = list(group.values())
     successes = sum(run.success for run in rows)
-    low, high = wilson(successes, len(rows))
+    low, high = wilson_interval(successes, len(rows))
     calls = np.array([run.motion_planner_calls for run in rows], dtype=float)
     below, above = bootstrap(calls)
     share = f"{100 * successes / len(rows):.0f} [{100 * low:.0f}, {100 * high:.0f}]"

@@ -1,13 +1,14 @@
 """Tasks by name in generated rooms: in the exact scene, and in scenes reconstructed from images, executed in physics.
 
 `run` gives flat figures: `ours/<case>/<measure>` over all tasks and `<task>/<case>/<measure>`; `table` prints them.
-One room is `room_results`. Seconds are of CPU, one process; rooms of a case are the same for every task.
+One of them is `task_result`. Seconds are of CPU, one process; rooms of a case are the same for every task.
 """
 
 from __future__ import annotations
 
 import json
 import multiprocessing
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -27,6 +28,7 @@ from schemas.cad_library import CadLibrary
 from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
+from stages.kit.measurement.proportions import wilson_interval
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.kit.tasks.pddl import parse_domain, parse_problem
@@ -120,6 +122,9 @@ def reconstructed_room(library: Path, seed: int, folder: Path) -> tuple[Interact
 
     Raises BadInput with the last line of what a step said when it fails.
     """
+    made = InteractiveScene(folder / "interactive_scene"), GroundTruth(folder / "ground_truth")
+    if (folder / "interactive_scene" / "scene.json").is_file():
+        return made
     wishes = ("--recipe", RECIPE, "--frames", str(FRAMES), "--seed", str(seed), "library")
     for command, name, inputs, options in (("synthesize", "ground_truth", {}, wishes), *CHAIN):
         words = [sys.executable, "-m", "cli", command, "--out", str(folder / name)]
@@ -131,32 +136,34 @@ def reconstructed_room(library: Path, seed: int, folder: Path) -> tuple[Interact
         if done.returncode not in (0, 4):
             said = done.stderr.strip().splitlines()[-1:] or ["nothing"]
             raise BadInput(f"{command} of room {seed}: {said[0]}")
-    return InteractiveScene(folder / "interactive_scene"), GroundTruth(folder / "ground_truth")
+    return made
 
 
-def room_results(
-    case: str, seed: int, library: Path, folder: Path, tasks: Sequence[TaskName] = TASKS
-) -> list[RoomResult]:  # fmt: skip
-    """Return the results of all tasks in the room of one seed; a second call reads `results.json` of the first."""
-    done = folder / "results.json"
+def task_result(case: str, seed: int, task: TaskName, library: Path, folder: Path) -> RoomResult:
+    """Return the result of a task in the room of one seed; a second call reads `<task>.json` of the first."""
+    done = folder / f"{task}.json"
     if done.is_file():
-        return [RoomResult(**entry) for entry in json.loads(done.read_text(encoding="utf-8"))]
+        return RoomResult(**json.loads(done.read_text(encoding="utf-8")))
     try:
-        if case == EXACT:
-            scene = exact_room(CadLibrary(library), RECIPE, seed, folder / "room", shut=True)
-            truth = None
-        else:
-            scene, truth = reconstructed_room(library, seed, folder / "chain")
+        scene, truth = _room(case, seed, library, folder)
     except BadInput as error:
         print(f"room {seed}: {error}", file=sys.stderr)
-        return [RoomResult(task, case, seed, False, "infeasible", "no_room", 0, {}) for task in tasks]
-    results = []
-    for task in tasks:
-        with tempfile.TemporaryDirectory(dir=folder) as scratch:
-            results.append(plan_room(scene, truth, task, case, seed, Path(scratch) / "plan"))
-        print(f"{case} {seed} {task}: {results[-1].status} {results[-1].reason}", file=sys.stderr, flush=True)
-    done.write_text(json.dumps([asdict(result) for result in results], indent=1) + "\n", encoding="utf-8")
-    return results
+        return RoomResult(task, case, seed, False, "infeasible", "no_room", 0, {})
+    with tempfile.TemporaryDirectory(dir=folder) as scratch:
+        plan = Path(scratch) / "plan"
+        result = plan_room(scene, truth, task, case, seed, plan)
+        shutil.copy(plan / "plan.json", folder / f"{task}.plan.json")
+    print(f"{case} {seed} {task}: {result.status} {result.reason}", file=sys.stderr, flush=True)
+    done.write_text(json.dumps(asdict(result), indent=1) + "\n", encoding="utf-8")
+    return result
+
+
+def _room(case: str, seed: int, library: Path, folder: Path) -> tuple[InteractiveScene, GroundTruth | None]:
+    if case == RECONSTRUCTED:
+        return reconstructed_room(library, seed, folder / "chain")
+    if not (folder / "room" / "scene.json").is_file():
+        exact_room(CadLibrary(library), RECIPE, seed, folder / "room", shut=True)
+    return InteractiveScene(folder / "room"), None
 
 
 def run(
@@ -164,30 +171,37 @@ def run(
     tasks: Sequence[TaskName] = TASKS, jobs: int = 1,
 ) -> dict[str, float]:  # fmt: skip
     """Return the figures over the rooms of some seeds, `jobs` of them at a time; rooms and results go to `folder` and
-    are used again."""
-    rooms = [(case, seed) for case in cases for seed in seeds]
+    are used again. All rooms of one task come before the next task."""
+    units = [(case, seed, task) for case in cases for task in tasks for seed in seeds]
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
         found = [
-            pool.submit(room_results, case, seed, library, folder / case / str(seed), tasks) for case, seed in rooms
+            pool.submit(task_result, case, seed, task, library, folder / case / str(seed)) for case, seed, task in units
         ]
-        return figures([result for room in found for result in room.result()])
+        return figures([unit.result() for unit in found])
 
 
 def figures(results: Sequence[RoomResult]) -> dict[str, float]:
     """Return `<task>/<case>/<measure>`: rooms, goals (rooms that have what the task needs), success (share of the rooms
-    with a goal), seconds and actions (medians of those that succeeded), failures by kind."""
+    with a goal), seconds and actions (medians of those that succeeded), failures by kind.
+
+    A room has what a task needs when the task has a goal in any case of that room: what a reconstruction lacks is its
+    failure.
+    """
     metrics: dict[str, float] = {}
     arms: dict[str, list[RoomResult]] = {}
+    able = {(result.task, result.seed) for result in results if result.reason not in ("no_goal", "no_room")}
     for result in results:
         if result.reason != "no_room":
             arms.setdefault(f"ours/{result.case}", []).append(result)
             arms.setdefault(f"{result.task}/{result.case}", []).append(result)
     for key, own in sorted(arms.items()):
-        posed = [result for result in own if result.reason != "no_goal"]
+        posed = [result for result in own if (result.task, result.seed) in able]
         good = [result for result in posed if result.success]
         metrics |= {f"{key}/rooms": len(own), f"{key}/goals": len(posed), f"{key}/successes": len(good)}
         if posed:
             metrics[f"{key}/success"] = round(len(good) / len(posed), 4)
+            low, high = wilson_interval(len(good), len(posed))
+            metrics |= {f"{key}/success_low": round(low, 4), f"{key}/success_high": round(high, 4)}
         if good:
             metrics[f"{key}/actions"] = float(np.median([result.actions for result in good]))
         for part in ("load the scene", "task search", "plan", "execute"):
@@ -195,7 +209,7 @@ def figures(results: Sequence[RoomResult]) -> dict[str, float]:
             if values:
                 metrics[f"{key}/seconds_{part.replace(' ', '_')}"] = round(float(np.median(values)), 3)
                 metrics[f"{key}/seconds_{part.replace(' ', '_')}_p95"] = round(float(np.percentile(values, 95)), 3)
-        for reason, count in Counter(result.reason for result in own if not result.success).items():
+        for reason, count in Counter(result.reason for result in posed if not result.success).items():
             metrics[f"{key}/failed_{reason}"] = count
     return metrics
 
@@ -218,7 +232,10 @@ def table(metrics: dict[str, float]) -> str:
         reasons = {name.removeprefix(failed): count for name, count in metrics.items() if name.startswith(failed)}
         words = ", ".join(f"{name} {count:g}" for name, count in sorted(reasons.items(), key=lambda entry: -entry[1]))
         success = metrics.get(f"{key}/success")
-        share = "" if success is None else f"{100 * success:.0f} %"
+        share = ""
+        if success is not None:
+            low, high = (100 * metrics[f"{key}/success_{end}"] for end in ("low", "high"))
+            share = f"{100 * success:.0f} % ({low:.0f} to {high:.0f})"
         lines.append(
             f"| {task} | {case} | {cell('rooms')} | {cell('goals')} | {share} | {cell('actions')} | "
             f"{cell('seconds_task_search')} | {cell('seconds_plan')} | {cell('seconds_execute')} | {words} |"
