@@ -109,8 +109,11 @@ class _Shape:
         rays = np.tile(direction, (len(start), 1))
         places, ray, faces = self.mesh.ray.intersects_location(start, rays, multiple_hits=True)
         found: list[list[tuple[float, int]]] = [[] for _ in start]
-        for place, index, face in zip(places, ray, faces, strict=True):
-            found[index].append((float(np.linalg.norm(place - start[index])), int(self.owner[face])))
+        distances = np.linalg.norm(places - start[ray], axis=1)
+        for index, distance, owner in zip(
+            ray.tolist(), distances.tolist(), self.owner[faces].tolist(), strict=True
+        ):  # fmt: skip
+            found[index].append((distance, owner))
         return found
 
 
