@@ -51,7 +51,9 @@ def _of_item(model: WorldModel, name: str, size_uncertainty: float) -> set[Atom]
     carrier = model.records[name].class_name in CARRIER_CLASSES
     if carrier:
         atoms.add(("carrier", name))
-    if narrowest_width(points) < model.description.opening + size_uncertainty or (carrier and has_rim(model, name)):
+    if narrowest_width(points) < model.description.opening + size_uncertainty or (
+        carrier and has_rim(model, name, size_uncertainty)
+    ):
         atoms.add(("graspable", name))
     return atoms
 

@@ -119,13 +119,17 @@ def plan_pick(
     # Fingers may touch the item, so that its believed shape, a little too wide, does not stop them.
     widest = model.description.opening + budgets.size_uncertainty
     # what is laden is held straight from above: the load stays level while the arm moves
-    grasps = _bearable(model, item, rim_grasps(points, world_from_item, random)) if model.laden(item) else []
+    grasps = (
+        _bearable(model, item, rim_grasps(points, world_from_item, random, uncertainty=budgets.size_uncertainty))
+        if model.laden(item)
+        else []
+    )
     if not grasps:
         grasps = sample_grasps(
             points, normals, world_from_item, opening=widest, random=random, pitches=PITCHES[style]
         )  # fmt: skip
     if not grasps:
-        grasps = rim_grasps(points, world_from_item, random)
+        grasps = rim_grasps(points, world_from_item, random, uncertainty=budgets.size_uncertainty)
     if not grasps:
         width = narrowest_width(apply(world_from_item, points))
         raise MotionFailed(
@@ -286,7 +290,9 @@ def plan_place(
             {"places": len(regions)},
         )
     if model.records[target].movable and places:
-        left = lifts_left(model, target, item, np.array([place.world_from_item for place in places]))
+        left = lifts_left(
+            model, target, item, np.array([place.world_from_item for place in places]), budgets.size_uncertainty
+        )  # fmt: skip
         order = sorted(range(len(places)), key=lambda index: (not places[index].roomy, -left[index]))
         places = [places[index] for index in order]
     tally = Tally()

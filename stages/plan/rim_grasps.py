@@ -23,24 +23,29 @@ FINGER_ROOM = 0.045
 """Free width behind the wall for the inner finger [m]."""
 OFFSETS = (-0.09, -0.06, -0.03, 0.03, 0.06, 0.09)
 """Straight walls are taken beside their middle too [m]: the palm has to pass what stands on the tray."""
+FLOOR = 0.008
+"""What is lower than this in a flat thing is its floor [m]."""
 BREADTH = 0.011
 """Half the breadth of a finger tip [m]."""
 
 
 def rim_grasps(
-    points: np.ndarray, world_from_body: np.ndarray, random: np.random.Generator, headings: int = 24
-) -> list[Grasp]:
+    points: np.ndarray, world_from_body: np.ndarray, random: np.random.Generator, headings: int = 24,
+    uncertainty: float = 0.0,
+) -> list[Grasp]:  # fmt: skip
     """Return grasps straight from above with one finger outside and one inside of the outermost wall.
 
     `points` (N, 3) are of the surface, body frame. Per heading through the middle (along the body's axes also
-    beside it) the wall is where the outermost points near the rim are; it must be thin and free behind.
+    beside it) the wall is where the outermost points near the rim are; it must be thin and free behind. The rim may be
+    up to `uncertainty` [m] higher than the points say, as voxels miss thin walls and handles.
     """
     world = apply(world_from_body, points)
     low, high = world.min(axis=0), world.max(axis=0)
-    depth = min(DEPTH, high[2] - low[2] - FOOT_ROOM)
+    rim = high[2] + max(0.0, min(uncertainty, DEPTH + FOOT_ROOM - (high[2] - low[2])))
+    depth = min(DEPTH, rim - low[2] - FOOT_ROOM)
     if depth < LEAST_DEPTH:
         return []
-    top = world[world[:, 2] > high[2] - depth - 0.004]
+    top = world[world[:, 2] > max(high[2] - depth - 0.004, min(rim - depth, low[2] + FLOOR))]
     middle = (low + high)[:2] / 2
     yaw = float(np.arctan2(world_from_body[1, 0], world_from_body[0, 0]))
     even = yaw + 2 * np.pi * np.arange(headings) / headings
@@ -64,12 +69,13 @@ def rim_grasps(
         pose = np.eye(4)
         pose[:3, :3] = np.column_stack([np.cross(closing, approach), closing, approach])
         pose[:2, 3] = middle + outward * (along.max() - thickness / 2) + across * offset
-        pose[2, 3] = high[2] - depth
+        pose[2, 3] = rim - depth
         for turned in (pose, pose @ np.diag([-1.0, -1.0, 1.0, 1.0])):
             found.append(Grasp(inverse(world_from_body) @ turned, thickness, np.pi / 2))
     return [found[index] for index in random.permutation(len(found)).tolist()]
 
 
-def has_rim(model: WorldModel, item: str) -> bool:
-    """Whether a thing can be lifted by its rim."""
-    return bool(rim_grasps(model.points(item), model.pose(item), np.random.default_rng(0)))
+def has_rim(model: WorldModel, item: str, uncertainty: float) -> bool:
+    """Whether a thing can be lifted by its rim, which may be up to `uncertainty` [m] higher than it looks."""
+    random = np.random.default_rng(0)
+    return bool(rim_grasps(model.points(item), model.pose(item), random, uncertainty=uncertainty))

@@ -42,11 +42,11 @@ def load_moments(model: WorldModel, tray: str, tool_poses: np.ndarray) -> np.nda
     return holding_moments(tool_poses, np.array([model.pose(name)[:2, 3] for name in names]), masses)
 
 
-def lifts_left(model: WorldModel, tray: str, item: str, places: np.ndarray) -> np.ndarray:
+def lifts_left(model: WorldModel, tray: str, item: str, places: np.ndarray, uncertainty: float = 0.0) -> np.ndarray:
     """Return, per pose world_from_item (N, 4, 4), by how many rim grasps the tray can be lifted when the item stands
-    there, the palm over nothing and the fingers bearing the moment: (N,) int."""
+    there, the palm over nothing and the fingers bearing the moment: (N,) int. `uncertainty` as in `rim_grasps` [m]."""
     world_from_tray = model.pose(tray)
-    grasps = rim_grasps(model.points(tray), world_from_tray, np.random.default_rng(0))
+    grasps = rim_grasps(model.points(tray), world_from_tray, np.random.default_rng(0), uncertainty=uncertainty)
     if not grasps:
         return np.zeros(len(places), dtype=int)
     poses = np.array([world_from_tray @ grasp.body_from_tool for grasp in grasps])
