@@ -22,7 +22,7 @@ from stages.plan.refinement import Step, grasp_style, refine_action
 from stages.plan.tree_state import carrier
 from stages.plan.world_model import RobotState, WorldModel
 
-UPRIGHT = 0.35
+MOST_TILT = 0.35
 """What was put down stands when it is tilted by less [rad]."""
 JOINT_TOLERANCE = 0.05
 """A joint further than this from where a motion should have left it is looked at again [rad or m]."""
@@ -190,10 +190,12 @@ class Conduct:
         self.model.see(body, record, text, self.room.planes[here])
 
     def look_around(self) -> None:
-        """Take over everything that moves or has joints and has a counterpart in the room."""
+        """Take over everything that moves or has joints and has a counterpart in the room, but for what is held."""
         for body, match in sorted(self.matches.items()):
             record = self.model.records.get(body)
-            if match.matched is not None and record is not None and (record.movable or record.joints):
+            if match.matched in (None, self.physical.held) or record is None:
+                continue
+            if record.movable or record.joints:
                 self._see(body, match.matched)
 
     def _anchor(self, step: Step) -> tuple[np.ndarray, np.ndarray] | None:
@@ -216,7 +218,7 @@ class Conduct:
         assert manipulation.item_pose is not None
         place = manipulation.item_pose.copy()
         place[:3, 3] += shift
-        bottom = place[2, 3] + float(self.model.points(step.arguments[0])[:, 2].min())
+        bottom = place[2, 3] + self.model.foot(step.arguments[0])
         place[2, 3] += nearest_level(self.model, body, place[:2, 3], bottom) - bottom + PUT_DOWN_HEIGHT
         return base, place
 
@@ -264,12 +266,14 @@ class Conduct:
     def _check_place(self, item: str, target: str) -> None:
         world, here, there = self.physical.world, self._matched(item), self._matched(target)
         parent = carrier(world, here)
-        tilt = float(np.arccos(np.clip(world.pose(here)[2, 2], -1.0, 1.0)))
-        if parent != there or tilt > UPRIGHT:
+        standing = self.model.standing(item)
+        tilt = float(np.arccos(np.clip((world.pose(here) @ standing.T)[2, 2], -1.0, 1.0)))
+        fell = tilt > MOST_TILT and abs(standing[2, 2]) > 0.5
+        if parent != there or fell:
             raise MotionFailed(
                 "condition_not_met",
-                f"{item} was let go over {target} and now stands on {parent or 'nothing'}, {np.degrees(tilt):.0f} "
-                "degrees from upright",
+                f"{item} was let go over {target} and is now on {parent or 'nothing'}, {np.degrees(tilt):.0f} degrees "
+                "from how it was to stand",
                 (item, target),
                 {"tilt": tilt},
             )

@@ -14,6 +14,7 @@ from stages.kit.simulation.urdf_split import PART_SEPARATOR
 from stages.kit.tasks.strips import Atom, GroundAction, atom_text
 
 TAKING = ("pick", "take_out", "lift")
+PUTTING = ("place", "put_in", "stack")
 MOVED = "moved"
 Key = tuple[str, tuple[str, ...]]
 
@@ -22,6 +23,8 @@ Key = tuple[str, tuple[str, ...]]
 class Lessons:
     """Changes to the ground actions of a task, and each of them in words."""
 
+    held: str | None = None
+    """What the hand holds in the first state: it may have to be taken otherwise."""
     blocked: set[Key] = field(default_factory=set)
     needs: dict[Key, frozenset[Atom]] = field(default_factory=dict)
     """Further preconditions; `moved(NAME)` becomes true when NAME is picked up."""
@@ -67,6 +70,8 @@ class Lessons:
         body = name.split(PART_SEPARATOR)[0]
         if body not in action.arguments and any(a.name in TAKING and a.arguments[0] == body for a in actions):
             return (MOVED, body)
+        if action.name in PUTTING and action.arguments[0] == self.held:
+            return (MOVED, self.held)  # put down somewhere and taken again, by another grasp
         if PART_SEPARATOR not in name:
             return None
         doors = {atom for other in actions for atom in other.add if atom[0] in ("open", "closed")}

@@ -25,6 +25,8 @@ APPROACH = 0.10
 LIFT = 0.03
 DRAWER_LIFT = 0.2
 SLOW = 0.35
+PALM_BEHIND, HAND_END = 0.04, 0.11
+"""How far behind the tool point the palm begins and the hand ends [m]."""
 GraspStyle = Literal["any", "rather_level", "level", "steep"]
 """How the hand may come: `level` from the side (for what is put under a cover), `steep` from above (into a drawer);
 `rather_level` tries the ways from the side first."""
@@ -55,6 +57,15 @@ def _pairs(bases: np.ndarray, others: int, random: np.random.Generator, most: in
     """Return at most `most` (base, other) index pairs in random order, each once."""
     order = random.permutation(len(bases) * others)[:most]
     return [(int(index) // others, int(index) % others) for index in order]
+
+
+def palm_bottom(world_from_tool: np.ndarray, palm: tuple[float, float]) -> float:
+    """Return the lowest height [m] of the palm and the hand behind it at a tool pose (4, 4), its length and breadth
+    given [m]."""
+    corners = [
+        [x * palm[1] / 2, y * palm[0] / 2, -z] for x in (-1, 1) for y in (-1, 1) for z in (PALM_BEHIND, HAND_END)
+    ]
+    return float(apply(world_from_tool, np.array(corners))[:, 2].min())
 
 
 def _bearable(model: WorldModel, item: str, grasps: list[Grasp]) -> list[Grasp]:
@@ -148,8 +159,12 @@ def plan_pick(
     if model.laden(item):
         moments = load_moments(model, item, np.array([world_from_item @ grasp.body_from_tool for _, grasp in queue]))
         queue = [queue[index] for index in np.argsort(moments.round(1), kind="stable")]
-    if style == "rather_level":
-        queue.sort(key=lambda entry: entry[1].pitch > max(PITCHES["level"]))
+    lowest = float(apply(world_from_item, points)[:, 2].min())
+    over = {id(grasp): palm_bottom(world_from_item @ grasp.body_from_tool, model.description.palm) > lowest
+            for grasp in grasps}  # fmt: skip
+    sideways = style == "rather_level"
+    # A hand that reaches below the item's foot, over an edge, cannot put it down but over an edge.
+    queue.sort(key=lambda entry: (not over[id(entry[1])], sideways and entry[1].pitch > max(PITCHES["level"])))
     if preferred is not None:
         queue.insert(0, (preferred[0], Grasp(preferred[1], 0.0, 0.0)))
     checker.allow(touch=model.links(item))
@@ -350,11 +365,12 @@ def _try_place(
     checker.allow(touch=touch, rest_on=rest)
     # The yaw in which the hand points away from the base is the one an arm likes; the sampled yaw varies it.
     outward = np.arctan2(*(place[:2, 3] - base[:2])[::-1])
-    hand = item_from_tool[:3, 2]
+    upright_from_item = model.standing(item)
+    hand = (upright_from_item @ item_from_tool)[:3, 2]
     steep = abs(hand[2]) > 0.95
     for wish in (0.0, 0.6, -0.6):
         yaw = float(np.arctan2(place[1, 0], place[0, 0])) if steep else outward - np.arctan2(hand[1], hand[0])
-        upright = transform_from_yaw(yaw + wish, place[:3, 3])
+        upright = transform_from_yaw(yaw + wish, place[:3, 3]) @ upright_from_item
         world_from_tool = upright @ item_from_tool
         arm = arm_planner.reachable(base, world_from_tool, tally)
         if arm is None or not arm_planner.free(base, arm, tally):

@@ -52,7 +52,7 @@ def sample_placements(
     item is put there in the collision checker.
     """
     radius, height = model.footprint(item)
-    bottom = float(model.points(item)[:, 2].min())
+    bottom = model.foot(item)
     regions = place_regions(model, item, target, door)
     turns: list[list[Placement]] = []
     for region in sorted(regions, key=lambda region: abs(_height(model, region) - COMFORT)):

@@ -240,7 +240,7 @@ def plan_and_refine(
     """
     actions = ground(domain, problem)
     failures: list[Failure] = []
-    lessons = Lessons()
+    lessons = Lessons(held=next((atom[1] for atom in problem.initial if atom[0] == "holding"), None))
     tried: list[TriedPlan] = []
     for _ in range(task_attempts):
         allowed = lessons.apply(actions)

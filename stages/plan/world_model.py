@@ -40,6 +40,10 @@ class RobotState:
     """The grasp with which it holds."""
 
 
+UPRIGHT = 0.9
+"""Least upward share of the upright axis of a body that stands, or (downward) stands upside down."""
+
+
 @dataclass(frozen=True)
 class Snapshot:
     """Poses of movable bodies, joint values and records."""
@@ -231,6 +235,19 @@ class WorldModel:
         """Return radius of the upright foot about the body's origin and height [m] of a rigid body."""
         points = self.points(item)
         return float(np.linalg.norm(points[:, :2], axis=1).max()), float(np.ptp(points[:, 2]))
+
+    def standing(self, item: str) -> np.ndarray:
+        """Return the rotation (4, 4) in which a rigid body is put down, but for its yaw: as it was last seen, upright,
+        upside down or on its side."""
+        rotation = np.eye(4)
+        rotation[:3, :3] = np.array(self.records[item].world_from_body)[:3, :3]
+        if rotation[2, 2] > UPRIGHT:
+            return np.eye(4)
+        return np.diag([1.0, -1.0, -1.0, 1.0]) if rotation[2, 2] < -UPRIGHT else rotation
+
+    def foot(self, item: str) -> float:
+        """Return the height [m] of the lowest point of a rigid body over its origin when it stands."""
+        return float(apply(self.standing(item), self.points(item))[:, 2].min())
 
     def shaped_links(self, name: str) -> tuple[str, ...]:
         """Return the links of a body that have a collision shape."""
