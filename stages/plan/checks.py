@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from schemas.plan import BodyMatch, Check
+from stages.kit.geometry.transforms import apply
+from stages.kit.simulation.shapes import link_shapes
 from stages.kit.simulation.world import PhysicsWorld
 
 AT_REST = 0.02
@@ -22,7 +24,8 @@ def check_on(world: PhysicsWorld, literal: str, item: str, support: str) -> Chec
     low, high = world.bounds(item)
     below = [contact for contact in contacts if abs(contact.normal[2]) > 0.7]
     height = float(np.mean([contact.point[2] for contact in below])) if below else float("nan")
-    gap = float(low[2]) - height if below else None
+    lowest = _lowest_point(world, item)
+    gap = lowest - height if below else None
     speed, turning = world.velocity(item)
     support_low, support_high = world.bounds(support)
     center = (low + high)[:2] / 2
@@ -32,12 +35,21 @@ def check_on(world: PhysicsWorld, literal: str, item: str, support: str) -> Chec
         numbers |= {"height": round(height, 6), "gap": round(gap, 6)}
     holds = gap is not None and abs(gap) < CONTACT_HEIGHT and inside and speed < AT_REST
     if gap is None:
-        detail = f"{item} does not touch {support} from above (its lowest point is at {low[2]:.3f} m)"
+        detail = f"{item} does not touch {support} from above (its lowest point is at {lowest:.3f} m)"
     else:
         detail = f"{item} rests at {height:.3f} m on {support}, speed {speed:.3f} m/s"
         if not inside:
             detail += ", outside its outline"
     return Check(condition=literal, holds=holds, detail=detail, numbers=numbers)
+
+
+def _lowest_point(world: PhysicsWorld, item: str) -> float:
+    """Return the height [m] of the lowest point of a body's collision shapes: bounds of what lies aslant are wider."""
+    shapes = link_shapes(world.bodies[item].text)
+    return min(
+        float(apply(world.link_pose(item, link), mesh.vertices)[:, 2].min())
+        for link, meshes in shapes.items() for mesh in meshes
+    )  # fmt: skip
 
 
 def check_joints(world: PhysicsWorld, literal: str, body: str, joints: list[str], shut: bool) -> Check:
