@@ -171,8 +171,8 @@ def run(
     tasks: Sequence[TaskName] = TASKS, jobs: int = 1,
 ) -> dict[str, float]:  # fmt: skip
     """Return the figures over the rooms of some seeds, `jobs` of them at a time; rooms and results go to `folder` and
-    are used again. All rooms of one task come before the next task."""
-    units = [(case, seed, task) for case in cases for task in tasks for seed in seeds]
+    are used again."""
+    units = [(case, seed, task) for case in cases for seed in seeds for task in tasks]
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
         found = [
             pool.submit(task_result, case, seed, task, library, folder / case / str(seed)) for case, seed, task in units
