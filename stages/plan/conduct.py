@@ -22,6 +22,8 @@ from stages.plan.refinement import Step, grasp_style, refine_action
 from stages.plan.tree_state import carrier
 from stages.plan.world_model import RobotState, WorldModel
 
+NOT_THERE = "not_found"
+"""Failure of an action on what the room does not have: neither another attempt nor another plan helps."""
 MOST_TILT = 0.35
 """What was put down stands when it is tilted by less [rad]."""
 JOINT_TOLERANCE = 0.05
@@ -77,7 +79,8 @@ class Conduct:
                 return False
             state = after
             complete = done == len(self.steps)
-            if (complete and reached()) or turn == replans:
+            missing = bool(self.failures) and self.failures[-1].kind == NOT_THERE
+            if (complete and reached()) or turn == replans or missing:
                 return complete
             self.look_around()
             further = replan(state, done)
@@ -126,6 +129,8 @@ class Conduct:
                 )
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
+                if failed.failure.kind == NOT_THERE:
+                    break
                 continue
             try:
                 for offset, step in enumerate(steps):
@@ -166,7 +171,7 @@ class Conduct:
         """Return the body of the room that a planned body is. Raises MotionFailed `not_found`."""
         match = self.matches[body]
         if match.matched is None:
-            raise MotionFailed("not_found", f"the room has no body of the class of {body} near it", (body,))
+            raise MotionFailed(NOT_THERE, f"the room has no body of the class of {body} near it", (body,))
         return match.matched
 
     def _named_bodies(self, name: str, arguments: tuple[str, ...]) -> list[str]:

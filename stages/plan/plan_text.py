@@ -14,6 +14,8 @@ def plan_text(plan: PlanFile, steps: list[Step]) -> str:
         where += f", executed in the {plan.executed_in.replace('_', ' ')} room"
     lines += [where, "", "actions:"]
     for number, (action, step) in enumerate(zip(plan.actions, steps, strict=True), start=1):
+        if number - 1 in plan.replanned:
+            lines.append("     looked around and planned anew:")
         x, y = action.base_pose[0][3], action.base_pose[1][3]
         lines.append(f"{number:3d}. {step.text}   base at ({x:.2f}, {y:.2f}) m, rows {action.start} to {action.end}")
     if not steps:
