@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,10 +12,14 @@ from schemas.plan import BodyMatch, Failure
 from schemas.scene_parts import SurfacePlane
 from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.kinematics import forward
+from stages.kit.simulation.robot import base_pose
+from stages.plan.arm_motion import ArmPlanner, Tally
 from stages.plan.correspondence import match_joint, renamed
 from stages.plan.door_motion import is_closed, is_open
 from stages.plan.execution import PhysicalRobot, true_record
-from stages.plan.motions import Segment
+from stages.plan.level_carrying import LEVEL_PACE, levelled
+from stages.plan.motions import Segment, whole_body
 from stages.plan.pick_place import Budgets
 from stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level
 from stages.plan.refinement import Step, grasp_style, refine_action
@@ -146,6 +150,8 @@ class Conduct:
                 state = recovered
                 continue
             state = self._perceived(after)
+            if name == "pick" and self.model.laden(arguments[0]):
+                state = self._level(state)
             try:
                 self._check_effect(name, arguments)
                 return state, True
@@ -294,6 +300,20 @@ class Conduct:
         if state.holding is not None:
             self.model.checker.carry(state.holding, tool_from_item)
         return RobotState(base, arm, state.holding, tool_from_item, inverse(tool_from_item))
+
+    def _level(self, state: RobotState) -> RobotState:
+        """Turn the hand so that a laden tray, which gave way in the fingers, stands level; return the state then."""
+        if state.tool_from_item is None:
+            return state
+        model = self.model
+        world_from_tool = base_pose(state.base, model.description) @ forward(model.chain, state.arm)
+        planner = ArmPlanner(model, self.random, self.budgets.path_samples)
+        goal = levelled(world_from_tool, state.tool_from_item)
+        path = planner.line(state.base, state.arm, goal, Tally())
+        if path is None:
+            return state
+        self.physical.follow(Segment(whole_body(state.base, path), 0.0, LEVEL_PACE, "", state.holding), None)
+        return self._perceived(replace(state, arm=path[-1]))
 
     def _recover(self, state: RobotState) -> RobotState:
         """Go back the way the arm came since the base last stood still, then believe what the joints say."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stages.kit.geometry.transforms import inverse, transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
@@ -34,6 +35,18 @@ def drawn_in(model: WorldModel, planner: ArmPlanner, base: np.ndarray, arm: np.n
         if path is not None:
             return path
     return arm[None]
+
+
+def levelled(world_from_tool: np.ndarray, tool_from_item: np.ndarray) -> np.ndarray:
+    """Return the tool pose (4, 4), turned about the tool point, in which what is held stands upright with its yaw."""
+    up = (world_from_tool @ tool_from_item)[:3, 2]
+    axis = np.cross(up, [0.0, 0.0, 1.0])
+    sine = float(np.linalg.norm(axis))
+    turned = world_from_tool.copy()
+    if sine > 1e-9:
+        change = Rotation.from_rotvec(axis / sine * np.arctan2(sine, up[2]))
+        turned[:3, :3] = change.as_matrix() @ world_from_tool[:3, :3]
+    return turned
 
 
 def level_place(
