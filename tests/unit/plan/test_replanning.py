@@ -65,11 +65,18 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
-@pytest.fixture
-def model(scene: Path) -> Iterator[WorldModel]:
+@pytest.fixture(scope="module")
+def kitchen_model(scene: Path) -> Iterator[WorldModel]:
     model = WorldModel(scene, ContactGraphFile.read(scene / "graph.json"), load_robot("panda"), 0.004)
     yield model
     model.close()
+
+
+@pytest.fixture
+def model(kitchen_model: WorldModel) -> Iterator[WorldModel]:
+    snapshot = kitchen_model.snapshot()  # nothing is aboard
+    yield kitchen_model
+    kitchen_model.restore(snapshot)
 
 
 class Script:
@@ -129,6 +136,28 @@ def test_with_something_in_the_hand(model: WorldModel, scene: Path) -> None:
     assert not [atom for atom in initial if atom[0] in ("on", "in", "unmoved") and atom[1] == "cup_5"]
     assert ("in", "bottle_7", "fridge_2") in initial
     assert model.records["cup_5"].parent == "table_3"  # the hand is no body
+
+
+def test_what_stands_on_what_is_held_goes_along(model: WorldModel, scene: Path) -> None:
+    """In every motion that is searched for, though geometry puts the model back after each failure."""
+    laden = []
+
+    def search(state: RobotState, problem: Problem) -> Attempt:
+        snapshot = model.snapshot()
+        for _ in range(2):
+            laden.append(model.laden("bottle_7"))
+            model.set_down()
+            model.restore(snapshot)
+        return Attempt([], [], [])
+
+    start = start_state(model)
+    over = model.pose("bottle_7") @ transform_from_yaw(0.0, np.array([0.0, 0.0, 0.2]))
+    model.world.set_pose("cup_5", over)
+    anew = Replanning(model, ContactGraphFile.read(scene / "graph.json"), start, ("on(bottle_7, table_3)",), search)
+    held = seen(seen(start, "cup_5", "bottle_7", over), "bottle_7", HAND, model.pose("bottle_7"), held="bottle_7")
+    anew.plan(RobotState(np.zeros(3), model.description.carry, "bottle_7"), start, held, 1)
+    assert laden == [True, True] and model.laden("bottle_7")
+    np.testing.assert_allclose(model.pose("cup_5"), over, atol=1e-6)
 
 
 def test_a_door_that_stands_otherwise_is_seen(model: WorldModel, scene: Path) -> None:
