@@ -1,4 +1,4 @@
-"""Carrying a plan out: trying again, planning anew, and looking at what was put down; without any search for motions."""
+"""Carrying a plan out: trying again, planning anew, looking at what was put down; without any search for motions."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ PLAN = [drive("start", "cup"), act("pick", "cup", "table"), drive("cup", "shelf"
 
 
 class Scripted(Conduct):
-    """Actions succeed, unless their text is in `failing` (as often as noted); the arm does not get back from `stuck`."""
+    """Actions succeed, unless their text is in `failing` so often; the arm does not get back from `stuck`."""
 
     failing: dict[str, int]
     stuck: str = ""
