@@ -23,7 +23,7 @@ from stages.plan.motions import Segment, whole_body
 from stages.plan.pick_place import Budgets
 from stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level
 from stages.plan.refinement import Step, grasp_style, refine_action
-from stages.plan.tree_state import carrier
+from stages.plan.tree_state import NOTHING, carrier
 from stages.plan.world_model import RobotState, WorldModel
 
 NOT_THERE = "not_found"
@@ -201,12 +201,17 @@ class Conduct:
         self.model.see(body, record, text, self.room.planes[here])
 
     def look_around(self) -> None:
-        """Take over everything that moves or has joints and has a counterpart in the room, but for what is held."""
+        """Take over everything that moves or has joints and has a counterpart in the room; of what is held its pose.
+        What stands on that is a body of its own afterwards."""
+        self.model.checker.put_down()
+        self.model.set_down()
         for body, match in sorted(self.matches.items()):
             record = self.model.records.get(body)
-            if match.matched in (None, self.physical.held) or record is None:
+            if match.matched is None or record is None:
                 continue
-            if record.movable or record.joints:
+            if match.matched == self.physical.held:
+                self.model.world.set_pose(body, self.physical.world.pose(match.matched))
+            elif record.movable or record.joints:
                 self._see(body, match.matched)
 
     def _anchor(self, step: Step) -> tuple[np.ndarray, np.ndarray] | None:
@@ -298,6 +303,7 @@ class Conduct:
             return RobotState(base, arm)
         tool_from_item = self.physical.held_pose()
         if state.holding is not None:
+            self._take_along(state.holding)
             self.model.checker.carry(state.holding, tool_from_item)
         return RobotState(base, arm, state.holding, tool_from_item, inverse(tool_from_item))
 
@@ -314,6 +320,23 @@ class Conduct:
             return state
         self.physical.follow(Segment(whole_body(state.base, path), 0.0, LEVEL_PACE, "", state.holding), None)
         return self._perceived(replace(state, arm=path[-1]))
+
+    def _take_along(self, item: str) -> None:
+        """Join what is held with what stands on it, as they are in the room now: the load counts in collision checks.
+        What has fallen off stands on something else from now on."""
+        self.model.checker.put_down()
+        self.model.set_down()
+        load = self.model.load(item)
+        planned = {match.matched: body for body, match in self.matches.items() if match.matched is not None}
+        for body in (item, *load):
+            here = self.matches[body].matched
+            if here is None:
+                continue
+            self.model.world.set_pose(body, self.physical.world.pose(here))
+            below = carrier(self.physical.world, here)
+            if body != item and below is not None and planned.get(below) not in (item, *load):
+                self.model.put_on(body, planned.get(below, NOTHING))
+        self.model.take_aboard(item)
 
     def _recover(self, state: RobotState) -> RobotState:
         """Go back the way the arm came since the base last stood still, then believe what the joints say."""

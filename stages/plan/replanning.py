@@ -55,6 +55,8 @@ class Replanning:
         objects, initial = symbolic_state(self.model, graph)
         initial = in_the_middle(initial, state.holding, start, observed)
         goal, _ = parse_goal(self.literals, objects)
+        if state.holding is not None:
+            self.model.take_aboard(state.holding)
         try:
             attempt = self.search(state, task_problem(objects, initial, goal))
         except MotionFailed as failed:

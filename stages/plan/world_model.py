@@ -51,6 +51,8 @@ class Snapshot:
     poses: dict[str, np.ndarray]
     joints: dict[str, dict[str, float]]
     records: dict[str, SceneBody]
+    laden: tuple[str, ...]
+    """Carriers that were one body with their load."""
 
 
 class WorldModel:
@@ -199,10 +201,11 @@ class WorldModel:
         poses = {name: self.pose(name) for name, record in self.records.items() if record.movable}
         joints = {name: {joint: self.joint_value(name, joint) for joint in body.joints}
                   for name, body in self.world.bodies.items()}  # fmt: skip
-        return Snapshot(poses, joints, dict(self.records))
+        laden = tuple(sorted({carrier for carrier, _ in self._aboard.values()}))
+        return Snapshot(poses, joints, dict(self.records), laden)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Put everything where it was; nothing is carried afterwards."""
+        """Put everything where it was, loads aboard of what carried them; the robot carries nothing afterwards."""
         self.checker.put_down()
         self.set_down()
         for name, pose in snapshot.poses.items():
@@ -211,6 +214,8 @@ class WorldModel:
             for joint, value in values.items():
                 self.world.set_joint(name, joint, value)
         self.records = dict(snapshot.records)
+        for carrier in snapshot.laden:
+            self.take_aboard(carrier)
 
     # --- geometry ---------------------------------------------------------------------------------------------
 

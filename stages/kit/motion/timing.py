@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 BEND = 1e-9
 """Changes of direction below this (seconds at the acceleration limit) are none."""
@@ -56,9 +57,15 @@ def time_path(
 
 
 def sample_times(times: np.ndarray, points: np.ndarray, period: float) -> np.ndarray:
-    """Return points (K, D) at every `period` [s], the last one exactly at the end."""
+    """Return points (K, D) at every `period` [s], the last one exactly at the end.
+
+    Between points each joint follows a monotone cubic (Fritsch & Carlson 1980): its speed does not jump, and it stays
+    between the values of the two points.
+    """
     count = int(np.ceil(times[-1] / period - 1e-9))
     wanted = np.minimum(np.arange(1, count + 1) * period, times[-1])
     if count == 0:
         return points[-1:]
-    return np.stack([np.interp(wanted, times, points[:, column]) for column in range(points.shape[1])], axis=1)
+    rows = PchipInterpolator(times, points, axis=0)(wanted)
+    rows[-1] = points[-1]
+    return np.asarray(rows)

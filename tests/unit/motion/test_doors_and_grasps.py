@@ -8,7 +8,7 @@ import trimesh
 
 from schemas.scene_parts import Joint
 from stages.kit.motion.doors import ContactPoint, body_from_moved, closing_direction, push_points, tool_poses
-from stages.kit.motion.grasps import narrowest_width, sample_grasps
+from stages.kit.motion.grasps import _square, narrowest_width, sample_grasps
 from stages.kit.simulation.shapes import surface_points
 
 HINGE = Joint(
@@ -90,3 +90,36 @@ def test_an_item_wider_than_the_gripper_has_no_grasp() -> None:
     assert _grasps(mesh) == []
     points, _ = surface_points([mesh], 4000, np.random.default_rng(0))
     assert narrowest_width(points) == pytest.approx(0.12, abs=0.003)
+
+
+def _from_the_side(mesh: trimesh.Trimesh) -> list:
+    """Grasps of a thing with inner faces whose walls are 2 mm thick, from the side."""
+    return [grasp for grasp in _grasps(mesh) if grasp.pitch == 0.0]
+
+
+def test_a_thin_walled_cup_is_grasped_from_the_side() -> None:
+    """The inner face of the wall, 2 mm behind the outer one, points the other way and must not count."""
+    wall = trimesh.creation.annulus(r_min=0.033, r_max=0.035, height=0.1)
+    bottom = trimesh.creation.cylinder(radius=0.033, height=0.002)
+    bottom.apply_translation([0.0, 0.0, -0.049])
+    found = _from_the_side(trimesh.util.concatenate([wall, bottom]))
+    assert len(found) >= 16
+    for grasp in found:
+        assert grasp.width == pytest.approx(0.07, abs=0.003)
+        assert abs(float(grasp.body_from_tool[:3, 3] @ grasp.body_from_tool[:3, 1])) < 0.003
+
+
+def test_a_thin_walled_box_is_not_grasped_at_its_corners() -> None:
+    """From corner to corner the box would fit between the fingers too, but they would slip off."""
+    outer, inner = trimesh.creation.box(extents=(0.05, 0.05, 0.1)), trimesh.creation.box(extents=(0.046, 0.046, 0.1))
+    inner.invert()
+    found = _from_the_side(trimesh.util.concatenate([outer, inner]))
+    assert found and 0.05 * np.sqrt(2) < 0.08 - 0.006
+    for grasp in found:
+        closing = np.abs(grasp.body_from_tool[:2, 1])
+        assert closing.max() > 0.99 and grasp.width < 0.056
+
+
+def test_what_only_faces_away_is_not_square() -> None:
+    assert not _square(np.array([])) and not _square(np.array([-1.0, -1.0, 0.0]))
+    assert _square(np.array([-1.0, 1.0, 1.0])) and not _square(np.array([0.7, 0.7, -1.0]))

@@ -134,6 +134,15 @@ def test_times_keep_the_speed_and_acceleration_limits() -> None:
     assert np.abs(velocity[0]).max() < 0.1  # it starts from rest
 
 
+def test_speed_does_not_jump_between_samples() -> None:
+    path = np.array([[0.0, 0.0], [1.0, 0.3], [1.0, 1.0]])
+    times, points = time_path(path, np.array([0.5, 0.25]), np.array([1.0, 1.0]))
+    rows = np.concatenate([points[:1], sample_times(times, points, 1 / 120)])
+    acceleration = np.diff(rows[:-1], 2, axis=0) * 120**2
+    assert np.abs(acceleration).max() < 3.0  # straight pieces jump by up to 0.02 m/s within 1/120 s: more than 4
+    assert np.all(np.diff(rows, axis=0) > -1e-12)  # monotone like the path
+
+
 def test_a_straight_way_takes_the_time_of_a_trapezoid() -> None:
     times, _ = time_path(np.array([[0.0], [2.0]]), np.array([0.5]), np.array([1.0]))
     assert times[-1] == pytest.approx(2.0 / 0.5 + 0.5 / 1.0, rel=1e-3)

@@ -148,3 +148,58 @@ def test_a_named_prior_makes_a_task_possible(model: WorldModel, scene: Path) -> 
 def test_bad_priors(prior: str, model: WorldModel) -> None:
     with pytest.raises(UsageError):
         parse_priors((prior,), model)
+
+
+PUT = action("place", "cup", "table", pre=(("holding", "cup"), ("near", "table"), ("flat", "table")))
+
+
+@pytest.mark.parametrize("kind", ["goal_in_collision", "no_path", "start_in_collision"])
+def test_what_was_held_at_first_is_put_down_and_taken_otherwise_once(kind: str) -> None:
+    lessons = Lessons(held="cup")
+    lessons.learn(PUT, failure(kind, "cup", "table"), [*ALL, PUT], frozenset())
+    after = {entry.text: entry for entry in lessons.apply([*ALL, PUT])}
+    assert after["place(cup, table)"].preconditions == PUT.preconditions | {("moved", "cup")}
+    assert ("moved", "cup") in after["pick(cup, table)"].add
+    assert ("moved", "cup") in after["take_out(cup, fridge, fridge__door_hinge)"].add
+    assert ("moved", "cup") not in after["pick(can, table)"].add
+    assert lessons.blocked == set()
+    lessons.learn(PUT, failure(kind, "cup", "table"), [*ALL, PUT], frozenset())
+    assert "place(cup, table)" not in {entry.text for entry in lessons.apply([*ALL, PUT])}
+    assert len(lessons.words) == 2
+
+
+def test_only_what_was_held_at_first_has_to_be_taken_otherwise() -> None:
+    """A thing that the plan itself picked up was taken by a grasp of its choice; so was anything when nothing was held.
+    What cannot be put down for want of room cannot by another grasp either."""
+    in_the_way = failure("goal_in_collision", "cup", "table")
+    for lessons, reason in ((Lessons(), in_the_way), (Lessons(held="can"), in_the_way),
+                            (Lessons(held="cup"), failure("no_placement", "cup", "table"))):  # fmt: skip
+        lessons.learn(PUT, reason, [*ALL, PUT], frozenset())
+        assert lessons.needs == {} and lessons.blocked == {("place", ("cup", "table"))}
+
+
+def test_what_can_be_moved_out_of_the_way_is_moved_before_another_grasp_is_tried() -> None:
+    lessons = Lessons(held="cup")
+    lessons.learn(PUT, failure("goal_in_collision", "cup", "table", "can"), [*ALL, PUT], frozenset())
+    assert lessons.needs == {("place", ("cup", "table")): frozenset({("moved", "can")})}
+    lessons.learn(PUT, failure("goal_in_collision", "cup", "table"), [*ALL, PUT], frozenset())
+    assert lessons.needs[("place", ("cup", "table"))] == {("moved", "can"), ("moved", "cup")}
+
+
+def test_the_task_search_finds_the_way_round_with_a_held_thing() -> None:
+    """Held, it cannot be put on the table: it is put on the shelf, taken again and then put on the table."""
+    objects = {"start": "spot", "cup": "item", "table": "surface", "shelf": "surface"}
+    initial = {("near", "start"), ("holding", "cup"), ("graspable", "cup")}
+    initial |= {(word, name) for name in ("cup", "table", "shelf") for word in ("reachable", "flat")}
+    initial |= {("fits", "cup", name) for name in ("table", "shelf")} | {("clear", "cup")}
+    problem = task_problem(objects, frozenset(initial), frozenset({("on", "cup", "table")}))
+    actions = ground(DOMAIN, problem)
+    direct = plan_task(problem, actions).actions
+    assert direct is not None and [entry.name for entry in direct] == ["drive", "place"]
+    lessons = Lessons(held="cup")
+    lessons.learn(direct[1], failure("no_path", "table"), actions, problem.initial)
+    around = plan_task(problem, lessons.apply(actions)).actions
+    assert around is not None
+    assert [entry.text for entry in around if entry.name != "drive"] == [
+        "place(cup, shelf)", "pick(cup, shelf)", "place(cup, table)",
+    ]  # fmt: skip
