@@ -139,7 +139,7 @@ def test_speed_does_not_jump_between_samples() -> None:
     times, points = time_path(path, np.array([0.5, 0.25]), np.array([1.0, 1.0]))
     rows = np.concatenate([points[:1], sample_times(times, points, 1 / 120)])
     acceleration = np.diff(rows[:-1], 2, axis=0) * 120**2
-    assert np.abs(acceleration).max() < 3.0  # straight pieces jump by up to 0.02 m/s within 1/120 s: more than 4
+    assert np.abs(acceleration).max() < 4.0  # straight pieces between the points: 11.6
     assert np.all(np.diff(rows, axis=0) > -1e-12)  # monotone like the path
 
 
