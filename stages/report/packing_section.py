@@ -9,7 +9,7 @@ from stages.report.images import Picture, from_file
 
 MOST_ROWS = 60
 PICTURES = {
-    "layout": "The table from above after the last plan; dotted: where boxes started, red: refused placements",
+    "layout": "The basket from above after the last plan; red: placements that were refused",
     "scene": "After the last action that was carried out",
     "attempts": "The plans as a tree; red: the reason at each branch that was cut",
 }
