@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from schemas.artifact import Artifact
 from schemas.base import Model, Transform
@@ -30,6 +30,15 @@ class TriedPlan(Model):
     failed_action: int | None = None
     """Index of the first action without a motion; None: every action has one."""
     failure: Failure | None = None
+    """Why that action has none; None exactly where `failed_action` is."""
+
+    @model_validator(mode="after")
+    def _names_what_failed(self) -> TriedPlan:
+        if (self.failed_action is None) != (self.failure is None):
+            raise ValueError("`failed_action` and `failure` go together: give both or neither")
+        if self.failed_action is not None and not 0 <= self.failed_action < len(self.actions):
+            raise ValueError(f"`failed_action` {self.failed_action} is none of the {len(self.actions)} actions")
+        return self
 
 
 class PlannedAction(Model):

@@ -11,7 +11,6 @@ from stages.pack.instances import PUBLISHED_CELLS, Instance, published_instance
 from stages.pack.language_proposer import LanguageProposer, SymbolicProposer
 from stages.pack.language_scripted import scripted_chat
 from stages.pack.loop import Budget
-from stages.pack.motion import MotionPlanner
 from stages.pack.own_proposer import OwnProposer, placement_solver
 from stages.pack.records import Proposer
 from stages.pack.sampling import FixedLayout, RandomRestarts, RandomSampler
@@ -61,7 +60,7 @@ ARMS: dict[str, Arm] = {
 }
 
 
-def make_instance(case: str, seed: int, planner: MotionPlanner) -> Instance:
+def make_instance(case: str, seed: int) -> Instance:
     """Return the instance of `published/<cell>` or `hard/<cell>`."""
     suite, cell = case.split("/")
-    return published_instance(cell, seed) if suite == "published" else hard_instance(cell, seed, planner)
+    return published_instance(cell, seed) if suite == "published" else hard_instance(cell, seed)

@@ -9,6 +9,7 @@ import numpy as np
 
 from benchmarks.llm3.arms import ARMS, HARD, PUBLISHED
 from benchmarks.llm3.records import Run
+from stages.kit.measurement.bootstrap import bootstrap_interval
 from stages.kit.measurement.proportions import wilson_interval
 
 MEASURES = ("success", "proposer_calls", "motion_planner_calls", "seconds")
@@ -44,10 +45,11 @@ def grouped(runs: Iterable[Run]) -> Runs:
 
 
 def bootstrap(values: np.ndarray) -> tuple[float, float]:
-    """Return the 95 % percentile-bootstrap interval of the mean of (N,) values."""
-    random = np.random.default_rng(SEEDS_OF_INTERVALS)
-    means = values[random.integers(len(values), size=(DRAWS, len(values)))].mean(axis=1)
-    return float(np.percentile(means, 2.5)), float(np.percentile(means, 97.5))
+    """Return the 95 % percentile-bootstrap interval of the mean of (N,) values; raises ValueError for none."""
+    found = bootstrap_interval(values, np.random.default_rng(SEEDS_OF_INTERVALS), resamples=DRAWS)
+    if found is None:
+        raise ValueError("no values have no interval")
+    return found.low, found.high
 
 
 def metrics(runs: list[Run]) -> dict[str, float]:

@@ -56,7 +56,7 @@ BUILD = Stage(
 
 ADD = Stage(
     name="library add",
-    version=2,
+    version=3,
     summary="Import models of other people into a CAD library: URDF, MJCF, SDF, meshes, PartNet, ShapeNetSem",
     parameters=AdditionParameters,
     reads={

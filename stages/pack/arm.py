@@ -14,6 +14,8 @@ from typing import Literal
 
 import numpy as np
 
+from stages.kit.motion.all_branches import panda_lengths
+from stages.kit.motion.compiled_check import link_frames
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.kinematics import ArmChain, arm_chain, forward, inverse_kinematics, random_starts
 from stages.kit.simulation.robot_description import RobotDescription, load_robot
@@ -135,16 +137,11 @@ class FixedArm:
         """Return world_from_tool (4, 4) of joint values (7,)."""
         return forward(self.chain, arm)
 
-    def frames(self, arm: np.ndarray) -> list[np.ndarray]:
-        """Return world_from_link (4, 4) of links 1 to 7 at joint values (7,)."""
-        frames = []
-        pose = np.eye(4)
-        for fixed, value in zip(self.chain.fixed, arm, strict=True):
-            pose = pose @ fixed
-            c, s = cos(value), sin(value)
-            pose = pose @ np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
-            frames.append(pose)
-        return frames
+    def frames(self, arm: np.ndarray) -> np.ndarray:
+        """Return world_from_link (7, 3, 4) of links 1 to 7 at joint values (7,)."""
+        frames = np.zeros((len(arm) + 1, 3, 4))
+        link_frames(self.chain.fixed, 0.0, np.concatenate([np.zeros(3), arm]), frames)
+        return frames[1:]
 
     def _planar(self, radius: float, z: float) -> np.ndarray:
         """Return the configuration (7,) in the plane y = 0 with the tool's yaw 0, limits and reach not looked at."""
@@ -192,19 +189,12 @@ class FixedArm:
 
 def _measures(chain: ArmChain) -> _Lengths:
     """Read the planar arm's measures out of the chain; raises ValueError when it is no arm of this shape."""
-    fixed = chain.fixed
-    lengths = _Lengths(
-        shoulder=float(fixed[0][2, 3]),
-        upper=-float(fixed[2][1, 3]),
-        elbow=float(fixed[3][0, 3]),
-        forearm=float(fixed[4][1, 3]),
-        wrist=float(fixed[6][0, 3]),
-        hand=float(chain.tool[2, 3]),
-        yaw_offset=float(np.arctan2(chain.tool[0, 1], chain.tool[0, 0])),
-    )
-    if len(fixed) != 7 or min(lengths.upper, lengths.forearm, lengths.elbow, lengths.wrist) <= 0:
+    found = panda_lengths(chain)
+    if found is None or found[1:].min() <= 0:
         raise ValueError("not an arm of the Franka's shape")
-    return lengths
+    shoulder, upper, elbow, forearm, wrist = found.tolist()
+    hand, yaw_offset = float(chain.tool[2, 3]), float(np.arctan2(chain.tool[0, 1], chain.tool[0, 0]))
+    return _Lengths(shoulder, upper, forearm, elbow, wrist, hand, yaw_offset)
 
 
 def planar_joints(arm: FixedArm, radii: np.ndarray, heights: np.ndarray) -> np.ndarray | None:

@@ -12,6 +12,8 @@ from math import hypot, pi
 
 import numpy as np
 
+from schemas.errors import UsageError
+from stages.pack.arm import Limits
 from stages.pack.environment import PackingWorld
 from stages.pack.instances import BASKETS, Instance, Obstacle, centred
 from stages.pack.loop import Budget, run_loop
@@ -75,20 +77,29 @@ class _Recited:
         return self._plan
 
 
-def hard_instance(cell: str, seed: int, planner: MotionPlanner) -> Instance:
-    """Return the instance of a cell and a seed with its certificate. Raises RuntimeError when none could be made."""
+def hard_instance(cell: str, seed: int, limits: Limits = "fr3") -> Instance:
+    """Return the instance of a cell and a seed with its certificate, which keeps the joint limits.
+
+    Raises UsageError when none could be made.
+    """
     recipe = HARD_CELLS[cell]
     random = np.random.default_rng([seed, 43, sorted(HARD_CELLS).index(cell)])
-    for _ in range(TRIES):
-        drawn = _draw(recipe, random)
-        if drawn is None:
-            continue
-        boxes, obstacles, places = drawn
-        instance = Instance(f"hard/{cell}/{seed}", boxes, recipe.basket, obstacles)
-        certificate = _certify(instance, places, planner, random)
-        if certificate is not None:
-            return replace(instance, certificate=certificate)
-    raise RuntimeError(f"hard/{cell}/{seed}: no certified instance in {TRIES} tries")
+    planner = MotionPlanner(limits)  # one of its own: an instance does not depend on the seed of those who solve it
+    try:
+        for _ in range(TRIES):
+            drawn = _draw(recipe, random)
+            if drawn is None:
+                continue
+            boxes, obstacles, places = drawn
+            instance = Instance(f"hard/{cell}/{seed}", boxes, recipe.basket, obstacles)
+            certificate = _certify(instance, places, planner, random)
+            if certificate is not None:
+                return replace(instance, certificate=certificate)
+    finally:
+        planner.close()
+    raise UsageError(
+        f"hard/{cell}: number {seed} has no certified problem in {TRIES} tries", hint="choose another --instance"
+    )
 
 
 def _cut(region: np.ndarray, count: int, random: np.random.Generator) -> list[np.ndarray]:

@@ -31,7 +31,7 @@ def run(problem: Path | None, transcript: Path | None, *, parameters: PackParame
     """Pack the boxes of the user's problem, or of an instance of a suite."""
     planner = MotionPlanner(parameters.limits, context.seed)
     try:
-        instance = _instance(problem, parameters, planner)
+        instance = _instance(problem, parameters)
         proposer = _proposer(parameters, transcript, context)
         with PackingWorld(instance, planner=planner) as world:
             with context.progress.step("propose and check"):
@@ -72,13 +72,13 @@ class _Guarded:
             self.calls = self._proposer.calls
 
 
-def _instance(problem: Path | None, parameters: PackParameters, planner: MotionPlanner) -> Instance:
+def _instance(problem: Path | None, parameters: PackParameters) -> Instance:
     if problem is not None:
         return read_problem(problem, parameters.limits)
     suite, cell = parameters.suite.split("/")
     if suite == "published":
         return published_instance(cell, parameters.instance)
-    return hard_instance(cell, parameters.instance, planner)
+    return hard_instance(cell, parameters.instance, parameters.limits)
 
 
 def _proposer(parameters: PackParameters, transcript: Path | None, context: Context) -> Proposer:

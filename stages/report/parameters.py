@@ -15,6 +15,7 @@ from schemas.kinds import (
     Evaluation,
     GroundTruth,
     InteractiveScene,
+    Packing,
     PanopticMap,
     Plan,
     Report,
@@ -47,7 +48,7 @@ def check_inputs(parameters: ReportParameters, inputs: Mapping[str, Any]) -> Non
 
 STAGE = Stage(
     name="report",
-    version=4,
+    version=5,
     summary="Write one self-contained HTML page about a run: pictures, graph, figures, times, how it was made",
     parameters=ReportParameters,
     reads={
@@ -61,11 +62,12 @@ STAGE = Stage(
         "cad_library": Optionally(CadLibrary),
         "interactive_scene": Optionally(InteractiveScene),
         "plan": Optionally(Plan),
+        "packing": Optionally(Packing),
         "evaluation": Optionally(Evaluation),
         "baseline_evaluation": Optionally(Evaluation),
     },
     writes=Report,
-    libraries=("numpy", "scipy", "jinja2", "pillow", "open3d"),
+    libraries=("numpy", "scipy", "jinja2", "matplotlib", "pillow", "open3d"),
     check=check_inputs,
     example="scenewright report --sequence outputs/demo/sequence --panoptic-map outputs/demo/panoptic_map "
     "--evaluation outputs/demo/evaluation --out outputs/demo/report",

@@ -17,6 +17,7 @@ from schemas.evaluation import Evaluation, Report, ReportFile
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
 from schemas.manifest import CONVENTIONS
+from schemas.packing import Packing
 from schemas.panoptic_map import PanopticMap
 from schemas.plan import Plan
 from schemas.segments import Segments
@@ -32,6 +33,7 @@ from stages.report.global_check import checked_scenes
 from stages.report.graph_drawing import draw_graph, marks_from_evaluation
 from stages.report.images import Picture, jpeg
 from stages.report.kinematic_tree import corresponding_trees, read_joints
+from stages.report.packing_section import packing_view
 from stages.report.page import render_page
 from stages.report.parameters import ReportParameters
 from stages.report.placed_models import ModelShelf
@@ -48,6 +50,7 @@ HEADLINES = (
 SECTIONS = (
     ("frames", "Frames", "frames"), ("map", "Map", "map_text"), ("graph", "Contact graph", "graph"),
     ("cad", "CAD scene", "cad_views"), ("scene", "Interactive scene", "bodies"), ("plan", "Plan", "plan"),
+    ("packing", "Packing", "packing"),
     ("figures", "Figures", "groups"), ("cost", "Time and memory", "made"), ("made", "How it was made", "made"),
 )  # fmt: skip
 
@@ -78,6 +81,7 @@ def run(
     cad_library: CadLibrary | None = None,
     interactive_scene: InteractiveScene | None = None,
     plan: Plan | None = None,
+    packing: Packing | None = None,
     evaluation: Evaluation | None = None,
     baseline_evaluation: Evaluation | None = None,
     *,
@@ -88,7 +92,7 @@ def run(
     given: dict[str, Artifact | None] = {
         "ground_truth": ground_truth, "sequence": sequence, "trajectory": trajectory, "segments": segments,
         "panoptic_map": panoptic_map, "contact_graph": contact_graph, "cad_scene": cad_scene,
-        "cad_library": cad_library, "interactive_scene": interactive_scene, "plan": plan,
+        "cad_library": cad_library, "interactive_scene": interactive_scene, "plan": plan, "packing": packing,
         "evaluation": evaluation, "baseline_evaluation": baseline_evaluation,
     }  # fmt: skip
     artifacts = {role: artifact for role, artifact in given.items() if artifact is not None}
@@ -112,12 +116,15 @@ def run(
         with context.progress.step("plan"):
             values["plan"] = plan_view(plan, parameters.keyframes, 640)
             values["plan_ok"] = all(check.holds for check in plan.plan.checks)
+    if packing is not None:
+        with context.progress.step("packing"):
+            values["packing"] = packing_view(packing, 1100)
     if evaluation is not None:
         with context.progress.step("figures"):
             _add_figures(values, evaluation, baseline_evaluation)
     values["made"] = made_of(artifacts, context.output.parent / "report")
     values["timed"] = any(m.known for m in values["made"])
-    values["title"] = parameters.title or _title(ground_truth, sequence)
+    values["title"] = parameters.title or _title(ground_truth, sequence, artifacts)
     values["lead"] = _lead(ground_truth, sequence, artifacts)
     values["sections"] = [{"id": i, "name": name} for i, name, key in SECTIONS if values[key]]
     return _write(values, artifacts, context)
@@ -126,7 +133,7 @@ def run(
 def _empty_page() -> dict[str, Any]:
     empty = (
         "frames legend map_views graph cad_views replacements bodies fixed_bodies groups notes plots tables metrics "
-        "tiles plan baseline has_intervals plan_ok checked objects_changed objects_kept trees"
+        "tiles plan packing baseline has_intervals plan_ok checked objects_changed objects_kept trees"
     )
     texts = "frames_text map_text graph_text graph_errors cad_text scene_text figures_text"
     values: dict[str, Any] = dict.fromkeys(empty.split(), None)
@@ -147,7 +154,9 @@ def _label(evaluation: Evaluation | None, segments: Segments | None, panoptic_ma
     return panoptic_map.info.segmentation if panoptic_map is not None else ""
 
 
-def _title(ground_truth: GroundTruth | None, sequence: Sequence | None) -> str:
+def _title(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts: dict[str, Artifact]) -> str:
+    if set(artifacts) == {"packing"}:
+        return "Boxes and a basket"
     if ground_truth is not None and ground_truth.truth.source == "generated":
         return "A generated room, reconstructed"
     return "A scanned room, reconstructed" if sequence is not None else "A reconstructed room"
@@ -161,7 +170,7 @@ def _lead(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts
         parts.append(f"{info.frame_count} RGB-D frames of {camera} pixels over {info.end_time - info.start_time:.0f} s")
     names = {
         "panoptic_map": "a labelled map", "contact_graph": "a contact graph", "cad_scene": "a scene of CAD models",
-        "interactive_scene": "a scene that simulators load",
+        "interactive_scene": "a scene that simulators load", "packing": "a packing of boxes",
     }  # fmt: skip
     if isinstance(plan := artifacts.get("plan"), Plan):
         status = plan.plan.status

@@ -7,7 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from schemas.errors import UsageError
 from schemas.plan import Failure
+from stages.pack import hard_suites
 from stages.pack.backtracking import Backtracking
 from stages.pack.environment import PackingWorld
 from stages.pack.hard_suites import HARD_CELLS, hard_instance
@@ -102,12 +104,19 @@ def test_samplers_are_seeded_and_restart(planner: MotionPlanner) -> None:
 
 @pytest.mark.parametrize("cell", sorted(HARD_CELLS))
 def test_hard_instances_are_certified_and_ours_solves_them(planner: MotionPlanner, cell: str) -> None:
-    instance = hard_instance(cell, 4, planner)
-    assert instance == hard_instance(cell, 4, planner)
+    instance = hard_instance(cell, 4)
+    assert instance == hard_instance(cell, 4)
     with PackingWorld(instance, planner=planner) as world:
         assert run_loop(world, Recited(instance.certificate), Budget(1)).success
         result = run_loop(world, OwnProposer(), Budget(20))
     assert result.success and result.motion_calls <= 4 * len(instance.boxes)
+
+
+def test_a_hard_instance_that_cannot_be_certified_is_an_error_of_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hard_suites, "_certify", lambda *_: None)
+    with pytest.raises(UsageError, match="hard/fill: number 4 has no certified problem") as refused:
+        hard_instance("fill", 4)
+    assert refused.value.hint and "\n" not in str(refused.value)
 
 
 def test_ours_learns_the_reach_and_the_height_of_an_obstacle(planner: MotionPlanner) -> None:

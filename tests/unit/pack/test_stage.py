@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 
 from benchmarks.llm3.arms import ARMS, HARD, PUBLISHED
 from benchmarks.llm3.records import Run
-from benchmarks.llm3.tables import bootstrap, metrics, table, wilson
+from benchmarks.llm3.tables import bootstrap, metrics, table
 from schemas.errors import BadInput, UsageError
 from schemas.packing import Packing
 from stages.kit.language.failures import LanguageFailed
+from stages.kit.measurement.proportions import wilson_interval
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.pack.parameters import STAGE, PackParameters, Suite
@@ -143,7 +144,7 @@ def test_figures_and_tables_of_known_runs() -> None:
     assert "| hard/fill | `backtracking` | 3.0 [3.0, 3.0] | 3 | 1 | 0 |" in text and "## Harder suites" in text
     published = [run.model_copy(update={"case": "published/easy"}) for run in runs]
     assert "## Harder suites" not in table(published) and "| published/easy | `backtracking` | 3.0" in table(published)
-    assert wilson(50, 100) == pytest.approx((0.4038, 0.5962), abs=1e-4)  # Wilson 1927, worked example of many books
+    assert wilson_interval(50, 100) == pytest.approx((0.4038, 0.5962), abs=1e-4)  # Wilson 1927, as in many books
     low, high = bootstrap(np.array([1.0, 2.0, 3.0, 4.0]))
     assert 1.0 <= low < 2.5 < high <= 4.0
     assert set(ARMS) >= {"random", "scripted_backtrack", "scripted_scratch", "ours", "fixed_layout"}

@@ -180,11 +180,12 @@ class Tries(Conduct):
     """So many times the motion is blocked on the way."""
     ineffective: int = 0
     lose: bool = False
+    reason: str = "no_path"
 
     def _look(self, name, arguments):  # type: ignore[no-untyped-def]
         if self.refuse > 0:
             self.refuse -= 1
-            raise MotionFailed("not_found", "not there")
+            raise MotionFailed(self.reason, "it refuses")
 
     def _anchor(self, step):  # type: ignore[no-untyped-def]
         return None
@@ -241,9 +242,16 @@ def test_an_action_has_its_attempts(
     tries.refuse, tries.block, tries.ineffective = refuse, block, ineffective
     after, done = tries._act(START, [CLOSE], "start", 0, [])
     assert after is not None and (float(after.base[0]), done) == (base, carried_out)
-    kinds = ["not_found"] * refuse + ["path_blocked"] * block + ["condition_not_met"] * ineffective
+    kinds = ["no_path"] * refuse + ["path_blocked"] * block + ["condition_not_met"] * ineffective
     assert [failure.kind for failure in tries.failures] == kinds
     assert all(failure.action == "close(hinge)" for failure in tries.failures)
+
+
+def test_what_is_not_there_is_looked_for_once_and_not_planned_anew(tries: Tries) -> None:
+    tries.refuse, tries.reason = 3, "not_found"
+    asked: list[int] = []
+    assert not tries.run(START, [CLOSE], 2, lambda state, number: asked.append(number), lambda: True)
+    assert [failure.kind for failure in tries.failures] == ["not_found"] and not asked
 
 
 def test_what_was_put_down_wrongly_is_not_in_the_hand_any_more_for_another_try(tries: Tries) -> None:

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from schemas.base import as_transform
 from schemas.errors import BadInput
@@ -26,6 +27,13 @@ def test_tried_plans_share_what_they_share_and_say_where_each_ended() -> None:
     texts = [text.get_text() for text in tried_tree(file(tried=tried)).axes[0].texts]
     assert texts.count("drive\nfridge_7") == texts.count("open\nfridge_7 door") == 1
     assert "1: pick\nbottle_9: the shelf is in the way" in texts and "2: every action has a motion" in texts
+
+
+@pytest.mark.parametrize("failed, why", [(2, False), (None, True), (3, True), (-1, True)])
+def test_a_tried_plan_names_the_action_that_failed_and_why_or_neither(failed: int | None, why: bool) -> None:
+    failure = {"kind": "no_path", "message": "the shelf is in the way"} if why else None
+    with pytest.raises(ValidationError, match="failed_action"):
+        TriedPlan.model_validate({"actions": ACTIONS, "failed_action": failed, "failure": failure})
 
 
 def test_motion_is_drawn_by_joint_with_the_actions(tmp_path) -> None:
