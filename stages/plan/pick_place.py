@@ -16,7 +16,7 @@ from stages.kit.simulation.robot import Configuration
 from stages.plan.arm_motion import ArmPlanner, Tally
 from stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
 from stages.plan.motions import Manipulation, Segment, whole_body
-from stages.plan.placements import Placement, place_regions, sample_placements
+from stages.plan.placements import PLACES, Placement, place_regions, sample_placements
 from stages.plan.rim_grasps import rim_grasps
 from stages.plan.tray_loading import lifts_left, load_moments
 from stages.plan.world_model import RobotState, WorldModel
@@ -295,7 +295,8 @@ def plan_place(
     free place there carries the item's footprint, otherwise what ended most attempts.
     """
     assert state.tool_from_item is not None
-    places = sample_placements(model, item, target, door, random)
+    on_tray = model.records[target].movable
+    places = sample_placements(model, item, target, door, random, 2 * PLACES if on_tray else PLACES)
     if not places and preferred is None:
         regions = place_regions(model, item, target, door)
         raise MotionFailed(
@@ -304,12 +305,12 @@ def plan_place(
             (item, target),
             {"places": len(regions)},
         )
-    if model.records[target].movable and places:
+    if on_tray and places:
         left = lifts_left(
             model, target, item, np.array([place.world_from_item for place in places]), budgets.size_uncertainty
         )  # fmt: skip
         order = sorted(range(len(places)), key=lambda index: (not places[index].roomy, -left[index]))
-        places = [places[index] for index in order]
+        places = [places[index] for index in order if left[index] or not left.any()]
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
     paths = budgets.paths

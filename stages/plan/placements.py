@@ -13,6 +13,8 @@ from stages.plan.world_model import WorldModel
 
 PUT_DOWN_HEIGHT = 0.006
 """Items are let go this far over the surface [m]."""
+PLACES = 48
+"""Drawn in each region."""
 EDGE = 0.8
 """Surface is wanted under a circle of this share of the item's radius, and under its middle."""
 COMFORT = 0.9
@@ -43,7 +45,7 @@ def place_regions(model: WorldModel, item: str, target: str, door: str | None) -
 
 
 def sample_placements(
-    model: WorldModel, item: str, target: str, door: str | None, random: np.random.Generator, count: int = 48
+    model: WorldModel, item: str, target: str, door: str | None, random: np.random.Generator, count: int = PLACES
 ) -> list[Placement]:
     """Return up to `count` placements a region, those of regions at a comfortable height first, taking turns; tight
     ones come last.

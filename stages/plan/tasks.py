@@ -51,6 +51,10 @@ class SceneFacts:
         """Return the least width of a thing [m]; narrow things are safer to grasp."""
         return narrowest_width(apply(self.model.pose(name), self.model.points(name)))
 
+    def slenderness(self, name: str) -> float:
+        """Return height over least width of a thing: slender things fall over on what moves."""
+        return round(self.model.footprint(name)[1] / max(self.width(name), 1e-3), 2)
+
     def distance(self, first: str, second: str) -> float:
         """Return the distance of two bodies in the plane [m]."""
         return float(np.linalg.norm((self.model.pose(first) - self.model.pose(second))[:2, 3]))
@@ -149,7 +153,7 @@ def put_away_in_drawer(facts: SceneFacts) -> Goals:
 
 
 def stack_and_carry(facts: SceneFacts) -> Goals:
-    """Small things onto a tray, and the tray with all that onto another table."""
+    """Small things onto a tray, those that stand best, and the tray with all that onto another table."""
     trays = sorted(
         name for name in facts.model.records
         if all(facts.holds(word, name) for word in ("carrier", "graspable", "reachable", "flat"))
@@ -160,10 +164,10 @@ def stack_and_carry(facts: SceneFacts) -> Goals:
     for tray in trays:
         here = facts.on[tray]
         beside = facts.small([item for item, where in facts.on.items() if where in (here, *surfaces)])
-        beside = sorted((item for item in beside if facts.holds("fits", item, tray)), key=facts.width)
+        beside = sorted(item for item in beside if facts.holds("fits", item, tray))
         for target in surfaces:
             if target != here and facts.holds("fits", tray, target) and beside:
-                near = sorted(beside, key=lambda item: (facts.on[item] != here, facts.width(item), item))
+                near = sorted(beside, key=lambda item: (facts.on[item] != here, facts.slenderness(item), item))
                 ranked.append((facts.distance(here, target), tray, target, tuple(near)))
     if not ranked:
         raise _missing(
