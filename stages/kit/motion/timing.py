@@ -31,6 +31,8 @@ def time_path(
         count = max(1, int(np.ceil(duration / spacing)))
         rows.append(first + (second - first) * (np.arange(1, count + 1) / count)[:, None])
     points = np.concatenate(rows)
+    if len(points) == 2:  # at rest at both ends, it has to move in between
+        points = np.array([points[0], (points[0] + points[1]) / 2, points[1]])
     steps = np.diff(points, axis=0)
     # s counts seconds at full speed, so ds/dt <= 1 everywhere.
     lengths = np.max(np.abs(steps) / speed, axis=1)

@@ -143,6 +143,11 @@ def test_speed_does_not_jump_between_samples() -> None:
     assert np.all(np.diff(rows, axis=0) > -1e-12)  # monotone like the path
 
 
+def test_a_very_short_way_takes_the_time_of_a_triangle() -> None:
+    times, _ = time_path(np.array([[0.0], [0.001]]), np.array([0.5]), np.array([1.0]))
+    assert times[-1] == pytest.approx(2 * np.sqrt(0.001 / 1.0), rel=1e-6)
+
+
 def test_a_straight_way_takes_the_time_of_a_trapezoid() -> None:
     times, _ = time_path(np.array([[0.0], [2.0]]), np.array([0.5]), np.array([1.0]))
     assert times[-1] == pytest.approx(2.0 / 0.5 + 0.5 / 1.0, rel=1e-3)
