@@ -150,15 +150,17 @@ class Conduct:
                 state = recovered
                 continue
             state = self._perceived(after)
-            if name == "pick" and self.model.laden(arguments[0]):
-                state = self._level(state)
             try:
+                if name == "pick" and self.model.laden(arguments[0]):
+                    state = self._level(state)
                 self._check_effect(name, arguments)
                 return state, True
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
                 if name == "place":
                     return state, False
+                if name == "pick":  # the tray was lost, or something is in the way of levelling it
+                    return self._recovered(state, name, arguments), False
         return state, False
 
     def _recovered(self, state: RobotState, name: str, arguments: tuple[str, ...]) -> RobotState | None:
@@ -308,7 +310,10 @@ class Conduct:
         return RobotState(base, arm, state.holding, tool_from_item, inverse(tool_from_item))
 
     def _level(self, state: RobotState) -> RobotState:
-        """Turn the hand so that a laden tray, which gave way in the fingers, stands level; return the state then."""
+        """Turn the hand so that a laden tray, which gave way in the fingers, stands level; return the state then.
+
+        Raises MotionFailed as `PhysicalRobot.follow` does.
+        """
         if state.tool_from_item is None:
             return state
         model = self.model

@@ -222,7 +222,6 @@ def _differences(
 
 def draw(pictures: RoomPictures, physical: PhysicalRobot, parameters: PlanParameters, context: Context) -> None:
     """Write the key frames as PNG files, and the log with its video, into the artifact's folder."""
-
     import cv2
 
     recording = physical.recording

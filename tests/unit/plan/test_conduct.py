@@ -261,6 +261,19 @@ def test_what_was_put_down_wrongly_is_not_in_the_hand_any_more_for_another_try(t
     assert [failure.kind for failure in tries.failures] == ["condition_not_met"]
 
 
+def test_a_tray_lost_while_it_is_levelled_is_a_failed_action_and_no_crash(
+    tries: Tries, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lose(state: RobotState) -> RobotState:
+        raise MotionFailed("grasp_lost", "it slipped")
+
+    tries.model.laden = lambda name: True  # type: ignore[method-assign]
+    monkeypatch.setattr(tries, "_level", lose)
+    after, done = tries._act(START, [act("pick", "tray", "desk")], "start", 0, [])
+    assert not done and after is not None and float(after.base[0]) == 9.0  # back along the way
+    assert [failure.kind for failure in tries.failures] == ["grasp_lost"]
+
+
 def test_what_was_lost_on_the_way_cannot_be_placed(tries: Tries) -> None:
     tries.physical.held, tries.block, tries.lose = "cup", 1, True
     after, done = tries._act(RobotState(np.zeros(3), np.zeros(7), "cup"), [PLACE], "start", 0, [])
