@@ -95,7 +95,7 @@ def can_stack(upper: str, lower: str, rules: Rules) -> bool:
     return fits and can_hold(upper, rules) and can_hold(lower + upper, rules)
 
 
-def _order(part: str) -> tuple[bool, bool, float, float]:
+def pile_order(part: str) -> tuple[bool, bool, float, float]:
     """What goes lower sorts first: dishes, dishes that carry utensils, utensils; the wider first."""
     bare = part.rstrip("u")
     if not bare:
@@ -105,10 +105,10 @@ def _order(part: str) -> tuple[bool, bool, float, float]:
 
 @lru_cache(maxsize=65536)
 def can_pile(base: str, parts: tuple[str, ...], rules: Rules) -> bool:
-    """Return whether all parts can be stacked onto `base`, in the order of `_order`. No other order does better: widths
-    must fall from the foot to the top, and utensils end a pile."""
+    """Return whether all parts can be stacked onto `base`, in the order of `pile_order`. No other order does better:
+    widths must fall from the foot to the top, and utensils end a pile."""
     pile = base
-    for part in sorted(parts, key=_order):
+    for part in sorted(parts, key=pile_order):
         if not can_stack(part, pile, rules):
             return False
         pile += part
@@ -125,8 +125,8 @@ def split_over_two(first: str, second: str, parts: tuple[str, ...], rules: Rules
         ones = tuple(part for part, side in zip(parts, sides, strict=True) if not side)
         others = tuple(part for part, side in zip(parts, sides, strict=True) if side)
         if can_pile(first, ones, rules) and can_pile(second, others, rules):
-            low = first + "".join(sorted(ones, key=_order))
-            high = second + "".join(sorted(others, key=_order))
+            low = first + "".join(sorted(ones, key=pile_order))
+            high = second + "".join(sorted(others, key=pile_order))
             if can_hold_two(low, high, rules):
                 return sides
     return None
