@@ -77,33 +77,46 @@ class _Option:
     pulled: bool
 
 
-def clear(table: Table, rules: Rules, model: TimeModel, chances: Chances, per_trip: float = 0.0) -> list[Trip]:
-    """Return the trips that clear a table in the least expected time [s], in order; `per_trip` seconds are charged for
-    each trip beyond what it takes.
+class Optimum:
+    """All that one trip can take on one table, made ready; `trips` finds the best order of trips."""
 
-    Raises UsageError for more than 16 items.
-    """
-    if len(table.items) > MOST_ITEMS:
-        raise UsageError(f"{len(table.items)} items are too many for the exact optimum", hint=f"at most {MOST_ITEMS}")
-    groups = _groups(table, rules, model, chances)
-    count = len(table.items)
-    number_of = np.full(1 << count, -1, dtype=np.int32)
-    starts, costs, blockers = [0], [], []
-    for number, (mask, _, options) in enumerate(groups):
-        number_of[mask] = number
-        costs.extend(option.cost + per_trip for option in options)
-        blockers.extend(option.blockers for option in options)
-        starts.append(len(costs))
-    below, above = _masks(table)
-    _, trip, chosen = _solve(
-        count, below, above, number_of, np.array(starts), np.array(costs), np.array(blockers, dtype=np.int64)
-    )
-    left, trips = (1 << count) - 1, []
-    while left:
-        mask, parts, options = groups[number_of[trip[left]]]
-        trips.append(_as_trip(parts, options[chosen[left] - starts[number_of[mask]]], rules))
-        left &= ~mask
-    return trips
+    def __init__(self, table: Table, rules: Rules, model: TimeModel, chances: Chances) -> None:
+        """Raises UsageError for more than 16 items."""
+        count = len(table.items)
+        if count > MOST_ITEMS:
+            raise UsageError(f"{count} items are too many for the exact optimum", hint=f"at most {MOST_ITEMS}")
+        self._rules = rules
+        self._groups = _groups(table, rules, model, chances)
+        self._number_of = np.full(1 << count, -1, dtype=np.int32)
+        starts, costs, blockers = [0], [], []
+        for number, (mask, _, options) in enumerate(self._groups):
+            self._number_of[mask] = number
+            costs.extend(option.cost for option in options)
+            blockers.extend(option.blockers for option in options)
+            starts.append(len(costs))
+        self._starts, self._costs = np.array(starts, dtype=np.int64), np.array(costs, dtype=np.float64)
+        self._blockers = np.array(blockers, dtype=np.int64)
+        self._masks = _masks(table)
+        self._count = count
+
+    def trips(self, per_trip: float = 0.0) -> list[Trip]:
+        """Return the trips that clear the table in the least expected time [s], in order; `per_trip` seconds are
+        charged for each trip beyond what it takes."""
+        _, trip, chosen = _solve(
+            self._count, *self._masks, self._number_of, self._starts, self._costs + per_trip, self._blockers
+        )
+        left, trips = (1 << self._count) - 1, []
+        while left:
+            number = self._number_of[trip[left]]
+            mask, parts, options = self._groups[number]
+            trips.append(_as_trip(parts, options[chosen[left] - self._starts[number]], self._rules))
+            left &= ~mask
+        return trips
+
+
+def clear(table: Table, rules: Rules, model: TimeModel, chances: Chances) -> list[Trip]:
+    """Return the trips that clear a table in the least expected time [s]. Raises UsageError for more than 16 items."""
+    return Optimum(table, rules, model, chances).trips()
 
 
 def seconds(trips: list[Trip]) -> float:

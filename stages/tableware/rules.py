@@ -7,7 +7,7 @@ named as ours where it stands.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
 from math import atan2, cos, hypot, pi, sin
@@ -175,24 +175,21 @@ def pull_end(item: Item, target: Item, rules: Rules) -> tuple[float, float, floa
 
 
 def sweep(item: Item, target: Item, rules: Rules) -> tuple[Footprint, ...]:
-    """Return what a pull of `item` to `target` covers from above: nothing else may lie there (section 6.2)."""
+    """Return what a pull of `item` to `target` covers from above, and the jaws that then close on both: nothing else
+    may lie there (section 6.2; the jaws are ours)."""
     x, y, yaw = pull_end(item, target, rules)
+    closing = jaws(replace(item, position=(x, y, item.position[2]), yaw=yaw), target, rules)
     if item.is_dish:
-        return (swept_disc(item, x, y),)
+        return swept_disc(item, x, y), closing
     turn = (yaw - item.yaw + pi / 2) % pi - pi / 2
-    steps = max(2, int(hypot(x - item.position[0], y - item.position[1]) / (item.measures.width / 2)) + 1)
-    places = []
-    for step in range(1, steps + 1):
-        share = step / steps
-        places.append(
-            footprint(
-                item,
-                item.position[0] + share * (x - item.position[0]),
-                item.position[1] + share * (y - item.position[1]),
-                item.yaw + share * turn,
-            )
-        )
-    return tuple(places)
+    dx, dy = x - item.position[0], y - item.position[1]
+    steps = max(2, int(hypot(dx, dy) / (item.measures.width / 2)) + 1)
+    shares = [step / steps for step in range(1, steps + 1)]
+    on_the_way = (
+        footprint(item, item.position[0] + share * dx, item.position[1] + share * dy, item.yaw + share * turn)
+        for share in shares
+    )
+    return (*on_the_way, closing)
 
 
 def in_the_way(covers: Iterable[Footprint], table: Table, apart_from: set[str]) -> tuple[Item, ...]:
