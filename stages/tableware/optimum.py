@@ -2,7 +2,7 @@
 
 A trip takes one pile, or two that stand side by side. Its cost is the time model's: the trip, a stacking for each part
 that is put on another, a pull where the two are not near enough yet, and what a slip would cost (the chance that the
-second pile stays, times the trip it then needs). f(left) = min over trips of cost(trip, left) + f(left less the trip).
+second pile stays, times `slip_cost`). f(left) = min over trips of cost(trip, left) + f(left less the trip).
 Within a trip the pull comes first, while the dishes are light, then the stackings. Exact for this set of plans: what
 else is left counts as obstacle of a pull; only things that stand on the table are pulled or stacked upon.
 """
@@ -230,6 +230,15 @@ class _Pair:
     pulled: bool
 
 
+def slip_cost(model: TimeModel) -> float:
+    """Return what a slip costs [s]: the pile that stayed shares a later trip, and as likely as not a pull.
+
+    With chance q of holding, pairs take n / (1 + q) trips for n equal items and slip (1 - q) n / (1 + q) times: over
+    the n / 2 trips without slips that is half a trip a slip.
+    """
+    return (model.whole_trip + model.pull) / 2
+
+
 def _pairs(table: Table, rules: Rules, model: TimeModel, chances: Chances) -> list[_Pair]:
     """Return the pairs from the cheapest on."""
     row = {item.name: number for number, item in enumerate(table.items)}
@@ -240,7 +249,7 @@ def _pairs(table: Table, rules: Rules, model: TimeModel, chances: Chances) -> li
             if one is other or one.is_dish != other.is_dish:
                 continue
             names = {one.name, other.name}
-            cost = (1.0 - chances.holds(letters((one,)), letters((other,)))) * model.whole_trip
+            cost = (1.0 - chances.holds(letters((one,)), letters((other,)))) * slip_cost(model)
             if within_jaws(one, other, rules):
                 if row[one.name] > row[other.name]:
                     continue
