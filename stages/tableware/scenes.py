@@ -71,10 +71,12 @@ def _draw(tier: Tier, random: np.random.Generator) -> Table | None:
                     break
                 top = touched[0][-1]
                 if left and len(touched) == 1 and len(touched[0]) < tier.highest and radius(item) <= radius(top):
-                    left -= 1
                     z = stand_height(table, item, top.name)
                     item = make_item(item.name, kind, top.position[0], top.position[1], item.yaw, z, top.name)
-                    break
+                    others = [stack for stack in table.stacks if stack is not touched[0]]
+                    if all(_least_gap(footprint(item), stack) >= 0.0 for stack in others):
+                        left -= 1
+                        break
             else:
                 return None
             if item.on is None and random.random() < tier.touching:
