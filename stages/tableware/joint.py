@@ -1,8 +1,8 @@
 """Our policy: pulls, stackings, multi-object and single grasps chosen together for the whole table.
 
 The exact optimum (optimum.py) of expected time, slips counted in, where the table is small enough, which the thesis's
-tables are; larger ones are cleared in portions, each by its own optimum. Among plans nearly as fast as the fastest the
-one with the fewest trips is taken: it loses least when the bin is farther than thought. The plan is kept while what is
+tables are; larger ones are cleared in portions, each by its own optimum. With `slack`, of the plans nearly as fast as
+the fastest the one with the fewest trips is taken, which loses least when the bin is farther than thought. The plan is kept while what is
 seen is what it foresaw, and made anew otherwise.
 """
 
@@ -24,7 +24,7 @@ from stages.tableware.policies import liftable
 from stages.tableware.rules import Rules, can_grasp_two
 from stages.tableware.time_model import Chances, TimeModel
 
-SLACK = 0.02
+SLACK = 0.0
 """How much slower than the fastest, as a share of its time, a plan with fewer trips may be."""
 CHARGES = (1.0, 2.0, 4.0, 8.0)
 """Seconds charged for a trip beyond what it takes, to find plans with fewer of them."""

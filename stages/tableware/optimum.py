@@ -75,6 +75,8 @@ class _Option:
     second: int
     """Rows of the parts that stand below; -1: there is one pile."""
     pulled: bool
+    alone: float = 0.0
+    """Seconds more when the trip leaves nothing on the table: a slip then costs a trip of its own."""
 
 
 class Optimum:
@@ -88,14 +90,16 @@ class Optimum:
         self._rules = rules
         self._groups = _groups(table, rules, model, chances)
         self._number_of = np.full(1 << count, -1, dtype=np.int32)
-        starts, costs, blockers = [0], [], []
+        starts, costs, blockers, alone = [0], [], [], []
         for number, (mask, _, options) in enumerate(self._groups):
             self._number_of[mask] = number
             costs.extend(option.cost for option in options)
             blockers.extend(option.blockers for option in options)
+            alone.extend(option.alone for option in options)
             starts.append(len(costs))
         self._starts, self._costs = np.array(starts, dtype=np.int64), np.array(costs, dtype=np.float64)
         self._blockers = np.array(blockers, dtype=np.int64)
+        self._alone = np.array(alone, dtype=np.float64)
         self._masks = _masks(table)
         self._count = count
 
@@ -103,7 +107,13 @@ class Optimum:
         """Return the trips that clear the table in the least expected time [s], in order; `per_trip` seconds are
         charged for each trip beyond what it takes."""
         _, trip, chosen = _solve(
-            self._count, *self._masks, self._number_of, self._starts, self._costs + per_trip, self._blockers
+            self._count,
+            *self._masks,
+            self._number_of,
+            self._starts,
+            self._costs + per_trip,
+            self._blockers,
+            self._alone,
         )
         left, trips = (1 << self._count) - 1, []
         while left:
@@ -133,7 +143,7 @@ def _masks(table: Table) -> tuple[np.ndarray, np.ndarray]:
 
 
 @njit(cache=True)
-def _solve(count, below, above, number_of, starts, costs, blockers):  # type: ignore[no-untyped-def]
+def _solve(count, below, above, number_of, starts, costs, blockers, alone):  # type: ignore[no-untyped-def]
     """f over all sets of items that may be left: (2^N,) seconds, mask of the next trip, row of its option."""
     size = 1 << count
     best = np.full(size, np.inf)
@@ -161,10 +171,11 @@ def _solve(count, below, above, number_of, starts, costs, blockers):  # type: ig
                 if lifted:
                     for option in range(starts[group], starts[group + 1]):
                         if not blockers[option] & rest:
-                            value = costs[option] + best[rest]
+                            value = costs[option] + (best[rest] if rest else alone[option])
                             if value < best[left]:
                                 best[left], trip[left], chosen[left] = value, part, option
-                            break  # options of a group stand in order of cost
+                            if rest:
+                                break  # options of a group stand in order of cost
             part = (part - 1) & left
     return best, trip, chosen
 
@@ -228,10 +239,13 @@ class _Pair:
     cost: float
     """Seconds beyond the trip and the stackings."""
     pulled: bool
+    alone: float
+    """Seconds that a slip costs more when nothing else is left to share a trip with."""
 
 
 def slip_cost(model: TimeModel) -> float:
-    """Return what a slip costs [s]: the pile that stayed shares a later trip, and as likely as not a pull.
+    """Return what a slip costs [s] while there is more on the table (a trip of its own when there is not): the pile
+    that stayed shares a later trip, and as likely as not a pull.
 
     With chance q of holding, pairs take n / (1 + q) trips for n equal items and slip (1 - q) n / (1 + q) times: over
     the n / 2 trips without slips that is half a trip a slip.
@@ -249,7 +263,8 @@ def _pairs(table: Table, rules: Rules, model: TimeModel, chances: Chances) -> li
             if one is other or one.is_dish != other.is_dish:
                 continue
             names = {one.name, other.name}
-            cost = (1.0 - chances.holds(letters((one,)), letters((other,)))) * slip_cost(model)
+            slips = 1.0 - chances.holds(letters((one,)), letters((other,)))
+            cost = slips * slip_cost(model)
             if within_jaws(one, other, rules):
                 if row[one.name] > row[other.name]:
                     continue
@@ -262,7 +277,8 @@ def _pairs(table: Table, rules: Rules, model: TimeModel, chances: Chances) -> li
                 covers, pulled, cost = sweep(one, other, rules), True, cost + model.pull
             hit = sum(1 << row[item.name] for item in in_the_way(covers, table, names))
             first, second = row[one.name], row[other.name]
-            found.append(_Pair(first, second, 1 << first | 1 << second, hit, cost, pulled))
+            alone = slips * (model.whole_trip - slip_cost(model))
+            found.append(_Pair(first, second, 1 << first | 1 << second, hit, cost, pulled, alone))
     return sorted(found, key=lambda pair: pair.cost)
 
 
@@ -312,7 +328,7 @@ def _options(parts: tuple[Part, ...], mask: int, pairs: list[_Pair], rules: Rule
                 continue
             blockers = pair.blockers & ~mask
             if not any(option.blockers & ~blockers == 0 for option in options if option.second >= 0):
-                options.append(_Option(start + pair.cost, blockers, one, other, pair.pulled))
+                options.append(_Option(start + pair.cost, blockers, one, other, pair.pulled, pair.alone))
             if not blockers:
                 break
     return sorted(options, key=lambda option: option.cost)
