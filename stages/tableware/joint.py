@@ -2,8 +2,8 @@
 
 The exact optimum (optimum.py) of expected time, slips counted in, where the table is small enough, which the thesis's
 tables are; larger ones are cleared in portions, each by its own optimum. With `slack`, of the plans nearly as fast as
-the fastest the one with the fewest trips is taken, which loses least when the bin is farther than thought. The plan is kept while what is
-seen is what it foresaw, and made anew otherwise.
+the fastest the one with the fewest trips is taken, which loses least when the bin is farther than thought. The plan
+is kept while what is seen is what it foresaw, and made anew otherwise.
 """
 
 from __future__ import annotations

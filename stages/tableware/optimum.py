@@ -119,8 +119,9 @@ class Optimum:
         while left:
             number = self._number_of[trip[left]]
             mask, parts, options = self._groups[number]
-            trips.append(_as_trip(parts, options[chosen[left] - self._starts[number]], self._rules))
+            option = options[chosen[left] - self._starts[number]]
             left &= ~mask
+            trips.append(_as_trip(parts, option, option.cost + (0.0 if left else option.alone), self._rules))
         return trips
 
 
@@ -334,7 +335,7 @@ def _options(parts: tuple[Part, ...], mask: int, pairs: list[_Pair], rules: Rule
     return sorted(options, key=lambda option: option.cost)
 
 
-def _as_trip(parts: tuple[Part, ...], option: _Option, rules: Rules) -> Trip:
+def _as_trip(parts: tuple[Part, ...], option: _Option, expected: float, rules: Rules) -> Trip:
     """Return an option with the names of what is pulled and stacked, in order."""
     first = parts[option.first]
     rest = [part for row, part in enumerate(parts) if row not in (option.first, option.second)]
@@ -351,4 +352,4 @@ def _as_trip(parts: tuple[Part, ...], option: _Option, rules: Rules) -> Trip:
     going = sorted(zip(rest, sides, strict=True), key=lambda pair: pile_order(pair[0].kinds))
     stacks = tuple((part.items[0].name, bases[1] if side else bases[0]) for part, side in going)
     pull = (bases[0], bases[1]) if option.pulled else None
-    return Trip(pull, stacks, bases, taken, option.cost)
+    return Trip(pull, stacks, bases, taken, expected)
