@@ -24,7 +24,7 @@ from stages.tableware.policies import liftable
 from stages.tableware.rules import Rules, can_grasp_two
 from stages.tableware.time_model import Chances, TimeModel
 
-SLACK = 0.0
+SLACK = 0.01
 """How much slower than the fastest, as a share of its time, a plan with fewer trips may be."""
 CHARGES = (1.0, 2.0, 4.0, 8.0)
 """Seconds charged for a trip beyond what it takes, to find plans with fewer of them."""
