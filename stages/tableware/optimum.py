@@ -90,7 +90,10 @@ class Optimum:
         self._rules = rules
         self._groups = _groups(table, rules, model, chances)
         self._number_of = np.full(1 << count, -1, dtype=np.int32)
-        starts, costs, blockers, alone = [0], [], [], []
+        starts = [0]
+        costs: list[float] = []
+        blockers: list[int] = []
+        alone: list[float] = []
         for number, (mask, _, options) in enumerate(self._groups):
             self._number_of[mask] = number
             costs.extend(option.cost for option in options)
@@ -343,7 +346,7 @@ def _as_trip(parts: tuple[Part, ...], option: _Option, expected: float, rules: R
     taken = frozenset(item.name for part in parts for item in part.items)
     if option.second < 0:
         sides: tuple[bool, ...] = (False,) * len(rest)
-        bases = (first.items[0].name,)
+        bases: tuple[str, ...] = (first.items[0].name,)
     else:
         split = split_over_two(first.kinds, parts[option.second].kinds, tuple(part.kinds for part in rest), rules)
         assert split is not None  # an option is only made where a split exists
