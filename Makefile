@@ -158,6 +158,11 @@ scenenn: setup ## The thesis's tables on SceneNN: make scenenn DATA=folder (OPTI
 SCENE ?= $(OUTPUTS)/demo/interactive_scene
 bench-planning: setup ## Planning beside OMPL with pybullet checks (QUICK=1: 10 queries a set; SCENE=folder)
 	$(PYTHON) -m benchmarks.planning $(if $(QUICK),--quick) $(if $(wildcard $(SCENE)),--scene $(SCENE)) --out $(OUTPUTS)/experiments/bench-planning$(if $(QUICK),-quick)
+.PHONY: tidy-fast
+# Two hundred reporting seeds a tier, about forty minutes of one core; a stopped run goes on where it was.
+tidy-fast: setup ## Clearing tables in the fast simulator: tables 7.1 and 7.2, joint planner, optimum (QUICK=1: ten tables)
+	$(PYTHON) -m benchmarks.tidy $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/tidy-fast$(if $(QUICK),-quick)
+
 .PHONY: llm3
 # A hundred reporting seeds a cell, about ten minutes of one core; a stopped run goes on where it was.
 llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2, harder suites (QUICK=1: ten instances)

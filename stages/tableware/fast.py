@@ -1,0 +1,142 @@
+"""The fast simulator: actions on a table by their fitted times (time_model.py), in a world with its chances.
+
+What goes wrong, and nothing else does: a pull misses by the measured error, and contact stops a dish that would come to
+stand in another; a multi-object grasp whose second pile is out of reach then, or slips, leaves it where it is; an
+action may drop something off the table for good, by chances that are 0 unless said. Seeing is perfect here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+
+from stages.tableware.actions import (
+    Action,
+    Grasp,
+    Pull,
+    PullGrasp,
+    Stack,
+    StackGrasp,
+    after_pull,
+    after_stack,
+    taken,
+)
+from stages.tableware.footprints import footprint, gap
+from stages.tableware.items import Table
+from stages.tableware.policies import Policy
+from stages.tableware.rules import Rules, can_grasp_two, letters
+from stages.tableware.time_model import Chances, TimeModel, placement_error
+
+MOST_ACTIONS = 400
+
+
+@dataclass
+class Trial:
+    """One policy on one table. A trial fails when something was dropped or left (section 7.1)."""
+
+    seconds: float = 0.0
+    trips: int = 0
+    moved: int = 0
+    pulls: int = 0
+    stacks: int = 0
+    dropped: int = 0
+    left: int = 0
+
+    @property
+    def objects_per_trip(self) -> float:
+        """Items brought to the bin over trips."""
+        return self.moved / max(self.trips, 1)
+
+    @property
+    def failed(self) -> bool:
+        """Whether not everything came to the bin."""
+        return self.dropped + self.left > 0
+
+
+class FastWorld:
+    """A table that actions change."""
+
+    def __init__(self, table: Table, model: TimeModel, chances: Chances, seed: int) -> None:
+        self.table = table
+        self.trial = Trial(left=len(table.items))
+        self._model, self._chances = model, chances
+        self._random = np.random.default_rng([seed, 72])
+        self._rules = Rules()
+
+    def do(self, action: Action) -> None:
+        """Carry out an action, a composite one without looking in between."""
+        if isinstance(action, PullGrasp):
+            self._pull(action.u_P)
+            self._grasp(action.u_G)
+        elif isinstance(action, StackGrasp):
+            self._stack(action.u_S)
+            self._grasp(action.u_G)
+        elif isinstance(action, Pull):
+            self._pull(action)
+        elif isinstance(action, Stack):
+            self._stack(action)
+        else:
+            self._grasp(action)
+        self.trial.left = len(self.table.items)
+
+    def _pull(self, action: Pull) -> None:
+        self.trial.seconds += self._model.pull
+        self.trial.pulls += 1
+        if self._random.random() < self._chances.drop_pull:
+            self._drop(action.item)
+            return
+        item, target = self.table.by_name[action.item], self.table.by_name[action.target]
+        error = (0.0, 0.0)
+        if self._chances.noise:
+            length = hypot(action.p_E[0] - action.p_S[0], action.p_E[1] - action.p_S[1])
+            error = placement_error(item.kind, length, self._random)
+        moved = after_pull(self.table, action, error)
+        inside = -gap(footprint(moved.by_name[item.name]), footprint(target))
+        if inside > 0.0:  # contact stops it on its way
+            dx, dy = action.p_E[0] - target.position[0], action.p_E[1] - target.position[1]
+            apart = hypot(dx, dy)
+            error = (error[0] + inside * dx / apart, error[1] + inside * dy / apart)
+            moved = after_pull(self.table, action, error)
+        self.table = moved
+
+    def _stack(self, action: Stack) -> None:
+        self.trial.seconds += self._model.stack
+        self.trial.stacks += 1
+        if self._random.random() < self._chances.drop_stack:
+            self._drop(action.u_G.items[0])
+            return
+        self.table = after_stack(self.table, action)
+
+    def _grasp(self, action: Grasp) -> None:
+        self.trial.seconds += self._model.whole_trip
+        self.trial.trips += 1
+        here = tuple(name for name in action.items if name in self.table.by_name)
+        if len(here) == 2:
+            first, second = (self.table.by_name[name] for name in here)
+            holds = self._chances.holds(letters((first,)), letters((second,)))
+            if not can_grasp_two(self.table, *here, self._rules) or self._random.random() >= holds:
+                here = here[:1]
+        elif here and self._random.random() < self._chances.drop_single:
+            self._drop(here[0])
+            return
+        for name in here:
+            names = taken(self.table, Grasp((name,), action.p_G, action.theta_G))
+            self.trial.moved += len(names)
+            self.table = self.table.without(names)
+
+    def _drop(self, name: str) -> None:
+        names = {name, *(item.name for item in self.table.load(name))}
+        self.trial.dropped += len(names)
+        self.table = self.table.without(names)
+
+
+def run_trial(table: Table, policy: Policy, model: TimeModel, chances: Chances, seed: int) -> Trial:
+    """Return what a policy came to on a table; it is stopped after 400 actions and what is left counts as left."""
+    world = FastWorld(table, model, chances, seed)
+    for _ in range(MOST_ACTIONS):
+        if not world.table.items:
+            break
+        world.do(policy.decide(world.table))
+    return world.trial
