@@ -1,0 +1,239 @@
+"""What may be grasped, pulled and stacked (Srinivas 2024, section 6.2), from the kinds in a pile and from above.
+
+A pile is a string, lower things first: `p` plate, `b` bowl, `c` cup, `u` utensil. A rule that the thesis leaves open is
+named as ours where it stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
+from math import atan2, cos, hypot, pi, sin
+
+from stages.tableware.footprints import Footprint, footprint, gap, swept_disc
+from stages.tableware.items import MEASURES, Item, Kind, Measures, Table, rise
+
+LETTERS: dict[Kind, str] = {"plate": "p", "bowl": "b", "cup": "c", "fork": "u", "spoon": "u"}
+_MEASURES: dict[str, Measures] = {
+    "p": MEASURES["plate"], "b": MEASURES["bowl"], "c": MEASURES["cup"], "u": MEASURES["fork"],
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Rules:
+    """The gripper [m, rad] and what a policy dares."""
+
+    opening: float = 0.085
+    jaw_height: float = 0.045
+    finger: float = 0.011
+    """Half the width of a finger; what lies under the jaws when they come down is in the way (ours)."""
+    similar: float = 0.02
+    """Greatest difference of two grasp heights in a multi-object grasp (the thesis's adjustable threshold)."""
+    parallel: float = pi / 6
+    """Greatest angle between two utensils that are grasped together (ours)."""
+    pull_gap: float = 0.01
+    """Distance between rims or utensils that a pull aims at (ours)."""
+    most_utensils: int = 4
+    """Utensils in one pile (ours)."""
+    utensils_in_cups: bool = False
+    """Whether utensils are put on cups; the thesis allows any dish. One that lies there already may stay."""
+    loaded_pulls: bool = True
+    """Whether a dish that carries others may be pulled."""
+    both_piles: bool = True
+    """Whether more is stacked onto a pair of dishes that stand side by side, before one grasp takes all (ours)."""
+
+
+def letters(items: Iterable[Item]) -> str:
+    """Return the pile of some items, lower things first."""
+    return "".join(LETTERS[item.kind] for item in items)
+
+
+@lru_cache(maxsize=4096)
+def lips(pile: str) -> tuple[float, ...]:
+    """Return the heights [m] of the dishes' lips over the lowest one's foot."""
+    foot, found = 0.0, []
+    for number, kind in enumerate(pile):
+        if number:
+            foot += rise(_MEASURES[kind], _MEASURES[pile[number - 1]])
+        if kind != "u":
+            found.append(foot + _MEASURES[kind].height)
+    return tuple(found)
+
+
+@lru_cache(maxsize=65536)
+def can_hold(pile: str, rules: Rules) -> bool:
+    """Return whether one grasp lifts the whole pile: its lips differ by no more than the jaws' height (section 6.4)."""
+    heights = lips(pile)
+    spread = max(heights) - min(heights) if heights else 0.0
+    return spread <= rules.jaw_height and pile.count("u") <= rules.most_utensils
+
+
+@lru_cache(maxsize=65536)
+def can_hold_two(first: str, second: str, rules: Rules) -> bool:
+    """Return whether one grasp lifts two piles that stand side by side: similar grasp heights (the lowest lips), and
+    all lips between the jaws. Utensils go with utensils only."""
+    if not (can_hold(first, rules) and can_hold(second, rules)):
+        return False
+    one, other = lips(first), lips(second)
+    if not one or not other:
+        return not one and not other
+    heights = (*one, *other)
+    return abs(one[0] - other[0]) <= rules.similar and max(heights) - min(heights) <= rules.jaw_height
+
+
+@lru_cache(maxsize=65536)
+def can_stack(upper: str, lower: str, rules: Rules) -> bool:
+    """Return whether one pile may be put on another: no wider than what it comes to stand on (section 6.2), no dish on
+    a utensil, and only what can be lifted and held afterwards (ours)."""
+    top, bottom = lower[-1], upper[0]
+    if bottom == "u":
+        fits = top != "c" or rules.utensils_in_cups
+    else:
+        fits = top != "u" and _MEASURES[bottom].rim_radius <= _MEASURES[top].rim_radius
+    return fits and can_hold(upper, rules) and can_hold(lower + upper, rules)
+
+
+def _order(part: str) -> tuple[bool, bool, float, float]:
+    """What goes lower sorts first: dishes, dishes that carry utensils, utensils; the wider first."""
+    bare = part.rstrip("u")
+    if not bare:
+        return (True, True, 0.0, 0.0)
+    return (False, bare != part, -_MEASURES[bare[0]].rim_radius, -_MEASURES[bare[-1]].rim_radius)
+
+
+@lru_cache(maxsize=65536)
+def can_pile(base: str, parts: tuple[str, ...], rules: Rules) -> bool:
+    """Return whether all parts can be stacked onto `base`, in the order of `_order`. No other order does better: widths
+    must fall from the foot to the top, and utensils end a pile."""
+    pile = base
+    for part in sorted(parts, key=_order):
+        if not can_stack(part, pile, rules):
+            return False
+        pile += part
+    return can_hold(pile, rules)
+
+
+@lru_cache(maxsize=262144)
+def split_over_two(first: str, second: str, parts: tuple[str, ...], rules: Rules) -> tuple[bool, ...] | None:
+    """Return which parts go onto `second` (True) so that one grasp lifts both piles, None where no split does.
+    Utensils lie side by side alone: their piles get nothing more."""
+    if parts and not rules.both_piles:
+        return None
+    for sides in product((False, True), repeat=len(parts)):
+        ones = tuple(part for part, side in zip(parts, sides, strict=True) if not side)
+        others = tuple(part for part, side in zip(parts, sides, strict=True) if side)
+        if can_pile(first, ones, rules) and can_pile(second, others, rules):
+            low = first + "".join(sorted(ones, key=_order))
+            high = second + "".join(sorted(others, key=_order))
+            if can_hold_two(low, high, rules):
+                return sides
+    return None
+
+
+def within_jaws(first: Item, second: Item, rules: Rules) -> bool:
+    """Return whether two things on the table are near enough for one grasp: dishes by the walls that face each other,
+    utensils by their middles and directions."""
+    if first.is_dish != second.is_dish:
+        return False
+    if first.is_dish:
+        walls = first.measures.wall + second.measures.wall
+        return gap(footprint(first), footprint(second)) + walls <= rules.opening
+    apart = hypot(first.position[0] - second.position[0], first.position[1] - second.position[1])
+    turned = abs((first.yaw - second.yaw + pi / 2) % pi - pi / 2)
+    return apart + max(first.measures.width, second.measures.width) <= rules.opening and turned <= rules.parallel
+
+
+def grasp_centre(first: Item, second: Item) -> tuple[float, float, float]:
+    """Return x, y [m] of the middle of a grasp of two things, and the direction in which the jaws close [rad]."""
+    dx, dy = second.position[0] - first.position[0], second.position[1] - first.position[1]
+    apart = max(hypot(dx, dy), 1e-9)
+    reach = (first.measures.rim_radius + apart - second.measures.rim_radius) / 2 / apart
+    return first.position[0] + dx * reach, first.position[1] + dy * reach, atan2(dy, dx)
+
+
+def jaws(first: Item, second: Item, rules: Rules) -> Footprint:
+    """Return what open jaws cover from above as they go down over two things."""
+    x, y, angle = grasp_centre(first, second)
+    dx, dy = rules.opening / 2 * cos(angle), rules.opening / 2 * sin(angle)
+    return Footprint((x - dx, y - dy), (x + dx, y + dy), rules.finger)
+
+
+def pull_end(item: Item, target: Item, rules: Rules) -> tuple[float, float, float]:
+    """Return x, y [m] and yaw [rad] where a pull to `target` ends: `pull_gap` from it, on the item's own side; a
+    utensil alongside."""
+    dx, dy = item.position[0] - target.position[0], item.position[1] - target.position[1]
+    if item.is_dish:
+        apart = max(hypot(dx, dy), 1e-9)
+        reach = (item.measures.rim_radius + target.measures.rim_radius + rules.pull_gap) / apart
+        return target.position[0] + dx * reach, target.position[1] + dy * reach, item.yaw
+    across = (-sin(target.yaw), cos(target.yaw))
+    side = 1.0 if dx * across[0] + dy * across[1] >= 0.0 else -1.0
+    reach = side * ((item.measures.width + target.measures.width) / 2 + rules.pull_gap)
+    return target.position[0] + reach * across[0], target.position[1] + reach * across[1], target.yaw
+
+
+def sweep(item: Item, target: Item, rules: Rules) -> tuple[Footprint, ...]:
+    """Return what a pull of `item` to `target` covers from above: nothing else may lie there (section 6.2)."""
+    x, y, yaw = pull_end(item, target, rules)
+    if item.is_dish:
+        return (swept_disc(item, x, y),)
+    turn = (yaw - item.yaw + pi / 2) % pi - pi / 2
+    steps = max(2, int(hypot(x - item.position[0], y - item.position[1]) / (item.measures.width / 2)) + 1)
+    places = []
+    for step in range(1, steps + 1):
+        share = step / steps
+        places.append(
+            footprint(
+                item,
+                item.position[0] + share * (x - item.position[0]),
+                item.position[1] + share * (y - item.position[1]),
+                item.yaw + share * turn,
+            )
+        )
+    return tuple(places)
+
+
+def in_the_way(covers: Iterable[Footprint], table: Table, apart_from: set[str]) -> tuple[Item, ...]:
+    """Return the items that any of `covers` overlaps, less those of the piles that `apart_from` stand in."""
+    places = tuple(covers)
+    return tuple(
+        item
+        for stack in table.stacks
+        if not any(other.name in apart_from for other in stack)
+        for item in stack
+        if any(gap(place, footprint(item)) < 0.0 for place in places)
+    )
+
+
+def can_grasp_two(table: Table, first: str, second: str, rules: Rules) -> bool:
+    """Return whether one grasp takes two things that stand on the table, with their loads, as they are now."""
+    one, other = table.by_name[first], table.by_name[second]
+    if first == second or one.on is not None or other.on is not None or not within_jaws(one, other, rules):
+        return False
+    piles = letters((one, *table.load(first))), letters((other, *table.load(second)))
+    return can_hold_two(*piles, rules) and not in_the_way((jaws(one, other, rules),), table, {first, second})
+
+
+def can_pull(table: Table, item: str, target: str, rules: Rules) -> bool:
+    """Return whether a thing may be pulled to another: one grasp could take both there, and nothing lies between."""
+    one, other = table.by_name[item], table.by_name[target]
+    if item == target or one.on is not None or other.on is not None or one.is_dish != other.is_dish:
+        return False
+    load = table.load(item)
+    if load and not rules.loaded_pulls:
+        return False
+    if not can_hold_two(letters((one, *load)), letters((other, *table.load(target))), rules):
+        return False
+    x, y, yaw = pull_end(one, other, rules)
+    inside = footprint(one, x, y, yaw).on_table
+    return inside and not in_the_way(sweep(one, other, rules), table, {item, target})
+
+
+def can_put(table: Table, item: str, onto: str, rules: Rules) -> bool:
+    """Return whether a thing with its load may be put onto the pile that `onto` stands in."""
+    base = next(stack for stack in table.stacks if any(other.name == onto for other in stack))
+    if any(other.name == item for other in base):
+        return False
+    return can_stack(letters((table.by_name[item], *table.load(item))), letters(base), rules)
