@@ -29,11 +29,12 @@ BAND = 0.006
 """A utensil on a dish lies within this of the lip's height [m]."""
 LEAST_DEPTH, MOST_GLARE = 0.45, 0.10
 """Shares of a lip's pixels with depth, and of a dish's pixels at full white, at which there is doubt."""
+FLAT = 0.0020
+"""What looks unlike the table and rises less than this [m] is a shadow or a mark, and nothing to clear."""
 LEAST_RELIEF = 0.0008
 """A utensil rises this much over the table [m], on average over its plan."""
 UNKNOWN_HEIGHT, UNKNOWN_AREA = 0.010, 0.00035
 """What rises over the first [m] on more than the second [m^2] without being an item is unknown."""
-SURE = 0.5
 
 
 def detect(color: np.ndarray, depth: np.ndarray, camera: OverheadCamera) -> tuple[Detection, ...]:
@@ -191,9 +192,6 @@ def _utensil(bar: Bar, heights: HeightMap, z: float, on: int | None) -> Detectio
     confidence = min(1.0, bar.score / 0.85)
     if heights.valid[rows, columns].mean() < LEAST_DEPTH:
         reasons.append("no depth")
-    elif on is None and z == 0.0 and _relief(heights, bar) < LEAST_RELIEF:
-        reasons.append("flat: maybe a mark on the table")
-        confidence *= 0.6
     if bar.margin < 0.015:
         reasons.append("fork or spoon")
         confidence *= 0.8
@@ -247,8 +245,12 @@ def _on_table(heights: HeightMap, unlike: np.ndarray, hidden: np.ndarray) -> tup
             found = [bar] if bar.score >= LEAST_SCORE else []
         if not found:
             found = search_bars(map_, scale, min(5, int(area / whole + 1.5)))
-        if not found and area > UNKNOWN_AREA * scale**2:
+        if not found and area > UNKNOWN_AREA * scale**2 and heights.smooth[window][own].mean() > FLAT:
             strange[window] |= own
+        if heights.valid[window][own].mean() > LEAST_DEPTH:
+            # The rim of a shadow may be as slender as a utensil; it does not rise over the table.
+            local = [replace(bar, u=bar.u + corner[0], v=bar.v + corner[1]) for bar in found]
+            found = [bar for bar, there in zip(found, local, strict=True) if _relief(heights, there) > LEAST_RELIEF]
         bars.extend(replace(bar, u=bar.u + corner[0], v=bar.v + corner[1]) for bar in found)
     return bars, strange
 

@@ -21,10 +21,11 @@ LEAST_STEP = 0.006
 DIRECTIONS = 96
 WINDOW = 14
 """Pixels on either side of the expected circle that are searched."""
-LEAST_VOTES, LEAST_SUPPORT = 0.16, 0.42
+LEAST_VOTES, LEAST_SUPPORT = 0.22, 0.42
 """Shares of the circumference that must vote, and that the fitted circle must explain."""
 _ANGLES = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
 _RAYS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
+_SYSTEM = np.column_stack([_RAYS, np.ones(DIRECTIONS)])
 
 
 @dataclass(frozen=True)
@@ -112,9 +113,9 @@ def fit_rim(heights: HeightMap, kind: Kind, u: float, v: float) -> Rim | None:
         kept = found
         shift = np.zeros(3)
         for _ in range(4):
-            system = np.column_stack([_RAYS[kept], np.ones(int(kept.sum()))])
-            shift = np.linalg.lstsq(system, edge[kept], rcond=None)[0]
-            residual = np.abs(edge - _RAYS @ shift[:2] - shift[2])
+            system = _SYSTEM[kept]
+            shift = np.linalg.solve(system.T @ system + 1e-6 * np.eye(3), system.T @ edge[kept])
+            residual = np.abs(edge - _SYSTEM @ shift)
             kept = found & (residual < (6.0 if turn < 2 else 2.5))
             if kept.sum() < 0.25 * DIRECTIONS:
                 return None
@@ -133,7 +134,8 @@ def _outer_edge(profile: np.ndarray, lip: float) -> tuple[np.ndarray, np.ndarray
     """Return per direction whether a fall from the lip was found, and its offset from the expected circle [px]."""
     level = lip - LEAST_STEP
     falls = (profile[:, :-1] >= level) & (profile[:, 1:] < level)
-    crest = np.maximum(profile[:, :-1], np.roll(profile, 1, axis=1)[:, :-1])
+    crest = profile[:, :-1].copy()
+    np.maximum(crest[:, 1:], profile[:, :-2], out=crest[:, 1:])
     falls &= np.abs(crest - lip) < 0.012
     index = profile.shape[1] - 2 - np.argmax(falls[:, ::-1], axis=1)
     rows = np.arange(len(profile))
