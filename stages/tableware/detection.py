@@ -230,7 +230,10 @@ def _on_table(heights: HeightMap, unlike: np.ndarray, hidden: np.ndarray) -> tup
         left, top, width, height, area = boxes[label]
         if area < 0.25 * whole:
             continue
-        window = (slice(max(0, top - margin), top + height + margin), slice(max(0, left - margin), left + width + margin))
+        window = (
+            slice(max(0, top - margin), top + height + margin),
+            slice(max(0, left - margin), left + width + margin),
+        )
         own = labels[window] == label
         map_ = np.where(own, 1, -1).astype(np.int8)
         map_[hidden[window] | ((labels[window] > 0) & ~own)] = 0

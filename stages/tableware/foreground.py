@@ -24,22 +24,27 @@ def unlike_table(heights: HeightMap, covered: np.ndarray) -> np.ndarray:
     color = cv2.GaussianBlur(heights.color, (3, 3), 0.7)
     gray = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)
     table = ((np.abs(heights.smooth) < 0.008) & ~covered).astype(np.uint8)
-    tone = float(np.median(gray[table > 0])) if table.any() else float(np.median(gray))
+    some = gray[::4, ::4][table[::4, ::4] > 0]
+    tone = float(np.median(some)) if len(some) else float(np.median(gray))
     usual = table & cv2.inRange(gray, 0.5 * tone - 4.0, 1.6 * tone + 8.0)
     small = (gray.shape[1] // 8, gray.shape[0] // 8)
     weight = cv2.resize(usual.astype(np.float32), small, interpolation=cv2.INTER_AREA)
-    light = cv2.resize(gray.astype(np.float32) * usual, small, interpolation=cv2.INTER_AREA)
+    light = cv2.resize(cv2.multiply(gray, usual, dtype=cv2.CV_32F), small, interpolation=cv2.INTER_AREA)
     blur = [cv2.GaussianBlur(part, (0, 0), 6.0) for part in (light, weight)]
     local = np.where(blur[1] > 0.02, blur[0] / np.maximum(blur[1], 1e-4), tone).astype(np.float32)
-    around = cv2.resize(local, gray.shape[::-1], interpolation=cv2.INTER_LINEAR)
-    level = gray.astype(np.float32)
-    plain = np.where(covered, around, level).clip(0.0, 255.0).astype(np.uint8)
+    around = cv2.resize(np.clip(local, 0.0, 255.0).astype(np.uint8), gray.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    plain = np.where(covered, around, gray)
     kernel = np.ones((BROADEST, BROADEST), np.uint8)
-    dark = cv2.morphologyEx(plain, cv2.MORPH_BLACKHAT, kernel).astype(np.float32)
-    bright = cv2.morphologyEx(plain, cv2.MORPH_TOPHAT, kernel).astype(np.float32)
-    unlike = (level < DARKER * around) & (dark > np.maximum(DARK_LINE * around, LEAST_DIFFERENCE))
-    unlike |= (level > BRIGHTER * around) & (bright > np.maximum(BRIGHT_LINE * around, LEAST_DIFFERENCE))
-    spread = color.max(axis=2).astype(np.int16) - color.min(axis=2)
+    # Saturating arithmetic of 8-bit images: each comparison is a difference that is left over.
+    dark = cv2.subtract(cv2.subtract(cv2.morphologyEx(plain, cv2.MORPH_CLOSE, kernel), plain),
+                        cv2.max(cv2.multiply(around, DARK_LINE), LEAST_DIFFERENCE))  # fmt: skip
+    dark = cv2.min(dark, cv2.subtract(cv2.multiply(around, DARKER), gray))
+    bright = cv2.subtract(cv2.subtract(plain, cv2.morphologyEx(plain, cv2.MORPH_OPEN, kernel)),
+                          cv2.max(cv2.multiply(around, BRIGHT_LINE), LEAST_DIFFERENCE))  # fmt: skip
+    bright = cv2.min(bright, cv2.subtract(gray, cv2.multiply(around, BRIGHTER)))
+    unlike = cv2.max(dark, bright) > 0
+    red, green, blue = cv2.split(color)
+    spread = cv2.subtract(cv2.max(cv2.max(red, green), blue), cv2.min(cv2.min(red, green), blue))
     usual_spread = float(np.median(spread[::4, ::4][usual[::4, ::4] > 0])) if usual[::4, ::4].any() else 0.0
     unlike |= spread > usual_spread + CHROMA
     return unlike & ~covered

@@ -112,7 +112,9 @@ def _table_plane(part: np.ndarray, center: tuple[float, float], focal: tuple[flo
     u, v, z = u[inside & (z > 0)], v[inside & (z > 0)], z[inside & (z > 0)]
     near = z[np.abs(z - above) < PLANE_OFF]
     if len(near) < 0.05 * max(len(z), 400):
-        raise BadInput(f"no table is seen {above:.3g} m below the camera", hint="check the depth's scale and the height")
+        raise BadInput(
+            f"no table is seen {above:.3g} m below the camera", hint="check the depth's scale and the height"
+        )
     plane = np.array([0.0, 0.0, float(np.median(near))])
     for band in (PLANE_BAND, 0.008, 0.006):
         kept = np.abs(z - plane[0] * u - plane[1] * v - plane[2]) < band

@@ -56,12 +56,17 @@ def _outline(kind: Kind) -> tuple[np.ndarray, np.ndarray]:
     gaps = (x > 0.5 * measures.length - 0.040) & (np.abs(y) < 0.5 * measures.width) & (x < 0.5 * measures.length)
     border &= ~(gaps & (kind == "fork"))
     points = np.stack([x, y], axis=2)
-    return points[inside > 0][::2], points[border][::2]
+    return points[inside > 0][::3], points[border][::3]
 
 
 @njit(cache=True)
 def _scores(
-    map_: np.ndarray, inside: np.ndarray, border: np.ndarray, scale: float, u: np.ndarray, v: np.ndarray,
+    map_: np.ndarray,
+    inside: np.ndarray,
+    border: np.ndarray,
+    scale: float,
+    u: np.ndarray,
+    v: np.ndarray,
     angle: np.ndarray,
 ) -> np.ndarray:
     """Return (N,) scores of an outline at N poses: half the difference of the mean map in it and around it.
@@ -86,27 +91,29 @@ def _scores(
     return result
 
 
+def _best_pose(
+    map_: np.ndarray, kind: Kind, scale: float, start: tuple[float, float, float], steps: tuple[float, float, float]
+) -> tuple[float, float, float, float]:
+    """Return (score, u, v, angle) of the best of 45 poses around a start: steps along, across [px] and of turn [rad]."""
+    along, across, turn = (
+        step * grid.reshape(-1)
+        for step, grid in zip(steps, np.meshgrid(np.arange(-2, 3), np.arange(-1, 2), np.arange(-1, 2)), strict=True)
+    )
+    cos, sin = np.cos(start[2]), np.sin(start[2])
+    columns, rows = start[0] + along * cos - across * sin, start[1] + along * sin + across * cos
+    scores = _scores(map_, *_outline(kind), scale, columns, rows, start[2] + turn)
+    k = int(np.argmax(scores))
+    return float(scores[k]), float(columns[k]), float(rows[k]), float(start[2] + turn[k])
+
+
 def fit_utensil(map_: np.ndarray, scale: float, u: float, v: float, angle: float) -> Bar:
     """Return the best outline near a bar's centre [px] and direction [rad]; `scale` in pixels per metre."""
     found = []
     for kind in UTENSILS:
-        best = (-1.0, u, v, angle)
-        for flip in (0.0, np.pi):
-            pose = (-1.0, u, v, angle + flip)
-            for along_step, across_step, turn_step in ((6.0, 2.0, 0.05), (2.0, 1.0, 0.02), (1.0, 0.5, 0.008)):
-                along, across, turn = (
-                    grid.reshape(-1)
-                    for grid in np.meshgrid(along_step * np.arange(-2, 3), across_step * np.arange(-1, 2),
-                                            turn_step * np.arange(-1, 2))
-                )  # fmt: skip
-                angles = pose[3] + turn
-                columns = pose[1] + along * np.cos(pose[3]) - across * np.sin(pose[3])
-                rows = pose[2] + along * np.sin(pose[3]) + across * np.cos(pose[3])
-                scores = _scores(map_, *_outline(kind), scale, columns, rows, angles)
-                k = int(np.argmax(scores))
-                pose = (float(scores[k]), float(columns[k]), float(rows[k]), float(angles[k]))
-            best = max(best, pose)
-        found.append((best, kind))
+        pose = max(_best_pose(map_, kind, scale, (u, v, angle + flip), (6.0, 2.0, 0.05)) for flip in (0.0, np.pi))
+        for steps in ((2.0, 1.0, 0.02), (1.0, 0.5, 0.008)):
+            pose = _best_pose(map_, kind, scale, pose[1:], steps)
+        found.append((pose, kind))
     found.sort(reverse=True)
     (score, u, v, angle), kind = found[0]
     return Bar(kind, u, v, angle, score, score - found[1][0][0])
