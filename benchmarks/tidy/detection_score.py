@@ -58,7 +58,7 @@ def compare(table: Table, detections: tuple[Detection, ...]) -> list[Match]:
 
 
 def measures(matches: Iterable[Match]) -> dict[str, dict[str, float]]:
-    """Return kind -> measure -> value; `all` and `unknown` beside the kinds. Precision and recall of nothing are NaN."""
+    """Return kind -> measure -> value; `all` and `unknown` beside the kinds. Shares of nothing are NaN."""
     groups: dict[str, list[Match]] = defaultdict(list)
     for match in matches:
         groups[match.kind].append(match)

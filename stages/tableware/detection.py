@@ -17,7 +17,7 @@ import numpy as np
 from stages.tableware.detections import Detection
 from stages.tableware.foreground import unlike_table
 from stages.tableware.height_map import HeightMap, height_map
-from stages.tableware.items import MEASURES, TABLE_SIDES
+from stages.tableware.items import MEASURES, TABLE_SIDES, UTENSILS
 from stages.tableware.overhead import OverheadCamera
 from stages.tableware.rim_finding import Rim, find_rims, overlapping
 from stages.tableware.stack_reading import LIP_TOLERANCE, Stack, read_stacks
@@ -63,8 +63,9 @@ def detect(color: np.ndarray, depth: np.ndarray, camera: OverheadCamera) -> tupl
     unlike = unlike_table(heights, cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0) & _workspace(heights)
     bars, strange = _on_table(heights, unlike, hidden)
     for bar in bars:
-        below = [k for k, other in enumerate(found) if other.on is None and other.kind in ("fork", "spoon")
-                 and np.hypot(*(np.subtract(other.position[:2], heights.world(bar.u, bar.v, 0.0)))) < 0.012]  # fmt: skip
+        here = np.array(heights.world(np.float64(bar.u), np.float64(bar.v), 0.0))
+        below = [k for k, other in enumerate(found) if other.on is None and other.kind in UTENSILS
+                 and np.hypot(*(here - other.position[:2])) < 0.012]  # fmt: skip
         z = MEASURES[bar.kind].height if below else 0.0
         found.append(_utensil(bar, heights, z, below[0] if below else None))
         _cover_bar(covered, heights, bar, z)

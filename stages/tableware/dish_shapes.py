@@ -135,17 +135,14 @@ def utensil_mesh(strip: Measures, fork: bool, arch: float = 0.0) -> trimesh.Trim
 
 
 def utensil_volume(strip: Measures, fork: bool) -> float:
-    """Return the volume [m^3]: plan area (trapezia between stations) times the vertical thickness, whatever the arch."""
+    """Return the volume [m^3]: plan area (trapezia between stations) times the thickness, whatever the arch."""
     area = sum(float(np.trapezoid(high - low, x)) for x, low, high in utensil_parts(strip, fork))
     return area * strip.height
 
 
 def item_mesh(item: Item, arch: float = 0.0) -> trimesh.Trimesh:
     """Return the mesh of an item where it stands, world frame [m]; `arch` bends utensils."""
-    if item.is_dish:
-        mesh = shell_mesh(item.measures)
-    else:
-        mesh = utensil_mesh(item.measures, item.kind == "fork", arch)
+    mesh = shell_mesh(item.measures) if item.is_dish else utensil_mesh(item.measures, item.kind == "fork", arch)
     pose = trimesh.transformations.rotation_matrix(item.yaw, [0.0, 0.0, 1.0])
     pose[:3, 3] = item.position
     mesh.apply_transform(pose)

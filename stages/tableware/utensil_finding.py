@@ -94,7 +94,7 @@ def _scores(
 def _best_pose(
     map_: np.ndarray, kind: Kind, scale: float, start: tuple[float, float, float], steps: tuple[float, float, float]
 ) -> tuple[float, float, float, float]:
-    """Return (score, u, v, angle) of the best of 45 poses around a start: steps along, across [px] and of turn [rad]."""
+    """Return (score, u, v, angle) of the best of 45 poses around a start; steps along, across [px], turn [rad]."""
     along, across, turn = (
         step * grid.reshape(-1)
         for step, grid in zip(steps, np.meshgrid(np.arange(-2, 3), np.arange(-1, 2), np.arange(-1, 2)), strict=True)

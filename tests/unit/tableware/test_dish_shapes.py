@@ -42,7 +42,7 @@ def test_utensil_is_closed_and_has_its_volume(kind, arch):
 @pytest.mark.parametrize(("upper", "lower"), [("cup", "cup"), ("bowl", "bowl"), ("plate", "plate"), ("cup", "bowl"),
                                               ("cup", "plate"), ("bowl", "plate")])  # fmt: skip
 def test_stacked_dishes_touch_and_do_not_meet(upper, lower):
-    """Heights by `items.rise`: every ring of the upper shell is inside the hollow of the lower, and somewhere touches."""
+    """Heights by `items.rise`: every ring of the upper is inside the hollow of the lower, and one touches."""
     above, below = MEASURES[upper], MEASURES[lower]
     up = rise(above, below)
     z = np.linspace(up, min(up + above.height, below.height), 400)
