@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.tidy.detection_score import Match, compare, measures
 from stages.tableware.detection import detect
-from stages.tableware.overhead import LEVELS, SCHEMES, overhead_camera, render_overhead
+from stages.tableware.overhead import LEVELS, SCHEMES, Scheme, overhead_camera, render_overhead
 from stages.tableware.scenes import make_table
 from stages.tableware.thesis_detection import detect_thesis
 
@@ -28,7 +28,7 @@ REPORTING, TUNING = 1000, 0
 TIERS = ("tier1", "tier2", "tier3")
 
 
-def conditions(seed: int) -> tuple[str, str]:
+def conditions(seed: int) -> tuple[str, Scheme]:
     """Return the light level and the scheme of a seed: six in a row see all."""
     return list(LEVELS)[seed % 3], SCHEMES[seed // 3 % 2]
 

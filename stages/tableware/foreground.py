@@ -36,15 +36,21 @@ def unlike_table(heights: HeightMap, covered: np.ndarray) -> np.ndarray:
     plain = np.where(covered, around, gray)
     kernel = np.ones((BROADEST, BROADEST), np.uint8)
     # Saturating arithmetic of 8-bit images: each comparison is a difference that is left over.
-    dark = cv2.subtract(cv2.subtract(cv2.morphologyEx(plain, cv2.MORPH_CLOSE, kernel), plain),
-                        cv2.max(cv2.multiply(around, DARK_LINE), LEAST_DIFFERENCE))  # fmt: skip
-    dark = cv2.min(dark, cv2.subtract(cv2.multiply(around, DARKER), gray))
-    bright = cv2.subtract(cv2.subtract(plain, cv2.morphologyEx(plain, cv2.MORPH_OPEN, kernel)),
-                          cv2.max(cv2.multiply(around, BRIGHT_LINE), LEAST_DIFFERENCE))  # fmt: skip
-    bright = cv2.min(bright, cv2.subtract(gray, cv2.multiply(around, BRIGHTER)))
+    dark = cv2.subtract(cv2.morphologyEx(plain, cv2.MORPH_CLOSE, kernel), plain)
+    dark = cv2.subtract(dark, _share(around, DARK_LINE, LEAST_DIFFERENCE))
+    dark = cv2.min(dark, cv2.subtract(_share(around, DARKER), gray))
+    bright = cv2.subtract(plain, cv2.morphologyEx(plain, cv2.MORPH_OPEN, kernel))
+    bright = cv2.subtract(bright, _share(around, BRIGHT_LINE, LEAST_DIFFERENCE))
+    bright = cv2.min(bright, cv2.subtract(gray, _share(around, BRIGHTER)))
     unlike = cv2.max(dark, bright) > 0
     red, green, blue = cv2.split(color)
     spread = cv2.subtract(cv2.max(cv2.max(red, green), blue), cv2.min(cv2.min(red, green), blue))
     usual_spread = float(np.median(spread[::4, ::4][usual[::4, ::4] > 0])) if usual[::4, ::4].any() else 0.0
     unlike |= spread > usual_spread + CHROMA
     return unlike & ~covered
+
+
+def _share(image: np.ndarray, factor: float, least: float = 0.0) -> np.ndarray:
+    """Return an 8-bit image times a factor, saturated, nowhere below `least`."""
+    levels = np.clip(np.rint(np.arange(256) * factor), least, 255.0).astype(np.uint8)
+    return np.asarray(cv2.LUT(np.asarray(image, dtype=np.uint8), levels))

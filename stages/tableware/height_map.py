@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -41,12 +42,12 @@ class HeightMap:
         """Return pixels per metre at height z [m]."""
         return self.focal[0] / (self.camera_height - z)
 
-    def pixel(self, x: np.ndarray, y: np.ndarray, z: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+    def pixel(self, x: np.ndarray | float, y: np.ndarray | float, z: np.ndarray | float) -> tuple[Any, Any]:
         """Return (column, row) of world points [m]."""
         range_ = self.camera_height - z
         return self.center[0] + self.focal[0] * x / range_, self.center[1] - self.focal[1] * y / range_
 
-    def world(self, u: np.ndarray, v: np.ndarray, z: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+    def world(self, u: np.ndarray | float, v: np.ndarray | float, z: np.ndarray | float) -> tuple[Any, Any]:
         """Return world (x, y) [m] of pixels at height z [m]."""
         range_ = self.camera_height - z
         return (u - self.center[0]) / self.focal[0] * range_, -(v - self.center[1]) / self.focal[1] * range_

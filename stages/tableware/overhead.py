@@ -71,7 +71,7 @@ def overhead_camera(height: float = CAMERA_HEIGHT, width: int = 1280, rows: int 
 
 def _coloured(mesh: trimesh.Trimesh, srgb: np.ndarray) -> trimesh.Trimesh:
     rgba = np.append(np.round(255.0 * np.clip(srgb, 0.0, 1.0)), 255.0).astype(np.uint8)
-    mesh.visual.face_colors = np.tile(rgba, (len(mesh.faces), 1))
+    mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=np.tile(rgba, (len(mesh.faces), 1)))
     return mesh
 
 

@@ -73,7 +73,7 @@ def _peaks(
     inside = (u > 0) & (v > 0) & (u < 2 * columns - 2) & (v < 2 * rows - 2)
     cell = (v[inside] * 0.5).astype(np.int64) * columns + (u[inside] * 0.5).astype(np.int64)
     votes = np.bincount(cell, minlength=rows * columns).reshape(rows, columns).astype(np.float32)
-    votes = cv2.boxFilter(votes, -1, (7, 7), normalize=False)
+    votes = np.asarray(cv2.boxFilter(votes, -1, (7, 7), normalize=False), dtype=np.float32)
     circumference = 2.0 * np.pi * float(heights.scale(0.05)) * MEASURES[kind].rim_radius
     found = []
     apart = int(0.5 * MEASURES[kind].rim_radius * float(heights.scale(0.05)) * 0.6)
@@ -141,7 +141,7 @@ def _outer_edge(profile: np.ndarray, lip: float) -> tuple[np.ndarray, np.ndarray
     rows = np.arange(len(profile))
     here, there = profile[rows, index], profile[rows, index + 1]
     part = (here - level) / np.maximum(here - there, 1e-6)
-    return falls.any(axis=1), index - WINDOW + np.clip(part, 0.0, 1.0)
+    return np.asarray(falls.any(axis=1)), index - WINDOW + np.clip(part, 0.0, 1.0)
 
 
 def _lip_height(heights: HeightMap, u: float, v: float, radius: float, lip: float) -> tuple[float, float]:

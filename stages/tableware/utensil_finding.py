@@ -162,7 +162,8 @@ def _turned_best(map_: np.ndarray, scale: float) -> tuple[float, float, float] |
     positive = np.stack([(map_ > 0).astype(np.float32), (map_ != 0).astype(np.float32)], axis=2)
     for degrees in np.arange(0.0, 180.0, ANGLE_STEP):
         turn = cv2.getRotationMatrix2D(center, float(degrees), 1.0)
-        turn[:, 2] += 0.5 * (side - 1) - np.array(center)
+        turn = np.array(turn, dtype=np.float64)
+        turn[:, 2] = turn[:, 2] + 0.5 * (side - 1) - np.array(center)
         turned = cv2.warpAffine(positive, turn, (side, side), flags=cv2.INTER_NEAREST)
         sums = cv2.boxFilter(turned, -1, (length, width), borderType=cv2.BORDER_CONSTANT)
         share = np.where(sums[..., 1] > 0.45, sums[..., 0] / np.maximum(sums[..., 1], 1e-6), 0.0)
