@@ -13,11 +13,11 @@ from schemas.sequence import LabelEntry
 from stages.kit.formats.frames import FrameWriter
 from stages.kit.formats.scene_bundle import write_scene_bundle
 from stages.kit.formats.trajectories import write_tum
+from stages.kit.rendering.depth_noise import DepthCamera, disturb_depth
 from stages.kit.rendering.ray_casting import SceneRenderer
 from stages.kit.stage import Context
 from stages.synthesize.appearance import AMBIENT, SKY, gloss_table, lamps, layout_materials, object_material
 from stages.synthesize.arrangement import Arrangement, arrange, world_meshes
-from stages.synthesize.depth_noise import DepthCamera, disturb_depth
 from stages.synthesize.free_space import find_free_space
 from stages.synthesize.furniture import Catalogue
 from stages.synthesize.parameters import SynthesizeParameters

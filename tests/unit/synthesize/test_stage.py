@@ -20,9 +20,9 @@ from stages.kit.geometry.boxes import boxes_overlap_volume, points_in_box
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import apply
 from stages.kit.progress import SilentProgress
+from stages.kit.rendering.depth_noise import DepthCamera
 from stages.kit.simulation.world import load_scene
 from stages.kit.stage import Context
-from stages.synthesize.depth_noise import DepthCamera
 from stages.synthesize.parameters import SynthesizeParameters
 from stages.synthesize.stage import run
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from schemas.scene_parts import Camera
-from stages.synthesize.depth_noise import (
+from stages.kit.rendering.depth_noise import (
     DepthCamera,
     axial_sigma,
     disturb_depth,

@@ -1,0 +1,57 @@
+"""What vision says of an overhead image: items with a confidence, and why it is unsure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from stages.tableware.items import MEASURES, Item, Kind, Table
+
+
+@dataclass(frozen=True)
+class Detection:
+    """One item that was seen, or that the height of a stack says must be there. World frame [m, rad]."""
+
+    kind: Kind | None
+    """None for something that is no tableware of known size."""
+    position: tuple[float, float, float]
+    """Foot centre of a dish, middle of the underside of a utensil."""
+    yaw: float = 0.0
+    """Of a utensil, from the handle's end to the head, -pi to pi."""
+    lip: float = 0.0
+    """Height of the upper edge above the table."""
+    on: int | None = None
+    """Index of the detection that carries it, None for the table."""
+    hidden: bool = False
+    """Whether it was inferred from the height of the stack alone."""
+    grasp: tuple[float, float, float] | None = None
+    """Of a utensil: the highest point along its axis."""
+    extent: float = 0.0
+    """Of an unknown thing: radius of the circle around it."""
+    confidence: float = 1.0
+    unsure: tuple[str, ...] = ()
+    """Reasons for doubt; empty when there is none."""
+
+
+def as_table(detections: tuple[Detection, ...]) -> Table:
+    """Return the table that detections describe; things that are no tableware are left out."""
+    names = {index: f"{found.kind}_{index + 1}" for index, found in enumerate(detections) if found.kind is not None}
+    return Table(
+        tuple(
+            Item(names[index], found.kind, found.position, found.yaw,
+                 None if found.on is None else names[found.on], MEASURES[found.kind])
+            for index, found in enumerate(detections)
+            if found.kind is not None
+        )
+    )  # fmt: skip
+
+
+def statement(detections: tuple[Detection, ...]) -> str:
+    """Return in one line what is on the table and what is in doubt; an empty table is a statement too."""
+    known = sum(found.kind is not None for found in detections)
+    unknown = len(detections) - known
+    doubts = sorted({reason for found in detections for reason in found.unsure})
+    if not detections:
+        return "the table is empty: there is nothing to clear"
+    text = f"{known} item{'s' * (known != 1)} of tableware"
+    text += f", {unknown} thing{'s' * (unknown != 1)} of unknown kind" if unknown else ""
+    return text + (f"; unsure: {', '.join(doubts)}" if doubts else "")

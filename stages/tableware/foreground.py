@@ -1,0 +1,56 @@
+"""What on the table differs from it in colour; shadows do not count."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from stages.tableware.height_map import HeightMap
+
+DARKER, BRIGHTER = 0.82, 1.25
+"""Grey against the table's nearby, beyond which it may be no table."""
+DARK_LINE, BRIGHT_LINE = 0.13, 0.5
+"""What a closing or an opening takes away, against the table's grey nearby: shadows are broader than utensils."""
+LEAST_DIFFERENCE = 10.0
+"""Grey levels; noise on a dark table is a large share of little."""
+BROADEST = 21
+"""A utensil is narrower than this [px]."""
+CHROMA = 40.0
+"""Distance of the colour, grey taken off, from the table's [levels]."""
+
+
+def unlike_table(heights: HeightMap, covered: np.ndarray) -> np.ndarray:
+    """Return (h, w) bool: pixels outside of `covered` (h, w) that look unlike the table around them."""
+    color = cv2.GaussianBlur(heights.color, (3, 3), 0.7)
+    gray = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)
+    table = ((np.abs(heights.smooth) < 0.008) & ~covered).astype(np.uint8)
+    some = gray[::4, ::4][table[::4, ::4] > 0]
+    tone = float(np.median(some)) if len(some) else float(np.median(gray))
+    usual = table & cv2.inRange(gray, 0.5 * tone - 4.0, 1.6 * tone + 8.0)
+    small = (gray.shape[1] // 8, gray.shape[0] // 8)
+    weight = cv2.resize(usual.astype(np.float32), small, interpolation=cv2.INTER_AREA)
+    light = cv2.resize(cv2.multiply(gray, usual, dtype=cv2.CV_32F), small, interpolation=cv2.INTER_AREA)
+    blur = [cv2.GaussianBlur(part, (0, 0), 6.0) for part in (light, weight)]
+    local = np.where(blur[1] > 0.02, blur[0] / np.maximum(blur[1], 1e-4), tone).astype(np.float32)
+    around = cv2.resize(np.clip(local, 0.0, 255.0).astype(np.uint8), gray.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    plain = np.where(covered, around, gray)
+    kernel = np.ones((BROADEST, BROADEST), np.uint8)
+    # Saturating arithmetic of 8-bit images: each comparison is a difference that is left over.
+    dark = cv2.subtract(cv2.morphologyEx(plain, cv2.MORPH_CLOSE, kernel), plain)
+    dark = cv2.subtract(dark, _share(around, DARK_LINE, LEAST_DIFFERENCE))
+    dark = cv2.min(dark, cv2.subtract(_share(around, DARKER), gray))
+    bright = cv2.subtract(plain, cv2.morphologyEx(plain, cv2.MORPH_OPEN, kernel))
+    bright = cv2.subtract(bright, _share(around, BRIGHT_LINE, LEAST_DIFFERENCE))
+    bright = cv2.min(bright, cv2.subtract(gray, _share(around, BRIGHTER)))
+    unlike = cv2.max(dark, bright) > 0
+    red, green, blue = cv2.split(color)
+    spread = cv2.subtract(cv2.max(cv2.max(red, green), blue), cv2.min(cv2.min(red, green), blue))
+    usual_spread = float(np.median(spread[::4, ::4][usual[::4, ::4] > 0])) if usual[::4, ::4].any() else 0.0
+    unlike |= spread > usual_spread + CHROMA
+    return unlike & ~covered
+
+
+def _share(image: np.ndarray, factor: float, least: float = 0.0) -> np.ndarray:
+    """Return an 8-bit image times a factor, saturated, nowhere below `least`."""
+    levels = np.clip(np.rint(np.arange(256) * factor), least, 255.0).astype(np.uint8)
+    return np.asarray(cv2.LUT(np.asarray(image, dtype=np.uint8), levels))

@@ -1,0 +1,91 @@
+"""Vision on small rendered tables, and what it says of images that it cannot use."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from schemas.errors import BadInput
+from stages.tableware.detection import detect
+from stages.tableware.detections import as_table, statement
+from stages.tableware.items import MEASURES, Table, make_item, rise, stand_height
+from stages.tableware.overhead import overhead_camera, render_overhead
+from stages.tableware.rim_finding import Rim
+from stages.tableware.stack_reading import read_stacks
+
+VIEW = overhead_camera()
+
+
+@pytest.fixture(scope="module")
+def images():
+    table = Table((make_item("bowl_1", "bowl", -0.2, 0.1), make_item("spoon_1", "spoon", 0.15, -0.1, 0.6)))
+    cup = make_item("cup_1", "cup", -0.2, 0.1, on="bowl_1")
+    cup = replace(cup, position=(-0.2, 0.1, stand_height(table, cup, "bowl_1")))
+    brick = trimesh.creation.box((0.06, 0.05, 0.04), trimesh.transformations.translation_matrix([0.2, 0.15, 0.02]))
+    return render_overhead(Table((*table.items, cup)), 3, "usual", others=(brick,))
+
+
+@pytest.fixture(scope="module")
+def found(images):
+    return detect(*images, VIEW)
+
+
+def test_items_are_where_they_stand(found):
+    known = {one.kind: one for one in found if one.kind is not None}
+    assert sorted(known) == ["bowl", "cup", "spoon"]
+    assert known["bowl"].position == pytest.approx((-0.2, 0.1, 0.0), abs=2e-3)
+    assert known["cup"].position == pytest.approx((-0.2, 0.1, rise(MEASURES["cup"], MEASURES["bowl"])), abs=2e-3)
+    assert found[known["cup"].on] is known["bowl"]
+    assert known["spoon"].position[:2] == pytest.approx((0.15, -0.1), abs=4e-3)
+    assert known["spoon"].yaw == pytest.approx(0.6, abs=0.03)
+
+
+def test_what_is_no_tableware_is_said(found):
+    (brick,) = [one for one in found if one.kind is None]
+    assert brick.position[:2] == pytest.approx((0.2, 0.15), abs=0.012)
+    assert brick.unsure == ("unknown object",)
+    assert "1 thing of unknown kind" in statement(found)
+
+
+def test_the_found_table_carries_what_was_carried(found):
+    table = as_table(found)
+    assert len(table.items) == 3
+    assert [len(stack) for stack in table.stacks] == [2, 1]
+
+
+def test_an_empty_table_is_a_statement():
+    depth = np.full((720, 1280), 0.83, dtype=np.float32)
+    color = np.full((720, 1280, 3), 220, dtype=np.uint8)
+    assert detect(color, depth, VIEW) == ()
+    assert "empty" in statement(())
+
+
+@pytest.mark.parametrize(
+    ("depth", "said"),
+    [(np.zeros((720, 1280)), "0% of the pixels"), (np.full((720, 1280), 830.0), "830"),
+     (np.full((720, 1280), 0.70), "no table"), (np.zeros((360, 640)), "the depth image is"),
+     (np.full((720, 1280), np.nan), "no numbers")],
+)  # fmt: skip
+def test_useless_depth_is_refused_in_one_line(depth, said):
+    with pytest.raises(BadInput, match=said) as refusal:
+        detect(np.zeros((720, 1280, 3), dtype=np.uint8), depth, VIEW)
+    assert "\n" not in str(refusal.value)
+
+
+def test_an_oblique_camera_is_refused():
+    turned = VIEW.world_from_camera.copy()
+    turned[:3, :3] = trimesh.transformations.rotation_matrix(0.3, [1, 0, 0])[:3, :3] @ turned[:3, :3]
+    with pytest.raises(BadInput, match="straight down"):
+        detect(np.zeros((720, 1280, 3), np.uint8), np.ones((720, 1280)), replace(VIEW, world_from_camera=turned))
+
+
+def test_a_stack_is_read_from_its_lips():
+    """Two bowls and three cups would be five; two bowls and two cups are found from their two highest lips."""
+    bowl, cup = MEASURES["bowl"], MEASURES["cup"]
+    lower = bowl.nesting_rise
+    foot = lower + rise(cup, bowl) + cup.nesting_rise
+    rims = [Rim("cup", 0.101, 0.0, foot + cup.height + 0.001, 0.9, 1.0), Rim("bowl", 0.1, 0.0, lower + 0.07, 1.0, 1.0)]
+    (stack,) = read_stacks(rims)
+    assert stack.kinds == ("bowl", "bowl", "cup", "cup")
+    assert stack.misfit < 0.001
