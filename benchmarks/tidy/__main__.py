@@ -18,7 +18,7 @@ from pathlib import Path
 from benchmarks.tidy.arms import ARMS, WORLDS, trials
 from benchmarks.tidy.records import read_runs
 from benchmarks.tidy.tables import metrics, table
-from stages.tableware.scenes import TIERS
+from stages.tableware.world.scenes import TIERS
 
 REPORTING, TUNING, AS_THE_THESIS = 1000, 0, 2000
 SCENES, QUICK = 200, 10

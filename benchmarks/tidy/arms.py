@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from benchmarks.tidy.records import Run
-from stages.tableware.fast import Trial, run_trial
-from stages.tableware.items import Table
-from stages.tableware.joint import JointPolicy
-from stages.tableware.optimum import clear, seconds
-from stages.tableware.policies import Policy, PullPolicy, RandomOne, RandomPile, StackPolicy
-from stages.tableware.rules import Rules
-from stages.tableware.scenes import make_table
-from stages.tableware.time_model import EXACT, Chances, TimeModel, fitted, measured
+from stages.tableware.planning.joint import JointPolicy
+from stages.tableware.planning.optimum import clear, seconds
+from stages.tableware.planning.policies import Policy, PullPolicy, RandomOne, RandomPile, StackPolicy
+from stages.tableware.planning.rules import Rules
+from stages.tableware.planning.time_model import EXACT, Chances, TimeModel, fitted, measured
+from stages.tableware.simulation.fast import Trial, run_trial
+from stages.tableware.world.items import Table
+from stages.tableware.world.scenes import make_table
 
 OURS = {"ours": Rules(), "ours_without_loaded_pulls": Rules(loaded_pulls=False)}
 SIMPLE = ("random", "random_piles", "stack", "pull")

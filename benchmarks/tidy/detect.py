@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.tidy.detection_score import Match, compare, measures
-from stages.tableware.detection import detect
-from stages.tableware.overhead import LEVELS, SCHEMES, Scheme, overhead_camera, render_overhead
-from stages.tableware.scenes import make_table
-from stages.tableware.thesis_detection import detect_thesis
+from stages.tableware.vision.detection import detect
+from stages.tableware.vision.thesis_detection import detect_thesis
+from stages.tableware.world.overhead import LEVELS, SCHEMES, Scheme, overhead_camera, render_overhead
+from stages.tableware.world.scenes import make_table
 
 ARMS = {"ours": detect, "thesis": detect_thesis}
 REPORTING, TUNING = 1000, 0

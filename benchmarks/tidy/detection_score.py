@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from stages.tableware.detections import Detection
-from stages.tableware.items import Table
+from stages.tableware.vision.detections import Detection
+from stages.tableware.world.items import Table
 
 NEAR = 0.020
 """A detection counts for an item of its kind no further away than this in the plane [m]."""

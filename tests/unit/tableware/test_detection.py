@@ -7,12 +7,12 @@ import pytest
 import trimesh
 
 from schemas.errors import BadInput
-from stages.tableware.detection import detect
-from stages.tableware.detections import as_table, statement
-from stages.tableware.items import MEASURES, Table, make_item, rise, stand_height
-from stages.tableware.overhead import overhead_camera, render_overhead
-from stages.tableware.rim_finding import Rim
-from stages.tableware.stack_reading import read_stacks
+from stages.tableware.vision.detection import detect
+from stages.tableware.vision.detections import as_table, statement
+from stages.tableware.vision.rim_finding import Rim
+from stages.tableware.vision.stack_reading import read_stacks
+from stages.tableware.world.items import MEASURES, Table, make_item, rise, stand_height
+from stages.tableware.world.overhead import overhead_camera, render_overhead
 
 VIEW = overhead_camera()
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from stages.tableware.dish_shapes import item_mesh, shell_mesh, shell_volume, utensil_mesh, utensil_volume
-from stages.tableware.items import DISHES, MEASURES, UTENSILS, Measures, make_item, rise
+from stages.tableware.world.dish_shapes import item_mesh, shell_mesh, shell_volume, utensil_mesh, utensil_volume
+from stages.tableware.world.items import DISHES, MEASURES, UTENSILS, Measures, make_item, rise
 
 
 @pytest.mark.parametrize("kind", DISHES)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from stages.tableware.height_map import HeightMap
-from stages.tableware.items import DISHES, MEASURES, Kind
+from stages.tableware.vision.height_map import HeightMap
+from stages.tableware.world.items import DISHES, MEASURES, Kind
 
 LIPS: dict[Kind, tuple[float, float]] = {"cup": (0.066, 0.170), "bowl": (0.056, 0.145), "plate": (0.014, 0.048)}
 """Heights [m] between which a lip of the kind may be, stacks included."""

@@ -8,7 +8,7 @@ is kept while what is seen is what it foresaw, and made anew otherwise.
 
 from __future__ import annotations
 
-from stages.tableware.actions import (
+from stages.tableware.planning.actions import (
     Action,
     after_pull,
     after_stack,
@@ -18,11 +18,11 @@ from stages.tableware.actions import (
     stack,
     taken,
 )
-from stages.tableware.items import Table
-from stages.tableware.optimum import MOST_ITEMS, Optimum, Trip, seconds
-from stages.tableware.policies import liftable
-from stages.tableware.rules import Rules, can_grasp_two
-from stages.tableware.time_model import Chances, TimeModel
+from stages.tableware.planning.optimum import MOST_ITEMS, Optimum, Trip, seconds
+from stages.tableware.planning.policies import liftable
+from stages.tableware.planning.rules import Rules, can_grasp_two
+from stages.tableware.planning.time_model import Chances, TimeModel
+from stages.tableware.world.items import Table
 
 SLACK = 0.01
 """How much slower than the fastest, as a share of its time, a plan with fewer trips may be."""

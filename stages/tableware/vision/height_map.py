@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.tableware.items import TABLE_SIDES
-from stages.tableware.overhead import OverheadCamera
+from stages.tableware.world.items import TABLE_SIDES
+from stages.tableware.world.overhead import OverheadCamera
 
 TALLEST = 0.20
 """Nothing on the table reaches higher [m]."""

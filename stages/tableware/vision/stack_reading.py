@@ -8,8 +8,8 @@ from itertools import product
 
 import numpy as np
 
-from stages.tableware.items import DISHES, MEASURES, Kind, rise
-from stages.tableware.rim_finding import Rim
+from stages.tableware.vision.rim_finding import Rim
+from stages.tableware.world.items import DISHES, MEASURES, Kind, rise
 
 MOST = 4
 """Dishes in a stack."""

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numba import njit
 
-from stages.tableware.dish_shapes import utensil_parts
-from stages.tableware.items import MEASURES, UTENSILS, Kind
+from stages.tableware.world.dish_shapes import utensil_parts
+from stages.tableware.world.items import MEASURES, UTENSILS, Kind
 
 ANGLE_STEP = 4.0
 """Of the search for bars [degrees]."""

@@ -16,9 +16,7 @@ import numpy as np
 from numba import njit
 
 from schemas.errors import UsageError
-from stages.tableware.footprints import Footprint, footprint
-from stages.tableware.items import Item, Table
-from stages.tableware.rules import (
+from stages.tableware.planning.rules import (
     Rules,
     can_hold,
     can_pile,
@@ -31,7 +29,9 @@ from stages.tableware.rules import (
     sweep,
     within_jaws,
 )
-from stages.tableware.time_model import Chances, TimeModel
+from stages.tableware.planning.time_model import Chances, TimeModel
+from stages.tableware.world.footprints import Footprint, footprint
+from stages.tableware.world.items import Item, Table
 
 MOST_ITEMS = 16
 MOST_DISHES = 6

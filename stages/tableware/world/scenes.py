@@ -14,8 +14,8 @@ from math import atan2, cos, hypot, pi, sin
 import numpy as np
 
 from schemas.errors import UsageError
-from stages.tableware.footprints import Footprint, footprint, gap
-from stages.tableware.items import MEASURES, Item, Kind, Table, make_item, radius, stand_height
+from stages.tableware.world.footprints import Footprint, footprint, gap
+from stages.tableware.world.items import MEASURES, Item, Kind, Table, make_item, radius, stand_height
 
 ORDER: tuple[Kind, ...] = ("plate", "bowl", "cup", "fork", "spoon")
 APART = 0.002

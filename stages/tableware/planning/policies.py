@@ -10,9 +10,9 @@ from typing import Protocol
 
 import numpy as np
 
-from stages.tableware.actions import Action, grasp, grasp_two, pull_grasp, stack_grasp
-from stages.tableware.items import Item, Table
-from stages.tableware.rules import Rules, can_grasp_two, can_hold, can_pull, can_put, letters
+from stages.tableware.planning.actions import Action, grasp, grasp_two, pull_grasp, stack_grasp
+from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold, can_pull, can_put, letters
+from stages.tableware.world.items import Item, Table
 
 THESIS = replace(Rules(), utensils_in_cups=True, both_piles=False)
 """What section 6.2 allows."""

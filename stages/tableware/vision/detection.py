@@ -14,14 +14,14 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from stages.tableware.detections import Detection
-from stages.tableware.foreground import unlike_table
-from stages.tableware.height_map import HeightMap, height_map
-from stages.tableware.items import MEASURES, TABLE_SIDES, UTENSILS
-from stages.tableware.overhead import OverheadCamera
-from stages.tableware.rim_finding import Rim, find_rims, overlapping
-from stages.tableware.stack_reading import LIP_TOLERANCE, Stack, read_stacks
-from stages.tableware.utensil_finding import LEAST_SCORE, Bar, fit_utensil, search_bars
+from stages.tableware.vision.detections import Detection
+from stages.tableware.vision.foreground import unlike_table
+from stages.tableware.vision.height_map import HeightMap, height_map
+from stages.tableware.vision.rim_finding import Rim, find_rims, overlapping
+from stages.tableware.vision.stack_reading import LIP_TOLERANCE, Stack, read_stacks
+from stages.tableware.vision.utensil_finding import LEAST_SCORE, Bar, fit_utensil, search_bars
+from stages.tableware.world.items import MEASURES, TABLE_SIDES, UTENSILS
+from stages.tableware.world.overhead import OverheadCamera
 
 UTENSIL_AREA = 0.00158
 """Plan area of a fork or a spoon [m^2]."""

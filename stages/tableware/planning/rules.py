@@ -12,8 +12,8 @@ from functools import lru_cache
 from itertools import product
 from math import atan2, cos, hypot, pi, sin
 
-from stages.tableware.footprints import Footprint, footprint, gap, swept_disc
-from stages.tableware.items import MEASURES, Item, Kind, Measures, Table, rise
+from stages.tableware.world.footprints import Footprint, footprint, gap, swept_disc
+from stages.tableware.world.items import MEASURES, Item, Kind, Measures, Table, rise
 
 LETTERS: dict[Kind, str] = {"plate": "p", "bowl": "b", "cup": "c", "fork": "u", "spoon": "u"}
 _MEASURES: dict[str, Measures] = {

@@ -12,7 +12,7 @@ from math import hypot
 
 import numpy as np
 
-from stages.tableware.actions import (
+from stages.tableware.planning.actions import (
     Action,
     Grasp,
     Pull,
@@ -23,11 +23,11 @@ from stages.tableware.actions import (
     after_stack,
     taken,
 )
-from stages.tableware.footprints import footprint, gap
-from stages.tableware.items import Table
-from stages.tableware.policies import Policy
-from stages.tableware.rules import Rules, can_grasp_two, letters
-from stages.tableware.time_model import Chances, TimeModel, placement_error
+from stages.tableware.planning.policies import Policy
+from stages.tableware.planning.rules import Rules, can_grasp_two, letters
+from stages.tableware.planning.time_model import Chances, TimeModel, placement_error
+from stages.tableware.world.footprints import footprint, gap
+from stages.tableware.world.items import Table
 
 MOST_ACTIONS = 400
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stages.tableware.items import MEASURES, Item, Kind, Table
+from stages.tableware.world.items import MEASURES, Item, Kind, Table
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import atan2, cos, pi, sin
 
-from stages.tableware.items import Item, Table, stand_height
-from stages.tableware.rules import Rules, grasp_centre, pull_end
+from stages.tableware.planning.rules import Rules, grasp_centre, pull_end
+from stages.tableware.world.items import Item, Table, stand_height
 
 POINT = tuple[float, float, float]
 BITE = 0.005

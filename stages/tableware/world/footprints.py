@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, hypot, sin
 
-from stages.tableware.items import TABLE_SIDES, Item
+from stages.tableware.world.items import TABLE_SIDES, Item
 
 POINT = tuple[float, float]
 

@@ -11,12 +11,12 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from stages.tableware.detections import Detection
-from stages.tableware.height_map import HeightMap, height_map
-from stages.tableware.items import MEASURES, Kind
-from stages.tableware.overhead import OverheadCamera
-from stages.tableware.rim_finding import Rim
-from stages.tableware.stack_reading import read_stacks
+from stages.tableware.vision.detections import Detection
+from stages.tableware.vision.height_map import HeightMap, height_map
+from stages.tableware.vision.rim_finding import Rim
+from stages.tableware.vision.stack_reading import read_stacks
+from stages.tableware.world.items import MEASURES, Kind
+from stages.tableware.world.overhead import OverheadCamera
 
 CANNY = (60.0, 150.0)
 VOTES = 26.0

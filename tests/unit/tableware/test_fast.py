@@ -13,16 +13,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.errors import UsageError
-from stages.tableware.actions import after_pull, after_stack, grasp_two, pull, pull_grasp, stack, stack_grasp, taken
-from stages.tableware.fast import FastWorld, run_trial
-from stages.tableware.footprints import Footprint, footprint, gap
-from stages.tableware.items import MEASURES, Item, Table, make_item, rise
-from stages.tableware.joint import JointPolicy
-from stages.tableware.optimum import Optimum, clear, seconds, slip_cost
-from stages.tableware.policies import PullPolicy, RandomOne, RandomPile, StackPolicy
-from stages.tableware.rules import Rules, can_grasp_two, can_hold, can_pull, can_put, can_stack, letters
-from stages.tableware.scenes import TIERS, make_table
-from stages.tableware.time_model import (
+from stages.tableware.planning.actions import (
+    after_pull,
+    after_stack,
+    grasp_two,
+    pull,
+    pull_grasp,
+    stack,
+    stack_grasp,
+    taken,
+)
+from stages.tableware.planning.joint import JointPolicy
+from stages.tableware.planning.optimum import Optimum, clear, seconds, slip_cost
+from stages.tableware.planning.policies import PullPolicy, RandomOne, RandomPile, StackPolicy
+from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold, can_pull, can_put, can_stack, letters
+from stages.tableware.planning.time_model import (
     EXACT,
     TABLE_7_2,
     Chances,
@@ -34,6 +39,10 @@ from stages.tableware.time_model import (
     placement_error,
     trips_of,
 )
+from stages.tableware.simulation.fast import FastWorld, run_trial
+from stages.tableware.world.footprints import Footprint, footprint, gap
+from stages.tableware.world.items import MEASURES, Item, Table, make_item, rise
+from stages.tableware.world.scenes import TIERS, make_table
 
 MODEL = TimeModel(trip=10.1, stack=8.45, pull=5.7)
 DISHES = st.sampled_from(["cup", "bowl", "plate"])

@@ -1,0 +1,1 @@
+"""What can be done with tableware, what it costs, and what to do next."""

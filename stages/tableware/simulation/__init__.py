@@ -1,0 +1,1 @@
+"""Tables that are cleared: the fast simulator and physics."""

@@ -1,0 +1,1 @@
+"""Tableware in an overhead RGB-D image."""

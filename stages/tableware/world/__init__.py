@@ -1,0 +1,1 @@
+"""Tableware: items, scenes, shapes, images from above."""
