@@ -113,6 +113,7 @@ def execute(
     observed: dict[int, TreeState] = {}
     anew: dict[int, TreeState] = {}
     with load_scene(root) as world:
+        world.anchor_friction()
         start = Configuration(order.state.base, order.state.arm, model.description.opening)
         physical = PhysicalRobot(world, model.description, start, RECORD_RATE)
         failures = _start_failures(physical)

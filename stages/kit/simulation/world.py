@@ -236,6 +236,15 @@ class PhysicsWorld:
                     body.body_id, -1, activationState=engine.ACTIVATION_STATE_WAKE_UP, physicsClientId=self.client
                 )
 
+    def anchor_friction(self) -> None:
+        """Let what sticks by friction stay where it sticks. Friction solved for speeds alone lets things creep on a
+        carrier that moves for long: centimetres in 20 s on a tray. What pulls harder than friction holds still slides.
+        """
+        for body in self.bodies.values():
+            if body.record.movable:
+                for link in (-1, *body.links.values()):
+                    engine.changeDynamics(body.body_id, link, frictionAnchor=1, physicsClientId=self.client)
+
     def settle(self, seconds: float = 1.0) -> dict[str, float]:
         """Let the world fall for some simulated seconds; return how far each movable body moved [m]."""
         movable = [name for name, body in self.bodies.items() if body.record.movable]

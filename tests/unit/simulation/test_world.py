@@ -96,3 +96,15 @@ def test_a_broken_urdf_is_refused(scene: Path) -> None:
     (scene / "static.urdf").write_text("<robot><link name=")
     with pytest.raises(BadInput, match="no well-formed XML"):
         load_scene(scene)
+
+
+@pytest.mark.parametrize(("slope", "slides"), [(8.0, False), (30.0, True)])
+def test_anchored_friction_is_still_friction(tmp_path: Path, slope: float, slides: bool) -> None:
+    write_scene(tmp_path, [floor(), bottle(0.0, 0.0, 0.0, "floor_1", name="bottle_1")])
+    with load_scene(tmp_path) as world:
+        world.anchor_friction()
+        pull = np.radians(slope)
+        gravity = 9.81 * np.array([np.sin(pull), 0.0, -np.cos(pull)])
+        engine.setGravity(*gravity, physicsClientId=world.client)
+        moved = world.settle(1.0)["bottle_1"]
+    assert moved > 0.1 if slides else moved < 1e-3
