@@ -9,11 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from schemas.contact_graph import ContactGraphFile
 from schemas.plan import BodyMatch
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.simulation.robot_description import load_robot
 from stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
 from stages.plan import conduct as conduct_module
 from stages.plan import refinement
@@ -22,7 +20,6 @@ from stages.plan.motions import Manipulation
 from stages.plan.pick_place import Budgets
 from stages.plan.refinement import Step
 from stages.plan.world_model import RobotState, WorldModel
-from tests.unit.simulation.handmade_scene import kitchen, write_scene
 
 BUDGETS = Budgets(bases=1, pairs=1, path_samples=1, paths=1)
 START = RobotState(np.zeros(3), np.zeros(7))
@@ -284,24 +281,10 @@ def test_what_was_lost_on_the_way_cannot_be_placed(tries: Tries) -> None:
 # --- looks at a room ------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root = tmp_path_factory.mktemp("kitchen")
-    write_scene(root, kitchen())
-    return root
-
-
-@pytest.fixture(scope="module")
-def model(scene: Path) -> Iterator[WorldModel]:
-    model = WorldModel(scene, ContactGraphFile.read(scene / "graph.json"), load_robot("panda"), 0.004)
-    yield model
-    model.close()
-
-
 @pytest.fixture
-def looking(scene: Path, model: WorldModel) -> Iterator[Conduct]:
+def looking(scene: Path, kitchen_model: WorldModel) -> Iterator[Conduct]:
     """The kitchen as it is believed to be, and as it is: the same at first."""
-    before = model.snapshot()
+    model, before = kitchen_model, kitchen_model.snapshot()
     bodies = read_scene_bodies(scene)
     room = Room({name: record for name, (record, _) in bodies.items()},
                 {name: text for name, (_, text) in bodies.items()}, {name: () for name in bodies})  # fmt: skip

@@ -13,13 +13,11 @@ from schemas.contact_graph import ContactGraphFile
 from schemas.plan import Failure, TriedPlan
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.simulation.robot_description import load_robot
 from stages.kit.tasks.strips import Problem
 from stages.plan.refinement import Attempt, Step
 from stages.plan.replanning import Replanning, in_the_middle
 from stages.plan.tree_state import HAND, NOTHING, TreeState, start_state
 from stages.plan.world_model import RobotState, WorldModel
-from tests.unit.simulation.handmade_scene import kitchen, write_scene
 
 FIRST = frozenset({
     ("hand_empty",), ("on", "cup", "tray"), ("carried_along", "cup", "tray"), ("on", "tray", "desk"),
@@ -56,20 +54,6 @@ def test_what_the_hand_holds_stands_nowhere(held: str, gone: set[tuple[str, ...]
 
 
 # --- in the handmade kitchen ----------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root = tmp_path_factory.mktemp("kitchen")
-    write_scene(root, kitchen())
-    return root
-
-
-@pytest.fixture(scope="module")
-def kitchen_model(scene: Path) -> Iterator[WorldModel]:
-    model = WorldModel(scene, ContactGraphFile.read(scene / "graph.json"), load_robot("panda"), 0.004)
-    yield model
-    model.close()
 
 
 @pytest.fixture
