@@ -25,3 +25,10 @@ def kitchen_model(scene: Path) -> Iterator[WorldModel]:
     model = WorldModel(scene, ContactGraphFile.read(scene / "graph.json"), load_robot("panda"), 0.004)
     yield model
     model.close()
+
+
+@pytest.fixture
+def model(kitchen_model: WorldModel) -> Iterator[WorldModel]:
+    snapshot = kitchen_model.snapshot()  # nothing is aboard
+    yield kitchen_model
+    kitchen_model.restore(snapshot)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ from schemas.contact_graph import ContactGraphFile
 from schemas.errors import UsageError
 from schemas.plan import BodyMatch, Failure
 from stages.kit.geometry.transforms import inverse, transform_from_yaw
-from stages.kit.simulation.robot_description import load_robot
 from stages.kit.tasks.strips import GroundAction, ground
 from stages.kit.tasks.task_planner import plan_task
 from stages.plan.assumptions import believe, match_beliefs, parse_priors
@@ -25,7 +23,6 @@ from stages.plan.refinement import Step
 from stages.plan.symbols import parse_goal, symbolic_state, task_problem
 from stages.plan.tree_state import HAND, after_step, start_state
 from stages.plan.world_model import WorldModel
-from tests.unit.simulation.handmade_scene import kitchen, write_scene
 
 
 def action(name: str, *arguments: str, pre: tuple = (), add: tuple = ()) -> GroundAction:
@@ -79,20 +76,6 @@ def test_angles_of_urdf_agree_with_scipy() -> None:
         pose[:3, :3] = rotation.as_matrix()
         again = Rotation.from_euler("xyz", _roll_pitch_yaw(pose))
         assert (again * rotation.inv()).magnitude() < 1e-6
-
-
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root = tmp_path_factory.mktemp("kitchen")
-    write_scene(root, kitchen())
-    return root
-
-
-@pytest.fixture
-def model(scene: Path) -> Iterator[WorldModel]:
-    model = WorldModel(scene, ContactGraphFile.read(scene / "graph.json"), load_robot("panda"), 0.004)
-    yield model
-    model.close()
 
 
 def test_a_load_is_lifted_as_one_body_and_set_down_where_it_went(model: WorldModel) -> None:

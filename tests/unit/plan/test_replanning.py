@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -54,13 +53,6 @@ def test_what_the_hand_holds_stands_nowhere(held: str, gone: set[tuple[str, ...]
 
 
 # --- in the handmade kitchen ----------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def model(kitchen_model: WorldModel) -> Iterator[WorldModel]:
-    snapshot = kitchen_model.snapshot()  # nothing is aboard
-    yield kitchen_model
-    kitchen_model.restore(snapshot)
 
 
 class Script:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from schemas.base import as_transform
-from schemas.contact_graph import ContactGraphFile
 from stages.kit.geometry.transforms import apply, transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.simulation.robot_description import load_robot
@@ -31,20 +29,6 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     next(body for body in bodies if body.name == "cup_5").boxes = [((0, 0, 0.04), (0.07, 0.07, 0.08))]
     write_scene(root, bodies)
     return root
-
-
-@pytest.fixture(scope="module")
-def kitchen_model(scene: Path) -> Iterator[WorldModel]:
-    model = WorldModel(scene, ContactGraphFile.read(scene / "graph.json"), PANDA, 0.004)
-    yield model
-    model.close()
-
-
-@pytest.fixture
-def model(kitchen_model: WorldModel) -> Iterator[WorldModel]:
-    snapshot = kitchen_model.snapshot()
-    yield kitchen_model
-    kitchen_model.restore(snapshot)
 
 
 def turned(axis: str, degrees: float, yaw: float = 0.0) -> np.ndarray:

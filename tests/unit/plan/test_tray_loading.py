@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -124,13 +123,6 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_scene(root, [floor(), table(0.0, 0.0), tray(), can("can_7", 0.5, 0.2, "table_3"),
                        can("can_8", 0.5, -0.2, "table_3")])  # fmt: skip
     return root
-
-
-@pytest.fixture
-def model(scene: Path) -> Iterator[WorldModel]:
-    model = WorldModel(scene, ContactGraphFile.read(scene / "graph.json"), PANDA, 0.004)
-    yield model
-    model.close()
 
 
 def on_tray(model: WorldModel, x: float, y: float) -> np.ndarray:
