@@ -27,6 +27,14 @@ def count_refusal(counts: np.ndarray, state: int, other: int, parts: int) -> Non
 
 
 @njit(cache=True)
+def _step_count(begin: np.ndarray, end: np.ndarray, resolution: np.ndarray) -> int:
+    steps = 1
+    for k in range(begin.shape[0]):
+        steps = max(steps, int(np.ceil(abs(end[k] - begin[k]) / resolution[k] - 1e-9)))
+    return steps
+
+
+@njit(cache=True)
 def last_free(
     robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, begin: np.ndarray,
     end: np.ndarray, resolution: np.ndarray, most: int, counts: np.ndarray,
@@ -35,9 +43,7 @@ def last_free(
 
     No more than `most` steps are looked at. `body` is scratch: the values that do not move are read from it.
     """
-    steps = 1
-    for k in range(begin.shape[0]):
-        steps = max(steps, int(np.ceil(abs(end[k] - begin[k]) / resolution[k] - 1e-9)))
+    steps = _step_count(begin, end, resolution)
     for number in range(1, min(steps, most) + 1):
         share = number / steps
         for k in range(begin.shape[0]):
@@ -47,6 +53,35 @@ def last_free(
             count_refusal(counts, state, other, scene.allowed.shape[0])
             return number - 1, steps
     return min(steps, most), steps
+
+
+@njit(cache=True)
+def way_is_free(
+    robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, begin: np.ndarray,
+    end: np.ndarray, resolution: np.ndarray, counts: np.ndarray,
+) -> bool:  # fmt: skip
+    """Return whether all steps of `last_free` are free, looked at from coarse to fine: a way that is blocked is
+    mostly blocked in its middle, and then few looks tell."""
+    steps = _step_count(begin, end, resolution)
+    stride = 1
+    while stride < steps:
+        stride *= 2
+    while stride >= 1:
+        for number in range(stride, steps, 2 * stride):
+            share = number / steps
+            for k in range(begin.shape[0]):
+                body[moving[k]] = begin[k] + (end[k] - begin[k]) * share
+            state, _, other = find_collision(robot, scene, body, first_frame)
+            if state != FREE:
+                count_refusal(counts, state, other, scene.allowed.shape[0])
+                return False
+        stride //= 2
+    for k in range(begin.shape[0]):
+        body[moving[k]] = end[k]
+    state, _, other = find_collision(robot, scene, body, first_frame)
+    if state != FREE:
+        count_refusal(counts, state, other, scene.allowed.shape[0])
+    return bool(state == FREE)
 
 
 @njit(cache=True)
@@ -170,11 +205,15 @@ def _joined(
 def shorten(
     robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, path: np.ndarray,
     resolution: np.ndarray, attempts: int, random: np.random.Generator,
-) -> np.ndarray:  # fmt: skip
-    """Return a shorter path (M, D): pairs of random points on it are joined by straight pieces where those are free."""
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return a shorter path (M, D): pairs of random points on it are joined by straight pieces where those are free.
+
+    Returned too: which of its pieces (M - 1,) are such, or parts of such, and thus free at this resolution.
+    """
     counts = np.zeros(1 + scene.allowed.shape[0] + scene.low.shape[0], dtype=np.int64)
     rows = path.copy()
     count = path.shape[0]
+    looked_at = np.zeros(count - 1, dtype=np.bool_)
     ends = np.zeros(count + 2 * attempts + 2)
     first, second = np.empty(path.shape[1]), np.empty(path.shape[1])
     for _ in range(attempts):
@@ -195,13 +234,16 @@ def shorten(
         second[:] = rows[j] + (rows[j + 1] - rows[j]) * along
         if np.max(np.abs(second - first) / resolution) > high - low - 0.5:
             continue  # hardly shorter
-        free, steps = last_free(robot, scene, body, moving, first_frame, first, second, resolution, WHOLE_WAY, counts)
-        if free < steps:
+        if not way_is_free(robot, scene, body, moving, first_frame, first, second, resolution, counts):
             continue
         fresh = np.empty((count - (j - i) + 2, path.shape[1]))
         fresh[: i + 1] = rows[: i + 1]
         fresh[i + 1], fresh[i + 2] = first, second
         fresh[i + 3 :] = rows[j + 1 : count]
-        rows = fresh
+        known = np.empty(fresh.shape[0] - 1, dtype=np.bool_)
+        known[: i + 1] = looked_at[: i + 1]
+        known[i + 1] = True
+        known[i + 2 :] = looked_at[j:]
+        rows, looked_at = fresh, known
         count = rows.shape[0]
-    return rows[:count].copy()
+    return rows, looked_at

@@ -16,7 +16,7 @@ import numpy as np
 from schemas.errors import MissingDependency
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.compiled_check import FREE, find_collision
-from stages.kit.motion.compiled_rrt import WHOLE_WAY, count_refusal, last_free
+from stages.kit.motion.compiled_rrt import count_refusal, way_is_free
 from stages.kit.motion.failures import no_path
 from stages.kit.motion.path_query import (
     Effort,
@@ -61,7 +61,7 @@ def optimal_path(
     if len(usable) and compiled_free(query, query.start, checker):
         path = _solve(query, usable, checker, random, iterations, counts, effort)
     if path is not None:
-        for candidate in (shorten_path(query, path, checker, random, smoothing), path):
+        for candidate in (shorten_path(query, path, checker, random, smoothing)[0], path):
             if is_free(query, candidate, checker, counts):
                 if confirm(query, candidate, checker, effort) is None:
                     return candidate
@@ -124,11 +124,9 @@ def _solve(
         return bool(found == FREE)
 
     def look(begin: Any, end: Any) -> bool:
-        free, steps = last_free(
-            robot, scene, body, query.moving, query.first_frame, values(begin), values(end), resolution, WHOLE_WAY,
-            counts,
-        )  # fmt: skip
-        return bool(free == steps)
+        return way_is_free(
+            robot, scene, body, query.moving, query.first_frame, values(begin), values(end), resolution, counts
+        )
 
     validator = straight(information)
     validator.look = look

@@ -11,7 +11,7 @@ import numpy as np
 
 from stages.kit.motion.collision import Collision, CollisionChecker
 from stages.kit.motion.compiled_check import FREE, find_collision
-from stages.kit.motion.compiled_rrt import UNCERTAIN_COUNT, WHOLE_WAY, last_free, shorten
+from stages.kit.motion.compiled_rrt import UNCERTAIN_COUNT, shorten, way_is_free
 from stages.kit.motion.failures import end_in_collision, joint_limit
 from stages.kit.motion.rrt_connect import FINER, SearchSpace, densify, first_collision
 
@@ -109,24 +109,28 @@ def compiled_free(query: Query, values: np.ndarray, checker: CollisionChecker) -
     return bool(find_collision(robot, scene, query.whole(values), 0)[0] == FREE)
 
 
-def is_free(query: Query, path: np.ndarray, checker: CollisionChecker, counts: np.ndarray) -> bool:
-    """Whether a path (N, D) is free for the compiled check at FINER times the resolution."""
+def is_free(
+    query: Query, path: np.ndarray, checker: CollisionChecker, counts: np.ndarray, known: np.ndarray | None = None
+) -> bool:
+    """Whether a path (N, D) is free for the compiled check at FINER times the resolution. Pieces `known` (N - 1,) to be
+    so are not looked at again."""
     robot, scene = checker.arrays()
     body = query.body.copy()
-    for begin, end in zip(path[:-1], path[1:], strict=True):
-        free, steps = last_free(
-            robot, scene, body, query.moving, query.first_frame, begin, end, query.space.resolution / FINER, WHOLE_WAY,
-            counts,
-        )  # fmt: skip
-        if free < steps:
+    for number, (begin, end) in enumerate(zip(path[:-1], path[1:], strict=True)):
+        if known is not None and known[number]:
+            continue
+        if not way_is_free(
+            robot, scene, body, query.moving, query.first_frame, begin, end, query.space.resolution / FINER, counts
+        ):  # fmt: skip
             return False
     return True
 
 
 def shorten_path(
     query: Query, path: np.ndarray, checker: CollisionChecker, random: np.random.Generator, attempts: int
-) -> np.ndarray:
-    """Return a shorter path (M, D), its new pieces free for the compiled check at FINER times the resolution."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a shorter path (M, D) and which of its pieces (M - 1,) are new, which are free for the compiled check at
+    FINER times the resolution."""
     robot, scene = checker.arrays()
     return shorten(
         robot, scene, query.body.copy(), query.moving, query.first_frame, path, query.space.resolution / FINER,

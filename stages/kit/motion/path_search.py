@@ -115,9 +115,10 @@ def _compiled_path(
         if len(path) == 0:
             return None
         path = without_repeats(path)
+        known = None
         if len(path) > 2:
-            path = shorten_path(query, path, checker, random, smoothing)
-        if is_free(query, path, checker, counts):
+            path, known = shorten_path(query, path, checker, random, smoothing)
+        if is_free(query, path, checker, counts, known):
             return path
         finer = FINER  # something thin lay between two checks; it will again
         used += 1
