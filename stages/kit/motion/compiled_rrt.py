@@ -18,7 +18,7 @@ WHOLE_WAY = 1_000_000
 """As `most` of `last_free`: more steps than any way has."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def count_refusal(counts: np.ndarray, state: int, other: int, parts: int) -> None:
     """Count what refused: counts are (1 + parts + groups,)."""
     if state == UNCERTAIN:
@@ -26,7 +26,7 @@ def count_refusal(counts: np.ndarray, state: int, other: int, parts: int) -> Non
     counts[1 + parts + other if other >= 0 else -other] += 1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _step_count(begin: np.ndarray, end: np.ndarray, resolution: np.ndarray) -> int:
     steps = 1
     for k in range(begin.shape[0]):
@@ -34,7 +34,7 @@ def _step_count(begin: np.ndarray, end: np.ndarray, resolution: np.ndarray) -> i
     return steps
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def last_free(
     robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, begin: np.ndarray,
     end: np.ndarray, resolution: np.ndarray, most: int, counts: np.ndarray,
@@ -55,7 +55,7 @@ def last_free(
     return min(steps, most), steps
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def way_is_free(
     robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, begin: np.ndarray,
     end: np.ndarray, resolution: np.ndarray, counts: np.ndarray,
@@ -84,7 +84,7 @@ def way_is_free(
     return bool(state == FREE)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _nearest(points: np.ndarray, count: int, target: np.ndarray, resolution: np.ndarray) -> int:
     best, least = 0, np.inf
     for index in range(count):
@@ -97,7 +97,7 @@ def _nearest(points: np.ndarray, count: int, target: np.ndarray, resolution: np.
     return best
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _grown(points: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     more_points = np.empty((2 * points.shape[0], points.shape[1]))
     more_parents = np.empty(2 * parents.shape[0], dtype=np.int64)
@@ -106,7 +106,7 @@ def _grown(points: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndar
     return more_points, more_parents
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def search(
     robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, start: np.ndarray,
     goals: np.ndarray, lower: np.ndarray, upper: np.ndarray, resolution: np.ndarray, samples: int, step: int,
@@ -175,7 +175,7 @@ def search(
     return np.empty((0, dimension)), samples
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _joined(
     points_a: np.ndarray, parents_a: np.ndarray, node_a: int, points_b: np.ndarray, parents_b: np.ndarray, node_b: int
 ) -> np.ndarray:
@@ -201,7 +201,7 @@ def _joined(
     return path
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def shorten(
     robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, path: np.ndarray,
     resolution: np.ndarray, attempts: int, random: np.random.Generator,

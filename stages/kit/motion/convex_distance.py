@@ -13,7 +13,7 @@ PRECISION = 1e-5
 """The two bounds of a distance are this near to each other [m] when nothing ends the search earlier."""
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _extreme(vertices: np.ndarray, begin: int, end: int, pose: np.ndarray, direction: np.ndarray, sign: float) -> int:
     """Return the index of the vertex, of those begin to end, that lies farthest along sign * direction (world)."""
     x = sign * (pose[0, 0] * direction[0] + pose[1, 0] * direction[1] + pose[2, 0] * direction[2])
@@ -29,7 +29,7 @@ def _extreme(vertices: np.ndarray, begin: int, end: int, pose: np.ndarray, direc
     return best
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _nearest_on_segment(simplex: np.ndarray, a: int, b: int, weights: np.ndarray) -> None:
     dot, square = 0.0, 0.0
     for k in range(3):
@@ -42,7 +42,7 @@ def _nearest_on_segment(simplex: np.ndarray, a: int, b: int, weights: np.ndarray
     weights[b] += share
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _nearest_on_triangle(simplex: np.ndarray, a: int, b: int, c: int, weights: np.ndarray) -> None:
     d1, d2, d3, d4, d5, d6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(3):
@@ -84,7 +84,7 @@ def _nearest_on_triangle(simplex: np.ndarray, a: int, b: int, c: int, weights: n
     weights[a] = 1.0 - weights[b] - weights[c]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _outside(simplex: np.ndarray, a: int, b: int, c: int, d: int) -> bool:
     """Whether the origin and corner d lie on different sides of the plane a, b, c, or the corners are in one plane."""
     ux, uy, uz = (simplex[b, 0] - simplex[a, 0], simplex[b, 1] - simplex[a, 1], simplex[b, 2] - simplex[a, 2])
@@ -99,7 +99,7 @@ def _outside(simplex: np.ndarray, a: int, b: int, c: int, d: int) -> bool:
     return origin * corner <= 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _nearest_on_tetrahedron(simplex: np.ndarray, weights: np.ndarray) -> bool:
     """Write the weights of the nearest point; return True when the origin lies inside."""
     trial = np.zeros(4)
@@ -122,7 +122,7 @@ def _nearest_on_tetrahedron(simplex: np.ndarray, weights: np.ndarray) -> bool:
     return inside
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def convex_distance(
     first: np.ndarray, first_begin: int, first_end: int, first_pose: np.ndarray,
     second: np.ndarray, second_begin: int, second_end: int, second_pose: np.ndarray,
