@@ -19,22 +19,21 @@ from stages.tableware.vision.foreground import unlike_table
 from stages.tableware.vision.height_map import HeightMap, height_map
 from stages.tableware.vision.rim_finding import Rim, find_rims, overlapping
 from stages.tableware.vision.stack_reading import LIP_TOLERANCE, Stack, read_stacks
-from stages.tableware.vision.utensil_finding import LEAST_SCORE, Bar, fit_utensil, search_bars
+from stages.tableware.vision.utensil_finding import Bar
+from stages.tableware.vision.utensil_reading import (
+    SAME_PLACE,
+    UNKNOWN_AREA,
+    as_detection,
+    utensils_on_dish,
+    utensils_on_table,
+)
 from stages.tableware.world.items import MEASURES, TABLE_SIDES, UTENSILS
 from stages.tableware.world.overhead import OverheadCamera
 
-UTENSIL_AREA = 0.00158
-"""Plan area of a fork or a spoon [m^2]."""
-BAND = 0.006
-"""A utensil on a dish lies within this of the lip's height [m]."""
 LEAST_DEPTH, MOST_GLARE = 0.45, 0.10
 """Shares of a lip's pixels with depth, and of a dish's pixels at full white, at which there is doubt."""
-FLAT = 0.0020
-"""What looks unlike the table and rises less than this [m] is a shadow or a mark, and nothing to clear."""
-LEAST_RELIEF = 0.0008
-"""A utensil rises this much over the table [m], on average over its plan."""
-UNKNOWN_HEIGHT, UNKNOWN_AREA = 0.010, 0.00035
-"""What rises over the first [m] on more than the second [m^2] without being an item is unknown."""
+UNKNOWN_HEIGHT = 0.010
+"""What rises over this [m] on more than UNKNOWN_AREA without being an item is unknown."""
 
 
 def detect(color: np.ndarray, depth: np.ndarray, camera: OverheadCamera) -> tuple[Detection, ...]:
@@ -54,21 +53,21 @@ def detect(color: np.ndarray, depth: np.ndarray, camera: OverheadCamera) -> tupl
     for index, stack in enumerate(stacks):
         carrier = len(found) + len(stack.kinds) - 1
         found.extend(_dishes(stack, heights, crossed, len(found)))
-        for level, bar in enumerate(_on_stack(heights, stack, covered, index + 1)):
-            z = stack.top + level * MEASURES[bar.kind].height
-            found.append(_utensil(bar, heights, z, carrier))
+        for level, seen in enumerate(utensils_on_dish(heights, stack, covered, index + 1)):
+            z = stack.top + level * MEASURES[seen.bar.kind].height
+            found.append(as_detection(seen, heights, z, carrier))
             carrier = len(found) - 1
-            _cover_bar(covered, heights, bar, z)
+            _cover_bar(covered, heights, seen.bar, z)
     hidden = covered > 0
     unlike = unlike_table(heights, cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0) & _workspace(heights)
-    bars, strange = _on_table(heights, unlike, hidden)
-    for bar in bars:
-        here = np.array(heights.world(np.float64(bar.u), np.float64(bar.v), 0.0))
+    lying, strange = utensils_on_table(heights, unlike, hidden)
+    for seen in lying:
+        here = np.array(heights.world(np.float64(seen.bar.u), np.float64(seen.bar.v), 0.0))
         below = [k for k, other in enumerate(found) if other.on is None and other.kind in UTENSILS
-                 and np.hypot(*(here - other.position[:2])) < 0.012]  # fmt: skip
-        z = MEASURES[bar.kind].height if below else 0.0
-        found.append(_utensil(bar, heights, z, below[0] if below else None))
-        _cover_bar(covered, heights, bar, z)
+                 and np.hypot(*(here - other.position[:2])) < SAME_PLACE]  # fmt: skip
+        z = MEASURES[seen.bar.kind].height if below else 0.0
+        found.append(as_detection(seen, heights, z, below[0] if below else None))
+        _cover_bar(covered, heights, seen.bar, z)
     found.extend(_unknown(heights, covered, strange))
     return tuple(_outside(one) for one in found)
 
@@ -139,125 +138,6 @@ def _doubt(rim: Rim, stack: Stack, heights: HeightMap) -> tuple[float, tuple[str
         reasons.append("glare")
         confidence *= 0.7
     return confidence, tuple(reasons)
-
-
-def _on_stack(heights: HeightMap, stack: Stack, covered: np.ndarray, label: int) -> list[Bar]:
-    """Return utensils that lie across the uppermost lip, the lowest first; places in the map's pixels at its height."""
-    top = MEASURES[stack.kinds[-1]]
-    z = stack.top + 0.002
-    scale = float(heights.scale(z))
-    u, v = (float(value) for value in heights.pixel(np.float64(stack.x), np.float64(stack.y), z))
-    reach = int(0.112 * scale)
-    left, up = max(0, int(u) - reach), max(0, int(v) - reach)
-    window = (slice(up, max(up, int(v) + reach)), slice(left, max(left, int(u) + reach)))
-    part, owner = heights.smooth[window], covered[window]
-    if part.size == 0:
-        return []
-    rows, columns = np.mgrid[up : up + part.shape[0], left : left + part.shape[1]]
-    distance = np.hypot(columns - u, rows - v) / scale
-    # The gaps between tines show what is below: the highest of three by three closes them.
-    high = np.abs(cv2.dilate(part, np.ones((3, 3), np.uint8)) - z) < BAND
-    within = distance < top.inner_radius(top.height) - 0.010
-    if high[within].sum() < 0.9 * top.inner_radius(top.height) * 0.006 * scale**2:
-        return []
-    map_ = np.where(high, 1, -1).astype(np.int8)
-    map_[(distance > top.inner_radius(top.height) - 0.007) & (distance < top.rim_radius + 0.004)] = 0
-    map_[(owner != label) & (owner > 0)] = 0
-    map_[(part > z + BAND)] = 0
-    bars = [replace(bar, u=bar.u + left, v=bar.v + up) for bar in search_bars(map_, scale, 2)]
-    return sorted(bars, key=lambda bar: _mean_height(heights, bar, z))
-
-
-def _axis(heights: HeightMap, bar: Bar, z: float, share: float = 0.94) -> tuple[np.ndarray, np.ndarray]:
-    """Return pixel columns and rows along a bar's middle line."""
-    half = 0.5 * share * MEASURES[bar.kind].length * float(heights.scale(z))
-    along = np.linspace(-half, half, 60)
-    columns = np.clip(np.rint(bar.u + along * np.cos(bar.angle)).astype(int), 0, heights.smooth.shape[1] - 1)
-    rows = np.clip(np.rint(bar.v + along * np.sin(bar.angle)).astype(int), 0, heights.smooth.shape[0] - 1)
-    return columns, rows
-
-
-def _mean_height(heights: HeightMap, bar: Bar, z: float) -> float:
-    columns, rows = _axis(heights, bar, z)
-    return float(np.median(heights.smooth[rows, columns]))
-
-
-def _utensil(bar: Bar, heights: HeightMap, z: float, on: int | None) -> Detection:
-    """Return a utensil whose underside is at height z [m]; its grasp is the highest place along its axis."""
-    thick = MEASURES[bar.kind].height
-    x, y = heights.world(np.float64(bar.u), np.float64(bar.v), z + thick)
-    columns, rows = _axis(heights, bar, z)
-    along = np.convolve(heights.smooth[rows, columns], np.full(9, 1.0 / 9.0), mode="valid")
-    k = int(np.argmax(along)) + 4
-    grasp = heights.world(np.float64(columns[k]), np.float64(rows[k]), z + thick)
-    reasons = []
-    confidence = min(1.0, bar.score / 0.85)
-    if heights.valid[rows, columns].mean() < LEAST_DEPTH:
-        reasons.append("no depth")
-    if bar.margin < 0.015:
-        reasons.append("fork or spoon")
-        confidence *= 0.8
-    yaw = float(np.arctan2(np.sin(-bar.angle), np.cos(-bar.angle)))
-    return Detection(
-        kind=bar.kind, position=(float(x), float(y), z), yaw=yaw, lip=z + thick, on=on,
-        grasp=(float(grasp[0]), float(grasp[1]), float(along.max())), confidence=confidence, unsure=tuple(reasons),
-    )  # fmt: skip
-
-
-def _relief(heights: HeightMap, bar: Bar) -> float:
-    """Return how much higher [m] the heights along a bar are than beside it."""
-    columns, rows = _axis(heights, bar, 0.0)
-    aside = 0.022 * float(heights.scale(0.0))
-    du, dv = -np.sin(bar.angle) * aside, np.cos(bar.angle) * aside
-    beside = []
-    for sign in (-1.0, 1.0):
-        c = np.clip(np.rint(columns + sign * du).astype(int), 0, heights.smooth.shape[1] - 1)
-        r = np.clip(np.rint(rows + sign * dv).astype(int), 0, heights.smooth.shape[0] - 1)
-        values = heights.smooth[r, c]
-        beside.append(values[np.abs(values) < 0.008])
-    ground = np.concatenate(beside)
-    return float(heights.smooth[rows, columns].mean() - (ground.mean() if len(ground) else 0.0))
-
-
-def _on_table(heights: HeightMap, unlike: np.ndarray, hidden: np.ndarray) -> tuple[list[Bar], np.ndarray]:
-    """Return the utensils on the table, and (h, w) bool of what looks unlike the table and is none."""
-    scale = float(heights.scale(0.003))
-    whole = UTENSIL_AREA * scale**2
-    count, labels, boxes, centers = cv2.connectedComponentsWithStats(unlike.astype(np.uint8), connectivity=8)
-    bars: list[Bar] = []
-    strange = np.zeros(unlike.shape, dtype=bool)
-    margin = int(0.05 * scale)
-    for label in range(1, count):
-        left, top, width, height, area = boxes[label]
-        if area < 0.25 * whole:
-            continue
-        window = (
-            slice(max(0, top - margin), top + height + margin),
-            slice(max(0, left - margin), left + width + margin),
-        )
-        own = labels[window] == label
-        map_ = np.where(own, 1, -1).astype(np.int8)
-        map_[hidden[window] | ((labels[window] > 0) & ~own)] = 0
-        corner = (window[1].start, window[0].start)
-        rows, columns = np.nonzero(own)
-        spread = np.cov(np.stack([columns, rows]).astype(np.float64))
-        values, vectors = np.linalg.eigh(spread)
-        lone = area < 1.4 * whole and values[0] < 0.02 * values[1] and np.sqrt(12.0 * values[1]) > 0.11 * scale
-        found: list[Bar] = []
-        if lone:
-            angle = float(np.arctan2(vectors[1, 1], vectors[0, 1]))
-            bar = fit_utensil(map_, scale, float(columns.mean()), float(rows.mean()), angle)
-            found = [bar] if bar.score >= LEAST_SCORE else []
-        if not found:
-            found = search_bars(map_, scale, min(5, int(area / whole + 1.5)))
-        if not found and area > UNKNOWN_AREA * scale**2 and heights.smooth[window][own].mean() > FLAT:
-            strange[window] |= own
-        if heights.valid[window][own].mean() > LEAST_DEPTH:
-            # The rim of a shadow may be as slender as a utensil; it does not rise over the table.
-            local = [replace(bar, u=bar.u + corner[0], v=bar.v + corner[1]) for bar in found]
-            found = [bar for bar, there in zip(found, local, strict=True) if _relief(heights, there) > LEAST_RELIEF]
-        bars.extend(replace(bar, u=bar.u + corner[0], v=bar.v + corner[1]) for bar in found)
-    return bars, strange
 
 
 def _unknown(heights: HeightMap, covered: np.ndarray, strange: np.ndarray) -> list[Detection]:

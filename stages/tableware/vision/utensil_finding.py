@@ -29,18 +29,22 @@ STARTS = 4
 """Candidate bars that are fitted before the best is taken."""
 
 
+Pose = tuple[float, float, float, float, float]
+"""(score, u [px], v [px], angle [rad], share that is known)"""
+
+
 @dataclass(frozen=True)
 class Bar:
-    """A utensil in the map: kind, centre [px], direction of the head in the image [rad], score 0..1, margin over the
-    other kind, share that is known."""
+    """A utensil in the map: kind, centre [px], direction of the head in the image [rad], score 0..1, share that is
+    known; the best poses as either kind."""
 
     kind: Kind
     u: float
     v: float
     angle: float
     score: float
-    margin: float
     visible: float
+    poses: dict[Kind, Pose]
 
 
 @cache
@@ -57,7 +61,7 @@ def outline(kind: Kind) -> tuple[np.ndarray, np.ndarray]:
         inside |= (within & (y >= np.interp(x, stations, low)) & (y <= np.interp(x, stations, high))).astype(np.uint8)
     near = cv2.dilate(inside, np.ones((3, 3), np.uint8))
     border = (cv2.dilate(inside, np.ones((7, 7), np.uint8)) > 0) & (near == 0)
-    # A fork's gaps are two pixels wide, and blurred: they say nothing.
+    # A fork's gaps are two pixels wide, and blurred: here they say nothing.
     gaps = (x > 0.5 * measures.length - 0.040) & (np.abs(y) < 0.5 * measures.width) & (x < 0.5 * measures.length)
     border &= ~(gaps & (kind == "fork"))
     points = np.stack([x, y], axis=2)
@@ -94,15 +98,12 @@ def _scores(
     return result, visible
 
 
-Pose = tuple[float, float, float, float, float]
-"""(score, u [px], v [px], angle [rad], share that is known)"""
-
-
 def _best_pose(
-    map_: np.ndarray, kind: Kind, scale: float, start: tuple[float, float, float], steps: tuple[float, float, float]
-) -> Pose:
-    """Return the best of 45 poses around a start; steps along, across [px], turn [rad]."""
-    along, across, turn = (step * grid for step, grid in zip(steps, _GRID, strict=True))
+    map_: np.ndarray, kind: Kind, scale: float, start: tuple[float, float, float], steps: tuple[float, float, float],
+    far: int = 2,
+) -> Pose:  # fmt: skip
+    """Return the best of 9 (2 far + 1) poses around a start; steps along, across [px], turn [rad]."""
+    along, across, turn = (step * grid for step, grid in zip(steps, _grid(far), strict=True))
     cos, sin = np.cos(start[2]), np.sin(start[2])
     columns, rows = start[0] + along * cos - across * sin, start[1] + along * sin + across * cos
     scores, visible = _scores(map_, *outline(kind), scale, columns, rows, start[2] + turn)
@@ -110,20 +111,27 @@ def _best_pose(
     return float(scores[k]), float(columns[k]), float(rows[k]), float(start[2] + turn[k]), float(visible[k])
 
 
-_GRID = [part.reshape(-1) for part in np.meshgrid(np.arange(-2, 3), np.arange(-1, 2), np.arange(-1, 2))]
+@cache
+def _grid(far: int) -> tuple[np.ndarray, ...]:
+    near = np.arange(-1, 2)
+    return tuple(part.reshape(-1) for part in np.meshgrid(np.arange(-far, far + 1), near, near))
 
 
 def fit_utensil(map_: np.ndarray, scale: float, u: float, v: float, angle: float) -> Bar:
     """Return the best outline near a bar's centre [px] and direction [rad]; `scale` in pixels per metre."""
     found: list[tuple[Pose, Kind]] = []
+    part = _scores(map_, *outline("spoon"), scale, np.array([u]), np.array([v]), np.array([angle]))[1][0] < 0.9
     for kind in UTENSILS:
-        pose = max(_best_pose(map_, kind, scale, (u, v, angle + flip), (6.0, 2.0, 0.05)) for flip in (0.0, np.pi))
+        pose = max(
+            _best_pose(map_, kind, scale, (u, v, angle + flip), (6.0, 2.0, 0.05), 6 if part else 2)
+            for flip in (0.0, np.pi)
+        )
         for steps in ((2.0, 1.0, 0.02), (1.0, 0.5, 0.008)):
             pose = _best_pose(map_, kind, scale, pose[1:4], steps)
         found.append((pose, kind))
     found.sort(reverse=True)
     (score, u, v, angle, visible), kind = found[0]
-    return Bar(kind, u, v, angle, score, score - found[1][0][0], visible)
+    return Bar(kind, u, v, angle, score, visible, {kind: pose for pose, kind in found})
 
 
 def search_bars(map_: np.ndarray, scale: float, most: int) -> list[Bar]:
@@ -135,7 +143,7 @@ def search_bars(map_: np.ndarray, scale: float, most: int) -> list[Bar]:
         if len(rows) < 0.25 * MEASURES["spoon"].length * scale * 0.008 * scale:
             break
         starts = bar_candidates(rows, columns, MEASURES["spoon"].length * scale, STARTS)
-        fitted = [fit_utensil(rest, scale, *(float(value) for value in start[1:])) for start in starts]
+        fitted = [fit_utensil(rest, scale, float(start[1]), float(start[2]), float(start[3])) for start in starts]
         if not fitted:
             break
         best = max(fitted, key=lambda bar: bar.score)
