@@ -32,6 +32,8 @@ def bar_candidates(rows: np.ndarray, columns: np.ndarray, length: float, most: i
     """Return (N, 4) bars (votes, u [px], v [px], direction [rad]), most votes first, N <= `most`, of the item's pixels
     `rows`, `columns` (P,) [px]; `length` [px] of a bar. No two lie within 8 px and 10 degrees of each other."""
     best = np.zeros((2 * DIRECTIONS, 4))
+    if len(rows) == 0:
+        return best[:0]
     window = max(3, int(0.94 * length / ALONG))
     for d in range(DIRECTIONS):
         angle = np.pi * d / DIRECTIONS

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from stages.tableware.vision.detections import Detection
-from stages.tableware.vision.foreground import unlike_table
+from stages.tableware.vision.foreground import rising, unlike_table
 from stages.tableware.vision.height_map import HeightMap, height_map
 from stages.tableware.vision.rim_finding import Rim, find_rims, overlapping
 from stages.tableware.vision.stack_reading import LIP_TOLERANCE, Stack, read_stacks
@@ -59,7 +59,8 @@ def detect(color: np.ndarray, depth: np.ndarray, camera: OverheadCamera) -> tupl
             carrier = len(found) - 1
             _cover_bar(covered, heights, seen.bar, z)
     hidden = covered > 0
-    unlike = unlike_table(heights, cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0) & _workspace(heights)
+    near = cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0
+    unlike = rising(heights, unlike_table(heights, near), near) & _workspace(heights)
     lying, strange = utensils_on_table(heights, unlike, hidden)
     for seen in lying:
         here = np.array(heights.world(np.float64(seen.bar.u), np.float64(seen.bar.v), 0.0))
@@ -142,10 +143,13 @@ def _doubt(rim: Rim, stack: Stack, heights: HeightMap) -> tuple[float, tuple[str
 
 def _unknown(heights: HeightMap, covered: np.ndarray, strange: np.ndarray) -> list[Detection]:
     """Return what stands out and is no item that was found."""
-    around = cv2.dilate(covered, np.ones((13, 13), np.uint8)) > 0
-    high = ((heights.smooth > UNKNOWN_HEIGHT) & ~around & _workspace(heights)).astype(np.uint8)
-    high = cv2.morphologyEx(high, cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
-    count, labels, boxes, _ = cv2.connectedComponentsWithStats(high | (strange & ~around).astype(np.uint8))
+    high = (heights.smooth > UNKNOWN_HEIGHT) & _workspace(heights)
+    high = cv2.morphologyEx((high & (covered == 0)).astype(np.uint8), cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
+    high |= strange.astype(np.uint8)
+    if not high.any():
+        return []
+    high[cv2.dilate(covered, np.ones((13, 13), np.uint8)) > 0] = 0
+    count, labels, boxes, _ = cv2.connectedComponentsWithStats(high, ltype=cv2.CV_16U)
     result = []
     for label in range(1, count):
         left, top, width, height, area = boxes[label]

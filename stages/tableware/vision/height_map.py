@@ -7,6 +7,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numba import njit
 
 from schemas.errors import BadInput
 from stages.tableware.world.items import TABLE_SIDES
@@ -14,7 +15,10 @@ from stages.tableware.world.overhead import OverheadCamera
 
 TALLEST = 0.20
 """Nothing on the table reaches higher [m]."""
+LOWEST = np.float32(-0.02)
 LEAST_VALID = 0.2
+PLANE_WIDTH = 0.0025
+"""Width of the last fit's weights [m]: the noise of a dim image."""
 PLANE_BAND, PLANE_OFF = 0.015, 0.03
 """Table pixels lie this near [m] to the table's plane; the plane may be this far [m] from where the camera says."""
 
@@ -89,14 +93,9 @@ def height_map(color: np.ndarray, depth: np.ndarray, view: OverheadCamera) -> He
         raise BadInput(f"the depth image says {middle:.4g} where the table is {above:.3g} m away",
                        hint="depth must be in metres" if middle > 50 else "check the camera's height")  # fmt: skip
     plane = _table_plane(part, (camera.cx - left, camera.cy - top), (camera.fx, camera.fy), above)
-    columns = np.arange(right - left, dtype=np.float32) * np.float32(plane[0])
-    rows = np.arange(bottom - top, dtype=np.float32) * np.float32(plane[1])
-    raw = np.float32(plane[2]) + columns[None] + rows[:, None] - part
-    valid &= raw < TALLEST
-    # What lies beyond the table's edge counts as low: unknown there, it would be filled with the dish that juts out.
-    raw = np.where(valid, np.maximum(raw, np.float32(-0.02)), np.float32(0.0))
+    raw, valid = _heights(part, float(plane[0]), float(plane[1]), float(plane[2]))
     weight = cv2.boxFilter(valid.astype(np.float32), -1, (7, 7))
-    filled = np.where(valid, raw, cv2.boxFilter(raw, -1, (7, 7)) / np.maximum(weight, 1e-3))
+    filled = _filled(raw, valid, cv2.boxFilter(raw, -1, (7, 7)), weight)
     return HeightMap(
         raw, valid, cv2.medianBlur(filled, 5), color[top:bottom, left:right], (camera.fx, camera.fy),
         (camera.cx - left, camera.cy - top), above, (left, top),
@@ -104,23 +103,53 @@ def height_map(color: np.ndarray, depth: np.ndarray, view: OverheadCamera) -> He
 
 
 def _table_plane(part: np.ndarray, center: tuple[float, float], focal: tuple[float, float], above: float) -> np.ndarray:
-    """Return (a, b, c) of the table's depth a u + b v + c [m] by trimmed least squares on every fourth pixel."""
-    v, u = np.mgrid[0 : part.shape[0] : 4, 0 : part.shape[1] : 4]
-    z = part[::4, ::4]
+    """Return (a, b, c) of the table's depth a u + b v + c [m] on every sixth pixel, by least squares that leave out
+    more and more."""
+    v, u = np.mgrid[0 : part.shape[0] : 6, 0 : part.shape[1] : 6]
+    z = part[::6, ::6]
     inside = (np.abs(u - center[0]) < 0.49 * TABLE_SIDES[0] * focal[0] / above) & (
         np.abs(v - center[1]) < 0.49 * TABLE_SIDES[1] * focal[1] / above
     )
     u, v, z = u[inside & (z > 0)], v[inside & (z > 0)], z[inside & (z > 0)]
     near = z[np.abs(z - above) < PLANE_OFF]
-    if len(near) < 0.05 * max(len(z), 400):
+    if len(near) < 0.05 * max(len(z), 200):
         raise BadInput(
             f"no table is seen {above:.3g} m below the camera", hint="check the depth's scale and the height"
         )
     plane = np.array([0.0, 0.0, float(np.median(near))])
-    for band in (PLANE_BAND, 0.008, 0.006):
-        kept = np.abs(z - plane[0] * u - plane[1] * v - plane[2]) < band
-        if kept.sum() < 50:
+    columns = np.column_stack([u, v, np.ones(len(u))]).astype(np.float64)
+    for turn, width in enumerate((PLANE_BAND, 0.008, 0.004, PLANE_WIDTH, PLANE_WIDTH, PLANE_WIDTH)):
+        residual = z - columns @ plane
+        # Welsch's weights: floors of dishes and utensils lie above the table alone and would lift a trimmed mean.
+        weight = (np.abs(residual) < width).astype(float) if turn < 2 else np.exp(-0.5 * (residual / width) ** 2)
+        weight[np.abs(residual) > 4.0 * width] = 0.0
+        if weight.sum() < 50.0:
             break
-        columns = np.column_stack([u[kept], v[kept], np.ones(int(kept.sum()))])
-        plane = np.linalg.lstsq(columns, z[kept], rcond=None)[0]
+        weighted = columns * weight[:, None]
+        plane = np.linalg.solve(columns.T @ weighted + 1e-9 * np.eye(3), weighted.T @ z)
     return plane
+
+
+@njit(cache=True)
+def _heights(part: np.ndarray, a: float, b: float, c: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return heights (h, w) [m] over the plane of depth a u + b v + c, 0 where not valid, and (h, w) bool valid.
+
+    What lies beyond the table's edge counts as low: unknown there, it would be filled with the dish that juts out."""
+    raw, valid = np.zeros(part.shape, np.float32), np.zeros(part.shape, np.bool_)
+    for v in range(part.shape[0]):
+        for u in range(part.shape[1]):
+            height = np.float32(a * u + b * v + c - part[v, u])
+            if part[v, u] > 0.0 and height < TALLEST:
+                valid[v, u] = True
+                raw[v, u] = max(height, LOWEST)
+    return raw, valid
+
+
+@njit(cache=True)
+def _filled(raw: np.ndarray, valid: np.ndarray, sums: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    filled = raw.copy()
+    for v in range(raw.shape[0]):
+        for u in range(raw.shape[1]):
+            if not valid[v, u]:
+                filled[v, u] = sums[v, u] / max(weight[v, u], np.float32(1e-3))
+    return filled

@@ -13,10 +13,13 @@ import numpy as np
 
 from stages.tableware.vision.height_map import HeightMap
 from stages.tableware.vision.rim_fitting import RAYS, fit_circle
+from stages.tableware.vision.rim_votes import cast_votes
 from stages.tableware.world.items import DISHES, MEASURES, Kind
 
 LIPS: dict[Kind, tuple[float, float]] = {"cup": (0.066, 0.170), "bowl": (0.056, 0.145), "plate": (0.014, 0.048)}
 """Heights [m] between which a lip of the kind may be, stacks included."""
+LEAST_SLOPE = 0.0012
+"""Of an edge [m/px]."""
 LEAST_VOTES, LEAST_SUPPORT = 0.22, 0.42
 """Shares of the circumference that must vote, and that the fitted circle must explain."""
 
@@ -35,21 +38,15 @@ class Rim:
 
 def find_rims(heights: HeightMap) -> list[Rim]:
     """Return the rims of all kinds, surest first, none twice."""
-    smooth = cv2.GaussianBlur(heights.smooth, (0, 0), 2.0)
-    gx = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=0.125)
-    gy = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=0.125)
-    size = cv2.magnitude(gx, gy)
-    rows, columns = np.nonzero(size > 0.0012)
-    lip = cv2.dilate(heights.smooth, np.ones((5, 5), np.uint8))[rows, columns]
-    norm = size[rows, columns]
-    ux, uy = gx[rows, columns] / norm, gy[rows, columns] / norm
+    low, high = (np.array([LIPS[kind][end] for kind in DISHES]) for end in (0, 1))
+    votes = cast_votes(
+        cv2.GaussianBlur(heights.smooth, (0, 0), 2.0), heights.smooth,
+        np.array([MEASURES[kind].rim_radius for kind in DISHES]), low, high,
+        heights.focal[0], heights.camera_height, LEAST_SLOPE,
+    )  # fmt: skip
     found: list[Rim] = []
-    for kind in DISHES:
-        low, high = LIPS[kind]
-        usable = (lip > low) & (lip < high)
-        radius = np.asarray(heights.scale(lip[usable])) * MEASURES[kind].rim_radius
-        u, v = columns[usable] + radius * ux[usable], rows[usable] + radius * uy[usable]
-        rims = [fitted for u0, v0 in _peaks(u, v, norm[usable], heights, kind)
+    for kind, own in zip(DISHES, votes, strict=True):
+        rims = [fitted for u0, v0 in _peaks(own, heights, kind)
                 if (fitted := fit_rim(heights, kind, u0, v0)) is not None]  # fmt: skip
         for rim in sorted(rims, key=lambda rim: -rim.support):
             apart = 1.2 * MEASURES[kind].rim_radius
@@ -58,24 +55,18 @@ def find_rims(heights: HeightMap) -> list[Rim]:
     return found
 
 
-def _peaks(
-    u: np.ndarray, v: np.ndarray, weight: np.ndarray, heights: HeightMap, kind: Kind
-) -> list[tuple[float, float]]:
-    """Return places [px] where votes gather, most votes first. Votes count once a pixel of edge, at half resolution."""
-    rows, columns = heights.smooth.shape[0] // 2 + 1, heights.smooth.shape[1] // 2 + 1
-    inside = (u > 0) & (v > 0) & (u < 2 * columns - 2) & (v < 2 * rows - 2)
-    cell = (v[inside] * 0.5).astype(np.int64) * columns + (u[inside] * 0.5).astype(np.int64)
-    votes = np.bincount(cell, minlength=rows * columns).reshape(rows, columns).astype(np.float32)
-    votes = np.asarray(cv2.boxFilter(votes, -1, (7, 7), normalize=False), dtype=np.float32)
+def _peaks(votes: np.ndarray, heights: HeightMap, kind: Kind) -> list[tuple[float, float]]:
+    """Return places [px] where votes (at half resolution) gather, most votes first. A pixel of edge votes once."""
+    gathered = np.asarray(cv2.boxFilter(votes, -1, (7, 7), normalize=False), dtype=np.float32)
     circumference = 2.0 * np.pi * float(heights.scale(0.05)) * MEASURES[kind].rim_radius
     found = []
     apart = int(0.5 * MEASURES[kind].rim_radius * float(heights.scale(0.05)) * 0.6)
     for _ in range(16):
-        _, most, _, (column, row) = cv2.minMaxLoc(votes)
+        _, most, _, (column, row) = cv2.minMaxLoc(gathered)
         if most < LEAST_VOTES * circumference:
             break
         found.append((2.0 * column + 0.5, 2.0 * row + 0.5))
-        cv2.circle(votes, (column, row), apart, 0.0, -1)
+        cv2.circle(gathered, (column, row), apart, 0.0, -1)
     return found
 
 

@@ -25,6 +25,10 @@ LEAST_VISIBLE = 0.40
 UNKNOWN_WEIGHT = 0.5
 """Unknown points of an outline count as this much of a point that is half item and half not: an outline gains nothing
 by sliding to where nothing is known."""
+LEAST_VOTES = 1.5
+"""Votes per pixel of length under which a bar is not tried: a utensil that is wholly seen has about six."""
+GOOD_SCORE = 0.75
+"""No further candidate is tried from here."""
 STARTS = 4
 """Candidate bars that are fitted before the best is taken."""
 
@@ -142,12 +146,15 @@ def search_bars(map_: np.ndarray, scale: float, most: int) -> list[Bar]:
         rows, columns = np.nonzero(rest > 0)
         if len(rows) < 0.25 * MEASURES["spoon"].length * scale * 0.008 * scale:
             break
-        starts = bar_candidates(rows, columns, MEASURES["spoon"].length * scale, STARTS)
-        fitted = [fit_utensil(rest, scale, float(start[1]), float(start[2]), float(start[3])) for start in starts]
-        if not fitted:
-            break
-        best = max(fitted, key=lambda bar: bar.score)
-        if best.score < LEAST_SCORE or best.visible < LEAST_VISIBLE:
+        length = MEASURES["spoon"].length * scale
+        best: Bar | None = None
+        for start in bar_candidates(rows, columns, length, STARTS):
+            if start[0] < LEAST_VOTES * length or (best is not None and best.score > GOOD_SCORE):
+                break
+            bar = fit_utensil(rest, scale, float(start[1]), float(start[2]), float(start[3]))
+            if best is None or bar.score > best.score:
+                best = bar
+        if best is None or best.score < LEAST_SCORE or best.visible < LEAST_VISIBLE:
             break
         bars.append(best)
         erase_bar(rest, best, scale)

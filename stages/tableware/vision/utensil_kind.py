@@ -21,11 +21,9 @@ LEAST_CONTRAST = 15.0
 """Grey levels between a handle and what is beside it; less is noise."""
 SHIFTS = (0.0, 0.005, -0.005)
 """A spoon is 10 mm shorter: where the head ends may be off by half of that [m]."""
-WEIGHTS: dict[str, tuple[float, float, float, float]] = {
-    "table": (-3.5, 26.5, 1.7, 1.9),
-    "dish": (-3.6, 30.2, 1.6, 4.4),
-}
-"""Of a constant, the outlines' difference in score, the tines' height [mm] and their colour over the contrast."""
+WEIGHTS: dict[str, tuple[float, float, float]] = {"table": (26.8, 1.7, 2.2), "dish": (26.1, 1.6, 4.6)}
+"""Of the outlines' difference in score, the tines' height [mm] and their colour over the contrast, less MIDDLE."""
+MIDDLE: dict[str, tuple[float, float, float]] = {"table": (0.0, 1.3, 0.3), "dish": (0.0, 1.3, 0.3)}
 
 
 def kind_features(bar: Bar, heights: HeightMap, z: float, hidden: np.ndarray) -> tuple[float, float, float]:
@@ -51,12 +49,13 @@ def kind_features(bar: Bar, heights: HeightMap, z: float, hidden: np.ndarray) ->
     places = [(u - left + shift * scale * along[0], v - top + shift * scale * along[1]) for shift in SHIFTS]
     steps = [tine_difference(high, x, y, angle, scale) for x, y in places]
     tones = [tine_difference(gray, x, y, angle, scale, sign) for x, y in places]
-    known = [(step, tone) for step, tone in zip(steps, tones, strict=True) if not np.isnan(step + tone)]
     difference = bar.poses["fork"][0] - bar.poses["spoon"][0]
-    if not known:
-        return difference, float("nan"), float("nan")
-    step, tone_step = max(step for step, _ in known), max(tone for _, tone in known)
-    return difference, 1e3 * step, tone_step / max(abs(contrast), LEAST_CONTRAST)
+    return difference, 1e3 * _most(steps), _most(tones) / max(abs(contrast), LEAST_CONTRAST)
+
+
+def _most(values: list[float]) -> float:
+    known = [value for value in values if not np.isnan(value)]
+    return max(known) if known else float("nan")
 
 
 def _sampled(image: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -67,17 +66,18 @@ def _sampled(image: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 def fork_chance(features: tuple[float, float, float], place: str) -> float:
     """Return the chance 0..1 that a utensil with these features is a fork; `place` is `table` or `dish`."""
-    constant, *weights = WEIGHTS[place]
-    if np.isnan(features[1]):  # only the outline is known, and half of it: no more than a hint
-        logit = weights[0] * features[0]
-    else:
-        logit = constant + sum(weight * feature for weight, feature in zip(weights, _cut(features), strict=True))
+    logit = sum(
+        weight * (feature - middle)
+        for weight, feature, middle in zip(WEIGHTS[place], _cut(features), MIDDLE[place], strict=True)
+        if not np.isnan(feature)
+    )
     return 1.0 / (1.0 + exp(-min(max(logit, -30.0), 30.0)))
 
 
 def _cut(features: tuple[float, float, float]) -> tuple[float, float, float]:
     """Return features within what was seen while the weights were fitted: one odd pixel decides nothing."""
-    return features[0], min(max(features[1], -1.0), 4.0), min(max(features[2], -0.5), 1.5)
+    low, high = (-1.0, -1.0, -0.5), (1.0, 4.0, 1.5)
+    return tuple(float(np.clip(f, *ends)) for f, ends in zip(features, zip(low, high, strict=True), strict=True))  # type: ignore[return-value]
 
 
 def told_apart(bar: Bar, chance: float) -> Bar:
@@ -85,5 +85,3 @@ def told_apart(bar: Bar, chance: float) -> Bar:
     kind = "fork" if chance >= 0.5 else "spoon"
     score, u, v, angle, visible = bar.poses[kind]
     return Bar(kind, u, v, angle, score, visible, bar.poses)
-
-

@@ -11,7 +11,15 @@ import numpy as np
 from stages.tableware.vision.detections import Detection
 from stages.tableware.vision.height_map import HeightMap
 from stages.tableware.vision.stack_reading import Stack
-from stages.tableware.vision.utensil_finding import LEAST_SCORE, LEAST_VISIBLE, Bar, fit_utensil, outline, search_bars
+from stages.tableware.vision.utensil_finding import (
+    LEAST_SCORE,
+    LEAST_VISIBLE,
+    Bar,
+    erase_bar,
+    fit_utensil,
+    outline,
+    search_bars,
+)
 from stages.tableware.vision.utensil_kind import fork_chance, kind_features, told_apart
 from stages.tableware.world.items import MEASURES
 
@@ -27,6 +35,8 @@ FLAT = 0.0020
 """What looks unlike the table and rises less than this [m] is a shadow or a mark, and nothing to clear."""
 UNKNOWN_AREA = 0.00035
 """What stands out on more than this [m^2] without being an item is unknown."""
+MOST_CUT = 3
+"""Utensils in two parts that are looked for."""
 SURE_OF_KIND = 0.9
 """Chance of the likelier kind under which fork and spoon are in doubt."""
 MOSTLY_SEEN = 0.7
@@ -66,12 +76,15 @@ def utensils_on_dish(heights: HeightMap, stack: Stack, covered: np.ndarray, labe
     part, owner = heights.smooth[window], covered[window]
     if part.size == 0:
         return []
+    hollow = top.inner_radius(top.height)
+    inner = heights.smooth[_square(v, hollow - 0.010, scale)][:, _square(u, hollow - 0.010, scale)]
+    if np.count_nonzero(np.abs(inner[::2, ::2] - np.float32(z)) < BAND) < 0.1 * hollow * 0.006 * scale**2:
+        return []
     columns = np.arange(left, left + part.shape[1], dtype=np.float32) - np.float32(u)
     rows = np.arange(up, up + part.shape[0], dtype=np.float32) - np.float32(v)
     distance = np.sqrt(columns[None] ** 2 + rows[:, None] ** 2) * np.float32(1.0 / scale)
     # The gaps between tines show what is below: the highest of three by three closes them.
     high = np.abs(cv2.dilate(part, np.ones((3, 3), np.uint8)) - np.float32(z)) < BAND
-    hollow = top.inner_radius(top.height)
     if np.count_nonzero(high & (distance < hollow - 0.010)) < 0.9 * hollow * 0.006 * scale**2:
         return []
     map_ = np.where(high, 1, -1).astype(np.int8)
@@ -82,6 +95,11 @@ def utensils_on_dish(heights: HeightMap, stack: Stack, covered: np.ndarray, labe
     nothing = np.zeros(heights.smooth.shape, dtype=bool)
     seen = [_seen(bar, heights, stack.top, "dish", nothing) for bar in bars]
     return sorted(seen, key=lambda one: _middle_height(heights, one.bar, z))
+
+
+def _square(center: float, half: float, scale: float) -> slice:
+    """Return the pixels within `half` [m] of a centre [px], along one axis."""
+    return slice(max(0, int(center - half * scale)), max(0, int(center + half * scale) + 1))
 
 
 def _shifted(bar: Bar, du: float, dv: float) -> Bar:
@@ -131,10 +149,14 @@ def utensils_on_table(
     the table and is none. `unlike` (h, w) bool: what looks like no table; `hidden` (h, w) bool: where dishes are."""
     scale = float(heights.scale(0.003))
     whole = UTENSIL_AREA * scale**2
-    count, labels, boxes, _ = cv2.connectedComponentsWithStats(unlike.astype(np.uint8), connectivity=8)
-    seen: list[SeenUtensil] = []
+    count, labels, boxes, _ = cv2.connectedComponentsWithStats(
+        unlike.astype(np.uint8), connectivity=8, ltype=cv2.CV_16U
+    )
     strange = np.zeros(unlike.shape, dtype=bool)
+    rest = np.where(unlike, 1, -1).astype(np.int8)
+    rest[hidden] = 0
     margin = int(0.05 * scale)
+    seen: list[SeenUtensil] = []
     for label in range(1, count):
         left, top, width, height, area = boxes[label]
         if area < 0.25 * whole:
@@ -149,14 +171,27 @@ def utensils_on_table(
         found = _lone_bar(map_, own, scale, area, whole)
         if not found:
             found = search_bars(map_, scale, min(5, int(area / whole + 1.5)))
+        found = [_shifted(bar, window[1].start, window[0].start) for bar in found]
         if not found and area > UNKNOWN_AREA * scale**2 and heights.smooth[window][own].mean() > FLAT:
             strange[window] |= own
-        for bar in found:
-            one = _seen(_shifted(bar, window[1].start, window[0].start), heights, 0.0, "table", hidden)
-            # The rim of a shadow may be as slender as a utensil; it does not rise over the table.
-            if not one.relief < LEAST_RELIEF:
-                seen.append(one)
+        seen.extend(_that_rise(found, heights, hidden, rest, scale))
+    # What a dish cuts in two is found by its parts together.
+    if np.count_nonzero(rest > 0) > LEAST_VISIBLE * 0.5 * whole:
+        seen.extend(_that_rise(search_bars(rest, scale, MOST_CUT), heights, hidden, rest, scale))
+    strange &= rest > 0
     return sorted(seen, key=lambda one: 0.0 if np.isnan(one.relief) else one.relief), strange
+
+
+def _that_rise(
+    bars: list[Bar], heights: HeightMap, hidden: np.ndarray, rest: np.ndarray, scale: float
+) -> list[SeenUtensil]:
+    """Return the bars that rise over the table, which the rim of a shadow as slender as a utensil does not, and set
+    `rest` (h, w) to unknown where they lie, in place."""
+    seen = [_seen(bar, heights, 0.0, "table", hidden) for bar in bars]
+    kept = [one for one in seen if not one.relief < LEAST_RELIEF]
+    for one in kept:
+        erase_bar(rest, one.bar, scale)
+    return kept
 
 
 def _lone_bar(map_: np.ndarray, own: np.ndarray, scale: float, area: int, whole: float) -> list[Bar]:
