@@ -15,10 +15,11 @@ import cv2
 import numpy as np
 
 from stages.tableware.vision.detections import Detection
+from stages.tableware.vision.dish_reading import cover_stack, dishes_of
 from stages.tableware.vision.foreground import rising, unlike_table
 from stages.tableware.vision.height_map import HeightMap, height_map
-from stages.tableware.vision.rim_finding import Rim, find_rims, overlapping
-from stages.tableware.vision.stack_reading import LIP_TOLERANCE, Stack, read_stacks
+from stages.tableware.vision.rim_finding import find_rims, overlapping
+from stages.tableware.vision.stack_reading import read_stacks
 from stages.tableware.vision.utensil_finding import Bar
 from stages.tableware.vision.utensil_reading import (
     SAME_PLACE,
@@ -30,29 +31,30 @@ from stages.tableware.vision.utensil_reading import (
 from stages.tableware.world.items import MEASURES, TABLE_SIDES, UTENSILS
 from stages.tableware.world.overhead import OverheadCamera
 
-LEAST_DEPTH, MOST_GLARE = 0.45, 0.10
-"""Shares of a lip's pixels with depth, and of a dish's pixels at full white, at which there is doubt."""
 UNKNOWN_HEIGHT = 0.010
 """What rises over this [m] on more than UNKNOWN_AREA without being an item is unknown."""
 
 
-def detect(color: np.ndarray, depth: np.ndarray, camera: OverheadCamera) -> tuple[Detection, ...]:
+def detect(
+    color: np.ndarray, depth: np.ndarray, camera: OverheadCamera, sides: tuple[float, float] = TABLE_SIDES
+) -> tuple[Detection, ...]:
     """Return the items in an image; what carries another comes before it.
 
-    `color` (H, W, 3) uint8, `depth` (H, W) z-depth [m], 0 where unknown. An empty table gives an empty tuple. Raises
-    BadInput when there is no depth, its scale is wrong, or the images do not fit the camera.
+    `color` (H, W, 3) uint8, `depth` (H, W) z-depth [m], 0 where unknown; `sides` of the workspace along x and y [m]. An
+    empty table gives an empty tuple. Raises BadInput when there is no depth, its scale is wrong, or the images do not
+    fit the camera.
     """
-    heights = height_map(color, depth, camera)
+    heights = height_map(color, depth, camera, sides)
     rims = find_rims(heights)
     crossed = {id(rims[index]) for index in overlapping(rims)}
     stacks = read_stacks(rims)
     covered = np.zeros(heights.smooth.shape, dtype=np.uint8)
     for index, stack in enumerate(stacks):
-        _cover(covered, heights, stack, index + 1)
+        cover_stack(covered, heights, stack, index + 1)
     found: list[Detection] = []
     for index, stack in enumerate(stacks):
         carrier = len(found) + len(stack.kinds) - 1
-        found.extend(_dishes(stack, heights, crossed, len(found)))
+        found.extend(dishes_of(stack, heights, crossed, len(found)))
         for level, seen in enumerate(utensils_on_dish(heights, stack, covered, index + 1)):
             z = stack.top + level * MEASURES[seen.bar.kind].height
             found.append(as_detection(seen, heights, z, carrier))
@@ -70,18 +72,7 @@ def detect(color: np.ndarray, depth: np.ndarray, camera: OverheadCamera) -> tupl
         found.append(as_detection(seen, heights, z, below[0] if below else None))
         _cover_bar(covered, heights, seen.bar, z)
     found.extend(_unknown(heights, covered, strange))
-    return tuple(_outside(one) for one in found)
-
-
-def _cover(covered: np.ndarray, heights: HeightMap, stack: Stack, label: int) -> None:
-    """Write a label where dishes are seen, in place: discs of their outer radius at several heights."""
-    for kind, foot in zip(stack.kinds, stack.feet, strict=True):
-        measures = MEASURES[kind]
-        for share in (0.0, 0.25, 0.5, 0.75, 1.0):
-            z = foot + share * measures.height
-            u, v = heights.pixel(np.float64(stack.x), np.float64(stack.y), z)
-            radius = float(heights.scale(z)) * measures.outer_radius(share * measures.height) + 2.0
-            cv2.circle(covered, (int(round(float(u))), int(round(float(v)))), int(round(radius)), label, -1)
+    return tuple(_outside(one, sides) for one in found)
 
 
 def _cover_bar(covered: np.ndarray, heights: HeightMap, bar: Bar, z: float) -> None:
@@ -95,50 +86,10 @@ def _workspace(heights: HeightMap) -> np.ndarray:
     """Return (h, w) bool: the table top in the image, less two pixels."""
     mask = np.zeros(heights.smooth.shape, dtype=bool)
     (left, right), (bottom, top) = heights.pixel(
-        np.array([-0.5, 0.5]) * TABLE_SIDES[0], np.array([-0.5, 0.5]) * TABLE_SIDES[1], 0.0
+        np.array([-0.5, 0.5]) * heights.sides[0], np.array([-0.5, 0.5]) * heights.sides[1], 0.0
     )
     mask[max(0, int(top) + 3) : int(bottom) - 1, max(0, int(left) + 3) : int(right) - 1] = True
     return mask
-
-
-def _dishes(stack: Stack, heights: HeightMap, crossed: set[int], first: int) -> list[Detection]:
-    """Return the dishes of a stack from the lowest up; those under one of their own kind are hidden."""
-    result = []
-    rims = {rim.kind: rim for rim in stack.rims}
-    for level, (kind, foot) in enumerate(zip(stack.kinds, stack.feet, strict=True)):
-        rim = rims[kind]
-        hidden = level + 1 < len(stack.kinds) and stack.kinds[level + 1] == kind
-        confidence, reasons = _doubt(rim, stack, heights)
-        if id(rim) in crossed:
-            confidence, reasons = 0.5 * confidence, (*reasons, "overlapping rims")
-        at = (stack.x, stack.y) if hidden else (rim.x, rim.y)
-        result.append(
-            Detection(
-                kind=kind, position=(*at, foot), lip=foot + MEASURES[kind].height, hidden=hidden,
-                on=first + level - 1 if level else None, confidence=confidence * (0.9 if hidden else 1.0),
-                unsure=reasons,
-            )
-        )  # fmt: skip
-    return result
-
-
-def _doubt(rim: Rim, stack: Stack, heights: HeightMap) -> tuple[float, tuple[str, ...]]:
-    """Return the confidence 0..1 in a rim and the reasons for doubt."""
-    reasons = []
-    confidence = min(1.0, rim.support / 0.65) * float(np.exp(-0.5 * (stack.misfit / LIP_TOLERANCE) ** 2))
-    if rim.depth_share < LEAST_DEPTH:
-        reasons.append("no depth")
-        confidence *= rim.depth_share / LEAST_DEPTH
-    if stack.misfit > LIP_TOLERANCE:
-        reasons.append("a stack of unknown height")
-    u, v = (float(value) for value in heights.pixel(np.float64(rim.x), np.float64(rim.y), rim.lip))
-    radius = 0.7 * MEASURES[rim.kind].rim_radius * float(heights.scale(rim.lip))
-    part = heights.color[max(0, int(v - radius)) : int(v + radius) + 1, max(0, int(u - radius)) : int(u + radius) + 1]
-    bright = part.min(axis=2) if part.size else np.zeros((1, 1))
-    if float((bright >= 253).mean()) > MOST_GLARE and float(np.median(bright)) < 250:
-        reasons.append("glare")
-        confidence *= 0.7
-    return confidence, tuple(reasons)
 
 
 def _unknown(heights: HeightMap, covered: np.ndarray, strange: np.ndarray) -> list[Detection]:
@@ -168,10 +119,10 @@ def _unknown(heights: HeightMap, covered: np.ndarray, strange: np.ndarray) -> li
     return result
 
 
-def _outside(one: Detection) -> Detection:
+def _outside(one: Detection, sides: tuple[float, float]) -> Detection:
     """Return a detection with the doubt that its middle, or a dish's rim, is not over the workspace."""
     reach = MEASURES[one.kind].rim_radius if one.kind is not None else 0.0
-    over = [abs(one.position[axis]) + reach - 0.5 * TABLE_SIDES[axis] for axis in (0, 1)]
+    over = [abs(one.position[axis]) + reach - 0.5 * sides[axis] for axis in (0, 1)]
     if max(over) > 0.006:
         return replace(one, unsure=(*one.unsure, "outside of the workspace"), confidence=0.5 * one.confidence)
     return one

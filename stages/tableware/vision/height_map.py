@@ -41,6 +41,8 @@ class HeightMap:
     camera_height: float
     corner: tuple[int, int]
     """Column and row of the part's first pixel in the whole image."""
+    sides: tuple[float, float] = TABLE_SIDES
+    """Of the workspace along x and y [m]; its middle is below the camera."""
 
     def scale(self, z: float | np.ndarray) -> float | np.ndarray:
         """Return pixels per metre at height z [m]."""
@@ -73,14 +75,16 @@ def check_images(color: np.ndarray, depth: np.ndarray, view: OverheadCamera) -> 
         raise BadInput("the depth image holds values that are no numbers", hint="use 0 where there is no depth")
 
 
-def height_map(color: np.ndarray, depth: np.ndarray, view: OverheadCamera) -> HeightMap:
+def height_map(
+    color: np.ndarray, depth: np.ndarray, view: OverheadCamera, sides: tuple[float, float] = TABLE_SIDES
+) -> HeightMap:
     """Return heights above the table plane, which is fitted to the depth.
 
     `color` (H, W, 3) uint8, `depth` (H, W) metres, 0 where unknown. Raises BadInput for no depth or a wrong scale.
     """
     check_images(color, depth, view)
     camera, above = view.camera, float(view.world_from_camera[2, 3])
-    half = [0.5 * side * camera.fx / (above - 0.15) + 6 for side in TABLE_SIDES]
+    half = [0.5 * side * camera.fx / (above - 0.15) + 6 for side in sides]
     left, top = max(0, int(camera.cx - half[0])), max(0, int(camera.cy - half[1]))
     right, bottom = min(camera.width, int(camera.cx + half[0]) + 2), min(camera.height, int(camera.cy + half[1]) + 2)
     part = np.ascontiguousarray(depth[top:bottom, left:right], dtype=np.float32)
@@ -92,23 +96,26 @@ def height_map(color: np.ndarray, depth: np.ndarray, view: OverheadCamera) -> He
     if not 0.5 * above < middle < 2.2 * above:
         raise BadInput(f"the depth image says {middle:.4g} where the table is {above:.3g} m away",
                        hint="depth must be in metres" if middle > 50 else "check the camera's height")  # fmt: skip
-    plane = _table_plane(part, (camera.cx - left, camera.cy - top), (camera.fx, camera.fy), above)
+    plane = _table_plane(part, (camera.cx - left, camera.cy - top), (camera.fx, camera.fy), above, sides)
     raw, valid = _heights(part, float(plane[0]), float(plane[1]), float(plane[2]))
     weight = cv2.boxFilter(valid.astype(np.float32), -1, (7, 7))
     filled = _filled(raw, valid, cv2.boxFilter(raw, -1, (7, 7)), weight)
     return HeightMap(
         raw, valid, cv2.medianBlur(filled, 5), color[top:bottom, left:right], (camera.fx, camera.fy),
-        (camera.cx - left, camera.cy - top), above, (left, top),
+        (camera.cx - left, camera.cy - top), above, (left, top), sides,
     )  # fmt: skip
 
 
-def _table_plane(part: np.ndarray, center: tuple[float, float], focal: tuple[float, float], above: float) -> np.ndarray:
+def _table_plane(
+    part: np.ndarray, center: tuple[float, float], focal: tuple[float, float], above: float,
+    sides: tuple[float, float],
+) -> np.ndarray:  # fmt: skip
     """Return (a, b, c) of the table's depth a u + b v + c [m] on every sixth pixel, by least squares that leave out
     more and more."""
     v, u = np.mgrid[0 : part.shape[0] : 6, 0 : part.shape[1] : 6]
     z = part[::6, ::6]
-    inside = (np.abs(u - center[0]) < 0.49 * TABLE_SIDES[0] * focal[0] / above) & (
-        np.abs(v - center[1]) < 0.49 * TABLE_SIDES[1] * focal[1] / above
+    inside = (np.abs(u - center[0]) < 0.49 * sides[0] * focal[0] / above) & (
+        np.abs(v - center[1]) < 0.49 * sides[1] * focal[1] / above
     )
     u, v, z = u[inside & (z > 0)], v[inside & (z > 0)], z[inside & (z > 0)]
     near = z[np.abs(z - above) < PLANE_OFF]
