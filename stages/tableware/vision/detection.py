@@ -17,7 +17,7 @@ import numpy as np
 from stages.tableware.vision.detections import Detection
 from stages.tableware.vision.dish_reading import cover_stack, dishes_of
 from stages.tableware.vision.foreground import rising, unlike_table
-from stages.tableware.vision.height_map import HeightMap, height_map
+from stages.tableware.vision.height_map import TALLEST, HeightMap, height_map
 from stages.tableware.vision.rim_finding import find_rims, overlapping
 from stages.tableware.vision.stack_reading import read_stacks
 from stages.tableware.vision.utensil_finding import Bar
@@ -44,7 +44,11 @@ def detect(
     empty table gives an empty tuple. Raises BadInput when there is no depth, its scale is wrong, or the images do not
     fit the camera.
     """
-    heights = height_map(color, depth, camera, sides)
+    return items_in(height_map(color, depth, camera, sides))
+
+
+def items_in(heights: HeightMap) -> tuple[Detection, ...]:
+    """Return the items in a map of heights, as `detect` does."""
     rims = find_rims(heights)
     crossed = {id(rims[index]) for index in overlapping(rims)}
     stacks = read_stacks(rims)
@@ -62,7 +66,7 @@ def detect(
             _cover_bar(covered, heights, seen.bar, z)
     hidden = covered > 0
     near = cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0
-    unlike = rising(heights, unlike_table(heights, near), near) & _workspace(heights)
+    unlike = rising(heights, unlike_table(heights, near), near) & heights.workspace()
     lying, strange = utensils_on_table(heights, unlike, hidden)
     for seen in lying:
         here = np.array(heights.world(np.float64(seen.bar.u), np.float64(seen.bar.v), 0.0))
@@ -72,7 +76,7 @@ def detect(
         found.append(as_detection(seen, heights, z, below[0] if below else None))
         _cover_bar(covered, heights, seen.bar, z)
     found.extend(_unknown(heights, covered, strange))
-    return tuple(_outside(one, sides) for one in found)
+    return tuple(_outside(one, heights.sides) for one in found)
 
 
 def _cover_bar(covered: np.ndarray, heights: HeightMap, bar: Bar, z: float) -> None:
@@ -82,19 +86,9 @@ def _cover_bar(covered: np.ndarray, heights: HeightMap, bar: Bar, z: float) -> N
     cv2.line(covered, ends[0], ends[1], 255, int(1.5 * MEASURES[bar.kind].width * float(heights.scale(z))))
 
 
-def _workspace(heights: HeightMap) -> np.ndarray:
-    """Return (h, w) bool: the table top in the image, less two pixels."""
-    mask = np.zeros(heights.smooth.shape, dtype=bool)
-    (left, right), (bottom, top) = heights.pixel(
-        np.array([-0.5, 0.5]) * heights.sides[0], np.array([-0.5, 0.5]) * heights.sides[1], 0.0
-    )
-    mask[max(0, int(top) + 3) : int(bottom) - 1, max(0, int(left) + 3) : int(right) - 1] = True
-    return mask
-
-
 def _unknown(heights: HeightMap, covered: np.ndarray, strange: np.ndarray) -> list[Detection]:
     """Return what stands out and is no item that was found."""
-    high = (heights.smooth > UNKNOWN_HEIGHT) & _workspace(heights)
+    high = ((heights.smooth > max(UNKNOWN_HEIGHT, 4.0 * heights.roughness)) | heights.tall) & heights.workspace()
     high = cv2.morphologyEx((high & (covered == 0)).astype(np.uint8), cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
     high |= strange.astype(np.uint8)
     if not high.any():
@@ -106,6 +100,9 @@ def _unknown(heights: HeightMap, covered: np.ndarray, strange: np.ndarray) -> li
         left, top, width, height, area = boxes[label]
         inside = labels[top : top + height, left : left + width] == label
         tall = float(np.percentile(heights.smooth[top : top + height, left : left + width][inside], 90))
+        reason = "unknown object"
+        if heights.tall[top : top + height, left : left + width][inside].any():
+            tall, reason = TALLEST, f"taller than {TALLEST:.2f} m"
         scale = float(heights.scale(max(0.0, tall)))
         if area < UNKNOWN_AREA * scale**2:
             continue
@@ -113,7 +110,7 @@ def _unknown(heights: HeightMap, covered: np.ndarray, strange: np.ndarray) -> li
         result.append(
             Detection(
                 kind=None, position=(float(x), float(y), 0.0), lip=max(0.0, tall), confidence=0.0,
-                extent=0.5 * float(np.hypot(width, height)) / scale, unsure=("unknown object",),
+                extent=0.5 * float(np.hypot(width, height)) / scale, unsure=(reason,),
             )
         )  # fmt: skip
     return result

@@ -31,6 +31,8 @@ class HeightMap:
     """Height above the table [m], NaN-free; 0 where not valid."""
     valid: np.ndarray
     """bool, whether the sensor reports a depth."""
+    tall: np.ndarray
+    """bool, whether what is there is higher than TALLEST: not valid."""
     smooth: np.ndarray
     """Height [m], gaps filled from around, median over 5 x 5."""
     color: np.ndarray
@@ -43,6 +45,8 @@ class HeightMap:
     """Column and row of the part's first pixel in the whole image."""
     sides: tuple[float, float] = TABLE_SIDES
     """Of the workspace along x and y [m]; its middle is below the camera."""
+    roughness: float = 0.0
+    """Standard deviation of the table's smoothed heights [m] where it was measured: real depth has waves."""
 
     def scale(self, z: float | np.ndarray) -> float | np.ndarray:
         """Return pixels per metre at height z [m]."""
@@ -57,6 +61,19 @@ class HeightMap:
         """Return world (x, y) [m] of pixels at height z [m]."""
         range_ = self.camera_height - z
         return (u - self.center[0]) / self.focal[0] * range_, -(v - self.center[1]) / self.focal[1] * range_
+
+    def workspace(self) -> np.ndarray:
+        """Return (h, w) bool: the table top in the image, less two pixels."""
+        mask = np.zeros(self.smooth.shape, dtype=bool)
+        half = 0.5 * np.array(self.sides)
+        (left, right), (bottom, top) = self.pixel(half[0] * np.array([-1, 1]), half[1] * np.array([-1, 1]), 0.0)
+        mask[max(0, int(top) + 3) : max(0, int(bottom) - 1), max(0, int(left) + 3) : max(0, int(right) - 1)] = True
+        return mask
+
+    def measured_roughness(self) -> float:
+        """Return the standard deviation (from the median deviation) of `smooth` on the bare table [m]."""
+        values = self.smooth[self.workspace() & self.valid & (np.abs(self.smooth) < PLANE_BAND)]
+        return 1.4826 * float(np.median(np.abs(values - np.median(values)))) if len(values) > 100 else 0.0
 
 
 def check_images(color: np.ndarray, depth: np.ndarray, view: OverheadCamera) -> None:
@@ -97,11 +114,11 @@ def height_map(
         raise BadInput(f"the depth image says {middle:.4g} where the table is {above:.3g} m away",
                        hint="depth must be in metres" if middle > 50 else "check the camera's height")  # fmt: skip
     plane = _table_plane(part, (camera.cx - left, camera.cy - top), (camera.fx, camera.fy), above, sides)
-    raw, valid = _heights(part, float(plane[0]), float(plane[1]), float(plane[2]))
+    raw, valid, tall = _heights(part, float(plane[0]), float(plane[1]), float(plane[2]))
     weight = cv2.boxFilter(valid.astype(np.float32), -1, (7, 7))
     filled = _filled(raw, valid, cv2.boxFilter(raw, -1, (7, 7)), weight)
     return HeightMap(
-        raw, valid, cv2.medianBlur(filled, 5), color[top:bottom, left:right], (camera.fx, camera.fy),
+        raw, valid, tall, cv2.medianBlur(filled, 5), color[top:bottom, left:right], (camera.fx, camera.fy),
         (camera.cx - left, camera.cy - top), above, (left, top), sides,
     )  # fmt: skip
 
@@ -138,18 +155,23 @@ def _table_plane(
 
 
 @njit(cache=True)
-def _heights(part: np.ndarray, a: float, b: float, c: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return heights (h, w) [m] over the plane of depth a u + b v + c, 0 where not valid, and (h, w) bool valid.
+def _heights(part: np.ndarray, a: float, b: float, c: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return heights (h, w) [m] over the plane of depth a u + b v + c, 0 where not valid, (h, w) bool valid, and (h, w)
+    bool taller than TALLEST.
 
     What lies beyond the table's edge counts as low: unknown there, it would be filled with the dish that juts out."""
     raw, valid = np.zeros(part.shape, np.float32), np.zeros(part.shape, np.bool_)
+    tall = np.zeros(part.shape, np.bool_)
     for v in range(part.shape[0]):
         for u in range(part.shape[1]):
             height = np.float32(a * u + b * v + c - part[v, u])
-            if part[v, u] > 0.0 and height < TALLEST:
-                valid[v, u] = True
-                raw[v, u] = max(height, LOWEST)
-    return raw, valid
+            if part[v, u] > 0.0:
+                if height < TALLEST:
+                    valid[v, u] = True
+                    raw[v, u] = max(height, LOWEST)
+                else:
+                    tall[v, u] = True
+    return raw, valid, tall
 
 
 @njit(cache=True)

@@ -33,6 +33,8 @@ LEAST_RELIEF = 0.0008
 """A utensil rises this much over the table [m], on average over its plan."""
 FLAT = 0.0020
 """What looks unlike the table and rises less than this [m] is a shadow or a mark, and nothing to clear."""
+ROUGH = 3.0
+"""Times a table's measured roughness: less is a wave in the depth."""
 UNKNOWN_AREA = 0.00035
 """What stands out on more than this [m^2] without being an item is unknown."""
 MOST_CUT = 3
@@ -175,7 +177,11 @@ def utensils_on_table(
         if not found:
             found = search_bars(map_, scale, min(5, int(area / whole + 1.5)))
         found = [_shifted(bar, window[1].start, window[0].start) for bar in found]
-        if not found and area > UNKNOWN_AREA * scale**2 and heights.smooth[window][own].mean() > FLAT:
+        if (
+            not found
+            and area > UNKNOWN_AREA * scale**2
+            and heights.smooth[window][own].mean() > max(FLAT, ROUGH * heights.roughness)
+        ):
             strange[window] |= own
         seen.extend(_that_rise(found, heights, hidden, rest, scale))
     # What a dish cuts in two is found by its parts together.
@@ -191,7 +197,7 @@ def _that_rise(
     """Return the bars that rise over the table, which the rim of a shadow as slender as a utensil does not, and set
     `rest` (h, w) to unknown where they lie, in place."""
     seen = [_seen(bar, heights, 0.0, "table", hidden) for bar in bars]
-    kept = [one for one in seen if not one.relief < LEAST_RELIEF]
+    kept = [one for one in seen if not one.relief < max(LEAST_RELIEF, ROUGH * heights.roughness)]
     for one in kept:
         erase_bar(rest, one.bar, scale)
     return kept
