@@ -77,8 +77,11 @@ def _apart(found: list[Detection]) -> list[Detection]:
     """Return dishes less those whose middle is within one that is surer."""
     kept: list[Detection] = []
     for one in sorted(found, key=lambda one: -one.confidence):
-        if all(np.hypot(one.position[0] - other.position[0], one.position[1] - other.position[1]) > other.size.rim_radius
-               for other in kept if other.size is not None):  # fmt: skip
+        (x, y, _), apart = one.position, True
+        for other in kept:
+            reach = other.size.rim_radius if other.size is not None else 0.0
+            apart &= bool(np.hypot(x - other.position[0], y - other.position[1]) > reach)
+        if apart:
             kept.append(one)
     return kept
 
