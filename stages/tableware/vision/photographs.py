@@ -17,14 +17,14 @@ from stages.tableware.world.items import DISHES, MEASURES, Kind
 WIDTH = 960
 """Pictures are looked at in this width [px]."""
 CANNY = (40.0, 110.0)
-LEAST_POINTS, LEAST_AXIS, MOST_AXIS = 30, 0.02, 0.5
+LEAST_POINTS, LEAST_AXIS, MOST_AXIS = 30, 0.035, 0.5
 """Points of a contour; greater axis of an ellipse over the picture's width."""
 FLATTEST = 0.25
 """Smaller over greater axis."""
-NEAR = 2.5
-"""An edge this near to the ellipse is on it [px]."""
-LEAST_SUPPORT = 0.55
-"""Share of 72 directions with an edge."""
+LEAST_SLOPE, ALIGNED = 6.0, 0.90
+"""Tone's change across an edge [levels/px], and cosine of its angle to the ellipse's normal."""
+LEAST_SUPPORT = 0.8
+"""Share of 72 directions with such an edge within 2 px."""
 SAME = 0.4
 """Ellipses whose boxes overlap by this share of the smaller are one thing."""
 
@@ -46,7 +46,8 @@ def find_outlines(color: np.ndarray, picture_width: float | None = None) -> tupl
     small = cv2.resize(color, (WIDTH, max(1, round(color.shape[0] * factor))), interpolation=cv2.INTER_AREA)
     gray = cv2.bilateralFilter(cv2.cvtColor(small, cv2.COLOR_RGB2GRAY), 7, 30.0, 5.0)
     edges = cv2.Canny(gray, *CANNY)
-    distance = cv2.distanceTransform(255 - edges, cv2.DIST_L2, 3)
+    smooth = cv2.GaussianBlur(gray, (0, 0), 1.5)
+    slopes = np.stack([cv2.Sobel(smooth, cv2.CV_32F, *axis, scale=0.25) for axis in ((1, 0), (0, 1))], axis=2)
     closed = cv2.morphologyEx(edges, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     contours, _ = cv2.findContours(closed, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     found: list[Outline] = []
@@ -60,7 +61,7 @@ def find_outlines(color: np.ndarray, picture_width: float | None = None) -> tupl
             great, little = max(axes), min(axes)
             if not LEAST_AXIS * WIDTH < great < MOST_AXIS * WIDTH or little < FLATTEST * great:
                 continue
-            support, box = _support(distance, (u, v), axes, degrees)
+            support, box = _support(slopes, (u, v), axes, degrees)
             if support >= LEAST_SUPPORT:
                 kind, reasons = _kind(great, picture_width)
                 left, top, right, bottom = (float(value / factor) for value in box)
@@ -69,18 +70,27 @@ def find_outlines(color: np.ndarray, picture_width: float | None = None) -> tupl
 
 
 def _support(
-    distance: np.ndarray, center: tuple[float, float], axes: tuple[float, float], degrees: float
+    slopes: np.ndarray, center: tuple[float, float], axes: tuple[float, float], degrees: float
 ) -> tuple[float, tuple[float, float, float, float]]:
-    """Return the share of directions with an edge on the ellipse, and its box (left, top, right, bottom)."""
+    """Return the share of directions in which the picture's tone changes across the ellipse, and more across than
+    along it, and the ellipse's box (left, top, right, bottom). `slopes` (H, W, 2) are the tone's."""
     angles = 2.0 * np.pi * np.arange(72) / 72
     turn = np.deg2rad(degrees)
+    cos, sin = np.cos(turn), np.sin(turn)
     along, across = 0.5 * axes[0] * np.cos(angles), 0.5 * axes[1] * np.sin(angles)
-    u = center[0] + along * np.cos(turn) - across * np.sin(turn)
-    v = center[1] + along * np.sin(turn) + across * np.cos(turn)
-    inside = (u >= 0) & (v >= 0) & (u < distance.shape[1] - 0.5) & (v < distance.shape[0] - 0.5)
-    values = distance[np.rint(v[inside]).astype(int), np.rint(u[inside]).astype(int)]
-    share = float((values < NEAR).sum()) / 72.0
-    return share, (float(u.min()), float(v.min()), float(u.max()), float(v.max()))
+    u, v = center[0] + along * cos - across * sin, center[1] + along * sin + across * cos
+    outward = np.column_stack([np.cos(angles) / axes[0], np.sin(angles) / axes[1]])
+    outward /= np.linalg.norm(outward, axis=1)[:, None]
+    normal = np.column_stack([outward[:, 0] * cos - outward[:, 1] * sin, outward[:, 0] * sin + outward[:, 1] * cos])
+    agreed = np.zeros(72, dtype=bool)
+    for reach in (-2.0, -1.0, 0.0, 1.0, 2.0):
+        columns = np.rint(u + reach * normal[:, 0]).astype(int)
+        rows = np.rint(v + reach * normal[:, 1]).astype(int)
+        inside = (columns >= 0) & (rows >= 0) & (columns < slopes.shape[1]) & (rows < slopes.shape[0])
+        slope = slopes[np.where(inside, rows, 0), np.where(inside, columns, 0)]
+        size = np.linalg.norm(slope, axis=1)
+        agreed |= inside & (size > LEAST_SLOPE) & (np.abs((slope * normal).sum(axis=1)) > ALIGNED * size)
+    return float(agreed.mean()), (float(u.min()), float(v.min()), float(u.max()), float(v.max()))
 
 
 def _kind(great: float, picture_width: float | None) -> tuple[Kind | None, tuple[str, ...]]:
