@@ -28,7 +28,7 @@ class KindErrors(Model):
     """Standard deviation of the place along each axis [m] of those found."""
     yaw_sigma: float = 0.0
     """Of a utensil's direction [rad], turned heads left out."""
-    turned_rate: float = Field(0.0, ge=0.0, le=1.0)
+    turned_rate: float = Field(default=0.0, ge=0.0, le=1.0)
     """Share whose head and handle were taken for each other."""
     miss_rate: float = Field(ge=0.0, le=1.0)
     """Share of items of which nothing was said."""
