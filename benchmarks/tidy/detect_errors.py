@@ -60,9 +60,11 @@ def main() -> None:
     parser.add_argument("--runs", type=Path, required=True)
     parser.add_argument("--commit", required=True)
     parser.add_argument("--date", required=True)
+    parser.add_argument("--first", type=int, default=60, help="seeds from here: thresholds were set on those before")
     parser.add_argument("--out", type=Path, default=FILE)
     options = parser.parse_args()
-    model_of(read_looks(options.runs), options.commit, options.date).write(options.out)
+    looks = [look for look in read_looks(options.runs) if look.seed >= options.first]
+    model_of(looks, options.commit, options.date).write(options.out)
 
 
 if __name__ == "__main__":
