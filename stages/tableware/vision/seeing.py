@@ -32,6 +32,8 @@ MILLIMETRES = 20.0
 """A median depth beyond this [m] is one in millimetres."""
 LEVEL = 0.9995
 """Cosine of the angle to the vertical, from which a camera looks straight down."""
+OBLIQUE, OBLIQUE_TRUST = np.deg2rad(15.0), 0.8
+"""A view this far off the vertical is oblique; what is left of a confidence there."""
 OVER_MIDDLE = 0.002
 """A camera this near [m] to the vertical through the workspace's middle is over it."""
 USUAL_SCALE = (600.0, 1000.0)
@@ -122,6 +124,8 @@ def see(
     else:
         found = estimated_dishes(heights, seed)
         notes.append("sizes are estimated: utensils and what stacks hold were not looked for")
+    if rectified and -normal[2] < np.cos(OBLIQUE):
+        found = tuple(_doubted(one) for one in found)
     notes += _unhandled(heights)
     plane = ((float(normal[0]), float(normal[1]), float(normal[2])), float(offset))
     return Sight(found, tuple(notes), intrinsics, world, plane, sides, rectified, heights)
@@ -176,6 +180,14 @@ def _check_pose(pose: np.ndarray, normal: np.ndarray, offset: float) -> None:
     if angle > 5.0 or abs(offset - float(pose[2, 3])) > 0.05:
         raise BadInput(f"the table is seen {offset:.3f} m away where the pose says {float(pose[2, 3]):.3f} m, "
                        f"{angle:.1f} degrees off it", hint="correct the pose, or leave it out")  # fmt: skip
+
+
+def _doubted(one: Detection) -> Detection:
+    """Return a detection of an oblique view: confidences are calibrated from above, and a tall cup seen from the side
+    passes for two."""
+    if one.kind is None:
+        return one
+    return replace(one, confidence=OBLIQUE_TRUST * one.confidence, unsure=(*one.unsure, "oblique view"))
 
 
 def _unhandled(heights: HeightMap) -> list[str]:

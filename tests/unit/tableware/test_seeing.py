@@ -89,6 +89,7 @@ def test_an_oblique_view_is_rectified_by_its_pose(oblique):
     known = {one.kind: one for one in sight.detections if one.kind in ("bowl", "cup")}
     assert known["bowl"].position == pytest.approx((-0.12, 0.02, 0.0), abs=4e-3)
     assert known["cup"].position == pytest.approx((0.14, -0.05, 0.0), abs=4e-3)
+    assert all("oblique view" in one.unsure and one.confidence <= 0.8 for one in known.values())
 
 
 def test_without_a_pose_the_table_is_found(oblique):
