@@ -13,6 +13,7 @@ from schemas.panoptic_map import PanopticMap
 from schemas.plan import Plan
 from schemas.segments import Segments
 from schemas.sequence import Sequence
+from schemas.tableware_detections import TablewareDetections
 from schemas.trajectory import Depth, Trajectory
 
 __all__ = [
@@ -32,5 +33,6 @@ __all__ = [
     "Report",
     "Segments",
     "Sequence",
+    "TablewareDetections",
     "Trajectory",
 ]
