@@ -24,7 +24,7 @@ class DisparityParameters(Parameters):
     effort: Literal["low", "medium", "high"] = Field(
         "medium", description="`semi-global`: directions that costs are gathered along (3, 4, 8)"
     )
-    block_size: int = Field(1, ge=1, le=11, description="`semi-global`: odd width of the compared squares [px]")
+    block_size: int = Field(3, ge=1, le=11, description="`semi-global`: odd width of the compared squares [px]")
     agreement: float = Field(
         1.0, gt=0, le=16, description="Matches from left to right and back may differ by this much [px]"
     )

@@ -26,8 +26,8 @@ class SemiGlobalSettings:
 
     effort: Effort = "medium"
     """Directions that costs are gathered along: `low` 3, `medium` 4, `high` 8."""
-    block_size: int = 1
-    """Odd width of the squares that are compared [px]; 1 keeps thin things."""
+    block_size: int = 3
+    """Odd width of the squares that are compared [px]."""
     small_penalty: int = 8
     """Cost of a step of one pixel (P1)."""
     large_penalty: int = 32
@@ -71,7 +71,7 @@ def match(
         disparity = smoothed(unlocked(disparity))
     disparity[~(disparity > 0)] = np.nan
     difference[~np.isfinite(disparity)] = np.inf
-    return DisparityMap(disparity, confidence_of(difference, grays[0]))
+    return DisparityMap(disparity, confidence_of(difference, disparity, grays[0]))
 
 
 def gray_of(picture: np.ndarray) -> np.ndarray:

@@ -11,8 +11,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-UNLOCKED = np.array([0.0, 0.148, 0.213, 0.265, 0.313, 0.359, 0.406, 0.454, 0.5])
-"""Distance from the nearest whole pixel that an estimate at 0, 1/16 ... 8/16 px stands for."""
+UNLOCKED = np.array([0.0, 0.102, 0.165, 0.229, 0.291, 0.352, 0.418, 0.465, 0.5])
+"""Distance from the nearest whole pixel that an estimate at 0, 1/16 ... 8/16 px stands for: the median of the true one
+over the pixels of a generated room with noisy pictures (seed 100, four frames, 48,000 pixels an entry; the sign of the
+first is not known, so that it is 0)."""
 REACH = 5
 """Diameter of the window of the smoothing [px]."""
 SAME_SURFACE = 0.7
