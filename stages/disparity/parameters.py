@@ -28,9 +28,7 @@ class DisparityParameters(Parameters):
     agreement: float = Field(
         1.0, gt=0, le=16, description="Matches from left to right and back may differ by this much [px]"
     )
-    refine: bool = Field(
-        True, description="`semi-global`: undo the pull to whole pixels and smooth within surfaces"
-    )
+    refine: bool = Field(True, description="`semi-global`: undo the pull to whole pixels and smooth within surfaces")
     lowest_disparity: int | None = Field(
         None, ge=0, le=4096, description="Disparities from here on are searched [px]; default: as every pair needs"
     )
@@ -42,11 +40,14 @@ class DisparityParameters(Parameters):
     maximum_depth: float = Field(20.0, gt=0, le=65.0, description="Farther depth is left out [m]")
     rectification: Literal["correct", "report", "refuse"] = Field(
         "correct",
-        description="When matched features lie in different rows: `correct` turns the right eye back where a small turn "
-        "explains it, `report` says so and goes on, `refuse` stops",
+        description="When matched features lie in different rows: `correct` turns the right eye back where a small "
+        "turn explains it, `report` says so and goes on, `refuse` stops",
     )
     largest_row_error: float = Field(
-        0.5, gt=0, le=20, description="Median distance of the rows of matched features above which a pair is not rectified [px]"
+        0.5,
+        gt=0,
+        le=20,
+        description="Matched features of a rectified pair lie at most so many rows apart (median) [px]",
     )
 
 

@@ -49,9 +49,7 @@ def run(sequence: Sequence, weights: Path | None, *, parameters: DisparityParame
     with FrameReader(sequence.path("frames.mcap")) as reader:
         baselines = stereo_cameras(reader, sequence)
         with context.progress.step("check rows"):
-            rows = {
-                name: check_eyes(reader, name, sequence, parameters, context.logger) for name in sorted(baselines)
-            }
+            rows = {name: check_eyes(reader, name, sequence, parameters, context.logger) for name in sorted(baselines)}
         matcher, detail = open_matcher(parameters, weights, context)
         with context.progress.step("match"):
             written = _match_all(reader, sequence, baselines, rows, matcher, parameters, context)

@@ -1,4 +1,4 @@
-"""Disparity and confidence of a sequence's frames: one MCAP file beside `frames.mcap`, the same bytes for the same maps.
+"""Disparity and confidence of a sequence's frames: an MCAP file beside `frames.mcap`, the same bytes for the same maps.
 
 Topics of a camera called `camera`: `/camera/disparity` RawImage 32FC1 [px, NaN unknown] and `/camera/confidence`
 RawImage mono8 (255 is 1), at the stamps of the frames.

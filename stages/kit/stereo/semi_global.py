@@ -84,9 +84,7 @@ def mirrored(picture: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(picture[:, ::-1])
 
 
-def directed(
-    left: np.ndarray, right: np.ndarray, settings: SemiGlobalSettings, low: int, levels: int
-) -> np.ndarray:
+def directed(left: np.ndarray, right: np.ndarray, settings: SemiGlobalSettings, low: int, levels: int) -> np.ndarray:
     """Return disparities (H, W) float32 [px] of the left picture, NaN where the matcher has none."""
     area = settings.block_size**2
     modes = {

@@ -12,7 +12,7 @@ Kind = TypeVar("Kind", bound=Artifact)
 
 
 def input_artifact(artifact: Artifact, kind: type[Kind]) -> Kind | None:
-    """Return the input of this kind (or a kind of it) where the manifest says it lies, or None when it is not (or no longer) there."""
+    """Return the input of this kind, or a subclass, where the manifest says it lies; None when it is not there."""
     if artifact.manifest is None:
         return None
     for record in artifact.manifest.inputs:
