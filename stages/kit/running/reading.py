@@ -87,7 +87,10 @@ def check_hashes(root: Path, manifest: Manifest) -> None:
 
 
 def open_artifact(root: Path, expected: type[Artifact] | None = None) -> Artifact:
-    """Open an artifact folder as its typed handle. A subclass of the kind will do (a disparity is a sequence). Raises BadInput for a wrong kind, version or missing payload."""
+    """Open an artifact folder as its typed handle. A subclass of the kind will do: a disparity is a sequence.
+
+    Raises BadInput for a wrong kind, version or missing payload.
+    """
     root = Path(root)
     manifest = read_manifest(root)
     known = KINDS.get(manifest.kind)
