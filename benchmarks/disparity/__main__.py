@@ -109,7 +109,7 @@ def main() -> None:
                 maps[arm], figures = measured(pair, arm)
                 rows[arm].append(figures)
             if number == 0:
-                cv2.imwrite(str(options.out / f"{case}.jpg"), picture(pair, maps)[..., ::-1])
+                cv2.imwrite(str(options.out / f"{case}.png"), picture(pair, maps)[..., ::-1])
             print(f"{pair.name}: " + ", ".join(f"{arm} {rows[arm][-1]['bad2']:.1f}" for arm in ARMS), flush=True)
         metrics[f"pairs/{case}/count"] = len(rows["ours"])
         for arm, figures_of_all in rows.items():

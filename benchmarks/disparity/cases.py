@@ -51,8 +51,11 @@ def motorcycle(data: Path, work: Path, quick: bool) -> Iterator[Pair]:
 
 
 def endoscope(data: Path, work: Path, quick: bool) -> Iterator[Pair]:
-    """Every second in-vivo frame of a stereo endoscope. Nobody measured their disparities: those of SIFT features that match in
-    both directions and lie in one row stand for them."""
+    """Every second in-vivo frame of a stereo endoscope.
+
+    Nobody measured their disparities: those of SIFT features that match in both directions and lie in one row stand for
+    them.
+    """
     sequence = work / "endoscope"
     made(["ingest", "--log", str(data / "surgt_stereo"), "--out", str(sequence)])
     with FrameReader(sequence / "frames.mcap") as reader:
