@@ -14,8 +14,8 @@ from stages.kit.running.chain import run_command
 from stages.kit.stereo.rectification import matched_features
 from stages.kit.stereo.semi_global import gray_of
 
-ROOM_SEEDS = (1000, 1001)
-"""Reporting seeds of the recipe `room`; the sub-pixel table and the settings were looked at with seed 100."""
+ROOM_SEEDS = (1000,)
+"""Reporting seed of the recipe `room`; the sub-pixel table and the settings were looked at with seed 100."""
 ROOM_FRAMES = 6
 BASELINE, PICTURE_NOISE = 0.12, 2.0
 ROWS_AGREE = 0.75

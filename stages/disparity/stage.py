@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -117,7 +118,7 @@ def _match_all(
     return written
 
 
-def _world_up(reader: FrameReader) -> str:
+def _world_up(reader: FrameReader) -> Literal["z", "unknown"]:
     return "z" if reader.world_up == "z" else "unknown"
 
 
@@ -166,6 +167,7 @@ def _finish(
         info.model_dump()
         | {
             "notes": (*info.notes, f"depth from stereo: {detail}"),
+            "camera": next(known.camera for known in info.cameras if known.name in rows),
             "cameras": tuple(
                 known.model_dump() | {"frame_count": written.cameras[known.name], "baseline": None}
                 for known in info.cameras

@@ -42,7 +42,7 @@ def confidence_of(difference: np.ndarray, disparity: np.ndarray, gray: np.ndarra
     """Return the confidence (H, W) float32 of disparities (H, W) [px, NaN unknown] whose two directions differ by
     `difference` (H, W) [px]; `gray` (H, W) uint8 is the left picture."""
     agreement = np.exp(-0.5 * (np.minimum(difference, 1e3) / AGREEMENT) ** 2)
-    along = cv2.Sobel(gray, cv2.CV_32F, 1, 0, ksize=3) / 8.0
+    along = (cv2.Sobel(gray, cv2.CV_32F, 1, 0, ksize=3) / 8.0).astype(np.float32)
     change = cv2.boxFilter(along * along, cv2.CV_32F, (TEXTURE_WINDOW, TEXTURE_WINDOW))
     texture = change / (change + TEXTURE_HALF**2)
     sure = agreement * texture * same_surface(disparity)
