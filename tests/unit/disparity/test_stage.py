@@ -13,25 +13,16 @@ from schemas.disparity import Disparity
 from schemas.errors import BadInput, UsageError
 from schemas.sequence import Sequence
 from stages.disparity.parameters import DisparityParameters, check_inputs
-from stages.disparity.stage import run
 from stages.ingest.preflight.steps import step_reports
 from stages.kit.formats.disparity_file import DisparityReader
 from stages.kit.formats.frames import FrameReader, FrameWriter, require_depth
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from stages.report.stereo_section import stereo_view
 from tests.unit.disparity.pairs import BASELINE, CAMERA, pair, write_folder
+from tests.unit.disparity.running import matched
 from tests.unit.disparity.test_rectification import turned
 from tests.unit.ingest.running import ingest
 
 LEFT, RIGHT, TRUTH, SEEN = pair()
-
-
-def matched(sequence: Sequence, out: Path, **options: object) -> Disparity:
-    """Run the step in this process."""
-    out.mkdir(parents=True)
-    context = Context(output=out, seed=0, device="cpu", progress=SilentProgress())
-    return run(sequence, None, parameters=DisparityParameters(**options), context=context)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
