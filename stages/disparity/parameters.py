@@ -80,7 +80,8 @@ STAGE = Stage(
         ),
     },
     writes=Disparity,
-    libraries=("numpy", "opencv-python-headless", "torch", "zstandard"),
+    libraries=("numpy", "opencv-python-headless", "zstandard"),
+    versions="versions",
     check=check_inputs,
     example="scenewright disparity --sequence outputs/pair/sequence --out outputs/pair/disparity",
 )

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import torch
 
-from schemas.errors import BadInput
+from cli.weights_command import convert_weights
+from schemas.errors import BadInput, MissingDependency, UsageError
 from stages.disparity.raft.architecture import Architecture, architecture_of
 from stages.disparity.raft.checkpoint import convert, load_network, network_of
 from stages.disparity.raft.correlation import RowCorrelation
@@ -148,6 +149,7 @@ class Evil:
         return (exec, ("raise SystemExit('executed')",))
 
 
+@pytest.mark.filterwarnings("ignore:Detected pickle protocol")
 def test_files_that_are_no_checkpoint_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "raft.pth"
     path.write_bytes(pickle.dumps(Evil()))
@@ -217,3 +219,15 @@ def test_pictures_are_padded_to_multiples_of_32_in_the_middle() -> None:
     picture = torch.rand(1, 3, 33, 70)
     full = padded(picture)
     assert full.shape == (1, 3, 64, 96) and torch.equal(full[:, :, 15:48, 13:83], picture)
+
+
+def test_the_command_converts_and_overwrites_nothing(tmp_path: Path) -> None:
+    torch.save(small_state(), tmp_path / "raft.pth")
+    made = tmp_path / "raft.safetensors"
+    assert convert_weights(tmp_path / "raft.pth", made) == 0 and load_network(made).sizes == SMALL
+    with pytest.raises(UsageError, match="exists"):
+        convert_weights(tmp_path / "raft.pth", made)
+    with pytest.raises(UsageError, match="must end in .safetensors"):
+        convert_weights(tmp_path / "raft.pth", tmp_path / "raft.bin")
+    with pytest.raises(MissingDependency, match="no such file"):
+        convert_weights(tmp_path / "nowhere.pth", tmp_path / "other.safetensors")

@@ -117,8 +117,8 @@ def test_a_frame_without_its_right_eye_is_left_out_and_counted(tmp_path: Path) -
     assert made.summary["frames"] == 1 and made.info.drops == {"missing_right": 1}
 
 
-def test_eyes_of_different_sizes_leave_no_frame(tmp_path: Path) -> None:
-    sequence = ingest(write_folder(tmp_path / "log", [(LEFT, cv2.resize(RIGHT, (120, 80)))]), tmp_path / "sequence")
+def test_eyes_of_different_shapes_leave_no_frame(tmp_path: Path) -> None:
+    sequence = ingest(write_folder(tmp_path / "log", [(LEFT, cv2.resize(RIGHT, (240, 100)))]), tmp_path / "sequence")
     assert sequence.outcome == "empty" and sum(sequence.info.drops.values()) == 1
     with pytest.raises(BadInput, match="no frames"):
         matched(sequence, tmp_path / "disparity")
