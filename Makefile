@@ -168,6 +168,10 @@ tidy-fast: setup ## Clearing tables in the fast simulator: tables 7.1 and 7.2, j
 llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2, harder suites (QUICK=1: ten instances)
 	$(PYTHON) -m benchmarks.llm3 $(if $(QUICK),--quick) $(if $(FRESH),--fresh) --out $(OUTPUTS)/experiments/llm3$(if $(QUICK),-quick)
 
+.PHONY: bench-disparity
+bench-disparity: setup ## Disparity beside OpenCV's matchers: Middlebury, endoscope, generated rooms (QUICK=1: fewer frames; REAL_DATA=folder)
+	OMP_NUM_THREADS=1 $(PYTHON) -m benchmarks.disparity $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-disparity$(if $(QUICK),-quick)
+
 .PHONY: pictures
 pictures: setup ## Take the README's pictures out of the demo run
 	$(PYTHON) docs/pictures.py $(OUTPUTS)/demo

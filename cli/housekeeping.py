@@ -18,6 +18,7 @@ from cli.serve_command import serve
 from cli.timeline_command import timeline
 from cli.urdf_check_command import urdf_check
 from cli.urdf_settle_command import urdf_settle
+from cli.weights_command import convert_weights
 from schemas.errors import BadInput, UsageError
 
 Paths = Annotated[list[Path], typer.Argument(help="Artifact folders.")]
@@ -254,6 +255,7 @@ COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (timeline, "Artifacts"),
     (gc, "Artifacts"),
     (doctor, "Installation"),
+    (convert_weights, "Installation"),
     (schemas, "Installation"),
     (makefile, "Installation"),
 )

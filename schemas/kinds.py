@@ -4,6 +4,7 @@ from schemas.artifact import KINDS, Artifact
 from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene
 from schemas.contact_graph import ContactGraph
+from schemas.disparity import Disparity
 from schemas.evaluation import Evaluation, Report
 from schemas.exported_sequence import ExportedSequence
 from schemas.ground_truth import GroundTruth
@@ -14,7 +15,7 @@ from schemas.plan import Plan
 from schemas.segments import Segments
 from schemas.sequence import Sequence
 from schemas.tableware_detections import TablewareDetections
-from schemas.trajectory import Depth, Trajectory
+from schemas.trajectory import Trajectory
 
 __all__ = [
     "KINDS",
@@ -22,7 +23,7 @@ __all__ = [
     "CadLibrary",
     "CadScene",
     "ContactGraph",
-    "Depth",
+    "Disparity",
     "Evaluation",
     "ExportedSequence",
     "GroundTruth",

@@ -78,10 +78,3 @@ class Trajectory(Artifact):
     def info(self) -> PosesFile:
         """The parsed poses.json. Raises BadInput where there is none."""
         return PosesFile.read(self.path("poses.json"))
-
-
-class Depth(Artifact):
-    """`depth.mcap`: depth that overrides the sequence's own, with confidence."""
-
-    kind: ClassVar[str] = "depth"
-    description: ClassVar[str] = "depth images and confidence computed from stereo"

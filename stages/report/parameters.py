@@ -48,7 +48,7 @@ def check_inputs(parameters: ReportParameters, inputs: Mapping[str, Any]) -> Non
 
 STAGE = Stage(
     name="report",
-    version=5,
+    version=6,
     summary="Write one self-contained HTML page about a run: pictures, graph, figures, times, how it was made",
     parameters=ReportParameters,
     reads={

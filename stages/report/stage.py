@@ -12,6 +12,7 @@ from schemas.artifact import Artifact
 from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene, Replacement
 from schemas.contact_graph import ContactGraph
+from schemas.disparity import Disparity
 from schemas.errors import BadInput
 from schemas.evaluation import Evaluation, Report, ReportFile
 from schemas.ground_truth import GroundTruth
@@ -38,6 +39,7 @@ from stages.report.page import render_page
 from stages.report.parameters import ReportParameters
 from stages.report.placed_models import ModelShelf
 from stages.report.provenance import made_of
+from stages.report.stereo_section import stereo_view
 from stages.report.surfaces import Model, cad_model, map_model, true_model
 from stages.report.views import Label, View, oblique_view, place_labels, render, top_view
 
@@ -48,7 +50,8 @@ HEADLINES = (
     "plan/goal_reached",
 )  # fmt: skip
 SECTIONS = (
-    ("frames", "Frames", "frames"), ("map", "Map", "map_text"), ("graph", "Contact graph", "graph"),
+    ("frames", "Frames", "frames"), ("stereo", "Stereo", "stereo"), ("map", "Map", "map_text"),
+    ("graph", "Contact graph", "graph"),
     ("cad", "CAD scene", "cad_views"), ("scene", "Interactive scene", "bodies"), ("plan", "Plan", "plan"),
     ("packing", "Packing", "packing"),
     ("figures", "Figures", "groups"), ("cost", "Time and memory", "made"), ("made", "How it was made", "made"),
@@ -102,6 +105,8 @@ def run(
     if sequence is not None:
         with context.progress.step("frames"):
             _add_frames(values, sequence, segments, parameters)
+            if isinstance(sequence, Disparity):
+                values["stereo"] = stereo_view(sequence, parameters.frames, parameters.frame_width)
     with context.progress.step("views"):
         view = _add_views(values, ground_truth, sequence, panoptic_map, cad_scene, parameters)
     if cad_scene is not None:
@@ -132,8 +137,8 @@ def run(
 
 def _empty_page() -> dict[str, Any]:
     empty = (
-        "frames legend map_views graph cad_views replacements bodies fixed_bodies groups notes plots tables metrics "
-        "tiles plan packing baseline has_intervals plan_ok checked objects_changed objects_kept trees"
+        "frames stereo legend map_views graph cad_views replacements bodies fixed_bodies groups notes plots tables "
+        "metrics tiles plan packing baseline has_intervals plan_ok checked objects_changed objects_kept trees"
     )
     texts = "frames_text map_text graph_text graph_errors cad_text scene_text figures_text"
     values: dict[str, Any] = dict.fromkeys(empty.split(), None)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from pydantic import Field
 
 from schemas.cad_library import CadLibrary
+from schemas.errors import UsageError
 from schemas.ground_truth import GroundTruth
 from stages.kit.stage import Parameters, Stage
 
@@ -23,6 +25,19 @@ class SynthesizeParameters(Parameters):
     rate: float = Field(30.0, gt=0, le=1000, description="Frame rate of the sensor; times are multiples of 1/rate [Hz]")
     walking_speed: float = Field(0.5, gt=0.05, le=2.0, description="Speed between the places that are looked at [m/s]")
     depth_noise: bool = Field(True, description="Depth as a structured-light camera reports it; off: exact")
+    stereo_baseline: float = Field(
+        0.0, ge=0, le=0.5, description="Record a right eye at this distance along the camera's x too [m]; 0: none"
+    )
+    depth: bool = Field(True, description="The log holds depth; off: a stereo camera's log, for the step disparity")
+    picture_noise: float = Field(
+        0.0, ge=0, le=30, description="Standard deviation of the noise of every pixel of the pictures [of 255]"
+    )
+
+
+def check(parameters: SynthesizeParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError for a log that would say nothing of distance."""
+    if not parameters.depth and parameters.stereo_baseline == 0:
+        raise UsageError("--no-depth leaves a log without distances", hint="give --stereo-baseline 0.12, for example")
 
 
 STAGE = Stage(
@@ -34,5 +49,6 @@ STAGE = Stage(
     writes=GroundTruth,
     libraries=("open3d", "numba", "numpy", "opencv-python-headless", "trimesh", "python-fcl", "scipy"),
     data_files=lambda parameters: (f"recipes/{parameters.recipe}.toml",),
+    check=check,
     example="scenewright synthesize --library outputs/demo/cad_library --out outputs/demo/ground_truth --frames 300",
 )

@@ -10,9 +10,10 @@ from schemas.cad_library import CadLibrary
 from schemas.ground_truth import GroundTruth, GroundTruthFile
 from schemas.scene_parts import Camera
 from schemas.sequence import LabelEntry
-from stages.kit.formats.frames import FrameWriter
+from stages.kit.formats.frames import CAMERA_FRAME, FrameWriter
 from stages.kit.formats.scene_bundle import write_scene_bundle
 from stages.kit.formats.trajectories import write_tum
+from stages.kit.geometry.transforms import transform_from
 from stages.kit.rendering.depth_noise import DepthCamera, disturb_depth
 from stages.kit.rendering.ray_casting import SceneRenderer
 from stages.kit.stage import Context
@@ -27,7 +28,7 @@ from stages.synthesize.truth import object_boxes, scene_bodies, true_graph, true
 from stages.synthesize.viewpoints import blocked_floor, choose_views
 from stages.synthesize.walk import Walk, frame_times, plan_walk
 
-VIEW_STREAM, TREMOR_STREAM, NOISE_STREAM = 1, 2, 3
+VIEW_STREAM, TREMOR_STREAM, NOISE_STREAM, PICTURE_STREAM = 1, 2, 3, 4
 
 
 @dataclass(frozen=True)
@@ -110,12 +111,17 @@ def _record(
     times = frame_times(walk.duration, parameters.frames, parameters.rate)
     pace = walk.duration / times[-1]
     gloss = gloss_table(arrangement)
-    noise = context.random(NOISE_STREAM)
+    noise, pictures = context.random(NOISE_STREAM), context.random(PICTURE_STREAM)
+    baseline = parameters.stereo_baseline
+    left_from_right = transform_from(np.eye(3), np.array([baseline, 0.0, 0.0]))
     labels = [LabelEntry(instance=k, class_name=e.class_name) for k, e in enumerate(arrangement.room.layouts, start=1)]
     labels += [LabelEntry(instance=thing.instance, class_name=thing.class_name) for thing in arrangement.objects]
     visible = np.zeros(len(gloss), dtype=np.int64)
     poses, valid = [], 0
-    with FrameWriter(context.output / "log.mcap", camera, labels=True, label_table=labels) as writer:
+    with FrameWriter(
+        context.output / "log.mcap", camera, labels=True, label_table=labels,
+        baselines={CAMERA_FRAME: baseline} if baseline > 0 else None,
+    ) as writer:  # fmt: skip
         for time in context.progress.track(times, total=len(times), description="rendering"):
             pose = walk.pose(time * pace)
             view = renderer.render(camera, pose)
@@ -126,9 +132,21 @@ def _record(
             seen.add(view.depth, view.instance, pose, camera)
             visible += np.bincount(view.instance.reshape(-1), minlength=len(visible))
             valid += int(np.count_nonzero(depth))
-            writer.write(float(time), view.color, depth, pose, view.instance)
+            color, right = disturbed_picture(view.color, parameters.picture_noise, pictures), None
+            if baseline > 0:
+                right = renderer.render(camera, pose @ left_from_right).color
+                right = disturbed_picture(right, parameters.picture_noise, pictures)
+            writer.write(float(time), color, depth if parameters.depth else None, pose, view.instance, right=right)
             poses.append(pose)
     return Recording(times, np.array(poses), visible, valid / (len(times) * camera.width * camera.height))
+
+
+def disturbed_picture(color: np.ndarray, deviation: float, random: np.random.Generator) -> np.ndarray:
+    """Return a picture (H, W, 3) uint8 with white noise of a standard deviation [of 255]; 0: as it is."""
+    if deviation == 0:
+        return color
+    noisy = color + random.normal(0.0, deviation, color.shape).astype(np.float32)
+    return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
 
 
 def _write_truth(

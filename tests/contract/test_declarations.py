@@ -35,7 +35,7 @@ def test_the_chain_is_there() -> None:
 
 def test_every_kind_of_the_chain_has_a_maker() -> None:
     made = {stage.writes.kind for stage in STAGES}
-    assert set(KINDS) - made <= {"depth", "trajectory"} | {k for k in KINDS if k.startswith("test_")}
+    assert set(KINDS) - made <= {"trajectory"} | {k for k in KINDS if k.startswith("test_")}
 
 
 @each_step

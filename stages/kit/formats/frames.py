@@ -386,7 +386,7 @@ def require_depth(sequence: Sequence) -> None:
     if streams and "depth" not in streams:
         raise BadInput(
             f"{sequence.root}: its frames have no depth ({', '.join(streams)})",
-            hint="compute depth from the stereo pairs first"
+            hint="make depth of its stereo pairs: scenewright disparity"
             if "right" in streams
             else "record depth, or a stereo pair",
         )

@@ -162,7 +162,7 @@ def _artifact_amount(root: Path) -> Amount:
     manifest = read_manifest(root)
     megabytes = sum(record.bytes for record in manifest.files) / MEGABYTE
     amount = Amount(megabytes, megabytes)
-    if manifest.kind == "sequence":
+    if manifest.kind in ("sequence", "disparity"):
         info = SequenceFile.read(root / "sequence.json")
         sizes = {camera.name: camera.camera.width * camera.camera.height / 1e6 for camera in info.cameras}
         pixels = sum(sizes[camera.name] * camera.frame_count for camera in info.cameras)

@@ -87,10 +87,14 @@ def check_hashes(root: Path, manifest: Manifest) -> None:
 
 
 def open_artifact(root: Path, expected: type[Artifact] | None = None) -> Artifact:
-    """Open an artifact folder as its typed handle. Raises BadInput for a wrong kind, version or missing payload."""
+    """Open an artifact folder as its typed handle. A subclass of the kind will do: a disparity is a sequence.
+
+    Raises BadInput for a wrong kind, version or missing payload.
+    """
     root = Path(root)
     manifest = read_manifest(root)
-    if expected is not None and manifest.kind in KINDS and manifest.kind != expected.kind:
+    known = KINDS.get(manifest.kind)
+    if expected is not None and known is not None and not issubclass(known, expected):
         raise BadInput(
             f"{root}: holds a {manifest.kind!r} artifact, {expected.kind!r} is needed", hint="give another folder"
         )

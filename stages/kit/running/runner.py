@@ -176,7 +176,9 @@ def _open_inputs(stage: Stage, paths: Mapping[str, Path]) -> list[_OpenInput]:
             stamp = _stamp(Path(path), True)
             artifact = open_artifact(path, what)
             assert artifact.manifest is not None
-            opened.append(_OpenInput(role, what.kind, artifact.manifest.content_digest, Path(path), artifact, stamp))
+            opened.append(
+                _OpenInput(role, artifact.kind, artifact.manifest.content_digest, Path(path), artifact, stamp)
+            )
     return opened
 
 

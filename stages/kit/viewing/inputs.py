@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from schemas.artifact import Artifact
+from schemas.artifact import KINDS, Artifact
 from schemas.errors import BadInput
 from stages.kit.running.reading import open_artifact
 
@@ -12,11 +12,11 @@ Kind = TypeVar("Kind", bound=Artifact)
 
 
 def input_artifact(artifact: Artifact, kind: type[Kind]) -> Kind | None:
-    """Return the input of this kind where the manifest says it lies, or None when it is not (or no longer) there."""
+    """Return the input of this kind, or a subclass, where the manifest says it lies; None when it is not there."""
     if artifact.manifest is None:
         return None
     for record in artifact.manifest.inputs:
-        if record.kind == kind.kind:
+        if issubclass(KINDS.get(record.kind, Artifact), kind):
             try:
                 found = open_artifact(artifact.root / record.path, kind)
             except BadInput:

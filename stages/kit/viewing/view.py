@@ -12,6 +12,7 @@ from stages.kit.viewing.canvas import Canvas, import_rerun
 
 VIEWERS = {
     "sequence": ("sequence_view", "draw_sequence"),
+    "disparity": ("disparity_view", "draw_disparity"),
     "trajectory": ("sequence_view", "draw_trajectory"),
     "segments": ("segments_view", "draw_segments"),
     "panoptic_map": ("map_view", "draw_map"),

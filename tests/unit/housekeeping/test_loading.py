@@ -40,7 +40,7 @@ def run(run_folder: Path) -> dict:
 
 
 def test_every_kind_has_a_class_and_opens_as_it(run: dict) -> None:
-    made = set(KINDS) - {"trajectory", "depth"} - {kind for kind in KINDS if kind.startswith("test_")}
+    made = set(KINDS) - {"trajectory"} - {kind for kind in KINDS if kind.startswith("test_")}
     assert set(CLASSES) == made
     assert {type(artifact) for artifact in run.values()} == {*CLASSES.values(), LoadedArtifact}
     for name, artifact in run.items():

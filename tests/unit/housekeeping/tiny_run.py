@@ -16,6 +16,7 @@ def make_tiny_run(folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     artifacts.make_sequence(folder)
     artifacts.make_segments(folder)
+    artifacts.make_disparity(folder)
     labels = {name: np.full(8, 4, np.int32) for name in ("instance", "segment", "class_id")}
     np.savez(artifacts.make_map(folder) / "mesh_labels.npz", **labels)
     artifacts.seal(folder / "panoptic_map", "panoptic_map", sequence=folder / "sequence")

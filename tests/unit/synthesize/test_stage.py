@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
+import cv2
 import numpy as np
 import open3d as o3d
 import pytest
@@ -12,6 +13,7 @@ import trimesh
 
 from schemas.cad_library import CadLibrary
 from schemas.contact_graph import SCENE_NODE
+from schemas.errors import UsageError
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveSceneFile
 from stages.kit.formats.frames import FrameReader
@@ -23,7 +25,7 @@ from stages.kit.progress import SilentProgress
 from stages.kit.rendering.depth_noise import DepthCamera
 from stages.kit.simulation.world import load_scene
 from stages.kit.stage import Context
-from stages.synthesize.parameters import SynthesizeParameters
+from stages.synthesize.parameters import SynthesizeParameters, check
 from stages.synthesize.stage import run
 
 
@@ -155,6 +157,28 @@ def test_noise_changes_the_depth_and_nothing_else(library: CadLibrary, truth: Gr
             assert with_noise.depth[valid].min() >= sensor.minimum_range - 1e-3
             error = np.abs(with_noise.depth - exact.depth)[valid]
             assert 0.0005 < np.median(error) < 0.03
+
+
+def test_a_second_eye_sees_the_same_points_further_left(
+    library: CadLibrary, truth: GroundTruth, tmp_path: Path
+) -> None:
+    stereo = make(library, tmp_path, frames=2, depth_noise=False, stereo_baseline=0.1, depth=False)
+    with FrameReader(truth.path("log.mcap")) as one, FrameReader(stereo.path("log.mcap")) as two:
+        assert two.baselines == {"camera": pytest.approx(0.1)} and "depth" not in two.streams
+        exact, pair = one.read(0), two.read(0, ("color", "right"))
+        assert exact.depth is not None and pair.color is not None and pair.right is not None
+        assert np.array_equal(pair.color, exact.color)
+        row, column = np.mgrid[:120, :160].astype(np.float32)
+        target = column - two.camera.fx * 0.1 / np.maximum(exact.depth, 0.1)
+        carried = cv2.remap(pair.right, target.astype(np.float32), row, cv2.INTER_LINEAR)
+        seen = target >= 0
+        moved = np.abs(carried.astype(int) - pair.color)[seen].mean()
+        assert moved < 0.4 * np.abs(pair.right.astype(int) - pair.color)[seen].mean()
+
+
+def test_a_log_must_say_something_of_distance() -> None:
+    with pytest.raises(UsageError, match="without distances"):
+        check(SynthesizeParameters(depth=False), {})  # type: ignore[call-arg]
 
 
 def test_same_seed_same_bytes(library: CadLibrary, truth: GroundTruth, tmp_path: Path) -> None:

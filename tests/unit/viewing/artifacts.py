@@ -34,6 +34,8 @@ from stages.kit.formats.masks import write_panoptic_zip
 from stages.kit.formats.scene_bundle import write_scene_bundle
 from stages.kit.formats.trajectories import write_tum
 from stages.kit.running.digests import content_digest, record_files
+from tests.unit.disparity.pairs import pair, write_folder
+from tests.unit.disparity.running import matched
 from tests.unit.export.sequences import export
 from tests.unit.ingest.foxglove_logs import LogWriter, compressed, transform
 from tests.unit.ingest.running import ingest
@@ -68,6 +70,13 @@ def make_sequence(run: Path) -> Path:
     """Five frames of the tiny room."""
     ingest(write_seven_scenes(run / "log", frames(5)), run / "sequence")
     return seal(run / "sequence", "sequence")
+
+
+def make_disparity(run: Path) -> Path:
+    """One pair of a box before a wall."""
+    sequence = ingest(write_folder(run / "pairs", [pair()[:2]]), run / "pairs" / "sequence")
+    matched(sequence, run / "disparity")
+    return seal(run / "disparity", "disparity")
 
 
 def make_segments(run: Path) -> Path:

@@ -31,6 +31,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
     artifacts.make_sequence(folder)
     artifacts.make_segments(folder)
+    artifacts.make_disparity(folder)
     artifacts.make_map(folder)
     library = CadLibrary(root=artifacts.make_library(folder))
     artifacts.make_contact_graph(folder, library)
@@ -48,6 +49,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 EXPECTED = {
     "sequence": {"/world/camera", "/world/camera/color", "/world/camera/depth", "/world/cloud", "/world/camera_path"},
+    "disparity": {"/world/camera/color", "/world/camera/disparity", "/world/camera/confidence", "/rows"},
     "trajectory": {"/world/camera_path"},
     "segments": {"/world/class/labels", "/world/class/color", "/world/instance/labels", "/world/segment/labels"},
     "panoptic_map": {"/world/color", "/world/instance", "/world/boxes"},
@@ -129,7 +131,7 @@ def test_every_kind_is_drawn(recordings: dict, kind: str) -> None:
 def test_every_kind_that_steps_write_has_a_view() -> None:
     import schemas.kinds  # noqa: F401
 
-    assert set(VIEWERS) == set(EXPECTED) == set(KINDS) - {"depth"}
+    assert set(VIEWERS) == set(EXPECTED) == set(KINDS)
 
 
 def test_relations_show_their_confidence_and_evidence(recordings: dict) -> None:

@@ -3,6 +3,7 @@
 from stages.kit.running.loading.artifact import LoadedArtifact
 from stages.kit.running.loading.opening import load, load_run
 from stages.kit.running.loading.perception import (
+    LoadedDisparity,
     LoadedEntity,
     LoadedGroundTruth,
     LoadedMap,
@@ -23,6 +24,7 @@ __all__ = [
     "LoadedCadScene",
     "LoadedContactGraph",
     "LoadedEntity",
+    "LoadedDisparity",
     "LoadedEvaluation",
     "LoadedExport",
     "LoadedGroundTruth",

@@ -7,7 +7,13 @@ from typing import TypeVar
 
 from schemas.errors import BadInput
 from stages.kit.running.loading.artifact import LoadedArtifact
-from stages.kit.running.loading.perception import LoadedGroundTruth, LoadedMap, LoadedSegments, LoadedSequence
+from stages.kit.running.loading.perception import (
+    LoadedDisparity,
+    LoadedGroundTruth,
+    LoadedMap,
+    LoadedSegments,
+    LoadedSequence,
+)
 from stages.kit.running.loading.results import LoadedEvaluation, LoadedExport, LoadedPacking, LoadedPlan, LoadedReport
 from stages.kit.running.loading.scenes import (
     LoadedCadLibrary,
@@ -22,6 +28,7 @@ CLASSES: dict[str, type[LoadedArtifact]] = {
     "cad_library": LoadedCadLibrary,
     "cad_scene": LoadedCadScene,
     "contact_graph": LoadedContactGraph,
+    "disparity": LoadedDisparity,
     "evaluation": LoadedEvaluation,
     "exported_sequence": LoadedExport,
     "ground_truth": LoadedGroundTruth,

@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 
 from schemas.contact_graph import ContactGraphFile
+from schemas.disparity import DisparityFile
 from schemas.ground_truth import GroundTruthFile, TrueObject
 from schemas.panoptic_map import EntitiesFile, Entity
 from schemas.scene_parts import Camera
 from schemas.segments import FrameSegment, SegmentsFile
 from schemas.sequence import SequenceFile
+from stages.kit.formats.disparity_file import DisparityReader
 from stages.kit.formats.frames import PIXEL_STREAMS, Frame, FrameReader
 from stages.kit.formats.masks import PanopticReader
 from stages.kit.formats.mesh_files import read_mesh
@@ -23,6 +25,7 @@ from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.formats.trajectories import read_tum
 from stages.kit.running.loading.artifact import LoadedArtifact
 from stages.kit.running.loading.graphs import as_networkx
+from stages.kit.stereo.disparity_map import DisparityMap
 
 
 class LoadedSequence(LoadedArtifact):
@@ -77,6 +80,24 @@ class LoadedSequence(LoadedArtifact):
 
     def _reader(self) -> FrameReader:
         return FrameReader(self.path / "frames.mcap")
+
+
+class LoadedDisparity(LoadedSequence):
+    """Kind `disparity`: a sequence with depth from stereo, and the maps that it is from."""
+
+    @cached_property
+    def matching(self) -> DisparityFile:
+        """disparity.json: how pairs were matched, whether they were rectified, what was searched and found."""
+        return DisparityFile.read(self.path / "disparity.json")
+
+    def disparity(self, index: int) -> DisparityMap:
+        """Return disparity (H, W) [px, NaN unknown] and confidence (H, W) of a frame. Raises IndexError."""
+        with self._reader() as reader:
+            stamps = reader.stamps
+        if not 0 <= index < len(stamps):
+            raise IndexError(f"frame {index} of {len(stamps)}")
+        with DisparityReader(self.path / "disparity.mcap") as maps:
+            return maps.read(int(stamps[index]))
 
 
 class LoadedSegments(LoadedArtifact):

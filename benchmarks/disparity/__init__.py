@@ -1,0 +1,1 @@
+"""How good disparity is, beside OpenCV's matchers as they come."""

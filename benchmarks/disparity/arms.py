@@ -1,0 +1,69 @@
+"""The matchers. OpenCV's get the range of disparities that ours finds: by themselves they search 16 pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+
+from stages.disparity.parameters import DisparityParameters
+from stages.kit.stereo.disparity_map import DisparityMap
+from stages.kit.stereo.semi_global import SemiGlobalSettings, gray_of, match
+
+Arm = Callable[[np.ndarray, np.ndarray, tuple[int, int]], DisparityMap]
+TRUSTED: float = DisparityParameters().minimum_confidence  # type: ignore[call-arg]
+
+
+def opencv_map(matcher: cv2.StereoMatcher, left: np.ndarray, right: np.ndarray, low: int) -> DisparityMap:
+    """Return what one of OpenCV's matchers finds; it knows no confidence."""
+    fixed = matcher.compute(gray_of(left), gray_of(right))
+    known = fixed >= max(16 * low, 1)
+    disparity = np.where(known, fixed.astype(np.float32) / 16, np.nan).astype(np.float32)
+    return DisparityMap(disparity, known.astype(np.float32))
+
+
+def opencv_default(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
+    """StereoSGBM with every default but the range."""
+    return opencv_map(cv2.StereoSGBM.create(minDisparity=limits[0], numDisparities=limits[1]), left, right, limits[0])
+
+
+def opencv_usual(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
+    """StereoSGBM with the settings that OpenCV's own stereo example uses."""
+    matcher = cv2.StereoSGBM.create(
+        minDisparity=limits[0], numDisparities=limits[1], blockSize=3, P1=8 * 9, P2=32 * 9, disp12MaxDiff=1,
+        preFilterCap=63, uniquenessRatio=10, speckleWindowSize=100, speckleRange=32,
+    )  # fmt: skip
+    return opencv_map(matcher, left, right, limits[0])
+
+
+def opencv_blocks(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
+    """StereoBM with every default but the range."""
+    matcher = cv2.StereoBM.create(limits[1])
+    matcher.setMinDisparity(limits[0])
+    return opencv_map(matcher, left, right, limits[0])
+
+
+def ours(trusted: bool = False, **settings: object) -> Arm:
+    """Return our matcher, which finds its range itself; `trusted`: only what gives depth."""
+    chosen = SemiGlobalSettings(**settings)  # type: ignore[arg-type]
+
+    def arm(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
+        found = match(left, right, chosen)
+        if not trusted:
+            return found
+        return DisparityMap(np.where(found.confidence >= TRUSTED, found.disparity, np.nan), found.confidence)
+
+    return arm
+
+
+ARMS: dict[str, tuple[str, Arm]] = {
+    "opencv_default": ("OpenCV StereoSGBM, defaults", opencv_default),
+    "opencv_usual": ("OpenCV StereoSGBM, its example's settings", opencv_usual),
+    "opencv_blocks": ("OpenCV StereoBM, defaults", opencv_blocks),
+    "ours_low": ("ours, effort low", ours(effort="low")),
+    "ours": ("**ours**", ours()),
+    "ours_high": ("ours, effort high", ours(effort="high")),
+    "ours_unrefined": ("ours without sub-pixel refinement", ours(refine=False)),
+    "ours_trusted": (f"ours where confidence is {TRUSTED:g} or more", ours(trusted=True)),
+}

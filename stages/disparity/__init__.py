@@ -1,0 +1,1 @@
+"""The step `disparity`: depth from the stereo pairs of a sequence."""

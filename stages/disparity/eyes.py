@@ -1,0 +1,130 @@
+"""What a sequence must have to be matched, and whether its eyes see the same points in the same rows."""
+
+from __future__ import annotations
+
+import logging
+import math
+
+import numpy as np
+
+from schemas.disparity import RowReport
+from schemas.errors import BadInput
+from schemas.scene_parts import Camera
+from schemas.sequence import Sequence
+from stages.disparity.parameters import DisparityParameters
+from stages.kit.formats.frames import FrameReader
+from stages.kit.stereo.rectification import RowCheck, check_rows, matched_features
+from stages.kit.stereo.semi_global import gray_of
+
+LOOKED_AT = 6
+"""Frames of a camera whose features are matched."""
+SWAPPED = 0.8
+"""Share of negative disparities from which on the eyes are swapped."""
+SMALLEST_BASELINE = 1e-4
+"""Eyes nearer than this [m] are one."""
+LARGEST_TURN = math.radians(3)
+"""A turn of the right eye over this is no small one: the calibration is of other cameras."""
+LEAST_GAIN = 0.7
+"""A correction must bring the row error to this share of what it was."""
+
+
+def stereo_cameras(reader: FrameReader, sequence: Sequence) -> dict[str, float]:
+    """Return camera -> baseline [m] of the cameras with two eyes. Raises BadInput when there is none, for a baseline
+    that is none, and for one that is negative."""
+    if len(reader) == 0:
+        raise BadInput(f"{sequence.root}: it has no frames", hint="look at the drops in its sequence.json")
+    if "right" not in reader.streams:
+        raise BadInput(
+            f"{sequence.root}: its frames have one eye ({', '.join(reader.streams)})",
+            hint="ingest the log with both eyes (--color-topic, --right-topic; left/ and right/ with a calibration)",
+        )
+    if "color" not in reader.streams:
+        raise BadInput(f"{sequence.root}: its frames have a right eye and no left one", hint="ingest both eyes")
+    baselines = reader.baselines
+    for name, baseline in baselines.items():
+        if not math.isfinite(baseline) or abs(baseline) < SMALLEST_BASELINE:
+            raise BadInput(
+                f"{sequence.root}: the eyes of {name!r} have no baseline ({baseline:g} m)",
+                hint="correct P[3] of the right calibration (minus fx times the baseline)",
+            )
+        if baseline < 0:
+            raise BadInput(
+                f"{sequence.root}: left and right of {name!r} are swapped: the baseline is {baseline:g} m",
+                hint="ingest with --color-topic and --right-topic exchanged",
+            )
+    return baselines
+
+
+def check_eyes(
+    reader: FrameReader, name: str, sequence: Sequence, parameters: DisparityParameters, logger: logging.Logger
+) -> RowReport:
+    """Match features of some frames of a camera and return what their rows say.
+
+    Raises BadInput for swapped eyes, and for pairs that are not rectified when `rectification` is `refuse`.
+    """
+    indices = [k for k in range(len(reader)) if reader.read(k, ()).camera_name == name]
+    chosen = [indices[k] for k in np.unique(np.linspace(0, len(indices) - 1, min(LOOKED_AT, len(indices))).astype(int))]
+    pairs = []
+    for index in chosen:
+        frame = reader.read(index, ("color", "right"))
+        if frame.color is not None and frame.right is not None:
+            pairs.append(matched_features(gray_of(frame.color), gray_of(frame.right)))
+    camera = reader.cameras[name]
+    found = check_rows(pairs, camera)
+    if found.checked and found.negative_share > SWAPPED:
+        raise BadInput(
+            f"{sequence.root}: left and right of {name!r} are swapped: {100 * found.negative_share:.0f} % of "
+            f"{found.matches} matched features lie further right in the right picture",
+            hint="exchange the two eyes (--color-topic and --right-topic, or the folders left/ and right/)",
+        )
+    report = row_report(found, name, len(pairs), parameters)
+    _tell(report, sequence, parameters, camera, logger)
+    return report
+
+
+def row_report(found: RowCheck, name: str, frames: int, parameters: DisparityParameters) -> RowReport:
+    """Return the record of a check, with the verdict under these parameters."""
+    if not found.checked:
+        return RowReport(camera=name, verdict="not_checked", frames=frames, matches=found.matches)
+    rectified = found.error <= parameters.largest_row_error
+    small = max(abs(found.pitch), abs(found.roll)) <= LARGEST_TURN
+    helped = found.corrected_error <= max(LEAST_GAIN * found.error, 0.0)
+    fixed = not rectified and parameters.rectification == "correct" and small and helped
+    return RowReport(
+        camera=name,
+        verdict="rectified" if rectified else "corrected" if fixed else "not_rectified",
+        frames=frames,
+        matches=found.matches,
+        row_error=round(found.error, 3),
+        row_error_90=round(found.error_90, 3),
+        row_offset=round(found.offset, 3),
+        pitch=round(found.pitch, 7),
+        roll=round(found.roll, 7),
+        corrected_row_error=round(found.corrected_error, 3),
+        negative_share=round(found.negative_share, 3),
+    )
+
+
+def _tell(
+    report: RowReport, sequence: Sequence, parameters: DisparityParameters, camera: Camera, logger: logging.Logger
+) -> None:
+    where = f"{sequence.root}: {report.camera}"
+    if report.verdict == "not_checked":
+        logger.warning("%s: rows cannot be checked: %d features match between the eyes", where, report.matches)
+    elif report.verdict == "rectified":
+        logger.info("%s: rows of %d matched features differ by %.2f px", where, report.matches, report.row_error)
+    elif report.verdict == "corrected":
+        logger.warning(
+            "%s: not rectified: rows differ by %.2f px; the right eye is turned back by %.3f degrees (pitch) and %.3f "
+            "(roll), which leaves %.2f px", where, report.row_error, math.degrees(report.pitch or 0.0),
+            math.degrees(report.roll or 0.0), report.corrected_row_error,
+        )  # fmt: skip
+    else:
+        message = (
+            f"{where}: left and right are not rectified: rows of {report.matches} matched features differ by "
+            f"{report.row_error:.2f} px (with a small turn of the right eye {report.corrected_row_error:.2f} px; "
+            f"fy {camera.fy:.0f} px)"
+        )
+        if parameters.rectification == "refuse":
+            raise BadInput(message, hint="calibrate the pair again, or --rectification correct")
+        logger.warning("%s", message)

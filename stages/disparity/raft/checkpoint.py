@@ -1,0 +1,74 @@
+"""Checkpoints: the authors' .pth, read without executing anything, and the safetensors that are made of it."""
+
+from __future__ import annotations
+
+import pickle
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from schemas.errors import BadInput
+from stages.disparity.raft.architecture import OTHER_FILE, architecture_of
+from stages.disparity.raft.network import RaftStereo
+from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+
+FORMAT = "RAFT-Stereo checkpoint"
+PREFIX = "module."
+"""Before every name in the authors' files, which were saved from several devices at once."""
+COUNTER = "num_batches_tracked"
+"""Of batch normalisation; not needed to use a network."""
+
+
+def load_network(path: Path) -> RaftStereo:
+    """Return the network of a checkpoint, ready to use. Raises BadInput for a damaged file, tensors of another network,
+    and numbers that are not finite."""
+    return network_of(read_tensors(path), str(path))
+
+
+def network_of(tensors: dict[str, np.ndarray], where: str) -> RaftStereo:
+    """Return the network with these tensors. Raises BadInput when they do not fit one of RAFT-Stereo's sizes."""
+    sizes = architecture_of({name: tensor.shape for name, tensor in tensors.items()}, where)
+    with torch.device("meta"):
+        network = RaftStereo(sizes)
+    state = network.state_dict()
+    needed = {name for name in state if not name.endswith(COUNTER)}
+    for name in sorted(needed | {name for name in tensors if not name.endswith(COUNTER)}):
+        there = tuple(tensors[name].shape) if name in tensors else None
+        wanted = tuple(state[name].shape) if name in needed else None
+        if there != wanted:
+            raise BadInput(f"{where}: tensor {name!r} has shape {there}, the network needs {wanted}", hint=OTHER_FILE)
+        if not np.isfinite(tensors[name]).all():
+            raise BadInput(f"{where}: tensor {name!r} holds numbers that are not finite", hint=OTHER_FILE)
+    loaded = {name: torch.from_numpy(tensors[name].astype(np.float32)) for name in needed}
+    loaded |= {name: torch.tensor(0) for name in state if name.endswith(COUNTER)}
+    network.load_state_dict(loaded, assign=True)
+    return network.eval()
+
+
+def read_tensors(path: Path) -> dict[str, np.ndarray]:
+    """Return name -> array of a .pth or .safetensors file, names without the authors' prefix. Raises BadInput."""
+    path = Path(path)
+    if path.suffix == ".safetensors":
+        return read_safetensors(path)[0]
+    try:
+        found = torch.load(path, map_location="cpu", weights_only=True)
+    except (pickle.UnpicklingError, RuntimeError, zipfile.BadZipFile, EOFError, ValueError, KeyError, OSError) as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0][:160]
+        raise BadInput(f"{path}: no checkpoint that can be read: {reason}", hint=OTHER_FILE) from None
+    if isinstance(found, dict) and isinstance(found.get("state_dict"), dict):
+        found = found["state_dict"]
+    whole = isinstance(found, dict) and all(
+        isinstance(name, str) and isinstance(tensor, torch.Tensor) for name, tensor in found.items()
+    )
+    if not whole:
+        raise BadInput(f"{path}: holds no table of tensors", hint=OTHER_FILE)
+    return {name.removeprefix(PREFIX): tensor.detach().numpy() for name, tensor in found.items()}
+
+
+def convert(source: Path, target: Path) -> None:
+    """Write a checkpoint as safetensors, when its tensors are those of a RAFT-Stereo network. Raises BadInput."""
+    tensors = read_tensors(source)
+    network_of(tensors, str(source))
+    write_safetensors(target, tensors, {"format": FORMAT, "source": Path(source).name})

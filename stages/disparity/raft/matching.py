@@ -1,0 +1,49 @@
+"""RAFT-Stereo as a matcher: both directions, so that there is a confidence, as for the other matcher."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from stages.disparity.raft.checkpoint import load_network
+from stages.disparity.raft.network import RaftStereo
+from stages.kit.stereo.consistency import confidence_of, left_right_difference
+from stages.kit.stereo.disparity_map import DisparityMap
+from stages.kit.stereo.semi_global import gray_of, mirrored
+
+
+def open_raft(
+    weights: Path, iterations: int, agreement: float, device: str
+) -> tuple[Callable[[np.ndarray, np.ndarray, tuple[int, int]], DisparityMap], str]:
+    """Return the matcher (left and right (H, W, 3) uint8 RGB, limits that it does not need) and what it is.
+
+    Raises BadInput for a checkpoint that does not fit.
+    """
+    network = load_network(weights).to(device)
+    scale = 2**network.sizes.downsample
+    detail = f"RAFT-Stereo, {Path(weights).name}, {iterations} updates at 1/{scale} of the size, both directions"
+    return lambda left, right, limits: match(network, left, right, iterations, agreement, device), detail
+
+
+def match(
+    network: RaftStereo, left: np.ndarray, right: np.ndarray, iterations: int, agreement: float, device: str
+) -> DisparityMap:
+    """Match a rectified pair (H, W, 3) uint8 RGB of one size. Raises ValueError for two sizes."""
+    if left.shape != right.shape:
+        raise ValueError(f"the eyes have different sizes: {left.shape} and {right.shape}")
+    forward = estimated(network, left, right, iterations, device)
+    backward = estimated(network, mirrored(right), mirrored(left), iterations, device)[:, ::-1]
+    difference = left_right_difference(forward, backward)
+    kept = (difference <= agreement) & (forward > 0)
+    disparity = np.where(kept, forward, np.nan).astype(np.float32)
+    difference[~kept] = np.inf
+    return DisparityMap(disparity, confidence_of(difference, disparity, gray_of(left)))
+
+
+def estimated(network: RaftStereo, left: np.ndarray, right: np.ndarray, iterations: int, device: str) -> np.ndarray:
+    """Return what the network makes of a pair: disparities (H, W) float32 [px]."""
+    pictures = [torch.from_numpy(np.ascontiguousarray(one)).permute(2, 0, 1).float() for one in (left, right)]
+    return network(*(one.to(device) for one in pictures), iterations).cpu().numpy()

@@ -1,0 +1,83 @@
+"""The network: pictures in, disparity out."""
+
+from __future__ import annotations
+
+import torch
+from torch import nn
+from torch.nn import functional
+
+from stages.disparity.raft.architecture import Architecture
+from stages.disparity.raft.correlation import RowCorrelation
+from stages.disparity.raft.encoders import ContextEncoder, FeatureEncoder, Residual
+from stages.disparity.raft.update import UpdateBlock
+
+DIVISOR = 32
+"""Pictures are padded to multiples of this [px]."""
+
+
+class RaftStereo(nn.Module):
+    """RAFT-Stereo for one pair at a time."""
+
+    def __init__(self, sizes: Architecture | None = None) -> None:
+        super().__init__()
+        self.sizes = sizes = sizes or Architecture()
+        self.cnet = ContextEncoder(sizes)
+        self.update_block = UpdateBlock(sizes)
+        self.context_zqr_convs = nn.ModuleList(
+            nn.Conv2d(hidden, 3 * hidden, 3, 1, 1) for hidden in sizes.hidden[: sizes.scales]
+        )
+        if sizes.shared:
+            width = sizes.widths[2]
+            self.conv2 = nn.Sequential(Residual(width, width, False), nn.Conv2d(width, sizes.features, 3, 1, 1))
+        else:
+            self.fnet = FeatureEncoder(sizes)
+
+    @torch.inference_mode()
+    def forward(self, left: torch.Tensor, right: torch.Tensor, iterations: int) -> torch.Tensor:
+        """Return the disparity (H, W) [px] of the left of two pictures (3, H, W) float, 0 to 255, RGB."""
+        height, width = left.shape[1:]
+        pictures = padded(torch.stack([left, right]) * (2 / 255.0) - 1.0)
+        features, scales = self._encode(pictures)
+        states = [state for state, _ in scales]
+        context = [
+            list(convolution(told).chunk(3, dim=1))
+            for convolution, (_, told) in zip(self.context_zqr_convs, scales, strict=True)
+        ]
+        correlation = RowCorrelation(features[:1], features[1:], self.sizes.levels, self.sizes.radius)
+        start = torch.arange(features.shape[3], dtype=features.dtype, device=features.device)
+        start = start.expand(features.shape[2], -1)
+        column = start
+        for _ in range(iterations):
+            flow = torch.stack([column - start, torch.zeros_like(start)])[None]
+            if self.sizes.slow_fast:
+                self.update_block.coarse_step(states, context, only_coarsest=True)
+                self.update_block.coarse_step(states, context)
+            self.update_block.coarse_step(states, context)
+            change = self.update_block.fine_step(states, context, flow, correlation.at(column))
+            column = column + change[0, 0]
+        weights = self.update_block.upsampling_weights(states)
+        full = upsampled((start - column)[None, None], weights, 2**self.sizes.downsample)
+        top, left_edge = (full.shape[0] - height) // 2, (full.shape[1] - width) // 2
+        return full[top : top + height, left_edge : left_edge + width]
+
+    def _encode(self, pictures: torch.Tensor) -> tuple[torch.Tensor, list[tuple[torch.Tensor, torch.Tensor]]]:
+        if self.sizes.shared:
+            finest = self.cnet.trunk(pictures)
+            return self.conv2(finest), self.cnet.scales(finest[:1], self.sizes.scales)
+        return self.fnet(pictures), self.cnet.scales(self.cnet.trunk(pictures[:1]), self.sizes.scales)
+
+
+def padded(pictures: torch.Tensor) -> torch.Tensor:
+    """Return pictures (N, 3, H, W) with repeated borders, so that both sizes are multiples of DIVISOR."""
+    extra_rows, extra_columns = (-pictures.shape[2]) % DIVISOR, (-pictures.shape[3]) % DIVISOR
+    top, left = extra_rows // 2, extra_columns // 2
+    return functional.pad(pictures, (left, extra_columns - left, top, extra_rows - top), mode="replicate")
+
+
+def upsampled(coarse: torch.Tensor, weights: torch.Tensor, factor: int) -> torch.Tensor:
+    """Return a map (1, 1, h, w) at `factor` times the size (h * factor, w * factor): every pixel is a mean of the nine
+    cells around its own, with `weights` (1, 9 * factor^2, h, w) through a softmax; values grow by the factor."""
+    height, width = coarse.shape[2:]
+    shares = torch.softmax(weights.reshape(9, factor, factor, height, width), dim=0)
+    cells = functional.unfold(factor * coarse, 3, padding=1).reshape(9, 1, 1, height, width)
+    return (shares * cells).sum(dim=0).permute(2, 0, 3, 1).reshape(height * factor, width * factor)

@@ -1,0 +1,157 @@
+"""The whole step on folders of pairs, through ingest: what it writes, and every way in which a pair can be wrong."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from schemas.disparity import Disparity
+from schemas.errors import BadInput, UsageError
+from schemas.sequence import Sequence
+from stages.disparity.parameters import DisparityParameters, check_inputs
+from stages.ingest.preflight.steps import step_reports
+from stages.kit.formats.disparity_file import DisparityReader
+from stages.kit.formats.frames import FrameReader, FrameWriter, require_depth
+from stages.report.stereo_section import stereo_view
+from tests.unit.disparity.pairs import BASELINE, CAMERA, pair, write_folder
+from tests.unit.disparity.running import matched
+from tests.unit.disparity.test_rectification import turned
+from tests.unit.ingest.running import ingest
+
+LEFT, RIGHT, TRUTH, SEEN = pair()
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Disparity:
+    folder = tmp_path_factory.mktemp("pairs")
+    log = write_folder(folder / "log", [(LEFT, RIGHT), pair(seed=9)[:2]])
+    return matched(ingest(log, folder / "sequence"), folder / "disparity")
+
+
+def test_the_artifact_is_a_sequence_with_the_depth_of_its_disparities(made: Disparity) -> None:
+    assert made.outcome == "ok" and made.summary["frames"] == 2 and isinstance(made, Sequence)
+    require_depth(made)
+    info = made.info
+    assert info.streams == ("color", "depth") and info.frame_count == 2 and info.cameras[0].baseline is None
+    with FrameReader(made.path("frames.mcap")) as reader, DisparityReader(made.path("disparity.mcap")) as maps:
+        frame, found = reader.read(0), maps.read(int(reader.stamps[0]))
+    assert frame.depth is not None and frame.color is not None
+    known = (frame.depth > 0) & SEEN
+    assert known.mean() > 0.5
+    error = frame.depth - CAMERA.fx * BASELINE / TRUTH
+    assert np.median(np.abs(error[known])) < 0.04
+    sure = found.confidence >= made.disparity.minimum_confidence
+    np.testing.assert_array_equal(frame.depth > 0, found.known & sure)
+
+
+def test_its_record_says_what_was_searched_and_found(made: Disparity) -> None:
+    file = made.disparity
+    assert [row.verdict for row in file.rows] == ["rectified"] and file.rows[0].matches > 100
+    first = file.frames[0]
+    assert first.lowest <= TRUTH.min() and first.lowest + first.levels > TRUTH.max()
+    assert 0.3 < first.trusted <= first.known <= 1 and first.median_disparity == pytest.approx(11, abs=2)
+
+
+def test_the_report_shows_it(made: Disparity) -> None:
+    view = stereo_view(made, 6, 200)
+    assert len(view.frames) == 2 and all(len(frame.pictures) == 3 for frame in view.frames)
+    assert view.rows[0].verdict == "rectified" and 0 < view.trusted <= view.known <= 100
+
+
+def test_the_same_pairs_give_the_same_bytes(made: Disparity, tmp_path: Path) -> None:
+    again = matched(Sequence(made.root.parent / "sequence"), tmp_path / "again")
+    for name in ("frames.mcap", "disparity.mcap", "disparity.json", "sequence.json"):
+        assert again.path(name).read_bytes() == made.path(name).read_bytes(), name
+
+
+def test_a_turned_eye_is_reported_corrected_or_refused(tmp_path: Path) -> None:
+    log = write_folder(tmp_path / "log", [(LEFT, turned(RIGHT, 0.012, -0.02))])
+    sequence = ingest(log, tmp_path / "sequence")
+    corrected = matched(sequence, tmp_path / "corrected")
+    assert corrected.outcome == "ok" and corrected.disparity.rows[0].verdict == "corrected"
+    reported = matched(sequence, tmp_path / "reported", rectification="report")
+    assert reported.outcome == "not_rectified" and reported.disparity.rows[0].row_error > 1.5  # type: ignore[operator]
+    assert corrected.disparity.frames[0].trusted > reported.disparity.frames[0].trusted + 0.1
+    with pytest.raises(BadInput, match="not rectified"):
+        matched(sequence, tmp_path / "refused", rectification="refuse")
+
+
+def test_swapped_pictures_are_said_to_be_swapped(tmp_path: Path) -> None:
+    sequence = ingest(write_folder(tmp_path / "log", [(RIGHT, LEFT)]), tmp_path / "sequence")
+    with pytest.raises(BadInput, match="swapped.*further right"):
+        matched(sequence, tmp_path / "disparity")
+
+
+def test_a_calibration_that_is_swapped_or_without_a_baseline_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="swapped"):
+        ingest(write_folder(tmp_path / "swapped", [(LEFT, RIGHT)], baseline=-BASELINE), tmp_path / "a")
+    with pytest.raises(BadInput, match="no baseline"):
+        ingest(write_folder(tmp_path / "zero", [(LEFT, RIGHT)], baseline=0.0), tmp_path / "b")
+
+
+@pytest.mark.parametrize(("baseline", "message"), [(0.0, "no baseline"), (-0.1, "swapped")])
+def test_a_sequence_with_such_a_baseline_is_refused_too(tmp_path: Path, baseline: float, message: str) -> None:
+    sequence = ingest(write_folder(tmp_path / "log", [(LEFT, RIGHT)]), tmp_path / "sequence")
+    with FrameWriter(sequence.path("frames.mcap"), CAMERA, baselines={"camera": baseline}) as writer:
+        writer.write(0.0, LEFT, None, right=RIGHT)
+    with pytest.raises(BadInput, match=message):
+        matched(sequence, tmp_path / "disparity")
+
+
+def test_one_eye_is_not_enough(tmp_path: Path) -> None:
+    log = write_folder(tmp_path / "log", [(LEFT, RIGHT)])
+    shutil.rmtree(log / "right")
+    (log / "left").rename(log / "color")
+    with pytest.raises(BadInput, match="one eye"):
+        matched(ingest(log, tmp_path / "sequence"), tmp_path / "disparity")
+
+
+def test_a_frame_without_its_right_eye_is_left_out_and_counted(tmp_path: Path) -> None:
+    log = write_folder(tmp_path / "log", [(LEFT, RIGHT), (LEFT, RIGHT)])
+    (log / "right" / "0001.png").unlink()
+    made = matched(ingest(log, tmp_path / "sequence"), tmp_path / "disparity")
+    assert made.summary["frames"] == 1 and made.info.drops == {"missing_right": 1}
+
+
+def test_eyes_of_different_shapes_leave_no_frame(tmp_path: Path) -> None:
+    sequence = ingest(write_folder(tmp_path / "log", [(LEFT, cv2.resize(RIGHT, (240, 100)))]), tmp_path / "sequence")
+    assert sequence.outcome == "empty" and sum(sequence.info.drops.values()) == 1
+    with pytest.raises(BadInput, match="no frames"):
+        matched(sequence, tmp_path / "disparity")
+
+
+def test_pairs_without_a_calibration_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="calibration"):
+        ingest(write_folder(tmp_path / "log", [(LEFT, RIGHT)], calibrated=False), tmp_path / "sequence")
+
+
+def test_blank_walls_give_an_empty_artifact_with_the_reason(tmp_path: Path) -> None:
+    blank = np.full((CAMERA.height, CAMERA.width, 3), 120, np.uint8)
+    made = matched(ingest(write_folder(tmp_path / "log", [(blank, blank)]), tmp_path / "sequence"), tmp_path / "out")
+    assert made.outcome == "empty" and "nothing_matches" in made.summary["reason"]
+    assert made.disparity.rows[0].verdict == "not_checked" and made.disparity.left_out == {"nothing_matches": 1}
+
+
+@pytest.mark.parametrize(
+    ("options", "inputs", "message"),
+    [
+        ({"method": "raft-stereo"}, {}, "needs --weights"),
+        ({}, {"weights": Path("x.pth")}, "reads no --weights"),
+        ({"levels": 64}, {}, "go together"),
+        ({"levels": 60, "lowest_disparity": 0}, {}, "multiple of 16"),
+        ({"block_size": 4}, {}, "even"),
+    ],
+)
+def test_options_that_do_not_go_together(options: dict, inputs: dict, message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        check_inputs(DisparityParameters(**options), inputs)
+
+
+def test_inspect_calls_the_step_available() -> None:
+    rows = {row.step: row for row in step_reports({"usable frames", "a stereo pair with a baseline", "colour"})}
+    assert rows["disparity"].ready and rows["disparity"].available
+    assert rows["segment"].missing == ("depth (make it with `disparity`)",)
