@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -80,7 +80,7 @@ def metrics(looks: Iterable[Look]) -> dict[str, float]:
     return {name: round(value, 5) for name, value in result.items()}
 
 
-def table_text(looks: list[Look], result: dict[str, float]) -> str:
+def table_text(looks: Sequence[Look], result: dict[str, float]) -> str:
     """Return table.md: all cases and arms, calibration, reasons for doubt, time."""
     scenes = Counter(tier for tier, _ in {(look.tier, look.seed) for look in looks})
     per_tier = ", ".join(f"{tier} {count}" for tier, count in sorted(scenes.items()))

@@ -97,7 +97,7 @@ def compare(table: Table, detections: tuple[Detection, ...]) -> list[Match]:
 def measures(matches: Iterable[Match]) -> dict[str, dict[str, float]]:
     """Return class -> measure -> value; `all` and `unknown` beside the kinds. Shares of nothing are left out."""
     rows = list(matches)
-    result = {}
+    result: dict[str, dict[str, float]] = {}
     for kind in ("all", *MEASURES, "unknown"):
         true = [m for m in rows if m.kind is not None and kind in ("all", m.kind)]
         found = [m for m in rows if m.found is not None and (kind == m.found or kind == "all" != m.found != "unknown")]
