@@ -1,12 +1,14 @@
 """Our policy: pulls, stackings, multi-object and single grasps chosen together for the whole table.
 
-The exact optimum (optimum.py) of expected time, slips counted in, where the table is small enough, which the thesis's
-tables are; larger ones are cleared in portions, each by its own optimum. With `slack`, of the plans nearly as fast as
-the fastest the one with the fewest trips is taken, which loses least when the bin is farther than thought. The plan
-is kept while what is seen is what it foresaw, and made anew otherwise.
+The exact optimum (optimum.py) of expected time and risk, slips counted in, where the table is small enough, which the
+thesis's tables are; larger ones are cleared in portions, each by its own optimum. With `slack`, of the plans nearly as
+fast as the fastest the one with the fewest trips is taken, which loses least when the bin is farther than thought. The
+plan says what is best for whatever may be left, so that after a slip nothing is planned anew unless something moved.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from stages.tableware.planning.actions import (
     Action,
@@ -18,7 +20,7 @@ from stages.tableware.planning.actions import (
     stack,
     taken,
 )
-from stages.tableware.planning.optimum import MOST_ITEMS, Optimum, Trip, seconds
+from stages.tableware.planning.optimum import MOST_ITEMS, Optimum, Solution, Trip
 from stages.tableware.planning.policies import liftable
 from stages.tableware.planning.rules import Rules, can_grasp_two
 from stages.tableware.planning.time_model import Chances, TimeModel
@@ -28,20 +30,56 @@ SLACK = 0.01
 """How much slower than the fastest, as a share of its time, a plan with fewer trips may be."""
 CHARGES = (1.0, 2.0, 4.0, 8.0)
 """Seconds charged for a trip beyond what it takes, to find plans with fewer of them."""
+WORTH = 60.0
+"""Seconds that we give for not losing an item (ours): six trips."""
 PORTION = 14
 
 
-def plan(table: Table, rules: Rules, model: TimeModel, chances: Chances, slack: float = SLACK) -> list[Trip]:
-    """Return the trips that clear a table, or the first portion of a large one, in order."""
-    optimum = Optimum(_portion(table), rules, model, chances)
-    plans = [optimum.trips()]
-    limit = seconds(plans[0]) * (1.0 + slack)
+@dataclass(frozen=True)
+class Plan:
+    """What is best for whatever may be left of a table, or of the first portion of a large one."""
+
+    optimum: Optimum
+    solution: Solution
+
+    @property
+    def trips(self) -> list[Trip]:
+        """The trips in order, when nothing slips."""
+        return self.optimum.trips(self.solution)
+
+    @property
+    def seconds(self) -> float:
+        """Expected time [s]."""
+        return float(self.solution.seconds[self.optimum.everything])
+
+    @property
+    def expected_trips(self) -> float:
+        """Expected number of trips."""
+        return float(self.solution.trips[self.optimum.everything])
+
+    @property
+    def lost(self) -> float:
+        """Expected number of actions that let something fall off the table."""
+        return float(self.solution.lost[self.optimum.everything])
+
+
+def plan(
+    table: Table, rules: Rules, model: TimeModel, chances: Chances, slack: float = SLACK, worth: float = WORTH
+) -> Plan:
+    """Return the plan for a table, or for the first portion of one with more than 16 items."""
+    optimum = Optimum(_portion(table), rules, model, chances, worth)
+    plans = [Plan(optimum, optimum.solve())]
+    limit = _cost(plans[0], worth) * (1.0 + slack)
     for charge in CHARGES if slack > 0.0 else ():
-        other = optimum.trips(charge)
-        if seconds(other) > limit:
+        other = Plan(optimum, optimum.solve(charge))
+        if _cost(other, worth) > limit:
             break
         plans.append(other)
-    return min(plans, key=lambda trips: (len(trips), seconds(trips)))
+    return min(plans, key=lambda one: (round(one.expected_trips, 6), _cost(one, worth)))
+
+
+def _cost(found: Plan, worth: float) -> float:
+    return found.seconds + worth * found.lost
 
 
 def _portion(table: Table) -> Table:
@@ -61,46 +99,62 @@ def _portion(table: Table) -> Table:
 
 
 class JointPolicy:
-    """Keeps a plan and takes its actions one at a time."""
+    """Keeps a plan and takes its actions one at a time. `found` is a plan that was made before."""
 
-    def __init__(self, rules: Rules, model: TimeModel, chances: Chances, slack: float = SLACK) -> None:
-        self._rules, self._model, self._chances, self._slack = rules, model, chances, slack
-        self._trips: list[Trip] = []
+    def __init__(
+        self,
+        rules: Rules,
+        model: TimeModel,
+        chances: Chances,
+        slack: float = SLACK,
+        worth: float = WORTH,
+        found: Plan | None = None,
+    ) -> None:
+        self._make = lambda table: plan(table, rules, model, chances, slack, worth)
+        self._rules = rules
+        self._plan = found
+        self._trip: Trip | None = None
         self._expected: frozenset[tuple[str, str | None]] | None = None
 
     def decide(self, table: Table) -> Action:
         """Return the next action of the plan, or the first of a new one."""
-        if not self._trips or self._expected != _state(table):
-            self._trips = plan(table, self._rules, self._model, self._chances, self._slack)
-        action = self._next(table)
+        if self._expected != _state(table):
+            self._trip = None
+        if self._trip is None:
+            self._trip = self._next_trip(table)
+        action = self._next(table, self._trip)
         if action is None:  # two things came to stand too far apart for their grasp
-            self._trips = plan(table, self._rules, self._model, self._chances, self._slack)
-            action = self._next(table)
+            self._plan = None
+            self._trip = self._next_trip(table)
+            action = self._next(table, self._trip)
         if action is None:
+            self._trip = None
             return grasp(table, liftable(table, table.stacks[0], self._rules))
         return action
 
-    def _next(self, table: Table) -> Action | None:
-        trip = self._trips[0]
+    def _next_trip(self, table: Table) -> Trip:
+        left = None if self._plan is None else self._plan.optimum.left_of(table)
+        if self._plan is None or left is None:
+            self._plan = self._make(table)
+            left = self._plan.optimum.everything
+        return self._plan.optimum.trips(self._plan.solution, left)[0]
+
+    def _next(self, table: Table, trip: Trip) -> Action | None:
         action: Action
         if trip.pull is not None:
             action = pull(table, *trip.pull, self._rules)
-            self._keep(Trip(None, trip.stacks, trip.bases, trip.taken, trip.seconds))
+            self._trip = Trip(None, trip.stacks, trip.bases, trip.taken, trip.seconds)
             self._expected = _state(after_pull(table, action))
         elif trip.stacks:
             action = stack(table, *trip.stacks[0])
-            self._keep(Trip(None, trip.stacks[1:], trip.bases, trip.taken, trip.seconds))
+            self._trip = Trip(None, trip.stacks[1:], trip.bases, trip.taken, trip.seconds)
             self._expected = _state(after_stack(table, action))
         else:
             if len(trip.bases) == 2 and not can_grasp_two(table, trip.bases[0], trip.bases[1], self._rules):
                 return None
             action = grasp_two(table, *trip.bases) if len(trip.bases) == 2 else grasp(table, trip.bases[0])
-            self._trips = self._trips[1:]
-            self._expected = _state(table.without(taken(table, action)))
+            self._trip = None
         return action
-
-    def _keep(self, rest: Trip) -> None:
-        self._trips = [rest, *self._trips[1:]]
 
 
 def _state(table: Table) -> frozenset[tuple[str, str | None]]:

@@ -12,7 +12,7 @@ from functools import lru_cache
 from itertools import product
 from math import atan2, cos, hypot, pi, sin
 
-from stages.tableware.world.footprints import Footprint, footprint, gap, swept_disc
+from stages.tableware.world.footprints import Footprint, footprint, gap, overlapped, swept_disc
 from stages.tableware.world.items import MEASURES, Item, Kind, Measures, Table, rise
 
 LETTERS: dict[Kind, str] = {"plate": "p", "bowl": "b", "cup": "c", "fork": "u", "spoon": "u"}
@@ -123,14 +123,20 @@ def split_over_two(first: str, second: str, parts: tuple[str, ...], rules: Rules
     Utensils lie side by side alone: their piles get nothing more."""
     if parts and not rules.both_piles:
         return None
-    for sides in product((False, True), repeat=len(parts)):
-        ones = tuple(part for part, side in zip(parts, sides, strict=True) if not side)
-        others = tuple(part for part, side in zip(parts, sides, strict=True) if side)
+    kinds = sorted(set(parts), key=pile_order)
+    counts = [parts.count(kind) for kind in kinds]
+    for numbers in product(*(range(count + 1) for count in counts)):  # how many of each kind go onto the second
+        ones = tuple(k for k, all_, n in zip(kinds, counts, numbers, strict=True) for _ in range(all_ - n))
+        others = tuple(k for k, n in zip(kinds, numbers, strict=True) for _ in range(n))
         if can_pile(first, ones, rules) and can_pile(second, others, rules):
-            low = first + "".join(sorted(ones, key=pile_order))
-            high = second + "".join(sorted(others, key=pile_order))
+            low, high = first + "".join(ones), second + "".join(others)
             if can_hold_two(low, high, rules):
-                return sides
+                left = dict(zip(kinds, numbers, strict=True))
+                sides = []
+                for part in parts:
+                    sides.append(left[part] > 0)
+                    left[part] -= 1
+                return tuple(sides)
     return None
 
 
@@ -196,14 +202,13 @@ def sweep(item: Item, target: Item, rules: Rules) -> tuple[Footprint, ...]:
 
 def in_the_way(covers: Iterable[Footprint], table: Table, apart_from: set[str]) -> tuple[Item, ...]:
     """Return the items that any of `covers` overlaps, less those of the piles that `apart_from` stand in."""
-    places = tuple(covers)
-    return tuple(
-        item
-        for stack in table.stacks
-        if not any(other.name in apart_from for other in stack)
-        for item in stack
-        if any(gap(place, footprint(item)) < 0.0 for place in places)
-    )
+    items = [
+        item for stack in table.stacks if not any(other.name in apart_from for other in stack) for item in stack
+    ]
+    if not items:
+        return ()
+    hits = overlapped(tuple(covers), [footprint(item) for item in items]).any(axis=0)
+    return tuple(item for item, hit in zip(items, hits, strict=True) if hit)
 
 
 def can_grasp_two(table: Table, first: str, second: str, rules: Rules) -> bool:

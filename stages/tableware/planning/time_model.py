@@ -111,14 +111,17 @@ class Chances:
 
     hold: letters of what two piles stand on -> chance that a multi-object grasp keeps the second; else it stays.
     noise: whether pulls miss as measured. drop_*: chance that an action lets something fall off the table, which is
-    lost and a failure.
+    lost and a failure: grasps of one pile and of two, stackings, pulls of a dish that carries nothing and of one that
+    does.
     """
 
     hold: Mapping[str, float] = field(default_factory=dict)
     noise: bool = False
     drop_single: float = 0.0
+    drop_two: float = 0.0
     drop_stack: float = 0.0
     drop_pull: float = 0.0
+    drop_loaded_pull: float = 0.0
 
     def holds(self, first: str, second: str) -> float:
         """Return the chance for two piles by the letters of their lowest things; unlike ones as the worse of both."""
