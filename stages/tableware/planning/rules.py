@@ -7,9 +7,8 @@ named as ours where it stands.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
-from itertools import product
 from math import atan2, cos, hypot, pi, sin
 
 from stages.tableware.world.footprints import Footprint, footprint, gap, overlapped, swept_disc
@@ -45,6 +44,14 @@ class Rules:
     """Whether a dish that carries others may be pulled."""
     both_piles: bool = True
     """Whether more is stacked onto a pair of dishes that stand side by side, before one grasp takes all (ours)."""
+
+    def __post_init__(self) -> None:
+        values = tuple(getattr(self, one.name) for one in fields(self))
+        object.__setattr__(self, "_hash", hash(values))
+
+    def __hash__(self) -> int:
+        """Taken once: rules are part of the key of everything that is remembered below."""
+        return self._hash  # type: ignore[attr-defined, no-any-return]
 
 
 def letters(items: Iterable[Item]) -> str:
@@ -123,21 +130,39 @@ def split_over_two(first: str, second: str, parts: tuple[str, ...], rules: Rules
     Utensils lie side by side alone: their piles get nothing more."""
     if parts and not rules.both_piles:
         return None
-    kinds = sorted(set(parts), key=pile_order)
-    counts = [parts.count(kind) for kind in kinds]
-    for numbers in product(*(range(count + 1) for count in counts)):  # how many of each kind go onto the second
-        ones = tuple(k for k, all_, n in zip(kinds, counts, numbers, strict=True) for _ in range(all_ - n))
-        others = tuple(k for k, n in zip(kinds, numbers, strict=True) for _ in range(n))
-        if can_pile(first, ones, rules) and can_pile(second, others, rules):
-            low, high = first + "".join(ones), second + "".join(others)
-            if can_hold_two(low, high, rules):
-                left = dict(zip(kinds, numbers, strict=True))
-                sides = []
-                for part in parts:
-                    sides.append(left[part] > 0)
-                    left[part] -= 1
-                return tuple(sides)
+    kinds = tuple(sorted(set(parts), key=pile_order))
+    numbers = _share_out(first, second, kinds, tuple(parts.count(kind) for kind in kinds), rules)
+    if numbers is None:
+        return None
+    left = dict(zip(kinds, numbers, strict=True))
+    sides = []
+    for part in parts:
+        sides.append(left[part] > 0)
+        left[part] -= 1
+    return tuple(sides)
+
+
+def _share_out(
+    low: str, high: str, kinds: tuple[str, ...], counts: tuple[int, ...], rules: Rules
+) -> tuple[int, ...] | None:
+    """Return how many of each kind of part, in the order of `pile_order`, go onto `high`, the others onto `low`."""
+    if not kinds:
+        return () if can_hold_two(low, high, rules) else None
+    lows, highs = _grown(low, kinds[0], counts[0], rules), _grown(high, kinds[0], counts[0], rules)
+    for number in range(counts[0] + 1):
+        if counts[0] - number < len(lows) and number < len(highs):
+            rest = _share_out(lows[counts[0] - number], highs[number], kinds[1:], counts[1:], rules)
+            if rest is not None:
+                return (number, *rest)
     return None
+
+
+def _grown(pile: str, part: str, count: int, rules: Rules) -> list[str]:
+    """Return the pile with 0, 1, ... `count` parts on it, as far as that goes."""
+    piles = [pile]
+    while len(piles) <= count and can_stack(part, piles[-1], rules):
+        piles.append(piles[-1] + part)
+    return piles
 
 
 def within_jaws(first: Item, second: Item, rules: Rules) -> bool:

@@ -167,6 +167,7 @@ def _ways(signature: tuple[tuple[str, bool], ...], rules: Rules) -> Known:
         return signature[0][0], frozenset()
     base = None
     two = set()
+    tried = set()
     for number, (kinds, whole) in enumerate(signature):
         if not whole or (number and signature[number - 1] == (kinds, whole)):
             continue
@@ -174,7 +175,8 @@ def _ways(signature: tuple[tuple[str, bool], ...], rules: Rules) -> Known:
         if base is None and can_pile(kinds, rest, rules):
             base = kinds
         for second, (others, stands) in enumerate(signature):
-            if second != number and stands and (kinds, others) not in two:
+            if second != number and stands and (kinds, others) not in tried:
+                tried.add((kinds, others))
                 left = tuple(other for row, (other, _) in enumerate(signature) if row not in (number, second))
                 if split_over_two(kinds, others, left, rules) is not None:
                     two.add((kinds, others))
