@@ -15,7 +15,7 @@ import json
 import time
 from pathlib import Path
 
-from benchmarks.tidy.arms import ARMS, WORLDS, trials
+from benchmarks.tidy.arms import ARMS, WORLDS, applies, trials
 from benchmarks.tidy.records import read_runs
 from benchmarks.tidy.tables import metrics, table
 from stages.tableware.world.scenes import TIERS
@@ -48,13 +48,9 @@ def main() -> None:
         tag = "/thesis15" if seed in fifteen else ""
         rows = []
         for tier in options.tiers:
-            if tag and tier == "tier3":
-                continue
             for world in options.worlds:
                 for arm in options.arms:
-                    if arm == "optimum" and world != "fast/exact":
-                        continue
-                    if (arm, f"{tier}/{world}{tag}", seed) not in done:
+                    if applies(tier, world, arm, tag) and (arm, f"{tier}/{world}{tag}", seed) not in done:
                         rows.extend(trials(tier, world, seed, arm, tag))
         with log.open("a", encoding="utf-8") as stream:
             stream.writelines(run.model_dump_json() + "\n" for run in rows)

@@ -1,9 +1,10 @@
 """Our policy: pulls, stackings, multi-object and single grasps chosen together for the whole table.
 
 The exact optimum (optimum.py) of expected time and risk, slips counted in, where the table is small enough, which the
-thesis's tables are; larger ones are cleared in portions, each by its own optimum. With `slack`, of the plans nearly as
-fast as the fastest the one with the fewest trips is taken, which loses least when the bin is farther than thought. The
-plan says what is best for whatever may be left, so that after a slip nothing is planned anew unless something moved.
+thesis's tables are; larger ones are cleared in portions, each by its own optimum. Of the plans nearly as fast as the
+fastest (`slack`) the one with the fewest trips is taken, which loses least when the bin is farther than thought; where
+nothing is left to chance, only of those no slower than Pull and Stack would be. The plan says what is best for whatever
+may be left, so that after a slip nothing is planned anew unless something moved.
 """
 
 from __future__ import annotations
@@ -12,6 +13,9 @@ from dataclasses import dataclass
 
 from stages.tableware.planning.actions import (
     Action,
+    Grasp,
+    PullGrasp,
+    StackGrasp,
     after_pull,
     after_stack,
     grasp,
@@ -21,13 +25,14 @@ from stages.tableware.planning.actions import (
     taken,
 )
 from stages.tableware.planning.optimum import MOST_ITEMS, Optimum, Solution, Trip
-from stages.tableware.planning.policies import liftable
+from stages.tableware.planning.policies import Policy, PullPolicy, StackPolicy, liftable
 from stages.tableware.planning.rules import Rules, can_grasp_two
 from stages.tableware.planning.time_model import Chances, TimeModel
 from stages.tableware.world.items import Table
 
-SLACK = 0.01
-"""How much slower than the fastest, as a share of its time, a plan with fewer trips may be."""
+SLACK, SLACK_WHEN_SURE = 0.01, 0.029
+"""How much slower than the fastest, as a share of its cost, a plan with fewer trips may be: where something may slip,
+and where nothing does."""
 CHARGES = (1.0, 2.0, 4.0, 8.0)
 """Seconds charged for a trip beyond what it takes, to find plans with fewer of them."""
 WORTH = 60.0
@@ -64,18 +69,38 @@ class Plan:
 
 
 def plan(
-    table: Table, rules: Rules, model: TimeModel, chances: Chances, slack: float = SLACK, worth: float = WORTH
+    table: Table, rules: Rules, model: TimeModel, chances: Chances, slack: float | None = None, worth: float = WORTH
 ) -> Plan:
-    """Return the plan for a table, or for the first portion of one with more than 16 items."""
-    optimum = Optimum(_portion(table), rules, model, chances, worth)
+    """Return the plan for a table, or the first portion of one with more than 16 items; `slack`: None takes ours."""
+    portion = _portion(table)
+    optimum = Optimum(portion, rules, model, chances, worth)
     plans = [Plan(optimum, optimum.solve())]
-    limit = _cost(plans[0], worth) * (1.0 + slack)
-    for charge in CHARGES if slack > 0.0 else ():
+    least = _cost(plans[0], worth)
+    limit = least * (1.0 + (slack if slack is not None else SLACK_WHEN_SURE if chances.sure else SLACK))
+    if slack is None and chances.sure:
+        limit = max(least, min(limit, *(_alone(policy, portion, model) for policy in (PullPolicy(), StackPolicy()))))
+    if chances.sure and limit > least:
+        return Plan(optimum, optimum.fewest_trips(plans[0].solution, limit + 1e-9))
+    for charge in CHARGES if limit > least else ():
         other = Plan(optimum, optimum.solve(charge))
         if _cost(other, worth) > limit:
             break
         plans.append(other)
     return min(plans, key=lambda one: (round(one.expected_trips, 6), _cost(one, worth)))
+
+
+def _alone(policy: Policy, table: Table, model: TimeModel) -> float:
+    """Return the seconds that a policy of the thesis would take where nothing goes wrong."""
+    time = 0.0
+    while table.items:
+        action = policy.decide(table)
+        if isinstance(action, PullGrasp):
+            time, table, action = time + model.pull, after_pull(table, action.u_P), action.u_G
+        elif isinstance(action, StackGrasp):
+            time, table, action = time + model.stack, after_stack(table, action.u_S), action.u_G
+        assert isinstance(action, Grasp)  # these policies neither pull nor stack without grasping
+        time, table = time + model.whole_trip, table.without(taken(table, action))
+    return time
 
 
 def _cost(found: Plan, worth: float) -> float:
@@ -106,7 +131,7 @@ class JointPolicy:
         rules: Rules,
         model: TimeModel,
         chances: Chances,
-        slack: float = SLACK,
+        slack: float | None = None,
         worth: float = WORTH,
         found: Plan | None = None,
     ) -> None:

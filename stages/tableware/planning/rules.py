@@ -227,9 +227,7 @@ def sweep(item: Item, target: Item, rules: Rules) -> tuple[Footprint, ...]:
 
 def in_the_way(covers: Iterable[Footprint], table: Table, apart_from: set[str]) -> tuple[Item, ...]:
     """Return the items that any of `covers` overlaps, less those of the piles that `apart_from` stand in."""
-    items = [
-        item for stack in table.stacks if not any(other.name in apart_from for other in stack) for item in stack
-    ]
+    items = [item for stack in table.stacks if not any(other.name in apart_from for other in stack) for item in stack]
     if not items:
         return ()
     hits = overlapped(tuple(covers), [footprint(item) for item in items]).any(axis=0)

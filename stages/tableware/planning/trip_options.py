@@ -220,9 +220,7 @@ def _pairs(
     own = {base.name: sum(1 << row[name] for name, lowest in pile.items() if lowest == base.name) for base in bases}
     for number, (first, second, *_) in enumerate(found):
         blockers[number] &= ~(own[table.items[first].name] | own[table.items[second].name])
-    order = sorted(
-        range(len(found)), key=lambda n: found[n][2] + worth * found[n][3] + found[n][4] * slip_cost(model)
-    )
+    order = sorted(range(len(found)), key=lambda n: found[n][2] + worth * found[n][3] + found[n][4] * slip_cost(model))
     columns = list(zip(*(found[number] for number in order), strict=True)) or [()] * 6
     return (
         np.array(columns[0], np.int64), np.array(columns[1], np.int64), blockers[np.array(order, np.int64)],
@@ -243,8 +241,8 @@ def slip_cost(model: TimeModel) -> float:
 
 @njit(cache=True)
 def _ways_of(  # type: ignore[no-untyped-def]
-    rows, masks, signatures, bases, two, lowest, whole, length, part_mask, type_of, pair_first, pair_second, pair_blockers,
-    pair_seconds, pair_lost, pair_slips, pair_pulled, costs, loaded_pulls, drop_loaded,
+    rows, masks, signatures, bases, two, lowest, whole, length, part_mask, type_of, pair_first, pair_second,
+    pair_blockers, pair_seconds, pair_lost, pair_slips, pair_pulled, costs, loaded_pulls, drop_loaded,
 ):  # fmt: skip
     """Return starts (C + 1,) and the options of all choices, see TripOptions."""
     whole_trip, stack, drop_stack, drop_single, drop_two, worth = costs

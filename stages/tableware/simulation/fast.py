@@ -2,13 +2,19 @@
 
 What goes wrong, and nothing else does: a pull misses by the measured error, and contact stops a dish that would come to
 stand in another; a multi-object grasp whose second pile is out of reach then, or slips, leaves it where it is; an
-action may drop something off the table for good, by chances that are 0 unless said. Seeing is perfect here.
+action may drop something off the table for good, by chances that are 0 unless said. Whatever chance decides follows
+from the seed, from what it happens to and from how often that was tried, not from the order of things: all policies
+meet the same luck. Who sees less than everything is told by `see` (the truth unless said).
 """
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot
+from typing import Protocol
+from zlib import crc32
 
 import numpy as np
 
@@ -55,15 +61,37 @@ class Trial:
         return self.dropped + self.left > 0
 
 
+class World(Protocol):
+    """A table that actions change, simulated fast or with physics."""
+
+    table: Table
+    """The truth as it is now."""
+    trial: Trial
+
+    def do(self, action: Action) -> None:
+        """Carry out an action, a composite one without looking in between."""
+        ...
+
+
 class FastWorld:
     """A table that actions change."""
 
-    def __init__(self, table: Table, model: TimeModel, chances: Chances, seed: int) -> None:
+    def __init__(self, table: Table, model: TimeModel, chances: Chances, seed: int | tuple[int, ...]) -> None:
         self.table = table
         self.trial = Trial(left=len(table.items))
         self._model, self._chances = model, chances
-        self._random = np.random.default_rng([seed, 72])
+        self._seed = (seed,) if isinstance(seed, int) else seed
+        self._tried: Counter[str] = Counter()
         self._rules = Rules()
+
+    def _luck(self, what: str, name: str) -> np.random.Generator:
+        """Return the generator of one thing that happens to an item, another at each attempt."""
+        key = f"{what} {name}"
+        self._tried[key] += 1
+        return np.random.default_rng([*self._seed, 72, crc32(key.encode()), self._tried[key]])
+
+    def _goes_wrong(self, chance: float, what: str, name: str) -> bool:
+        return chance > 0.0 and self._luck(what, name).random() < chance
 
     def do(self, action: Action) -> None:
         """Carry out an action, a composite one without looking in between."""
@@ -84,14 +112,16 @@ class FastWorld:
     def _pull(self, action: Pull) -> None:
         self.trial.seconds += self._model.pull
         self.trial.pulls += 1
-        if self._random.random() < self._chances.drop_pull:
+        loaded = bool(self.table.carried[action.item])
+        chance = self._chances.drop_loaded_pull if loaded else self._chances.drop_pull
+        if self._goes_wrong(chance, "pull", action.item):
             self._drop(action.item)
             return
         item, target = self.table.by_name[action.item], self.table.by_name[action.target]
         error = (0.0, 0.0)
         if self._chances.noise:
             length = hypot(action.p_E[0] - action.p_S[0], action.p_E[1] - action.p_S[1])
-            error = placement_error(item.kind, length, self._random)
+            error = placement_error(item.kind, length, self._luck("miss", item.name))
         moved = after_pull(self.table, action, error)
         inside = -gap(footprint(moved.by_name[item.name]), footprint(target))
         if inside > 0.0:  # contact stops it on its way
@@ -104,7 +134,7 @@ class FastWorld:
     def _stack(self, action: Stack) -> None:
         self.trial.seconds += self._model.stack
         self.trial.stacks += 1
-        if self._random.random() < self._chances.drop_stack:
+        if self._goes_wrong(self._chances.drop_stack, "stack", action.u_G.items[0]):
             self._drop(action.u_G.items[0])
             return
         self.table = after_stack(self.table, action)
@@ -115,10 +145,13 @@ class FastWorld:
         here = tuple(name for name in action.items if name in self.table.by_name)
         if len(here) == 2:
             first, second = (self.table.by_name[name] for name in here)
-            holds = self._chances.holds(letters((first,)), letters((second,)))
-            if not can_grasp_two(self.table, *here, self._rules) or self._random.random() >= holds:
+            slips = 1.0 - self._chances.holds(letters((first,)), letters((second,)))
+            if not can_grasp_two(self.table, *here, self._rules) or self._goes_wrong(slips, "slip", here[1]):
                 here = here[:1]
-        elif here and self._random.random() < self._chances.drop_single:
+            elif self._goes_wrong(self._chances.drop_two, "lift", here[1]):
+                self._drop(here[1])
+                here = here[:1]
+        elif here and self._goes_wrong(self._chances.drop_single, "lift", here[0]):
             self._drop(here[0])
             return
         for name in here:
@@ -132,11 +165,29 @@ class FastWorld:
         self.table = self.table.without(names)
 
 
-def run_trial(table: Table, policy: Policy, model: TimeModel, chances: Chances, seed: int) -> Trial:
-    """Return what a policy came to on a table; it is stopped after 400 actions and what is left counts as left."""
-    world = FastWorld(table, model, chances, seed)
+def truth(world: World) -> Table:
+    """See everything as it is."""
+    return world.table
+
+
+def run_in(
+    world: World,
+    policy: Policy,
+    see: Callable[[World], Table] = truth,
+    told: Callable[[Action], None] = lambda action: None,
+) -> Trial:
+    """Let a policy clear the table of any world, one action an image; it ends when nothing is seen, and after 400
+    actions. What is left counts as left. `told` hears each action before it is done."""
     for _ in range(MOST_ACTIONS):
-        if not world.table.items:
+        seen = see(world)
+        if not seen.items:
             break
-        world.do(policy.decide(world.table))
+        action = policy.decide(seen)
+        told(action)
+        world.do(action)
     return world.trial
+
+
+def run_trial(table: Table, policy: Policy, model: TimeModel, chances: Chances, seed: int | tuple[int, ...]) -> Trial:
+    """Return what a policy came to on a table in the fast simulator, seeing everything."""
+    return run_in(FastWorld(table, model, chances, seed), policy)
