@@ -13,6 +13,9 @@ from schemas.panoptic_map import PanopticMap
 from schemas.plan import Plan
 from schemas.segments import Segments
 from schemas.sequence import Sequence
+from schemas.tableware_plan import TablewarePlan
+from schemas.tableware_scene import TablewareScene
+from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
 from schemas.trajectory import Depth, Trajectory
 
 __all__ = [
@@ -32,5 +35,9 @@ __all__ = [
     "Report",
     "Segments",
     "Sequence",
+    "TablewareEvaluation",
+    "TablewarePlan",
+    "TablewareScene",
+    "TablewareTrial",
     "Trajectory",
 ]

@@ -120,7 +120,7 @@ def _portion(table: Table) -> Table:
     for pile in near:
         if len(chosen) + len(pile) <= PORTION:
             chosen.update(item.name for item in pile)
-    return Table(tuple(item for item in table.items if item.name in chosen))
+    return Table(tuple(item for item in table.items if item.name in chosen), table.obstacles)
 
 
 class JointPolicy:
@@ -137,7 +137,7 @@ class JointPolicy:
     ) -> None:
         self._make = lambda table: plan(table, rules, model, chances, slack, worth)
         self._rules = rules
-        self._plan = found
+        self._first, self._plan = found, found
         self._trip: Trip | None = None
         self._expected: frozenset[tuple[str, str | None]] | None = None
 
@@ -149,8 +149,8 @@ class JointPolicy:
             self._trip = self._next_trip(table)
         action = self._next(table, self._trip)
         if action is None:  # two things came to stand too far apart for their grasp
-            self._plan = None
-            self._trip = self._next_trip(table)
+            self._plan = self._make(table)
+            self._trip = self._plan.trips[0]
             action = self._next(table, self._trip)
         if action is None:
             self._trip = None
@@ -158,11 +158,13 @@ class JointPolicy:
         return action
 
     def _next_trip(self, table: Table) -> Trip:
-        left = None if self._plan is None else self._plan.optimum.left_of(table)
-        if self._plan is None or left is None:
-            self._plan = self._make(table)
-            left = self._plan.optimum.everything
-        return self._plan.optimum.trips(self._plan.solution, left)[0]
+        for known in (self._plan, self._first):
+            left = None if known is None else known.optimum.left_of(table)
+            if known is not None and left is not None:
+                return known.optimum.trips(known.solution, left)[0]
+        self._plan = self._make(table)
+        self._first = self._first or self._plan
+        return self._plan.trips[0]
 
     def _next(self, table: Table, trip: Trip) -> Action | None:
         action: Action

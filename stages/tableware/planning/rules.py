@@ -234,13 +234,24 @@ def in_the_way(covers: Iterable[Footprint], table: Table, apart_from: set[str]) 
     return tuple(item for item, hit in zip(items, hits, strict=True) if hit)
 
 
+def obstructed(covers: Iterable[Footprint], table: Table) -> bool:
+    """Return whether any of `covers` touches something that is not understood."""
+    if not table.obstacles:
+        return False
+    circles = [Footprint((x, y), (x, y), size) for x, y, size in table.obstacles]
+    return bool(overlapped(tuple(covers), circles).any())
+
+
 def can_grasp_two(table: Table, first: str, second: str, rules: Rules) -> bool:
     """Return whether one grasp takes two things that stand on the table, with their loads, as they are now."""
     one, other = table.by_name[first], table.by_name[second]
     if first == second or one.on is not None or other.on is not None or not within_jaws(one, other, rules):
         return False
     piles = letters((one, *table.load(first))), letters((other, *table.load(second)))
-    return can_hold_two(*piles, rules) and not in_the_way((jaws(one, other, rules),), table, {first, second})
+    covers = (jaws(one, other, rules),)
+    if not can_hold_two(*piles, rules) or obstructed(covers, table):
+        return False
+    return not in_the_way(covers, table, {first, second})
 
 
 def can_pull(table: Table, item: str, target: str, rules: Rules) -> bool:
@@ -254,8 +265,10 @@ def can_pull(table: Table, item: str, target: str, rules: Rules) -> bool:
     if not can_hold_two(letters((one, *load)), letters((other, *table.load(target))), rules):
         return False
     x, y, yaw = pull_end(one, other, rules)
-    inside = footprint(one, x, y, yaw).on_table
-    return inside and not in_the_way(sweep(one, other, rules), table, {item, target})
+    if not footprint(one, x, y, yaw).on_table:
+        return False
+    covers = sweep(one, other, rules)
+    return not obstructed(covers, table) and not in_the_way(covers, table, {item, target})
 
 
 def can_put(table: Table, item: str, onto: str, rules: Rules) -> bool:

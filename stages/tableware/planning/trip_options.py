@@ -19,6 +19,7 @@ from stages.tableware.planning.rules import (
     can_pile,
     jaws,
     letters,
+    obstructed,
     pull_end,
     split_over_two,
     sweep,
@@ -209,6 +210,8 @@ def _pairs(
                 if not footprint(one, *pull_end(one, other, rules)).on_table:
                     continue
                 places, pulled, cost, lost = sweep(one, other, rules), True, model.pull, chances.drop_pull
+            if obstructed(places, table):
+                continue
             owners.extend([len(found)] * len(places))
             covers.extend(places)
             found.append((first, second, cost, lost, slips, pulled))

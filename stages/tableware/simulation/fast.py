@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot
-from typing import Protocol
+from typing import Literal, Protocol
 from zlib import crc32
 
 import numpy as np
@@ -30,12 +30,12 @@ from stages.tableware.planning.actions import (
     taken,
 )
 from stages.tableware.planning.policies import Policy
-from stages.tableware.planning.rules import Rules, can_grasp_two, letters
+from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold, letters
 from stages.tableware.planning.time_model import Chances, TimeModel, placement_error
 from stages.tableware.world.footprints import footprint, gap
 from stages.tableware.world.items import Table
 
-MOST_ACTIONS = 400
+MOST_ACTIONS, MOST_IDLE = 400, 8
 
 
 @dataclass
@@ -60,6 +60,11 @@ class Trial:
         """Whether not everything came to the bin."""
         return self.dropped + self.left > 0
 
+    @property
+    def failure(self) -> Literal["", "policy", "perception"]:
+        """What a failed trial is counted as: something was dropped, or only left, which nobody saw (section 7.1)."""
+        return "policy" if self.dropped else "perception" if self.left else ""
+
 
 class World(Protocol):
     """A table that actions change, simulated fast or with physics."""
@@ -68,8 +73,9 @@ class World(Protocol):
     """The truth as it is now."""
     trial: Trial
 
-    def do(self, action: Action) -> None:
-        """Carry out an action, a composite one without looking in between."""
+    def do(self, action: Action, seen: Table | None = None) -> None:
+        """Carry out an action that was decided on `seen` (None: on the truth), a composite one without looking in
+        between."""
         ...
 
 
@@ -83,6 +89,10 @@ class FastWorld:
         self._seed = (seed,) if isinstance(seed, int) else seed
         self._tried: Counter[str] = Counter()
         self._rules = Rules()
+        self.fallen: list[str] = []
+        """Everything that fell off the table, in order."""
+        self.troubles: list[str] = []
+        """What did not go as planned in the last action."""
 
     def _luck(self, what: str, name: str) -> np.random.Generator:
         """Return the generator of one thing that happens to an item, another at each attempt."""
@@ -93,8 +103,10 @@ class FastWorld:
     def _goes_wrong(self, chance: float, what: str, name: str) -> bool:
         return chance > 0.0 and self._luck(what, name).random() < chance
 
-    def do(self, action: Action) -> None:
-        """Carry out an action, a composite one without looking in between."""
+    def do(self, action: Action, seen: Table | None = None) -> None:
+        """Carry out an action, a composite one without looking in between. Items go by their names, whatever was seen:
+        what is not there is reached for in vain, and a pile that is more than the jaws hold is dropped."""
+        self.troubles = []
         if isinstance(action, PullGrasp):
             self._pull(action.u_P)
             self._grasp(action.u_G)
@@ -112,6 +124,8 @@ class FastWorld:
     def _pull(self, action: Pull) -> None:
         self.trial.seconds += self._model.pull
         self.trial.pulls += 1
+        if not self._there(action.item, action.target):
+            return
         loaded = bool(self.table.carried[action.item])
         chance = self._chances.drop_loaded_pull if loaded else self._chances.drop_pull
         if self._goes_wrong(chance, "pull", action.item):
@@ -134,6 +148,8 @@ class FastWorld:
     def _stack(self, action: Stack) -> None:
         self.trial.seconds += self._model.stack
         self.trial.stacks += 1
+        if not self._there(action.u_G.items[0], action.onto):
+            return
         if self._goes_wrong(self._chances.drop_stack, "stack", action.u_G.items[0]):
             self._drop(action.u_G.items[0])
             return
@@ -143,10 +159,12 @@ class FastWorld:
         self.trial.seconds += self._model.whole_trip
         self.trial.trips += 1
         here = tuple(name for name in action.items if name in self.table.by_name)
+        self._there(*action.items)
         if len(here) == 2:
             first, second = (self.table.by_name[name] for name in here)
             slips = 1.0 - self._chances.holds(letters((first,)), letters((second,)))
             if not can_grasp_two(self.table, *here, self._rules) or self._goes_wrong(slips, "slip", here[1]):
+                self.troubles.append(f"{here[1]} stayed behind")
                 here = here[:1]
             elif self._goes_wrong(self._chances.drop_two, "lift", here[1]):
                 self._drop(here[1])
@@ -155,14 +173,39 @@ class FastWorld:
             self._drop(here[0])
             return
         for name in here:
+            if not can_hold(letters((self.table.by_name[name], *self.table.load(name))), self._rules):
+                self._drop(name)
+                continue
             names = taken(self.table, Grasp((name,), action.p_G, action.theta_G))
             self.trial.moved += len(names)
             self.table = self.table.without(names)
 
+    def _there(self, *names: str) -> bool:
+        missing = [name for name in names if name not in self.table.by_name]
+        if missing:
+            self.troubles.append(f"reached in vain for {' and '.join(missing)}")
+        return not missing
+
     def _drop(self, name: str) -> None:
         names = {name, *(item.name for item in self.table.load(name))}
+        self.fallen.extend(sorted(names))
+        self.troubles.append(f"{' and '.join(sorted(names))} fell off the table")
         self.trial.dropped += len(names)
         self.table = self.table.without(names)
+
+
+@dataclass(frozen=True)
+class Done:
+    """An action that was carried out: the truth before and after it, seconds since the beginning, what fell off the
+    table, and what did not go as planned."""
+
+    action: Action
+    before: Table
+    after: Table
+    start: float
+    end: float
+    dropped: tuple[str, ...] = ()
+    troubles: tuple[str, ...] = ()
 
 
 def truth(world: World) -> Table:
@@ -170,21 +213,32 @@ def truth(world: World) -> Table:
     return world.table
 
 
+def do_in(world: World, action: Action, seen: Table) -> Done:
+    """Carry out an action that was decided on `seen`, and say what came of it."""
+    before, start = world.table, world.trial.seconds
+    fallen = set(getattr(world, "fallen", ()))
+    world.do(action, seen)
+    after, end = world.table, world.trial.seconds
+    dropped = tuple(name for name in getattr(world, "fallen", ()) if name not in fallen)
+    return Done(action, before, after, start, end, dropped, tuple(getattr(world, "troubles", ())))
+
+
 def run_in(
     world: World,
     policy: Policy,
     see: Callable[[World], Table] = truth,
-    told: Callable[[Action], None] = lambda action: None,
+    told: Callable[[Done], None] = lambda done: None,
 ) -> Trial:
-    """Let a policy clear the table of any world, one action an image; it ends when nothing is seen, and after 400
-    actions. What is left counts as left. `told` hears each action before it is done."""
+    """Let a policy clear the table of any world, one action an image; `told` hears of each action. It ends when nothing
+    is seen, when eight actions in a row have changed nothing, and after 400. What is left counts as left."""
+    idle = 0
     for _ in range(MOST_ACTIONS):
         seen = see(world)
-        if not seen.items:
+        if not seen.items or idle == MOST_IDLE:
             break
-        action = policy.decide(seen)
-        told(action)
-        world.do(action)
+        done = do_in(world, policy.decide(seen), seen)
+        idle = idle + 1 if done.after.items == done.before.items else 0
+        told(done)
     return world.trial
 
 

@@ -1,0 +1,95 @@
+"""Seeing a table: from an RGB-D image to what is planned for, and eyes that look anew before each action."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import hypot
+
+import numpy as np
+
+from stages.tableware.planning.refusals import Accepted, Doubt, Unknown, accept
+from stages.tableware.planning.rules import Rules
+from stages.tableware.simulation.fast import World
+from stages.tableware.vision.detection import detect
+from stages.tableware.vision.detections import Detection, as_table
+from stages.tableware.world.items import Table
+from stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_camera, render_overhead
+
+SAME_PLACE = 0.025
+"""What is seen no farther than this [m] from where an item of its sort is, is that item: a grasp there meets it."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What an image says."""
+
+    detections: tuple[Detection, ...]
+    accepted: Accepted
+
+
+def look(color: np.ndarray, depth: np.ndarray, view: OverheadCamera, least: float, rules: Rules) -> Seen:
+    """Return what an image says, and what of it is planned for. Raises BadInput for an image that cannot be used."""
+    return understood(detect(color, depth, view), least, rules)
+
+
+def understood(detections: tuple[Detection, ...], least: float, rules: Rules) -> Seen:
+    """Return what of some detections is planned for; items are named by their kind and their row."""
+    names = {row: f"{found.kind}_{row + 1}" for row, found in enumerate(detections) if found.kind is not None}
+    doubts = {name: Doubt(detections[row].confidence, detections[row].unsure) for row, name in names.items()}
+    unknown = tuple(
+        Unknown(f"unknown_{row + 1}", found.position[0], found.position[1], max(found.extent, 0.01))
+        for row, found in enumerate(detections)
+        if found.kind is None
+    )
+    return Seen(detections, accept(as_table(detections), doubts, unknown, least, rules))
+
+
+class Eyes:
+    """Looks at a world before each action: the image that it gives, or one rendered of its table. Items get the names
+    of the true ones that stand there, so that a policy can follow them; what is nobody keeps a name of its own."""
+
+    def __init__(self, seed: int, light: str, colors: Scheme, least: float) -> None:
+        self._seed, self._light, self._colors, self._least = seed, light, colors, least
+        self._rules = Rules()
+        self.images = 0
+        self.last: Seen | None = None
+
+    def __call__(self, world: World) -> Table:
+        """Return what is seen."""
+        color, depth, view = self._image(world)
+        self.images += 1
+        self.last = look(color, depth, view, self._least, self._rules)
+        return named_as(self.last.accepted.table, world.table)
+
+    def _image(self, world: World) -> tuple[np.ndarray, np.ndarray, OverheadCamera]:
+        image = getattr(world, "image", None)
+        if image is not None:
+            color, depth, view = image()
+            return color, depth, view
+        view = overhead_camera()
+        seed = 1000 * self._seed + self.images
+        color, depth = render_overhead(world.table, seed, self._light, self._colors, view=view)
+        return color, depth, view
+
+
+def named_as(seen: Table, known: Table, reach: float = SAME_PLACE) -> Table:
+    """Return a table whose items have the names of those of another that they are: of the same kind (forks and spoons
+    are one), nearest first, no farther than `reach` [m]. The others are called `stray_1` and so on."""
+    pairs = sorted(
+        (hypot(*(a - b for a, b in zip(one.position, other.position, strict=True))), one.name, other.name)
+        for one in seen.items
+        for other in known.items
+        if one.kind == other.kind or not (one.is_dish or other.is_dish)
+    )
+    names: dict[str, str] = {}
+    taken: set[str] = set()
+    for apart, one, other in pairs:
+        if apart <= reach and one not in names and other not in taken:
+            names[one] = other
+            taken.add(other)
+    strays = (item.name for item in seen.items if item.name not in names)
+    names |= {name: f"stray_{number}" for number, name in enumerate(strays, start=1)}
+    items = tuple(
+        replace(item, name=names[item.name], on=None if item.on is None else names[item.on]) for item in seen.items
+    )
+    return Table(items, seen.obstacles)
