@@ -66,7 +66,8 @@ class TablewareSceneFile(Model):
 
 
 class TablewareScene(Artifact):
-    """`scene.json`, `color.png` (sRGB), `depth.npz` (`depth` (H, W) float32 z-depth [m], 0 where unknown)."""
+    """`scene.json`, `color.png` (sRGB), `depth.npz` (`depth` (H, W) float32 z-depth [m], 0 where unknown),
+    `shapes/<kind>.ply`."""
 
     kind: ClassVar[str] = "tableware_scene"
     description: ClassVar[str] = "a table with tableware, its overhead RGB-D image and the truth"

@@ -21,6 +21,9 @@ from schemas.kinds import (
     Report,
     Segments,
     Sequence,
+    TablewareEvaluation,
+    TablewarePlan,
+    TablewareTrial,
     Trajectory,
 )
 from stages.kit.stage import Optionally, Parameters, Stage
@@ -48,7 +51,7 @@ def check_inputs(parameters: ReportParameters, inputs: Mapping[str, Any]) -> Non
 
 STAGE = Stage(
     name="report",
-    version=5,
+    version=6,
     summary="Write one self-contained HTML page about a run: pictures, graph, figures, times, how it was made",
     parameters=ReportParameters,
     reads={
@@ -63,6 +66,9 @@ STAGE = Stage(
         "interactive_scene": Optionally(InteractiveScene),
         "plan": Optionally(Plan),
         "packing": Optionally(Packing),
+        "tableware_plan": Optionally(TablewarePlan),
+        "tableware_trial": Optionally(TablewareTrial),
+        "tableware_evaluation": Optionally(TablewareEvaluation),
         "evaluation": Optionally(Evaluation),
         "baseline_evaluation": Optionally(Evaluation),
     },

@@ -12,6 +12,7 @@ from stages.tableware.parameters import SceneParameters
 from stages.tableware.world.overhead import overhead_camera, render_overhead
 from stages.tableware.world.records import as_records
 from stages.tableware.world.scenes import make_table
+from stages.tableware.world.shape_files import write_shapes
 
 
 def run(*, parameters: SceneParameters, context: Context) -> TablewareScene:
@@ -21,6 +22,7 @@ def run(*, parameters: SceneParameters, context: Context) -> TablewareScene:
         color, depth = render_overhead(table, context.seed, parameters.light, parameters.colors, view=view)
     Image.fromarray(color).save(context.output / "color.png")
     np.savez_compressed(context.output / "depth.npz", depth=depth.astype(np.float32))
+    write_shapes(context.output)
     TablewareSceneFile(
         tier=parameters.tier,
         seed=context.seed,

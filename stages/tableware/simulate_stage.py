@@ -21,6 +21,7 @@ from stages.tableware.simulation.fast import Done, FastWorld, Trial, World, do_i
 from stages.tableware.table_pictures import draw_strip, words_of, write_animation
 from stages.tableware.world.items import Table
 from stages.tableware.world.records import as_records, as_table
+from stages.tableware.world.shape_files import write_shapes
 
 ANIMATION_WIDTH = 560
 
@@ -61,6 +62,7 @@ def run(
         statement=said,
     ).write(context.output / "trial.json")
     context.output.joinpath("trial.txt").write_text(_text(done, said), encoding="utf-8")
+    write_shapes(context.output)
     with context.progress.step("pictures"):
         draw_strip(panels(done, table), parameters.image_width).save(context.output / "keyframes.png")
         moving = [
