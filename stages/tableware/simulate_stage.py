@@ -24,6 +24,8 @@ from stages.tableware.world.records import as_records, as_table
 from stages.tableware.world.shape_files import write_shapes
 
 ANIMATION_WIDTH = 560
+PHYSICS = "stages.tableware.simulation.physics"
+"""Loaded only when it is asked for; its `PhysicsTable(table)` is a `World` that also gives images."""
 
 
 def run(
@@ -69,7 +71,7 @@ def run(
             (one.action, one.before, one.after, f"{one.start:.0f} s: {words_of(one.action)}")
             for one in done
         ]  # fmt: skip
-        write_animation(context.output / "clearing.gif", moving, ANIMATION_WIDTH)
+        write_animation(context.output / "clearing.gif", moving, min(ANIMATION_WIDTH, parameters.image_width))
     summary: dict[str, object] = {
         "policy": "plan" if planned is not None else parameters.policy,
         "simulator": parameters.simulator,
@@ -87,7 +89,7 @@ def open_world(simulator: str, table: Table, model: TimeModel, chances: Chances,
     if simulator == "fast":
         return FastWorld(table, model, chances, seed)
     try:
-        physics = importlib.import_module("stages.tableware.simulation.physics")
+        physics = importlib.import_module(PHYSICS)
     except ImportError as error:
         raise MissingDependency(f"tableware has no physics here: {error}", hint="--simulator fast") from None
     world: World = physics.PhysicsTable(table)
