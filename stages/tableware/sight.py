@@ -46,20 +46,27 @@ def understood(detections: tuple[Detection, ...], least: float, rules: Rules) ->
 
 class Eyes:
     """Looks at a world before each action: the image that it gives, or one rendered of its table. Items get the names
-    of the true ones that stand there, so that a policy can follow them; what is nobody keeps a name of its own."""
+    of the true ones that stand there, so that a policy can follow them; what is nobody keeps a name of its own. Where
+    the hand closed on nothing (`vain` of the world, as a gripper reports it) nothing is believed to be any more."""
 
     def __init__(self, seed: int, light: str, colors: Scheme, least: float) -> None:
         self._seed, self._light, self._colors, self._least = seed, light, colors, least
         self._rules = Rules()
         self.images = 0
         self.last: Seen | None = None
+        self._told = Table(())
+        self._nothing: list[tuple[float, float]] = []
 
     def __call__(self, world: World) -> Table:
         """Return what is seen."""
         color, depth, view = self._image(world)
         self.images += 1
         self.last = look(color, depth, view, self._least, self._rules)
-        return named_as(self.last.accepted.table, world.table)
+        for name in getattr(world, "vain", ()):
+            if name in self._told.by_name:
+                self._nothing.append(self._told.by_name[name].position[:2])
+        self._told = named_as(without_places(self.last.accepted.table, self._nothing), world.table)
+        return self._told
 
     def _image(self, world: World) -> tuple[np.ndarray, np.ndarray, OverheadCamera]:
         image = getattr(world, "image", None)
@@ -87,9 +94,27 @@ def named_as(seen: Table, known: Table, reach: float = SAME_PLACE) -> Table:
         if apart <= reach and one not in names and other not in taken:
             names[one] = other
             taken.add(other)
+    for one in seen.items:  # what lies on something is met there, wherever exactly it was seen
+        carrier = names.get(one.on or "")
+        if one.name not in names and carrier in known.carried:
+            for other in known.carried[carrier]:
+                if other.name not in taken and (one.kind == other.kind or not (one.is_dish or other.is_dish)):
+                    names[one.name] = other.name
+                    taken.add(other.name)
+                    break
     strays = (item.name for item in seen.items if item.name not in names)
     names |= {name: f"stray_{number}" for number, name in enumerate(strays, start=1)}
     items = tuple(
         replace(item, name=names[item.name], on=None if item.on is None else names[item.on]) for item in seen.items
     )
     return Table(items, seen.obstacles)
+
+
+def without_places(table: Table, places: list[tuple[float, float]]) -> Table:
+    """Return a table less what carries nothing and stands at one of some places [m]."""
+    gone = {
+        item.name
+        for item in table.tops
+        if any(hypot(item.position[0] - x, item.position[1] - y) < SAME_PLACE for x, y in places)
+    }
+    return table.without(gone)

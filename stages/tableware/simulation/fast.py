@@ -93,6 +93,8 @@ class FastWorld:
         """Everything that fell off the table, in order."""
         self.troubles: list[str] = []
         """What did not go as planned in the last action."""
+        self.vain: tuple[str, ...] = ()
+        """What the hand closed on in vain in the last action."""
 
     def _luck(self, what: str, name: str) -> np.random.Generator:
         """Return the generator of one thing that happens to an item, another at each attempt."""
@@ -106,7 +108,7 @@ class FastWorld:
     def do(self, action: Action, seen: Table | None = None) -> None:
         """Carry out an action, a composite one without looking in between. Items go by their names, whatever was seen:
         what is not there is reached for in vain, and a pile that is more than the jaws hold is dropped."""
-        self.troubles = []
+        self.troubles, self.vain = [], ()
         if isinstance(action, PullGrasp):
             self._pull(action.u_P)
             self._grasp(action.u_G)
@@ -181,7 +183,8 @@ class FastWorld:
             self.table = self.table.without(names)
 
     def _there(self, *names: str) -> bool:
-        missing = [name for name in names if name not in self.table.by_name]
+        missing = tuple(name for name in names if name not in self.table.by_name)
+        self.vain += missing
         if missing:
             self.troubles.append(f"reached in vain for {' and '.join(missing)}")
         return not missing

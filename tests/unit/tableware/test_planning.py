@@ -36,7 +36,7 @@ from stages.tableware.planning.time_model import (
     trips_of,
     with_thesis_failures,
 )
-from stages.tableware.sight import named_as, understood
+from stages.tableware.sight import named_as, understood, without_places
 from stages.tableware.simulation.fast import FastWorld, run_in, run_trial
 from stages.tableware.table_pictures import draw_strip, draw_table
 from stages.tableware.vision.detections import Detection
@@ -214,6 +214,14 @@ def test_what_is_seen_gets_the_names_of_what_stands_there() -> None:
         (make_item("x", "spoon", 0.21, 0.0, 0.3), make_item("y", "cup", 0.004, 0.0), make_item("z", "cup", 0.1, 0.1))
     )
     assert [item.name for item in named_as(seen, known).items] == ["b", "a", "stray_1"]
+    lying = known.moved("b", 0.0, 0.0, on="a")
+    shifted = Table((make_item("x", "cup", 0.0, 0.0), make_item("y", "spoon", 0.04, 0.0, z=0.08, on="x")))
+    assert [item.name for item in named_as(shifted, lying).items] == ["a", "b"]
+
+
+def test_where_the_hand_closed_on_nothing_nothing_is_believed() -> None:
+    table = Table((make_item("a", "cup", 0.0, 0.0), make_item("b", "cup", 0.2, 0.0)))
+    assert [item.name for item in without_places(table, [(0.21, 0.0)]).items] == ["a"]
 
 
 def test_reaching_for_what_is_not_there_ends_the_trial() -> None:
