@@ -13,6 +13,7 @@ from schemas.panoptic_map import PanopticMap
 from schemas.plan import Plan
 from schemas.segments import Segments
 from schemas.sequence import Sequence
+from schemas.tableware_detections import TablewareDetections
 from schemas.tableware_plan import TablewarePlan
 from schemas.tableware_scene import TablewareScene
 from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
@@ -35,6 +36,7 @@ __all__ = [
     "Report",
     "Segments",
     "Sequence",
+    "TablewareDetections",
     "TablewareEvaluation",
     "TablewarePlan",
     "TablewareScene",

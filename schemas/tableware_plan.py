@@ -116,7 +116,9 @@ class RefusedItem(Model):
     position: Vector3
     radius: float
     """Of the circle around it, which no action touches [m]."""
-    reason: Literal["unknown_object", "unsure", "outside_workspace", "in_a_refused_pile", "too_tall_to_lift"]
+    reason: Literal[
+        "unknown_object", "unsure", "outside_workspace", "in_a_refused_pile", "too_tall_to_lift", "other_size"
+    ]
     message: str
 
 
@@ -152,6 +154,8 @@ class TablewarePlanFile(Model):
     draws: int = Field(ge=1)
     impossible: tuple[ImpossiblePair, ...] = ()
     refused: tuple[RefusedItem, ...] = ()
+    notes: tuple[str, ...] = ()
+    """What vision did not handle."""
     statement: str
     """In one line: what is planned for, and what was not handled."""
 

@@ -1,10 +1,12 @@
-"""Vision on rendered tables: precision, recall, errors, heights; per class, tier, light level and arm.
+"""Vision on rendered tables: precision, recall, errors, heights, calibration; per class, tier, light and colours.
 
-    python -m benchmarks.tidy.detect --out FOLDER [--scenes N] [--tuning] [--tiers NAME ...]
+    python -m benchmarks.tidy.detect --out FOLDER [--scenes N] [--tuning] [--quick] [--one] [--jobs 1] [--seconds S]
 
-Reporting seeds are 1000 and up, tuning seeds (`--tuning`) 0 and up. Light levels and colour schemes alternate from seed
-to seed. Writes metrics.json (`<arm>/<case>/detect/<class>/<measure>`) and table.md; milliseconds are CPU time of one
-thread for one frame of 1280 x 720.
+Reporting seeds are 1000 and up, tuning seeds (`--tuning`) 0 and up; the tier goes round with the seed, and every scene
+is seen at three levels of light and noise in two schemes of colour (`--one`: in one of the six, which goes round).
+`--quick` takes six scenes. A stopped run goes on where it was. Writes runs.jsonl, metrics.json
+(`<arm>/detect/<class>/<measure>`, and `<arm>/detect_<case>/<class>/<measure>`) and table.md. Milliseconds are CPU time
+of one thread for a frame of 1280 x 720; `quiet` is the least of five looks at a frame, for a machine that others use.
 """
 
 from __future__ import annotations
@@ -12,90 +14,129 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections import defaultdict
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-import numpy as np
+import cv2
 
-from benchmarks.tidy.detection_score import Match, compare, measures
+from benchmarks.tidy.detect_tables import metrics, table_text
+from benchmarks.tidy.detection_score import Match, compare
+from schemas.base import Model
 from stages.tableware.vision.detection import detect
 from stages.tableware.vision.thesis_detection import detect_thesis
 from stages.tableware.world.overhead import LEVELS, SCHEMES, Scheme, overhead_camera, render_overhead
-from stages.tableware.world.scenes import make_table
+from stages.tableware.world.scenes import TIERS, make_table
 
 ARMS = {"ours": detect, "thesis": detect_thesis}
 REPORTING, TUNING = 1000, 0
-TIERS = ("tier1", "tier2", "tier3")
+SCENES, QUICK = 200, 6
+LOOKS = 5
 
 
-def conditions(seed: int) -> tuple[str, Scheme]:
-    """Return the light level and the scheme of a seed: six in a row see all."""
-    return list(LEVELS)[seed % 3], SCHEMES[seed // 3 % 2]
+class Look(Model):
+    """One arm's look at one image."""
+
+    arm: str
+    tier: str
+    seed: int
+    level: str
+    scheme: str
+    seconds: float
+    quiet: float | None = None
+    """Least of LOOKS times [s], of one image a scene."""
+    matches: tuple[Match, ...]
+
+
+def conditions(seed: int, one: bool) -> list[tuple[str, Scheme]]:
+    """Return the light levels and schemes in which a seed's scene is seen."""
+    every = [(level, scheme) for level in LEVELS for scheme in SCHEMES]
+    return [every[seed // len(TIERS) % len(every)]] if one else every
+
+
+def tier_of(seed: int) -> str:
+    """Return the tier of a seed's scene."""
+    return list(TIERS)[seed % len(TIERS)]
+
+
+def look_at(seed: int, one: bool) -> list[Look]:
+    """Render a seed's scene under its conditions and return what both arms see."""
+    cv2.setNumThreads(1)
+    tier, view, looks = tier_of(seed), overhead_camera(), []
+    table = make_table(tier, seed)
+    for number, (level, scheme) in enumerate(conditions(seed, one)):
+        color, depth = render_overhead(table, seed, level, scheme, view=view)
+        for arm, look in ARMS.items():
+            if number == 0:
+                look(color, depth, view)  # compiles what is compiled; its time is not kept
+            times = []
+            for _ in range(LOOKS if number == seed % len(LEVELS) and arm == "ours" else 1):
+                started = time.process_time()
+                found = look(color, depth, view)
+                times.append(time.process_time() - started)
+            looks.append(
+                Look(
+                    arm=arm, tier=tier, seed=seed, level=level, scheme=scheme, seconds=times[0],
+                    quiet=min(times) if len(times) > 1 else None, matches=tuple(compare(table, found)),
+                )
+            )  # fmt: skip
+    return looks
+
+
+def read_looks(path: Path) -> list[Look]:
+    """Return the looks of a log; a line that was cut off at the end is taken out of the file."""
+    if not path.exists():
+        return []
+    text = path.read_text(encoding="utf-8")
+    whole = text[: text.rfind("\n") + 1]
+    if whole != text:
+        path.write_text(whole, encoding="utf-8")
+    return [Look.model_validate_json(line) for line in whole.splitlines()]
 
 
 def main() -> None:
     """Parse the command line and run."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.tidy.detect", description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--scenes", type=int, default=66, help="seeds a tier")
+    parser.add_argument("--scenes", type=int, default=SCENES)
+    parser.add_argument("--quick", action="store_true", help=f"{QUICK} scenes")
     parser.add_argument("--tuning", action="store_true", help="tuning seeds instead of reporting seeds")
-    parser.add_argument("--tiers", nargs="+", default=list(TIERS))
-    parser.add_argument("--seconds", type=float, default=None, help="no new seed after so much wall time")
+    parser.add_argument("--one", action="store_true", help="one light and one scheme a scene")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--seconds", type=float, default=None, help="no new scene after so much wall time")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    matches: dict[tuple[str, str], list[Match]] = defaultdict(list)
-    seconds: dict[str, list[float]] = defaultdict(list)
-    view = overhead_camera()
-    begun, seeds = time.monotonic(), 0
+    log = options.out / "runs.jsonl"
     first = TUNING if options.tuning else REPORTING
-    for seed in range(first, first + options.scenes):
-        if options.seconds is not None and time.monotonic() - begun > options.seconds:
-            break
-        level, scheme = conditions(seed)
-        seeds += 1
-        for tier in options.tiers:
-            table = make_table(tier, seed)
-            color, depth = render_overhead(table, seed, level, scheme, view=view)
-            for arm, look in ARMS.items():
-                if seed == first and tier == options.tiers[0]:
-                    look(color, depth, view)  # compiles what is compiled; its time is not kept
-                started = time.process_time()
-                found = look(color, depth, view)
-                seconds[arm].append(time.process_time() - started)
-                rows = compare(table, found)
-                for case in (tier, level, scheme, "all"):
-                    matches[arm, case].extend(rows)
-    result = {
-        f"{arm}/{case}/detect/{kind}/{name}": value
-        for (arm, case), rows in matches.items()
-        for kind, values in measures(rows).items()
-        for name, value in values.items()
-    }
-    result |= {f"{arm}/detect/milliseconds_median": 1e3 * float(np.median(times)) for arm, times in seconds.items()}
-    result |= {f"{arm}/detect/milliseconds_least": 1e3 * float(np.min(times)) for arm, times in seconds.items()}
-    result["seeds_per_tier"] = float(seeds)
-    known = {name: round(value, 5) for name, value in result.items() if not np.isnan(value)}
-    (options.out / "metrics.json").write_text(json.dumps(known, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    (options.out / "table.md").write_text(table_text(result, seeds, options.tiers), encoding="utf-8")
+    seeds = range(first, first + (QUICK if options.quick else options.scenes))
+    done: dict[int, int] = {}
+    for look in read_looks(log):
+        done[look.seed] = done.get(look.seed, 0) + 1
+    waiting = [seed for seed in seeds if done.get(seed, 0) < len(ARMS) * len(conditions(seed, options.one))]
+    begun = time.monotonic()
+
+    def keep(looks: list[Look]) -> bool:
+        with log.open("a", encoding="utf-8") as stream:
+            stream.writelines(look.model_dump_json() + "\n" for look in looks)
+        return options.seconds is None or time.monotonic() - begun < options.seconds
+
+    if options.jobs == 1:
+        for seed in waiting:
+            if not keep(look_at(seed, options.one)):
+                break
+    else:
+        with ProcessPoolExecutor(options.jobs) as pool:
+            for looks in pool.map(look_at, waiting, [options.one] * len(waiting)):
+                if not keep(looks):
+                    pool.shutdown(wait=False, cancel_futures=True)
+                    break
+    write(options.out, [look for look in read_looks(log) if look.seed in seeds])
 
 
-def table_text(result: dict[str, float], seeds: int, tiers: list[str]) -> str:
-    """Return the Markdown table of all arms and cases."""
-    columns = ("items", "found", "precision", "recall", "center_mm", "center_p95_mm", "angle_deg", "head_right",
-               "height_right")  # fmt: skip
-    lines = [f"{seeds} seeds a tier ({', '.join(tiers)}).", "", "| arm | case | class | " + " | ".join(columns) + " |"]
-    lines.append("|---" * (3 + len(columns)) + "|")
-    rows = sorted({name.rsplit("/", 1)[0] for name in result if name.count("/") == 4})
-    for row in rows:
-        arm, case, _, kind = row.split("/")
-        values = [result.get(f"{row}/{column}", float("nan")) for column in columns]
-        cells = ["" if np.isnan(value) else f"{value:.0f}" if column in ("items", "found") else f"{value:.3f}"
-                 for column, value in zip(columns, values, strict=True)]  # fmt: skip
-        lines.append(f"| {arm} | {case} | {kind} | " + " | ".join(cells) + " |")
-    for arm in ARMS:
-        median, least = (result[f"{arm}/detect/milliseconds_{name}"] for name in ("median", "least"))
-        lines += ["", f"{arm}: {median:.0f} ms a frame (median), {least:.0f} ms (least)."]
-    return "\n".join(lines) + "\n"
+def write(out: Path, looks: list[Look]) -> None:
+    """Write metrics.json and table.md."""
+    result = metrics(looks)
+    (out / "metrics.json").write_text(json.dumps(result, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    (out / "table.md").write_text(table_text(looks, result), encoding="utf-8")
 
 
 if __name__ == "__main__":

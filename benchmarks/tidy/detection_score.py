@@ -3,81 +3,149 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from schemas.base import Model
 from stages.tableware.vision.detections import Detection
-from stages.tableware.world.items import Table
+from stages.tableware.world.items import MEASURES, UTENSILS, Table
 
 NEAR = 0.020
 """A detection counts for an item of its kind no further away than this in the plane [m]."""
 LEVEL = 0.008
 """The height of a lip is right within this [m]: half of what a bowl in a bowl adds."""
+BINS = (0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 1.0)
+"""Ends of the bins of confidence."""
 
 
-@dataclass(frozen=True)
-class Match:
-    """One item or one detection: `kind`; matched or not; errors when matched."""
+class Match(Model):
+    """One item, or one detection in vain."""
 
-    kind: str
-    true: bool
-    found: bool
-    center: float = 0.0
-    """[m]"""
-    angle: float = 0.0
-    """[rad], utensils, head and handle told apart."""
-    height_right: bool = False
-    sure: bool = True
+    kind: str | None
+    """Of the item; None for a detection in vain."""
+    found: str | None
+    """Kind that was detected: the item's own, another at its place, `unknown`; None for an item that was missed."""
+    stacked: bool = False
+    """Whether the item carries something or is carried."""
+    dx: float = 0.0
+    dy: float = 0.0
+    """Detected less true [m]."""
+    turn: float = 0.0
+    """Detected less true yaw [rad], -pi to pi, of a utensil."""
+    lip: float = 0.0
+    """Detected less true height of the upper edge [m]."""
+    confidence: float = 0.0
+    unsure: tuple[str, ...] = ()
     hidden: bool = False
+
+    @property
+    def right(self) -> bool:
+        """Whether the item was found as what it is."""
+        return self.kind is not None and self.kind == self.found
+
+
+def _distances(table: Table, kind: str | None, other: str | None, ones: Sequence[Detection]) -> np.ndarray:
+    """Return (items, detections) distances in the plane [m], infinite between those of other kinds than these."""
+    result = np.full((len(table.items), len(ones)), np.inf)
+    for r, item in enumerate(table.items):
+        for c, one in enumerate(ones):
+            if (kind is None or item.kind == kind) and (other is None or one.kind == other):
+                result[r, c] = np.hypot(item.position[0] - one.position[0], item.position[1] - one.position[1])
+    return result
 
 
 def compare(table: Table, detections: tuple[Detection, ...]) -> list[Match]:
     """Return matches of least total distance (Hungarian method), kind by kind; lips count with a third of their
-    difference, so that dishes of one kind in a stack find their own level. Things of unknown kind count as found in
-    vain under the kind `unknown`."""
-    result = [Match("unknown", False, True) for one in detections if one.kind is None]
-    for kind in sorted({item.kind for item in table.items} | {one.kind for one in detections if one.kind}):
-        items = [item for item in table.items if item.kind == kind]
-        ours = [one for one in detections if one.kind == kind]
-        plane = np.array([[np.hypot(i.position[0] - d.position[0], i.position[1] - d.position[1]) for d in ours]
-                          for i in items]).reshape(len(items), len(ours))  # fmt: skip
-        lips = np.array([[abs(i.lip - d.lip) for d in ours] for i in items]).reshape(plane.shape)
+    difference, so that dishes of one kind in a stack find their own level. What is left over of both is matched across
+    kinds, by the plane and within LEVEL: a confusion, and no item found."""
+    items = table.items
+    lips = np.array([[abs(item.lip - one.lip) for one in detections] for item in items]).reshape(len(items), -1)
+    pairs: dict[int, int] = {}
+    for kind in (*sorted({item.kind for item in items}), None):
+        plane = _distances(table, kind, kind, detections)
+        if kind is None:
+            plane[lips > LEVEL] = np.inf
+            plane[:, [c for c, one in enumerate(detections) if one.kind is None]] = np.inf
+        plane[list(pairs)] = np.inf
+        plane[:, list(pairs.values())] = np.inf
         rows, columns = linear_sum_assignment(np.where(plane < NEAR, plane + lips / 3.0, 10.0))
-        pairs = [(r, c) for r, c in zip(rows, columns, strict=True) if plane[r, c] < NEAR]
-        for r, c in pairs:
-            turn = abs(np.angle(np.exp(1j * (items[r].yaw - ours[c].yaw)))) if not items[r].is_dish else 0.0
-            result.append(Match(kind, True, True, float(plane[r, c]), float(turn), bool(lips[r, c] < LEVEL),
-                                not ours[c].unsure, ours[c].hidden))  # fmt: skip
-        result += [Match(kind, True, False) for r in range(len(items)) if r not in {r for r, _ in pairs}]
-        result += [Match(kind, False, True, sure=not d.unsure, hidden=d.hidden) for c, d in enumerate(ours)
-                   if c not in {c for _, c in pairs}]  # fmt: skip
+        pairs |= {int(r): int(c) for r, c in zip(rows, columns, strict=True) if plane[r, c] < NEAR}
+    result = []
+    for r, item in enumerate(items):
+        stacked = item.on is not None or bool(table.carried[item.name])
+        if r not in pairs:
+            result.append(Match(kind=item.kind, found=None, stacked=stacked))
+            continue
+        one = detections[pairs[r]]
+        turn = float(np.angle(np.exp(1j * (one.yaw - item.yaw)))) if not item.is_dish else 0.0
+        result.append(
+            Match(
+                kind=item.kind, found=one.kind, stacked=stacked, dx=one.position[0] - item.position[0],
+                dy=one.position[1] - item.position[1], turn=turn, lip=one.lip - item.lip,
+                confidence=one.confidence, unsure=one.unsure, hidden=one.hidden,
+            )
+        )  # fmt: skip
+    for c, one in enumerate(detections):
+        if c not in pairs.values():
+            result.append(Match(kind=None, found=one.kind or "unknown", confidence=one.confidence, unsure=one.unsure,
+                                hidden=one.hidden))  # fmt: skip
     return result
 
 
 def measures(matches: Iterable[Match]) -> dict[str, dict[str, float]]:
-    """Return kind -> measure -> value; `all` and `unknown` beside the kinds. Shares of nothing are NaN."""
-    groups: dict[str, list[Match]] = defaultdict(list)
-    for match in matches:
-        groups[match.kind].append(match)
-        if match.kind != "unknown":
-            groups["all"].append(match)
+    """Return class -> measure -> value; `all` and `unknown` beside the kinds. Shares of nothing are left out."""
+    rows = list(matches)
     result = {}
-    for kind, ones in groups.items():
-        both = [m for m in ones if m.true and m.found]
-        found, true = sum(m.found for m in ones), sum(m.true for m in ones)
-        values = {"items": float(true), "found": float(found)}
-        values["precision"] = len(both) / found if found else float("nan")
-        values["recall"] = len(both) / true if true else float("nan")
-        if both:
-            values["center_mm"] = 1e3 * float(np.mean([m.center for m in both]))
-            values["center_p95_mm"] = 1e3 * float(np.percentile([m.center for m in both], 95))
-            values["height_right"] = float(np.mean([m.height_right for m in both]))
-            values["sure_share"] = float(np.mean([m.sure for m in both]))
-        if both and kind in ("fork", "spoon"):
-            values["angle_deg"] = float(np.rad2deg(np.mean([min(m.angle, np.pi - m.angle) for m in both])))
-            values["head_right"] = float(np.mean([m.angle < np.pi / 2 for m in both]))
+    for kind in ("all", *MEASURES, "unknown"):
+        true = [m for m in rows if m.kind is not None and kind in ("all", m.kind)]
+        found = [m for m in rows if m.found is not None and (kind == m.found or kind == "all" != m.found != "unknown")]
+        right = [m for m in true if m.right]
+        if not true and not found:
+            continue
+        values = {"items": float(len(true)), "found": float(len(found))}
+        if kind == "unknown":
+            result[kind] = values
+            continue
+        if found:
+            values["precision"] = len(right) / len(found)
+        if true:
+            values["recall"] = len(right) / len(true)
+        if right:
+            values |= _errors(right, utensil=kind in UTENSILS)
         result[kind] = values
     return result
+
+
+def _errors(right: list[Match], utensil: bool) -> dict[str, float]:
+    centers = [1e3 * np.hypot(m.dx, m.dy) for m in right]
+    values = {
+        "center_mm": float(np.mean(centers)),
+        "center_p95_mm": float(np.percentile(centers, 95)),
+        "height_right": float(np.mean([abs(m.lip) < LEVEL for m in right])),
+        "sure_share": float(np.mean([not m.unsure for m in right])),
+    }
+    piles = [abs(m.lip) < LEVEL for m in right if m.stacked]
+    if piles:
+        values["stack_height_right"] = float(np.mean(piles))
+    if utensil:
+        turns = np.abs([m.turn for m in right])
+        values["angle_deg"] = float(np.rad2deg(np.minimum(turns, np.pi - turns).mean()))
+        values["head_right"] = float(np.mean(turns < np.pi / 2))
+    return values
+
+
+def reliability(matches: Iterable[Match]) -> tuple[list[tuple[float, float, int, float, float]], float]:
+    """Return bins (low, high, count, mean confidence, share right), and the expected calibration error: the mean over
+    detections of how far their bin's confidence is from its share. Things of unknown kind claim nothing."""
+    claims = [(m.confidence, m.right) for m in matches if m.found not in (None, "unknown")]
+    groups: dict[int, list[tuple[float, bool]]] = defaultdict(list)
+    for confidence, right in claims:
+        groups[min(int(np.searchsorted(BINS, confidence, side="right")), len(BINS) - 1)].append((confidence, right))
+    bins = [
+        (BINS[k - 1], BINS[k], len(ones), float(np.mean([c for c, _ in ones])), float(np.mean([r for _, r in ones])))
+        for k, ones in sorted(groups.items())
+    ]
+    error = sum(count * abs(mean - share) for _, _, count, mean, share in bins) / max(len(claims), 1)
+    return bins, error

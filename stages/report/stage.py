@@ -22,6 +22,7 @@ from schemas.panoptic_map import PanopticMap
 from schemas.plan import Plan
 from schemas.segments import Segments
 from schemas.sequence import Sequence
+from schemas.tableware_detections import TablewareDetections
 from schemas.tableware_plan import TablewarePlan
 from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
 from schemas.trajectory import Trajectory
@@ -85,6 +86,7 @@ def run(
     interactive_scene: InteractiveScene | None = None,
     plan: Plan | None = None,
     packing: Packing | None = None,
+    tableware_detections: TablewareDetections | None = None,
     tableware_plan: TablewarePlan | None = None,
     tableware_trial: TablewareTrial | None = None,
     tableware_evaluation: TablewareEvaluation | None = None,
@@ -99,7 +101,7 @@ def run(
         "ground_truth": ground_truth, "sequence": sequence, "trajectory": trajectory, "segments": segments,
         "panoptic_map": panoptic_map, "contact_graph": contact_graph, "cad_scene": cad_scene,
         "cad_library": cad_library, "interactive_scene": interactive_scene, "plan": plan, "packing": packing,
-        "tableware_plan": tableware_plan, "tableware_trial": tableware_trial,
+        "tableware_detections": tableware_detections, "tableware_plan": tableware_plan, "tableware_trial": tableware_trial,
         "tableware_evaluation": tableware_evaluation,
         "evaluation": evaluation, "baseline_evaluation": baseline_evaluation,
     }  # fmt: skip
@@ -127,9 +129,11 @@ def run(
     if packing is not None:
         with context.progress.step("packing"):
             values["packing"] = packing_view(packing, 1100)
-    if tableware_plan is not None or tableware_trial is not None or tableware_evaluation is not None:
+    if any(role.startswith("tableware_") for role in artifacts):
         with context.progress.step("tableware"):
-            values["tableware"] = tableware_view(tableware_plan, tableware_trial, tableware_evaluation, 1100)
+            values["tableware"] = tableware_view(
+                tableware_detections, tableware_plan, tableware_trial, tableware_evaluation, 1100
+            )
     if evaluation is not None:
         with context.progress.step("figures"):
             _add_figures(values, evaluation, baseline_evaluation)
@@ -184,7 +188,7 @@ def _lead(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts
     names = {
         "panoptic_map": "a labelled map", "contact_graph": "a contact graph", "cad_scene": "a scene of CAD models",
         "interactive_scene": "a scene that simulators load", "packing": "a packing of boxes",
-        "tableware_plan": "a plan to clear a table", "tableware_trial": "a table being cleared",
+        "tableware_detections": "a table that was looked at", "tableware_plan": "a plan to clear a table", "tableware_trial": "a table being cleared",
         "tableware_evaluation": "a comparison of policies",
     }  # fmt: skip
     if isinstance(plan := artifacts.get("plan"), Plan):

@@ -10,13 +10,15 @@ from pathlib import Path
 from PIL import Image
 
 from schemas.errors import BadInput
+from schemas.tableware_detections import TablewareDetections
 from schemas.tableware_plan import TablewareAction, TablewarePlan
 from schemas.tableware_trial import EvaluatedPolicy, TablewareEvaluation, TablewareTrial
 from stages.report.images import Picture, from_file
 
 LARGEST_ANIMATION = 6_000_000
 CAPTIONS = {
-    "detections": "What was seen: green where sure, amber in doubt, red what is refused; dots are grasps of utensils",
+    "overlay": "What was seen, and how sure that is",
+    "detections": "What was seen, and how sure that is",
     "strip": "The plan from above, before each action: green pulls, violet stackings, red jaws, in rings how many are "
     "stacked",
     "keyframes": "The trial from above, the true table before each action",
@@ -41,6 +43,7 @@ class TablewareRow:
 class TablewareView:
     """Everything the page says about clearing a table."""
 
+    seen: str
     plan: str
     refused: tuple[str, ...]
     impossible: tuple[tuple[str, int], ...]
@@ -56,10 +59,20 @@ class TablewareView:
 
 
 def tableware_view(
-    plan: TablewarePlan | None, trial: TablewareTrial | None, evaluation: TablewareEvaluation | None, width: int
+    detections: TablewareDetections | None,
+    plan: TablewarePlan | None,
+    trial: TablewareTrial | None,
+    evaluation: TablewareEvaluation | None,
+    width: int,
 ) -> TablewareView:
     """Read what there is; pictures are at most `width` wide [px]. Raises BadInput for a picture that cannot be read."""
-    folders = {"detections": plan, "strip": plan, "keyframes": trial, "physics": trial}
+    folders = {
+        "overlay": detections,
+        "detections": plan if detections is None else None,
+        "strip": plan,
+        "keyframes": trial,
+        "physics": trial,
+    }
     pictures = {
         name: (from_file(path, CAPTIONS[name], width), CAPTIONS[name])
         for name, artifact in folders.items()
@@ -79,6 +92,7 @@ def tableware_view(
             f"{results.sight}; 95 % bootstrap intervals over tables, ratios against Random."
         )
     return TablewareView(
+        seen="" if detections is None else detections.detections.statement,
         plan=_plan_text(plan),
         refused=tuple(one.message for one in file.refused) if file is not None else (),
         impossible=tuple(

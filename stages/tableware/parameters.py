@@ -1,4 +1,4 @@
-"""Declarations of the steps `tableware scene`, `plan`, `simulate` and `evaluate`."""
+"""Declarations of the steps `tableware scene`, `detect`, `plan`, `simulate` and `evaluate`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import Any, Literal
 from pydantic import Field
 
 from schemas.errors import UsageError
-from schemas.kinds import TablewareEvaluation, TablewarePlan, TablewareScene, TablewareTrial
+from schemas.kinds import TablewareDetections, TablewareEvaluation, TablewarePlan, TablewareScene, TablewareTrial
 from stages.kit.stage import Optionally, Parameters, Stage
+from stages.tableware.detect_parameters import DETECT
 from stages.tableware.options import ActionTimes, PolicyName, TierName
 
 
@@ -26,7 +27,7 @@ class PlanParameters(ActionTimes):
 
     policy: PolicyName = Field("ours", description="Who decides; random_piles is Random as its tier-2 figure implies")
     source: Literal["image", "truth"] = Field(
-        "image", description="Where the items of a scene come from: its image, looked at now, or its ground truth"
+        "image", description="Where the items of --scene come from: its image, looked at now, or its ground truth"
     )
     least_confidence: float = Field(
         0.5, ge=0.0, le=1.0, description="What was seen with less confidence is refused, left alone and kept clear of"
@@ -67,9 +68,13 @@ class EvaluateParameters(ActionTimes):
 
 
 def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
-    """Raise UsageError when there is nothing to plan from."""
+    """Raise UsageError unless there is one thing to plan from."""
     if not inputs:
-        raise UsageError("tableware plan: nothing to plan from", hint="give --scene")
+        raise UsageError("tableware plan: nothing to plan from", hint="give --detections, or --scene")
+    if len(inputs) > 1:
+        raise UsageError("tableware plan: --detections and --scene both say what is there", hint="give one of them")
+    if "detections" in inputs and parameters.source == "truth":
+        raise UsageError("--source truth is for --scene", hint="leave it out")
 
 
 def check_simulate(parameters: SimulateParameters, inputs: Mapping[str, Any]) -> None:
@@ -104,12 +109,12 @@ PLAN = Stage(
     version=1,
     summary="Plan how to clear a table: pulls, stackings, multi-object and single grasps (TIDY)",
     parameters=PlanParameters,
-    reads={"scene": Optionally(TablewareScene)},
+    reads={"detections": Optionally(TablewareDetections), "scene": Optionally(TablewareScene)},
     writes=TablewarePlan,
-    libraries=("numpy", "numba", "opencv-python-headless", "pillow"),
+    libraries=("numpy", "scipy", "numba", "opencv-python-headless", "trimesh", "pillow"),
     module="plan_stage",
     check=check_plan,
-    example="scenewright tableware plan --scene outputs/tidy/scene --policy ours --out outputs/tidy/plan",
+    example="scenewright tableware plan --detections outputs/tidy/detections --policy ours --out outputs/tidy/plan",
 )
 SIMULATE = Stage(
     name="tableware simulate",
@@ -135,4 +140,4 @@ EVALUATE = Stage(
     check=check_evaluate,
     example="scenewright tableware evaluate --tier tier2 --scenes 50 --out outputs/tidy/evaluation",
 )
-STAGES = [SCENE, PLAN, SIMULATE, EVALUATE]
+STAGES = [SCENE, DETECT, PLAN, SIMULATE, EVALUATE]

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from PIL import Image
 
 from schemas.errors import BadInput
+from schemas.tableware_detections import TablewareDetections
 from schemas.tableware_plan import TablewarePlan, TablewarePlanFile, TablewareStep
 from schemas.tableware_scene import TablewareScene
 from stages.kit.stage import Context
@@ -18,18 +20,26 @@ from stages.tableware.planning.refusals import Accepted, accept, statement
 from stages.tableware.planning.rules import Rules
 from stages.tableware.planning.time_model import EXACT, Chances, TimeModel
 from stages.tableware.scene_files import read_image
-from stages.tableware.sight import look
+from stages.tableware.sight import look, understood
 from stages.tableware.simulation.fast import Done, FastWorld, Trial, run_in, run_trial
-from stages.tableware.table_pictures import Panel, draw_detections, draw_strip, words_of
+from stages.tableware.table_pictures import Panel, draw_strip, words_of
+from stages.tableware.vision.detections_file import from_file
+from stages.tableware.vision.overlay import draw_sight
 from stages.tableware.world.items import Table
 from stages.tableware.world.records import as_records, as_table
 
 
-def run(scene: TablewareScene | None, *, parameters: PlanParameters, context: Context) -> TablewarePlan:
-    """Plan from a scene's image, or from its ground truth."""
+def run(
+    detections: TablewareDetections | None,
+    scene: TablewareScene | None,
+    *,
+    parameters: PlanParameters,
+    context: Context,
+) -> TablewarePlan:
+    """Plan from what was detected, from a scene's image, or from its ground truth."""
     model, chances = time_model(parameters), chances_of(parameters.chances)
     with context.progress.step("see"):
-        accepted = _accepted(scene, parameters, context)
+        accepted, notes = _accepted(detections, scene, parameters, context)
     table = accepted.table
     with context.progress.step("plan"):
         done: list[Done] = []
@@ -38,7 +48,7 @@ def run(scene: TablewareScene | None, *, parameters: PlanParameters, context: Co
         expected = _expected(table, model, chances, parameters, context.seed)
     file = TablewarePlanFile(
         policy=parameters.policy,
-        source=parameters.source,
+        source="detections" if detections is not None else parameters.source,
         times=as_times(model),
         chances=parameters.chances,
         items=as_records(table),
@@ -55,7 +65,8 @@ def run(scene: TablewareScene | None, *, parameters: PlanParameters, context: Co
         draws=parameters.draws,
         impossible=impossible_pairs(table, rules_of(parameters.policy)),
         refused=accepted.refused,
-        statement=statement(accepted),
+        notes=notes,
+        statement=statement(accepted, notes),
     )
     file.write(context.output / "plan.json")
     context.output.joinpath("plan.txt").write_text(plan_text(file, done), encoding="utf-8")
@@ -69,22 +80,33 @@ def run(scene: TablewareScene | None, *, parameters: PlanParameters, context: Co
         "expected_seconds": round(file.expected_seconds, 1),
         "refused": len(file.refused),
     }
-    outcome = "partial" if file.refused else "ok" if table.items else "empty"
+    outcome = "partial" if file.refused or notes else "ok" if table.items else "empty"
     if outcome != "ok":
         summary["reason"] = file.statement
     return TablewarePlan(root=context.output, outcome=outcome, summary=summary)
 
 
-def _accepted(scene: TablewareScene | None, parameters: PlanParameters, context: Context) -> Accepted:
+def _accepted(
+    detections: TablewareDetections | None,
+    scene: TablewareScene | None,
+    parameters: PlanParameters,
+    context: Context,
+) -> tuple[Accepted, tuple[str, ...]]:
+    """Return what is planned for, and what vision did not handle. Raises BadInput for what cannot be planned from."""
+    least, rules = parameters.least_confidence, Rules()
+    if detections is not None:
+        told = detections.detections
+        return understood(from_file(told), least, rules), told.notes
     if scene is None:
-        raise BadInput("tableware plan: nothing to plan from", hint="give --scene")
+        raise BadInput("tableware plan: nothing to plan from", hint="give --detections, or --scene")
     if parameters.source == "truth":
-        return accept(as_table(scene.scene.items), {}, (), parameters.least_confidence, Rules())
+        return accept(as_table(scene.scene.items), {}, (), least, rules), ()
     color, depth, view = read_image(scene)
-    seen = look(color, depth, view, parameters.least_confidence, Rules())
-    picture = draw_detections(color, seen.detections, view, parameters.least_confidence, parameters.image_width)
+    seen = look(color, depth, view, least, rules)
+    picture = Image.fromarray(draw_sight(color, seen.sight))
+    picture.thumbnail((parameters.image_width, parameters.image_width))
     picture.save(context.output / "detections.png")
-    return seen.accepted
+    return seen.accepted, seen.sight.notes
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ import numpy as np
 from stages.tableware.planning.refusals import Accepted, Doubt, Unknown, accept
 from stages.tableware.planning.rules import Rules
 from stages.tableware.simulation.fast import World
-from stages.tableware.vision.detection import detect
 from stages.tableware.vision.detections import Detection, as_table
+from stages.tableware.vision.seeing import Sight, see
 from stages.tableware.world.items import Table
 from stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_camera, render_overhead
 
@@ -21,18 +21,19 @@ SAME_PLACE = 0.025
 
 @dataclass(frozen=True)
 class Seen:
-    """What an image says."""
+    """What an image says, and what of it is planned for."""
 
-    detections: tuple[Detection, ...]
+    sight: Sight
     accepted: Accepted
 
 
 def look(color: np.ndarray, depth: np.ndarray, view: OverheadCamera, least: float, rules: Rules) -> Seen:
     """Return what an image says, and what of it is planned for. Raises BadInput for an image that cannot be used."""
-    return understood(detect(color, depth, view), least, rules)
+    sight = see(color, depth, view)
+    return Seen(sight, understood(sight.detections, least, rules))
 
 
-def understood(detections: tuple[Detection, ...], least: float, rules: Rules) -> Seen:
+def understood(detections: tuple[Detection, ...], least: float, rules: Rules) -> Accepted:
     """Return what of some detections is planned for; items are named by their kind and their row."""
     names = {row: f"{found.kind}_{row + 1}" for row, found in enumerate(detections) if found.kind is not None}
     doubts = {name: Doubt(detections[row].confidence, detections[row].unsure) for row, name in names.items()}
@@ -41,7 +42,7 @@ def understood(detections: tuple[Detection, ...], least: float, rules: Rules) ->
         for row, found in enumerate(detections)
         if found.kind is None
     )
-    return Seen(detections, accept(as_table(detections), doubts, unknown, least, rules))
+    return accept(as_table(detections), doubts, unknown, least, rules)
 
 
 class Eyes:
@@ -94,14 +95,14 @@ def named_as(seen: Table, known: Table, reach: float = SAME_PLACE) -> Table:
         if apart <= reach and one not in names and other not in taken:
             names[one] = other
             taken.add(other)
-    for one in seen.items:  # what lies on something is met there, wherever exactly it was seen
-        carrier = names.get(one.on or "")
-        if one.name not in names and carrier in known.carried:
-            for other in known.carried[carrier]:
-                if other.name not in taken and (one.kind == other.kind or not (one.is_dish or other.is_dish)):
-                    names[one.name] = other.name
-                    taken.add(other.name)
-                    break
+    for item in seen.items:  # what lies on something is met there, wherever exactly it was seen
+        if item.name in names:
+            continue
+        for on_it in known.carried.get(names.get(item.on or "", ""), ()):
+            if on_it.name not in taken and (item.kind == on_it.kind or not (item.is_dish or on_it.is_dish)):
+                names[item.name] = on_it.name
+                taken.add(on_it.name)
+                break
     strays = (item.name for item in seen.items if item.name not in names)
     names |= {name: f"stray_{number}" for number, name in enumerate(strays, start=1)}
     items = tuple(

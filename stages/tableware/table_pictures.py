@@ -1,4 +1,4 @@
-"""Tables drawn from above, actions on them, what was seen in an image; strips of pictures and animations."""
+"""Tables drawn from above, actions on them; strips of pictures and animations."""
 
 from __future__ import annotations
 
@@ -12,9 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from stages.tableware.planning.actions import Action, Grasp, Pull, PullGrasp, Stack, StackGrasp
 from stages.tableware.planning.rules import Rules
-from stages.tableware.vision.detections import Detection
-from stages.tableware.world.items import MEASURES, TABLE_SIDES, Item, Kind, Table
-from stages.tableware.world.overhead import OverheadCamera
+from stages.tableware.world.items import TABLE_SIDES, Item, Kind, Table
 
 SUPERSAMPLING = 2
 MARGIN = 0.03
@@ -24,7 +22,6 @@ COLORS: dict[Kind, str] = {
 }  # fmt: skip
 GROUND, CLOTH, EDGE, INK = "#e5e7eb", "#ffffff", "#9ca3af", "#1f2937"
 PULL_INK, STACK_INK, GRASP_INK, REFUSED_INK = "#15803d", "#7c3aed", "#b91c1c", "#dc2626"
-SURE, DOUBTFUL, REFUSED = (22, 163, 74), (217, 119, 6), (220, 38, 38)
 
 
 @dataclass(frozen=True)
@@ -263,68 +260,3 @@ def _between(table: Table, action: Action, share: float) -> Table | None:
     )
     moved = tuple(replace(item, on=None) if item.name == name else item for item in moved)
     return Table((*(item for item in table.items if item.name not in going), *moved), table.obstacles)
-
-
-def draw_detections(
-    color: np.ndarray, detections: Sequence[Detection], view: OverheadCamera, least: float, width: int
-) -> Image.Image:
-    """Return the image with what was seen in it: green where sure, amber in doubt, red where refused (below `least`, or
-    of unknown kind), each with kind, confidence and the reasons for doubt. Hidden dishes are counted at their pile."""
-    image = Image.fromarray(np.ascontiguousarray(color)).convert("RGB")
-    scale = SUPERSAMPLING * width / image.width / 2
-    image = image.resize((round(image.width * scale), round(image.height * scale)), Image.Resampling.LANCZOS)
-    draw = ImageDraw.Draw(image, "RGBA")
-    inverse = np.linalg.inv(view.world_from_camera)
-    camera = view.camera
-
-    def pixel(x: float, y: float, z: float) -> tuple[float, float, float]:
-        along = inverse @ np.array([x, y, z, 1.0])
-        u, v = camera.fx * along[0] / along[2] + camera.cx, camera.fy * along[1] / along[2] + camera.cy
-        return u * scale, v * scale, camera.fx / along[2] * scale
-
-    top = {found.on for found in detections if found.on is not None}
-    for row, found in enumerate(detections):
-        refused = found.kind is None or found.confidence < least
-        ink = REFUSED if refused else DOUBTFUL if found.unsure or found.confidence < 0.75 else SURE
-        u, v, metre = pixel(found.position[0], found.position[1], found.lip)
-        measures = MEASURES[found.kind] if found.kind is not None else None
-        stroke = max(2, round(3 * scale))
-        if measures is None or measures.is_dish:
-            r = metre * (found.extent if measures is None else measures.rim_radius)
-            if not found.hidden:
-                draw.ellipse((u - r, v - r, u + r, v + r), outline=(*ink, 255), width=stroke)
-        else:
-            half = measures.length / 2
-            ends = [
-                pixel(
-                    found.position[0] + side * half * cos(found.yaw),
-                    found.position[1] + side * half * sin(found.yaw),
-                    found.lip,
-                )
-                for side in (-1, 1)
-            ]
-            draw.line((*ends[0][:2], *ends[1][:2]), fill=(*ink, 255), width=stroke)
-            if found.grasp is not None:
-                gu, gv, _ = pixel(*found.grasp)
-                draw.ellipse((gu - 5, gv - 5, gu + 5, gv + 5), fill=(*ink, 255))
-        if row in top and found.kind is not None:
-            continue  # the one on top speaks for the pile
-        text = f"{found.kind or 'unknown'} {found.confidence:.2f}"
-        pile = _pile_of(detections, row)
-        if len(pile) > 1:
-            text += f", pile of {len(pile)}"
-        if found.unsure:
-            text += f": {', '.join(found.unsure)}"
-        font = _font(max(11.0, 0.0125 * image.width))
-        box = draw.textbbox((u, v), text, font=font, anchor="mm")
-        draw.rectangle((box[0] - 3, box[1] - 2, box[2] + 3, box[3] + 2), fill=(255, 255, 255, 200))
-        draw.text((u, v), text, fill=(*ink, 255), font=font, anchor="mm")
-    return image
-
-
-def _pile_of(detections: Sequence[Detection], row: int) -> list[int]:
-    """Return the rows from an item down to the table."""
-    rows = [row]
-    while (below := detections[rows[-1]].on) is not None and below not in rows:
-        rows.append(below)
-    return rows

@@ -24,14 +24,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_table_is_seen_planned_cleared_and_reported(folder: Path) -> None:
-    scene, plan, trial, report = (str(folder / name) for name in ("scene", "plan", "trial", "report"))
+    scene, seen, plan, trial, report = (
+        str(folder / name) for name in ("scene", "detections", "plan", "trial", "report")
+    )
     small = ["--image-width", "300", "--quiet"]
-    assert run(["tableware", "plan", "--scene", scene, "--draws", "5", "--out", plan, *small]) == 0
+    assert run(["tableware", "detect", scene, "--out", seen, "--quiet"]) == 0
+    assert run(["tableware", "plan", "--detections", seen, "--draws", "5", "--out", plan, *small]) == 0
     assert run(["tableware", "simulate", "--scene", scene, "--plan", plan, "--out", trial, *small]) == 0
-    assert run(["report", "--tableware-plan", plan, "--tableware-trial", trial, "--out", report, "--quiet"]) == 0
+    shown = ["--tableware-detections", seen, "--tableware-plan", plan, "--tableware-trial", trial]
+    assert run(["report", *shown, "--out", report, "--quiet"]) == 0
 
     planned = TablewarePlanFile.read(folder / "plan" / "plan.json")
-    assert planned.source == "image" and len(planned.items) == 6 and not planned.refused
+    assert planned.source == "detections" and len(planned.items) == 6 and not planned.refused
     for step in planned.steps:
         assert getattr(step.action, FIELD_OF[step.action.name]) is not None
     assert planned.seconds == pytest.approx(sum(step.action.seconds for step in planned.steps))
@@ -125,6 +129,7 @@ def test_a_plan_of_another_table_is_refused(folder: Path, tmp_path: Path, capsys
     [
         (["plan", "--policy", "greedy", "--scene", "x"], "greedy"),
         (["plan"], "nothing to plan from"),
+        (["plan", "--scene", "x", "--detections", "y"], "give one of them"),
         (["evaluate", "--policies", "best"], "there is no policy 'best'"),
         (["simulate", "--scene", "x", "--simulator", "physics", "--delay", "3"], "--delay"),
         (["scene", "--tier", "tier9"], "tier9"),

@@ -6,6 +6,7 @@ import numpy as np
 
 from schemas.artifact import Artifact
 from schemas.scene_parts import Box
+from schemas.tableware_detections import TablewareDetections
 from schemas.tableware_plan import TablewarePlan
 from schemas.tableware_scene import TablewareItem, TablewareScene
 from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
@@ -29,6 +30,19 @@ def draw_tableware_scene(scene: TablewareScene, canvas: Canvas) -> None:
     canvas.transform("camera", np.array(file.world_from_camera))
     canvas.camera("camera", file.camera)
     canvas.picture("camera/color", scene.path("color.png").read_bytes())
+
+
+def draw_tableware_detections(found: TablewareDetections, canvas: Canvas) -> None:
+    """Show what was seen: the statement, the picture, and every item as a point at its lip, green by confidence."""
+    told = found.detections
+    canvas.document("seen", "\n\n".join([told.statement, *told.notes]))
+    canvas.picture("overlay", found.path("overlay.png").read_bytes())
+    _table(canvas)
+    for number, item in enumerate(told.items, start=1):
+        share = item.confidence if item.kind is not None else 0.0
+        color = np.array([[round(255 * (1.0 - share)), round(200 * share), 40]], np.uint8)
+        place = np.array([[item.position[0], item.position[1], item.lip]])
+        canvas.points(f"items/{number}_{item.kind or 'unknown'}", place, color, radius=0.01)
 
 
 def draw_tableware_plan(plan: TablewarePlan, canvas: Canvas) -> None:

@@ -19,6 +19,7 @@ VIEWERS = {
     "cad_scene": ("cad_scene_view", "draw_cad_scene"),
     "interactive_scene": ("scene_view", "draw_scene"),
     "packing": ("packing_view", "draw_packing"),
+    "tableware_detections": ("tableware_view", "draw_tableware_detections"),
     "tableware_scene": ("tableware_view", "draw_tableware_scene"),
     "tableware_plan": ("tableware_view", "draw_tableware_plan"),
     "tableware_trial": ("tableware_view", "draw_tableware_trial"),

@@ -11,7 +11,11 @@ from schemas.tableware_plan import RefusedItem
 from schemas.tableware_scene import MOST_ITEMS
 from stages.tableware.planning.rules import Rules, can_hold, letters
 from stages.tableware.world.footprints import footprint
-from stages.tableware.world.items import Item, Table
+from stages.tableware.world.items import MEASURES, Item, Table
+
+
+SIZE = 0.005
+"""Dishes whose estimated rim radius or height differs from their kind's by more [m] are not planned for."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,9 @@ def _wrong(item: Item, doubt: Doubt | None, least: float) -> RefusedItem | None:
     if not footprint(item).on_table:
         where = f"at ({item.position[0]:.3f}, {item.position[1]:.3f}) m"
         return _refusal(item, "outside_workspace", f"{where}, hangs over the edge of the workspace")
+    known = MEASURES[item.kind]
+    if abs(item.measures.rim_radius - known.rim_radius) > SIZE or abs(item.measures.height - known.height) > SIZE:
+        return _refusal(item, "other_size", f"not of the size that a {item.kind} has here: it may not fit the jaws")
     if doubt is not None and doubt.confidence < least:
         why = f" ({', '.join(doubt.reasons)})" if doubt.reasons else ""
         return _refusal(item, "unsure", f"seen with a confidence of {doubt.confidence:.2f}, below {least:.2f}{why}")
@@ -93,10 +100,10 @@ def _refusal(item: Item, reason: str, message: str) -> RefusedItem:
     )  # fmt: skip
 
 
-def statement(accepted: Accepted) -> str:
-    """Return in one line what is planned for and what is not."""
+def statement(accepted: Accepted, notes: tuple[str, ...] = ()) -> str:
+    """Return in one line what is planned for and what is not; `notes`: what vision did not handle."""
     count = len(accepted.table.items)
     text = f"{count} item{'s' * (count != 1)} to clear" if count else "nothing to clear"
-    if not accepted.refused:
+    if not accepted.refused and not notes:
         return text if count else "the table is empty: nothing to clear"
-    return f"{text}; not handled: " + "; ".join(one.message for one in accepted.refused)
+    return f"{text}; not handled: " + "; ".join([*(one.message for one in accepted.refused), *notes])

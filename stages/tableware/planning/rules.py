@@ -11,6 +11,8 @@ from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from math import atan2, cos, hypot, pi, sin
 
+import numpy as np
+
 from stages.tableware.world.footprints import Footprint, footprint, gap, overlapped, swept_disc
 from stages.tableware.world.items import MEASURES, Item, Kind, Measures, Table, rise
 
@@ -230,8 +232,8 @@ def in_the_way(covers: Iterable[Footprint], table: Table, apart_from: set[str]) 
     items = [item for stack in table.stacks if not any(other.name in apart_from for other in stack) for item in stack]
     if not items:
         return ()
-    hits = overlapped(tuple(covers), [footprint(item) for item in items]).any(axis=0)
-    return tuple(item for item, hit in zip(items, hits, strict=True) if hit)
+    hits: np.ndarray = overlapped(tuple(covers), [footprint(item) for item in items])
+    return tuple(items[row] for row in np.flatnonzero(hits.sum(axis=0)))
 
 
 def obstructed(covers: Iterable[Footprint], table: Table) -> bool:

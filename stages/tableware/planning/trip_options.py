@@ -192,7 +192,7 @@ def _pairs(
     row = {item.name: number for number, item in enumerate(table.items)}
     pile = {item.name: stack[0].name for stack in table.stacks for item in stack}
     bases = [stack[0] for stack in table.stacks]
-    found = []
+    found: list[tuple[int, int, float, float, float, bool]] = []
     covers: list[Footprint] = []
     owners: list[int] = []
     for one in bases:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stages.tableware.world.items import MEASURES, Item, Kind, Table
+from stages.tableware.world.items import MEASURES, Item, Kind, Measures, Table
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class Detection:
     """Of a utensil: the highest point along its axis."""
     extent: float = 0.0
     """Of an unknown thing: radius of the circle around it."""
+    size: Measures | None = None
+    """Where it was estimated; else the size is that of the kind."""
     confidence: float = 1.0
     unsure: tuple[str, ...] = ()
     """Reasons for doubt; empty when there is none."""
@@ -38,7 +40,7 @@ def as_table(detections: tuple[Detection, ...]) -> Table:
     return Table(
         tuple(
             Item(names[index], found.kind, found.position, found.yaw,
-                 None if found.on is None else names[found.on], MEASURES[found.kind])
+                 None if found.on is None else names[found.on], found.size or MEASURES[found.kind])
             for index, found in enumerate(detections)
             if found.kind is not None
         )

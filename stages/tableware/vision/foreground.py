@@ -17,6 +17,11 @@ BROADEST = 21
 """A utensil is narrower than this [px]."""
 CHROMA = 40.0
 """Distance of the colour, grey taken off, from the table's [levels]."""
+LEAST_RISE, PLAIN_RISE, MOST_RISE = 0.0005, 0.0020, 0.012
+"""What looks unlike the table is a shadow where it rises less than the first [m], mean over 5 x 5 pixels; what rises
+over the second is no table whatever its colour; the third is where heights are cut."""
+NEAR_DISH = 9
+"""Heights in a square of this side [px] around a dish's pixels are mixed with its own."""
 
 
 def unlike_table(heights: HeightMap, covered: np.ndarray) -> np.ndarray:
@@ -54,3 +59,14 @@ def _share(image: np.ndarray, factor: float, least: float = 0.0) -> np.ndarray:
     """Return an 8-bit image times a factor, saturated, nowhere below `least`."""
     levels = np.clip(np.rint(np.arange(256) * factor), least, 255.0).astype(np.uint8)
     return np.asarray(cv2.LUT(np.asarray(image, dtype=np.uint8), levels))
+
+
+def rising(heights: HeightMap, unlike: np.ndarray, covered: np.ndarray) -> np.ndarray:
+    """Return (h, w) bool: `unlike` (h, w) less what does not rise over the table, plus what does; by colour alone where
+    there is too little depth."""
+    cut = np.clip(heights.raw, np.float32(-0.004), np.float32(MOST_RISE))
+    count = cv2.boxFilter(heights.valid.astype(np.uint8), cv2.CV_32F, (5, 5), normalize=False)
+    mean = cv2.boxFilter(cut, -1, (5, 5), normalize=False) / np.maximum(count, 1.0)
+    near = cv2.dilate(covered.astype(np.uint8), np.ones((NEAR_DISH, NEAR_DISH), np.uint8)) > 0
+    plain = (mean > PLAIN_RISE) & (mean < 0.7 * MOST_RISE) & (count >= 16.0) & ~near
+    return np.asarray(((unlike & ~((count >= 9.0) & (mean < LEAST_RISE))) | plain) & ~covered)

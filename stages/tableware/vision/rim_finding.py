@@ -12,20 +12,16 @@ import cv2
 import numpy as np
 
 from stages.tableware.vision.height_map import HeightMap
+from stages.tableware.vision.rim_fitting import RAYS, fit_circle
+from stages.tableware.vision.rim_votes import cast_votes
 from stages.tableware.world.items import DISHES, MEASURES, Kind
 
 LIPS: dict[Kind, tuple[float, float]] = {"cup": (0.066, 0.170), "bowl": (0.056, 0.145), "plate": (0.014, 0.048)}
 """Heights [m] between which a lip of the kind may be, stacks included."""
-LEAST_STEP = 0.006
-"""A lip stands this much [m] over what is outside of it."""
-DIRECTIONS = 96
-WINDOW = 14
-"""Pixels on either side of the expected circle that are searched."""
+LEAST_SLOPE = 0.0012
+"""Of an edge [m/px]."""
 LEAST_VOTES, LEAST_SUPPORT = 0.22, 0.42
 """Shares of the circumference that must vote, and that the fitted circle must explain."""
-_ANGLES = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-_RAYS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
-_SYSTEM = np.column_stack([_RAYS, np.ones(DIRECTIONS)])
 
 
 @dataclass(frozen=True)
@@ -42,21 +38,15 @@ class Rim:
 
 def find_rims(heights: HeightMap) -> list[Rim]:
     """Return the rims of all kinds, surest first, none twice."""
-    smooth = cv2.GaussianBlur(heights.smooth, (0, 0), 2.0)
-    gx = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=0.125)
-    gy = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=0.125)
-    size = cv2.magnitude(gx, gy)
-    rows, columns = np.nonzero(size > 0.0012)
-    lip = cv2.dilate(heights.smooth, np.ones((5, 5), np.uint8))[rows, columns]
-    norm = size[rows, columns]
-    ux, uy = gx[rows, columns] / norm, gy[rows, columns] / norm
+    low, high = (np.array([LIPS[kind][end] for kind in DISHES]) for end in (0, 1))
+    votes = cast_votes(
+        cv2.GaussianBlur(heights.smooth, (0, 0), 2.0), heights.smooth,
+        np.array([MEASURES[kind].rim_radius for kind in DISHES]), low, high,
+        heights.focal[0], heights.camera_height, LEAST_SLOPE,
+    )  # fmt: skip
     found: list[Rim] = []
-    for kind in DISHES:
-        low, high = LIPS[kind]
-        usable = (lip > low) & (lip < high)
-        radius = np.asarray(heights.scale(lip[usable])) * MEASURES[kind].rim_radius
-        u, v = columns[usable] + radius * ux[usable], rows[usable] + radius * uy[usable]
-        rims = [fitted for u0, v0 in _peaks(u, v, norm[usable], heights, kind)
+    for kind, own in zip(DISHES, votes, strict=True):
+        rims = [fitted for u0, v0 in _peaks(own, heights, kind)
                 if (fitted := fit_rim(heights, kind, u0, v0)) is not None]  # fmt: skip
         for rim in sorted(rims, key=lambda rim: -rim.support):
             apart = 1.2 * MEASURES[kind].rim_radius
@@ -65,24 +55,18 @@ def find_rims(heights: HeightMap) -> list[Rim]:
     return found
 
 
-def _peaks(
-    u: np.ndarray, v: np.ndarray, weight: np.ndarray, heights: HeightMap, kind: Kind
-) -> list[tuple[float, float]]:
-    """Return places [px] where votes gather, most votes first. Votes count once a pixel of edge, at half resolution."""
-    rows, columns = heights.smooth.shape[0] // 2 + 1, heights.smooth.shape[1] // 2 + 1
-    inside = (u > 0) & (v > 0) & (u < 2 * columns - 2) & (v < 2 * rows - 2)
-    cell = (v[inside] * 0.5).astype(np.int64) * columns + (u[inside] * 0.5).astype(np.int64)
-    votes = np.bincount(cell, minlength=rows * columns).reshape(rows, columns).astype(np.float32)
-    votes = np.asarray(cv2.boxFilter(votes, -1, (7, 7), normalize=False), dtype=np.float32)
+def _peaks(votes: np.ndarray, heights: HeightMap, kind: Kind) -> list[tuple[float, float]]:
+    """Return places [px] where votes (at half resolution) gather, most votes first. A pixel of edge votes once."""
+    gathered = np.asarray(cv2.boxFilter(votes, -1, (7, 7), normalize=False), dtype=np.float32)
     circumference = 2.0 * np.pi * float(heights.scale(0.05)) * MEASURES[kind].rim_radius
     found = []
     apart = int(0.5 * MEASURES[kind].rim_radius * float(heights.scale(0.05)) * 0.6)
     for _ in range(16):
-        _, most, _, (column, row) = cv2.minMaxLoc(votes)
+        _, most, _, (column, row) = cv2.minMaxLoc(gathered)
         if most < LEAST_VOTES * circumference:
             break
         found.append((2.0 * column + 0.5, 2.0 * row + 0.5))
-        cv2.circle(votes, (column, row), apart, 0.0, -1)
+        cv2.circle(gathered, (column, row), apart, 0.0, -1)
     return found
 
 
@@ -90,38 +74,9 @@ def fit_rim(heights: HeightMap, kind: Kind, u: float, v: float) -> Rim | None:
     """Return the rim of a kind near pixel (u, v), or None where heights do not bear it out."""
     measures = MEASURES[kind]
     low, high = LIPS[kind]
-    offsets = np.arange(-WINDOW, WINDOW + 1, dtype=np.float32)
-    lip = 0.5 * (low + high)
-    support, edge = 0.0, np.zeros(DIRECTIONS)
-    for turn in range(4):
-        radius = float(heights.scale(lip)) * measures.rim_radius
-        reach = radius + offsets
-        map_u = (u + _RAYS[:, :1] * reach).astype(np.float32)
-        map_v = (v + _RAYS[:, 1:] * reach).astype(np.float32)
-        profile = cv2.remap(heights.smooth, map_u, map_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        if turn < 2:
-            crest = profile[:, 4:-4].max(axis=1)
-            usable = crest[(crest > low) & (crest < high)]
-            if len(usable) < 0.3 * DIRECTIONS:
-                return None
-            lip = float(np.median(usable))
-            if turn == 0:
-                continue
-        found, edge = _outer_edge(profile, lip)
-        if found.sum() < 0.3 * DIRECTIONS:
-            return None
-        kept = found
-        shift = np.zeros(3)
-        for _ in range(4):
-            system = _SYSTEM[kept]
-            shift = np.linalg.solve(system.T @ system + 1e-6 * np.eye(3), system.T @ edge[kept])
-            residual = np.abs(edge - _SYSTEM @ shift)
-            kept = found & (residual < (6.0 if turn < 2 else 2.5))
-            if kept.sum() < 0.25 * DIRECTIONS:
-                return None
-        if abs(shift[2]) > 6.0 and turn > 1:
-            return None
-        u, v, support = u + float(shift[0]), v + float(shift[1]), float(kept.mean())
+    u, v, lip, support, radius = fit_circle(
+        heights.smooth, u, v, measures.rim_radius, low, high, heights.focal[0], heights.camera_height, RAYS
+    )
     if support < LEAST_SUPPORT:
         return None
     wall = (measures.rim_radius - measures.inner_radius(measures.height)) * float(heights.scale(lip))
@@ -130,24 +85,10 @@ def fit_rim(heights: HeightMap, kind: Kind, u: float, v: float) -> Rim | None:
     return Rim(kind, float(x), float(y), lip, support, share)
 
 
-def _outer_edge(profile: np.ndarray, lip: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return per direction whether a fall from the lip was found, and its offset from the expected circle [px]."""
-    level = lip - LEAST_STEP
-    falls = (profile[:, :-1] >= level) & (profile[:, 1:] < level)
-    crest = profile[:, :-1].copy()
-    np.maximum(crest[:, 1:], profile[:, :-2], out=crest[:, 1:])
-    falls &= np.abs(crest - lip) < 0.012
-    index = profile.shape[1] - 2 - np.argmax(falls[:, ::-1], axis=1)
-    rows = np.arange(len(profile))
-    here, there = profile[rows, index], profile[rows, index + 1]
-    part = (here - level) / np.maximum(here - there, 1e-6)
-    return np.asarray(falls.any(axis=1)), index - WINDOW + np.clip(part, 0.0, 1.0)
-
-
 def _lip_height(heights: HeightMap, u: float, v: float, radius: float, lip: float) -> tuple[float, float]:
     """Return the mean height [m] of the pixels on the lip that lie near the first estimate, and the share of pixels
     there that have depth."""
-    around = u + _RAYS[:, 0] * radius, v + _RAYS[:, 1] * radius
+    around = u + RAYS[:, 0] * radius, v + RAYS[:, 1] * radius
     rows = np.clip(np.rint(around[1]).astype(int), 0, heights.raw.shape[0] - 1)
     columns = np.clip(np.rint(around[0]).astype(int), 0, heights.raw.shape[1] - 1)
     valid = heights.valid[rows, columns]

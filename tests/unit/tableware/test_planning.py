@@ -176,8 +176,8 @@ def test_detections_of_unknown_kind_and_low_confidence_are_not_planned_for() -> 
         0.5,
         RULES,
     )
-    assert [item.name for item in seen.accepted.table.items] == ["cup_1"]
-    assert [one.reason for one in seen.accepted.refused] == ["unknown_object", "unsure"]
+    assert [item.name for item in seen.table.items] == ["cup_1"]
+    assert [one.reason for one in seen.refused] == ["unknown_object", "unsure"]
 
 
 @pytest.mark.parametrize("tier", ["tier1", "tier3"])

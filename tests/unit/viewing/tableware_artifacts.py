@@ -9,6 +9,7 @@ import numpy as np
 
 from schemas.base import as_transform
 from schemas.scene_parts import Camera
+from schemas.tableware_detections import TablewareDetection, TablewareDetectionsFile
 from schemas.tableware_plan import (
     GraspFields,
     StackFields,
@@ -49,9 +50,21 @@ def make_tableware(run: Path) -> None:
     np.savez(scene / "depth.npz", depth=np.ones((4, 4), np.float32))
     write_shapes(scene)
     seal(scene, "tableware_scene")
+    make_detections(run)
     make_plan(run)
     make_trial(run)
     make_evaluation(run)
+
+
+def make_detections(run: Path) -> Path:
+    """Write what was seen of a cup and of something unknown."""
+    root = run / "tableware_detections"
+    root.mkdir()
+    cup = TablewareDetection(kind="cup", position=(0.1, 0.0, 0.0), lip=0.08, confidence=0.9)
+    thing = TablewareDetection(kind=None, position=(0.2, 0.1, 0.0), lip=0.05, extent=0.04, confidence=0.0)
+    TablewareDetectionsFile(statement="1 item, 1 thing", items=(cup, thing)).write(root / "detections.json")
+    (root / "overlay.png").write_bytes(PICTURE)
+    return seal(root, "tableware_detections")
 
 
 def make_plan(run: Path) -> Path:

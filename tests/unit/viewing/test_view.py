@@ -81,6 +81,7 @@ EXPECTED = {
         "/world/robot/panda_hand",
         "/world/layout",
     },
+    "tableware_detections": {"/seen", "/world/items/1_cup", "/world/items/2_unknown", "/world/overlay"},
     "tableware_scene": {"/world/items/cup_1", "/world/table", "/world/camera/color"},
     "tableware_plan": {"/plan", "/world/strip", "/world/stackings/1", "/world/table"},
     "tableware_trial": {"/trial", "/world/items/cup_2", "/world/keyframes"},

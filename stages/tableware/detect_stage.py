@@ -1,0 +1,94 @@
+"""The step `tableware detect`: one image of a table, what is on it, and a picture of how sure that is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.scene_parts import Camera
+from schemas.tableware_detections import TablewareDetections, TablewareDetectionsFile, TablewareOutline
+from stages.kit.stage import Context
+from stages.tableware.detect_parameters import DetectParameters
+from stages.tableware.vision.detections_file import to_file
+from stages.tableware.vision.image_files import TableImage, read_image
+from stages.tableware.vision.overlay import draw_outlines, draw_sight
+from stages.tableware.vision.photographs import find_outlines
+from stages.tableware.vision.seeing import see
+from stages.tableware.world.overhead import OverheadCamera
+
+
+def run(
+    image: Path, depth: Path | None, camera: Path | None, *, parameters: DetectParameters, context: Context
+) -> TablewareDetections:
+    """Detect tableware in the user's image, or in that of a scene's folder."""
+    with context.progress.step("read"):
+        read = read_image(image, depth, camera, parameters.depth_scale)
+    if parameters.photograph:
+        return _photograph(read, parameters, context)
+    with context.progress.step("see"):
+        view, sides = _view(read, parameters)
+        sight = see(read.color, read.depth, view, sides, sizes=parameters.sizes, seed=context.seed)
+    for note in sight.notes:
+        context.logger.warning("%s", note)
+    told = to_file(sight, parameters.sizes)
+    told.write(context.output / "detections.json")
+    with context.progress.step("pictures"):
+        _save(context.output / "overlay.png", draw_sight(read.color, sight))
+        if sight.rectified:
+            _save(context.output / "above.png", sight.heights.color)
+    kinds = [one.kind for one in sight.detections]
+    summary = {
+        "statement": told.statement,
+        "items": sum(kind is not None for kind in kinds),
+        "unknown": kinds.count(None),
+        "in_doubt": sum(bool(one.unsure) for one in sight.detections),
+        "rectified": sight.rectified,
+    }
+    return TablewareDetections(root=context.output, outcome="ok" if kinds else "nothing_found", summary=summary)
+
+
+def _view(read: TableImage, parameters: DetectParameters) -> tuple[OverheadCamera | Camera, tuple[float, float]]:
+    """Return the camera, with its pose where that is known, and the workspace's sides [m]. Raises BadInput without
+    intrinsics."""
+    sides = (parameters.workspace_x, parameters.workspace_y)
+    if read.camera is None:
+        raise BadInput("there is no camera.json with the image", hint="give --camera: intrinsics in pixels")
+    if read.camera.workspace is not None:
+        sides = read.camera.workspace
+    if read.camera.world_from_camera is not None:
+        return OverheadCamera(read.camera.camera, np.array(read.camera.world_from_camera)), sides
+    if not parameters.overhead:
+        return read.camera.camera, sides
+    pose = np.diag([1.0, -1.0, -1.0, 1.0])
+    pose[2, 3] = parameters.camera_height
+    return OverheadCamera(read.camera.camera, pose), sides
+
+
+def _photograph(read: TableImage, parameters: DetectParameters, context: Context) -> TablewareDetections:
+    outlines = find_outlines(read.color, parameters.picture_width)
+    count = len(outlines)
+    statement = f"{count} round thing{'s' * (count != 1)} in a photograph without depth: heights are unknown, nothing "
+    statement += "can be planned from this"
+    if parameters.picture_width is None:
+        statement += "; sizes and kinds are unknown too (--picture-width)"
+    told = TablewareDetectionsFile(
+        statement=statement,
+        notes=("without depth neither heights, stacks nor utensils are looked for",),
+        heights_known=False,
+        outlines=tuple(
+            TablewareOutline(kind=one.kind, box=one.box, confidence=one.confidence, unsure=one.unsure)  # type: ignore[arg-type]
+            for one in outlines
+        ),
+    )
+    told.write(context.output / "detections.json")
+    _save(context.output / "overlay.png", draw_outlines(read.color, outlines, statement))
+    summary = {"statement": statement, "items": 0, "unknown": count, "in_doubt": count, "rectified": False}
+    return TablewareDetections(root=context.output, outcome="no_depth", summary=summary)
+
+
+def _save(path: Path, picture: np.ndarray) -> None:
+    if not cv2.imwrite(str(path), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)):
+        raise OSError(f"{path} could not be written")

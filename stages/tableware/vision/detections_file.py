@@ -1,0 +1,54 @@
+"""Detections as JSON and back."""
+
+from __future__ import annotations
+
+from schemas.base import as_transform
+from schemas.errors import BadInput
+from schemas.tableware_detections import DetectedSize, TablePlane, TablewareDetection, TablewareDetectionsFile
+from stages.tableware.vision.detections import Detection
+from stages.tableware.vision.seeing import Sight, Sizes
+from stages.tableware.world.items import Measures
+
+
+def to_file(sight: Sight, sizes: Sizes) -> TablewareDetectionsFile:
+    """Return the payload of what was seen."""
+    return TablewareDetectionsFile(
+        statement=sight.statement,
+        notes=sight.notes,
+        items=tuple(_item(one) for one in sight.detections),
+        camera=sight.camera,
+        world_from_camera=as_transform(sight.world_from_camera),
+        table=TablePlane(normal=sight.plane[0], offset=sight.plane[1]),
+        workspace=sight.sides,
+        rectified=sight.rectified,
+        sizes=sizes,
+    )
+
+
+def from_file(told: TablewareDetectionsFile) -> tuple[Detection, ...]:
+    """Return the detections of a payload. Raises BadInput where heights are not known: nothing can be planned then."""
+    if not told.heights_known:
+        raise BadInput("the detections are of a photograph without depth: heights are unknown",
+                       hint="detect on an RGB-D image")  # fmt: skip
+    return tuple(
+        Detection(
+            kind=item.kind, position=item.position, yaw=item.yaw, lip=item.lip, on=item.on, hidden=item.hidden,
+            grasp=item.grasp, extent=item.extent, confidence=item.confidence, unsure=item.unsure,
+            size=None if item.size is None else Measures(
+                height=item.size.height, rim_radius=item.size.rim_radius, foot_radius=item.size.foot_radius,
+                wall=item.size.wall,
+            ),
+        )
+        for item in told.items
+    )  # fmt: skip
+
+
+def _item(one: Detection) -> TablewareDetection:
+    size = None
+    if one.size is not None:
+        size = DetectedSize(height=one.size.height, rim_radius=one.size.rim_radius, foot_radius=one.size.foot_radius,
+                            wall=one.size.wall)  # fmt: skip
+    return TablewareDetection(
+        kind=one.kind, position=one.position, yaw=one.yaw, lip=max(0.0, one.lip), on=one.on, hidden=one.hidden,
+        grasp=one.grasp, extent=one.extent, size=size, confidence=min(1.0, max(0.0, one.confidence)), unsure=one.unsure,
+    )  # fmt: skip

@@ -1,0 +1,130 @@
+"""Images of a table from files: a colour image with a depth image and a camera, or a folder with the three.
+
+color.png | color.jpg | rgb.png     8 bits, three channels
+depth.png                           16 bits, times `depth_scale` metres
+depth.npy | depth.npz               metres times 1 / `depth_scale` (depth.npz: its array `depth`)
+camera.json | scene.json            {"camera": {width, height, fx, fy, cx, cy}, "world_from_camera": 4 x 4 or absent,
+                                     "workspace": [x, y] or absent, "depth_scale": metres a unit, or absent}
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from pydantic import ValidationError
+
+from schemas.base import Model, Transform
+from schemas.errors import BadInput
+from schemas.scene_parts import Camera
+
+COLORS = ("color.png", "color.jpg", "rgb.png", "rgb.jpg")
+DEPTHS = ("depth.npz", "depth.npy", "depth.png")
+CAMERAS = ("camera.json", "scene.json")
+LARGEST_JSON, LARGEST_PIXELS = 5_000_000, 40_000_000
+MILLIMETRE = 0.001
+"""Scale of a 16-bit image where none is given."""
+
+
+class CameraFile(Model):
+    """camera.json."""
+
+    camera: Camera
+    world_from_camera: Transform | None = None
+    """The world's origin is the middle of the workspace, z up; without it the table is found in the depth."""
+    workspace: tuple[float, float] | None = None
+    """Sides along x and y [m]."""
+    depth_scale: float | None = None
+    """Metres a unit of the depth file."""
+
+
+@dataclass(frozen=True)
+class TableImage:
+    """What was read: colour (H, W, 3) uint8, depth (H, W) float32 [m] or None, camera or None."""
+
+    color: np.ndarray
+    depth: np.ndarray | None
+    camera: CameraFile | None
+
+
+def read_image(
+    image: Path, depth: Path | None = None, camera: Path | None = None, depth_scale: float | None = None
+) -> TableImage:
+    """Read an image of a table. `image` is a file, or a folder that holds all; `depth_scale` [m a unit] goes before
+    what the camera's file says. Raises BadInput in one line for what cannot be read."""
+    if image.is_dir():
+        folder = image
+        image = _one_of(folder, COLORS) or _refuse(f"{folder}: no colour image", f"one of {', '.join(COLORS)}")
+        depth = depth or _one_of(folder, DEPTHS)
+        camera = camera or _one_of(folder, CAMERAS)
+    told = None if camera is None else read_camera(camera)
+    color = _picture(image, cv2.IMREAD_COLOR)
+    if depth is None:
+        return TableImage(cv2.cvtColor(color, cv2.COLOR_BGR2RGB), None, told)
+    scale = depth_scale if depth_scale is not None else None if told is None else told.depth_scale
+    return TableImage(cv2.cvtColor(color, cv2.COLOR_BGR2RGB), _depth(depth, scale), told)
+
+
+def read_camera(path: Path) -> CameraFile:
+    """Return the camera of a camera.json, or of a scene.json that says more. Raises BadInput."""
+    hint = 'it needs {"camera": {"width", "height", "fx", "fy", "cx", "cy"}}; docs/TIDY_VISION.md has an example'
+    try:
+        if path.stat().st_size > LARGEST_JSON:
+            raise BadInput(f"{path}: larger than {LARGEST_JSON} bytes", hint=hint)
+        told = json.loads(path.read_bytes())
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror}", hint=hint) from None
+    except ValueError:
+        raise BadInput(f"{path}: no JSON", hint=hint) from None
+    if not isinstance(told, dict):
+        raise BadInput(f"{path}: no JSON object", hint=hint)
+    try:
+        return CameraFile.model_validate({key: told[key] for key in CameraFile.model_fields if key in told})
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "document"
+        raise BadInput(f"{path}: {where}: {first['msg']}", hint=hint) from None
+
+
+def _one_of(folder: Path, names: tuple[str, ...]) -> Path | None:
+    return next((folder / name for name in names if (folder / name).is_file()), None)
+
+
+def _refuse(message: str, hint: str) -> Path:
+    raise BadInput(message, hint=hint)
+
+
+def _picture(path: Path, flags: int) -> np.ndarray:
+    if not path.is_file():
+        raise BadInput(f"{path}: no such file", hint="give an image file")
+    picture = cv2.imread(str(path), flags)
+    if picture is None:
+        raise BadInput(f"{path}: no image that can be read", hint="give a PNG or JPEG file")
+    if picture.shape[0] * picture.shape[1] > LARGEST_PIXELS:
+        raise BadInput(f"{path}: more than {LARGEST_PIXELS} pixels", hint="scale it down")
+    return np.asarray(picture)
+
+
+def _depth(path: Path, scale: float | None) -> np.ndarray:
+    """Return depth (H, W) float32 [m]. 16-bit images are millimetres unless told otherwise, arrays metres."""
+    if path.suffix.lower() in (".npy", ".npz"):
+        try:
+            with path.open("rb") as stream:
+                loaded = np.load(stream, allow_pickle=False)
+                array = loaded["depth"] if path.suffix.lower() == ".npz" else loaded
+        except (OSError, ValueError, KeyError, EOFError) as error:
+            raise BadInput(f"{path}: no depth array can be read ({type(error).__name__})",
+                           hint="save an array of (H, W) metres, in an .npz as `depth`") from None  # fmt: skip
+        if not np.issubdtype(array.dtype, np.number) or np.iscomplexobj(array) or array.ndim != 2:
+            raise BadInput(f"{path}: the depth is {array.shape} {array.dtype}", hint="save an array of (H, W) metres")
+        usual = MILLIMETRE if np.issubdtype(array.dtype, np.integer) else 1.0
+    else:
+        array = _picture(path, cv2.IMREAD_UNCHANGED)
+        if array.ndim != 2 or array.dtype != np.uint16:
+            raise BadInput(f"{path}: the depth image is {array.shape} {array.dtype}, not 16 bits in one channel",
+                           hint="8-bit pictures of depth hold no distances")  # fmt: skip
+        usual = MILLIMETRE
+    return np.asarray(array, dtype=np.float32) * np.float32(usual if scale is None else scale)

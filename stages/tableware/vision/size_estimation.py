@@ -1,0 +1,192 @@
+"""Dishes of unknown size: circles fitted to the upper edges of what stands on the table, told apart by their shape.
+
+A thing is a dish when its upper edge is a circle and what is within it lies lower. A narrow tall one is a cup, a wide
+one a bowl, a flat one a plate; everything else is reported as unknown with its extent. Utensils are not looked for:
+of unknown size they are not told from other slender things.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from stages.tableware.vision.detections import Detection
+from stages.tableware.vision.height_map import TALLEST, HeightMap
+from stages.tableware.world.items import Kind, Measures
+
+LEAST_HEIGHT, LEAST_AREA = 0.010, 0.0006
+"""What stands on the table rises over the first [m] on more than the second [m^2]."""
+LEVELS = (0.110, 0.085, 0.065, 0.045, 0.030, LEAST_HEIGHT)
+"""Heights [m] over which pieces are looked at."""
+ROUGH = 3.0
+"""Times the table's roughness: less is a wave in the depth."""
+AROUND = 0.012
+"""What is this near to a dish belongs to it: handles, what flies about its edge [m]."""
+EDGE_BAND = 0.012
+"""The upper edge lies within this of the greatest height [m]: dishes seen from the side are noisy."""
+DRAWS = 200
+NEAR = 0.0035
+"""Points this near to a circle are on it [m]."""
+LEAST_ROUND = 0.40
+"""Share of a circle's directions in which the upper edge must lie on it."""
+SURE_ROUND = 0.70
+RADII = (0.028, 0.160)
+HOLLOW, HOLLOW_SHARE = 0.020, 0.4
+"""What is inside of a dish's edge lies lower than it by the first [m] or by this share of its height, whichever is
+less."""
+WALL = 0.004
+"""Taken for the wall of a dish, which an image from above does not show [m]."""
+FOOT_SHARE = 0.65
+"""Taken for the foot's radius over the rim's."""
+
+
+def estimated_dishes(heights: HeightMap, seed: int = 0) -> tuple[Detection, ...]:
+    """Return what stands on the table, dishes with their measures in `size`, the rest as unknown. No two stacked ones
+    are told apart: a stack is one thing."""
+    random = np.random.default_rng([seed, 74])
+    inside = heights.workspace()
+    known = inside & heights.valid
+    result: list[Detection] = []
+    taken = np.zeros(inside.shape, dtype=np.uint8)
+    # What is joined low down, by what hides between things, comes apart higher up: levels from the top down, and what
+    # is a dish at one is left out of the lower ones.
+    for level in LEVELS:
+        high = (known & (heights.smooth > max(level, ROUGH * heights.roughness)) & (taken == 0)).astype(np.uint8)
+        for window, own in _pieces(high, heights):
+            found = _dish(heights, window, own, level, random)
+            if found is not None:
+                result.append(found)
+                assert found.size is not None
+                u, v = heights.pixel(found.position[0], found.position[1], found.lip)
+                reach = (found.size.rim_radius + AROUND) * float(heights.scale(found.lip))
+                cv2.circle(taken, (int(u), int(v)), int(reach), 1, -1)
+    result = _apart(result)
+    low = max(LEAST_HEIGHT, ROUGH * heights.roughness)
+    rest = (((known & (heights.smooth > low)) | (heights.tall & inside)) & (taken == 0)).astype(np.uint8)
+    for window, own in _pieces(rest, heights):
+        tall = heights.tall[window][own].mean() > 0.05
+        known_heights = heights.smooth[window][own & heights.valid[window]]
+        height = TALLEST if tall or len(known_heights) == 0 else float(np.percentile(known_heights, 97))
+        result.append(
+            _unknown(heights, window, own, height, f"taller than {TALLEST:.2f} m" if tall else "unknown object")
+        )
+    return tuple(result)
+
+
+def _apart(found: list[Detection]) -> list[Detection]:
+    """Return dishes less those whose middle is within one that is surer."""
+    kept: list[Detection] = []
+    for one in sorted(found, key=lambda one: -one.confidence):
+        (x, y, _), apart = one.position, True
+        for other in kept:
+            reach = other.size.rim_radius if other.size is not None else 0.0
+            apart &= bool(np.hypot(x - other.position[0], y - other.position[1]) > reach)
+        if apart:
+            kept.append(one)
+    return kept
+
+
+def _pieces(mask: np.ndarray, heights: HeightMap) -> list[tuple[tuple[slice, slice], np.ndarray]]:
+    """Return (window, (h, w) bool) of each connected piece of a mask (h, w) uint8 that is large enough."""
+    mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8))
+    count, labels, boxes, _ = cv2.connectedComponentsWithStats(mask)
+    result = []
+    for label in range(1, count):
+        left, top, width, height, area = boxes[label]
+        if area >= LEAST_AREA * float(heights.scale(0.05)) ** 2:
+            window = (slice(top, top + height), slice(left, left + width))
+            result.append((window, labels[window] == label))
+    return result
+
+
+def _dish(
+    heights: HeightMap, window: tuple[slice, slice], own: np.ndarray, level: float, random: np.random.Generator
+) -> Detection | None:
+    """Return the dish whose upper edge a piece over `level` [m] holds, or None."""
+    smooth, valid = heights.smooth[window], heights.valid[window] & own
+    if np.count_nonzero(valid) < 20:
+        return None
+    corner = np.array([window[1].start, window[0].start], dtype=float)
+    greatest = float(np.percentile(smooth[valid], 97))
+    edge = (valid & (smooth > greatest - EDGE_BAND)).astype(np.uint8)
+    circle = _circle(edge, float(heights.scale(greatest)), random)
+    if circle is None:
+        return None
+    u, v, radius, share = circle
+    columns, rows = np.meshgrid(np.arange(own.shape[1]) - u, np.arange(own.shape[0]) - v)
+    within = (np.hypot(columns, rows) < 0.55 * radius) & heights.valid[window]
+    floor = float(np.median(smooth[within])) if np.count_nonzero(within) > 10 else 0.0
+    if greatest - floor < min(HOLLOW, HOLLOW_SHARE * greatest):
+        return None
+    rim = radius / float(heights.scale(greatest))
+    kind: Kind
+    if greatest < 0.035:
+        kind = "plate"
+    elif rim < 0.060 and greatest > 0.7 * rim:
+        kind = "cup"
+    elif greatest < 1.6 * rim:
+        kind = "bowl"
+    else:
+        return None
+    x, y = heights.world(u + corner[0], v + corner[1], greatest)
+    reasons = ["size estimated"]
+    if share < SURE_ROUND:
+        reasons.append("partly hidden")
+    confidence = 0.5 + 0.4 * min(1.0, (share - LEAST_ROUND) / (SURE_ROUND - LEAST_ROUND))
+    size = Measures(height=greatest, rim_radius=rim, foot_radius=FOOT_SHARE * rim, wall=WALL)
+    return Detection(kind=kind, position=(float(x), float(y), 0.0), lip=greatest, confidence=confidence,
+                     unsure=tuple(reasons), size=size)  # fmt: skip
+
+
+def _unknown(heights: HeightMap, window: tuple[slice, slice], own: np.ndarray, height: float, reason: str) -> Detection:
+    middle = window[1].start + 0.5 * own.shape[1], window[0].start + 0.5 * own.shape[0]
+    x, y = heights.world(middle[0], middle[1], height)
+    extent = 0.5 * float(np.hypot(*own.shape)) / float(heights.scale(height))
+    return Detection(
+        kind=None, position=(float(x), float(y), 0.0), lip=height, confidence=0.0, extent=extent, unsure=(reason,)
+    )
+
+
+def _circle(edge: np.ndarray, scale: float, random: np.random.Generator) -> tuple[float, float, float, float] | None:
+    """Return (u, v, radius [px], share of directions) of the circle around an upper edge (h, w), or None.
+
+    Circles through three outline points are drawn (RANSAC); the one whose points lie in most directions is refitted by
+    least squares."""
+    contours, _ = cv2.findContours(edge, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    points = np.concatenate([contour[:, 0, :] for contour in contours]).astype(np.float64) if contours else np.empty(0)
+    if len(points) < 20:
+        return None
+    best, share = None, 0.0
+    for _ in range(DRAWS):
+        circle = _through(points[random.choice(len(points), 3, replace=False)])
+        if circle is None or not RADII[0] * scale < circle[2] < RADII[1] * scale:
+            continue
+        own = _share(points, circle, scale)
+        if own > share:
+            best, share = circle, own
+    if best is None or share < LEAST_ROUND:
+        return None
+    near = np.abs(np.hypot(points[:, 0] - best[0], points[:, 1] - best[1]) - best[2]) < NEAR * scale
+    system = np.column_stack([points[near], np.ones(int(near.sum()))])
+    a, b, c = np.linalg.lstsq(system, (points[near] ** 2).sum(axis=1), rcond=None)[0]
+    refitted = (0.5 * a, 0.5 * b, float(np.sqrt(max(c + 0.25 * (a * a + b * b), 1e-9))))
+    again = _share(points, refitted, scale)
+    u, v, radius = refitted if again >= share else best
+    return float(u), float(v), float(radius), max(share, again)
+
+
+def _through(points: np.ndarray) -> tuple[float, float, float] | None:
+    system = 2.0 * (points[1:] - points[0])
+    if abs(np.linalg.det(system)) < 1e-6:
+        return None
+    u, v = np.linalg.solve(system, (points[1:] ** 2).sum(axis=1) - (points[0] ** 2).sum())
+    return float(u), float(v), float(np.hypot(*(points[0] - (u, v))))
+
+
+def _share(points: np.ndarray, circle: tuple[float, float, float], scale: float) -> float:
+    """Return the share of 72 directions around a circle's centre in which a point lies on it."""
+    offset = points - np.array(circle[:2])
+    near = np.abs(np.hypot(offset[:, 0], offset[:, 1]) - circle[2]) < NEAR * scale
+    directions = np.floor((np.arctan2(offset[near, 1], offset[near, 0]) / (2.0 * np.pi) + 0.5) * 72.0).astype(int) % 72
+    return len(np.unique(directions)) / 72.0
