@@ -101,7 +101,8 @@ def run(
         "ground_truth": ground_truth, "sequence": sequence, "trajectory": trajectory, "segments": segments,
         "panoptic_map": panoptic_map, "contact_graph": contact_graph, "cad_scene": cad_scene,
         "cad_library": cad_library, "interactive_scene": interactive_scene, "plan": plan, "packing": packing,
-        "tableware_detections": tableware_detections, "tableware_plan": tableware_plan, "tableware_trial": tableware_trial,
+        "tableware_detections": tableware_detections, "tableware_plan": tableware_plan,
+        "tableware_trial": tableware_trial,
         "tableware_evaluation": tableware_evaluation,
         "evaluation": evaluation, "baseline_evaluation": baseline_evaluation,
     }  # fmt: skip
@@ -188,7 +189,8 @@ def _lead(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts
     names = {
         "panoptic_map": "a labelled map", "contact_graph": "a contact graph", "cad_scene": "a scene of CAD models",
         "interactive_scene": "a scene that simulators load", "packing": "a packing of boxes",
-        "tableware_detections": "a table that was looked at", "tableware_plan": "a plan to clear a table", "tableware_trial": "a table being cleared",
+        "tableware_detections": "a table that was looked at", "tableware_plan": "a plan to clear a table",
+        "tableware_trial": "a table being cleared",
         "tableware_evaluation": "a comparison of policies",
     }  # fmt: skip
     if isinstance(plan := artifacts.get("plan"), Plan):

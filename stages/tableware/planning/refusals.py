@@ -13,7 +13,6 @@ from stages.tableware.planning.rules import Rules, can_hold, letters
 from stages.tableware.world.footprints import footprint
 from stages.tableware.world.items import MEASURES, Item, Table
 
-
 SIZE = 0.005
 """Dishes whose estimated rim radius or height differs from their kind's by more [m] are not planned for."""
 
