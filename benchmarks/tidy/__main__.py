@@ -1,7 +1,7 @@
 """Runs every arm on the same seeded tables; a stopped run goes on where it was.
 
     python -m benchmarks.tidy --out FOLDER [--quick] [--tuning] [--tiers NAME ...] [--worlds NAME ...] [--arms NAME ...]
-                              [--seconds S]
+                              [--scenes N] [--seconds S]
 
 Reporting seeds are 1000 to 1199 and, for fifteen scenes as in the thesis (three a cell), 2000 to 2002; tuning seeds
 (`--tuning`) 0 to 199; `--quick` takes the first ten. Writes runs.jsonl, metrics.json and table.md. `--seconds` stops
@@ -33,12 +33,13 @@ def main() -> None:
     parser.add_argument("--tiers", nargs="+", default=list(TIERS), choices=list(TIERS))
     parser.add_argument("--worlds", nargs="+", default=list(WORLDS), choices=list(WORLDS))
     parser.add_argument("--arms", nargs="+", default=list(ARMS), choices=list(ARMS))
+    parser.add_argument("--scenes", type=int, default=SCENES, help="tables a tier")
     parser.add_argument("--seconds", type=float, help="stop after this time")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     log = options.out / "runs.jsonl"
     first = TUNING if options.tuning else REPORTING
-    seeds = range(first, first + (QUICK if options.quick else SCENES))
+    seeds = range(first, first + (QUICK if options.quick else options.scenes))
     fifteen = () if options.tuning else range(AS_THE_THESIS, AS_THE_THESIS + 3)
     done = {(run.arm, run.case, run.seed) for run in read_runs(log)}
     started = time.monotonic()

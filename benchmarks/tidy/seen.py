@@ -48,7 +48,7 @@ class SeenRun(Model):
 
 def trial(tier: str, seed: int, arm: str) -> SeenRun:
     """Return one arm's trial on one table."""
-    level, scheme = conditions(seed)
+    ((level, scheme),) = conditions(seed, one=True)
     model, chances = fitted(tier), WORLDS["fast"]
     eyes = Eyes(seed, level, scheme, LEAST_CONFIDENCE)
     world = FastWorld(make_table(tier, seed), model, chances, (seed, 0))
