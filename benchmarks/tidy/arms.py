@@ -9,6 +9,7 @@ import numpy as np
 
 from benchmarks.tidy.records import Run
 from stages.tableware.planning.actions import Action
+from stages.tableware.planning.choice import RULES
 from stages.tableware.planning.joint import JointPolicy, plan
 from stages.tableware.planning.optimum import Optimum
 from stages.tableware.planning.policies import Policy, PullPolicy, RandomOne, RandomPile, StackPolicy
@@ -18,13 +19,7 @@ from stages.tableware.simulation.fast import Trial, run_trial
 from stages.tableware.world.items import Table
 from stages.tableware.world.scenes import make_table
 
-OURS = {
-    "ours": Rules(),
-    "ours_without_loaded_pulls": Rules(loaded_pulls=False),
-    "ours_careful": Rules(both_piles=False, most_utensils=2),
-}
-"""`ours_careful`: nothing more is stacked onto two dishes that are lifted side by side, and two utensils a pile at most;
-the first findings in physics (what stands free in a dish falls out then, more utensils slide off) ask for that."""
+OURS = RULES
 SIMPLE = ("random", "random_piles", "stack", "pull")
 ARMS = (*SIMPLE, *OURS, "optimum")
 WORLDS: dict[str, Chances] = {"fast": measured(), "fast/exact": EXACT, "fast/drops": with_thesis_failures()}
