@@ -70,12 +70,12 @@ class Eyes:
         return self._told
 
     def _image(self, world: World) -> tuple[np.ndarray, np.ndarray, OverheadCamera]:
+        seed = 1000 * self._seed + self.images
         image = getattr(world, "image", None)
         if image is not None:
-            color, depth, view = image()
+            color, depth, view = image(seed, self._light, self._colors)
             return color, depth, view
         view = overhead_camera()
-        seed = 1000 * self._seed + self.images
         color, depth = render_overhead(world.table, seed, self._light, self._colors, view=view)
         return color, depth, view
 
