@@ -34,11 +34,11 @@ def as_times(model: TimeModel) -> TimesOfActions:
 RULES: dict[str, Rules] = {
     "ours": Rules(),
     "ours_without_loaded_pulls": Rules(loaded_pulls=False),
-    "ours_careful": Rules(both_piles=False, most_utensils=2),
+    "ours_careful": Rules(clamped_stacks=True, most_utensils=2),
 }
-"""What our policies allow themselves. `ours_careful`: nothing more is stacked onto two dishes that are lifted side by
-side, and two utensils a pile at most; the first findings in physics ask for that (what stands free in a dish falls out
-then, more utensils slide off)."""
+"""What our policies allow themselves. `ours_careful`: onto two dishes that are lifted side by side only dishes of their own
+kind are stacked, and two utensils a pile at most; the first findings in physics ask for that (what stands free in a dish
+falls out then, more utensils slide off)."""
 
 
 def rules_of(policy: str) -> Rules:

@@ -46,6 +46,9 @@ class Rules:
     """Whether a dish that carries others may be pulled."""
     both_piles: bool = True
     """Whether more is stacked onto a pair of dishes that stand side by side, before one grasp takes all (ours)."""
+    clamped_stacks: bool = False
+    """Whether onto a pair of dishes that stand side by side only dishes of their own kind are stacked, which the jaws
+    then clamp with them; what stands free in a dish falls out when two are lifted side by side (ours)."""
 
     def __post_init__(self) -> None:
         values = tuple(getattr(self, one.name) for one in fields(self))
@@ -150,7 +153,9 @@ def _share_out(
     """Return how many of each kind of part, in the order of `pile_order`, go onto `high`, the others onto `low`."""
     if not kinds:
         return () if can_hold_two(low, high, rules) else None
-    lows, highs = _grown(low, kinds[0], counts[0], rules), _grown(high, kinds[0], counts[0], rules)
+    lows, highs = (_grown(pile, kinds[0], counts[0], rules) for pile in (low, high))
+    if rules.clamped_stacks:
+        lows, highs = (piles if len(set(piles[-1])) == 1 else piles[:1] for piles in (lows, highs))
     for number in range(counts[0] + 1):
         if counts[0] - number < len(lows) and number < len(highs):
             rest = _share_out(lows[counts[0] - number], highs[number], kinds[1:], counts[1:], rules)

@@ -130,6 +130,9 @@ def test_a_split_is_one_that_the_jaws_hold() -> None:
     assert split_over_two("b", "b", ("b",) * 4, RULES) is not None
     assert split_over_two("b", "b", ("b",) * 5, RULES) is None  # seven bowls: four in one pile
     assert split_over_two("b", "b", ("c",), replace(RULES, both_piles=False)) is None
+    clamped = replace(RULES, clamped_stacks=True)
+    assert split_over_two("b", "b", ("b", "b"), clamped) is not None
+    assert split_over_two("b", "b", ("c",), clamped) is None and split_over_two("bc", "bc", (), clamped) is not None
 
 
 def test_what_is_not_understood_is_kept_clear_of() -> None:
