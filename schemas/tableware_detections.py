@@ -36,13 +36,13 @@ class TablewareDetection(Model):
     """Of a utensil, from the handle's end to the head, -pi to pi."""
     lip: float
     """Height of the upper edge above the table."""
-    on: int | None = Field(None, ge=0)
+    on: int | None = Field(default=None, ge=0)
     """Index of the item that carries it, always a lower one; None for the table."""
     hidden: bool = False
     """Inferred from the height of the stack alone."""
     grasp: Vector3 | None = None
     """Of a utensil: the highest point along its axis."""
-    extent: float = Field(0.0, ge=0.0)
+    extent: float = Field(default=0.0, ge=0.0)
     """Of an unknown thing: radius of the circle around it."""
     size: DetectedSize | None = None
     """Where it was estimated; else the size is that of the kind."""
@@ -78,8 +78,8 @@ class TablewareDetectionsFile(Model):
     """What was not handled, one line each."""
     heights_known: bool = True
     """False for a photograph without depth: it has outlines and no items, and nothing can be planned from it."""
-    items: tuple[TablewareDetection, ...] = Field((), max_length=MOST_DETECTIONS)
-    outlines: tuple[TablewareOutline, ...] = Field((), max_length=MOST_DETECTIONS)
+    items: tuple[TablewareDetection, ...] = Field(default=(), max_length=MOST_DETECTIONS)
+    outlines: tuple[TablewareOutline, ...] = Field(default=(), max_length=MOST_DETECTIONS)
     camera: Camera | None = None
     world_from_camera: Transform | None = None
     """The world's origin is the middle of the workspace, x along its longer side, z up."""

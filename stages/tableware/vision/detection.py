@@ -90,7 +90,7 @@ def _unknown(heights: HeightMap, covered: np.ndarray, strange: np.ndarray) -> li
     """Return what stands out and is no item that was found."""
     high = ((heights.smooth > max(UNKNOWN_HEIGHT, 4.0 * heights.roughness)) | heights.tall) & heights.workspace()
     high = cv2.morphologyEx((high & (covered == 0)).astype(np.uint8), cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
-    high |= strange.astype(np.uint8)
+    high = np.asarray(high, dtype=np.uint8) | strange.astype(np.uint8)
     if not high.any():
         return []
     high[cv2.dilate(covered, np.ones((13, 13), np.uint8)) > 0] = 0

@@ -61,7 +61,7 @@ def find_outlines(color: np.ndarray, picture_width: float | None = None) -> tupl
             great, little = max(axes), min(axes)
             if not LEAST_AXIS * WIDTH < great < MOST_AXIS * WIDTH or little < FLATTEST * great:
                 continue
-            support, box = _support(slopes, (u, v), axes, degrees)
+            support, box = _support(slopes, (u, v), (axes[0], axes[1]), degrees)
             if support >= LEAST_SUPPORT:
                 kind, reasons = _kind(great, picture_width)
                 left, top, right, bottom = (float(value / factor) for value in box)

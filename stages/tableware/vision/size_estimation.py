@@ -151,8 +151,8 @@ def _unknown(heights: HeightMap, window: tuple[slice, slice], own: np.ndarray, h
 def _circle(edge: np.ndarray, scale: float, random: np.random.Generator) -> tuple[float, float, float, float] | None:
     """Return (u, v, radius [px], share of directions) of the circle around an upper edge (h, w), or None.
 
-    Circles through three outline points are drawn (RANSAC); the one whose points lie in most directions is refitted by
-    least squares."""
+    Circles through three outline points are drawn (RANSAC); the one whose points lie in most directions is refitted to
+    the outermost by least squares."""
     contours, _ = cv2.findContours(edge, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     points = np.concatenate([contour[:, 0, :] for contour in contours]).astype(np.float64) if contours else np.empty(0)
     if len(points) < 20:
@@ -167,13 +167,25 @@ def _circle(edge: np.ndarray, scale: float, random: np.random.Generator) -> tupl
             best, share = circle, own
     if best is None or share < LEAST_ROUND:
         return None
-    near = np.abs(np.hypot(points[:, 0] - best[0], points[:, 1] - best[1]) - best[2]) < NEAR * scale
-    system = np.column_stack([points[near], np.ones(int(near.sum()))])
-    a, b, c = np.linalg.lstsq(system, (points[near] ** 2).sum(axis=1), rcond=None)[0]
-    refitted = (0.5 * a, 0.5 * b, float(np.sqrt(max(c + 0.25 * (a * a + b * b), 1e-9))))
-    again = _share(points, refitted, scale)
-    u, v, radius = refitted if again >= share else best
-    return float(u), float(v), float(radius), max(share, again)
+    outer = _outermost(points, best, scale)
+    system = np.column_stack([outer, np.ones(len(outer))])
+    a, b, c = np.linalg.lstsq(system, (outer**2).sum(axis=1), rcond=None)[0]
+    radius = float(np.sqrt(max(c + 0.25 * (a * a + b * b), 1e-9)))
+    if abs(radius - best[2]) > 3.0 * NEAR * scale:
+        return (*best, share)
+    return 0.5 * float(a), 0.5 * float(b), radius, share
+
+
+def _outermost(points: np.ndarray, circle: tuple[float, float, float], scale: float) -> np.ndarray:
+    """Return the farthest point near a circle in each of 72 directions: the outline of a ring with gaps runs along its
+    inner side too."""
+    offset = points - np.array(circle[:2])
+    reach = np.hypot(offset[:, 0], offset[:, 1])
+    near = np.abs(reach - circle[2]) < 2.5 * NEAR * scale
+    points, reach, offset = points[near], reach[near], offset[near]
+    direction = np.floor((np.arctan2(offset[:, 1], offset[:, 0]) / (2.0 * np.pi) + 0.5) * 72.0).astype(int) % 72
+    order = np.argsort(-reach)
+    return points[order[np.unique(direction[order], return_index=True)[1]]]
 
 
 def _through(points: np.ndarray) -> tuple[float, float, float] | None:

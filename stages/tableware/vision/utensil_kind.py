@@ -14,6 +14,7 @@ import numpy as np
 from stages.tableware.vision.height_map import HeightMap
 from stages.tableware.vision.tines import tine_difference
 from stages.tableware.vision.utensil_finding import Bar
+from stages.tableware.world.items import Kind
 
 RANGE = 0.006
 """Heights are cut to this much above and below the utensil's underside [m]: floors of dishes are far below."""
@@ -82,6 +83,6 @@ def _cut(features: tuple[float, float, float]) -> tuple[float, float, float]:
 
 def told_apart(bar: Bar, chance: float) -> Bar:
     """Return the bar as the likelier kind, at that kind's own best pose."""
-    kind = "fork" if chance >= 0.5 else "spoon"
+    kind: Kind = "fork" if chance >= 0.5 else "spoon"
     score, u, v, angle, visible = bar.poses[kind]
     return Bar(kind, u, v, angle, score, visible, bar.poses)
