@@ -36,9 +36,9 @@ RULES: dict[str, Rules] = {
     "ours_without_loaded_pulls": Rules(loaded_pulls=False),
     "ours_careful": Rules(clamped_stacks=True, most_utensils=2),
 }
-"""What our policies allow themselves. `ours_careful`: onto two dishes that are lifted side by side only dishes of their own
-kind are stacked, and two utensils a pile at most; the first findings in physics ask for that (what stands free in a dish
-falls out then, more utensils slide off)."""
+"""What our policies allow themselves. `ours_careful`: onto two dishes that are lifted side by side only dishes of their
+own kind are stacked, and two utensils a pile at most; the first findings in physics ask for that (what stands free in a
+dish falls out then, more utensils slide off)."""
 
 
 def rules_of(policy: str) -> Rules:
