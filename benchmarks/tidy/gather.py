@@ -2,7 +2,7 @@
 
     python -m benchmarks.tidy.gather --out FOLDER
 
-Parts are the folders `fast`, `seen`, `physics` and `detect` below FOLDER, each with metrics.json and table.md.
+Parts are the folders `fast`, `seen`, `physics`, `detect` and `detect_real` below FOLDER, each with metrics.json and table.md.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 
 from schemas.errors import BadInput
 
-PARTS = ("fast", "seen", "physics", "detect")
+PARTS = ("fast", "seen", "physics", "detect", "detect_real")
 
 
 def gather(folder: Path) -> tuple[dict[str, float], str]:
