@@ -10,9 +10,11 @@ from schemas.errors import BadInput
 from schemas.tableware_plan import RefusedItem
 from schemas.tableware_scene import MOST_ITEMS
 from stages.tableware.planning.rules import Rules, can_hold, letters
-from stages.tableware.world.footprints import footprint
+from stages.tableware.world.footprints import Footprint, footprint
 from stages.tableware.world.items import MEASURES, Item, Table
 
+EDGE = 0.005
+"""What stands on the table hangs over its edge when it is seen to by more [m]; what lies on a dish goes with the dish."""
 SIZE = 0.005
 """Dishes whose estimated rim radius or height differs from their kind's by more [m] are not planned for."""
 
@@ -80,7 +82,8 @@ def accept(
 
 
 def _wrong(item: Item, doubt: Doubt | None, least: float) -> RefusedItem | None:
-    if not footprint(item).on_table:
+    place = footprint(item)
+    if item.on is None and not Footprint(place.start, place.end, place.radius - EDGE).on_table:
         where = f"at ({item.position[0]:.3f}, {item.position[1]:.3f}) m"
         return _refusal(item, "outside_workspace", f"{where}, hangs over the edge of the workspace")
     known = MEASURES[item.kind]

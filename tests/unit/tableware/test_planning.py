@@ -157,6 +157,8 @@ def test_refusals_name_their_reasons() -> None:
     }  # fmt: skip
     assert "glare" in statement(found) and "\n" not in statement(found)
     assert statement(accept(Table(()), {}, (), 0.5, RULES)) == "the table is empty: nothing to clear"
+    edge = Table((make_item("d", "cup", 0.346, 0.0), make_item("e", "fork", 0.0, 0.2))).moved("e", 0.346, 0.0, on="d")
+    assert not accept(edge, {}, (), 0.5, RULES).refused  # a millimetre over it, and a fork that goes with its cup
     many = Table(tuple(make_item(f"cup_{n}", "cup", 0.0, 0.0) for n in range(61)))
     with pytest.raises(BadInput, match="61 items"):
         accept(many, {}, (), 0.5, RULES)
