@@ -2,7 +2,8 @@
 
     python -m benchmarks.tidy.gather --out FOLDER
 
-Parts are the folders `fast`, `seen`, `physics`, `detect` and `detect_real` below FOLDER, each with metrics.json and table.md.
+Parts are the folders `fast`, `seen`, `physics`, `detect` and `detect_real` below FOLDER, each with metrics.json
+and table.md.
 """
 
 from __future__ import annotations

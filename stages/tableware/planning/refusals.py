@@ -14,7 +14,7 @@ from stages.tableware.world.footprints import Footprint, footprint
 from stages.tableware.world.items import MEASURES, Item, Table
 
 EDGE = 0.005
-"""What stands on the table hangs over its edge when it is seen to by more [m]; what lies on a dish goes with the dish."""
+"""What stands on the table may be seen to hang over its edge by this [m]; what lies on a dish goes with the dish."""
 SIZE = 0.005
 """Dishes whose estimated rim radius or height differs from their kind's by more [m] are not planned for."""
 
