@@ -158,10 +158,19 @@ scenenn: setup ## The thesis's tables on SceneNN: make scenenn DATA=folder (OPTI
 SCENE ?= $(OUTPUTS)/demo/interactive_scene
 bench-planning: setup ## Planning beside OMPL with pybullet checks (QUICK=1: 10 queries a set; SCENE=folder)
 	$(PYTHON) -m benchmarks.planning $(if $(QUICK),--quick) $(if $(wildcard $(SCENE)),--scene $(SCENE)) --out $(OUTPUTS)/experiments/bench-planning$(if $(QUICK),-quick)
-.PHONY: tidy-fast
-# Two hundred reporting seeds a tier, about forty minutes of one core; a stopped run goes on where it was.
-tidy-fast: setup ## Clearing tables in the fast simulator: tables 7.1 and 7.2, joint planner, optimum (QUICK=1: ten tables)
-	$(PYTHON) -m benchmarks.tidy $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/tidy-fast$(if $(QUICK),-quick)
+
+.PHONY: tidy
+# Fast: 200 reporting seeds a tier, about 20 minutes of one core; seen: images before each action, a second each;
+# physics and detect: docs/TIDY.md. Stopped runs go on where they were. PARTS="fast seen" runs some of them.
+PARTS ?= fast seen physics detect
+TIDY := $(OUTPUTS)/experiments/tidy$(if $(QUICK),-quick)
+tidy: setup ## Clearing tables (TIDY): tables 7.1 to 7.3, joint planner, optimum, vision (QUICK=1: few tables; PARTS=...)
+	$(if $(filter fast,$(PARTS)),$(PYTHON) -m benchmarks.tidy $(if $(QUICK),--quick) --out $(TIDY)/fast)
+	$(if $(filter seen,$(PARTS)),$(PYTHON) -m benchmarks.tidy.seen $(if $(QUICK),--quick) --out $(TIDY)/seen)
+	$(if $(filter physics,$(PARTS)),$(PYTHON) -m benchmarks.tidy.physics $(if $(QUICK),--quick) --out $(TIDY)/physics)
+	$(if $(filter detect,$(PARTS)),$(PYTHON) -m benchmarks.tidy.detect $(if $(QUICK),--quick) --out $(TIDY)/detect)
+	$(if $(and $(filter detect,$(PARTS)),$(wildcard $(REAL_DATA)/tableware)),$(PYTHON) -m benchmarks.tidy.detect_real --data $(REAL_DATA)/tableware --out $(TIDY)/detect_real)
+	$(PYTHON) -m benchmarks.tidy.gather --out $(TIDY)
 
 .PHONY: llm3
 # A hundred reporting seeds a cell, about ten minutes of one core; a stopped run goes on where it was.

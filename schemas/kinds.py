@@ -15,6 +15,9 @@ from schemas.plan import Plan
 from schemas.segments import Segments
 from schemas.sequence import Sequence
 from schemas.tableware_detections import TablewareDetections
+from schemas.tableware_plan import TablewarePlan
+from schemas.tableware_scene import TablewareScene
+from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
 from schemas.trajectory import Trajectory
 
 __all__ = [
@@ -35,5 +38,9 @@ __all__ = [
     "Segments",
     "Sequence",
     "TablewareDetections",
+    "TablewareEvaluation",
+    "TablewarePlan",
+    "TablewareScene",
+    "TablewareTrial",
     "Trajectory",
 ]

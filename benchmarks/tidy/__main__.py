@@ -1,7 +1,7 @@
 """Runs every arm on the same seeded tables; a stopped run goes on where it was.
 
     python -m benchmarks.tidy --out FOLDER [--quick] [--tuning] [--tiers NAME ...] [--worlds NAME ...] [--arms NAME ...]
-                              [--seconds S]
+                              [--scenes N] [--seconds S]
 
 Reporting seeds are 1000 to 1199 and, for fifteen scenes as in the thesis (three a cell), 2000 to 2002; tuning seeds
 (`--tuning`) 0 to 199; `--quick` takes the first ten. Writes runs.jsonl, metrics.json and table.md. `--seconds` stops
@@ -15,7 +15,7 @@ import json
 import time
 from pathlib import Path
 
-from benchmarks.tidy.arms import ARMS, WORLDS, trials
+from benchmarks.tidy.arms import ARMS, WORLDS, applies, trials
 from benchmarks.tidy.records import read_runs
 from benchmarks.tidy.tables import metrics, table
 from stages.tableware.world.scenes import TIERS
@@ -33,12 +33,13 @@ def main() -> None:
     parser.add_argument("--tiers", nargs="+", default=list(TIERS), choices=list(TIERS))
     parser.add_argument("--worlds", nargs="+", default=list(WORLDS), choices=list(WORLDS))
     parser.add_argument("--arms", nargs="+", default=list(ARMS), choices=list(ARMS))
+    parser.add_argument("--scenes", type=int, default=SCENES, help="tables a tier")
     parser.add_argument("--seconds", type=float, help="stop after this time")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     log = options.out / "runs.jsonl"
     first = TUNING if options.tuning else REPORTING
-    seeds = range(first, first + (QUICK if options.quick else SCENES))
+    seeds = range(first, first + (QUICK if options.quick else options.scenes))
     fifteen = () if options.tuning else range(AS_THE_THESIS, AS_THE_THESIS + 3)
     done = {(run.arm, run.case, run.seed) for run in read_runs(log)}
     started = time.monotonic()
@@ -48,13 +49,9 @@ def main() -> None:
         tag = "/thesis15" if seed in fifteen else ""
         rows = []
         for tier in options.tiers:
-            if tag and tier == "tier3":
-                continue
             for world in options.worlds:
                 for arm in options.arms:
-                    if arm == "optimum" and world != "fast/exact":
-                        continue
-                    if (arm, f"{tier}/{world}{tag}", seed) not in done:
+                    if applies(tier, world, arm, tag) and (arm, f"{tier}/{world}{tag}", seed) not in done:
                         rows.extend(trials(tier, world, seed, arm, tag))
         with log.open("a", encoding="utf-8") as stream:
             stream.writelines(run.model_dump_json() + "\n" for run in rows)

@@ -1,4 +1,4 @@
-"""One trial of one arm on one table, as a line of runs.jsonl."""
+"""The trials of one arm on one table, as a line of runs.jsonl."""
 
 from __future__ import annotations
 
@@ -8,22 +8,25 @@ from schemas.base import Model
 
 
 class Run(Model):
-    """What a trial came to. `case`: `<tier>/fast[/exact][/thesis15][/delay<s>]`."""
+    """Means over the draws of what chance decides, on one table. `case`: `<tier>/fast[/exact|/drops][/thesis15]
+    [/delay<s>]`."""
 
     arm: str
     case: str
     seed: int
+    draws: int
     time: float
-    trips: int
-    moved: int
-    pulls: int
-    stacks: int
-    failed: bool
-
-    @property
-    def objects_per_trip(self) -> float:
-        """Items brought to the bin over trips."""
-        return self.moved / max(self.trips, 1)
+    time_first: float
+    """Of the first draw alone: one trial a table, as the thesis has."""
+    objects_per_trip: float
+    trips: float
+    pulls: float
+    stacks: float
+    failed: float
+    """Share of the draws in which something was dropped or left."""
+    failed_first: bool
+    planning_seconds: float = 0.0
+    """CPU time of making the first plan (ours), or the dynamic programme (optimum), one thread."""
 
 
 def read_runs(path: Path) -> list[Run]:

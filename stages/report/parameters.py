@@ -21,6 +21,10 @@ from schemas.kinds import (
     Report,
     Segments,
     Sequence,
+    TablewareDetections,
+    TablewareEvaluation,
+    TablewarePlan,
+    TablewareTrial,
     Trajectory,
 )
 from stages.kit.stage import Optionally, Parameters, Stage
@@ -63,6 +67,10 @@ STAGE = Stage(
         "interactive_scene": Optionally(InteractiveScene),
         "plan": Optionally(Plan),
         "packing": Optionally(Packing),
+        "tableware_detections": Optionally(TablewareDetections),
+        "tableware_plan": Optionally(TablewarePlan),
+        "tableware_trial": Optionally(TablewareTrial),
+        "tableware_evaluation": Optionally(TablewareEvaluation),
         "evaluation": Optionally(Evaluation),
         "baseline_evaluation": Optionally(Evaluation),
     },

@@ -23,6 +23,9 @@ from schemas.panoptic_map import PanopticMap
 from schemas.plan import Plan
 from schemas.segments import Segments
 from schemas.sequence import Sequence
+from schemas.tableware_detections import TablewareDetections
+from schemas.tableware_plan import TablewarePlan
+from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
 from schemas.trajectory import Trajectory
 from stages.kit.rendering.ray_casting import Rendering
 from stages.kit.stage import Context
@@ -41,6 +44,7 @@ from stages.report.placed_models import ModelShelf
 from stages.report.provenance import made_of
 from stages.report.stereo_section import stereo_view
 from stages.report.surfaces import Model, cad_model, map_model, true_model
+from stages.report.tableware_section import tableware_view
 from stages.report.views import Label, View, oblique_view, place_labels, render, top_view
 
 MAXIMUM_BYTES = 15_000_000
@@ -53,7 +57,7 @@ SECTIONS = (
     ("frames", "Frames", "frames"), ("stereo", "Stereo", "stereo"), ("map", "Map", "map_text"),
     ("graph", "Contact graph", "graph"),
     ("cad", "CAD scene", "cad_views"), ("scene", "Interactive scene", "bodies"), ("plan", "Plan", "plan"),
-    ("packing", "Packing", "packing"),
+    ("packing", "Packing", "packing"), ("tableware", "Tableware", "tableware"),
     ("figures", "Figures", "groups"), ("cost", "Time and memory", "made"), ("made", "How it was made", "made"),
 )  # fmt: skip
 
@@ -85,6 +89,10 @@ def run(
     interactive_scene: InteractiveScene | None = None,
     plan: Plan | None = None,
     packing: Packing | None = None,
+    tableware_detections: TablewareDetections | None = None,
+    tableware_plan: TablewarePlan | None = None,
+    tableware_trial: TablewareTrial | None = None,
+    tableware_evaluation: TablewareEvaluation | None = None,
     evaluation: Evaluation | None = None,
     baseline_evaluation: Evaluation | None = None,
     *,
@@ -96,6 +104,9 @@ def run(
         "ground_truth": ground_truth, "sequence": sequence, "trajectory": trajectory, "segments": segments,
         "panoptic_map": panoptic_map, "contact_graph": contact_graph, "cad_scene": cad_scene,
         "cad_library": cad_library, "interactive_scene": interactive_scene, "plan": plan, "packing": packing,
+        "tableware_detections": tableware_detections, "tableware_plan": tableware_plan,
+        "tableware_trial": tableware_trial,
+        "tableware_evaluation": tableware_evaluation,
         "evaluation": evaluation, "baseline_evaluation": baseline_evaluation,
     }  # fmt: skip
     artifacts = {role: artifact for role, artifact in given.items() if artifact is not None}
@@ -124,6 +135,11 @@ def run(
     if packing is not None:
         with context.progress.step("packing"):
             values["packing"] = packing_view(packing, 1100)
+    if any(role.startswith("tableware_") for role in artifacts):
+        with context.progress.step("tableware"):
+            values["tableware"] = tableware_view(
+                tableware_detections, tableware_plan, tableware_trial, tableware_evaluation, 1100
+            )
     if evaluation is not None:
         with context.progress.step("figures"):
             _add_figures(values, evaluation, baseline_evaluation)
@@ -138,7 +154,7 @@ def run(
 def _empty_page() -> dict[str, Any]:
     empty = (
         "frames stereo legend map_views graph cad_views replacements bodies fixed_bodies groups notes plots tables "
-        "metrics tiles plan packing baseline has_intervals plan_ok checked objects_changed objects_kept trees"
+        "metrics tiles plan packing tableware baseline has_intervals plan_ok checked objects_changed objects_kept trees"
     )
     texts = "frames_text map_text graph_text graph_errors cad_text scene_text figures_text"
     values: dict[str, Any] = dict.fromkeys(empty.split(), None)
@@ -162,6 +178,8 @@ def _label(evaluation: Evaluation | None, segments: Segments | None, panoptic_ma
 def _title(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts: dict[str, Artifact]) -> str:
     if set(artifacts) == {"packing"}:
         return "Boxes and a basket"
+    if artifacts and all(role.startswith("tableware_") for role in artifacts):
+        return "A table to clear"
     if ground_truth is not None and ground_truth.truth.source == "generated":
         return "A generated room, reconstructed"
     return "A scanned room, reconstructed" if sequence is not None else "A reconstructed room"
@@ -176,6 +194,9 @@ def _lead(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts
     names = {
         "panoptic_map": "a labelled map", "contact_graph": "a contact graph", "cad_scene": "a scene of CAD models",
         "interactive_scene": "a scene that simulators load", "packing": "a packing of boxes",
+        "tableware_detections": "a table that was looked at", "tableware_plan": "a plan to clear a table",
+        "tableware_trial": "a table being cleared",
+        "tableware_evaluation": "a comparison of policies",
     }  # fmt: skip
     if isinstance(plan := artifacts.get("plan"), Plan):
         status = plan.plan.status

@@ -1,15 +1,21 @@
 """Our policy: pulls, stackings, multi-object and single grasps chosen together for the whole table.
 
-The exact optimum (optimum.py) of expected time, slips counted in, where the table is small enough, which the thesis's
-tables are; larger ones are cleared in portions, each by its own optimum. With `slack`, of the plans nearly as fast as
-the fastest the one with the fewest trips is taken, which loses least when the bin is farther than thought. The plan
-is kept while what is seen is what it foresaw, and made anew otherwise.
+The exact optimum (optimum.py) of expected time and risk, slips counted in, where the table is small enough, which the
+thesis's tables are; larger ones are cleared in portions, each by its own optimum. Of the plans nearly as fast as the
+fastest (`slack`) the one with the fewest trips is taken, which loses least when the bin is farther than thought; where
+nothing is left to chance, only of those no slower than Pull and Stack would be. The plan says what is best for whatever
+may be left, so that after a slip nothing is planned anew unless something moved.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from stages.tableware.planning.actions import (
     Action,
+    Grasp,
+    PullGrasp,
+    StackGrasp,
     after_pull,
     after_stack,
     grasp,
@@ -18,30 +24,87 @@ from stages.tableware.planning.actions import (
     stack,
     taken,
 )
-from stages.tableware.planning.optimum import MOST_ITEMS, Optimum, Trip, seconds
-from stages.tableware.planning.policies import liftable
+from stages.tableware.planning.optimum import MOST_ITEMS, Optimum, Solution, Trip
+from stages.tableware.planning.policies import Policy, PullPolicy, StackPolicy, liftable
 from stages.tableware.planning.rules import Rules, can_grasp_two
 from stages.tableware.planning.time_model import Chances, TimeModel
 from stages.tableware.world.items import Table
 
-SLACK = 0.01
-"""How much slower than the fastest, as a share of its time, a plan with fewer trips may be."""
+SLACK, SLACK_WHEN_SURE = 0.01, 0.029
+"""How much slower than the fastest, as a share of its cost, a plan with fewer trips may be: where something may slip,
+and where nothing does."""
 CHARGES = (1.0, 2.0, 4.0, 8.0)
 """Seconds charged for a trip beyond what it takes, to find plans with fewer of them."""
+WORTH = 60.0
+"""Seconds that we give for not losing an item (ours): six trips."""
 PORTION = 14
 
 
-def plan(table: Table, rules: Rules, model: TimeModel, chances: Chances, slack: float = SLACK) -> list[Trip]:
-    """Return the trips that clear a table, or the first portion of a large one, in order."""
-    optimum = Optimum(_portion(table), rules, model, chances)
-    plans = [optimum.trips()]
-    limit = seconds(plans[0]) * (1.0 + slack)
-    for charge in CHARGES if slack > 0.0 else ():
-        other = optimum.trips(charge)
-        if seconds(other) > limit:
+@dataclass(frozen=True)
+class Plan:
+    """What is best for whatever may be left of a table, or of the first portion of a large one."""
+
+    optimum: Optimum
+    solution: Solution
+
+    @property
+    def trips(self) -> list[Trip]:
+        """The trips in order, when nothing slips."""
+        return self.optimum.trips(self.solution)
+
+    @property
+    def seconds(self) -> float:
+        """Expected time [s]."""
+        return float(self.solution.seconds[self.optimum.everything])
+
+    @property
+    def expected_trips(self) -> float:
+        """Expected number of trips."""
+        return float(self.solution.trips[self.optimum.everything])
+
+    @property
+    def lost(self) -> float:
+        """Expected number of actions that let something fall off the table."""
+        return float(self.solution.lost[self.optimum.everything])
+
+
+def plan(
+    table: Table, rules: Rules, model: TimeModel, chances: Chances, slack: float | None = None, worth: float = WORTH
+) -> Plan:
+    """Return the plan for a table, or the first portion of one with more than 16 items; `slack`: None takes ours."""
+    portion = _portion(table)
+    optimum = Optimum(portion, rules, model, chances, worth)
+    plans = [Plan(optimum, optimum.solve())]
+    least = _cost(plans[0], worth)
+    limit = least * (1.0 + (slack if slack is not None else SLACK_WHEN_SURE if chances.sure else SLACK))
+    if slack is None and chances.sure:
+        limit = max(least, min(limit, *(_alone(policy, portion, model) for policy in (PullPolicy(), StackPolicy()))))
+    if chances.sure and limit > least:
+        return Plan(optimum, optimum.fewest_trips(plans[0].solution, limit + 1e-9))
+    for charge in CHARGES if limit > least else ():
+        other = Plan(optimum, optimum.solve(charge))
+        if _cost(other, worth) > limit:
             break
         plans.append(other)
-    return min(plans, key=lambda trips: (len(trips), seconds(trips)))
+    return min(plans, key=lambda one: (round(one.expected_trips, 6), _cost(one, worth)))
+
+
+def _alone(policy: Policy, table: Table, model: TimeModel) -> float:
+    """Return the seconds that a policy of the thesis would take where nothing goes wrong."""
+    time = 0.0
+    while table.items:
+        action = policy.decide(table)
+        if isinstance(action, PullGrasp):
+            time, table, action = time + model.pull, after_pull(table, action.u_P), action.u_G
+        elif isinstance(action, StackGrasp):
+            time, table, action = time + model.stack, after_stack(table, action.u_S), action.u_G
+        assert isinstance(action, Grasp)  # these policies neither pull nor stack without grasping
+        time, table = time + model.whole_trip, table.without(taken(table, action))
+    return time
+
+
+def _cost(found: Plan, worth: float) -> float:
+    return found.seconds + worth * found.lost
 
 
 def _portion(table: Table) -> Table:
@@ -57,50 +120,68 @@ def _portion(table: Table) -> Table:
     for pile in near:
         if len(chosen) + len(pile) <= PORTION:
             chosen.update(item.name for item in pile)
-    return Table(tuple(item for item in table.items if item.name in chosen))
+    return Table(tuple(item for item in table.items if item.name in chosen), table.obstacles)
 
 
 class JointPolicy:
-    """Keeps a plan and takes its actions one at a time."""
+    """Keeps a plan and takes its actions one at a time. `found` is a plan that was made before."""
 
-    def __init__(self, rules: Rules, model: TimeModel, chances: Chances, slack: float = SLACK) -> None:
-        self._rules, self._model, self._chances, self._slack = rules, model, chances, slack
-        self._trips: list[Trip] = []
+    def __init__(
+        self,
+        rules: Rules,
+        model: TimeModel,
+        chances: Chances,
+        slack: float | None = None,
+        worth: float = WORTH,
+        found: Plan | None = None,
+    ) -> None:
+        self._make = lambda table: plan(table, rules, model, chances, slack, worth)
+        self._rules = rules
+        self._first, self._plan = found, found
+        self._trip: Trip | None = None
         self._expected: frozenset[tuple[str, str | None]] | None = None
 
     def decide(self, table: Table) -> Action:
         """Return the next action of the plan, or the first of a new one."""
-        if not self._trips or self._expected != _state(table):
-            self._trips = plan(table, self._rules, self._model, self._chances, self._slack)
-        action = self._next(table)
+        if self._expected != _state(table):
+            self._trip = None
+        if self._trip is None:
+            self._trip = self._next_trip(table)
+        action = self._next(table, self._trip)
         if action is None:  # two things came to stand too far apart for their grasp
-            self._trips = plan(table, self._rules, self._model, self._chances, self._slack)
-            action = self._next(table)
+            self._plan = self._make(table)
+            self._trip = self._plan.trips[0]
+            action = self._next(table, self._trip)
         if action is None:
+            self._trip = None
             return grasp(table, liftable(table, table.stacks[0], self._rules))
         return action
 
-    def _next(self, table: Table) -> Action | None:
-        trip = self._trips[0]
+    def _next_trip(self, table: Table) -> Trip:
+        for known in (self._plan, self._first):
+            left = None if known is None else known.optimum.left_of(table)
+            if known is not None and left is not None:
+                return known.optimum.trips(known.solution, left)[0]
+        self._plan = self._make(table)
+        self._first = self._first or self._plan
+        return self._plan.trips[0]
+
+    def _next(self, table: Table, trip: Trip) -> Action | None:
         action: Action
         if trip.pull is not None:
             action = pull(table, *trip.pull, self._rules)
-            self._keep(Trip(None, trip.stacks, trip.bases, trip.taken, trip.seconds))
+            self._trip = Trip(None, trip.stacks, trip.bases, trip.taken, trip.seconds)
             self._expected = _state(after_pull(table, action))
         elif trip.stacks:
             action = stack(table, *trip.stacks[0])
-            self._keep(Trip(None, trip.stacks[1:], trip.bases, trip.taken, trip.seconds))
+            self._trip = Trip(None, trip.stacks[1:], trip.bases, trip.taken, trip.seconds)
             self._expected = _state(after_stack(table, action))
         else:
             if len(trip.bases) == 2 and not can_grasp_two(table, trip.bases[0], trip.bases[1], self._rules):
                 return None
             action = grasp_two(table, *trip.bases) if len(trip.bases) == 2 else grasp(table, trip.bases[0])
-            self._trips = self._trips[1:]
-            self._expected = _state(table.without(taken(table, action)))
+            self._trip = None
         return action
-
-    def _keep(self, rest: Trip) -> None:
-        self._trips = [rest, *self._trips[1:]]
 
 
 def _state(table: Table) -> frozenset[tuple[str, str | None]]:

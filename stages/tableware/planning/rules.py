@@ -7,12 +7,13 @@ named as ours where it stands.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
-from itertools import product
 from math import atan2, cos, hypot, pi, sin
 
-from stages.tableware.world.footprints import Footprint, footprint, gap, swept_disc
+import numpy as np
+
+from stages.tableware.world.footprints import Footprint, footprint, gap, overlapped, swept_disc
 from stages.tableware.world.items import MEASURES, Item, Kind, Measures, Table, rise
 
 LETTERS: dict[Kind, str] = {"plate": "p", "bowl": "b", "cup": "c", "fork": "u", "spoon": "u"}
@@ -45,6 +46,17 @@ class Rules:
     """Whether a dish that carries others may be pulled."""
     both_piles: bool = True
     """Whether more is stacked onto a pair of dishes that stand side by side, before one grasp takes all (ours)."""
+    clamped_stacks: bool = False
+    """Whether onto a pair of dishes that stand side by side only dishes of their own kind are stacked, which the jaws
+    then clamp with them; what stands free in a dish falls out when two are lifted side by side (ours)."""
+
+    def __post_init__(self) -> None:
+        values = tuple(getattr(self, one.name) for one in fields(self))
+        object.__setattr__(self, "_hash", hash(values))
+
+    def __hash__(self) -> int:
+        """Taken once: rules are part of the key of everything that is remembered below."""
+        return self._hash  # type: ignore[attr-defined, no-any-return]
 
 
 def letters(items: Iterable[Item]) -> str:
@@ -123,15 +135,41 @@ def split_over_two(first: str, second: str, parts: tuple[str, ...], rules: Rules
     Utensils lie side by side alone: their piles get nothing more."""
     if parts and not rules.both_piles:
         return None
-    for sides in product((False, True), repeat=len(parts)):
-        ones = tuple(part for part, side in zip(parts, sides, strict=True) if not side)
-        others = tuple(part for part, side in zip(parts, sides, strict=True) if side)
-        if can_pile(first, ones, rules) and can_pile(second, others, rules):
-            low = first + "".join(sorted(ones, key=pile_order))
-            high = second + "".join(sorted(others, key=pile_order))
-            if can_hold_two(low, high, rules):
-                return sides
+    kinds = tuple(sorted(set(parts), key=pile_order))
+    numbers = _share_out(first, second, kinds, tuple(parts.count(kind) for kind in kinds), rules)
+    if numbers is None:
+        return None
+    left = dict(zip(kinds, numbers, strict=True))
+    sides = []
+    for part in parts:
+        sides.append(left[part] > 0)
+        left[part] -= 1
+    return tuple(sides)
+
+
+def _share_out(
+    low: str, high: str, kinds: tuple[str, ...], counts: tuple[int, ...], rules: Rules
+) -> tuple[int, ...] | None:
+    """Return how many of each kind of part, in the order of `pile_order`, go onto `high`, the others onto `low`."""
+    if not kinds:
+        return () if can_hold_two(low, high, rules) else None
+    lows, highs = (_grown(pile, kinds[0], counts[0], rules) for pile in (low, high))
+    if rules.clamped_stacks:
+        lows, highs = (piles if len(set(piles[-1])) == 1 else piles[:1] for piles in (lows, highs))
+    for number in range(counts[0] + 1):
+        if counts[0] - number < len(lows) and number < len(highs):
+            rest = _share_out(lows[counts[0] - number], highs[number], kinds[1:], counts[1:], rules)
+            if rest is not None:
+                return (number, *rest)
     return None
+
+
+def _grown(pile: str, part: str, count: int, rules: Rules) -> list[str]:
+    """Return the pile with 0, 1, ... `count` parts on it, as far as that goes."""
+    piles = [pile]
+    while len(piles) <= count and can_stack(part, piles[-1], rules):
+        piles.append(piles[-1] + part)
+    return piles
 
 
 def within_jaws(first: Item, second: Item, rules: Rules) -> bool:
@@ -196,14 +234,19 @@ def sweep(item: Item, target: Item, rules: Rules) -> tuple[Footprint, ...]:
 
 def in_the_way(covers: Iterable[Footprint], table: Table, apart_from: set[str]) -> tuple[Item, ...]:
     """Return the items that any of `covers` overlaps, less those of the piles that `apart_from` stand in."""
-    places = tuple(covers)
-    return tuple(
-        item
-        for stack in table.stacks
-        if not any(other.name in apart_from for other in stack)
-        for item in stack
-        if any(gap(place, footprint(item)) < 0.0 for place in places)
-    )
+    items = [item for stack in table.stacks if not any(other.name in apart_from for other in stack) for item in stack]
+    if not items:
+        return ()
+    hits: np.ndarray = overlapped(tuple(covers), [footprint(item) for item in items])
+    return tuple(items[row] for row in np.flatnonzero(hits.sum(axis=0)))
+
+
+def obstructed(covers: Iterable[Footprint], table: Table) -> bool:
+    """Return whether any of `covers` touches something that is not understood."""
+    if not table.obstacles:
+        return False
+    circles = [Footprint((x, y), (x, y), size) for x, y, size in table.obstacles]
+    return bool(overlapped(tuple(covers), circles).any())
 
 
 def can_grasp_two(table: Table, first: str, second: str, rules: Rules) -> bool:
@@ -212,7 +255,10 @@ def can_grasp_two(table: Table, first: str, second: str, rules: Rules) -> bool:
     if first == second or one.on is not None or other.on is not None or not within_jaws(one, other, rules):
         return False
     piles = letters((one, *table.load(first))), letters((other, *table.load(second)))
-    return can_hold_two(*piles, rules) and not in_the_way((jaws(one, other, rules),), table, {first, second})
+    covers = (jaws(one, other, rules),)
+    if not can_hold_two(*piles, rules) or obstructed(covers, table):
+        return False
+    return not in_the_way(covers, table, {first, second})
 
 
 def can_pull(table: Table, item: str, target: str, rules: Rules) -> bool:
@@ -226,8 +272,10 @@ def can_pull(table: Table, item: str, target: str, rules: Rules) -> bool:
     if not can_hold_two(letters((one, *load)), letters((other, *table.load(target))), rules):
         return False
     x, y, yaw = pull_end(one, other, rules)
-    inside = footprint(one, x, y, yaw).on_table
-    return inside and not in_the_way(sweep(one, other, rules), table, {item, target})
+    if not footprint(one, x, y, yaw).on_table:
+        return False
+    covers = sweep(one, other, rules)
+    return not obstructed(covers, table) and not in_the_way(covers, table, {item, target})
 
 
 def can_put(table: Table, item: str, onto: str, rules: Rules) -> bool:

@@ -2,13 +2,19 @@
 
 What goes wrong, and nothing else does: a pull misses by the measured error, and contact stops a dish that would come to
 stand in another; a multi-object grasp whose second pile is out of reach then, or slips, leaves it where it is; an
-action may drop something off the table for good, by chances that are 0 unless said. Seeing is perfect here.
+action may drop something off the table for good, by chances that are 0 unless said. Whatever chance decides follows
+from the seed, from what it happens to and from how often that was tried, not from the order of things: all policies
+meet the same luck. Who sees less than everything is told by `see` (the truth unless said).
 """
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot
+from typing import Literal, Protocol
+from zlib import crc32
 
 import numpy as np
 
@@ -24,12 +30,12 @@ from stages.tableware.planning.actions import (
     taken,
 )
 from stages.tableware.planning.policies import Policy
-from stages.tableware.planning.rules import Rules, can_grasp_two, letters
+from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold, letters
 from stages.tableware.planning.time_model import Chances, TimeModel, placement_error
 from stages.tableware.world.footprints import footprint, gap
 from stages.tableware.world.items import Table
 
-MOST_ACTIONS = 400
+MOST_ACTIONS, MOST_IDLE = 400, 8
 
 
 @dataclass
@@ -54,19 +60,55 @@ class Trial:
         """Whether not everything came to the bin."""
         return self.dropped + self.left > 0
 
+    @property
+    def failure(self) -> Literal["", "policy", "perception"]:
+        """What a failed trial is counted as: something was dropped, or only left, which nobody saw (section 7.1)."""
+        return "policy" if self.dropped else "perception" if self.left else ""
+
+
+class World(Protocol):
+    """A table that actions change, simulated fast or with physics."""
+
+    table: Table
+    """The truth as it is now."""
+    trial: Trial
+
+    def do(self, action: Action, seen: Table | None = None) -> None:
+        """Carry out an action that was decided on `seen` (None: on the truth), a composite one without looking in
+        between."""
+        ...
+
 
 class FastWorld:
     """A table that actions change."""
 
-    def __init__(self, table: Table, model: TimeModel, chances: Chances, seed: int) -> None:
+    def __init__(self, table: Table, model: TimeModel, chances: Chances, seed: int | tuple[int, ...]) -> None:
         self.table = table
         self.trial = Trial(left=len(table.items))
         self._model, self._chances = model, chances
-        self._random = np.random.default_rng([seed, 72])
+        self._seed = (seed,) if isinstance(seed, int) else seed
+        self._tried: Counter[str] = Counter()
         self._rules = Rules()
+        self.fallen: list[str] = []
+        """Everything that fell off the table, in order."""
+        self.troubles: list[str] = []
+        """What did not go as planned in the last action."""
+        self.vain: tuple[str, ...] = ()
+        """What the hand closed on in vain in the last action."""
 
-    def do(self, action: Action) -> None:
-        """Carry out an action, a composite one without looking in between."""
+    def _luck(self, what: str, name: str) -> np.random.Generator:
+        """Return the generator of one thing that happens to an item, another at each attempt."""
+        key = f"{what} {name}"
+        self._tried[key] += 1
+        return np.random.default_rng([*self._seed, 72, crc32(key.encode()), self._tried[key]])
+
+    def _goes_wrong(self, chance: float, what: str, name: str) -> bool:
+        return chance > 0.0 and self._luck(what, name).random() < chance
+
+    def do(self, action: Action, seen: Table | None = None) -> None:
+        """Carry out an action, a composite one without looking in between. Items go by their names, whatever was seen:
+        what is not there is reached for in vain, and a pile that is more than the jaws hold is dropped."""
+        self.troubles, self.vain = [], ()
         if isinstance(action, PullGrasp):
             self._pull(action.u_P)
             self._grasp(action.u_G)
@@ -84,14 +126,18 @@ class FastWorld:
     def _pull(self, action: Pull) -> None:
         self.trial.seconds += self._model.pull
         self.trial.pulls += 1
-        if self._random.random() < self._chances.drop_pull:
+        if not self._there(action.item, action.target):
+            return
+        loaded = bool(self.table.carried[action.item])
+        chance = self._chances.drop_loaded_pull if loaded else self._chances.drop_pull
+        if self._goes_wrong(chance, "pull", action.item):
             self._drop(action.item)
             return
         item, target = self.table.by_name[action.item], self.table.by_name[action.target]
         error = (0.0, 0.0)
         if self._chances.noise:
             length = hypot(action.p_E[0] - action.p_S[0], action.p_E[1] - action.p_S[1])
-            error = placement_error(item.kind, length, self._random)
+            error = placement_error(item.kind, length, self._luck("miss", item.name))
         moved = after_pull(self.table, action, error)
         inside = -gap(footprint(moved.by_name[item.name]), footprint(target))
         if inside > 0.0:  # contact stops it on its way
@@ -104,7 +150,9 @@ class FastWorld:
     def _stack(self, action: Stack) -> None:
         self.trial.seconds += self._model.stack
         self.trial.stacks += 1
-        if self._random.random() < self._chances.drop_stack:
+        if not self._there(action.u_G.items[0], action.onto):
+            return
+        if self._goes_wrong(self._chances.drop_stack, "stack", action.u_G.items[0]):
             self._drop(action.u_G.items[0])
             return
         self.table = after_stack(self.table, action)
@@ -113,30 +161,90 @@ class FastWorld:
         self.trial.seconds += self._model.whole_trip
         self.trial.trips += 1
         here = tuple(name for name in action.items if name in self.table.by_name)
+        self._there(*action.items)
         if len(here) == 2:
             first, second = (self.table.by_name[name] for name in here)
-            holds = self._chances.holds(letters((first,)), letters((second,)))
-            if not can_grasp_two(self.table, *here, self._rules) or self._random.random() >= holds:
+            slips = 1.0 - self._chances.holds(letters((first,)), letters((second,)))
+            if not can_grasp_two(self.table, *here, self._rules) or self._goes_wrong(slips, "slip", here[1]):
+                self.troubles.append(f"{here[1]} stayed behind")
                 here = here[:1]
-        elif here and self._random.random() < self._chances.drop_single:
+            elif self._goes_wrong(self._chances.drop_two, "lift", here[1]):
+                self._drop(here[1])
+                here = here[:1]
+        elif here and self._goes_wrong(self._chances.drop_single, "lift", here[0]):
             self._drop(here[0])
             return
         for name in here:
+            if not can_hold(letters((self.table.by_name[name], *self.table.load(name))), self._rules):
+                self._drop(name)
+                continue
             names = taken(self.table, Grasp((name,), action.p_G, action.theta_G))
             self.trial.moved += len(names)
             self.table = self.table.without(names)
 
+    def _there(self, *names: str) -> bool:
+        missing = tuple(name for name in names if name not in self.table.by_name)
+        self.vain += missing
+        if missing:
+            self.troubles.append(f"reached in vain for {' and '.join(missing)}")
+        return not missing
+
     def _drop(self, name: str) -> None:
         names = {name, *(item.name for item in self.table.load(name))}
+        self.fallen.extend(sorted(names))
+        self.troubles.append(f"{' and '.join(sorted(names))} fell off the table")
         self.trial.dropped += len(names)
         self.table = self.table.without(names)
 
 
-def run_trial(table: Table, policy: Policy, model: TimeModel, chances: Chances, seed: int) -> Trial:
-    """Return what a policy came to on a table; it is stopped after 400 actions and what is left counts as left."""
-    world = FastWorld(table, model, chances, seed)
+@dataclass(frozen=True)
+class Done:
+    """An action that was carried out: the truth before and after it, seconds since the beginning, what fell off the
+    table, and what did not go as planned."""
+
+    action: Action
+    before: Table
+    after: Table
+    start: float
+    end: float
+    dropped: tuple[str, ...] = ()
+    troubles: tuple[str, ...] = ()
+
+
+def truth(world: World) -> Table:
+    """See everything as it is."""
+    return world.table
+
+
+def do_in(world: World, action: Action, seen: Table) -> Done:
+    """Carry out an action that was decided on `seen`, and say what came of it."""
+    before, start = world.table, world.trial.seconds
+    fallen = set(getattr(world, "fallen", ()))
+    world.do(action, seen)
+    after, end = world.table, world.trial.seconds
+    dropped = tuple(name for name in getattr(world, "fallen", ()) if name not in fallen)
+    return Done(action, before, after, start, end, dropped, tuple(getattr(world, "troubles", ())))
+
+
+def run_in(
+    world: World,
+    policy: Policy,
+    see: Callable[[World], Table] = truth,
+    told: Callable[[Done], None] = lambda done: None,
+) -> Trial:
+    """Let a policy clear the table of any world, one action an image; `told` hears of each action. It ends when nothing
+    is seen, when eight actions in a row have changed nothing, and after 400. What is left counts as left."""
+    idle = 0
     for _ in range(MOST_ACTIONS):
-        if not world.table.items:
+        seen = see(world)
+        if not seen.items or idle == MOST_IDLE:
             break
-        world.do(policy.decide(world.table))
+        done = do_in(world, policy.decide(seen), seen)
+        idle = idle + 1 if done.after.items == done.before.items else 0
+        told(done)
     return world.trial
+
+
+def run_trial(table: Table, policy: Policy, model: TimeModel, chances: Chances, seed: int | tuple[int, ...]) -> Trial:
+    """Return what a policy came to on a table in the fast simulator, seeing everything."""
+    return run_in(FastWorld(table, model, chances, seed), policy)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, hypot, sin
+
+import numpy as np
+from numba import njit
 
 from stages.tableware.world.items import TABLE_SIDES, Item
 
@@ -45,6 +49,51 @@ def swept_disc(item: Item, x: float, y: float) -> Footprint:
 def gap(first: Footprint, second: Footprint) -> float:
     """Return the distance [m] between two footprints, negative when they overlap."""
     return _segment_distance(first.start, first.end, second.start, second.end) - first.radius - second.radius
+
+
+def overlapped(places: Sequence[Footprint], others: Sequence[Footprint]) -> np.ndarray:
+    """Return for places (P,) and others (N,) who overlaps whom: `gap` below zero, (P, N) bool."""
+    return _overlapped(_as_rows(places), _as_rows(others))
+
+
+def _as_rows(prints: Sequence[Footprint]) -> np.ndarray:
+    return np.array([(*one.start, *one.end, one.radius) for one in prints], dtype=np.float64).reshape(-1, 5)
+
+
+@njit(cache=True)
+def _overlapped(places, others):  # type: ignore[no-untyped-def]
+    result = np.zeros((len(places), len(others)), np.bool_)
+    for i in range(len(places)):
+        for k in range(len(others)):
+            reach = places[i, 4] + others[k, 4]
+            result[i, k] = _square_distance(places[i], others[k]) < reach * reach
+    return result
+
+
+@njit(cache=True)
+def _square_distance(one, other):  # type: ignore[no-untyped-def]
+    """Square of the distance of two segments (x, y, x, y, ...)."""
+    ax, ay, bx, by = one[0], one[1], one[2], one[3]
+    cx, cy, dx, dy = other[0], other[1], other[2], other[3]
+    c_side, d_side = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax), (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
+    a_side, b_side = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx), (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
+    if c_side * d_side < 0.0 and a_side * b_side < 0.0:
+        return 0.0
+    return min(
+        _square_to_segment(ax, ay, cx, cy, dx, dy), _square_to_segment(bx, by, cx, cy, dx, dy),
+        _square_to_segment(cx, cy, ax, ay, bx, by), _square_to_segment(dx, dy, ax, ay, bx, by),
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def _square_to_segment(px, py, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+    dx, dy = bx - ax, by - ay
+    square = dx * dx + dy * dy
+    along = 0.0
+    if square > 0.0:
+        along = min(1.0, max(0.0, ((px - ax) * dx + (py - ay) * dy) / square))
+    x, y = px - ax - along * dx, py - ay - along * dy
+    return x * x + y * y
 
 
 def _segment_distance(a: POINT, b: POINT, c: POINT, d: POINT) -> float:

@@ -130,9 +130,11 @@ def radius(item: Item) -> float:
 
 @dataclass(frozen=True)
 class Table:
-    """What is on the table. Items are told apart by name."""
+    """What is on the table. Items are told apart by name. `obstacles`: circles (x, y, radius) [m] of what is there, is
+    not understood, and must not be touched."""
 
     items: tuple[Item, ...]
+    obstacles: tuple[tuple[float, float, float], ...] = ()
 
     @cached_property
     def by_name(self) -> dict[str, Item]:
@@ -173,7 +175,7 @@ class Table:
         for item in self.items:
             if item.on in names and item.name not in names:
                 raise ValueError(f"{item.name!r} stands on {item.on!r}, which would be taken away")
-        return Table(tuple(item for item in self.items if item.name not in names))
+        return Table(tuple(item for item in self.items if item.name not in names), self.obstacles)
 
     def moved(self, name: str, x: float, y: float, on: str | None = None, yaw: float | None = None) -> Table:
         """Return the table after an item and its load went to (x, y) [m] on the table or onto `on`; loads keep their
@@ -192,7 +194,7 @@ class Table:
             if other.name == name:
                 other = replace(other, on=on, yaw=other.yaw if yaw is None else yaw)
             items.append(other)
-        return Table(tuple(items))
+        return Table(tuple(items), self.obstacles)
 
 
 def stand_height(table: Table, item: Item, on: str) -> float:

@@ -24,7 +24,7 @@ from stages.tableware.planning.actions import (
     taken,
 )
 from stages.tableware.planning.joint import JointPolicy
-from stages.tableware.planning.optimum import Optimum, clear, seconds, slip_cost
+from stages.tableware.planning.optimum import Optimum, clear, seconds
 from stages.tableware.planning.policies import PullPolicy, RandomOne, RandomPile, StackPolicy
 from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold, can_pull, can_put, can_stack, letters
 from stages.tableware.planning.time_model import (
@@ -39,6 +39,7 @@ from stages.tableware.planning.time_model import (
     placement_error,
     trips_of,
 )
+from stages.tableware.planning.trip_options import slip_cost
 from stages.tableware.simulation.fast import FastWorld, run_trial
 from stages.tableware.world.footprints import Footprint, footprint, gap
 from stages.tableware.world.items import MEASURES, Item, Table, make_item, rise
@@ -237,7 +238,7 @@ def test_the_plan_takes_as_long_as_it_says_when_nothing_slips(tier: str) -> None
 
 def test_a_charge_on_trips_buys_fewer_of_them() -> None:
     optimum = Optimum(make_table("tier1", 2), Rules(), MODEL, EXACT)
-    free, charged = optimum.trips(), optimum.trips(30.0)
+    free, charged = optimum.trips(), optimum.trips(optimum.solve(30.0))
     assert len(charged) < len(free) and seconds(charged) > seconds(free)
     assert len(charged) == 2  # four bowls and four cups are two piles twice, and utensils lie in bowls
 

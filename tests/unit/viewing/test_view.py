@@ -24,6 +24,7 @@ from stages.kit.viewing.library_view import row_places
 from stages.kit.viewing.segments_view import segment_images
 from stages.kit.viewing.view import VIEWERS, view_artifact
 from tests.unit.viewing import artifacts
+from tests.unit.viewing.tableware_artifacts import make_tableware
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +40,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     artifacts.make_interactive_scene(folder, library)
     artifacts.make_plan(folder)
     artifacts.make_packing(folder)
+    make_tableware(folder)
     artifacts.make_ground_truth(folder, library)
     artifacts.make_evaluation(folder)
     artifacts.make_report(folder)
@@ -81,6 +83,11 @@ EXPECTED = {
         "/world/robot/panda_hand",
         "/world/layout",
     },
+    "tableware_detections": {"/seen", "/world/items/1_cup", "/world/items/2_unknown", "/world/overlay"},
+    "tableware_scene": {"/world/items/cup_1", "/world/table", "/world/camera/color"},
+    "tableware_plan": {"/plan", "/world/strip", "/world/stackings/1", "/world/table"},
+    "tableware_trial": {"/trial", "/world/items/cup_2", "/world/keyframes"},
+    "tableware_evaluation": {"/policies"},
     "ground_truth": {"/world/room/fridge_4", "/world/boxes", "/world/visible", "/world/camera/labels"},
     "cad_library": {
         "/world/library/table/table_00/body",
@@ -185,6 +192,12 @@ def test_boxes_start_on_the_table_and_end_in_the_basket(recordings: dict) -> Non
     assert start == pytest.approx((0.39, -0.4, 0.005 + 0.035)) and packed == pytest.approx((0.7, 0.0, 0.007 + 0.035))
     (basket,) = _column(recordings["packing"]["/world/basket"], "centers")[0]
     assert basket == pytest.approx((0.65, 0.0, 0.002))
+
+
+def test_what_was_binned_leaves_the_table(recordings: dict) -> None:
+    chunks = recordings["tableware_trial"]["/world/items/cup_1"]
+    places = [row[0] if isinstance(row[0], list) else row for row in _column(chunks, "Transform3D:translation")]
+    assert places[0] == pytest.approx([0.1, 0.0, 0.0]) and places[-1][0] > 0.39
 
 
 def test_map_is_coloured_by_instance_and_by_itself(recordings: dict) -> None:

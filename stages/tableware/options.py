@@ -1,0 +1,28 @@
+"""Options that the commands of tableware share. Cheap to import."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from stages.kit.stage import Parameters
+
+TierName = Literal["tier0_cups", "tier0_bowls", "tier0_utensils", "tier1", "tier2", "tier3"]
+PolicyName = Literal["random", "random_piles", "pull", "stack", "ours", "ours_without_loaded_pulls", "ours_careful"]
+ChancesName = Literal["exact", "thesis", "thesis_failures"]
+
+
+class ActionTimes(Parameters):
+    """The time model, and what goes wrong."""
+
+    times_of: TierName = Field("tier1", description="Tier of the thesis whose fitted times of actions are taken")
+    trip_seconds: float | None = Field(None, gt=0.0, le=600.0, description="Seconds of a trip, instead of the fit's")
+    stack_seconds: float | None = Field(None, ge=0.0, le=600.0, description="Seconds of a stacking, likewise")
+    pull_seconds: float | None = Field(None, ge=0.0, le=600.0, description="Seconds of a pull, likewise")
+    delay: float = Field(0.0, ge=0.0, le=60.0, description="Seconds that a farther bin adds to each trip, each way")
+    chances: ChancesName = Field(
+        "thesis",
+        description="What goes wrong: nothing, pulls that miss and second piles that slip as the thesis measured, or "
+        "drops besides, as often as its trials failed",
+    )

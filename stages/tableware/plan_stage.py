@@ -1,0 +1,166 @@
+"""The step `tableware plan`: from what is seen of a table to actions, what they should take, and what was refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from PIL import Image
+
+from schemas.errors import BadInput
+from schemas.tableware_detections import TablewareDetections
+from schemas.tableware_plan import TablewarePlan, TablewarePlanFile, TablewareStep
+from schemas.tableware_scene import TablewareScene
+from stages.kit.stage import Context
+from stages.tableware.parameters import PlanParameters
+from stages.tableware.planning.choice import as_times, chances_of, make_policy, rules_of, time_model
+from stages.tableware.planning.reasons import impossible_pairs
+from stages.tableware.planning.records import as_record
+from stages.tableware.planning.refusals import Accepted, accept, statement
+from stages.tableware.planning.rules import Rules
+from stages.tableware.planning.time_model import EXACT, Chances, TimeModel
+from stages.tableware.scene_files import read_image
+from stages.tableware.sight import look, understood
+from stages.tableware.simulation.fast import Done, FastWorld, Trial, run_in, run_trial
+from stages.tableware.table_pictures import Panel, draw_strip, words_of
+from stages.tableware.vision.detections_file import from_file
+from stages.tableware.vision.overlay import draw_sight
+from stages.tableware.world.items import Table
+from stages.tableware.world.records import as_records, as_table
+
+
+def run(
+    detections: TablewareDetections | None,
+    scene: TablewareScene | None,
+    *,
+    parameters: PlanParameters,
+    context: Context,
+) -> TablewarePlan:
+    """Plan from what was detected, from a scene's image, or from its ground truth."""
+    model, chances = time_model(parameters), chances_of(parameters.chances)
+    with context.progress.step("see"):
+        accepted, notes = _accepted(detections, scene, parameters, context)
+    table = accepted.table
+    with context.progress.step("plan"):
+        done: list[Done] = []
+        policy = make_policy(parameters.policy, model, chances, context.seed)
+        nominal = run_in(FastWorld(table, model, EXACT, context.seed), policy, told=done.append)
+        expected = _expected(table, model, chances, parameters, context.seed)
+    file = TablewarePlanFile(
+        policy=parameters.policy,
+        source="detections" if detections is not None else parameters.source,
+        times=as_times(model),
+        chances=parameters.chances,
+        items=as_records(table),
+        steps=tuple(
+            TablewareStep(action=as_record(one.action, one.before, model, chances), before=as_records(one.before))
+            for one in done
+        ),
+        seconds=nominal.seconds,
+        trips=nominal.trips,
+        expected_seconds=expected.seconds,
+        expected_trips=expected.trips,
+        expected_objects_per_trip=expected.objects_per_trip,
+        risk=expected.risk,
+        draws=parameters.draws,
+        impossible=impossible_pairs(table, rules_of(parameters.policy)),
+        refused=accepted.refused,
+        notes=notes,
+        statement=statement(accepted, notes),
+    )
+    file.write(context.output / "plan.json")
+    context.output.joinpath("plan.txt").write_text(plan_text(file, done), encoding="utf-8")
+    with context.progress.step("pictures"):
+        draw_strip(panels(done, table), parameters.image_width).save(context.output / "strip.png")
+    summary = {
+        "policy": file.policy,
+        "items": len(table.items),
+        "trips": file.trips,
+        "seconds": round(file.seconds, 1),
+        "expected_seconds": round(file.expected_seconds, 1),
+        "refused": len(file.refused),
+    }
+    outcome = "partial" if file.refused or notes else "ok" if table.items else "empty"
+    if outcome != "ok":
+        summary["reason"] = file.statement
+    return TablewarePlan(root=context.output, outcome=outcome, summary=summary)
+
+
+def _accepted(
+    detections: TablewareDetections | None,
+    scene: TablewareScene | None,
+    parameters: PlanParameters,
+    context: Context,
+) -> tuple[Accepted, tuple[str, ...]]:
+    """Return what is planned for, and what vision did not handle. Raises BadInput for what cannot be planned from."""
+    least, rules = parameters.least_confidence, Rules()
+    if detections is not None:
+        told = detections.detections
+        return understood(from_file(told), least, rules), told.notes
+    if scene is None:
+        raise BadInput("tableware plan: nothing to plan from", hint="give --detections, or --scene")
+    if parameters.source == "truth":
+        return accept(as_table(scene.scene.items), {}, (), least, rules), ()
+    color, depth, view = read_image(scene)
+    seen = look(color, depth, view, least, rules)
+    picture = Image.fromarray(draw_sight(color, seen.sight))
+    picture.thumbnail((parameters.image_width, parameters.image_width))
+    picture.save(context.output / "detections.png")
+    return seen.accepted, seen.sight.notes
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Means over draws of what chance decides."""
+
+    seconds: float
+    trips: float
+    objects_per_trip: float
+    risk: float
+
+
+def _expected(table: Table, model: TimeModel, chances: Chances, parameters: PlanParameters, seed: int) -> Expected:
+    """Return what a policy comes to on the table as it was seen."""
+    if not table.items:
+        return Expected(0.0, 0.0, 0.0, 0.0)
+    policy = make_policy(parameters.policy, model, chances, seed)
+    done: list[Trial] = []
+    for draw in range(1 if chances.sure and not chances.noise else parameters.draws):
+        if parameters.policy.startswith("random"):
+            policy = make_policy(parameters.policy, model, chances, 1000 * seed + draw)
+        done.append(run_trial(table, policy, model, chances, (seed, draw)))
+    return Expected(
+        float(np.mean([trial.seconds for trial in done])),
+        float(np.mean([trial.trips for trial in done])),
+        float(np.mean([trial.objects_per_trip for trial in done])),
+        float(np.mean([trial.failed for trial in done])),
+    )
+
+
+def panels(done: list[Done], table: Table) -> list[Panel]:
+    """Return the table before each action, and at the end."""
+    rows: list[Panel] = [
+        (one.before, one.action, f"{number}. {words_of(one.action)} ({one.end - one.start:.1f} s)")
+        for number, one in enumerate(done, start=1)
+    ]
+    last = done[-1] if done else None
+    end = f"after {last.end:.0f} s" if last is not None else "nothing to clear"
+    return [*rows, (last.after if last is not None else table, None, end)]
+
+
+def plan_text(file: TablewarePlanFile, done: list[Done]) -> str:
+    """Return a plan as people read it."""
+    lines = [file.statement, f"policy {file.policy}, items from {file.source}", ""]
+    lines += [
+        f"{number:3}. {words_of(one.action)}, {one.end - one.start:.1f} s" for number, one in enumerate(done, start=1)
+    ]
+    lines += [
+        "",
+        f"{file.trips} trips and {file.seconds:.1f} s when nothing slips; over {file.draws} draws "
+        f"{file.expected_trips:.1f} trips and {file.expected_seconds:.1f} s, {file.expected_objects_per_trip:.2f} "
+        f"objects a trip, {100 * file.risk:.0f} % with something dropped or left",
+    ]
+    if file.impossible:
+        lines += ["", "not possible as things stand:"]
+        lines += [f"  {one.primitive.replace('_', ' ')}: {one.message}" for one in file.impossible]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,57 @@
+"""Policies, worlds and time models by the names of the command line."""
+
+from __future__ import annotations
+
+from schemas.tableware_plan import TimesOfActions
+from stages.tableware.options import ActionTimes
+from stages.tableware.planning.joint import JointPolicy
+from stages.tableware.planning.policies import THESIS, Policy, PullPolicy, RandomOne, RandomPile, StackPolicy
+from stages.tableware.planning.rules import Rules
+from stages.tableware.planning.time_model import EXACT, Chances, TimeModel, fitted, measured, with_thesis_failures
+
+
+def chances_of(name: str) -> Chances:
+    """Return the chances of a world by its name."""
+    return {"exact": lambda: EXACT, "thesis": measured, "thesis_failures": with_thesis_failures}[name]()
+
+
+def time_model(options: ActionTimes) -> TimeModel:
+    """Return the fit to a tier, with what is given explicitly in its place."""
+    model = fitted(options.times_of, options.delay)
+    return TimeModel(
+        model.trip if options.trip_seconds is None else options.trip_seconds,
+        model.stack if options.stack_seconds is None else options.stack_seconds,
+        model.pull if options.pull_seconds is None else options.pull_seconds,
+        options.delay,
+    )
+
+
+def as_times(model: TimeModel) -> TimesOfActions:
+    """Return a time model for JSON."""
+    return TimesOfActions(trip=model.trip, stack=model.stack, pull=model.pull, delay=model.delay)
+
+
+RULES: dict[str, Rules] = {
+    "ours": Rules(),
+    "ours_without_loaded_pulls": Rules(loaded_pulls=False),
+    "ours_careful": Rules(clamped_stacks=True, most_utensils=2),
+}
+"""What our policies allow themselves. `ours_careful`: onto two dishes that are lifted side by side only dishes of their
+own kind are stacked, and two utensils a pile at most; the first findings in physics ask for that (what stands free in a
+dish falls out then, more utensils slide off)."""
+
+
+def rules_of(policy: str) -> Rules:
+    """Return what a policy allows itself."""
+    return RULES.get(policy, THESIS)
+
+
+def make_policy(name: str, model: TimeModel, chances: Chances, seed: int) -> Policy:
+    """Return a policy by its name."""
+    if name in RULES:
+        return JointPolicy(RULES[name], model, chances)
+    if name == "random":
+        return RandomOne(seed)
+    if name == "random_piles":
+        return RandomPile(seed)
+    return PullPolicy() if name == "pull" else StackPolicy()

@@ -1,0 +1,335 @@
+"""Everything that one trip can take from a table, and in which ways: what the dynamic programme chooses among.
+
+A trip takes one pile, or two that stand side by side; things of other piles are stacked onto them before. A choice is a
+set of parts, at most one of each pile. Whether a choice can be taken follows from the kinds of its parts alone (its
+signature), so that is asked once for each signature; who can be pulled to whom, and past what, follows from above.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numba import njit
+
+from stages.tableware.planning.rules import (
+    Rules,
+    can_hold,
+    can_pile,
+    jaws,
+    letters,
+    obstructed,
+    pull_end,
+    split_over_two,
+    sweep,
+    within_jaws,
+)
+from stages.tableware.planning.time_model import Chances, TimeModel
+from stages.tableware.world.footprints import Footprint, footprint, overlapped
+from stages.tableware.world.items import Item, Table
+
+MOST_DISHES = 6
+"""In one grasp: three in each of two piles (section 6.4)."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Things of one pile that are lifted together, lower first."""
+
+    items: tuple[Item, ...]
+    kinds: str
+    mask: int
+    whole: bool
+    """Whether the lowest stands on the table."""
+    lowest: int
+    """Row of the lowest item."""
+
+
+@dataclass(frozen=True)
+class TripOptions:
+    """Choices and the ways to take them. A choice has the options `starts[c]` to `starts[c + 1]`.
+
+    masks: (C,) items of each choice as bits; parts: (C,) rows of its parts. For each option (O,): seconds; lost: chance
+    that something falls off the table; slips: chance that the second pile stays; stays: its items as bits; blockers:
+    items that must be gone before; first, second: rows of the parts that stand below (-1: there is one pile); pulled.
+    """
+
+    parts: tuple[Part, ...]
+    chosen: tuple[tuple[int, ...], ...]
+    masks: np.ndarray
+    starts: np.ndarray
+    seconds: np.ndarray
+    lost: np.ndarray
+    slips: np.ndarray
+    stays: np.ndarray
+    blockers: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    pulled: np.ndarray
+
+
+def trip_options(table: Table, rules: Rules, model: TimeModel, chances: Chances, worth: float) -> TripOptions:
+    """Return all that a trip can take. An option that a cheaper one makes idle is left out; `worth` [s] is what a loss
+    counts for there."""
+    runs = _runs(table, rules)
+    parts = tuple(part for run in runs for part in run)
+    types = {key: number for number, key in enumerate(sorted({(part.kinds, part.whole) for part in parts}))}
+    type_of = np.array([types[part.kinds, part.whole] for part in parts], dtype=np.int64)
+    chosen, masks, signatures, known = _choices(runs, type_of.tolist(), list(types), rules)
+    longest = max((len(rows) for rows in chosen), default=1)
+    rows = np.full((len(chosen), longest), -1, dtype=np.int64)
+    for number, choice in enumerate(chosen):
+        rows[number, : len(choice)] = choice
+    bases = np.full(len(known), -1, dtype=np.int64)
+    two = np.zeros((len(known), len(types), len(types)), dtype=np.bool_)
+    for number, (base, pairs) in enumerate(known):
+        if base is not None:
+            bases[number] = types.get((base, True), types.get((base, False), -1))
+        for one, other in pairs:
+            two[number, types[one, True], types[other, True]] = True
+    costs = np.array(
+        [model.whole_trip, model.stack, chances.drop_stack, chances.drop_single, chances.drop_two, worth], np.float64
+    )
+    found = _ways_of(
+        rows, masks, signatures, bases, two, np.array([part.lowest for part in parts], np.int64),
+        np.array([part.whole for part in parts], np.bool_), np.array([len(part.items) for part in parts], np.int64),
+        np.array([part.mask for part in parts], np.int64), type_of, *_pairs(table, rules, model, chances, worth), costs,
+        rules.loaded_pulls, chances.drop_loaded_pull,
+    )  # fmt: skip
+    return TripOptions(parts, tuple(chosen), masks, *found)
+
+
+def _runs(table: Table, rules: Rules) -> list[list[Part]]:
+    """Return for each pile the runs of neighbours in it that can be lifted together."""
+    row = {item.name: number for number, item in enumerate(table.items)}
+    runs = []
+    for stack in table.stacks:
+        parts = []
+        for low in range(len(stack)):
+            for high in range(low + 1, len(stack) + 1):
+                items = stack[low:high]
+                kinds = letters(items)
+                if can_hold(kinds, rules):
+                    mask = sum(1 << row[item.name] for item in items)
+                    parts.append(Part(items, kinds, mask, low == 0, row[items[0].name]))
+        runs.append(parts)
+    return runs
+
+
+Known = tuple[str | None, frozenset[tuple[str, str]]]
+
+
+def _choices(
+    runs: list[list[Part]], type_of: list[int], types: list[tuple[str, bool]], rules: Rules
+) -> tuple[list[tuple[int, ...]], np.ndarray, np.ndarray, list[Known]]:
+    """Return every choice that some way can take: rows of its parts, its mask, its signature; and for each signature
+    what `_ways` says."""
+    follow: dict[tuple[int, int], int] = {}
+    signature_of: dict[tuple[int, ...], int] = {(): 0}
+    signatures: list[tuple[int, ...]] = [()]
+    choices: list[tuple[tuple[int, ...], int, int, int, int]] = [((), 0, 0, 0, 0)]
+    row = 0
+    for run in runs:
+        before = len(choices)
+        for part in run:
+            utensils = part.kinds.count("u")
+            dishes = len(part.kinds) - utensils
+            most_dishes, most_utensils = MOST_DISHES - dishes, 2 * rules.most_utensils - utensils
+            kind = type_of[row]
+            for chosen, mask, signature, has_dishes, has_utensils in choices[:before]:
+                if has_dishes <= most_dishes and has_utensils <= most_utensils:
+                    step = (signature, kind)
+                    number = follow.get(step)
+                    if number is None:
+                        after = tuple(sorted((*signatures[signature], kind)))
+                        number = signature_of.setdefault(after, len(signatures))
+                        if number == len(signatures):
+                            signatures.append(after)
+                        follow[step] = number
+                    choices.append(
+                        ((*chosen, row), mask | part.mask, number, has_dishes + dishes, has_utensils + utensils)
+                    )
+            row += 1
+    known = [_ways(tuple(sorted(types[kind] for kind in signature)), rules) for signature in signatures]
+    kept = [choice for choice in choices[1:] if known[choice[2]][0] is not None or known[choice[2]][1]]
+    masks = np.array([mask for _, mask, *_ in kept], dtype=np.int64)
+    numbers = np.array([number for _, _, number, *_ in kept], dtype=np.int64)
+    return [chosen for chosen, *_ in kept], masks, numbers, known
+
+
+@lru_cache(maxsize=262144)
+def _ways(signature: tuple[tuple[str, bool], ...], rules: Rules) -> Known:
+    """Return for the kinds of a choice's parts, and whether each stands on the table, which of them all others can be
+    stacked on (None: no one), and on which two they can be shared out."""
+    if not signature:
+        return None, frozenset()
+    if len(signature) == 1:
+        return signature[0][0], frozenset()
+    base = None
+    two = set()
+    tried = set()
+    for number, (kinds, whole) in enumerate(signature):
+        if not whole or (number and signature[number - 1] == (kinds, whole)):
+            continue
+        rest = tuple(other for row, (other, _) in enumerate(signature) if row != number)
+        if base is None and can_pile(kinds, rest, rules):
+            base = kinds
+        for second, (others, stands) in enumerate(signature):
+            if second != number and stands and (kinds, others) not in tried:
+                tried.add((kinds, others))
+                left = tuple(other for row, (other, _) in enumerate(signature) if row not in (number, second))
+                if split_over_two(kinds, others, left, rules) is not None:
+                    two.add((kinds, others))
+    return base, frozenset(two)
+
+
+def _pairs(
+    table: Table, rules: Rules, model: TimeModel, chances: Chances, worth: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the pairs that one grasp could take, the first pulled to the second or as they stand, from the cheapest
+    on: rows of both (P,), blockers, seconds beyond the trip, chance of a loss, chance of a slip, pulled."""
+    row = {item.name: number for number, item in enumerate(table.items)}
+    pile = {item.name: stack[0].name for stack in table.stacks for item in stack}
+    bases = [stack[0] for stack in table.stacks]
+    found: list[tuple[int, int, float, float, float, bool]] = []
+    covers: list[Footprint] = []
+    owners: list[int] = []
+    for one in bases:
+        for other in bases:
+            if one is other or one.is_dish != other.is_dish:
+                continue
+            slips = 1.0 - chances.holds(letters((one,)), letters((other,)))
+            first, second = row[one.name], row[other.name]
+            if within_jaws(one, other, rules):
+                if first > second:
+                    continue
+                places: tuple[Footprint, ...] = (jaws(one, other, rules),)
+                pulled, cost, lost = False, 0.0, 0.0
+            else:
+                if not footprint(one, *pull_end(one, other, rules)).on_table:
+                    continue
+                places, pulled, cost, lost = sweep(one, other, rules), True, model.pull, chances.drop_pull
+            if obstructed(places, table):
+                continue
+            owners.extend([len(found)] * len(places))
+            covers.extend(places)
+            found.append((first, second, cost, lost, slips, pulled))
+    blockers = np.zeros(len(found), dtype=np.int64)
+    if covers:
+        hits = overlapped(covers, [footprint(item) for item in table.items])
+        for owner, hit in zip(owners, hits, strict=True):
+            blockers[owner] |= sum(1 << int(item) for item in np.flatnonzero(hit))
+    own = {base.name: sum(1 << row[name] for name, lowest in pile.items() if lowest == base.name) for base in bases}
+    for number, (first, second, *_) in enumerate(found):
+        blockers[number] &= ~(own[table.items[first].name] | own[table.items[second].name])
+    order = sorted(range(len(found)), key=lambda n: found[n][2] + worth * found[n][3] + found[n][4] * slip_cost(model))
+    columns = list(zip(*(found[number] for number in order), strict=True)) or [()] * 6
+    return (
+        np.array(columns[0], np.int64), np.array(columns[1], np.int64), blockers[np.array(order, np.int64)],
+        np.array(columns[2], np.float64), np.array(columns[3], np.float64), np.array(columns[4], np.float64),
+        np.array(columns[5], np.bool_),
+    )  # fmt: skip
+
+
+def slip_cost(model: TimeModel) -> float:
+    """Return about what a slip costs [s] while there is more on the table, by which pairs are put in order: the pile
+    that stayed shares a later trip, and as likely as not a pull.
+
+    With chance q of holding, pairs take n / (1 + q) trips for n equal items and slip (1 - q) n / (1 + q) times: over
+    the n / 2 trips without slips that is half a trip a slip.
+    """
+    return (model.whole_trip + model.pull) / 2
+
+
+@njit(cache=True)
+def _ways_of(  # type: ignore[no-untyped-def]
+    rows, masks, signatures, bases, two, lowest, whole, length, part_mask, type_of, pair_first, pair_second,
+    pair_blockers, pair_seconds, pair_lost, pair_slips, pair_pulled, costs, loaded_pulls, drop_loaded,
+):  # fmt: skip
+    """Return starts (C + 1,) and the options of all choices, see TripOptions."""
+    whole_trip, stack, drop_stack, drop_single, drop_two, worth = costs
+    starts = np.zeros(len(rows) + 1, np.int64)
+    seconds, lost, slips = [0.0], [0.0], [0.0]
+    stays, blockers, first, second, pulled = [0], [0], [0], [0], [False]
+    for choice in range(len(rows)):
+        begin = len(seconds)
+        count = 0
+        while count < rows.shape[1] and rows[choice, count] >= 0:
+            count += 1
+        signature, mask = signatures[choice], masks[choice]
+        alone = np.inf
+        if count == 1:
+            alone = whole_trip + worth * drop_single
+            seconds.append(whole_trip)
+            lost.append(drop_single)
+            slips.append(0.0)
+            stays.append(0)
+            blockers.append(0)
+            first.append(rows[choice, 0])
+            second.append(-1)
+            pulled.append(False)
+        elif bases[signature] >= 0:
+            for k in range(count):
+                part = rows[choice, k]
+                if whole[part] and type_of[part] == bases[signature]:
+                    chance = drop_single + (count - 1) * drop_stack
+                    alone = whole_trip + (count - 1) * stack + worth * chance
+                    seconds.append(whole_trip + (count - 1) * stack)
+                    lost.append(chance)
+                    slips.append(0.0)
+                    stays.append(0)
+                    blockers.append(0)
+                    first.append(part)
+                    second.append(-1)
+                    pulled.append(False)
+                    break
+        if count > 1 and two[signature].any():
+            start = whole_trip + (count - 2) * stack
+            risk = drop_two + (count - 2) * drop_stack
+            for pair in range(len(pair_first)):
+                if start + pair_seconds[pair] + worth * (risk + pair_lost[pair]) >= alone:
+                    continue
+                both = 1 << pair_first[pair] | 1 << pair_second[pair]
+                if both & ~mask:
+                    continue
+                one = other = -1
+                for k in range(count):
+                    part = rows[choice, k]
+                    if whole[part] and lowest[part] == pair_first[pair]:
+                        one = part
+                    if whole[part] and lowest[part] == pair_second[pair]:
+                        other = part
+                if one < 0 or other < 0 or not two[signature, type_of[one], type_of[other]]:
+                    continue
+                loaded = length[one] > 1
+                if pair_pulled[pair] and (pair_blockers[pair] & mask or (loaded and not loaded_pulls)):
+                    continue
+                block = pair_blockers[pair] & ~mask
+                time = start + pair_seconds[pair]
+                chance = risk + (drop_loaded if pair_pulled[pair] and loaded else pair_lost[pair])
+                idle = False
+                for option in range(begin, len(seconds)):
+                    if (
+                        second[option] >= 0
+                        and blockers[option] & ~block == 0
+                        and slips[option] <= pair_slips[pair]
+                        and seconds[option] + worth * lost[option] <= time + worth * chance
+                    ):
+                        idle = True
+                        break
+                if idle:
+                    continue
+                seconds.append(time)
+                lost.append(chance)
+                slips.append(pair_slips[pair])
+                stays.append(part_mask[other])
+                blockers.append(block)
+                first.append(one)
+                second.append(other)
+                pulled.append(pair_pulled[pair])
+        starts[choice + 1] = len(seconds) - 1
+    return (
+        starts, np.array(seconds[1:]), np.array(lost[1:]), np.array(slips[1:]), np.array(stays[1:]),
+        np.array(blockers[1:]), np.array(first[1:]), np.array(second[1:]), np.array(pulled[1:]),
+    )  # fmt: skip

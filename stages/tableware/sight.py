@@ -1,0 +1,121 @@
+"""Seeing a table: from an RGB-D image to what is planned for, and eyes that look anew before each action."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import hypot
+
+import numpy as np
+
+from stages.tableware.planning.refusals import Accepted, Doubt, Unknown, accept
+from stages.tableware.planning.rules import Rules
+from stages.tableware.simulation.fast import World
+from stages.tableware.vision.detections import Detection, as_table
+from stages.tableware.vision.seeing import Sight, see
+from stages.tableware.world.items import Table
+from stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_camera, render_overhead
+
+SAME_PLACE = 0.025
+"""What is seen no farther than this [m] from where an item of its sort is, is that item: a grasp there meets it."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What an image says, and what of it is planned for."""
+
+    sight: Sight
+    accepted: Accepted
+
+
+def look(color: np.ndarray, depth: np.ndarray, view: OverheadCamera, least: float, rules: Rules) -> Seen:
+    """Return what an image says, and what of it is planned for. Raises BadInput for an image that cannot be used."""
+    sight = see(color, depth, view)
+    return Seen(sight, understood(sight.detections, least, rules))
+
+
+def understood(detections: tuple[Detection, ...], least: float, rules: Rules) -> Accepted:
+    """Return what of some detections is planned for; items are named by their kind and their row."""
+    names = {row: f"{found.kind}_{row + 1}" for row, found in enumerate(detections) if found.kind is not None}
+    doubts = {name: Doubt(detections[row].confidence, detections[row].unsure) for row, name in names.items()}
+    unknown = tuple(
+        Unknown(f"unknown_{row + 1}", found.position[0], found.position[1], max(found.extent, 0.01))
+        for row, found in enumerate(detections)
+        if found.kind is None
+    )
+    return accept(as_table(detections), doubts, unknown, least, rules)
+
+
+class Eyes:
+    """Looks at a world before each action: the image that it gives, or one rendered of its table. Items get the names
+    of the true ones that stand there, so that a policy can follow them; what is nobody keeps a name of its own. Where
+    the hand closed on nothing (`vain` of the world, as a gripper reports it) nothing is believed to be any more."""
+
+    def __init__(self, seed: int, light: str, colors: Scheme, least: float) -> None:
+        self._seed, self._light, self._colors, self._least = seed, light, colors, least
+        self._rules = Rules()
+        self.images = 0
+        self.last: Seen | None = None
+        self._told = Table(())
+        self._nothing: list[tuple[float, float]] = []
+
+    def __call__(self, world: World) -> Table:
+        """Return what is seen."""
+        color, depth, view = self._image(world)
+        self.images += 1
+        self.last = look(color, depth, view, self._least, self._rules)
+        for name in getattr(world, "vain", ()):
+            if name in self._told.by_name:
+                self._nothing.append(self._told.by_name[name].position[:2])
+        self._told = named_as(without_places(self.last.accepted.table, self._nothing), world.table)
+        return self._told
+
+    def _image(self, world: World) -> tuple[np.ndarray, np.ndarray, OverheadCamera]:
+        seed = 1000 * self._seed + self.images
+        image = getattr(world, "image", None)
+        if image is not None:
+            color, depth, view = image(seed, self._light, self._colors)
+            return color, depth, view
+        view = overhead_camera()
+        color, depth = render_overhead(world.table, seed, self._light, self._colors, view=view)
+        return color, depth, view
+
+
+def named_as(seen: Table, known: Table, reach: float = SAME_PLACE) -> Table:
+    """Return a table whose items have the names of those of another that they are: of the same kind (forks and spoons
+    are one), nearest first, no farther than `reach` [m]. The others are called `stray_1` and so on."""
+    pairs = sorted(
+        (hypot(*(a - b for a, b in zip(one.position, other.position, strict=True))), one.name, other.name)
+        for one in seen.items
+        for other in known.items
+        if one.kind == other.kind or not (one.is_dish or other.is_dish)
+    )
+    names: dict[str, str] = {}
+    taken: set[str] = set()
+    for apart, one, other in pairs:
+        if apart <= reach and one not in names and other not in taken:
+            names[one] = other
+            taken.add(other)
+    for item in seen.items:  # what lies on something is met there, wherever exactly it was seen
+        if item.name in names:
+            continue
+        for on_it in known.carried.get(names.get(item.on or "", ""), ()):
+            if on_it.name not in taken and (item.kind == on_it.kind or not (item.is_dish or on_it.is_dish)):
+                names[item.name] = on_it.name
+                taken.add(on_it.name)
+                break
+    strays = (item.name for item in seen.items if item.name not in names)
+    names |= {name: f"stray_{number}" for number, name in enumerate(strays, start=1)}
+    items = tuple(
+        replace(item, name=names[item.name], on=None if item.on is None else names[item.on]) for item in seen.items
+    )
+    return Table(items, seen.obstacles)
+
+
+def without_places(table: Table, places: list[tuple[float, float]]) -> Table:
+    """Return a table less what carries nothing and stands at one of some places [m]."""
+    gone = {
+        item.name
+        for item in table.tops
+        if any(hypot(item.position[0] - x, item.position[1] - y) < SAME_PLACE for x, y in places)
+    }
+    return table.without(gone)

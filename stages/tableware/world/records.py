@@ -1,0 +1,21 @@
+"""Tables as artifacts hold them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from schemas.tableware_scene import TablewareItem
+from stages.tableware.world.items import MEASURES, Item, Table
+
+
+def as_records(table: Table) -> tuple[TablewareItem, ...]:
+    """Return the items of a table for JSON."""
+    return tuple(
+        TablewareItem(name=item.name, kind=item.kind, position=item.position, yaw=item.yaw, on=item.on)
+        for item in table.items
+    )
+
+
+def as_table(records: Iterable[TablewareItem]) -> Table:
+    """Return the table of an artifact, with the standard measures of each kind."""
+    return Table(tuple(Item(one.name, one.kind, one.position, one.yaw, one.on, MEASURES[one.kind]) for one in records))
