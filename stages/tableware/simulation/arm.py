@@ -46,7 +46,9 @@ class Arm:
         text = without_visuals(with_absolute_meshes(read_urdf(urdf), urdf.parent))
         self.body_id = world.load_urdf_text(text, fixed=True)
         client = world.client
-        engine.resetBasePositionAndOrientation(self.body_id, BASE.tolist(), [0, 0, 0, 1], physicsClientId=client)
+        # pybullet's base pose is that of the centre of mass, not of the link frame.
+        center = BASE + np.array(engine.getDynamicsInfo(self.body_id, -1, physicsClientId=client)[3])
+        engine.resetBasePositionAndOrientation(self.body_id, center.tolist(), [0, 0, 0, 1], physicsClientId=client)
         links, joints = {}, {}
         for index in range(engine.getNumJoints(self.body_id, physicsClientId=client)):
             info = engine.getJointInfo(self.body_id, index, physicsClientId=client)
@@ -103,12 +105,12 @@ class Arm:
 
     # --- kinematics -------------------------------------------------------------------------------------------
 
-    def solve(self, pose: np.ndarray, near: np.ndarray | None = None) -> np.ndarray | None:
-        """Return joint values (6,) for a tool pose or the one turned by half a turn, which for two like fingers is the
-        same, whichever is nearer to `near` (6,); None where neither is reached."""
-        near = self.target if near is None else near
+    def solve(self, pose: np.ndarray, *, held: bool = False) -> np.ndarray | None:
+        """Return joint values (6,) for a tool pose, None where it is not reached. With nothing held the one turned by
+        half a turn will do as well, as the fingers are alike: the answer that moves the joints least is taken."""
+        near = self.target
         found = []
-        for half_turn in (False, True):
+        for half_turn in (False,) if held else (False, True):
             wanted = pose.copy()
             if half_turn:
                 wanted[:3, :2] *= -1.0
@@ -154,7 +156,7 @@ class Arm:
         rows = follow(self.chain, in_base, self.target)
         path = np.vstack([self.target, rows])
         times, points = time_path(path, *self._limits(1.0))
-        times = times * max(1.0, length / speed / max(times[-1] - 0.1, 1e-6))
+        times = times * max(1.0, length / speed / float(times[-1]))
         self._run(times, points)
 
     def move_joints(self, end: np.ndarray, share: float) -> None:

@@ -12,6 +12,7 @@ from math import atan2, cos, pi, sin
 
 import numpy as np
 
+from stages.tableware.simulation.pieces import solid
 from stages.tableware.world.footprints import Footprint, footprint, gap
 from stages.tableware.world.items import Item, Table
 
@@ -145,7 +146,9 @@ def pair_hold(table: Table, first: str, second: str, point: tuple[float, float, 
         apart = abs(float(across @ (np.array(other.position[:2]) - np.array(one.position[:2]))))
         opening = min(0.085, apart + one.measures.width + 0.014)
         tip = min(one.position[2], other.position[2]) + ABOVE
-        pose = tool_pose(np.array([point[0], point[1], tip]), yaw + pi / 2)
+        along = touching(one, other, yaw)
+        place = np.array([point[0] + along * cos(yaw), point[1] + along * sin(yaw), tip])
+        pose = tool_pose(place, yaw + pi / 2)
         return Hold(pose, opening, jaw_clearance(pose, opening, others, []))
     families = [walls(table, name) for name in (first, second)]
     tip = max(min(item.lip for item in family) for family in families)
@@ -156,6 +159,31 @@ def pair_hold(table: Table, first: str, second: str, point: tuple[float, float, 
     pose = tool_pose(np.array([point[0], point[1], tip]), closing)
     own = [item for name in (first, second) for item in cargo(table, name)]
     return Hold(pose, 0.085, jaw_clearance(pose, 0.085, others, own))
+
+
+def touching(one: Item, other: Item, yaw: float) -> float:
+    """Return how far [m] from the middle between two utensils, along `yaw` [rad], they meet when pushed together: where
+    their widths add up to the most, and nearest to the middle of such places. Pads that press elsewhere would turn them."""
+    axis = np.array([cos(yaw), sin(yaw)])
+    middle = (np.array(one.position[:2]) + np.array(other.position[:2])) / 2
+    best, width = 0.0, 0.0
+    for along in sorted(np.arange(-0.08, 0.081, 0.005), key=abs):
+        total = 0.0
+        for item in (one, other):
+            forwards = 1.0 if cos(item.yaw - yaw) >= 0.0 else -1.0
+            place = forwards * (float(along) - float(axis @ (np.array(item.position[:2]) - middle)))
+            total += half_width(item, place)
+        if total > width + 0.0005:
+            best, width = float(along), total
+    return best
+
+
+def half_width(item: Item, along: float) -> float:
+    """Return half the width [m] of a utensil at a distance from its middle towards the head, 0 beyond its ends."""
+    for corners in solid(item.kind).pieces:
+        if corners[:, 0].min() - 0.0015 <= along <= corners[:, 0].max() + 0.0015:
+            return float(np.abs(corners[:, 1]).max())
+    return 0.0
 
 
 def bar_hold(table: Table, name: str, opening: float = 0.032) -> Hold:

@@ -46,8 +46,10 @@ class Speeds:
     lift: float = 0.15
     pull: float = 0.15
     carry: float = 0.7
-    force: float = 60.0
-    firm: float = 100.0
+    force: float = 40.0
+    firm: float = 80.0
+    gentle: float = 20.0
+    """For a utensil that is taken alone."""
 
 
 class PhysicsTable:
@@ -120,14 +122,21 @@ class PhysicsTable:
             hold = rim_hold(seen, names[0], action.theta_G)
         else:
             hold = bar_hold(seen, names[0])
-        self._take(hold, firm=any(len(seen.load(name)) > 0 for name in names) or len(names) == 2)
+        self._take(hold, self._force(seen, names))
         self._to_bin(seen, names)
 
-    def _take(self, hold: Hold, firm: bool = False) -> None:
-        """Go there, close, and lift a little."""
+    def _force(self, seen: Table, names: list[str]) -> float:
+        """Return the force [N] of each finger for some piles."""
+        count = sum(1 + len(seen.load(name)) for name in names)
+        if all(not seen.by_name[name].is_dish for name in names):
+            return self.speeds.gentle * (1.0 if count == 1 else 1.5)
+        return self.speeds.force if count == 1 else self.speeds.firm
+
+    def _take(self, hold: Hold, force: float) -> None:
+        """Go there and close."""
         self._above(hold.pose, hold.opening)
         self._descend(hold.pose)
-        self.arm.close(self.speeds.firm if firm else self.speeds.force)
+        self.arm.close(force)
         self._key("closed")
 
     def _above(self, pose: np.ndarray, opening: float) -> None:
@@ -203,7 +212,7 @@ class PhysicsTable:
             there = pose.copy()
             there[:3, :3] = rotation @ pose[:3, :3]
             there[:2, 3] = np.array(BIN_CENTER) - rotation[:2, :2] @ offset
-            arm = self.arm.solve(there)
+            arm = self.arm.solve(there, held=True)
             if arm is not None:
                 cost = float(np.abs(arm - self.arm.target).max())
                 if best is None or cost < best[0]:
@@ -275,8 +284,8 @@ class PhysicsTable:
             hold = rim_hold(seen, name, action.u_G.theta_G, min(room, max(nested, 0.012)))
         else:
             hold = bar_hold(seen, name)
-        self._take(hold, firm=len(seen.load(name)) > 0)
-        pose = hold.pose
+        self._take(hold, self._force(seen, [name]))
+        pose = self.arm.pose_of(self.arm.target)
         held = {name, *(load.name for load in seen.load(name))}
         self.top.wake(frozenset(self.top.bodies))
         highest = max([other.lip for other in seen.items if other.name not in held], default=0.0)
@@ -287,12 +296,13 @@ class PhysicsTable:
         self._key("lifted")
         drop = 0.002 if item.is_dish else 0.003
         over = self._placing(action, seen, item, onto, pose, up[2, 3])
-        values = self.arm.solve(over)
+        values = self.arm.solve(over, held=True)
         if values is None:
             raise MotionFailed("no_inverse_kinematics", "the arm does not reach the place")
         self.arm.move_joints(values, self.speeds.carry)
         self.top.wake({other.name for other in seen.items if other.name == onto.name} | {o.name for o in self._pile(seen, onto)})
-        down = _raised(over, pose[2, 3] + action.p_L[2] - item.position[2] + drop)
+        down = over.copy()
+        down[2, 3] = pose[2, 3] + action.p_L[2] - item.position[2] + drop
         near = _raised(down, down[2, 3] + 0.02)
         self.arm.move_through([near], self.speeds.lift)
         self.arm.move_line(down, 0.06)
@@ -329,7 +339,7 @@ class PhysicsTable:
             there[2, 3] = pose[2, 3] + action.p_L[2] - item.position[2]
             clearance = jaw_clearance(there, 0.03, others, [])
             there = _raised(there, height)
-            if self.arm.solve(there) is None:
+            if self.arm.solve(there, held=True) is None:
                 continue
             if best is None or clearance > best[0]:
                 best = (min(clearance, FREE), there)

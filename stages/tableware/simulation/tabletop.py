@@ -34,7 +34,7 @@ class Tabletop:
     def __init__(self, world: PhysicsWorld, table: Table) -> None:
         self.world = world
         engine.setPhysicsEngineParameter(
-            numSolverIterations=30, contactBreakingThreshold=0.002, physicsClientId=world.client
+            numSolverIterations=100, contactBreakingThreshold=0.002, contactERP=0.8, physicsClientId=world.client
         )
         shape = engine.createCollisionShape(
             engine.GEOM_BOX, halfExtents=[TABLE_SIDES[0] / 2, TABLE_SIDES[1] / 2, 0.02], physicsClientId=world.client
