@@ -25,7 +25,7 @@ ROOM = 0.007
 PALM_ROOM = 0.003
 FREE = 0.003
 """What open jaws keep from others [m]."""
-ABOVE = 0.0010
+ABOVE = 0.0005
 """Of the fingertips over the table when they take a utensil [m]."""
 
 
@@ -162,20 +162,18 @@ def pair_hold(table: Table, first: str, second: str, point: tuple[float, float, 
 
 
 def touching(one: Item, other: Item, yaw: float) -> float:
-    """Return how far [m] from the middle between two utensils, along `yaw` [rad], they meet when pushed together: where
-    their widths add up to the most, and nearest to the middle of such places. Pads that press elsewhere would turn them."""
+    """Return how far [m] from the middle between two utensils, along `yaw` [rad], they meet when pushed together: the
+    middle of where their widths add up to the most. Pads that press elsewhere would turn them."""
     axis = np.array([cos(yaw), sin(yaw)])
     middle = (np.array(one.position[:2]) + np.array(other.position[:2])) / 2
-    best, width = 0.0, 0.0
-    for along in sorted(np.arange(-0.08, 0.081, 0.005), key=abs):
-        total = 0.0
-        for item in (one, other):
-            forwards = 1.0 if cos(item.yaw - yaw) >= 0.0 else -1.0
-            place = forwards * (float(along) - float(axis @ (np.array(item.position[:2]) - middle)))
-            total += half_width(item, place)
-        if total > width + 0.0005:
-            best, width = float(along), total
-    return best
+    places = np.arange(-0.08, 0.081, 0.005)
+    totals = np.zeros(len(places))
+    for item in (one, other):
+        forwards = 1.0 if cos(item.yaw - yaw) >= 0.0 else -1.0
+        offset = float(axis @ (np.array(item.position[:2]) - middle))
+        totals += [half_width(item, forwards * (float(place) - offset)) for place in places]
+    meeting = places[totals >= totals.max() - 0.0015]
+    return float(meeting.min() + meeting.max()) / 2
 
 
 def half_width(item: Item, along: float) -> float:

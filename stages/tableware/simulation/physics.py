@@ -49,7 +49,10 @@ class Speeds:
     force: float = 40.0
     firm: float = 80.0
     gentle: float = 20.0
-    """For a utensil that is taken alone."""
+    """For a utensil that is taken alone, or a pile of them."""
+    edge: float = 10.0
+    """For two utensils side by side: pressed harder, flat things edge to edge spring out of the fingers."""
+    carry_edge: float = 0.4
 
 
 class PhysicsTable:
@@ -129,7 +132,7 @@ class PhysicsTable:
         """Return the force [N] of each finger for some piles."""
         count = sum(1 + len(seen.load(name)) for name in names)
         if all(not seen.by_name[name].is_dish for name in names):
-            return self.speeds.gentle * (1.0 if count == 1 else 1.5)
+            return self.speeds.edge if len(names) == 2 else self.speeds.gentle
         return self.speeds.force if count == 1 else self.speeds.firm
 
     def _take(self, hold: Hold, force: float) -> None:
@@ -179,7 +182,8 @@ class PhysicsTable:
         clear = highest + LIFT - lowest
         up = _raised(pose, pose[2, 3] + max(clear, 0.06))
         self.arm.move_line(_raised(pose, pose[2, 3] + 0.01), 0.05)
-        self.arm.move_line(up, self.speeds.lift)
+        edge = len(names) == 2 and not seen.by_name[names[0]].is_dish
+        self.arm.move_line(up, 0.6 * self.speeds.lift if edge else self.speeds.lift)
         self.top.sleep()
         self._key("lifted")
         if len(names) == 2:
@@ -187,7 +191,7 @@ class PhysicsTable:
         else:
             offset = np.array(seen.by_name[names[0]].position[:2]) - pose[:2, 3]
         goal = self._bin_pose(up, offset)
-        self.arm.move_joints(goal, self.speeds.carry)
+        self.arm.move_joints(goal, self.speeds.carry_edge if edge else self.speeds.carry)
         self._key("over the bin")
         self.arm.open_to(min(0.085, self.arm.finger_gap() + 0.03))
         self.arm.wait(0.15)

@@ -33,7 +33,7 @@ class Solid:
     """A rigid body in its item's frame (foot centre or middle of the underside, z up) [m, kg]."""
 
     pieces: tuple[np.ndarray, ...]
-    """Corners (N, 3) of each convex piece, without the margin."""
+    """Corners (N, 3) of each convex piece, of a dish without the margin."""
     mass: float
     center: np.ndarray
     """(3,) centre of mass."""
@@ -50,7 +50,7 @@ def solid(kind: Kind) -> Solid:
         pieces, density = shell_pieces(measures), DISH_DENSITY
     else:
         mesh = utensil_mesh(measures, kind == "fork")
-        pieces, density = utensil_pieces(measures, kind == "fork"), UTENSIL_DENSITY
+        pieces, density = utensil_boxes(measures, kind == "fork"), UTENSIL_DENSITY
     mesh.density = density
     return Solid(tuple(pieces), float(mesh.mass), np.array(mesh.center_mass), np.diag(mesh.moment_inertia).copy())
 
@@ -83,22 +83,15 @@ def shell_pieces(shell: Measures, sides: int | None = None, margin: float = MARG
     return [*pieces, np.concatenate(disc)]
 
 
-def utensil_pieces(strip: Measures, fork: bool, margin: float = MARGIN) -> list[np.ndarray]:
-    """Return boxes (8, 3) that follow a utensil's plan: handle in two parts, neck, head in three; tines as one block."""
-    mesh = utensil_mesh(strip, fork)
-    points = np.asarray(mesh.vertices)
+def utensil_boxes(strip: Measures, fork: bool) -> list[np.ndarray]:
+    """Return boxes, as their corners (8, 3), that follow a utensil's plan: handle, neck, head in three, tines as one."""
+    points = np.asarray(utensil_mesh(strip, fork).vertices)
     cuts = np.array([-0.5, -0.2, 0.08, 0.20, 0.30, 0.42, 0.5]) * strip.length
     pieces = []
     for low, high in zip(cuts[:-1], cuts[1:], strict=True):
-        corners = []
-        for x in (low, high):
-            near = np.abs(points[:, 0] - x) < 0.02 * strip.length
-            half = max(float(np.abs(points[near, 1]).max()), 0.0015)
-            inside = x + margin if x == low else x - margin
-            for y in (-half + margin, half - margin):
-                for z in (margin, strip.height - margin):
-                    corners.append([inside, y, z])
-        pieces.append(np.array(corners))
+        near = (points[:, 0] > low - 0.02 * strip.length) & (points[:, 0] < high + 0.02 * strip.length)
+        half = float(np.abs(points[near, 1]).mean() + np.abs(points[near, 1]).max()) / 2
+        pieces.append(np.array([[x, y, z] for x in (low, high) for y in (-half, half) for z in (0.0, strip.height)]))
     return pieces
 
 
@@ -116,14 +109,28 @@ def obj_text(solid_body: Solid) -> str:
     return "\n".join(lines) + "\n"
 
 
-def urdf_text(name: str, solid_body: Solid, mesh_path: str) -> str:
-    """Return the URDF of a free body whose pieces lie in a Wavefront file."""
-    x, y, z = solid_body.center
-    ixx, iyy, izz = solid_body.inertia
+def urdf_text(kind: Kind, mesh_path: str) -> str:
+    """Return the URDF of a free body of a kind; a dish's pieces lie in a Wavefront file (`obj_text`)."""
+    body = solid(kind)
+    x, y, z = body.center
+    ixx, iyy, izz = body.inertia
+    if MEASURES[kind].is_dish:
+        shapes = f'<collision><geometry><mesh filename="{mesh_path}"/></geometry></collision>'
+    else:
+        shapes = "".join(_box(corners) for corners in body.pieces)
     return (
-        f'<robot name="{name}"><link name="{name}">'
-        f'<inertial><origin xyz="{x:.8g} {y:.8g} {z:.8g}"/><mass value="{solid_body.mass:.8g}"/>'
+        f'<robot name="{kind}"><link name="{kind}">'
+        f'<inertial><origin xyz="{x:.8g} {y:.8g} {z:.8g}"/><mass value="{body.mass:.8g}"/>'
         f'<inertia ixx="{ixx:.8g}" ixy="0" ixz="0" iyy="{iyy:.8g}" iyz="0" izz="{izz:.8g}"/></inertial>'
-        f'<collision><geometry><mesh filename="{mesh_path}"/></geometry></collision>'
-        f"</link></robot>"
+        f"{shapes}</link></robot>"
+    )
+
+
+def _box(corners: np.ndarray) -> str:
+    middle, size = (corners.max(axis=0) + corners.min(axis=0)) / 2, np.ptp(corners, axis=0)
+    x, y, z = middle
+    a, b, c = size
+    return (
+        f'<collision><origin xyz="{x:.8g} {y:.8g} {z:.8g}"/><geometry><box size="{a:.8g} {b:.8g} {c:.8g}"/></geometry>'
+        f"</collision>"
     )

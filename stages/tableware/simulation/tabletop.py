@@ -51,7 +51,7 @@ class Tabletop:
             for kind in sorted({item.kind for item in table.items}):
                 path = os.path.join(folder, f"{kind}.obj")
                 Path(path).write_text(obj_text(solid(kind)), encoding="utf-8")
-                text = urdf_text(kind, solid(kind), path)
+                text = urdf_text(kind, path)
                 Path(folder, f"{kind}.urdf").write_text(text, encoding="utf-8")
             for item in table.items:
                 self.bodies[item.name] = self._load(os.path.join(folder, f"{item.kind}.urdf"))
