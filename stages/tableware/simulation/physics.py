@@ -175,7 +175,7 @@ class PhysicsTable:
     def _to_bin(self, seen: Table, names: list[str]) -> None:
         """Lift what is held, carry it over the bin, let go."""
         held = {name for name in names} | {item.name for name in names for item in seen.load(name)}
-        self.top.wake(frozenset(self.top.bodies))
+        self.top.wake_near([np.array(seen.by_name[name].position[:2]) for name in held], 0.03)
         pose = self.arm.pose_of(self.arm.target)
         lowest = min(seen.by_name[name].position[2] for name in held)
         highest = max([item.lip for item in self.table.items if item.name not in held], default=0.0)
@@ -250,7 +250,7 @@ class PhysicsTable:
         self._above(pose, push.opening)
         self.arm.hold_open(push.opening)
         self._descend(pose)
-        self.top.wake({action.item, *(load.name for load in seen.load(action.item))})
+        self.top.wake_near([start], 0.05)
         there = tool_pose(finish, push.closing)
         self._key("inside")
         self.arm.move_line(there, self.speeds.pull)
@@ -270,7 +270,6 @@ class PhysicsTable:
         self._key("inside")
         turn = (action.theta_E - action.theta_S + pi / 2) % pi - pi / 2
         there = tool_pose(np.array([*action.p_E[:2], tip]), action.theta_S + turn)
-        self.top.wake({action.item})
         self.arm.move_line(there, self.speeds.pull)
         self._key("pulled")
         self.arm.open_to(0.022)
@@ -291,7 +290,7 @@ class PhysicsTable:
         self._take(hold, self._force(seen, [name]))
         pose = self.arm.pose_of(self.arm.target)
         held = {name, *(load.name for load in seen.load(name))}
-        self.top.wake(frozenset(self.top.bodies))
+        self.top.wake_near([np.array(item.position[:2])], 0.03)
         highest = max([other.lip for other in seen.items if other.name not in held], default=0.0)
         up = _raised(pose, pose[2, 3] + max(highest + 0.04 - item.position[2], 0.04))
         self.arm.move_line(_raised(pose, pose[2, 3] + 0.01), 0.05)
@@ -304,7 +303,7 @@ class PhysicsTable:
         if values is None:
             raise MotionFailed("no_inverse_kinematics", "the arm does not reach the place")
         self.arm.move_joints(values, self.speeds.carry)
-        self.top.wake({other.name for other in seen.items if other.name == onto.name} | {o.name for o in self._pile(seen, onto)})
+        self.top.wake_near([np.array(onto.position[:2])], 0.03)
         down = over.copy()
         down[2, 3] = pose[2, 3] + action.p_L[2] - item.position[2] + drop
         near = _raised(down, down[2, 3] + 0.02)

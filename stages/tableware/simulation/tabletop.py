@@ -112,15 +112,20 @@ class Tabletop:
         return passed
 
     def sleep(self) -> None:
-        """Put everything that is slow to sleep: it wakes when something that moves touches it."""
+        """Put everything that is slow to sleep: it wakes when something that moves touches it. A table awake would keep
+        looking for contacts with what sleeps on it."""
+        self._activate(self.board, engine.ACTIVATION_STATE_SLEEP)
         for name, body in self.bodies.items():
             if self.speed(name) < REST_SPEED:
                 self._activate(body, engine.ACTIVATION_STATE_SLEEP)
 
-    def wake(self, names: set[str] | frozenset[str]) -> None:
-        """Wake some bodies, as what sleeps does not notice that its support was taken away."""
-        for name in names & set(self.bodies):
-            self._activate(self.bodies[name], engine.ACTIVATION_STATE_WAKE_UP)
+    def wake_near(self, points: list[np.ndarray], reach: float) -> None:
+        """Wake what lies within `reach` [m] of any of some points (2,), seen from above: what sleeps does not notice
+        that its support was taken away."""
+        for name, body in self.bodies.items():
+            here = self.pose(name)[:2, 3]
+            if any(float(np.linalg.norm(here - point)) < reach for point in points):
+                self._activate(body, engine.ACTIVATION_STATE_WAKE_UP)
 
     def _activate(self, body: int, state: int) -> None:
         engine.changeDynamics(body, -1, activationState=state, physicsClientId=self.world.client)
