@@ -20,6 +20,8 @@ JAW_HEIGHT, PAD, PAD_WIDTH, KNUCKLE = 0.045, 0.007, 0.022, 0.014
 """Height of the fingertips, their thickness and width, thickness of the knuckles above them [m]; see ur5.urdf."""
 DEPTH = 0.020
 """How far the pads reach below the lowest lip where they can [m]."""
+DEPTH_TWO = 0.030
+"""The same when two dishes are pressed together."""
 ROOM = 0.007
 """Between an open pad and the wall on each side [m]."""
 PALM_ROOM = 0.003
@@ -154,7 +156,7 @@ def pair_hold(table: Table, first: str, second: str, point: tuple[float, float, 
     tip = max(min(item.lip for item in family) for family in families)
     lips = [item.lip for family in families for item in family]
     tip = min(item.lip for family in families for item in family) - max(
-        0.003, min(DEPTH, JAW_HEIGHT - PALM_ROOM - (max(lips) - min(lips)))
+        0.003, min(DEPTH_TWO, JAW_HEIGHT - PALM_ROOM - (max(lips) - min(lips)))
     )
     pose = tool_pose(np.array([point[0], point[1], tip]), closing)
     own = [item for name in (first, second) for item in cargo(table, name)]

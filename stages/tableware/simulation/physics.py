@@ -52,7 +52,8 @@ class Speeds:
     """For a utensil that is taken alone, or a pile of them."""
     edge: float = 10.0
     """For two utensils side by side: pressed harder, flat things edge to edge spring out of the fingers."""
-    carry_edge: float = 0.4
+    carry_two: float = 0.4
+    lift_two: float = 0.09
 
 
 class PhysicsTable:
@@ -182,16 +183,16 @@ class PhysicsTable:
         clear = highest + LIFT - lowest
         up = _raised(pose, pose[2, 3] + max(clear, 0.06))
         self.arm.move_line(_raised(pose, pose[2, 3] + 0.01), 0.05)
-        edge = len(names) == 2 and not seen.by_name[names[0]].is_dish
-        self.arm.move_line(up, 0.6 * self.speeds.lift if edge else self.speeds.lift)
+        two = len(names) == 2
+        self.arm.move_line(up, self.speeds.lift_two if two else self.speeds.lift)
         self.top.sleep()
         self._key("lifted")
-        if len(names) == 2:
+        if two:
             offset = np.zeros(2)
         else:
             offset = np.array(seen.by_name[names[0]].position[:2]) - pose[:2, 3]
         goal = self._bin_pose(up, offset)
-        self.arm.move_joints(goal, self.speeds.carry_edge if edge else self.speeds.carry)
+        self.arm.move_joints(goal, self.speeds.carry_two if two else self.speeds.carry)
         self._key("over the bin")
         self.arm.open_to(min(0.085, self.arm.finger_gap() + 0.03))
         self.arm.wait(0.15)
