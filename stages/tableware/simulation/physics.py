@@ -13,23 +13,26 @@ import numpy as np
 
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.simulation.world import PhysicsWorld
-from stages.tableware.planning.actions import Action, Grasp, Pull, PullGrasp, Stack, StackGrasp
+from stages.tableware.planning.actions import Action, Grasp, Pull, PullGrasp, Stack, StackGrasp, after_pull, after_stack
 from stages.tableware.simulation.arm import Arm
 from stages.tableware.simulation.fast import Trial
 from stages.tableware.simulation.holds import (
+    FREE,
     JAW_HEIGHT,
     PAD,
     PAD_WIDTH,
     Hold,
     bar_hold,
     cargo,
+    jaw_clearance,
     pair_hold,
     rim_hold,
     tool_pose,
     walls,
 )
 from stages.tableware.simulation.tabletop import BIN_CENTER, Tabletop
-from stages.tableware.world.items import MEASURES, Item, Table, rise
+from stages.tableware.world.items import Item, Table, rise
+from stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_camera, render_overhead
 
 TRAVEL = 0.17
 """Height of the fingertips on the way above everything [m]."""
@@ -77,6 +80,17 @@ class PhysicsTable:
     def close(self) -> None:
         """Free the physics engine; the world cannot be used afterwards."""
         self.world.close()
+
+    def image(
+        self, seed: int = 0, level: str = "usual", scheme: Scheme = "dark_on_white"
+    ) -> tuple[np.ndarray, np.ndarray, OverheadCamera]:
+        """Return what the overhead camera sees of the bodies: color (H, W, 3) uint8, depth (H, W) float32 [m], camera.
+        The arm is out of the picture."""
+        items = sorted(self.top.read(everything=True).items, key=lambda item: item.name)
+        poses = {item.name: self.top.pose(item.name) for item in items}
+        view = overhead_camera()
+        color, depth = render_overhead(Table(tuple(items)), seed, level, scheme, view=view, poses=poses)
+        return color, depth, view
 
     def _key(self, label: str) -> None:
         if self.record is not None:
@@ -333,8 +347,6 @@ class PhysicsTable:
         own = {other.name for other in self._pile(seen, onto)} | {item.name, *(o.name for o in seen.load(item.name))}
         others = [other for other in seen.items if other.name not in own]
         best: tuple[float, np.ndarray] | None = None
-        from stages.tableware.simulation.holds import FREE, jaw_clearance
-
         for turn in turns:
             rotation = np.array([[cos(turn), -sin(turn), 0.0], [sin(turn), cos(turn), 0.0], [0.0, 0.0, 1.0]])
             there = pose.copy()
@@ -386,8 +398,6 @@ def push_place(seen: Table, name: str, direction: np.ndarray) -> Push | None:
                 continue
             for start in (0.0, reach * 0.5, reach - 0.006) if not load else (reach * 0.5, reach - 0.006, reach - 0.003):
                 point = np.append(center + start * direction, tip)
-                from stages.tableware.simulation.holds import jaw_clearance
-
                 clearance = jaw_clearance(tool_pose(point, closing), opening, load, []) if load else 1.0
                 if clearance > 0.002:
                     return Push(start, reach, tip, closing, opening)
@@ -402,9 +412,4 @@ def _raised(pose: np.ndarray, height: float) -> np.ndarray:
 
 def _after(seen: Table, action: PullGrasp | StackGrasp) -> Table:
     """Return the table as it is thought to be after the first half of a composite action."""
-    from stages.tableware.planning.actions import after_pull, after_stack
-
     return after_pull(seen, action.u_P) if isinstance(action, PullGrasp) else after_stack(seen, action.u_S)
-
-
-__all__ = ["MEASURES", "PhysicsTable", "Speeds"]
