@@ -20,10 +20,10 @@ from stages.kit.simulation.robot_description import load_robot
 from stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
 from stages.kit.simulation.world import PhysicsWorld
 
-BASE = np.array([0.0, -0.44, 0.0])
-"""Where the arm stands, at the height of the table top [m]."""
-PAD_FRICTION = 1.6
-"""Of rubber pads; Bullet multiplies the two of a contact."""
+BASE = np.array([0.0, -0.46, 0.15])
+"""Where the arm stands, higher than the table top: else the upper arm sweeps dishes off it when it reaches far [m]."""
+PAD_FRICTION, BACK_FRICTION = 1.6, 0.3
+"""Of rubber pads, and of the bare metal that pushes a dish from inside; Bullet multiplies the two of a contact."""
 JOINT_EFFORTS = np.array([150.0, 150.0, 150.0, 28.0, 28.0, 28.0])
 """Torques [N m] of the UR5's joints."""
 CLOSING_SPEED = 0.06
@@ -55,10 +55,7 @@ class Arm:
             links[info[12].decode()], joints[info[1].decode()] = index, index
         self.joints = [joints[name] for name in self.description.arm_joints]
         self.fingers = [joints[name] for name in self.description.finger_joints]
-        for index in self.fingers:
-            engine.changeDynamics(
-                self.body_id, index, lateralFriction=PAD_FRICTION, spinningFriction=0.0, physicsClientId=client
-            )
+        self.touch_with(PAD_FRICTION)
         gear = engine.createConstraint(
             self.body_id, self.fingers[0], self.body_id, self.fingers[1], engine.JOINT_GEAR, [0, 1, 0], [0, 0, 0],
             [0, 0, 0], physicsClientId=client,
@@ -183,6 +180,13 @@ class Arm:
         self.seconds += count * self.world.time_step
 
     # --- hand -------------------------------------------------------------------------------------------------
+
+    def touch_with(self, friction: float) -> None:
+        """Set the friction of the fingers: of their pads, or of their bare backs."""
+        for index in self.fingers:
+            engine.changeDynamics(
+                self.body_id, index, lateralFriction=friction, spinningFriction=0.0, physicsClientId=self.world.client
+            )
 
     def open_to(self, opening: float) -> None:
         """Open or close the fingers to a distance [m], and wait until they are there."""

@@ -14,7 +14,7 @@ import numpy as np
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.simulation.world import PhysicsWorld
 from stages.tableware.planning.actions import Action, Grasp, Pull, PullGrasp, Stack, StackGrasp, after_pull, after_stack
-from stages.tableware.simulation.arm import Arm
+from stages.tableware.simulation.arm import BACK_FRICTION, PAD_FRICTION, Arm
 from stages.tableware.simulation.fast import Trial
 from stages.tableware.simulation.holds import (
     FREE,
@@ -36,6 +36,8 @@ from stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_cam
 
 TRAVEL = 0.17
 """Height of the fingertips on the way above everything [m]."""
+SPREAD = 0.72
+"""Share of a dish's inner radius to which the fingers open when they pull it from inside."""
 LIFT = 0.06
 """By how much what is held goes above everything else [m]."""
 
@@ -55,6 +57,8 @@ class Speeds:
     """For a utensil that is taken alone, or a pile of them."""
     edge: float = 10.0
     """For two utensils side by side: pressed harder, flat things edge to edge spring out of the fingers."""
+    cage: float = 6.0
+    """Around a utensil that is pulled."""
     carry_two: float = 0.4
     lift_two: float = 0.09
 
@@ -262,26 +266,31 @@ class PhysicsTable:
         begin = np.append(start + push.start * direction, push.tip)
         finish = np.append(end + push.reach * direction, push.tip)
         pose = tool_pose(begin, push.closing)
-        self._above(pose, push.opening)
-        self.arm.hold_open(push.opening)
+        self._above(pose, 0.002 if push.spread else push.opening)
         self._descend(pose)
         self.top.wake_near([start], 0.05)
         there = tool_pose(finish, push.closing)
-        self._key("inside")
-        self.arm.move_line(there, self.speeds.pull)
-        self._key("pulled")
-        away = there.copy()
-        away[:2, 3] -= 0.006 * direction
-        self.arm.move_line(away, 0.1)
+        self.arm.touch_with(BACK_FRICTION)
+        try:
+            if push.spread:
+                self.arm.open_to(push.opening)
+            self._key("inside")
+            self.arm.move_line(there, self.speeds.pull)
+            self._key("pulled")
+            away = there.copy()
+            away[:2, 3] -= 0.006 * direction
+            self.arm.move_line(away, 0.1)
+        finally:
+            self.arm.touch_with(PAD_FRICTION)
         self.arm.move_line(_raised(away, TRAVEL + 0.03), self.speeds.descend)
 
     def _pull_bar(self, action: Pull, item: Item) -> None:
-        """Cage a utensil between nearly closed fingers, lead it, let go."""
+        """Close lightly on a utensil where it lies, lead it over the table, let go: a loose cage slides along it."""
         tip = 0.0012
         pose = tool_pose(np.array([*action.p_S[:2], tip]), action.theta_S)
         self._above(pose, 0.032)
         self._descend(pose)
-        self.arm.open_to(0.0135)
+        self.arm.close(self.speeds.cage)
         self._key("inside")
         turn = (action.theta_E - action.theta_S + pi / 2) % pi - pi / 2
         there = tool_pose(np.array([*action.p_E[:2], tip]), action.theta_S + turn)
@@ -375,18 +384,28 @@ class Push:
     tip: float
     closing: float
     opening: float
+    spread: bool = False
+    """Whether the fingers go down closed and open inside."""
 
 
 def push_place(seen: Table, name: str, direction: np.ndarray) -> Push | None:
     """Return where the fingers go into the top of a pile that is pulled along `direction` (2,), or None where its load
-    leaves no room: closed at its middle or nearer to the wall, or open astride of a utensil that lies along the pull."""
+    leaves no room. In an empty dish they open across the pull, so that both push the wall ahead and the dish comes to
+    lie right behind them; beside a load they go in closed near the wall, or astride of a utensil."""
     family = walls(seen, name)
     dish, load = family[-1], cargo(seen, name)
     angle = atan2(direction[1], direction[0])
-    heights = [0.012, 0.02, 0.03] if not load else [0.02, 0.03, 0.04]
+    if not load:
+        height = 0.025
+        inner = dish.measures.inner_radius(dish.measures.wall + height)
+        aside = min(0.0425 + PAD, SPREAD * inner)
+        ahead = float(np.sqrt(inner**2 - aside**2)) - PAD_WIDTH / 2
+        tip = dish.position[2] + dish.measures.wall + height
+        return Push(0.0, ahead, tip, angle + pi / 2, 2.0 * (aside - PAD), True)
+    heights = [0.02, 0.03, 0.04]
     center = np.array(dish.position[:2])
     for height in heights:
-        height = max(height, dish.measures.height - JAW_HEIGHT + 0.002) if load else height
+        height = max(height, dish.measures.height - JAW_HEIGHT + 0.002)
         tip = dish.position[2] + dish.measures.wall + height
         inner = dish.measures.inner_radius(dish.measures.wall + height)
         shapes = [(angle, 0.0, PAD, PAD_WIDTH / 2), (angle + pi / 2, 0.036, PAD_WIDTH / 2, 0.018 + PAD)]
@@ -396,9 +415,9 @@ def push_place(seen: Table, name: str, direction: np.ndarray) -> Push | None:
             reach = float(np.sqrt(inner**2 - aside**2)) - ahead
             if reach < 0.003:
                 continue
-            for start in (0.0, reach * 0.5, reach - 0.006) if not load else (reach * 0.5, reach - 0.006, reach - 0.003):
+            for start in (reach * 0.5, reach - 0.006, reach - 0.003):
                 point = np.append(center + start * direction, tip)
-                clearance = jaw_clearance(tool_pose(point, closing), opening, load, []) if load else 1.0
+                clearance = jaw_clearance(tool_pose(point, closing), opening, load, [])
                 if clearance > 0.002:
                     return Push(start, reach, tip, closing, opening)
     return None

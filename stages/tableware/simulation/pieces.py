@@ -20,6 +20,8 @@ OUTER = 3
 """Facets of a wedge's outer face: nearly round, while the inner face is one facet."""
 THINNEST = 2e-4
 """Of a piece without its margin [m]."""
+FOOT = 0.0006
+"""By how much the floor stands clear of the table, so that the dish rests on its foot ring all round [m]."""
 MARGIN = 0.001
 """By which Bullet rounds convex hulls off [m]."""
 DISH_DENSITY = 1500.0
@@ -76,7 +78,7 @@ def shell_pieces(shell: Measures, sides: int | None = None, margin: float = MARG
                 corners.extend([radius * np.cos(angle), radius * np.sin(angle), height] for angle in turns)
         pieces.append(np.array(corners))
     disc = []
-    for height in (margin, max(shell.wall - margin, margin + THINNEST)):
+    for height in (margin + FOOT, max(shell.wall - margin, margin + FOOT + THINNEST)):
         reach = shell.outer_radius(height) - margin
         angles = step * np.arange(OUTER * sides)
         disc.append(np.column_stack([reach * np.cos(angles), reach * np.sin(angles), np.full(len(angles), height)]))
