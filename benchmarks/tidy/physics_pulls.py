@@ -2,11 +2,11 @@
 
     python -m benchmarks.tidy.physics_pulls --out FOLDER [--quick] [--part divergence|loads|pairs ...] [--seconds S]
 
-divergence: a pull of 20, 30 or 40 cm is aimed from a nominal place; the dish stands elsewhere, drawn uniformly where the
-closed fingers still go down inside it (10 placements a row, as the thesis). Initial and final distance: from where the
-dish should start and end. loads: piles are pulled at several speeds; kept: everything still stands where it stood on what
-carried it, and the pile within 1 cm of its goal. pairs: a pile is pulled to a dish like its lowest one, and both are
-carried away; kept: everything comes to the bin. One JSON line a pull in pulls.jsonl; a stopped run goes on.
+divergence: a pull of 20, 30 or 40 cm is aimed from a nominal place; the dish stands elsewhere, drawn uniformly where
+the closed fingers still go down inside it (10 placements a row, as the thesis). Initial and final distance: from where
+the dish should start and end. loads: piles are pulled at several speeds; kept: everything still stands on what carried
+it, and the pile within 1 cm of its goal. pairs: a pile is pulled to a dish like its lowest one, and both are carried
+away; kept: everything comes to the bin. One JSON line a pull in pulls.jsonl; a stopped run goes on.
 """
 
 from __future__ import annotations

@@ -54,7 +54,10 @@ class RobotDescription:
 
 
 def load_robot(name: str) -> RobotDescription:
-    """Read data/robots/<name>.toml; its URDF lies beside it or in pybullet_data. Raises UsageError (no such robot), MissingDependency (its URDF is not there)."""
+    """Read data/robots/<name>.toml; its URDF lies beside it or in pybullet_data.
+
+    Raises UsageError (no such robot), MissingDependency (its URDF is not there).
+    """
     path = FOLDER / f"{name}.toml"
     if not path.is_file():
         known = ", ".join(sorted(entry.stem for entry in FOLDER.glob("*.toml")))

@@ -134,7 +134,7 @@ class Arm:
         self.move_through([end], speed)
 
     def move_through(self, ends: list[np.ndarray], speed: float) -> None:
-        """Lead the tool along straight lines through poses, slower where the joints cannot follow. Raises MotionFailed."""
+        """Lead the tool along straight lines through poses, slower where joints cannot follow. Raises MotionFailed."""
         poses, start, length = [], self.pose_of(self.target), 0.0
         for end in ends:
             if end[:3, 1] @ start[:3, 1] < 0.0:

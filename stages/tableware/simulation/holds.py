@@ -1,8 +1,8 @@
 """Where the hand goes to hold things: tool poses, openings, and whether open jaws fit between what stands around.
 
-A dish is pinched by the wall. The hand leans by the wall's slant, so that the flat pads lie flat on it, and reaches as far
-below the lowest lip as the palm and what stands beneath allow. Of the points of a rim the one nearest to the wanted angle
-is taken at which the open jaws touch nothing.
+A dish is pinched by the wall. The hand leans by the wall's slant, so that the flat pads lie flat on it, and reaches as
+far below the lowest lip as the palm and what stands beneath allow. Of the points of a rim the one nearest to the wanted
+angle is taken at which the open jaws touch nothing.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ class Hold:
 
 
 def tool_pose(point: np.ndarray, closing: float, lean: float = 0.0) -> np.ndarray:
-    """Return world_from_tool (4, 4): fingertips at a point (3,), closing along an angle [rad], the hand leaning towards it
-    by `lean` [rad]."""
+    """Return world_from_tool (4, 4): fingertips at a point (3,), closing along an angle [rad], the hand leaning towards
+    it by `lean` [rad]."""
     radial, up = np.array([cos(closing), sin(closing), 0.0]), np.array([0.0, 0.0, 1.0])
     pose = np.eye(4)
     pose[:3, 2] = -sin(lean) * radial - cos(lean) * up
@@ -81,8 +81,10 @@ def reach_below(family: list[Item], most: float = DEPTH) -> float:
     return max(0.003, min(most, room))
 
 
-def rim_hold(table: Table, name: str, wanted: float, most: float = DEPTH, center: tuple[float, float] | None = None) -> Hold:
-    """Return how a pile is held by the rim from `name` upwards, as near to the angle `wanted` [rad] as jaws fit, and else
+def rim_hold(
+    table: Table, name: str, wanted: float, most: float = DEPTH, center: tuple[float, float] | None = None
+) -> Hold:
+    """Return how a pile is held by the rim from `name` upwards, as near to the angle `wanted` [rad] as jaws fit, else
     where they come nearest to fitting. `center` [m] is where the pile is, by default where the table says."""
     family = walls(table, name)
     base = family[0]

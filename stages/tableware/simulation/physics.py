@@ -205,10 +205,7 @@ class PhysicsTable:
         self.arm.move_line(up, self.speeds.lift_two if two else self.speeds.lift)
         self.top.sleep()
         self._key("lifted")
-        if two:
-            offset = np.zeros(2)
-        else:
-            offset = np.array(seen.by_name[names[0]].position[:2]) - pose[:2, 3]
+        offset = np.zeros(2) if two else np.array(seen.by_name[names[0]].position[:2]) - pose[:2, 3]
         goal = self._bin_pose(up, offset)
         self.arm.move_joints(goal, self.speeds.carry_two if two else self.speeds.carry)
         self._key("over the bin")
@@ -223,9 +220,7 @@ class PhysicsTable:
         self._key("released")
 
     def _near_bin(self) -> bool:
-        return any(
-            hypot(*(self.top.pose(name)[:2, 3] - np.array(BIN_CENTER))) < 0.25 for name in self.top.bodies
-        )
+        return any(hypot(*(self.top.pose(name)[:2, 3] - np.array(BIN_CENTER))) < 0.25 for name in self.top.bodies)
 
     def _bin_pose(self, pose: np.ndarray, offset: np.ndarray) -> np.ndarray:
         """Return arm values over the bin with the hand leaning as it does, whose turn moves the wrist least."""

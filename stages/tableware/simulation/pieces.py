@@ -1,8 +1,8 @@
 """Tableware as rigid bodies: convex pieces, mass, centre of mass, inertia.
 
-A dish's wall is a ring of convex wedges, its floor a prism. The wedges' inner faces touch the
-inner cone, their outer corners lie on the outer one, so that dishes nest as high as `items.rise` says at any angle. Bullet rounds convex pieces off outwards by a margin; pieces are made smaller by it. Mass and inertia are
-those of the true shape (`dish_shapes`), not of the pieces.
+A dish's wall is a ring of convex wedges, its floor a prism. The wedges' inner faces touch the inner cone, their outer
+corners lie on the outer one, so that dishes nest as high as `items.rise` says at any angle. Bullet rounds convex pieces
+off outwards by a margin; pieces are made smaller by it. Mass and inertia are those of the true shape (`dish_shapes`).
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def shell_pieces(shell: Measures, sides: int | None = None, margin: float = MARG
 
 
 def utensil_boxes(strip: Measures, fork: bool) -> list[np.ndarray]:
-    """Return boxes, as their corners (8, 3), that follow a utensil's plan: handle, neck, head in three, tines as one."""
+    """Return boxes, as their corners (8, 3), that follow a utensil's plan; a fork's tines are one."""
     points = np.asarray(utensil_mesh(strip, fork).vertices)
     cuts = np.array([-0.5, -0.2, 0.08, 0.20, 0.30, 0.42, 0.5]) * strip.length
     pieces = []

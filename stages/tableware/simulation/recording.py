@@ -28,8 +28,8 @@ class Recording:
         self.kinds |= {name: item.kind for name, item in world.top.items.items()}
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return labels (F,), seconds (F,), joints (F, 7) [rad, last the opening in m], names (N,), kinds (N,) and poses
-        (F, N, 4, 4), world_from_item [m]."""
+        """Return labels (F,), seconds (F,), joints (F, 7) [rad, last the opening in m], names (N,), kinds (N,), poses
+        (F, N, 4, 4) world_from_item [m]."""
         names = sorted(self.kinds)
         away = np.full((4, 4), np.nan)
         return {

@@ -146,9 +146,7 @@ class Tabletop:
         """Return the dishes that have fallen over on the table: they lean, and stand in no other dish."""
         table = self.read(everything=True)
         return tuple(
-            item.name
-            for item in table.items
-            if item.is_dish and item.on is None and self.lean(item.name) > TIPPED
+            item.name for item in table.items if item.is_dish and item.on is None and self.lean(item.name) > TIPPED
         )
 
     def lean(self, name: str) -> float:
