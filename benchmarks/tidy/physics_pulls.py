@@ -15,6 +15,7 @@ import argparse
 import json
 import time
 from collections import defaultdict
+from collections.abc import Callable
 from math import cos, hypot, pi, sin
 from pathlib import Path
 
@@ -117,7 +118,7 @@ def main() -> None:
     rows = _read(log)
     done = {(row["case"], row["number"]) for row in rows}
     repeats = 2 if options.quick else REPEATS
-    jobs = []
+    jobs: list[tuple[str, int, Callable[..., dict[str, float]], tuple[object, ...]]] = []
     if "divergence" in options.part:
         jobs += [
             (f"pull/{plural}/{length}", number, divergence, (plural, length, number))
@@ -139,7 +140,7 @@ def main() -> None:
         if options.seconds is not None and time.monotonic() - started > options.seconds:
             break
         if (case, number) not in done:
-            row = {"case": case, "number": number, **work(*arguments)}  # type: ignore[operator]
+            row = {"case": case, "number": number, **work(*arguments)}
             rows.append(row)
             with log.open("a", encoding="utf-8") as stream:
                 stream.write(json.dumps(row) + "\n")

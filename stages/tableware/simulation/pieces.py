@@ -69,7 +69,7 @@ def shell_pieces(shell: Measures, sides: int | None = None, margin: float = MARG
     low, high = margin * shell.height / shell.slant, shell.height * (1.0 - margin / shell.slant)
     pieces = []
     for number in range(sides):
-        corners = []
+        corners: list[list[float]] = []
         for height in (low, high):
             outer, inner = shell.outer_radius(height) - margin * lean, shell.inner_radius(height) + margin * lean
             inner = min(inner / cos(half), outer - THINNEST)
