@@ -74,7 +74,7 @@ def pile(letters: str, x: float, y: float, yaw: float) -> Table:
 
 
 def load(letters: str, speed: float, number: int) -> dict[str, float]:
-    """Return whether a pile bears a pull of 25 cm at a speed [m/s]."""
+    """Return whether a pile bears a pull of 18 cm at a speed [m/s]."""
     random = np.random.default_rng([number, LOADS.index(letters), 76])
     heading = random.uniform(-pi, pi)
     table = pile(letters, 0.0, 0.05, random.uniform(-pi / 2, pi / 2))
