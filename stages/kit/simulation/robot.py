@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from schemas.errors import UsageError
 from stages.kit.geometry.transforms import (
     inverse,
     quaternion_of,
@@ -42,6 +43,11 @@ class Robot:
     """A mobile arm loaded into a world. Kinematic use: `set`; physical use: `command`, then step the world."""
 
     def __init__(self, world: PhysicsWorld, description: RobotDescription) -> None:
+        if len(description.arm_joints) != len(ARM_FORCES):
+            raise UsageError(
+                f"the robot {description.name} has {len(description.arm_joints)} arm joints and stands still",
+                hint=f"choose one with {len(ARM_FORCES)} that drives, as panda",
+            )
         self.world = world
         self.description = description
         flags = engine.URDF_USE_SELF_COLLISION  # pairs are chosen below

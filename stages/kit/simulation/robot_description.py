@@ -54,23 +54,34 @@ class RobotDescription:
 
 
 def load_robot(name: str) -> RobotDescription:
-    """Read data/robots/<name>.toml. Raises UsageError (no such robot), MissingDependency (its URDF is not there)."""
+    """Read data/robots/<name>.toml; its URDF lies beside it or in pybullet_data.
+
+    Raises UsageError (no such robot), MissingDependency (its URDF is not there).
+    """
     path = FOLDER / f"{name}.toml"
     if not path.is_file():
         known = ", ".join(sorted(entry.stem for entry in FOLDER.glob("*.toml")))
         raise UsageError(f"no robot is called {name!r}", hint=f"known: {known}")
     values = tomllib.loads(path.read_text(encoding="utf-8"))
-    try:
-        import pybullet_data
-    except ImportError:
-        raise MissingDependency("the package pybullet is not installed", hint="run `make setup`") from None
-    urdf = Path(pybullet_data.getDataPath()) / values.pop("urdf")
+    urdf = FOLDER / values.pop("urdf")
     if not urdf.is_file():
-        raise MissingDependency(f"{urdf}: the robot's URDF is missing", hint="install pybullet again")
+        urdf = _installed(urdf.relative_to(FOLDER))
     fields: dict[str, Any] = {"urdf": urdf, **values}
     fields |= {key: np.array(fields[key], dtype=float) for key in ("lower", "upper", "carry")}
     fields |= {key: tuple(fields[key]) for key in ("arm_joints", "finger_joints", "finger_links", "palm")}
     return RobotDescription(**fields)
+
+
+def _installed(urdf: Path) -> Path:
+    """Return a URDF of the package pybullet_data. Raises MissingDependency when the package or the file is missing."""
+    try:
+        import pybullet_data
+    except ImportError:
+        raise MissingDependency("the package pybullet is not installed", hint="run `make setup`") from None
+    path = Path(pybullet_data.getDataPath()) / urdf
+    if not path.is_file():
+        raise MissingDependency(f"{path}: the robot's URDF is missing", hint="install pybullet again")
+    return path
 
 
 def _joint(name: str, kind: str, parent: str, child: str, axis: str, origin: str = "0 0 0") -> str:

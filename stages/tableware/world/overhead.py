@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -84,11 +85,12 @@ def _slab(width: float, depth: float, top: float) -> trimesh.Trimesh:
 def render_overhead(
     table: Table, seed: int, level: str = "usual", scheme: Scheme = "dark_on_white", *,
     noise: bool = True, view: OverheadCamera | None = None, others: tuple[trimesh.Trimesh, ...] = (),
+    poses: Mapping[str, np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Return (color (H, W, 3) uint8 sRGB, depth (H, W) float32 [m], 0 where the sensor reports none).
 
     The lamp's place, the dishes' tones and the noise follow from `seed`. `others` are meshes that are no tableware.
-    Without `noise` both images are exact.
+    Without `noise` both images are exact. `poses`: item -> world_from_item (4, 4) where it does not stand upright.
     """
     view = view or overhead_camera()
     light = LEVELS[level]
@@ -98,7 +100,12 @@ def render_overhead(
     meshes.append((2, _coloured(_slab(6.0, 6.0, FLOOR), np.array([0.42, 0.38, 0.35]))))
     for index, item in enumerate(table.items):
         tone = dish_tone + random.uniform(-0.08, 0.08) + random.uniform(-0.05, 0.05, 3)
-        meshes.append((3 + index, _coloured(item_mesh(item), tone)))
+        mesh = item_mesh(item)
+        if poses is not None and item.name in poses:
+            upright = trimesh.transformations.rotation_matrix(item.yaw, [0.0, 0.0, 1.0])
+            upright[:3, 3] = item.position
+            mesh.apply_transform(poses[item.name] @ np.linalg.inv(upright))
+        meshes.append((3 + index, _coloured(mesh, tone)))
     first_other = 3 + len(table.items)
     for index, mesh in enumerate(others):
         meshes.append((first_other + index, _coloured(mesh.copy(), random.uniform(0.2, 0.7, 3))))

@@ -1,0 +1,252 @@
+"""The UR5 with its hand in a physics world: trajectories with contact, and quick ones above everything without.
+
+Tool poses are world_from_tool (4, 4): origin between the fingertips, z out of the hand, y along which the fingers
+close. The arm keeps to one branch of its kinematics (elbow up, hand down), in which it reaches the whole table and the
+bin from where it stands.
+"""
+
+from __future__ import annotations
+
+from math import asin, atan2, hypot, pi
+
+import numpy as np
+
+from stages.kit.motion.cartesian import follow, straight_poses
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.kinematics import arm_chain, forward, inverse_kinematics
+from stages.kit.motion.timing import sample_times, time_path
+from stages.kit.simulation.engine import engine
+from stages.kit.simulation.robot_description import load_robot
+from stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
+from stages.kit.simulation.world import PhysicsWorld
+
+BASE = np.array([0.0, -0.46, 0.15])
+"""Where the arm stands, higher than the table top: else the upper arm sweeps dishes off it when it reaches far [m]."""
+PAD_FRICTION, BACK_FRICTION = 1.6, 0.3
+"""Of rubber pads, and of the bare metal that pushes a dish from inside; Bullet multiplies the two of a contact."""
+JOINT_EFFORTS = np.array([150.0, 150.0, 150.0, 28.0, 28.0, 28.0])
+"""Torques [N m] of the UR5's joints."""
+CLOSING_SPEED = 0.06
+"""Of each finger [m/s]."""
+PAUSE = 0.15
+"""Before and after each movement of the fingers [s]."""
+WRIST_OFFSET = 0.10915
+"""Distance of the arm's plane from the axis of its first joint [m]."""
+
+
+class Arm:
+    """Moves; counts its time in `seconds`."""
+
+    def __init__(self, world: PhysicsWorld) -> None:
+        self.world = world
+        self.description = load_robot("ur5")
+        self.chain = arm_chain(self.description)
+        self.seconds = 0.0
+        urdf = self.description.urdf
+        text = without_visuals(with_absolute_meshes(read_urdf(urdf), urdf.parent))
+        self.body_id = world.load_urdf_text(text, fixed=True)
+        client = world.client
+        # pybullet's base pose is that of the centre of mass, not of the link frame.
+        center = BASE + np.array(engine.getDynamicsInfo(self.body_id, -1, physicsClientId=client)[3])
+        engine.resetBasePositionAndOrientation(self.body_id, center.tolist(), [0, 0, 0, 1], physicsClientId=client)
+        links, joints = {}, {}
+        for index in range(engine.getNumJoints(self.body_id, physicsClientId=client)):
+            info = engine.getJointInfo(self.body_id, index, physicsClientId=client)
+            links[info[12].decode()], joints[info[1].decode()] = index, index
+        self.joints = [joints[name] for name in self.description.arm_joints]
+        self.fingers = [joints[name] for name in self.description.finger_joints]
+        self.touch_with(PAD_FRICTION)
+        gear = engine.createConstraint(
+            self.body_id, self.fingers[0], self.body_id, self.fingers[1], engine.JOINT_GEAR, [0, 1, 0], [0, 0, 0],
+            [0, 0, 0], physicsClientId=client,
+        )  # fmt: skip
+        engine.changeConstraint(gear, gearRatio=-1, erp=0.2, maxForce=500, physicsClientId=client)
+        self.opening = self.description.opening
+        self.target = self.description.carry.copy()
+        self.put(self.target)
+        self._set_fingers(self.opening)
+
+    # --- state ------------------------------------------------------------------------------------------------
+
+    def values(self) -> np.ndarray:
+        """Return the arm's joint values (6,)."""
+        states = engine.getJointStates(self.body_id, self.joints, physicsClientId=self.world.client)
+        return np.array([state[0] for state in states])
+
+    def finger_gap(self) -> float:
+        """Return the distance between the fingers [m]."""
+        states = engine.getJointStates(self.body_id, self.fingers, physicsClientId=self.world.client)
+        return float(sum(state[0] for state in states))
+
+    def tool_pose(self) -> np.ndarray:
+        """Return world_from_tool (4, 4)."""
+        return self.pose_of(self.values())
+
+    def pose_of(self, arm: np.ndarray) -> np.ndarray:
+        """Return world_from_tool (4, 4) of joint values (6,)."""
+        pose = forward(self.chain, arm)
+        pose[:3, 3] += BASE
+        return pose
+
+    def put(self, arm: np.ndarray) -> None:
+        """Set the joints, at rest."""
+        for index, value in zip(self.joints, arm, strict=True):
+            engine.resetJointState(self.body_id, index, float(value), physicsClientId=self.world.client)
+        self.target = np.array(arm, dtype=float)
+        self._command(self.target, np.zeros(6))
+
+    def _set_fingers(self, opening: float) -> None:
+        for index in self.fingers:
+            engine.resetJointState(self.body_id, index, opening / 2, physicsClientId=self.world.client)
+        self.hold_open(opening)
+
+    # --- kinematics -------------------------------------------------------------------------------------------
+
+    def solve(self, pose: np.ndarray, *, held: bool = False) -> np.ndarray | None:
+        """Return joint values (6,) for a tool pose, None where it is not reached. With nothing held the one turned by
+        half a turn will do as well, as the fingers are alike: the answer that moves the joints least is taken."""
+        near = self.target
+        found = []
+        for half_turn in (False,) if held else (False, True):
+            wanted = pose.copy()
+            if half_turn:
+                wanted[:3, :2] *= -1.0
+            wanted[:3, 3] -= BASE
+            radius = hypot(wanted[0, 3], wanted[1, 3])
+            if radius < WRIST_OFFSET:
+                continue
+            first = atan2(wanted[1, 3], wanted[0, 3]) - pi - asin(WRIST_OFFSET / radius)
+            first = first + 2 * pi * round((self.description.carry[0] - first) / (2 * pi))
+            starts = [np.array([first, -1.4, 1.6, -1.77, -pi / 2, last]) for last in (near[5], 0.0, 2.0, 4.0)]
+            solution = inverse_kinematics(self.chain, wanted, np.array(starts))
+            if solution.found and solution.arm[2] > 0.0:
+                arm = solution.arm
+                turns = np.round((near[5] - arm[5]) / (2 * pi)) * 2 * pi
+                if abs(arm[5] + turns) < 2 * pi:
+                    arm[5] += turns
+                found.append(arm)
+        return min(found, key=lambda arm: float(np.abs(arm - near).max())) if found else None
+
+    # --- motion -----------------------------------------------------------------------------------------------
+
+    def move_line(self, end: np.ndarray, speed: float) -> None:
+        """Lead the tool along a straight line to a pose at `speed` [m/s]. Raises MotionFailed."""
+        self.move_through([end], speed)
+
+    def move_through(self, ends: list[np.ndarray], speed: float) -> None:
+        """Lead the tool along straight lines through poses, slower where joints cannot follow. Raises MotionFailed."""
+        poses, start, length = [], self.pose_of(self.target), 0.0
+        for end in ends:
+            if end[:3, 1] @ start[:3, 1] < 0.0:
+                end = end.copy()
+                end[:3, :2] *= -1.0
+            poses.extend(straight_poses(start, end, step=0.02))
+            length += float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
+            start = end
+        if length < 1e-5:
+            return
+        in_base = []
+        for pose in poses:
+            pose = pose.copy()
+            pose[:3, 3] -= BASE
+            in_base.append(pose)
+        rows = follow(self.chain, in_base, self.target)
+        path = np.vstack([self.target, rows])
+        times, points = time_path(path, *self._limits(1.0))
+        times = times * max(1.0, length / speed / float(times[-1]))
+        self._run(times, points)
+
+    def move_joints(self, end: np.ndarray, share: float) -> None:
+        """Move all joints to `end` (6,) at a share of the arm's speed and acceleration, with physics."""
+        times, points = time_path(np.array([self.target, end]), *self._limits(share))
+        self._run(times, points)
+
+    def jump(self, end: np.ndarray) -> None:
+        """Move the empty hand above everything to `end` (6,): nothing is met, so that only the time is counted."""
+        times, _ = time_path(np.array([self.target, end]), *self._limits(1.0))
+        self.seconds += float(times[-1])
+        self.put(end)
+
+    def lowest(self, end: np.ndarray) -> float:
+        """Return the least height [m] of the tool on the way to `end` (6,) in joint space."""
+        shares = np.linspace(0.0, 1.0, 12)[:, None]
+        return min(float(self.pose_of(row)[2, 3]) for row in self.target + shares * (end - self.target))
+
+    def wait(self, seconds: float) -> None:
+        """Hold still for a time [s]."""
+        count = max(1, round(seconds / self.world.time_step))
+        self._command(self.target, np.zeros(6))
+        self.world.step(count)
+        self.seconds += count * self.world.time_step
+
+    # --- hand -------------------------------------------------------------------------------------------------
+
+    def touch_with(self, friction: float) -> None:
+        """Set the friction of the fingers: of their pads, or of their bare backs."""
+        for index in self.fingers:
+            engine.changeDynamics(
+                self.body_id, index, lateralFriction=friction, spinningFriction=0.0, physicsClientId=self.world.client
+            )
+
+    def open_to(self, opening: float) -> None:
+        """Open or close the fingers to a distance [m], and wait until they are there."""
+        change = abs(opening - self.finger_gap())
+        self.hold_open(opening)
+        self.wait(PAUSE + change / 2 / CLOSING_SPEED)
+
+    def hold_open(self, opening: float) -> None:
+        """Set the fingers' target distance [m]."""
+        self.opening = opening
+        for index in self.fingers:
+            engine.setJointMotorControl2(
+                self.body_id, index, engine.POSITION_CONTROL, targetPosition=opening / 2, force=200.0,
+                maxVelocity=1.5 * CLOSING_SPEED, positionGain=0.3, velocityGain=1.0,
+                physicsClientId=self.world.client,
+            )  # fmt: skip
+
+    def close(self, force: float) -> None:
+        """Close the fingers with a force [N] each until they stand still; they go on pressing."""
+        for index in self.fingers:
+            engine.setJointMotorControl2(
+                self.body_id, index, engine.VELOCITY_CONTROL, targetVelocity=-CLOSING_SPEED, force=force,
+                physicsClientId=self.world.client,
+            )  # fmt: skip
+        still, before = 0, self.finger_gap()
+        for _ in range(60):
+            self.wait(5 * self.world.time_step)
+            now = self.finger_gap()
+            still = still + 1 if abs(now - before) < 2e-4 else 0
+            before = now
+            if still >= 3:
+                break
+        self.wait(PAUSE)
+
+    # --- inside -----------------------------------------------------------------------------------------------
+
+    def _limits(self, share: float) -> tuple[np.ndarray, np.ndarray]:
+        return (
+            np.full(6, self.description.arm_speed * share),
+            np.full(6, self.description.arm_acceleration * share),
+        )
+
+    def _run(self, times: np.ndarray, points: np.ndarray) -> None:
+        if len(times) < 2:
+            return
+        step = self.world.time_step
+        before = self.target
+        for row in sample_times(times, points, step):
+            self._command(row, (row - before) / step)
+            before = row
+            self.world.step()
+            self.seconds += step
+        self.target = points[-1].copy()
+
+    def _command(self, arm: np.ndarray, velocity: np.ndarray) -> None:
+        engine.setJointMotorControlArray(
+            self.body_id, self.joints, engine.POSITION_CONTROL, targetPositions=arm.tolist(),
+            targetVelocities=velocity.tolist(), positionGains=[0.3] * 6, velocityGains=[1.0] * 6,
+            forces=JOINT_EFFORTS.tolist(), physicsClientId=self.world.client,
+        )  # fmt: skip
+
+
+__all__ = ["BASE", "Arm", "MotionFailed"]

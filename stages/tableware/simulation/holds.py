@@ -1,0 +1,207 @@
+"""Where the hand goes to hold things: tool poses, openings, and whether open jaws fit between what stands around.
+
+A dish is pinched by the wall. The hand leans by the wall's slant, so that the flat pads lie flat on it, and reaches as
+far below the lowest lip as the palm and what stands beneath allow. Of the points of a rim the one nearest to the wanted
+angle is taken at which the open jaws touch nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2, cos, pi, sin
+
+import numpy as np
+
+from stages.tableware.simulation.pieces import solid
+from stages.tableware.world.footprints import Footprint, footprint, gap
+from stages.tableware.world.items import Item, Table
+
+JAW_HEIGHT, PAD, PAD_WIDTH, KNUCKLE = 0.045, 0.007, 0.022, 0.014
+"""Height of the fingertips, their thickness and width, thickness of the knuckles above them [m]; see ur5.urdf."""
+DEPTH = 0.020
+"""How far the pads reach below the lowest lip where they can [m]."""
+DEPTH_TWO = 0.030
+"""The same when two dishes are pressed together."""
+ROOM = 0.007
+"""Between an open pad and the wall on each side [m]."""
+PALM_ROOM = 0.003
+FREE = 0.003
+"""What open jaws keep from others [m]."""
+ABOVE = 0.0005
+"""Of the fingertips over the table when they take a utensil [m]."""
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A tool pose at which the fingers close from an opening [m], and how far they come with it."""
+
+    pose: np.ndarray
+    opening: float
+    clearance: float
+    """Least distance [m] of the open jaws from others."""
+
+
+def tool_pose(point: np.ndarray, closing: float, lean: float = 0.0) -> np.ndarray:
+    """Return world_from_tool (4, 4): fingertips at a point (3,), closing along an angle [rad], the hand leaning towards
+    it by `lean` [rad]."""
+    radial, up = np.array([cos(closing), sin(closing), 0.0]), np.array([0.0, 0.0, 1.0])
+    pose = np.eye(4)
+    pose[:3, 2] = -sin(lean) * radial - cos(lean) * up
+    pose[:3, 1] = cos(lean) * radial - sin(lean) * up
+    pose[:3, 0] = np.cross(pose[:3, 1], pose[:3, 2])
+    pose[:3, 3] = point
+    return pose
+
+
+def walls(table: Table, name: str) -> list[Item]:
+    """Return the dishes of a pile from `name` upwards whose walls lie in one another; what stands free in them is not
+    held between the fingers."""
+    family = [table.by_name[name]]
+    for item in table.load(name):
+        base = family[-1]
+        if not item.is_dish:
+            break
+        rise = item.position[2] - base.position[2]
+        if item.kind != base.kind or rise > 0.6 * base.measures.height:
+            break
+        family.append(item)
+    return family
+
+
+def cargo(table: Table, name: str) -> list[Item]:
+    """Return what a pile carries from `name` upwards beside `walls`."""
+    held = {item.name for item in walls(table, name)}
+    return [item for item in table.load(name) if item.name not in held]
+
+
+def reach_below(family: list[Item], most: float = DEPTH) -> float:
+    """Return how far [m] the pads go below the lowest lip of some nested dishes."""
+    lips = [item.lip for item in family]
+    room = JAW_HEIGHT - PALM_ROOM - (max(lips) - min(lips))
+    return max(0.003, min(most, room))
+
+
+def rim_hold(
+    table: Table, name: str, wanted: float, most: float = DEPTH, center: tuple[float, float] | None = None
+) -> Hold:
+    """Return how a pile is held by the rim from `name` upwards, as near to the angle `wanted` [rad] as jaws fit, else
+    where they come nearest to fitting. `center` [m] is where the pile is, by default where the table says."""
+    family = walls(table, name)
+    base = family[0]
+    x, y = center or (base.position[0], base.position[1])
+    low_lip = min(item.lip for item in family)
+    depth = reach_below(family, most)
+    tip = low_lip - depth
+    lean = atan2(base.measures.rim_radius - base.measures.foot_radius, base.measures.height)
+    outer = max(item.measures.outer_radius(tip - item.position[2]) for item in family)
+    inner = min(item.measures.inner_radius(tip - item.position[2]) for item in family)
+    middle, opening = (outer + inner) / 2, (outer - inner) * cos(lean) + 2 * ROOM
+    others = [item for pile in table.stacks for item in pile if base.name not in {other.name for other in pile}]
+    own = cargo(table, name)
+    best: Hold | None = None
+    for turn in sorted(np.linspace(-pi, pi, 36, endpoint=False), key=abs):
+        angle = wanted + float(turn)
+        point = np.array([x + middle * cos(angle), y + middle * sin(angle), tip])
+        pose = tool_pose(point, angle, lean)
+        clearance = jaw_clearance(pose, opening, others, own)
+        if best is None or clearance > best.clearance:
+            best = Hold(pose, opening, min(clearance, FREE))
+        if clearance >= FREE:
+            break
+    assert best is not None
+    return best
+
+
+def jaw_clearance(pose: np.ndarray, opening: float, others: list[Item], own: list[Item]) -> float:
+    """Return the least distance [m] between open jaws and other things, seen from above at the height of each thing's
+    upper edge; of the own pile's cargo the inner pad only has to keep clear."""
+    least = 1.0
+    tip = pose[2, 3]
+    for item in [*others, *own]:
+        if item.lip < tip - 0.002:
+            continue
+        top = min(item.lip, tip + 0.10)
+        knuckles = item.lip > tip + JAW_HEIGHT
+        thickness = KNUCKLE if knuckles else PAD
+        backwards = (top - tip) / max(-pose[2, 2], 0.5)
+        place = footprint(item)
+        for side in (-1.0, 1.0):
+            for back in (0.0, backwards):
+                middle = pose[:3, 3] - back * pose[:3, 2] + side * (opening / 2 + thickness / 2) * pose[:3, 1]
+                half = PAD_WIDTH / 2 - thickness / 2
+                across = half * pose[:3, 0]
+                print_ = Footprint(
+                    (float(middle[0] - across[0]), float(middle[1] - across[1])),
+                    (float(middle[0] + across[0]), float(middle[1] + across[1])),
+                    thickness / 2,
+                )
+                least = min(least, gap(print_, place))
+    return least
+
+
+def pair_hold(table: Table, first: str, second: str, point: tuple[float, float, float], closing: float) -> Hold:
+    """Return how two piles side by side are taken by the walls that face each other, or two utensils across."""
+    one, other = table.by_name[first], table.by_name[second]
+    others = [i for p in table.stacks for i in p if not {first, second} & {o.name for o in p}]
+    if not one.is_dish:
+        turned = (other.yaw - one.yaw + pi / 2) % pi - pi / 2
+        yaw = one.yaw + turned / 2
+        across = np.array([-sin(yaw), cos(yaw)])
+        apart = abs(float(across @ (np.array(other.position[:2]) - np.array(one.position[:2]))))
+        opening = min(0.085, apart + one.measures.width + 0.014)
+        tip = min(one.position[2], other.position[2]) + ABOVE
+        along = touching(one, other, yaw)
+        place = np.array([point[0] + along * cos(yaw), point[1] + along * sin(yaw), tip])
+        pose = tool_pose(place, yaw + pi / 2)
+        return Hold(pose, opening, jaw_clearance(pose, opening, others, []))
+    families = [walls(table, name) for name in (first, second)]
+    tip = max(min(item.lip for item in family) for family in families)
+    lips = [item.lip for family in families for item in family]
+    tip = min(item.lip for family in families for item in family) - max(
+        0.003, min(DEPTH_TWO, JAW_HEIGHT - PALM_ROOM - (max(lips) - min(lips)))
+    )
+    pose = tool_pose(np.array([point[0], point[1], tip]), closing)
+    own = [item for name in (first, second) for item in cargo(table, name)]
+    return Hold(pose, 0.085, jaw_clearance(pose, 0.085, others, own))
+
+
+def touching(one: Item, other: Item, yaw: float) -> float:
+    """Return how far [m] from the middle between two utensils, along `yaw` [rad], they meet when pushed together: the
+    middle of where their widths add up to the most. Pads that press elsewhere would turn them."""
+    axis = np.array([cos(yaw), sin(yaw)])
+    middle = (np.array(one.position[:2]) + np.array(other.position[:2])) / 2
+    places = np.arange(-0.08, 0.081, 0.005)
+    totals = np.zeros(len(places))
+    for item in (one, other):
+        forwards = 1.0 if cos(item.yaw - yaw) >= 0.0 else -1.0
+        offset = float(axis @ (np.array(item.position[:2]) - middle))
+        totals += [half_width(item, forwards * (float(place) - offset)) for place in places]
+    meeting = places[totals >= totals.max() - 0.0015]
+    return float(meeting.min() + meeting.max()) / 2
+
+
+def half_width(item: Item, along: float) -> float:
+    """Return half the width [m] of a utensil at a distance from its middle towards the head, 0 beyond its ends."""
+    for corners in solid(item.kind).pieces:
+        if corners[:, 0].min() - 0.0015 <= along <= corners[:, 0].max() + 0.0015:
+            return float(np.abs(corners[:, 1]).max())
+    return 0.0
+
+
+def bar_hold(table: Table, name: str, opening: float = 0.032) -> Hold:
+    """Return how a utensil, or a pile of utensils, is taken across its middle."""
+    item = table.by_name[name]
+    others = [i for p in table.stacks for i in p if name not in {o.name for o in p}]
+    best: Hold | None = None
+    for shift in (0.0, 0.015, -0.015, 0.03, -0.03, 0.045, -0.045):
+        x = item.position[0] + shift * cos(item.yaw)
+        y = item.position[1] + shift * sin(item.yaw)
+        tip = item.position[2] + (ABOVE if item.position[2] < 0.001 else -0.0005 if item.on is None else ABOVE)
+        pose = tool_pose(np.array([x, y, tip]), item.yaw + pi / 2)
+        clearance = jaw_clearance(pose, opening, others, [])
+        if best is None or clearance > best.clearance + 1e-6:
+            best = Hold(pose, opening, min(clearance, FREE))
+        if clearance >= FREE:
+            break
+    assert best is not None
+    return best

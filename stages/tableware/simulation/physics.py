@@ -1,0 +1,429 @@
+"""Clearing a table in physics: the actions of planning/actions.py, carried out by an arm that touches things.
+
+Nothing is fastened to anything: what is carried is held by friction between the pads, and may slip, tip or fall.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import atan2, cos, hypot, pi, sin
+
+import numpy as np
+
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.simulation.world import PhysicsWorld
+from stages.tableware.planning.actions import Action, Grasp, Pull, PullGrasp, Stack, StackGrasp, after_pull, after_stack
+from stages.tableware.simulation.arm import BACK_FRICTION, PAD_FRICTION, Arm
+from stages.tableware.simulation.fast import Trial
+from stages.tableware.simulation.holds import (
+    FREE,
+    JAW_HEIGHT,
+    PAD,
+    PAD_WIDTH,
+    Hold,
+    bar_hold,
+    cargo,
+    jaw_clearance,
+    pair_hold,
+    rim_hold,
+    tool_pose,
+    walls,
+)
+from stages.tableware.simulation.tabletop import BIN_CENTER, Tabletop
+from stages.tableware.world.items import Item, Table, rise
+from stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_camera, render_overhead
+
+TRAVEL = 0.17
+"""Height of the fingertips on the way above everything [m]."""
+SPREAD = 0.72
+"""Share of a dish's inner radius to which the fingers open when they pull it from inside."""
+LIFT = 0.06
+"""By how much what is held goes above everything else [m]."""
+
+
+@dataclass(frozen=True)
+class Speeds:
+    """Of the tool [m/s], shares of the arm's joint speeds, forces [N]."""
+
+    descend: float = 0.25
+    touch: float = 0.10
+    lift: float = 0.15
+    pull: float = 0.15
+    carry: float = 0.7
+    force: float = 40.0
+    firm: float = 80.0
+    gentle: float = 20.0
+    """For a utensil that is taken alone, or a pile of them."""
+    edge: float = 10.0
+    """For two utensils side by side: pressed harder, flat things edge to edge spring out of the fingers."""
+    cage: float = 6.0
+    """Around a utensil that is pulled."""
+    carry_two: float = 0.4
+    lift_two: float = 0.09
+
+
+class PhysicsTable:
+    """A world as `fast.FastWorld`: `table`, `trial`, `do`."""
+
+    def __init__(
+        self, table: Table, *, speeds: Speeds | None = None, record: Callable[[PhysicsTable, str], None] | None = None
+    ) -> None:
+        self.speeds = speeds or Speeds()
+        self.world = PhysicsWorld()
+        self.top = Tabletop(self.world, table)
+        self.arm = Arm(self.world)
+        self.record = record
+        self.top.rest(1.0)
+        self.table = self.top.read()
+        self.trial = Trial(left=len(self.table.items))
+        self.troubles: list[str] = []
+        """What could not be done, in order."""
+        self._key("start")
+
+    def close(self) -> None:
+        """Free the physics engine; the world cannot be used afterwards."""
+        self.world.close()
+
+    def image(
+        self, seed: int = 0, level: str = "usual", scheme: Scheme = "dark_on_white"
+    ) -> tuple[np.ndarray, np.ndarray, OverheadCamera]:
+        """Return what the overhead camera sees of the bodies: color (H, W, 3) uint8, depth (H, W) float32 [m], camera.
+        The arm is out of the picture."""
+        items = sorted(self.top.read(everything=True).items, key=lambda item: item.name)
+        poses = {item.name: self.top.pose(item.name) for item in items}
+        view = overhead_camera()
+        color, depth = render_overhead(Table(tuple(items)), seed, level, scheme, view=view, poses=poses)
+        return color, depth, view
+
+    def _key(self, label: str) -> None:
+        if self.record is not None:
+            self.record(self, label)
+
+    # --- actions ----------------------------------------------------------------------------------------------
+
+    def do(self, action: Action, seen: Table | None = None) -> None:
+        """Carry out an action that was decided on `seen`, by default the true table; a composite one without looking in
+        between. What then is where is read from the bodies."""
+        seen = seen or self.table
+        self.troubles = []
+        try:
+            if isinstance(action, PullGrasp):
+                self._pull(action.u_P, seen)
+                self._grasp(action.u_G, _after(seen, action))
+            elif isinstance(action, StackGrasp):
+                self._stack(action.u_S, seen)
+                self._grasp(action.u_G, _after(seen, action))
+            elif isinstance(action, Pull):
+                self._pull(action, seen)
+            elif isinstance(action, Stack):
+                self._stack(action, seen)
+            else:
+                self._grasp(action, seen)
+        except MotionFailed as failure:
+            self.troubles.append(str(failure))
+            self._retreat()
+        self._read()
+        self._key("done")
+
+    def _read(self) -> None:
+        self.arm.seconds += self.top.rest(0.6)
+        self.table = self.top.read()
+        lying = len(self.top.bodies) - len(self.table.items)
+        self.trial.moved = len(self.top.binned)
+        self.trial.dropped = len(self.top.lost) + lying
+        self.trial.left = len(self.table.items)
+        self.trial.seconds = self.arm.seconds
+
+    def _grasp(self, action: Grasp, seen: Table) -> None:
+        self.trial.trips += 1
+        names = [name for name in action.items if name in seen.by_name]
+        if len(names) == 2:
+            hold = pair_hold(seen, names[0], names[1], action.p_G, action.theta_G)
+        elif seen.by_name[names[0]].is_dish:
+            hold = rim_hold(seen, names[0], action.theta_G)
+        else:
+            hold = bar_hold(seen, names[0])
+        self._take(hold, self._force(seen, names))
+        self._to_bin(seen, names)
+
+    def _force(self, seen: Table, names: list[str]) -> float:
+        """Return the force [N] of each finger for some piles."""
+        count = sum(1 + len(seen.load(name)) for name in names)
+        if all(not seen.by_name[name].is_dish for name in names):
+            return self.speeds.edge if len(names) == 2 else self.speeds.gentle
+        return self.speeds.force if count == 1 else self.speeds.firm
+
+    def _take(self, hold: Hold, force: float) -> None:
+        """Go there and close."""
+        self._above(hold.pose, hold.opening)
+        self._descend(hold.pose)
+        self.arm.close(force)
+        self._key("closed")
+
+    def _above(self, pose: np.ndarray, opening: float) -> None:
+        """Bring the empty hand over a pose, with the fingers at an opening."""
+        high = _raised(pose, TRAVEL + (0.05 if pose[2, 3] > 0.08 else 0.0))
+        arm = self.arm.solve(high)
+        if arm is None:
+            raise MotionFailed("no_inverse_kinematics", "the arm does not reach above the grasp")
+        self._settle()
+        self.arm.jump(arm)
+        self.arm._set_fingers(opening)
+        self.arm.seconds += 0.3
+
+    def _settle(self) -> None:
+        """Let moving things come to rest while the hand is away from them; the way takes longer than that."""
+        self.top.rest(0.5)
+
+    def _descend(self, pose: np.ndarray) -> None:
+        near = pose.copy()
+        near[:3, 3] -= 0.025 * pose[:3, 2]
+        self.arm.move_line(near, self.speeds.descend)
+        self.arm.move_line(pose, self.speeds.touch)
+
+    def _retreat(self) -> None:
+        """Let go and go straight up."""
+        self.arm.open_to(min(0.085, self.arm.finger_gap() + 0.016))
+        pose = self.arm.pose_of(self.arm.target)
+        try:
+            self.arm.move_line(_raised(pose, TRAVEL), self.speeds.descend)
+        except MotionFailed:
+            self.arm.put(self.arm.description.carry)
+
+    def _to_bin(self, seen: Table, names: list[str]) -> None:
+        """Lift what is held, carry it over the bin, let go."""
+        held = {name for name in names} | {item.name for name in names for item in seen.load(name)}
+        self.top.wake_near([np.array(seen.by_name[name].position[:2]) for name in held], 0.03)
+        pose = self.arm.pose_of(self.arm.target)
+        lowest = min(seen.by_name[name].position[2] for name in held)
+        highest = max([item.lip for item in self.table.items if item.name not in held], default=0.0)
+        clear = highest + LIFT - lowest
+        up = _raised(pose, pose[2, 3] + max(clear, 0.06))
+        self.arm.move_line(_raised(pose, pose[2, 3] + 0.01), 0.05)
+        two = len(names) == 2
+        self.arm.move_line(up, self.speeds.lift_two if two else self.speeds.lift)
+        self.top.sleep()
+        self._key("lifted")
+        offset = np.zeros(2) if two else np.array(seen.by_name[names[0]].position[:2]) - pose[:2, 3]
+        goal = self._bin_pose(up, offset)
+        self.arm.move_joints(goal, self.speeds.carry_two if two else self.speeds.carry)
+        self._key("over the bin")
+        self.arm.open_to(min(0.085, self.arm.finger_gap() + 0.03))
+        self.arm.wait(0.15)
+        self.top.sweep()
+        for _ in range(12):
+            if not self._near_bin():
+                break
+            self.arm.wait(0.05)
+            self.top.sweep()
+        self._key("released")
+
+    def _near_bin(self) -> bool:
+        return any(hypot(*(self.top.pose(name)[:2, 3] - np.array(BIN_CENTER))) < 0.25 for name in self.top.bodies)
+
+    def _bin_pose(self, pose: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        """Return arm values over the bin with the hand leaning as it does, whose turn moves the wrist least."""
+        best: tuple[float, np.ndarray] | None = None
+        for turn in np.linspace(-pi, pi, 16, endpoint=False):
+            rotation = np.array([[cos(turn), -sin(turn), 0.0], [sin(turn), cos(turn), 0.0], [0.0, 0.0, 1.0]])
+            there = pose.copy()
+            there[:3, :3] = rotation @ pose[:3, :3]
+            there[:2, 3] = np.array(BIN_CENTER) - rotation[:2, :2] @ offset
+            arm = self.arm.solve(there, held=True)
+            if arm is not None:
+                cost = float(np.abs(arm - self.arm.target).max())
+                if best is None or cost < best[0]:
+                    best = (cost, arm)
+        if best is None:
+            raise MotionFailed("no_inverse_kinematics", "the arm does not reach the bin")
+        return best[1]
+
+    # --- pulls ------------------------------------------------------------------------------------------------
+
+    def _pull(self, action: Pull, seen: Table) -> None:
+        self.trial.pulls += 1
+        item = seen.by_name[action.item]
+        if item.is_dish:
+            self._pull_dish(action, seen)
+        else:
+            self._pull_bar(action, item)
+
+    def _pull_dish(self, action: Pull, seen: Table) -> None:
+        start, end = np.array(action.p_S[:2]), np.array(action.p_E[:2])
+        length = float(np.linalg.norm(end - start))
+        if length < 0.002:
+            return
+        direction = (end - start) / length
+        push = push_place(seen, action.item, direction)
+        if push is None:
+            raise MotionFailed("in_collision", f"there is no room for the fingers in {action.item}")
+        begin = np.append(start + push.start * direction, push.tip)
+        finish = np.append(end + push.reach * direction, push.tip)
+        pose = tool_pose(begin, push.closing)
+        self._above(pose, 0.002 if push.spread else push.opening)
+        self._descend(pose)
+        self.top.wake_near([start], 0.05)
+        there = tool_pose(finish, push.closing)
+        self.arm.touch_with(BACK_FRICTION)
+        try:
+            if push.spread:
+                self.arm.open_to(push.opening)
+            self._key("inside")
+            self.arm.move_line(there, self.speeds.pull)
+            self._key("pulled")
+            away = there.copy()
+            away[:2, 3] -= 0.006 * direction
+            self.arm.move_line(away, 0.1)
+        finally:
+            self.arm.touch_with(PAD_FRICTION)
+        self.arm.move_line(_raised(away, TRAVEL + 0.03), self.speeds.descend)
+
+    def _pull_bar(self, action: Pull, item: Item) -> None:
+        """Close lightly on a utensil where it lies, lead it over the table, let go: a loose cage slides along it."""
+        tip = 0.0012
+        pose = tool_pose(np.array([*action.p_S[:2], tip]), action.theta_S)
+        self._above(pose, 0.032)
+        self._descend(pose)
+        self.arm.close(self.speeds.cage)
+        self._key("inside")
+        turn = (action.theta_E - action.theta_S + pi / 2) % pi - pi / 2
+        there = tool_pose(np.array([*action.p_E[:2], tip]), action.theta_S + turn)
+        self.arm.move_line(there, self.speeds.pull)
+        self._key("pulled")
+        self.arm.open_to(0.022)
+        self.arm.move_line(_raised(there, TRAVEL), self.speeds.descend)
+
+    # --- stacks -----------------------------------------------------------------------------------------------
+
+    def _stack(self, action: Stack, seen: Table) -> None:
+        self.trial.stacks += 1
+        name = action.u_G.items[0]
+        item, onto = seen.by_name[name], seen.by_name[action.onto]
+        if item.is_dish:
+            nested = rise(item.measures, onto.measures) if onto.is_dish else 0.0
+            room = 0.014 if onto.measures.height + 0.002 > item.measures.height else 0.02
+            hold = rim_hold(seen, name, action.u_G.theta_G, min(room, max(nested, 0.012)))
+        else:
+            hold = bar_hold(seen, name)
+        self._take(hold, self._force(seen, [name]))
+        pose = self.arm.pose_of(self.arm.target)
+        held = {name, *(load.name for load in seen.load(name))}
+        self.top.wake_near([np.array(item.position[:2])], 0.03)
+        highest = max([other.lip for other in seen.items if other.name not in held], default=0.0)
+        up = _raised(pose, pose[2, 3] + max(highest + 0.04 - item.position[2], 0.04))
+        self.arm.move_line(_raised(pose, pose[2, 3] + 0.01), 0.05)
+        self.arm.move_line(up, self.speeds.lift)
+        self.top.sleep()
+        self._key("lifted")
+        drop = 0.002 if item.is_dish else 0.003
+        over = self._placing(action, seen, item, onto, pose, up[2, 3])
+        values = self.arm.solve(over, held=True)
+        if values is None:
+            raise MotionFailed("no_inverse_kinematics", "the arm does not reach the place")
+        self.arm.move_joints(values, self.speeds.carry)
+        self.top.wake_near([np.array(onto.position[:2])], 0.03)
+        down = over.copy()
+        down[2, 3] = pose[2, 3] + action.p_L[2] - item.position[2] + drop
+        near = _raised(down, down[2, 3] + 0.02)
+        self.arm.move_through([near], self.speeds.lift)
+        self.arm.move_line(down, 0.06)
+        self._key("placed")
+        self.arm.open_to(min(0.085, self.arm.finger_gap() + 2 * 0.006))
+        self.arm.move_line(_raised(down, down[2, 3] + 0.05), self.speeds.descend)
+        self._key("let go")
+
+    def _pile(self, seen: Table, item: Item) -> tuple[Item, ...]:
+        return next(pile for pile in seen.stacks if any(other.name == item.name for other in pile))
+
+    def _placing(
+        self, action: Stack, seen: Table, item: Item, onto: Item, pose: np.ndarray, height: float
+    ) -> np.ndarray:
+        """Return the tool pose above the place: a dish is turned so that the open jaws fit there, a utensil so that it
+        lies along the one below it."""
+        place = np.array(action.p_L[:2])
+        offset = pose[:2, 3] - np.array(item.position[:2])
+        turns = [0.0]
+        if not item.is_dish and not onto.is_dish:
+            turns = [(onto.yaw - item.yaw + pi / 2) % pi - pi / 2]
+        elif item.is_dish:
+            turns = sorted(np.linspace(-pi, pi, 24, endpoint=False), key=abs)
+        own = {other.name for other in self._pile(seen, onto)} | {item.name, *(o.name for o in seen.load(item.name))}
+        others = [other for other in seen.items if other.name not in own]
+        best: tuple[float, np.ndarray] | None = None
+        for turn in turns:
+            rotation = np.array([[cos(turn), -sin(turn), 0.0], [sin(turn), cos(turn), 0.0], [0.0, 0.0, 1.0]])
+            there = pose.copy()
+            there[:3, :3] = rotation @ pose[:3, :3]
+            there[:2, 3] = place + rotation[:2, :2] @ offset
+            there[2, 3] = pose[2, 3] + action.p_L[2] - item.position[2]
+            clearance = jaw_clearance(there, 0.03, others, [])
+            there = _raised(there, height)
+            if self.arm.solve(there, held=True) is None:
+                continue
+            if best is None or clearance > best[0]:
+                best = (min(clearance, FREE), there)
+            if clearance >= FREE:
+                break
+        if best is None:
+            raise MotionFailed("no_inverse_kinematics", "the arm does not reach the place")
+        return best[1]
+
+
+@dataclass(frozen=True)
+class Push:
+    """Where fingers push a dish from inside, from its middle along the pull [m]."""
+
+    start: float
+    reach: float
+    tip: float
+    closing: float
+    opening: float
+    spread: bool = False
+    """Whether the fingers go down closed and open inside."""
+
+
+def push_place(seen: Table, name: str, direction: np.ndarray) -> Push | None:
+    """Return where the fingers go into the top of a pile that is pulled along `direction` (2,), or None where its load
+    leaves no room. In an empty dish they open across the pull, so that both push the wall ahead and the dish comes to
+    lie right behind them; beside a load they go in closed near the wall, or astride of a utensil."""
+    family = walls(seen, name)
+    dish, load = family[-1], cargo(seen, name)
+    angle = atan2(direction[1], direction[0])
+    if not load:
+        height = 0.025
+        inner = dish.measures.inner_radius(dish.measures.wall + height)
+        aside = min(0.0425 + PAD, SPREAD * inner)
+        ahead = float(np.sqrt(inner**2 - aside**2)) - PAD_WIDTH / 2
+        tip = dish.position[2] + dish.measures.wall + height
+        return Push(0.0, ahead, tip, angle + pi / 2, 2.0 * (aside - PAD), True)
+    heights = [0.02, 0.03, 0.04]
+    center = np.array(dish.position[:2])
+    for height in heights:
+        height = max(height, dish.measures.height - JAW_HEIGHT + 0.002)
+        tip = dish.position[2] + dish.measures.wall + height
+        inner = dish.measures.inner_radius(dish.measures.wall + height)
+        shapes = [(angle, 0.0, PAD, PAD_WIDTH / 2), (angle + pi / 2, 0.036, PAD_WIDTH / 2, 0.018 + PAD)]
+        for closing, opening, ahead, aside in shapes:
+            if aside >= inner - 0.004:
+                continue
+            reach = float(np.sqrt(inner**2 - aside**2)) - ahead
+            if reach < 0.003:
+                continue
+            for start in (reach * 0.5, reach - 0.006, reach - 0.003):
+                point = np.append(center + start * direction, tip)
+                clearance = jaw_clearance(tool_pose(point, closing), opening, load, [])
+                if clearance > 0.002:
+                    return Push(start, reach, tip, closing, opening)
+    return None
+
+
+def _raised(pose: np.ndarray, height: float) -> np.ndarray:
+    high = pose.copy()
+    high[2, 3] = max(height, pose[2, 3])
+    return high
+
+
+def _after(seen: Table, action: PullGrasp | StackGrasp) -> Table:
+    """Return the table as it is thought to be after the first half of a composite action."""
+    return after_pull(seen, action.u_P) if isinstance(action, PullGrasp) else after_stack(seen, action.u_S)

@@ -1,0 +1,46 @@
+"""Key frames of a trial in physics as arrays, so that anything can draw them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from stages.tableware.simulation.physics import PhysicsTable
+
+
+class Recording:
+    """Give it to PhysicsTable or run_physics_trial as `record`; what left the table has NaN for a pose."""
+
+    def __init__(self) -> None:
+        self.labels: list[str] = []
+        self.times: list[float] = []
+        self.joints: list[np.ndarray] = []
+        self.poses: list[dict[str, np.ndarray]] = []
+        self.kinds: dict[str, str] = {}
+
+    def __call__(self, world: PhysicsTable, label: str) -> None:
+        """Keep the present moment."""
+        self.labels.append(label)
+        self.times.append(world.arm.seconds)
+        self.joints.append(np.append(world.arm.values(), world.arm.finger_gap()))
+        self.poses.append({name: world.top.pose(name) for name in world.top.bodies})
+        self.kinds |= {name: item.kind for name, item in world.top.items.items()}
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return labels (F,), seconds (F,), joints (F, 7) [rad, last the opening in m], names (N,), kinds (N,), poses
+        (F, N, 4, 4) world_from_item [m]."""
+        names = sorted(self.kinds)
+        away = np.full((4, 4), np.nan)
+        return {
+            "labels": np.array(self.labels),
+            "seconds": np.array(self.times),
+            "joints": np.array(self.joints),
+            "names": np.array(names),
+            "kinds": np.array([self.kinds[name] for name in names]),
+            "poses": np.array([[frame.get(name, away) for name in names] for frame in self.poses]),
+        }
+
+    def save(self, path: Path) -> None:
+        """Write the arrays to an .npz file."""
+        np.savez_compressed(path, **self.arrays())  # type: ignore[arg-type]
