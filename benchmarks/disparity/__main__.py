@@ -1,6 +1,6 @@
 """`make bench-disparity`: bad-2, end-point error, coverage and CPU time, ours beside OpenCV's matchers in one run.
 
-    python -m benchmarks.disparity --data FOLDER --out FOLDER [--quick] [--cases NAME ...]
+    python -m benchmarks.disparity --data FOLDER --out FOLDER [--quick] [--tuning] [--cases NAME ...]
 
 Writes metrics.json (`<arm>/<case>/<measure>`; `pairs/<case>/count`), table.md and a picture of the first pair of every
 case. Cases that are not asked for keep what an earlier run measured.
@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from benchmarks.disparity.arms import ARMS
-from benchmarks.disparity.cases import CASES, Pair
+from benchmarks.disparity.cases import CASES, Pair, Setting
 from stages.kit.stereo.disparity_map import DisparityMap
 from stages.kit.stereo.pictures import confidence_colors, disparity_colors
 from stages.kit.stereo.search_range import search_range
@@ -95,15 +95,17 @@ def main() -> None:
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--tuning", action="store_true")
     parser.add_argument("--cases", nargs="+", choices=tuple(CASES), default=tuple(CASES))
     options = parser.parse_args()
     cv2.setNumThreads(1)
     options.out.mkdir(parents=True, exist_ok=True)
+    setting = Setting(options.data, options.out / "logs", options.quick, options.tuning)
     kept = options.out / "metrics.json"
     metrics: dict[str, float] = json.loads(kept.read_text()) if kept.exists() else {}
     for case in options.cases:
         rows: dict[str, list[dict[str, float]]] = {arm: [] for arm in ARMS}
-        for number, pair in enumerate(CASES[case](options.data, options.out / "logs", options.quick)):
+        for number, pair in enumerate(CASES[case](setting)):
             maps = {}
             for arm in ARMS:
                 maps[arm], figures = measured(pair, arm)

@@ -15,11 +15,26 @@ from stages.kit.stereo.rectification import matched_features
 from stages.kit.stereo.semi_global import gray_of
 
 ROOM_SEEDS = (1000,)
-"""Reporting seed of the recipe `room`; the sub-pixel table and the settings were looked at with seed 100."""
-ROOM_FRAMES = 6
+"""Reporting seed of the recipe `room`."""
+TUNING_SEEDS = (100,)
+"""The sub-pixel table and the settings were looked at with this one."""
+ROOM_FRAMES = 8
 BASELINE, PICTURE_NOISE = 0.12, 2.0
 ROWS_AGREE = 0.75
 """Matched features of the endoscope count as truth when their rows differ by no more than this [px]."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is run, and where."""
+
+    data: Path
+    """Folder of the real logs."""
+    work: Path
+    """Folder for what the cases make."""
+    quick: bool = False
+    tuning: bool = False
+    """Rooms of the tuning seeds instead of the reporting ones."""
 
 
 def made(arguments: list[str]) -> None:
@@ -41,25 +56,25 @@ class Pair:
     """(H, W) disparity [px], NaN where it is not known."""
 
 
-def motorcycle(data: Path, work: Path, quick: bool) -> Iterator[Pair]:
+def motorcycle(setting: Setting) -> Iterator[Pair]:
     """Middlebury 2014's Motorcycle at a quarter of its size, with its measured disparities."""
-    folder = data / "middlebury_motorcycle"
+    folder = setting.data / "middlebury_motorcycle"
     left, right = (cv2.imread(str(folder / f"motorcycle_{eye}.png"))[..., ::-1].copy() for eye in ("left", "right"))
     truth = np.load(folder / "motorcycle_disp.npz", allow_pickle=False)["arr_0"].astype(np.float32)
     truth[~(np.isfinite(truth) & (truth > 0))] = np.nan
     yield Pair("motorcycle", left, right, truth)
 
 
-def endoscope(data: Path, work: Path, quick: bool) -> Iterator[Pair]:
+def endoscope(setting: Setting) -> Iterator[Pair]:
     """Every second in-vivo frame of a stereo endoscope.
 
     Nobody measured their disparities: those of SIFT features that match in both directions and lie in one row stand for
     them.
     """
-    sequence = work / "endoscope"
-    made(["ingest", "--log", str(data / "surgt_stereo"), "--out", str(sequence)])
+    sequence = setting.work / "endoscope"
+    made(["ingest", "--log", str(setting.data / "surgt_stereo"), "--out", str(sequence)])
     with FrameReader(sequence / "frames.mcap") as reader:
-        for index in range(0, len(reader), 5 if quick else 2):
+        for index in range(0, len(reader), 5 if setting.quick else 2):
             frame = reader.read(index, ("color", "right"))
             assert frame.color is not None and frame.right is not None
             yield Pair(f"endoscope frame {index}", frame.color, frame.right, feature_truth(frame.color, frame.right))
@@ -80,13 +95,13 @@ def feature_truth(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     return truth
 
 
-def rooms(data: Path, work: Path, quick: bool) -> Iterator[Pair]:
+def rooms(setting: Setting) -> Iterator[Pair]:
     """Generated rooms with exact depth, eyes 12 cm apart, pictures with noise of two grey levels."""
-    library = work / "cad_library"
+    library = setting.work / "cad_library"
     shapes = ["--shapes-per-class", "4", "--small-shapes-per-class", "4"]
     made(["library", "build", *shapes, "--seed", "1", "--out", str(library)])
-    for seed in ROOM_SEEDS[:1] if quick else ROOM_SEEDS:
-        truth, sequence = work / f"room-{seed}", work / f"room-{seed}-sequence"
+    for seed in TUNING_SEEDS if setting.tuning else ROOM_SEEDS:
+        truth, sequence = setting.work / f"room-{seed}", setting.work / f"room-{seed}-sequence"
         made(["synthesize", "--library", str(library), "--frames", str(ROOM_FRAMES), "--seed", str(seed),
              "--stereo-baseline", str(BASELINE), "--picture-noise", str(PICTURE_NOISE), "--no-depth-noise",
              "--out", str(truth)]
@@ -94,14 +109,14 @@ def rooms(data: Path, work: Path, quick: bool) -> Iterator[Pair]:
         made(["ingest", "--log", str(truth / "log.mcap"), "--out", str(sequence)])
         with FrameReader(sequence / "frames.mcap") as reader:
             focal = reader.camera.fx
-            for frame in reader.frames(("color", "right", "depth"), every=3 if quick else 1):
+            for frame in reader.frames(("color", "right", "depth"), every=4 if setting.quick else 2):
                 assert frame.color is not None and frame.right is not None and frame.depth is not None
                 with np.errstate(divide="ignore"):
                     disparity = np.where(frame.depth > 0, focal * BASELINE / frame.depth, np.nan).astype(np.float32)
                 yield Pair(f"room {seed} frame {frame.index}", frame.color, frame.right, disparity)
 
 
-CASES: dict[str, Callable[[Path, Path, bool], Iterator[Pair]]] = {
+CASES: dict[str, Callable[[Setting], Iterator[Pair]]] = {
     "motorcycle": motorcycle,
     "endoscope": endoscope,
     "rooms": rooms,
