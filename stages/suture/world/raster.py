@@ -94,9 +94,7 @@ def draw(
 
 
 @numba.njit(cache=True, fastmath=True)
-def pad_depth(
-    ray_x: float, ray_y: float, rotation: np.ndarray, eye: np.ndarray
-) -> tuple[float, float, float]:
+def pad_depth(ray_x: float, ray_y: float, rotation: np.ndarray, eye: np.ndarray) -> tuple[float, float, float]:
     """Return the depth z at which the ray meets the wound pad, and the world's x and y there.
 
     `rotation` (3, 3) turns camera directions into the world, `eye` (3,) is the camera's place in the world [m].
@@ -339,4 +337,3 @@ def label(
             best = np.argmax(counts)
             body_map[row, column] = best
             depth_map[row, column] = sums[best] / counts[best] if best > 0 else 0.0
-

@@ -178,13 +178,14 @@ def make_scene(
     holder: str | None = None,
     place: str | None = None,
     calibration_error: float = 0.0,
+    attempt: int = 0,
 ) -> NeedleScene:
     """Return the scene of `seed`. `holder` (one of HOLDERS) and `place` (of PLACES) are drawn where not given.
 
     `calibration_error` [px] is the standard deviation of the right image's shift along rows, along columns, and, 300
-    px from the image's centre, of its turn.
+    px from the image's centre, of its turn. `attempt` draws another scene of the same seed.
     """
-    random = np.random.default_rng([8, seed])
+    random = np.random.default_rng([8, seed, attempt])
     drawn_holder, drawn_place = str(random.choice(HOLDERS)), str(random.choice(list(PLACES)))
     holder, place = holder or drawn_holder, place or drawn_place
     if holder == "tissue":
@@ -229,7 +230,10 @@ def _grips(
     holds_right = holder in ("right", "both") or (holder == "tissue" and random.random() < 0.4)
     holds_left = holder in ("left", "both") or (holder == "tissue" and not holds_right and random.random() < 0.4)
     grips = {}
-    for body, holds, angle, side in ((LEFT_DRIVER, holds_left, left_angle, 1.0), (RIGHT_DRIVER, holds_right, right_angle, -1.0)):
+    for body, holds, angle, side in (
+        (LEFT_DRIVER, holds_left, left_angle, 1.0),
+        (RIGHT_DRIVER, holds_right, right_angle, -1.0),
+    ):
         if holds:
             grips[body] = _grip(pose, angle, body, size, random)
             continue

@@ -15,8 +15,8 @@ from stages.suture.rig import NeedlePose
 NEEDLE, THREAD, LEFT_DRIVER, RIGHT_DRIVER = 1, 2, 3, 4
 WIRE_RADIUS = 0.0005
 """Half the thickness of the needle's wire [m]; a needle for a 2-0 thread is about 1 mm thick."""
-TAPER_ANGLE = 0.55
-"""The tip's taper runs over this angle of the arc [rad], 6.6 mm."""
+TAPER_ANGLE = 0.7
+"""The tip's taper runs over this angle of the arc [rad], 8.4 mm."""
 TIP_RADIUS = 0.00004
 
 
@@ -55,9 +55,9 @@ def chain(points: np.ndarray, radii: np.ndarray, body: int) -> Tubes:
 
 
 def needle_radii(angles: np.ndarray) -> np.ndarray:
-    """Return the wire's radius [m] at arc angles [rad]: a rounded taper to the tip, a slight crimp at the swage."""
+    """Return the wire's radius [m] at arc angles [rad]: a pointed, slightly rounded taper to the tip, a slight crimp at the swage."""
     along = np.clip(angles / TAPER_ANGLE, 0.0, 1.0)
-    taper = TIP_RADIUS + (WIRE_RADIUS - TIP_RADIUS) * np.sqrt(1.0 - (1.0 - along) ** 2)
+    taper = TIP_RADIUS + (WIRE_RADIUS - TIP_RADIUS) * (1.0 - (1.0 - along) ** 1.6)
     crimp = 1.0 - 0.08 * np.exp(-(((np.pi - angles) * 12.0 - 2.5) ** 2) / 0.8)
     return taper * crimp
 
