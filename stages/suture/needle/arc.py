@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.suture.needle.refine import CIRCLE_ANGLES, CircleFit
+from stages.suture.needle.refine import CALIBRATION_SIGMA, CIRCLE_ANGLES, RESIDUAL_SIGMA, CircleFit
 from stages.suture.rig import NEEDLE_RADIUS, StereoRig
 
 SEEN_GAIN, MISSED_LOSS = 1.8, 0.8
@@ -21,11 +21,12 @@ TAPER_ANGLE = 0.7
 @dataclass(frozen=True)
 class Arc:
     """The half circle begins at `start` [rad] with standard deviation `deviation` [rad]; `seen` (2,) are the shares of
-    its cross-sections each eye sees."""
+    its cross-sections each eye sees; `likelihood` is the logarithm of the circle's and arc's, to compare fits by."""
 
     start: float
     deviation: float
     seen: np.ndarray
+    likelihood: float
 
 
 def place_arc(fit: CircleFit) -> Arc:
@@ -40,9 +41,13 @@ def place_arc(fit: CircleFit) -> Arc:
     mean = float((weight * away).sum() / weight.sum())
     deviation = float(np.sqrt((weight * (away - mean) ** 2).sum() / weight.sum() + np.radians(1.5) ** 2))
     inside = np.roll(seen, -best, axis=1)[:, :HALF]
+    misfit = np.minimum((np.where(seen, fit.offsets, 0.0) / RESIDUAL_SIGMA) ** 2, 9.0)
+    misfit_inside = np.roll(misfit, -best, axis=1)[:, :HALF].sum() / CORRELATED
+    likelihood = scores[best] - 0.5 * misfit_inside - 0.5 * float(fit.shift @ fit.shift) / CALIBRATION_SIGMA**2
     # cross-section i stands for the angles between i - 1/2 and i + 1/2
     half_step = (CIRCLE_ANGLES[1] - CIRCLE_ANGLES[0]) / 2.0
-    return Arc(float(CIRCLE_ANGLES[best] + mean - half_step), deviation, inside.mean(axis=1))
+    start = float(CIRCLE_ANGLES[best] + mean - half_step)
+    return Arc(start, deviation, inside.mean(axis=1), float(likelihood))
 
 
 def tip_at_start(

@@ -25,6 +25,7 @@ from stages.suture.rig import NeedlePose, StereoRig
 MARGIN = 40
 FEWEST_PIXELS = 30
 KEPT_STARTS = 8
+FINALISTS = 4
 WIDE_BANDS = (12.0, 10.0, 8.0, 6.0, 5.0, 4.0)
 NARROW_BANDS = (4.0, 3.0, 3.0, 2.5, 2.5)
 COVARIANCE_SCALE = 1.0
@@ -32,6 +33,8 @@ COVARIANCE_SCALE = 1.0
 LARGEST_TURN = np.radians(9.0)
 LARGEST_SHIFT = 0.0016
 LEAST_SEEN = 0.15
+LEAST_LEAD = 1.0
+"""By so much (log-likelihood) the pose must beat the best one elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -48,13 +51,19 @@ def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | 
     """
     observation.check()
     rig = observation.rig
-    counts = int(observation.left_mask.sum()), int(observation.right_mask.sum())
+    counts = tuple(
+        int(_without(mask, thread).sum())
+        for mask, thread in (
+            (observation.left_mask, observation.left_thread),
+            (observation.right_mask, observation.right_thread),
+        )
+    )
     if min(counts) < FEWEST_PIXELS:
         side = "left" if counts[0] <= counts[1] else "right"
         return NeedleEstimate.none(f"The {side} eye sees {min(counts)} pixels of needle; {FEWEST_PIXELS} are needed.")
     eyes = (
-        _window(observation.left_mask, observation.left_hidden),
-        _window(observation.right_mask, observation.right_hidden),
+        _window(_without(observation.left_mask, observation.left_thread), observation.left_hidden),
+        _window(_without(observation.right_mask, observation.right_thread), observation.right_hidden),
     )
     swapped = _eyes_swapped(rig, observation)
     if swapped:
@@ -65,13 +74,43 @@ def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | 
     candidates = _candidates(observation, eyes, distances, pixels, guess, random)
     if not candidates:
         return NeedleEstimate.none("No circle of the needle's radius passes through what both eyes see.")
-    best = candidates[0]
-    arc = place_arc(best.fit)
-    fit = refine(
-        rig, eyes, best.fit.frame, best.fit.centre, NARROW_BANDS, best.fit.shift, (arc.start + np.pi / 2, 1.75)
-    )
-    arc = place_arc(fit)
-    return _answer(observation, fit, arc, candidates, eyes)
+    chosen = _chosen(rig, eyes, candidates)
+    if isinstance(chosen, str):
+        return NeedleEstimate.none(chosen)
+    fit, arc, rival = chosen
+    return _answer(observation, fit, arc, rival)
+
+
+def _chosen(
+    rig: StereoRig, eyes: tuple[EyeMask, EyeMask], candidates: list[_Candidate]
+) -> tuple[CircleFit, Arc, float] | str:
+    """Return the likeliest of the best few circles after a close fit, its arc, and by how much (log-likelihood) it
+    beats the likeliest one that lies elsewhere; or why there is none."""
+    distinct: list[CircleFit] = []
+    for candidate in candidates:
+        fit = candidate.fit
+        if candidate.score > 0 and all(_differ(fit.frame, fit.centre, o.frame, o.centre, 4.0, 0.001) for o in distinct):
+            distinct.append(fit)
+        if len(distinct) == FINALISTS:
+            break
+    if not distinct:
+        return "No circle of the needle's radius passes through what both eyes see."
+    finals = []
+    for fit in distinct:
+        arc = place_arc(fit)
+        fit = refine(rig, eyes, fit.frame, fit.centre, NARROW_BANDS, fit.shift, (arc.start + np.pi / 2, 1.75))
+        finals.append((fit, place_arc(fit)))
+    finals.sort(key=lambda final: -final[1].likelihood)
+    fit, arc = finals[0]
+    elsewhere = [
+        other.likelihood for f, other in finals[1:] if _differ(f.frame, f.centre, fit.frame, fit.centre, 10.0, 0.0015)
+    ]
+    return fit, arc, arc.likelihood - max(elsewhere, default=-1e9)
+
+
+def _without(mask: np.ndarray, thread: np.ndarray | None) -> np.ndarray:
+    """Return the needle's mask without what is known to be thread."""
+    return mask if thread is None else mask & ~thread
 
 
 def _window(mask: np.ndarray, hidden: np.ndarray | None) -> EyeMask:
@@ -183,13 +222,7 @@ def _differ(
     return cosine < np.cos(np.radians(degrees)) or float(np.linalg.norm(centre - other_centre)) > far
 
 
-def _answer(
-    observation: NeedleObservation,
-    fit: CircleFit,
-    arc: Arc,
-    candidates: list[_Candidate],
-    eyes: tuple[EyeMask, EyeMask],
-) -> NeedleEstimate:
+def _answer(observation: NeedleObservation, fit: CircleFit, arc: Arc, rival: float) -> NeedleEstimate:
     """Return the pose with its covariance, or abstain where it is not known well enough."""
     odds = tip_at_start(fit, arc, observation.rig, (observation.left_thread, observation.right_thread))
     matrix = np.eye(4)
@@ -202,11 +235,11 @@ def _answer(
         pose = pose.swapped()
     covariance = COVARIANCE_SCALE * _covariance(fit, arc)
     probability = float(1.0 / (1.0 + np.exp(-abs(odds))))
-    return NeedleEstimate(pose, covariance, probability, _why_abstain(covariance, arc, fit, candidates))
+    return NeedleEstimate(pose, covariance, probability, _why_abstain(covariance, arc, fit, rival))
 
 
 def _covariance(fit: CircleFit, arc: Arc) -> np.ndarray:
-    """Return the covariance (6, 6) of centre [m] and rotation vector [rad], camera frame, the calibration summed out."""
+    """Return the covariance (6, 6) of centre [m] and rotation vector [rad], camera frame, calibration summed out."""
     tiny = np.diag([1.0] * 3 + [1e-4] * 2 + [0.0] * 2)
     marginal = np.linalg.inv(fit.information + tiny)[:5, :5]
     carry = np.zeros((6, 6))
@@ -218,7 +251,7 @@ def _covariance(fit: CircleFit, arc: Arc) -> np.ndarray:
     return carry @ local @ carry.T
 
 
-def _why_abstain(covariance: np.ndarray, arc: Arc, fit: CircleFit, candidates: list[_Candidate]) -> str:
+def _why_abstain(covariance: np.ndarray, arc: Arc, fit: CircleFit, rival: float) -> str:
     """Return why the pose should not be used, or nothing."""
     if arc.seen.min() < LEAST_SEEN:
         return f"One eye sees {100 * arc.seen.min():.0f} % of the needle on the best circle."
@@ -230,4 +263,6 @@ def _why_abstain(covariance: np.ndarray, arc: Arc, fit: CircleFit, candidates: l
     shift = float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
     if shift > LARGEST_SHIFT:
         return f"The needle's centre is known to {1000 * shift:.1f} mm only."
+    if rival < LEAST_LEAD:
+        return "Two different poses explain what both eyes see about equally well."
     return ""

@@ -1,8 +1,8 @@
 """Fit a circle of known radius to the needle's masks in both eyes, where the edges are; compiled where it counts.
 
 The circle is projected into both eyes. Across its curve, at each of CIRCLE_ANGLES, the mask is scanned for the run of
-mask that is nearest to the curve and as wide as the wire should be there: the run's middle, in pixels from the curve, is
-the residual. Robust Gauss-Newton steps move the centre (3), turn the plane (2), and shift the right image (2): the
+mask that is nearest to the curve and as wide as the wire should be there: the run's middle, in pixels from the curve,
+is the residual. Robust Gauss-Newton steps move the centre (3), turn the plane (2), and shift the right image (2): the
 calibration's error is estimated along with the pose, held by a prior.
 """
 
@@ -21,6 +21,8 @@ CALIBRATION_SIGMA = 0.3
 """Prior standard deviation [px] of the right image's shift."""
 RESIDUAL_SIGMA = 0.35
 """What a cross-section's middle is off by [px] when the fit is right."""
+HIDDEN_WEIGHT = 0.3
+"""What is seen where a driver should be is needle before the driver, or the driver's own bright edge."""
 CORRELATED = 5.0
 """Neighbouring cross-sections share their errors (the masks' outlines wander): so many count as one."""
 
@@ -205,6 +207,7 @@ def refine(
         residual, rows = fit.offsets[use], jacobian[use]
         scale = max(band / 4.0, 2.0 * RESIDUAL_SIGMA)
         weight = 1.0 / (1.0 + (residual / scale) ** 2) / noise
+        weight[fit.hidden[use]] *= HIDDEN_WEIGHT
         normal_matrix = (rows * weight[:, None]).T @ rows + prior
         right_side = rows.T @ (weight * residual)
         right_side[5:] -= prior[5, 5] * shift
@@ -220,5 +223,6 @@ def refine(
     use = np.isfinite(fit.offsets) & counts
     residual, rows = fit.offsets[use], jacobian[use]
     weight = 1.0 / (1.0 + (residual / (2.0 * RESIDUAL_SIGMA)) ** 2) / noise
+    weight[fit.hidden[use]] *= HIDDEN_WEIGHT
     information = (rows * weight[:, None]).T @ rows + prior
     return CircleFit(fit.frame, fit.centre, fit.shift, fit.offsets, fit.widths, fit.hidden, fit.expected, information)

@@ -1,9 +1,9 @@
 """Where a needle might be: circles of the known radius through points that both eyes, or the disparity, give.
 
 A row of a rectified pair meets the needle at the same points in both eyes. The middles of the masks' runs in one row
-are known to a fraction of a pixel, where a dense disparity of shiny wire is not; each pair of runs is a candidate point,
-right or wrong. Circles through three points of either kind are kept when their radius is near the needle's, and scored
-on both masks: how much of the best half circle lies on mask, and how much of the mask it explains.
+are known to a fraction of a pixel, where a dense disparity of shiny wire is not; each pair of runs is a candidate
+point, right or wrong. Circles through three points of either kind are kept when their radius is near the needle's, and
+scored on both masks: how much of the best half circle lies on mask, and how much of the mask it explains.
 """
 
 from __future__ import annotations

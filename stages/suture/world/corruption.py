@@ -71,6 +71,14 @@ def spoiled_thread(eye: Eye, random: np.random.Generator) -> np.ndarray:
     return thread & ~lost
 
 
+def spoiled_drivers(eye: Eye, random: np.random.Generator) -> np.ndarray:
+    """Return where (H, W) bool the robot's kinematics say that drivers are: off by some 3 px, grown by 2 px."""
+    drivers = eye.mask(LEFT_DRIVER, RIGHT_DRIVER).astype(np.uint8)
+    shift = np.float32(np.hstack([np.eye(2), random.normal(0.0, 3.0, (2, 1))]))
+    moved = cv2.warpAffine(drivers, shift, drivers.shape[::-1], flags=cv2.INTER_NEAREST)
+    return cv2.dilate(moved, np.ones((5, 5), np.uint8)) > 0
+
+
 def noisy_disparity(view: StereoView, noise: float, random: np.random.Generator) -> np.ndarray:
     """Return a disparity map (H, W) float32 [px] with errors of standard deviation `noise` [px] about the needle.
 

@@ -21,6 +21,8 @@ from stages.suture.world.scene import NeedleScene
 from stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, RIGHT_DRIVER, THREAD, Tubes
 
 SHADOW_SIZE, SHADOW_SCALE, SHADOW_ORIGIN = 800, 2000.0, -0.20
+NEAR = 70
+"""Without pictures only this many pixels about the needle are drawn."""
 ARC_ANGLES = np.linspace(0.0, np.pi, 121)
 
 
@@ -36,7 +38,9 @@ class Eye:
 
     def mask(self, *bodies: int) -> np.ndarray:
         """Return where (H, W) any of `bodies` is seen."""
-        return np.isin(self.bodies, bodies)
+        chosen = np.zeros(256, dtype=bool)
+        chosen[list(bodies)] = True
+        return chosen[self.bodies]
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,8 @@ class StereoView:
 
 
 def render(scene: NeedleScene, pictures: bool = True) -> StereoView:
-    """Return the two eyes' view of `scene`; without `pictures` only geometry (masks, depth, disparity), much faster."""
+    """Return the two eyes' view of `scene`; without `pictures` only geometry (masks, depth,
+    disparity of tubes), about the needle, much faster."""
     tubes = scene.tubes()
     random = np.random.default_rng([81, scene.seed])
     shadow = _shadow(tubes, scene) if pictures else np.zeros((1, 1))
@@ -101,7 +106,8 @@ def _eye(
     pictures: bool,
     random: np.random.Generator,
 ) -> Eye:
-    rig, light = scene.rig, scene.light
+    light = scene.light
+    column, row, rig = (0, 0, scene.rig) if pictures else _around_needle(scene.rig, pose)
     world_from_camera = inverse(camera_from_world)
     rotation, place = np.ascontiguousarray(world_from_camera[:3, :3]), np.ascontiguousarray(world_from_camera[:3, 3])
     depth = np.zeros((rig.height * SUBPIXELS, rig.width * SUBPIXELS), dtype=np.float32)
@@ -136,7 +142,31 @@ def _eye(
             depth_map,
         )
         image = _sensor(linear, scene, random)
-    return Eye(image, bodies, depth_map, _seen_arc(rig, pose, cone, tubes.bodies))
+    sees = _seen_arc(rig, pose, cone, tubes.bodies)
+    if not pictures:
+        bodies = _set_in(bodies, scene.rig, column, row)
+        depth_map = _set_in(depth_map, scene.rig, column, row)
+    return Eye(image, bodies, depth_map, sees)
+
+
+def _around_needle(rig: StereoRig, pose: NeedlePose) -> tuple[int, int, StereoRig]:
+    """Return first column, first row and camera of the part of this eye's image within NEAR px of the needle."""
+    pixels = rig.left(pose.points(ARC_ANGLES))
+    low = np.clip(np.floor(pixels.min(axis=0)).astype(int) - NEAR, 0, [rig.width - 2, rig.height - 2])
+    high = np.clip(np.ceil(pixels.max(axis=0)).astype(int) + NEAR, low + 2, [rig.width, rig.height])
+    centre = (rig.centre[0] - float(low[0]), rig.centre[1] - float(low[1]))
+    return (
+        int(low[0]),
+        int(low[1]),
+        StereoRig(int(high[0] - low[0]), int(high[1] - low[1]), rig.focal, centre, rig.baseline),
+    )
+
+
+def _set_in(part: np.ndarray, rig: StereoRig, column: int, row: int) -> np.ndarray:
+    """Return the whole image (H, W) that holds `part` at (column, row) and zeros elsewhere."""
+    whole = np.zeros((rig.height, rig.width), dtype=part.dtype)
+    whole[row : row + part.shape[0], column : column + part.shape[1]] = part
+    return whole
 
 
 def _seen_arc(rig: StereoRig, pose: NeedlePose, cone: np.ndarray, bodies: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from stages.suture.rig import TWO_CAMERAS, StereoRig
-from stages.suture.world.render import render
+from stages.suture.world.render import StereoView, render
 from stages.suture.world.scene import NeedleScene, make_scene
 
 LEAST_SEEN = 0.4
@@ -16,11 +16,15 @@ def seen_scene(
     holder: str | None = None,
     place: str | None = None,
     calibration_error: float = 0.0,
-) -> NeedleScene:
-    """Return the first scene of `seed` of whose needle each eye sees at least LEAST_SEEN (`make_scene`'s arguments)."""
+) -> tuple[NeedleScene, StereoView]:
+    """Return the first scene of `seed` of whose needle each eye sees at least LEAST_SEEN, and its geometry.
+
+    The arguments are those of `make_scene`.
+    """
     attempt = 0
     while True:
         scene = make_scene(seed, rig, holder, place, calibration_error, attempt)
-        if render(scene, pictures=False).seen >= LEAST_SEEN:
-            return scene
+        view = render(scene, pictures=False)
+        if view.seen >= LEAST_SEEN:
+            return scene, view
         attempt += 1

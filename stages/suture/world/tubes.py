@@ -55,7 +55,7 @@ def chain(points: np.ndarray, radii: np.ndarray, body: int) -> Tubes:
 
 
 def needle_radii(angles: np.ndarray) -> np.ndarray:
-    """Return the wire's radius [m] at arc angles [rad]: a pointed, slightly rounded taper to the tip, a slight crimp at the swage."""
+    """Return the wire's radius [m] at arc angles [rad]: a slightly rounded taper to the tip, a crimp at the swage."""
     along = np.clip(angles / TAPER_ANGLE, 0.0, 1.0)
     taper = TIP_RADIUS + (WIRE_RADIUS - TIP_RADIUS) * (1.0 - (1.0 - along) ** 1.6)
     crimp = 1.0 - 0.08 * np.exp(-(((np.pi - angles) * 12.0 - 2.5) ** 2) / 0.8)
