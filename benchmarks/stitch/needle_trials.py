@@ -46,7 +46,7 @@ class Case:
     frames: int = 1
 
 
-TWO_CAMERAS_NOISE, ENDOSCOPE_NOISE = 0.85, 0.65
+TWO_CAMERAS_NOISE, ENDOSCOPE_NOISE = 1.0, 0.65
 """Disparity noise [px] at which the thesis's estimator is right in 40 +- 5 % of the visible views of tuning seeds."""
 CASES = {
     case.name: case

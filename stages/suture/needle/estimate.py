@@ -29,11 +29,11 @@ FINALISTS = 4
 WIDE_BANDS = (12.0, 10.0, 8.0, 6.0, 5.0, 4.0)
 NARROW_BANDS = (4.0, 3.0, 3.0, 2.5, 2.5)
 COVARIANCE_SCALE = 1.0
-"""Calibrated on tuning seeds so that 95 % of the errors lie inside the 95 % ellipsoid."""
+"""On tuning seeds 1 put 95 % of the right answers within the 97 % ellipsoid, 90 % within the 86 % one; kept."""
 LARGEST_TURN = np.radians(9.0)
 LARGEST_SHIFT = 0.0016
 LEAST_SEEN = 0.15
-LEAST_LEAD = 1.0
+LEAST_LEAD = 3.0
 """By so much (log-likelihood) the pose must beat the best one elsewhere."""
 
 
