@@ -163,6 +163,11 @@ bench-planning: setup ## Planning beside OMPL with pybullet checks (QUICK=1: 10 
 tidy-fast: setup ## Clearing tables in the fast simulator: tables 7.1 and 7.2, joint planner, optimum (QUICK=1: ten tables)
 	$(PYTHON) -m benchmarks.tidy $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/tidy-fast$(if $(QUICK),-quick)
 
+.PHONY: stitch-needle
+# Five hundred rendered views and more without pictures, about forty minutes of one core; a stopped run goes on.
+stitch-needle: setup ## The needle's pose: the thesis's estimator and ours on rendered views (QUICK=1: ten a case)
+	$(PYTHON) -m benchmarks.stitch.needle $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/stitch-needle$(if $(QUICK),-quick)
+
 .PHONY: llm3
 # A hundred reporting seeds a cell, about ten minutes of one core; a stopped run goes on where it was.
 llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2, harder suites (QUICK=1: ten instances)

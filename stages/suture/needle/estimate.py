@@ -28,8 +28,6 @@ KEPT_STARTS = 8
 FINALISTS = 4
 WIDE_BANDS = (12.0, 10.0, 8.0, 6.0, 5.0, 4.0)
 NARROW_BANDS = (4.0, 3.0, 3.0, 2.5, 2.5)
-COVARIANCE_SCALE = 1.0
-"""On tuning seeds 1 put 95 % of the right answers within the 97 % ellipsoid, 90 % within the 86 % one; kept."""
 LARGEST_TURN = np.radians(9.0)
 LARGEST_SHIFT = 0.0016
 LEAST_SEEN = 0.15
@@ -68,9 +66,9 @@ def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | 
     swapped = _eyes_swapped(rig, observation)
     if swapped:
         return NeedleEstimate.none(swapped)
-    distances = tuple(_distance_to_mask(eye) for eye in eyes)
+    distances = (_distance_to_mask(eyes[0]), _distance_to_mask(eyes[1]))
     random = np.random.default_rng(seed)
-    pixels = tuple(_some_pixels(eye, 90, random) for eye in eyes)
+    pixels = (_some_pixels(eyes[0], 90, random), _some_pixels(eyes[1], 90, random))
     candidates = _candidates(observation, eyes, distances, pixels, guess, random)
     if not candidates:
         return NeedleEstimate.none("No circle of the needle's radius passes through what both eyes see.")
@@ -164,8 +162,8 @@ def _disparity_points(observation: NeedleObservation, random: np.random.Generato
 def _candidates(
     observation: NeedleObservation,
     eyes: tuple[EyeMask, EyeMask],
-    distances: tuple[np.ndarray, ...],
-    pixels: tuple[np.ndarray, ...],
+    distances: tuple[np.ndarray, np.ndarray],
+    pixels: tuple[np.ndarray, np.ndarray],
     guess: NeedlePose | None,
     random: np.random.Generator,
 ) -> list[_Candidate]:
@@ -204,8 +202,8 @@ def _candidates(
 def _refined(
     rig: StereoRig,
     eyes: tuple[EyeMask, EyeMask],
-    distances: tuple[np.ndarray, ...],
-    pixels: tuple[np.ndarray, ...],
+    distances: tuple[np.ndarray, np.ndarray],
+    pixels: tuple[np.ndarray, np.ndarray],
     frame: np.ndarray,
     centre: np.ndarray,
 ) -> _Candidate:
@@ -233,7 +231,7 @@ def _answer(observation: NeedleObservation, fit: CircleFit, arc: Arc, rival: flo
     pose = NeedlePose(matrix)
     if odds < 0:
         pose = pose.swapped()
-    covariance = COVARIANCE_SCALE * _covariance(fit, arc)
+    covariance = _covariance(fit, arc)
     probability = float(1.0 / (1.0 + np.exp(-abs(odds))))
     return NeedleEstimate(pose, covariance, probability, _why_abstain(covariance, arc, fit, rival))
 

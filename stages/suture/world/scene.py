@@ -117,7 +117,7 @@ def _needle_in_world(holder: str, place: str, size: float, random: np.random.Gen
         return transform_from(rotation, np.array([along, random.uniform(-0.002, 0.002), lift]))
     low, high = np.array(PLACES[place]).T
     while True:
-        right, back, up = random.uniform(low, high) * size
+        right, back, up = (random.uniform(low, high) * size).tolist()
         rotation = Rotation.random(random_state=random).as_matrix()
         pose = NeedlePose(transform_from(rotation, np.array([back, -right, max(up, 0.014)])))
         if np.min(pose.points(np.linspace(0.0, np.pi, 25))[:, 2]) > RIDGE_HEIGHT + 0.002:
