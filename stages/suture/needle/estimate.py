@@ -25,14 +25,16 @@ from stages.suture.rig import NeedlePose, StereoRig
 MARGIN = 40
 FEWEST_PIXELS = 30
 KEPT_STARTS = 8
-FINALISTS = 4
+FINALISTS = 6
+EXPLAINED_WEIGHT = 60.0
+"""Of the score (0 to 2) against the log-likelihood when finalists are compared."""
 WIDE_BANDS = (12.0, 10.0, 8.0, 6.0, 5.0, 4.0)
 NARROW_BANDS = (4.0, 3.0, 3.0, 2.5, 2.5)
 LARGEST_TURN = np.radians(9.0)
 LARGEST_SHIFT = 0.0016
 LEAST_SEEN = 0.15
 LEAST_LEAD = 3.0
-"""By so much (log-likelihood) the pose must beat the best one elsewhere."""
+"""By so much (log-likelihood and weighted score) the pose must beat the best one elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | 
     candidates = _candidates(observation, eyes, distances, pixels, guess, random)
     if not candidates:
         return NeedleEstimate.none("No circle of the needle's radius passes through what both eyes see.")
-    chosen = _chosen(rig, eyes, candidates)
+    chosen = _chosen(rig, eyes, candidates, distances, pixels)
     if isinstance(chosen, str):
         return NeedleEstimate.none(chosen)
     fit, arc, rival = chosen
@@ -80,10 +82,15 @@ def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | 
 
 
 def _chosen(
-    rig: StereoRig, eyes: tuple[EyeMask, EyeMask], candidates: list[_Candidate]
+    rig: StereoRig,
+    eyes: tuple[EyeMask, EyeMask],
+    candidates: list[_Candidate],
+    distances: tuple[np.ndarray, np.ndarray],
+    pixels: tuple[np.ndarray, np.ndarray],
 ) -> tuple[CircleFit, Arc, float] | str:
-    """Return the likeliest of the best few circles after a close fit, its arc, and by how much (log-likelihood) it
-    beats the likeliest one that lies elsewhere; or why there is none."""
+    """Return the best of the best few circles after a close fit, its arc, and by how much it beats the best one that
+    lies elsewhere; or why there is none. Best is the likelihood of what lies on the circle together with the share of
+    the masks that the circle explains."""
     distinct: list[CircleFit] = []
     for candidate in candidates:
         fit = candidate.fit
@@ -97,13 +104,13 @@ def _chosen(
     for fit in distinct:
         arc = place_arc(fit)
         fit = refine(rig, eyes, fit.frame, fit.centre, NARROW_BANDS, fit.shift, (arc.start + np.pi / 2, 1.75))
-        finals.append((fit, place_arc(fit)))
-    finals.sort(key=lambda final: -final[1].likelihood)
-    fit, arc = finals[0]
-    elsewhere = [
-        other.likelihood for f, other in finals[1:] if _differ(f.frame, f.centre, fit.frame, fit.centre, 10.0, 0.0015)
-    ]
-    return fit, arc, arc.likelihood - max(elsewhere, default=-1e9)
+        arc = place_arc(fit)
+        explained = score(rig, fit.frame, fit.centre, fit.shift, distances, eyes, pixels)
+        finals.append((arc.likelihood + EXPLAINED_WEIGHT * explained, fit, arc))
+    finals.sort(key=lambda final: -final[0])
+    best, fit, arc = finals[0]
+    elsewhere = [other for other, f, _ in finals[1:] if _differ(f.frame, f.centre, fit.frame, fit.centre, 10.0, 0.0015)]
+    return fit, arc, best - max(elsewhere, default=-1e9)
 
 
 def _without(mask: np.ndarray, thread: np.ndarray | None) -> np.ndarray:
