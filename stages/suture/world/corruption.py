@@ -47,7 +47,7 @@ def _wandering_outline(crop: np.ndarray, random: np.random.Generator) -> np.ndar
     outside = cv2.distanceTransform(1 - crop, cv2.DIST_L2, 3)
     inside = cv2.distanceTransform(crop, cv2.DIST_L2, 3)
     wander = cv2.GaussianBlur(random.standard_normal(crop.shape).astype(np.float32), (0, 0), 3.0)
-    wander *= 0.5 / max(float(wander.std()), 1e-9)
+    wander = wander * (0.5 / max(float(wander.std()), 1e-9))
     return ((outside - inside + wander) < 0.5).astype(np.uint8)
 
 
@@ -74,8 +74,8 @@ def spoiled_thread(eye: Eye, random: np.random.Generator) -> np.ndarray:
 def spoiled_drivers(eye: Eye, random: np.random.Generator) -> np.ndarray:
     """Return where (H, W) bool the robot's kinematics say that drivers are: off by some 3 px, grown by 2 px."""
     drivers = eye.mask(LEFT_DRIVER, RIGHT_DRIVER).astype(np.uint8)
-    shift = np.float32(np.hstack([np.eye(2), random.normal(0.0, 3.0, (2, 1))]))
-    moved = cv2.warpAffine(drivers, shift, drivers.shape[::-1], flags=cv2.INTER_NEAREST)
+    shift = np.hstack([np.eye(2), random.normal(0.0, 3.0, (2, 1))]).astype(np.float32)
+    moved = cv2.warpAffine(drivers, shift, (drivers.shape[1], drivers.shape[0]), flags=cv2.INTER_NEAREST)
     return cv2.dilate(moved, np.ones((5, 5), np.uint8)) > 0
 
 
@@ -104,8 +104,8 @@ def noisy_disparity(view: StereoView, noise: float, random: np.random.Generator)
         cv2.blur((~inside).astype(np.float64), (9, 9)), 1e-6
     )
     crop = np.where(wrong & (others > 0), others, crop)
-    even = cv2.GaussianBlur(random.standard_normal(crop.shape).astype(np.float32), (0, 0), 2.0)
-    even /= max(float(even.std()), 1e-9)
+    even: np.ndarray = cv2.GaussianBlur(random.standard_normal(crop.shape).astype(np.float32), (0, 0), 2.0)
+    even = even / max(float(even.std()), 1e-9)
     crop = crop + noise * np.sqrt(0.5) * (even + random.standard_normal(crop.shape))
     disparity[window] = crop.astype(np.float32)
     return disparity

@@ -27,7 +27,7 @@ def loose_thread(
     bend = random.normal(0.0, 30.0, 3)
     for index in range(count):
         bend += -0.05 * bend + random.normal(0.0, 5.0 + 17.0 * loops, 3)
-        bend *= min(1.0, 220.0 / (np.linalg.norm(bend) + 1e-9))
+        bend *= min(1.0, 220.0 / (float(np.linalg.norm(bend)) + 1e-9))
         heading = heading + STEP * (np.cross(bend, heading) + np.array([0.0, 0.0, -18.0]))
         distance = np.linalg.norm(points[index, :2])
         if distance > 0.06:
