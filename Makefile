@@ -172,6 +172,11 @@ tidy: setup ## Clearing tables (TIDY): tables 7.1 to 7.3, joint planner, optimum
 	$(if $(and $(filter detect,$(PARTS)),$(wildcard $(REAL_DATA)/tableware)),$(PYTHON) -m benchmarks.tidy.detect_real --data $(REAL_DATA)/tableware --out $(TIDY)/detect_real)
 	$(PYTHON) -m benchmarks.tidy.gather --out $(TIDY)
 
+.PHONY: stitch-needle
+# Five hundred rendered views and more without pictures, about forty minutes of one core; a stopped run goes on.
+stitch-needle: setup ## The needle's pose: the thesis's estimator and ours on rendered views (QUICK=1: ten a case)
+	$(PYTHON) -m benchmarks.stitch.needle $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/stitch-needle$(if $(QUICK),-quick)
+
 .PHONY: llm3
 # A hundred reporting seeds a cell, about ten minutes of one core; a stopped run goes on where it was.
 llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2, harder suites (QUICK=1: ten instances)

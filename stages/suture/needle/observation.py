@@ -1,0 +1,79 @@
+"""What an estimator of the needle's pose is given, and what it answers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.errors import BadInput
+from stages.suture.rig import NeedlePose, StereoRig
+
+
+@dataclass(frozen=True)
+class NeedleObservation:
+    """Masks (H, W) bool of both eyes, and whatever else is known.
+
+    `disparity` (H, W) float32 [px], left eye, NaN unknown; `left_thread`, `right_thread` where thread is seen;
+    `left_hidden`, `right_hidden` where something (a driver) may hide the needle. All but the masks may be None.
+    """
+
+    rig: StereoRig
+    left_mask: np.ndarray
+    right_mask: np.ndarray
+    disparity: np.ndarray | None = None
+    left_thread: np.ndarray | None = None
+    right_thread: np.ndarray | None = None
+    left_hidden: np.ndarray | None = None
+    right_hidden: np.ndarray | None = None
+
+    def check(self) -> None:
+        """Raise BadInput where the rig or the images' sizes cannot be."""
+        if not self.rig.baseline > 0:
+            raise BadInput(
+                f"The stereo rig's baseline is {self.rig.baseline} m: two eyes at one place measure no depth. "
+                "Check the calibration's baseline and the order of the eyes."
+            )
+        size = (self.rig.height, self.rig.width)
+        named = {
+            "left needle mask": self.left_mask,
+            "right needle mask": self.right_mask,
+            "disparity": self.disparity,
+            "left thread mask": self.left_thread,
+            "right thread mask": self.right_thread,
+            "left mask of what hides": self.left_hidden,
+            "right mask of what hides": self.right_hidden,
+        }
+        for name, array in named.items():
+            if array is not None and array.shape != size:
+                raise BadInput(
+                    f"The {name} is {array.shape} but the rig's images are {size} (rows, columns). "
+                    "Give masks of the rectified images at full size."
+                )
+
+
+@dataclass(frozen=True)
+class NeedleEstimate:
+    """A needle's pose and how sure it is, or why there is none.
+
+    `covariance` (6, 6): of the centre's error [m] (camera frame) and of the rotation vector [rad] (camera frame) that
+    turns the estimate into the truth. `tip_probability`: that tip and swage are not exchanged. `abstained`: empty, or
+    one sentence that says why the pose should not be used; `pose` is then the best guess or None.
+    """
+
+    pose: NeedlePose | None
+    covariance: np.ndarray
+    tip_probability: float
+    abstained: str
+
+    @staticmethod
+    def none(reason: str) -> NeedleEstimate:
+        """Return the abstention that has not even a guess."""
+        return NeedleEstimate(None, np.full((6, 6), np.inf), 0.5, reason)
+
+
+def violet(image: np.ndarray) -> np.ndarray:
+    """Return where (H, W) bool an RGB picture (H, W, 3) uint8 shows violet thread: more blue than green for its
+    brightness; neither steel (grey) nor the pad (red to yellow) is."""
+    red, green, blue = (image[..., channel].astype(np.int16) for channel in range(3))
+    return (blue - green) * 100 > 7 * (red + green + blue)

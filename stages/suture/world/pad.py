@@ -1,0 +1,48 @@
+"""The wound pad: a height field with one raised wound along the world's x axis (world z up, metres)."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+RIDGE_HEIGHT = 0.0055
+RIDGE_HALF_WIDTH = 0.0065
+SLIT_HALF_WIDTH = 0.0006
+FLAT_FROM = 0.0135
+"""Beyond this distance from the wound [m] the pad is flat but for its waves."""
+
+
+@numba.njit(cache=True, fastmath=True)
+def height(x: float, y: float) -> float:
+    """Return the pad's height [m] at (x, y): a rounded ridge with a slit along its crest, and slight waves."""
+    waves = 0.0004 * np.sin(90.0 * x + 1.3) * np.cos(70.0 * y)
+    if abs(y) > FLAT_FROM:
+        return waves
+    across = y / RIDGE_HALF_WIDTH
+    ridge = RIDGE_HEIGHT * np.exp(-across * across * across * across * 0.7)
+    slit = 0.0018 * np.exp(-(y / SLIT_HALF_WIDTH) * (y / SLIT_HALF_WIDTH))
+    return ridge - slit + waves
+
+
+@numba.njit(cache=True)
+def _hash(column: int, row: int, salt: int) -> float:
+    value = (column * 374761393 + row * 668265263 + salt * 1274126177) & 0xFFFFFFFF
+    value = ((value ^ (value >> 13)) * 1103515245) & 0xFFFFFFFF
+    return float((value ^ (value >> 16)) & 0xFFFF) / 65535.0
+
+
+@numba.njit(cache=True)
+def texture(x: float, y: float, salt: int) -> float:
+    """Return a smooth mottle between -1 and 1 with grains of 6, 1.5 and 0.5 mm at (x, y) [m]."""
+    total = 0.0
+    for octave in range(3):
+        scale = (166.0, 660.0, 2000.0)[octave]
+        weight = (0.45, 0.30, 0.25)[octave]
+        u, v = x * scale + 1000.0, y * scale + 1000.0
+        column, row = int(np.floor(u)), int(np.floor(v))
+        a, b = u - column, v - row
+        a, b = a * a * (3 - 2 * a), b * b * (3 - 2 * b)
+        low = _hash(column, row, salt + octave) * (1 - a) + _hash(column + 1, row, salt + octave) * a
+        high = _hash(column, row + 1, salt + octave) * (1 - a) + _hash(column + 1, row + 1, salt + octave) * a
+        total += weight * (2.0 * (low * (1 - b) + high * b) - 1.0)
+    return total

@@ -1,0 +1,45 @@
+"""Needle masks drawn from geometry alone, for the tests of the estimators."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stages.kit.geometry.transforms import transform_from
+from stages.suture.needle.observation import NeedleObservation
+from stages.suture.rig import TWO_CAMERAS, NeedlePose, StereoRig
+
+
+def pose_at(tilt_degrees: float = 50.0, roll_degrees: float = 70.0, depth: float = 0.35) -> NeedlePose:
+    """Return a pose whose plane is `tilt_degrees` from facing the cameras."""
+    rotation = Rotation.from_euler("zxz", [20.0, tilt_degrees, roll_degrees], degrees=True).as_matrix()
+    return NeedlePose(transform_from(rotation, np.array([0.03, 0.004, depth])))
+
+
+def drawn_mask(rig: StereoRig, pose: NeedlePose, eye: int, first: float = 0.0, last: float = np.pi) -> np.ndarray:
+    """Return one eye's mask of the arc from angle `first` to `last`, a wire of even thickness."""
+    points = pose.points(np.linspace(first, last, 400))
+    pixels = rig.right(points) if eye else rig.left(points)
+    canvas = np.zeros((rig.height, rig.width), dtype=np.uint8)
+    thickness = max(round(0.001 * rig.focal / pose.centre[2]), 1)
+    scaled = np.round(pixels * 16).astype(np.int32).reshape(-1, 1, 2)
+    cv2.polylines(canvas, [scaled], False, 1, thickness, cv2.LINE_8, 4)
+    return canvas > 0
+
+
+def disparity_of(rig: StereoRig, pose: NeedlePose, mask: np.ndarray) -> np.ndarray:
+    """Return the exact disparity of the circle's nearest point at every pixel of the left mask."""
+    points = pose.points(np.linspace(0.0, np.pi, 2000))
+    pixels = rig.left(points)
+    rows, columns = np.nonzero(mask)
+    gaps = (pixels[None, :, 0] - columns[:, None]) ** 2 + (pixels[None, :, 1] - rows[:, None]) ** 2
+    disparity = np.full(mask.shape, np.nan, dtype=np.float32)
+    disparity[rows, columns] = rig.focal * rig.baseline / points[np.argmin(gaps, axis=1), 2]
+    return disparity
+
+
+def observed(pose: NeedlePose, rig: StereoRig = TWO_CAMERAS) -> NeedleObservation:
+    """Return the clean observation of a needle at `pose`."""
+    left = drawn_mask(rig, pose, 0)
+    return NeedleObservation(rig, left, drawn_mask(rig, pose, 1), disparity_of(rig, pose, left))

@@ -1,0 +1,139 @@
+"""Both estimators on needles drawn from geometry, and what they say of bad input."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from schemas.errors import BadInput
+from stages.suture.needle.estimate import estimate
+from stages.suture.needle.filter import difference, fuse
+from stages.suture.needle.filter import moved as moved_pose
+from stages.suture.needle.observation import NeedleEstimate, NeedleObservation, violet
+from stages.suture.needle.thesis import farthest_pair, ransac_circle, ransac_plane, thesis_estimate
+from stages.suture.rig import TWO_CAMERAS
+from tests.unit.suture.needle_cases import drawn_mask, observed, pose_at
+
+
+def _plane_degrees(pose, other):
+    return np.degrees(np.arccos(min(1.0, abs(float(pose.normal @ other.normal)))))
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return pose_at(), observed(pose_at())
+
+
+def test_the_thesis_finds_a_needle_of_exact_disparity(clean):
+    truth, observation = clean
+    found = thesis_estimate(observation).pose
+    assert np.linalg.norm(found.centre - truth.centre) < 5e-4
+    assert _plane_degrees(found, truth) < 3.0
+    ends = sorted([np.linalg.norm(found.tip - truth.tip), np.linalg.norm(found.tip - truth.swage)])
+    assert ends[0] < 1.5e-3
+
+
+def test_ours_finds_it_without_any_disparity(clean):
+    truth, observation = clean
+    answer = estimate(replace(observation, disparity=None))
+    assert answer.abstained == ""
+    assert np.linalg.norm(answer.pose.centre - truth.centre) < 5e-4
+    assert _plane_degrees(answer.pose, truth) < 1.0
+    ends = sorted([np.linalg.norm(answer.pose.tip - truth.tip), np.linalg.norm(answer.pose.tip - truth.swage)])
+    assert ends[0] < 1.5e-3
+    assert np.all(np.linalg.eigvalsh(answer.covariance) > 0)
+
+
+@pytest.mark.parametrize("at_swage", [True, False])
+def test_thread_at_one_end_says_which_end_is_the_swage(clean, at_swage):
+    truth, observation = clean
+    shown = truth if at_swage else truth.swapped()
+    tangent = np.array([[0.0, -1.0, 0.0]]) @ shown.camera_from_needle[:3, :3].T
+    beyond = shown.swage + np.linspace(0.0003, 0.008, 60)[:, None] * tangent
+    threads = []
+    for project in (TWO_CAMERAS.left, TWO_CAMERAS.right):
+        thread = np.zeros((960, 1280), dtype=bool)
+        columns, rows = np.round(project(beyond)).astype(int).T
+        thread[rows, columns] = True
+        threads.append(thread)
+    answer = estimate(replace(observation, disparity=None, left_thread=threads[0], right_thread=threads[1]))
+    assert np.linalg.norm(answer.pose.swage - shown.swage) < 2e-3
+    assert answer.tip_probability > 0.9
+
+
+def test_the_same_input_gives_the_same_answer(clean):
+    _, observation = clean
+    first, second = estimate(observation), estimate(observation)
+    assert np.array_equal(first.pose.camera_from_needle, second.pose.camera_from_needle)
+
+
+def test_exchanged_eyes_are_named(clean):
+    _, observation = clean
+    exchanged = NeedleObservation(TWO_CAMERAS, observation.right_mask, observation.left_mask)
+    assert "exchanged" in estimate(exchanged).abstained
+
+
+def test_zero_baseline_and_wrong_sizes_are_bad_input(clean):
+    _, observation = clean
+    with pytest.raises(BadInput, match="baseline"):
+        estimate(replace(observation, rig=replace(TWO_CAMERAS, baseline=0.0)))
+    with pytest.raises(BadInput, match="right needle mask"):
+        estimate(replace(observation, right_mask=np.zeros((10, 10), dtype=bool)))
+
+
+def test_too_few_points_abstain():
+    empty = np.zeros((960, 1280), dtype=bool)
+    nothing = NeedleObservation(TWO_CAMERAS, empty, empty, np.full((960, 1280), np.nan, dtype=np.float32))
+    assert "0 points" in thesis_estimate(nothing).abstained
+    assert "0 pixels" in estimate(nothing).abstained
+
+
+def test_a_stub_of_needle_abstains():
+    pose = pose_at()
+    stub = NeedleObservation(TWO_CAMERAS, *(drawn_mask(TWO_CAMERAS, pose, eye, 1.4, 1.75) for eye in (0, 1)))
+    assert estimate(stub).abstained != ""
+
+
+def test_ransac_finds_plane_and_circle_among_outliers():
+    random = np.random.default_rng(1)
+    flat = np.stack([random.uniform(-0.01, 0.01, 200), random.uniform(-0.01, 0.01, 200), np.full(200, 0.3)], axis=1)
+    points = np.concatenate([flat, random.uniform([-0.01, -0.01, 0.28], [0.01, 0.01, 0.32], (60, 3))])
+    _, normal, inliers = ransac_plane(points, 0.0005, 200, random)
+    assert abs(normal[2]) > 0.999 and inliers[:200].all()
+    angles = random.uniform(0.0, np.pi, 200)
+    ring = np.stack([0.012 * np.cos(angles) + 0.001, 0.012 * np.sin(angles)], axis=1)
+    centre, radius, _ = ransac_circle(np.concatenate([ring, random.uniform(-0.02, 0.02, (50, 2))]), 2e-4, 300, random)
+    assert np.allclose(centre, [0.001, 0.0], atol=1e-4) and radius == pytest.approx(0.012, abs=1e-4)
+    first, second = farthest_pair(ring)
+    assert np.linalg.norm(first - second) == pytest.approx(
+        max(np.linalg.norm(ring - end, axis=1).max() for end in ring)
+    )
+
+
+def test_the_filter_outvotes_wrong_frames_and_keeps_what_frames_share():
+    truth, random = pose_at(), np.random.default_rng(2)
+    covariance = np.diag([(4e-4) ** 2] * 3 + [np.radians(2.0) ** 2] * 3)
+    frames = []
+    for index in range(10):
+        error = random.multivariate_normal(np.zeros(6), covariance)
+        if index in (2, 7, 9):
+            error = np.array([0.004, 0.0, 0.003, 0.9, 0.4, 0.0])
+        pose = moved_pose(truth, error)
+        pose = pose.swapped() if index in (1, 4) else pose
+        frames.append((NeedleEstimate(pose, covariance, 0.55 if index in (1, 4) else 0.9, ""), np.eye(4)))
+    fused = fuse(frames)
+    step = difference(fused.pose, truth)
+    assert np.linalg.norm(step[:3]) < 6e-4 and np.linalg.norm(step[3:]) < np.radians(3.0)
+    assert np.trace(fused.covariance) > 0.2 * np.trace(covariance)
+
+
+def test_difference_and_moved_are_inverse():
+    pose, step = pose_at(), np.array([0.001, -0.002, 0.003, 0.1, 0.2, -0.3])
+    assert np.allclose(difference(pose, moved_pose(pose, step)), step)
+
+
+def test_violet_is_thread_and_steel_is_not():
+    colours = np.array([[[110, 60, 130], [128, 128, 130], [190, 150, 130]]], dtype=np.uint8)
+    assert violet(colours).tolist() == [[True, False, False]]
