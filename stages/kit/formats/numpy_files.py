@@ -1,4 +1,4 @@
-"""Arrays out of NPZ files that nobody vouches for: sizes are checked before memory is taken, objects are refused."""
+"""Arrays out of NPZ and NPY files that nobody vouches for: sizes are checked before memory is taken, objects are refused."""
 
 from __future__ import annotations
 
@@ -30,21 +30,38 @@ def read_arrays(path: Path, *names: str, hint: str = "make the artifact again") 
         return tuple(_read_entry(archive, f"{name}.npy") for name in names)
 
 
+def read_array(path: Path, hint: str = "make the artifact again") -> np.ndarray:
+    """Return the array of an NPY file. Raises BadInput as `read_arrays` does."""
+    path = Path(path)
+    try:
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            return _read_stream(file, path.name, min(size, LARGEST_ARRAY))
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror or error}", hint=hint) from None
+    except BadInput as error:
+        raise BadInput(f"{path}: {error}", hint=hint) from None
+
+
 def _read_entry(archive: zipfile.ZipFile, name: str) -> np.ndarray:
     try:
         entry = find_entry(archive, name, LARGEST_ARRAY)
     except KeyError:
         raise BadInput(f"has no array {name.removesuffix('.npy')!r}") from None
     with archive.open(entry) as file:
-        shape, fortran_order, kind = _read_header(file, name)
-        expected = math.prod(shape) * kind.itemsize
-        if expected > entry.file_size:
-            raise BadInput(f"{name}: shape {shape} of {kind} needs {expected} bytes, there are {entry.file_size}")
-        data = bytearray()  # grows with what is really there
-        while len(data) < expected and (piece := file.read(min(PIECE, expected - len(data)))):
-            data += piece
-        if len(data) != expected or file.read(1):
-            raise BadInput(f"{name}: {len(data)} bytes or more, shape {shape} of {kind} needs {expected}")
+        return _read_stream(file, name, entry.file_size)
+
+
+def _read_stream(file: IO[bytes], name: str, size: int) -> np.ndarray:
+    shape, fortran_order, kind = _read_header(file, name)
+    expected = math.prod(shape) * kind.itemsize
+    if expected > size:
+        raise BadInput(f"{name}: shape {shape} of {kind} needs {expected} bytes, there are {size}")
+    data = bytearray()  # grows with what is really there
+    while len(data) < expected and (piece := file.read(min(PIECE, expected - len(data)))):
+        data += piece
+    if len(data) != expected or file.read(1):
+        raise BadInput(f"{name}: {len(data)} bytes or more, shape {shape} of {kind} needs {expected}")
     return np.frombuffer(data, dtype=kind).reshape(shape, order="F" if fortran_order else "C")
 
 

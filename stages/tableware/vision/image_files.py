@@ -20,6 +20,7 @@ from pydantic import ValidationError
 from schemas.base import Model, Transform
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
+from stages.kit.formats.numpy_files import read_array, read_arrays
 
 COLORS = ("color.png", "color.jpg", "rgb.png", "rgb.jpg")
 DEPTHS = ("depth.npz", "depth.npy", "depth.png")
@@ -111,13 +112,8 @@ def _picture(path: Path, flags: int) -> np.ndarray:
 def _depth(path: Path, scale: float | None) -> np.ndarray:
     """Return depth (H, W) float32 [m]. 16-bit images are millimetres unless told otherwise, arrays metres."""
     if path.suffix.lower() in (".npy", ".npz"):
-        try:
-            with path.open("rb") as stream:
-                loaded = np.load(stream, allow_pickle=False)
-                array = loaded["depth"] if path.suffix.lower() == ".npz" else loaded
-        except (OSError, ValueError, KeyError, EOFError) as error:
-            raise BadInput(f"{path}: no depth array can be read ({type(error).__name__})",
-                           hint="save an array of (H, W) metres, in an .npz as `depth`") from None  # fmt: skip
+        hint = "save an array of (H, W) metres, in an .npz as `depth`"
+        array = read_arrays(path, "depth", hint=hint)[0] if path.suffix.lower() == ".npz" else read_array(path, hint)
         if not np.issubdtype(array.dtype, np.number) or np.iscomplexobj(array) or array.ndim != 2:
             raise BadInput(f"{path}: the depth is {array.shape} {array.dtype}", hint="save an array of (H, W) metres")
         usual = MILLIMETRE if np.issubdtype(array.dtype, np.integer) else 1.0
