@@ -1,0 +1,1 @@
+"""The suturing experiments (STITCH, Srinivas 2024)."""
