@@ -21,7 +21,8 @@ HOME = {
     "right": transform_from(jaws(np.array([0.5, 0.0, -0.85])), np.array([-0.050, 0.0, 0.055])),
     "left": transform_from(jaws(np.array([-0.5, 0.0, -0.85])), np.array([0.050, 0.0, 0.055])),
 }
-CORNER = transform_from(jaws(np.array([np.cos(np.pi / 8), 0.0, np.sin(np.pi / 8)])), np.array([-0.045, -0.030, 0.032]))
+CORNER = transform_from(jaws(np.array([1.0, 0.0, 0.0])), np.array([-0.045, -0.030, 0.032]))
+"""The lower, back, right corner: away from the cameras, on the right driver's side."""
 SHAFT, SHAFT_RADIUS = 0.06, 0.004
 TURNING_RADIUS = 0.02
 SETTLING = 30

@@ -14,7 +14,7 @@ from stages.suture.trials.perception import Seen
 from stages.suture.trials.thread import pull_through
 from stages.suture.trials.wound import SPANNED, entry, exit_
 
-GRASPING = primitives.jaws(np.array([-np.cos(np.pi / 12), 0.0, -np.sin(np.pi / 12)]))
+GRASPING = primitives.jaws(np.array([-1.0, 0.0, 0.0]))
 OUTWARDS = np.array([0.249, 0.548, 0.798]) / np.linalg.norm([0.249, 0.548, 0.798])
 LONGEST_PULL = 0.115
 """How far [m] from the wound the left driver still reaches while it pulls."""

@@ -20,8 +20,9 @@ from stages.suture.trials.gripping import close
 from stages.suture.trials.perception import Seen
 from stages.suture.trials.thread import draw
 
-PRESENTING = about(UP_THE_WOUND, -np.pi / 8) @ GRASPING
-"""The left driver's orientation in which a needle extracted as planned shows its swage level to the right driver."""
+PRESENTING = about(UP_THE_WOUND, -np.pi / 4) @ GRASPING
+"""The left driver's orientation in which a needle extracted as planned is taken by level jaws so that, these turned by
+90 degrees about y, it is ready for insertion."""
 PLACE = np.array([0.010, 0.0, 0.045])
 TAKING = primitives.jaws(np.array([1.0, 0.0, 0.0]))
 RELEASED = 0.012

@@ -16,7 +16,7 @@ from stages.suture.trials.wound import CHORD, HOLE_HEIGHT, SPANNED, entry, exit_
 
 START_ANGLE = SPANNED / 2
 """The tip lies this far past the needle's lowest point at the entry [rad], so that the arc spans entry and exit."""
-NOMINAL = primitives.jaws(np.array([np.sin(START_ANGLE), 0.0, -np.cos(START_ANGLE)]))
+NOMINAL = primitives.jaws(np.array([0.0, 0.0, -1.0]))
 """The right driver's orientation when a needle that it holds by the swage as planned is ready for insertion."""
 STAND_OFF = np.array([-0.008, 0.0, 0.0])
 HOVER = np.array([-0.015, 0.0, 0.02])

@@ -22,7 +22,7 @@ class World:
     """Offset between robot and cameras, per axis, one for a trial."""
     jaw_half_opening: float = 0.0035
     jaw_half_width: float = 0.0015
-    jaw_half_depth: float = 0.004
+    jaw_half_depth: float = 0.006
     closing_normal: float = 3.0
     """How far closing jaws turn the needle beyond aligning it with their faces, per axis."""
     closing_in_plane: float = 4.0
