@@ -17,7 +17,7 @@ from stages.suture.motion.constants import (
 )
 from stages.suture.motion.needle import UP_THE_WOUND, about, turned
 
-STEPS = 24
+STEPS = 20
 
 
 def jaws(direction: np.ndarray) -> np.ndarray:

@@ -61,6 +61,8 @@ class Bench:
     tools: dict[str, np.ndarray] = field(default_factory=lambda: {name: pose.copy() for name, pose in HOME.items()})
     suture: int = 0
     anchor: np.ndarray | None = None
+    holes: tuple[np.ndarray, ...] = ()
+    """Where the needle in tissue really went in and came out, (3,) each."""
     rope: np.ndarray = field(default_factory=lambda: np.zeros((PARTICLES, 3)))
     seconds: float = 0.0
     stopped_short: int = 0

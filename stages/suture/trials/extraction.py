@@ -12,7 +12,7 @@ from stages.suture.trials.bench import HOME, Bench, Failed, Hold
 from stages.suture.trials.gripping import close, thread_between
 from stages.suture.trials.perception import Seen
 from stages.suture.trials.thread import pull_through
-from stages.suture.trials.wound import SPANNED, entry, exit_
+from stages.suture.trials.wound import SPANNED, exit_
 
 GRASPING = primitives.jaws(np.array([-1.0, 0.0, 0.0]))
 OUTWARDS = np.array([0.249, 0.548, 0.798]) / np.linalg.norm([0.249, 0.548, 0.798])
@@ -119,7 +119,7 @@ def _loads(bench: Bench, needles: np.ndarray, shift: float) -> np.ndarray:
     loads = np.empty(len(needles))
     for step, needle in enumerate(needles):
         points = ARC_POINTS @ needle[:3, :3].T + needle[:3, 3]
-        apart = [float(np.linalg.norm(points - hole, axis=1).min()) for hole in (entry(bench.suture), exit_(bench.suture))]
+        apart = [float(np.linalg.norm(points - hole, axis=1).min()) for hole in bench.holes]
         loads[step] = world.tissue_friction * in_tissue + world.tissue_stiffness * 1000.0 * max(*apart, shift)
     return loads
 

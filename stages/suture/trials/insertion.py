@@ -156,6 +156,7 @@ def insert(bench: Bench, belief: Believed) -> None:
     bench.record("b: inserted")
     if found.fault is not None:
         raise Failed("I", found.fault)
+    bench.holes = tuple(hole for hole in (found.entered, found.left) if hole is not None)
     bench.hold = None
     away = bench.tools["right"].copy()
     away[:3, 3] += np.array([-0.02, 0.0, 0.03])

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-PARTICLES = 56
+PARTICLES = 48
 THREAD_RADIUS = 0.00019
 GRAVITY_STEP = 4.0e-5
 """How far a free particle falls in one step [m]."""
-DAMPING, ITERATIONS, PAD_FRICTION, BENDING = 0.85, 14, 0.5, 0.08
+DAMPING, ITERATIONS, PAD_FRICTION, BENDING = 0.85, 10, 0.5, 0.08
 
 
 @njit(cache=True)
@@ -45,31 +45,39 @@ def drape(
             points[i, 2] -= GRAVITY_STEP
         apart_from_itself(points, length)
         for sweep in range(ITERATIONS):
-            if hold_first:
-                points[0] = first[step]
-            points[count - 1] = last[step]
+            for k in range(3):
+                if hold_first:
+                    points[0, k] = first[step, k]
+                points[count - 1, k] = last[step, k]
             for at in range(count - 1):
                 i = at if sweep % 2 == 0 else count - 2 - at
-                dx = points[i + 1] - points[i]
-                d = np.sqrt(dx[0] ** 2 + dx[1] ** 2 + dx[2] ** 2) + 1e-12
+                dx = points[i + 1, 0] - points[i, 0]
+                dy = points[i + 1, 1] - points[i, 1]
+                dz = points[i + 1, 2] - points[i, 2]
+                d = np.sqrt(dx * dx + dy * dy + dz * dz) + 1e-12
                 a = 0.0 if (i == 0 and hold_first) else 1.0
                 b = 0.0 if i + 1 == count - 1 else 1.0
-                if a + b > 0:
+                if a + b > 0.0:
                     s = (d - length) / d / (a + b)
-                    for k in range(3):
-                        points[i, k] += a * s * dx[k]
-                        points[i + 1, k] -= b * s * dx[k]
+                    points[i, 0] += a * s * dx
+                    points[i, 1] += a * s * dy
+                    points[i, 2] += a * s * dz
+                    points[i + 1, 0] -= b * s * dx
+                    points[i + 1, 1] -= b * s * dy
+                    points[i + 1, 2] -= b * s * dz
             for i in range(1, count - 1):
                 for k in range(3):
                     points[i, k] += BENDING * (0.5 * (points[i - 1, k] + points[i + 1, k]) - points[i, k])
             for i in range(count - 1):
-                contact(points, before, i, half_width, height)
-                for m in range(capsules.shape[1]):
-                    if capsules[step, m, 6] > 0.0:
-                        push_out(points, i, capsules[step, m])
-        if hold_first:
-            points[0] = first[step]
-        points[count - 1] = last[step]
+                if points[i, 2] < height:
+                    contact(points, before, i, half_width, height)
+            for m in range(capsules.shape[1]):
+                if capsules[step, m, 6] > 0.0:
+                    push_out(points, capsules, step, m)
+        for k in range(3):
+            if hold_first:
+                points[0, k] = first[step, k]
+            points[count - 1, k] = last[step, k]
 
 
 @njit(cache=True)
@@ -92,17 +100,23 @@ def contact(points: np.ndarray, before: np.ndarray, i: int, half_width: float, h
 
 
 @njit(cache=True)
-def push_out(points: np.ndarray, i: int, capsule: np.ndarray) -> None:
-    """Move particle i to the surface of a capsule (7,) when it is inside."""
-    axis = capsule[3:6] - capsule[:3]
-    away = points[i] - capsule[:3]
-    square = axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2 + 1e-15
-    share = min(1.0, max(0.0, (away[0] * axis[0] + away[1] * axis[1] + away[2] * axis[2]) / square))
-    off = away - share * axis
-    d = np.sqrt(off[0] ** 2 + off[1] ** 2 + off[2] ** 2) + 1e-12
-    if d < capsule[6]:
-        for k in range(3):
-            points[i, k] += off[k] * (capsule[6] - d) / d
+def push_out(points: np.ndarray, capsules: np.ndarray, step: int, m: int) -> None:
+    """Move the particles inside capsule m of a step to its surface."""
+    x, y, z = capsules[step, m, 0], capsules[step, m, 1], capsules[step, m, 2]
+    ax, ay, az = capsules[step, m, 3] - x, capsules[step, m, 4] - y, capsules[step, m, 5] - z
+    radius = capsules[step, m, 6]
+    square = ax * ax + ay * ay + az * az + 1e-15
+    for i in range(len(points) - 1):
+        px, py, pz = points[i, 0] - x, points[i, 1] - y, points[i, 2] - z
+        share = min(1.0, max(0.0, (px * ax + py * ay + pz * az) / square))
+        ox, oy, oz = px - share * ax, py - share * ay, pz - share * az
+        d2 = ox * ox + oy * oy + oz * oz
+        if d2 < radius * radius:
+            d = np.sqrt(d2) + 1e-12
+            s = (radius - d) / d
+            points[i, 0] += ox * s
+            points[i, 1] += oy * s
+            points[i, 2] += oz * s
 
 
 @njit(cache=True)
@@ -116,12 +130,14 @@ def apart_from_itself(points: np.ndarray, length: float) -> None:
             dx, dy, dz = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
             if dx * dx + dy * dy + dz * dz > near:
                 continue
-            s, t = nearest_shares(points[i], points[i + 1], points[j], points[j + 1])
-            gap = points[i] + s * (points[i + 1] - points[i]) - points[j] - t * (points[j + 1] - points[j])
-            d = np.sqrt(gap[0] ** 2 + gap[1] ** 2 + gap[2] ** 2) + 1e-12
+            s, t = nearest_shares(points, i, j)
+            gx = gap(points, i, j, s, t, 0)
+            gy = gap(points, i, j, s, t, 1)
+            gz = gap(points, i, j, s, t, 2)
+            d = np.sqrt(gx * gx + gy * gy + gz * gz) + 1e-12
             if d < least:
                 for k in range(3):
-                    push = 0.5 * (least - d) * gap[k] / d
+                    push = 0.5 * (least - d) * gap(points, i, j, s, t, k) / d
                     points[i, k] += push * (1.0 - s)
                     points[i + 1, k] += push * s
                     points[j, k] -= push * (1.0 - t)
@@ -129,11 +145,23 @@ def apart_from_itself(points: np.ndarray, length: float) -> None:
 
 
 @njit(cache=True)
-def nearest_shares(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> tuple[float, float]:
-    """Return where along ab and cd (shares 0 to 1) two segments are nearest (Ericson 2005, section 5.1.9)."""
-    u, v, w = b - a, d - c, a - c
-    uu, vv, uv = np.dot(u, u) + 1e-18, np.dot(v, v) + 1e-18, np.dot(u, v)
-    uw, vw = np.dot(u, w), np.dot(v, w)
+def gap(points: np.ndarray, i: int, j: int, s: float, t: float, k: int) -> float:
+    """Return component k from the point at share t of segment j to the one at share s of segment i."""
+    on_i = points[i, k] + s * (points[i + 1, k] - points[i, k])
+    return on_i - points[j, k] - t * (points[j + 1, k] - points[j, k])
+
+
+@njit(cache=True)
+def nearest_shares(points: np.ndarray, i: int, j: int) -> tuple[float, float]:
+    """Return where along segments i and j (shares 0 to 1) they are nearest (Ericson 2005, section 5.1.9)."""
+    uu, vv, uv, uw, vw = 1e-18, 1e-18, 0.0, 0.0, 0.0
+    for k in range(3):
+        u, v, w = points[i + 1, k] - points[i, k], points[j + 1, k] - points[j, k], points[i, k] - points[j, k]
+        uu += u * u
+        vv += v * v
+        uv += u * v
+        uw += u * w
+        vw += v * w
     bottom = uu * vv - uv * uv
     s = min(1.0, max(0.0, (uv * vw - uw * vv) / bottom)) if bottom > 1e-18 else 0.0
     t = (uv * s + vw) / vv

@@ -21,7 +21,7 @@ class World:
     hand_eye: float = 0.0005
     """Offset between robot and cameras, per axis, one for a trial."""
     jaw_half_opening: float = 0.0035
-    jaw_half_width: float = 0.0015
+    jaw_half_width: float = 0.0022
     jaw_half_depth: float = 0.006
     closing_normal: float = 3.0
     """How far closing jaws turn the needle beyond aligning it with their faces, per axis."""
@@ -34,7 +34,7 @@ class World:
     """What a perfect grasp holds against [N]."""
     tissue_friction: float = 0.06
     """Force along the needle per millimetre of it in tissue [N/mm]."""
-    tissue_stiffness: float = 0.5
+    tissue_stiffness: float = 0.2
     """Force against a needle that moves sideways in its hole [N/mm]."""
     thread_friction: float = 0.15
     """Force that draws thread through one free hole [N]."""
