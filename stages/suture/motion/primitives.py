@@ -15,7 +15,7 @@ from stages.suture.motion.constants import (
     EXTRACTION_TURN,
     INSERTION_TURN,
 )
-from stages.suture.motion.needle import UP_THE_WOUND, about, turned
+from stages.suture.motion.needle import UP_THE_WOUND, turned
 
 STEPS = 20
 
@@ -35,16 +35,29 @@ def straight(start: np.ndarray, end: np.ndarray, steps: int = STEPS) -> np.ndarr
     axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     length = np.linalg.norm(axis)
     axis = axis / length if length > 1e-9 else UP_THE_WOUND
-    path = []
-    for share in np.linspace(0.0, 1.0, steps):
-        place = start[:3, 3] + share * (end[:3, 3] - start[:3, 3])
-        path.append(transform_from(about(axis, share * angle) @ start[:3, :3], place))
-    return np.array(path)
+    share = np.linspace(0.0, 1.0, steps)
+    path = np.zeros((steps, 4, 4))
+    path[:, :3, :3] = _turns(axis, share * angle) @ start[:3, :3]
+    path[:, :3, 3] = start[:3, 3] + share[:, None] * (end[:3, 3] - start[:3, 3])
+    path[:, 3, 3] = 1.0
+    return path
+
+
+def _turns(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Return rotations (K, 3, 3) by angles (K,) [rad] about a unit axis (3,)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angles)[:, None, None] * cross + (1.0 - np.cos(angles))[:, None, None] * (cross @ cross)
 
 
 def turning(start: np.ndarray, axis: np.ndarray, angle: float, centre: np.ndarray, steps: int = STEPS) -> np.ndarray:
     """Return poses (steps, 4, 4) of a tool that turns by `angle` [rad] about a line."""
-    return np.array([turned(start, axis, share * angle, centre) for share in np.linspace(0.0, 1.0, steps)])
+    rotations = _turns(axis, np.linspace(0.0, angle, steps))
+    path = np.zeros((steps, 4, 4))
+    path[:, :3, :3] = rotations @ start[:3, :3]
+    path[:, :3, 3] = rotations @ (start[:3, 3] - centre) + centre
+    path[:, 3, 3] = 1.0
+    return path
 
 
 def insertion(start: np.ndarray, vector: np.ndarray, normal: np.ndarray, centre: np.ndarray) -> np.ndarray:

@@ -28,8 +28,17 @@ def _wrapped(angle: np.ndarray) -> np.ndarray:
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-def branches(base_from_tip: np.ndarray) -> np.ndarray:
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    # numpy's own takes several times as long on a few vectors
+    x = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    y = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    return np.stack([x, y, a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]], axis=-1)
+
+
+def branches(base_from_tip: np.ndarray, flips: tuple[bool, ...] = (False, True)) -> np.ndarray:
     """Return joints (..., 8, 6) that put the tip at base_from_tip (..., 4, 4), limits not asked, roll in [-pi, pi).
+
+    `flips` (False,) leaves out the half in which the second joint lies beyond 90 degrees.
 
     A row is NaN where the wrist-yaw axis passes through the remote centre (the plane is then not determined) or the
     pitch axis comes to lie in it.
@@ -50,7 +59,7 @@ def branches(base_from_tip: np.ndarray) -> np.ndarray:
             reach = np.where(reach > SMALLEST, reach, np.nan)
             for way in (1.0, -1.0):
                 shaft = way * pitch_point / reach[..., None]
-                for flip in (False, True):
+                for flip in flips:
                     found.append(_branch(wrist, link, yaw_axis, shaft, way * reach, flip))
     return np.stack(found, axis=-2)
 
@@ -66,8 +75,8 @@ def _branch(
     sine1, cosine1, sine2, cosine2 = np.sin(first), np.cos(first), np.sin(second), np.cos(second)
     # Columns of the third frame, by multiplying out the first three rows of the table.
     shaft_x = np.stack([-sine1 * sine2, -cosine2, cosine1 * sine2], axis=-1)
-    shaft_y = np.cross(shaft, shaft_x)
-    pitch_axis = np.cross(link, yaw_axis)
+    shaft_y = _cross(shaft, shaft_x)
+    pitch_axis = _cross(link, yaw_axis)
     roll = np.arctan2(-(pitch_axis * shaft_x).sum(-1), (pitch_axis * shaft_y).sum(-1))
     rolled_x = np.cos(roll)[..., None] * shaft_x + np.sin(roll)[..., None] * shaft_y
     pitch = np.arctan2(-(link * shaft).sum(-1), (link * rolled_x).sum(-1)) + np.pi / 2
@@ -88,7 +97,7 @@ def solutions(base_from_tip: np.ndarray, margin: float = 0.0) -> np.ndarray:
 
 def reachable(base_from_tip: np.ndarray) -> np.ndarray:
     """Whether some branch lies within the limits, for poses (..., 4, 4)."""
-    rows = branches(base_from_tip)
+    rows = branches(base_from_tip, flips=(False,))  # the second joint's limits are far below 90 degrees
     inside = np.ones(rows.shape[:-1], dtype=bool)
     for joint in (0, 1, 2, 4, 5):  # the roll has more than a whole turn, so it never decides
         inside &= (rows[..., joint] >= LOWER[joint]) & (rows[..., joint] <= UPPER[joint])

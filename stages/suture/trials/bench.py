@@ -26,6 +26,8 @@ CORNER = transform_from(jaws(np.array([1.0, 0.0, 0.0])), np.array([-0.045, -0.03
 SHAFT, SHAFT_RADIUS = 0.06, 0.004
 TURNING_RADIUS = 0.02
 SETTLING = 30
+CHECKED_EVERY = 5
+"""Every so many poses of a path the arm is asked whether it reaches them, and at the last."""
 
 
 class Failed(Exception):
@@ -73,10 +75,11 @@ class Bench:
         A path that leaves the arm's reach ends where it does (counted in `stopped_short`). `bar`: the jaws are wide
         open across the thread, as in sweeping.
         """
-        reached = ARMS[arm].reaches(path)
+        asked = np.arange(len(path) - 1, -1, -CHECKED_EVERY)[::-1]
+        reached = ARMS[arm].reaches(path[asked])
         if not reached.all():
             self.stopped_short += 1
-            path = path[: max(1, int(np.argmin(reached)))]
+            path = path[: asked[max(0, int(np.argmin(reached)) - 1)] + 1]
         held = self.hold is not None and self.hold.arm == arm
         needles = path @ self.hold.grip if held and self.hold else np.repeat(self.needle[None], len(path), axis=0)
         swages = needles[:, :3, :3] @ SWAGE + needles[:, :3, 3]

@@ -9,7 +9,7 @@ import numpy as np
 from stages.kit.geometry.transforms import apply, inverse, transform_from
 from stages.suture.motion import primitives
 from stages.suture.motion.constants import CORRECTION_TURN, NORMAL_SAMPLES
-from stages.suture.motion.needle import RADIUS, TIP, UP_THE_WOUND, point_at, turned, upright
+from stages.suture.motion.needle import RADIUS, TIP, UP_THE_WOUND, about, point_at, turned, upright
 from stages.suture.trials.bench import CORNER, Bench, Failed
 from stages.suture.trials.perception import Seen
 from stages.suture.trials.wound import CHORD, HOLE_HEIGHT, SPANNED, entry, exit_, passage
@@ -89,7 +89,7 @@ def servoed(bench: Bench) -> Believed:
         if abs(angle) < SERVOED and tilted < SERVOED:
             break
         bench.move("right", primitives.final_turn(tool, angle))
-        bench.go("right", primitives.normal_to_y(bench.tools["right"], primitives.about(UP_THE_WOUND, angle) @ normal))
+        bench.go("right", primitives.normal_to_y(bench.tools["right"], about(UP_THE_WOUND, angle) @ normal))
     tool = bench.tools["right"]
     looks = samples(bench, SERVO_LOOKS)
     bench.record("k: turned by the seen ends")
