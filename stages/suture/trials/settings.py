@@ -15,9 +15,9 @@ class World:
 
     thread_shortest: float = 0.15
     thread_longest: float = 0.40
-    loading_normal: float = 6.0
+    loading_normal: float = 5.0
     """How far the needle that is handed to the robot first is turned from where it should be, per axis."""
-    loading_in_plane: float = 8.0
+    loading_in_plane: float = 5.0
     hand_eye: float = 0.0005
     """Offset between robot and cameras, per axis, one for a trial."""
     jaw_half_opening: float = 0.0035
@@ -25,12 +25,12 @@ class World:
     jaw_half_depth: float = 0.006
     closing_normal: float = 3.0
     """How far closing jaws turn the needle beyond aligning it with their faces, per axis."""
-    closing_in_plane: float = 4.0
-    insertion_slip: float = 3.0
+    closing_in_plane: float = 3.0
+    insertion_slip: float = 2.5
     """Slip in the grip under the insertion's torque."""
     knock: float = 6.0
     """How far jaws that miss turn a needle that they touch."""
-    hold: float = 4.0
+    hold: float = 3.0
     """What a perfect grasp holds against [N]."""
     tissue_friction: float = 0.06
     """Force along the needle per millimetre of it in tissue [N/mm]."""
@@ -38,7 +38,7 @@ class World:
     """Force against a needle that moves sideways in its hole [N/mm]."""
     thread_friction: float = 0.15
     """Force that draws thread through one free hole [N]."""
-    capstan: float = 0.25
+    capstan: float = 0.22
     """Friction of thread in tissue: each stitch multiplies the force by exp(pi * capstan)."""
     tug_angle_per_millimetre: float = 2.0
     """How far a needle turns in the grip per millimetre that taut thread is short, where it does not draw thread."""
