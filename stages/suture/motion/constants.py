@@ -33,7 +33,7 @@ class OpenConstants:
     """l_each [m]: stitch width and spacing of the phantom."""
     linear_pull: float = 0.050
     """The linear motion [m] that ends an extraction."""
-    unchanged_normal: float = radians(6.0)
+    unchanged_normal: float = radians(8.0)
     """A normal that turned less than this [rad] counts as unchanged in the handover test."""
 
 

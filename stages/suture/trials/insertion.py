@@ -66,13 +66,13 @@ def corrected(bench: Bench) -> Believed:
     bench.record("j: normal along y")
     if bench.policy.servoes_ends:
         return servoed(bench)
-    # The ends were seen before the normal was aligned; they are looked at again, as the needle has moved.
-    looks = samples(bench, 1)
+    # The needle has moved since the normals were seen, so its ends are looked at anew, as often.
+    looks = samples(bench, NORMAL_SAMPLES)
     tool = bench.tools["right"]
     rotation = primitives.final_turn(tool, CORRECTION_TURN)[-1][:3, :3]
     bench.move("right", primitives.final_turn(tool, CORRECTION_TURN))
     bench.record("k: 90 degrees about y")
-    return believed(tool, rotation, UP_THE_WOUND, (looks[0].tip, looks[0].swage))
+    return believed(tool, rotation, UP_THE_WOUND, middle_ends(looks, tool[:3, 3]))
 
 
 def servoed(bench: Bench) -> Believed:

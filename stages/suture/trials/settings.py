@@ -15,7 +15,7 @@ class World:
 
     thread_shortest: float = 0.15
     thread_longest: float = 0.40
-    loading_normal: float = 5.0
+    loading_normal: float = 8.0
     """How far the needle that is handed to the robot first is turned from where it should be, per axis."""
     loading_in_plane: float = 5.0
     hand_eye: float = 0.0005
@@ -23,7 +23,7 @@ class World:
     jaw_half_opening: float = 0.0035
     jaw_half_width: float = 0.0022
     jaw_half_depth: float = 0.006
-    closing_normal: float = 3.0
+    closing_normal: float = 4.0
     """How far closing jaws turn the needle beyond aligning it with their faces, per axis."""
     closing_in_plane: float = 3.0
     insertion_slip: float = 2.5
@@ -34,7 +34,7 @@ class World:
     """What a perfect grasp holds against [N]."""
     tissue_friction: float = 0.06
     """Force along the needle per millimetre of it in tissue [N/mm]."""
-    tissue_stiffness: float = 0.2
+    tissue_stiffness: float = 0.18
     """Force against a needle that moves sideways in its hole [N/mm]."""
     thread_friction: float = 0.15
     """Force that draws thread through one free hole [N]."""
@@ -44,7 +44,7 @@ class World:
     """How far a needle turns in the grip per millimetre that taut thread is short, where it does not draw thread."""
     tug_loses: float = 0.020
     """Taut thread short by more than this pulls the needle out of the jaws."""
-    handover_turn: float = 10.0
+    handover_turn: float = 12.0
     """How far the second driver turns the normal of a needle that both hold; a part of it stays."""
     handover_turn_stays: float = 0.3
     pinched_share: float = 0.5
@@ -57,9 +57,9 @@ class World:
     """Turns of thread about a driver that count as a tangle."""
     sweep_height: float = 0.0035
     sweep_height_noise: float = 0.0015
-    speed: float = 0.010
+    speed: float = 0.007
     """Tool speed [m/s]; a turn of the tool counts by its arc at 20 mm."""
-    overhead: float = 3.0
+    overhead: float = 4.0
     """Seconds that every primitive takes besides moving and seeing (planning, settling, jaws)."""
 
 

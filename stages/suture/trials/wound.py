@@ -20,7 +20,7 @@ RIDGE_HALF_WIDTH, RIDGE_HEIGHT = 0.005, 0.005
 HOLE_HEIGHT = RIDGE_HEIGHT * sqrt(1.0 - (CHORD / 2 / RIDGE_HALF_WIDTH) ** 2)
 SPACING, FIRST = 0.005, 0.0125
 SUTURES = 6
-SLIDES_OFF = cos(np.radians(70.0))
+SLIDES_OFF = cos(np.radians(75.0))
 """Cosine of the angle between tip and inward surface normal beyond which the tip slides along the flank."""
 SIDEWAYS = 0.0025
 """A hole farther than this along the wound [m] from its place is another stitch's."""
