@@ -75,7 +75,7 @@ def _close(bench: Bench) -> Hold | None:
     closing = close(bench.tools["right"], bench.needle, world, bench.random)
     if bench.hold is None or closing.caught is None:
         if closing.touched:
-            bench.turn_in_grip(world.knock / 2, world.knock / 2)
+            bench.turn_in_grip(world.knock_held, world.knock_held)
         return None
     turn = np.radians(world.handover_turn * (1.0 + 0.3 * bench.random.standard_normal()))
     vertical = np.array([0.0, 0.0, 1.0])

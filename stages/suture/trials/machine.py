@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from stages.suture.motion.constants import THROWS
+from stages.suture.motion.constants import THROWS, cinch_length
 from stages.suture.trials.bench import CORNER, HOME, Bench, Failed, loaded
 from stages.suture.trials.extraction import cinch, extract, sweep
 from stages.suture.trials.handover import hand_over
@@ -14,7 +14,7 @@ from stages.suture.trials.insertion import corrected, insert, uncorrected
 from stages.suture.trials.perception import FOLDER, Eyes, PerceptionModel, perception_model
 from stages.suture.trials.recording import Recorder
 from stages.suture.trials.settings import Policy, World
-from stages.suture.trials.thread import Thread
+from stages.suture.trials.thread import LEFT_IN_FIRST_HOLE, Thread
 from stages.suture.trials.wound import exit_
 
 
@@ -100,7 +100,8 @@ def throw(bench: Bench, outcome: Outcome) -> None:
 
 def recover(bench: Bench, random: np.random.Generator, thrown: int) -> None:
     """The scripted supervisor: one motion that puts the needle back into the right driver in the corner, clears the thread,
-    and gives it enough to go on with where there is any. A stitch that was made stays; one that was not is made anew.
+    and draws it to the cinch length of the stitch before where there is any. A stitch that was made stays; one that was
+    not is made anew.
     """
     bench.tools = {name: pose.copy() for name, pose in HOME.items()}
     bench.tools["right"] = CORNER.copy()
@@ -110,7 +111,8 @@ def recover(bench: Bench, random: np.random.Generator, thrown: int) -> None:
     thread = bench.thread
     thread.through = made + 1
     if made >= 0:
-        more = min(max(0.0, 0.09 - thread.working), max(0.0, thread.tail - 0.01))
+        wanted = cinch_length(made, bench.policy.constants)
+        more = min(max(0.0, wanted - thread.working), max(0.0, thread.tail - LEFT_IN_FIRST_HOLE))
         thread.working, thread.tail = thread.working + more, thread.tail - more
     elif thrown == 0:
         thread.working += max(0.0, thread.tail)

@@ -18,7 +18,7 @@ from schemas.errors import BadInput
 from stages.suture.motion.needle import SWAGE, TIP, from_ends
 
 FOLDER = Path(__file__).resolve().parents[3] / "data" / "stitch"
-STILL = 1e-4
+STILL = 1.5e-3
 """A needle whose ends moved less than this [m] is seen as before."""
 
 

@@ -29,12 +29,14 @@ class World:
     insertion_slip: float = 2.5
     """Slip in the grip under the insertion's torque."""
     knock: float = 6.0
-    """How far jaws that miss turn a needle that they touch."""
+    """How far jaws that miss turn a needle in tissue that they touch."""
+    knock_held: float = 1.0
+    """The same for a needle that the other driver holds."""
     hold: float = 3.0
     """What a perfect grasp holds against [N]."""
     tissue_friction: float = 0.06
     """Force along the needle per millimetre of it in tissue [N/mm]."""
-    tissue_stiffness: float = 0.18
+    tissue_stiffness: float = 0.25
     """Force against a needle that moves sideways in its hole [N/mm]."""
     thread_friction: float = 0.15
     """Force that draws thread through one free hole [N]."""
@@ -44,9 +46,9 @@ class World:
     """How far a needle turns in the grip per millimetre that taut thread is short, where it does not draw thread."""
     tug_loses: float = 0.020
     """Taut thread short by more than this pulls the needle out of the jaws."""
-    handover_turn: float = 12.0
+    handover_turn: float = 15.0
     """How far the second driver turns the normal of a needle that both hold; a part of it stays."""
-    handover_turn_stays: float = 0.3
+    handover_turn_stays: float = 0.2
     pinched_share: float = 0.5
     """What jaws that hold thread too hold of the needle."""
     stitch_noise: float = 0.0015

@@ -31,7 +31,7 @@ from stages.suture.trials.wound import CHORD, entry, exit_, passage
 
 STILL_WORLD = World(
     thread_shortest=0.30, thread_longest=0.30, loading_normal=0, loading_in_plane=0, hand_eye=0, closing_normal=0,
-    closing_in_plane=0, insertion_slip=0, knock=0, stitch_noise=0, sweep_height_noise=0,
+    closing_in_plane=0, insertion_slip=0, knock=0, knock_held=0, stitch_noise=0, sweep_height_noise=0,
 )  # fmt: skip
 
 
