@@ -4,8 +4,8 @@
 
 Reporting seeds 1000 to 1099, tuning seeds (`--tuning`) 0 to 99; `--quick` takes the first ten. Writes runs.jsonl,
 metrics.json, table.md, sutures.png and, of the first seed, the key frames and a strip of an `ours` trial.
-`--seconds` stops early, between two seeds. The arm `thesis_other_test` is the thesis with the other reading of its
-handover test.
+`--seconds` stops early, between two seeds. Beside the arms of the issue: `ours_thesis_eyes` has our policies and the
+thesis's error model of perception, `thesis_other_test` is the thesis with the other reading of its handover test.
 """
 
 from __future__ import annotations
@@ -23,7 +23,11 @@ from stages.suture.trials.recording import Recorder
 from stages.suture.trials.settings import POLICIES
 
 REPORTING, TUNING, TRIALS, QUICK = 1000, 0, 100, 10
-ARMS = {**POLICIES, "thesis_other_test": replace(POLICIES["thesis"], retries_when_unchanged=False)}
+ARMS = {
+    **POLICIES,
+    "ours_thesis_eyes": replace(POLICIES["ours"], perception="thesis"),
+    "thesis_other_test": replace(POLICIES["thesis"], retries_when_unchanged=False),
+}
 
 
 def one(arm: str, seed: int) -> Run:

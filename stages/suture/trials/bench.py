@@ -97,6 +97,13 @@ class Bench:
         """Move a driver straight to a pose (4, 4)."""
         self.move(arm, straight(self.tools[arm], pose), bar)
 
+    def withdraw(self, arm: str, pose: np.ndarray) -> None:
+        """Take an empty driver out of the way; costs no time where the arm moves both drivers at once."""
+        before = self.seconds
+        self.go(arm, pose)
+        if self.policy.moves_both:
+            self.seconds = before
+
     def look(self, place: str) -> Seen | None:
         """Return one estimate of the needle in the robot's frame as it believes it (with the hand-eye error)."""
         self.seconds += self.eyes.model.seconds_an_estimate

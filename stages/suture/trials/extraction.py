@@ -31,7 +31,7 @@ def sweep(bench: Bench) -> None:
     bench.go("left", path[0])
     bench.move("left", path, bar=True)
     bench.record("c: swept")
-    bench.go("left", HOME["left"])
+    bench.withdraw("left", HOME["left"])
 
 
 def nearer_end(seen: Seen, driver: np.ndarray) -> np.ndarray:

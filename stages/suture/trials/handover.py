@@ -103,8 +103,8 @@ def _release(bench: Bench, grip: Hold | None) -> None:
     bench.needle = bench.tools["right"] @ grip.grip
     away = bench.tools["left"].copy()
     away[:3, 3] += np.array([RELEASED, 0.0, RELEASED])
-    bench.go("left", away)
-    bench.go("left", HOME["left"])
+    bench.withdraw("left", away)
+    bench.withdraw("left", HOME["left"])
     bench.record("h: released")
 
 
@@ -131,4 +131,4 @@ def _cinch_before(bench: Bench) -> None:
     push[1, 3] += 0.02 + LONGEST_PUSH
     bench.go("right", push)
     bench.record("f: cinched before handover")
-    bench.go("right", HOME["right"])
+    bench.withdraw("right", HOME["right"])

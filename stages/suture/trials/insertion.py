@@ -160,7 +160,7 @@ def insert(bench: Bench, belief: Believed) -> None:
     bench.hold = None
     away = bench.tools["right"].copy()
     away[:3, 3] += np.array([-0.02, 0.0, 0.03])
-    bench.go("right", away)
+    bench.withdraw("right", away)
 
 
 def nominal_needle(suture: int) -> np.ndarray:

@@ -36,7 +36,7 @@ class World:
     """What a perfect grasp holds against [N]."""
     tissue_friction: float = 0.06
     """Force along the needle per millimetre of it in tissue [N/mm]."""
-    tissue_stiffness: float = 0.25
+    tissue_stiffness: float = 0.2
     """Force against a needle that moves sideways in its hole [N/mm]."""
     thread_friction: float = 0.15
     """Force that draws thread through one free hole [N]."""
@@ -80,6 +80,8 @@ class Policy:
     keeps_books: bool = False
     """Cinch lengths come from the thread's seen length, not from constants."""
     cinches_before_handover: bool = False
+    moves_both: bool = False
+    """A driver that has nothing to hold withdraws while the other one goes on, instead of before it."""
     retries_when_unchanged: bool = True
     """The handover test: True retries where the normal did not change (the handover section), False where it did."""
     constants: OpenConstants = field(default_factory=OpenConstants)
@@ -90,13 +92,16 @@ POLICIES = {
     "thread_handling": Policy("thread_handling", corrects=False),
     "thesis": Policy("thesis"),
     "thesis_supervised": Policy("thesis_supervised", interventions=2),
-    "ours": Policy("ours", perception="ours", servoes_ends=True, keeps_books=True, cinches_before_handover=True),
+    "ours": Policy(
+        "ours", perception="ours", servoes_ends=True, keeps_books=True, cinches_before_handover=True, moves_both=True
+    ),
     "ours_supervised": Policy(
         "ours_supervised",
         perception="ours",
         servoes_ends=True,
         keeps_books=True,
         cinches_before_handover=True,
+        moves_both=True,
         interventions=2,
     ),
 }
