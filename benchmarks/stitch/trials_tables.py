@@ -14,8 +14,8 @@ THESIS: dict[str, tuple[float, float, float, float, float, tuple[int, int, int, 
     "thesis": (2.93, 69.4, 73.3, 0.0, 159.3, (8, 5, 0, 2), None),
     "thesis_supervised": (4.47, 83.3, 100.0, 20.0, 141.9, (16, 10, 0, 2), 2.25),
 }
-"""Mean sutures to failure, single-suture rate, three throws, full wound [%], seconds a suture, errors of 15 trials, sutures
-to intervention, as printed."""
+"""Mean sutures to failure, single-suture rate, three throws, full wound [%], seconds a suture, errors of 15 trials,
+sutures to intervention, as printed."""
 
 
 def interval(values: np.ndarray, weights: np.ndarray | None = None) -> tuple[float, float]:
@@ -38,9 +38,9 @@ def by_arm(runs: list[Run]) -> dict[str, dict[int, Run]]:
 def metrics(runs: list[Run]) -> dict[str, float]:
     """Return `<arm>/trials/<measure>` -> number. Shares are 0 to 1; `_low` and `_high` bound 95 % intervals.
 
-    `single_suture_rate` is completed over attempted throws; `seconds_per_suture` the seconds of all trials over attempted
-    throws (`seconds_per_completed` over completed ones); errors are counts over all trials. Ratios of ours to the
-    thesis's arm are over the same seeds.
+    `single_suture_rate` is completed over attempted throws; `seconds_per_suture` the seconds of all trials over
+    attempted throws (`seconds_per_completed` over completed ones); errors are counts over all trials. Ratios of
+    ours to the thesis's arm are over the same seeds.
     """
     groups = by_arm(runs)
     figures: dict[str, float] = {}
@@ -75,7 +75,9 @@ def metrics(runs: list[Run]) -> dict[str, float]:
         both = sorted(set(groups.get(ours, {})) & set(groups.get(rival, {})))
         if both:
             mine, other = [groups[ours][seed] for seed in both], [groups[rival][seed] for seed in both]
-            put(ours, "sutures_ratio", *(np.array([run.sutures for run in rows], dtype=float) for rows in (mine, other)))
+            put(
+                ours, "sutures_ratio", *(np.array([run.sutures for run in rows], dtype=float) for rows in (mine, other))
+            )
             figures[f"{ours}/trials/seconds_ratio"] = (
                 sum(run.seconds for run in mine) / sum(run.attempts for run in mine)
             ) / (sum(run.seconds for run in other) / sum(run.attempts for run in other))
@@ -87,7 +89,7 @@ def table(runs: list[Run]) -> str:
     figures, groups = metrics(runs), by_arm(runs)
     lines = [
         "# STITCH, whole trials in the simulator\n",
-        "Layout of table 4.1. Mean [95 % bootstrap over trials]; errors are of the 15 trials of the thesis, and of all ours.\n",
+        "Layout of table 4.1. Mean [95 % bootstrap over trials]; errors are counts over all trials of the row.\n",
         "| arm | trials | sutures to failure | single-suture rate | three throws | full wound | seconds a suture "
         "| I E H T | sutures to intervention | back at neutral (section 2.2) |",
         "|---|---|---|---|---|---|---|---|---|---|",

@@ -92,7 +92,7 @@ def pull(start: np.ndarray, direction: np.ndarray, length: float) -> np.ndarray:
 
 
 def sweep(suture_exit: np.ndarray, height: float) -> np.ndarray:
-    """Return the path of the open left driver over the wound towards the cameras, ahead of the needle (figure 3.2 c)."""
+    """Return the open left driver's path over the wound towards the cameras, ahead of the needle (figure 3.2 c)."""
     rotation = jaws(np.array([-0.6, 0.0, -0.8]))
     start = transform_from(rotation, suture_exit + np.array([0.006, 0.004, height - suture_exit[2]]))
     end = start.copy()

@@ -1,7 +1,7 @@
 """Inverse kinematics of the patient-side manipulator in closed form, every branch.
 
-The shaft line, the jaw's link and the wrist-yaw axis lie in one plane through the remote centre (the wrist-pitch axis is
-its normal). So the wrist-yaw point and axis give that plane; the link from pitch to yaw lies in it, perpendicular to
+The shaft line, the jaw's link and the wrist-yaw axis lie in one plane through the remote centre (the wrist-pitch axis
+is its normal). So the wrist-yaw point and axis give that plane; the link from pitch to yaw lies in it, perpendicular to
 the yaw axis, on either side; the shaft may run forwards or backwards through the remote centre; and the first two
 joints reach a direction in two ways: eight branches, and whole turns of the roll within its limits.
 """

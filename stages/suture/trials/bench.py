@@ -149,14 +149,18 @@ class Bench:
     def lay_thread(self) -> None:
         """Lay the thread anew between its anchor (or its free end on the pad) and the needle, and let it fall."""
         swage = point_at(self.needle, np.pi)
-        start = self.anchor if self.anchor is not None else swage + np.array([-0.3, 1.0, 0.0]) * self.thread.working * 0.5
+        start = (
+            self.anchor if self.anchor is not None else swage + np.array([-0.3, 1.0, 0.0]) * self.thread.working * 0.5
+        )
         share = np.linspace(0.0, 1.0, PARTICLES)
         self.rope = start + share[:, None] * (swage - start)
         spare = max(0.0, self.thread.working - float(np.linalg.norm(swage - start)))
         bulge = np.array([0.2 * self.random.standard_normal(), 0.6 + 0.3 * self.random.standard_normal(), 0.15])
         self.rope += np.sin(np.pi * share)[:, None] * bulge * 0.5 * spare
         self.rope[:, 2] = np.maximum(self.rope[:, 2], 0.0005)
-        self._drape("right", np.repeat(self.tools["right"][None], SETTLING, axis=0), np.repeat(swage[None], SETTLING, 0), False)
+        self._drape(
+            "right", np.repeat(self.tools["right"][None], SETTLING, axis=0), np.repeat(swage[None], SETTLING, 0), False
+        )
 
     def _anchor_or(self, other: np.ndarray) -> np.ndarray:
         return other if self.anchor is None else self.anchor

@@ -112,8 +112,8 @@ def _attempt(bench: Bench, seen: Seen) -> tuple[bool, bool]:
 
 
 def _loads(bench: Bench, needles: np.ndarray, shift: float) -> np.ndarray:
-    """Return the force [N] on the grasp along a turn of the needle (K, 4, 4): friction in tissue, and how far needle and
-    holes are apart."""
+    """Return the force [N] on the grasp along a turn of the needle (K, 4, 4): friction in tissue, and how far needle
+    and holes are apart."""
     world = bench.world
     in_tissue = SPANNED * RADIUS * 1000.0
     loads = np.empty(len(needles))
@@ -125,7 +125,7 @@ def _loads(bench: Bench, needles: np.ndarray, shift: float) -> np.ndarray:
 
 
 def _pull_to(bench: Bench, distance: float) -> None:
-    """Pull the needle straight out until it is `distance` [m] from the exit, the thread following through the stitch."""
+    """Pull the needle straight out to `distance` [m] from the exit, the thread following through the stitch."""
     if bench.hold is None:
         return
     hole = exit_(bench.suture)

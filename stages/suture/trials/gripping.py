@@ -53,9 +53,7 @@ def close(tool: np.ndarray, needle: np.ndarray, world: World, random: np.random.
     rotation = about(normal, np.radians(world.closing_in_plane) * random.standard_normal()) @ rotation
     rotation = about(along, float(slip[0])) @ rotation
     middle = np.array([point[0], 0.0, point[2]])
-    held = transform_from(
-        rotation @ tool_from_needle[:3, :3], rotation @ (tool_from_needle[:3, 3] - point) + middle
-    )
+    held = transform_from(rotation @ tool_from_needle[:3, :3], rotation @ (tool_from_needle[:3, 3] - point) + middle)
     flatness = abs(float(flat[0]))
     quality = (1.0 - 0.5 * abs(point[0]) / world.jaw_half_width) * (1.0 - 0.4 * abs(point[2]) / world.jaw_half_depth)
     shift = abs(float(point[1])) + RADIUS * sine

@@ -80,9 +80,7 @@ def _close(bench: Bench) -> Hold | None:
     turn = np.radians(world.handover_turn * (1.0 + 0.3 * bench.random.standard_normal()))
     vertical = np.array([0.0, 0.0, 1.0])
     bench.needle = turned(closing.caught, vertical, float(turn), bench.tools["left"][:3, 3])
-    settled = turned(
-        closing.caught, vertical, float(turn) * world.handover_turn_stays, bench.tools["right"][:3, 3]
-    )
+    settled = turned(closing.caught, vertical, float(turn) * world.handover_turn_stays, bench.tools["right"][:3, 3])
     bench.hold.grip = inverse(bench.tools["left"]) @ bench.needle
     return Hold("right", inverse(bench.tools["right"]) @ settled, closing.quality)
 

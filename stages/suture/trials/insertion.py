@@ -35,7 +35,9 @@ class Believed:
     centre: np.ndarray
 
 
-def believed(tool: np.ndarray, rotation: np.ndarray, normal: np.ndarray, ends: tuple[np.ndarray, np.ndarray]) -> Believed:
+def believed(
+    tool: np.ndarray, rotation: np.ndarray, normal: np.ndarray, ends: tuple[np.ndarray, np.ndarray]
+) -> Believed:
     """Return beliefs from a unit normal (3,) and ends (3,) [m] seen at `tool` (4, 4).
 
     The end farther from the driver is the tip: the driver holds the needle by the swage.
@@ -97,7 +99,7 @@ def servoed(bench: Bench) -> Believed:
 
 
 def samples(bench: Bench, count: int) -> list[Seen]:
-    """Return `count` estimates in the corner, looking on where some are abstained from; Failed (I) when too few come."""
+    """Return `count` estimates in the corner, looking on where some are abstained from; Failed (I) for too few."""
     found: list[Seen] = []
     for _ in range(TOO_MANY_LOOKS):
         seen = bench.look("corner_right")

@@ -99,9 +99,9 @@ def throw(bench: Bench, outcome: Outcome) -> None:
 
 
 def recover(bench: Bench, random: np.random.Generator, thrown: int) -> None:
-    """The scripted supervisor: one motion that puts the needle back into the right driver in the corner, clears the thread,
-    and draws it to the cinch length of the stitch before where there is any. A stitch that was made stays; one that was
-    not is made anew.
+    """The scripted supervisor: one motion that puts the needle back into the right driver in the corner, clears the
+    thread, and draws it to the cinch length of the stitch before where there is any. A stitch that was made stays;
+    one that was not is made anew.
     """
     bench.tools = {name: pose.copy() for name, pose in HOME.items()}
     bench.tools["right"] = CORNER.copy()

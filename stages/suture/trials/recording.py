@@ -21,7 +21,13 @@ class Recorder:
         self.ropes: list[np.ndarray] = []
 
     def keep(
-        self, panel: str, suture: int, seconds: float, tools: dict[str, np.ndarray], needle: np.ndarray, rope: np.ndarray
+        self,
+        panel: str,
+        suture: int,
+        seconds: float,
+        tools: dict[str, np.ndarray],
+        needle: np.ndarray,
+        rope: np.ndarray,
     ) -> None:
         """Add a frame: poses (4, 4) in the world frame, rope (N, 3) [m]."""
         self.panels.append(panel)

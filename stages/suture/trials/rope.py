@@ -1,8 +1,8 @@
 """The thread as a position-based rope (Mueller et al. 2007): one chain of particles of equal spacing.
 
 Distance constraints both ways along the chain, a little resistance to bending, contact with pad and ridge with
-friction, with the drivers' shafts and jaws as capsules, and of the thread with itself. Quasi-static: damped Verlet steps along
-the paths that its ends are led on. Thread passes a hole in the tissue by changing the rest length.
+friction, with the drivers' shafts and jaws as capsules, and of the thread with itself. Quasi-static: damped Verlet
+steps along the paths that its ends are led on. Thread passes a hole in the tissue by changing the rest length.
 """
 
 from __future__ import annotations

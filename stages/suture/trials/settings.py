@@ -9,7 +9,7 @@ from stages.suture.motion.constants import OpenConstants
 
 @dataclass(frozen=True)
 class World:
-    """The simulator's parameters, the same for every arm. Chosen on tuning seeds 0 to 499 so that the thesis's arms come
+    """The simulator's parameters, the same for every arm. Chosen on tuning seeds 0 to 29 so that the thesis's arms come
     near its published rates, and fixed before `ours` ran; lengths [m], angles [degrees], forces [N].
     """
 

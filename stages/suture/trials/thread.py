@@ -58,9 +58,7 @@ def draw(thread: Thread, length: float, force: float, world: World) -> Drawn:
     return Drawn()
 
 
-def pull_through(
-    thread: Thread, suture: int, distance: float, force: float, noise: float, world: World
-) -> Drawn:
+def pull_through(thread: Thread, suture: int, distance: float, force: float, noise: float, world: World) -> Drawn:
     """Draw the thread through a new stitch until the needle is `distance` [m] from its exit (extraction, cinching).
 
     The first time the whole thread follows and what stays behind is the tail; later the stitch takes its share,
