@@ -163,6 +163,11 @@ bench-planning: setup ## Planning beside OMPL with pybullet checks (QUICK=1: 10 
 tidy-fast: setup ## Clearing tables in the fast simulator: tables 7.1 and 7.2, joint planner, optimum (QUICK=1: ten tables)
 	$(PYTHON) -m benchmarks.tidy $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/tidy-fast$(if $(QUICK),-quick)
 
+.PHONY: stitch-trials
+# A hundred reporting seeds an arm, about three CPU minutes; a stopped run goes on where it was.
+stitch-trials: setup ## Whole suture trials in the simulator: table 4.1, the thesis's arms and ours (QUICK=1: ten trials)
+	$(PYTHON) -m benchmarks.stitch.trials $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/stitch-trials$(if $(QUICK),-quick)
+
 .PHONY: llm3
 # A hundred reporting seeds a cell, about ten minutes of one core; a stopped run goes on where it was.
 llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2, harder suites (QUICK=1: ten instances)

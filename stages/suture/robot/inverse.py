@@ -101,7 +101,7 @@ def reachable(base_from_tip: np.ndarray) -> np.ndarray:
     inside = np.ones(rows.shape[:-1], dtype=bool)
     for joint in (0, 1, 2, 4, 5):  # the roll has more than a whole turn, so it never decides
         inside &= (rows[..., joint] >= LOWER[joint]) & (rows[..., joint] <= UPPER[joint])
-    return inside.any(axis=-1)
+    return np.asarray(inside.any(axis=-1))
 
 
 def follow(poses: np.ndarray, start: np.ndarray) -> np.ndarray | None:

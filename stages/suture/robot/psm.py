@@ -68,4 +68,4 @@ def jacobian(joints: np.ndarray) -> np.ndarray:
 
 def within_limits(joints: np.ndarray, margin: float = 0.0) -> np.ndarray:
     """Whether joints (..., 6) keep `margin` [rad; third: m] from the published limits."""
-    return ((joints >= LOWER + margin) & (joints <= UPPER - margin)).all(axis=-1)
+    return np.asarray(((joints >= LOWER + margin) & (joints <= UPPER - margin)).all(axis=-1))

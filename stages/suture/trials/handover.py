@@ -2,8 +2,8 @@
 
 The thesis contradicts itself: the handover section retries when the needle's orientation is unchanged, the recovery
 section when its change is nonzero. Jaws that close on a needle that another driver holds, and then move, turn it; jaws
-that miss do not. So an unchanged normal is the sign of a miss, and that is the test used; the other reading drops
-nearly every needle that was missed and lets go of nearly every one that was caught (measured: docs/STITCH_TRIALS.md).
+that miss do not. So an unchanged normal is the sign of a miss, and that is the test used. With the other reading most
+trials end in handover (measured: docs/STITCH_TRIALS.md).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from stages.suture.trials.bench import HOME, Bench, Failed, Hold
 from stages.suture.trials.extraction import GRASPING
 from stages.suture.trials.gripping import close
 from stages.suture.trials.perception import Seen
+from stages.suture.trials.settings import Policy
 from stages.suture.trials.thread import draw
 
 PRESENTING = about(UP_THE_WOUND, -np.pi / 4) @ GRASPING
@@ -58,7 +59,7 @@ def hand_over(bench: Bench) -> None:
             grip = _close(bench)
             after = bench.look_until("elsewhere")
             bench.record("g: both hold" if grip else "g: missed")
-            if after is not None and _believes(bench, before, after):
+            if after is not None and handed_over(bench.policy, before, after):
                 _release(bench, grip)
                 return
             back = bench.tools["right"].copy()
@@ -85,11 +86,12 @@ def _close(bench: Bench) -> Hold | None:
     return Hold("right", inverse(bench.tools["right"]) @ settled, closing.quality)
 
 
-def _believes(bench: Bench, before: Seen, after: Seen) -> bool:
-    """The handover test: whether the robot takes the needle for grasped."""
+def handed_over(policy: Policy, before: Seen, after: Seen) -> bool:
+    """The handover test: whether the robot takes the needle for grasped by the looks before and after. Normals have no
+    sign."""
     cosine = abs(float(before.normal @ after.normal))
-    changed = float(np.arccos(min(1.0, cosine))) > bench.policy.constants.unchanged_normal
-    return changed if bench.policy.retries_when_unchanged else not changed
+    changed = float(np.arccos(min(1.0, cosine))) > policy.constants.unchanged_normal
+    return changed if policy.retries_when_unchanged else not changed
 
 
 def _release(bench: Bench, grip: Hold | None) -> None:
