@@ -22,7 +22,7 @@ from stages.suture.trials.machine import run_trial
 from stages.suture.trials.recording import Recorder
 from stages.suture.trials.settings import POLICIES
 
-REPORTING, TUNING, TRIALS, QUICK = 1000, 0, 100, 10
+REPORTING, TUNING, TRIALS, QUICK, FRAMES = 1000, 0, 100, 10, 13
 ARMS = {
     **POLICIES,
     "ours_thesis_eyes": replace(POLICIES["ours"], perception="thesis"),
@@ -67,7 +67,7 @@ def main() -> None:
 
 
 def pictures(folder: Path, runs: list[Run], seed: int) -> None:
-    """Write the histogram of figure 4.1, and key frames (npz) and a strip (png) of the first suture of one trial."""
+    """Write the histogram of figure 4.1, the key frames (npz) of one trial and a strip (png) of its first motions."""
     from benchmarks.stitch.trials_pictures import histogram
     from stages.suture.trials.drawing import draw_strip
 
@@ -75,7 +75,7 @@ def pictures(folder: Path, runs: list[Run], seed: int) -> None:
     recorder = Recorder()
     run_trial(ARMS["ours"], seed, recorder=recorder)
     recorder.write(folder / "frames.npz")
-    draw_strip(folder / "strip.png", recorder.arrays(), suture=0)
+    draw_strip(folder / "strip.png", recorder.arrays(), most=FRAMES)
 
 
 if __name__ == "__main__":
