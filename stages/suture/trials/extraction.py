@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.kit.geometry.transforms import inverse, transform_from
+from stages.kit.geometry.transforms import inverse
 from stages.suture.motion import primitives
 from stages.suture.motion.constants import EXTRACTION_ADVANCE, MOVED, RETRIES, cinch_length
 from stages.suture.motion.needle import ARC_POINTS, RADIUS, point_at, turned
@@ -167,8 +167,3 @@ def cinch(bench: Bench) -> None:
         raise Failed("T", f"{thread.slack * 1000:.0f} mm of slack stay in the stitch")
     if bench.tangled("left"):
         raise Failed("T", "thread is wound about the left driver")
-
-
-def raised(pose: np.ndarray, height: float) -> np.ndarray:
-    """Return pose (4, 4) lifted by `height` [m]."""
-    return transform_from(pose[:3, :3], pose[:3, 3] + np.array([0.0, 0.0, height]))
