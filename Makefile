@@ -177,6 +177,11 @@ tidy: setup ## Clearing tables (TIDY): tables 7.1 to 7.3, joint planner, optimum
 stitch-needle: setup ## The needle's pose: the thesis's estimator and ours on rendered views (QUICK=1: ten a case)
 	$(PYTHON) -m benchmarks.stitch.needle $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/stitch-needle$(if $(QUICK),-quick)
 
+.PHONY: stitch-trials
+# A hundred reporting seeds an arm, about three CPU minutes; a stopped run goes on where it was.
+stitch-trials: setup ## Whole suture trials in the simulator: table 4.1, the thesis's arms and ours (QUICK=1: ten trials)
+	$(PYTHON) -m benchmarks.stitch.trials $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/stitch-trials$(if $(QUICK),-quick)
+
 .PHONY: llm3
 # A hundred reporting seeds a cell, about ten minutes of one core; a stopped run goes on where it was.
 llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2, harder suites (QUICK=1: ten instances)

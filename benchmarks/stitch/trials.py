@@ -1,0 +1,82 @@
+"""Suture trials of every arm on the same seeds; a stopped run goes on where it was.
+
+    python -m benchmarks.stitch.trials --out FOLDER [--quick] [--tuning] [--arms NAME ...] [--count N] [--seconds S]
+
+Reporting seeds 1000 to 1099, tuning seeds (`--tuning`) 0 to 99; `--quick` takes the first ten. Writes runs.jsonl,
+metrics.json, table.md, sutures.png and, of the first seed, the key frames and a strip of an `ours` trial.
+`--seconds` stops early, between two seeds. Beside the arms of the issue: `ours_thesis_eyes` has our policies and the
+thesis's error model of perception, `thesis_other_test` is the thesis with the other reading of its handover test.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from benchmarks.stitch.trials_records import Run, read_runs, run_of
+from benchmarks.stitch.trials_tables import metrics, table
+from stages.suture.trials.machine import run_trial
+from stages.suture.trials.recording import Recorder
+from stages.suture.trials.settings import POLICIES
+
+REPORTING, TUNING, TRIALS, QUICK, FRAMES = 1000, 0, 100, 10, 13
+ARMS = {
+    **POLICIES,
+    "ours_thesis_eyes": replace(POLICIES["ours"], perception="thesis"),
+    "thesis_other_test": replace(POLICIES["thesis"], retries_when_unchanged=False),
+}
+
+
+def one(arm: str, seed: int) -> Run:
+    """Run a trial and return its record."""
+    started = time.process_time()
+    outcome = run_trial(ARMS[arm], seed)
+    return run_of(arm, seed, outcome, time.process_time() - started)
+
+
+def main() -> None:
+    """Parse the command line and run."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.stitch.trials", description=__doc__)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--quick", action="store_true", help="ten trials an arm")
+    parser.add_argument("--tuning", action="store_true", help="tuning seeds instead of reporting seeds")
+    parser.add_argument("--arms", nargs="+", default=list(ARMS), choices=list(ARMS))
+    parser.add_argument("--count", type=int, default=TRIALS, help="trials an arm")
+    parser.add_argument("--seconds", type=float, help="stop after this time")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    log = options.out / "runs.jsonl"
+    first = TUNING if options.tuning else REPORTING
+    seeds = range(first, first + (QUICK if options.quick else options.count))
+    done = {(run.arm, run.seed) for run in read_runs(log)}
+    started = time.monotonic()
+    for seed in seeds:
+        if options.seconds is not None and time.monotonic() - started > options.seconds:
+            break
+        rows = [one(arm, seed) for arm in options.arms if (arm, seed) not in done]
+        with log.open("a", encoding="utf-8") as stream:
+            stream.writelines(run.model_dump_json() + "\n" for run in rows)
+    runs = [run for run in read_runs(log) if run.seed in seeds]
+    (options.out / "metrics.json").write_text(json.dumps(metrics(runs), indent=1, sort_keys=True) + "\n")
+    (options.out / "table.md").write_text(table(runs), encoding="utf-8")
+    pictures(options.out, runs, first)
+    print(options.out / "table.md")
+
+
+def pictures(folder: Path, runs: list[Run], seed: int) -> None:
+    """Write the histogram of figure 4.1, the key frames (npz) of one trial and a strip (png) of its first motions."""
+    from benchmarks.stitch.trials_pictures import histogram
+    from stages.suture.trials.drawing import draw_strip
+
+    histogram(folder / "sutures.png", runs)
+    recorder = Recorder()
+    run_trial(ARMS["ours"], seed, recorder=recorder)
+    recorder.write(folder / "frames.npz")
+    draw_strip(folder / "strip.png", recorder.arrays(), most=FRAMES)
+
+
+if __name__ == "__main__":
+    main()

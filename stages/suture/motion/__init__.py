@@ -1,0 +1,1 @@
+"""The motion primitives of a suture throw as paths of tool poses."""

@@ -1,0 +1,169 @@
+"""Thread sweeping, needle extraction with its recovery, suture cinching, executed (section 3.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.kit.geometry.transforms import inverse
+from stages.suture.motion import primitives
+from stages.suture.motion.constants import EXTRACTION_ADVANCE, MOVED, RETRIES, cinch_length
+from stages.suture.motion.needle import ARC_POINTS, RADIUS, point_at, turned
+from stages.suture.trials.bench import HOME, Bench, Failed, Hold
+from stages.suture.trials.gripping import close, thread_between
+from stages.suture.trials.perception import Seen
+from stages.suture.trials.thread import pull_through
+from stages.suture.trials.wound import SPANNED, exit_
+
+GRASPING = primitives.jaws(np.array([-1.0, 0.0, 0.0]))
+OUTWARDS = np.array([0.249, 0.548, 0.798]) / np.linalg.norm([0.249, 0.548, 0.798])
+LONGEST_PULL = 0.115
+"""How far [m] from the wound the left driver still reaches while it pulls."""
+TAIL_TO_LEAVE = 0.030
+"""What bookkeeping leaves behind the first hole [m]."""
+BOOK_MARGIN = 0.002
+
+
+def sweep(bench: Bench) -> None:
+    """Pass the wide open left driver over the wound towards the cameras, pushing thread ahead (c)."""
+    bench.overhead()
+    noise = bench.world.sweep_height_noise * bench.random.standard_normal()
+    path = primitives.sweep(exit_(bench.suture), bench.world.sweep_height + noise)
+    bench.go("left", path[0])
+    bench.move("left", path, bar=True)
+    bench.record("c: swept")
+    bench.withdraw("left", HOME["left"])
+
+
+def nearer_end(seen: Seen, driver: np.ndarray) -> np.ndarray:
+    """Return the end (3,) of a seen needle that is nearer to a driver at (3,): where extraction grasps."""
+    return min((seen.tip, seen.swage), key=lambda end: float(np.linalg.norm(end - driver)))
+
+
+def extract(bench: Bench) -> None:
+    """Grasp the end nearer to the left driver, turn it out by 80 degrees, pull; up to five retries (d, e).
+
+    Believes what it sees: an end that moved less than 2 cm means another try. Raises Failed (E) when the needle is
+    still in the wound once the robot goes on or gives up, (T) when thread comes along in the jaws or about them.
+    """
+    for _ in range(1 + RETRIES):
+        bench.overhead()
+        bench.go("left", HOME["left"])
+        before = bench.look_until("tissue")
+        if before is None:
+            continue
+        out, pinched = _attempt(bench, before)
+        after = bench.look_until("elsewhere" if out else "tissue")
+        driver = bench.tools["left"][:3, 3]
+        moved = after is None or (
+            float(np.linalg.norm(nearer_end(after, driver) - nearer_end(before, HOME["left"][:3, 3]))) >= MOVED
+        )
+        if out and pinched:
+            raise Failed("T", "thread was grasped with the needle")
+        if out and bench.tangled("left"):
+            raise Failed("T", "thread is wound about the left driver")
+        if moved and out:
+            return
+        if moved:
+            raise Failed("E", "the needle was taken for extracted and is still in the wound")
+        if out:
+            raise Failed("E", "an extracted needle was taken for one in the wound and dropped")
+    raise Failed("E", "no try to extract the needle succeeded")
+
+
+def _attempt(bench: Bench, seen: Seen) -> tuple[bool, bool]:
+    """Return whether the needle came out, and whether thread was caught with it."""
+    world = bench.world
+    point = nearer_end(seen, bench.tools["left"][:3, 3])
+    path = primitives.approach(point, GRASPING, EXTRACTION_ADVANCE)
+    bench.go("left", path[0])
+    bench.move("left", path)
+    bench.record("d: at the needle")
+    closing = close(bench.tools["left"], bench.needle, world, bench.random)
+    if closing.caught is None:
+        if closing.touched:
+            knock = np.radians(world.knock) * bench.random.standard_normal(2)
+            hole = exit_(bench.suture)
+            bench.needle = turned(bench.needle, np.array([0.0, 0.0, 1.0]), float(knock[0]), hole)
+            bench.needle = turned(bench.needle, bench.needle[:3, 2], 0.5 * float(knock[1]), bench.needle[:3, 3])
+        return False, False
+    pinched = thread_between(bench.tools["left"], bench.rope, world)
+    share = closing.quality * (world.pinched_share if pinched else 1.0)
+    grip = inverse(bench.tools["left"]) @ closing.caught
+    centre, normal = seen.pose[:3, 3], seen.normal
+    if normal @ closing.caught[:3, 2] < 0:
+        normal = -normal
+    turn = primitives.rotating_out(bench.tools["left"], normal, centre)
+    needles = turn @ grip
+    loads = _loads(bench, needles, closing.shift)
+    over = np.flatnonzero(loads > world.hold * share)
+    if len(over):
+        # The jaws slip off where the force exceeds the hold; the needle stays as far as it came.
+        step = int(over[0])
+        bench.move("left", turn[: step + 1])
+        bench.needle = needles[max(0, step - 1)] if step > 1 else bench.needle
+        return False, pinched
+    bench.hold = Hold("left", grip, share)
+    bench.anchor = None
+    bench.move("left", turn)
+    bench.anchor = exit_(bench.suture)
+    bench.record("e: turned out")
+    _pull_to(bench, bench.policy.constants.linear_pull)
+    return True, pinched
+
+
+def _loads(bench: Bench, needles: np.ndarray, shift: float) -> np.ndarray:
+    """Return the force [N] on the grasp along a turn of the needle (K, 4, 4): friction in tissue, and how far needle
+    and holes are apart."""
+    world = bench.world
+    in_tissue = SPANNED * RADIUS * 1000.0
+    loads = np.empty(len(needles))
+    for step, needle in enumerate(needles):
+        points = ARC_POINTS @ needle[:3, :3].T + needle[:3, 3]
+        apart = [float(np.linalg.norm(points - hole, axis=1).min()) for hole in bench.holes]
+        loads[step] = world.tissue_friction * in_tissue + world.tissue_stiffness * 1000.0 * max(*apart, shift)
+    return loads
+
+
+def _pull_to(bench: Bench, distance: float) -> None:
+    """Pull the needle straight out to `distance` [m] from the exit, the thread following through the stitch."""
+    if bench.hold is None:
+        return
+    hole = exit_(bench.suture)
+    swage = point_at(bench.needle, np.pi)
+    target = bench.tools["left"].copy()
+    target[:3, 3] += hole + distance * OUTWARDS - swage
+    anchor, bench.anchor = bench.anchor, None
+    bench.go("left", target)
+    bench.anchor = anchor
+
+
+def cinch(bench: Bench) -> None:
+    """Pull the thread through the stitch: to beta where the arm cinches, else as the linear pull left it (e).
+
+    Raises Failed (T) where thread runs out or the needle is pulled out of the jaws, or the stitch stays loose.
+    """
+    world, policy, thread = bench.world, bench.policy, bench.thread
+    distance = policy.constants.linear_pull
+    noise = world.stitch_noise * bench.random.standard_normal()
+    if policy.cinches:
+        bench.overhead()
+        wanted = cinch_length(bench.suture, policy.constants)
+        if policy.keeps_books:
+            # The thread's length is seen with an error; the plan leaves a tail at first, later takes what there is.
+            seen = thread.working * (1.0 + bench.eyes.model.thread_length_error * bench.random.standard_normal())
+            bench.seconds += bench.eyes.model.seconds_an_estimate
+            spare = TAIL_TO_LEAVE if bench.suture == 0 else -BOOK_MARGIN
+            wanted = seen - thread.used_by(bench.suture, 0.0) - spare
+        distance = min(LONGEST_PULL, max(distance, wanted))
+        _pull_to(bench, distance)
+    force = world.hold * (bench.hold.quality if bench.hold else 0.0)
+    drawn = pull_through(thread, bench.suture, distance, force, noise, world)
+    bench.lay_thread()
+    bench.yield_to(drawn)
+    bench.record("e: cinched" if policy.cinches else "e: pulled")
+    if bench.hold is None:
+        raise Failed("T", "taut thread pulled the needle out of the jaws")
+    if thread.slack > world.loose:
+        raise Failed("T", f"{thread.slack * 1000:.0f} mm of slack stay in the stitch")
+    if bench.tangled("left"):
+        raise Failed("T", "thread is wound about the left driver")

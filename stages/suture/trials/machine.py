@@ -1,0 +1,120 @@
+"""The state machine of figure 3.2 over whole trials, with a scripted supervisor where the arm has one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stages.suture.motion.constants import THROWS, cinch_length
+from stages.suture.trials.bench import CORNER, HOME, Bench, Failed, loaded
+from stages.suture.trials.extraction import cinch, extract, sweep
+from stages.suture.trials.handover import hand_over
+from stages.suture.trials.insertion import corrected, insert, uncorrected
+from stages.suture.trials.perception import FOLDER, Eyes, PerceptionModel, perception_model
+from stages.suture.trials.recording import Recorder
+from stages.suture.trials.settings import Policy, World
+from stages.suture.trials.thread import LEFT_IN_FIRST_HOLE, Thread
+from stages.suture.trials.wound import exit_
+
+
+@dataclass
+class Outcome:
+    """What a trial came to. `sutures` as in section 4.1 (inserted, extracted, tensioned), `sutures_neutral` as in
+    section 2.2 (also back at a neutral place without a tangle); errors with their class and reason, in order."""
+
+    sutures: int = 0
+    sutures_neutral: int = 0
+    attempts: int = 0
+    seconds: float = 0.0
+    errors: list[tuple[str, str]] = field(default_factory=list)
+    interventions: int = 0
+    looks: int = 0
+    right: int = 0
+    abstained: int = 0
+    stopped_short: int = 0
+    thread_length: float = 0.0
+
+    @property
+    def closed(self) -> bool:
+        """Whether all six sutures were thrown."""
+        return self.sutures >= THROWS
+
+
+def run_trial(
+    policy: Policy,
+    seed: int,
+    world: World | None = None,
+    model: PerceptionModel | None = None,
+    recorder: Recorder | None = None,
+) -> Outcome:
+    """Throw up to six sutures; the same seed gives every arm the same needle, thread and calibration error."""
+    world = world or World()
+    model = model or perception_model(FOLDER / f"perception_{policy.perception}.toml")
+    given = np.random.default_rng([seed, 0])
+    length = float(given.uniform(world.thread_shortest, world.thread_longest))
+    hand_eye = world.hand_eye * given.standard_normal(3)
+    needle, hold = loaded(world, given)
+    bench = Bench(
+        policy, world, Eyes(model, np.random.default_rng([seed, 2])), np.random.default_rng([seed, 1]), hand_eye,
+        Thread(length), needle, hold, recorder,
+    )  # fmt: skip
+    bench.tools["right"] = CORNER.copy()
+    bench.lay_thread()
+    outcome = Outcome(thread_length=length)
+    while bench.suture < THROWS:
+        outcome.attempts += 1
+        thrown = bench.suture
+        try:
+            throw(bench, outcome)
+        except Failed as failure:
+            outcome.errors.append((failure.kind, failure.reason))
+            bench.record(f"failed {failure.kind}")
+            if outcome.interventions >= policy.interventions:
+                break
+            outcome.interventions += 1
+            recover(bench, given, thrown)
+    outcome.seconds = bench.seconds
+    outcome.looks, outcome.right, outcome.abstained = bench.eyes.looks, bench.eyes.right, bench.eyes.abstained
+    outcome.stopped_short = bench.stopped_short
+    return outcome
+
+
+def throw(bench: Bench, outcome: Outcome) -> None:
+    """One suture: insertion, sweep and extraction with cinching, handover; then the pose correction of the next.
+
+    The state machine enters at pose correction, where the needle is first seen.
+    """
+    insert(bench, corrected(bench) if bench.policy.corrects else uncorrected(bench))
+    if bench.policy.sweeps:
+        sweep(bench)
+    extract(bench)
+    cinch(bench)
+    outcome.sutures += 1
+    bench.suture += 1
+    hand_over(bench)
+    if bench.tangled("right"):
+        raise Failed("T", "thread is wound about the right driver")
+    outcome.sutures_neutral += 1
+
+
+def recover(bench: Bench, random: np.random.Generator, thrown: int) -> None:
+    """The scripted supervisor: one motion that puts the needle back into the right driver in the corner, clears the
+    thread, and draws it to the cinch length of the stitch before where there is any. A stitch that was made stays;
+    one that was not is made anew.
+    """
+    bench.tools = {name: pose.copy() for name, pose in HOME.items()}
+    bench.tools["right"] = CORNER.copy()
+    bench.needle, bench.hold = loaded(bench.world, random)
+    made = bench.suture - 1
+    bench.anchor = exit_(made) if made >= 0 else None
+    thread = bench.thread
+    thread.through = made + 1
+    if made >= 0:
+        wanted = cinch_length(made, bench.policy.constants)
+        more = min(max(0.0, wanted - thread.working), max(0.0, thread.tail - LEFT_IN_FIRST_HOLE))
+        thread.working, thread.tail = thread.working + more, thread.tail - more
+    elif thrown == 0:
+        thread.working += max(0.0, thread.tail)
+        thread.tail = 0.0
+    bench.lay_thread()

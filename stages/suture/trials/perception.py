@@ -1,0 +1,130 @@
+"""What is seen of the needle: true poses with the errors of a model that a small file states, with its provenance.
+
+An estimate is right, wrong or abstained from. Estimates of a needle that has not moved share most of their error and,
+often, their fate: a highlight or a thread in front of the needle does not go away by looking again.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from schemas.base import Model
+from schemas.errors import BadInput
+from stages.suture.motion.needle import SWAGE, TIP, from_ends
+
+FOLDER = Path(__file__).resolve().parents[3] / "data" / "stitch"
+STILL = 1.5e-3
+"""A needle whose ends moved less than this [m] is seen as before."""
+
+
+class Shares(Model):
+    """Shares (0 to 1) by where the needle is: in the corner by who holds it, elsewhere in air, in tissue."""
+
+    corner_left: float = Field(ge=0, le=1)
+    corner_right: float = Field(ge=0, le=1)
+    elsewhere: float = Field(ge=0, le=1)
+    tissue: float = Field(ge=0, le=1)
+
+    def at(self, place: str) -> float:
+        """Return the share of a place by its name."""
+        return float(getattr(self, place))
+
+
+class Errors(Model):
+    """Standard deviations per axis; `stray_end_share` of the estimates have one end farther off along a direction."""
+
+    normal_degrees: float = Field(ge=0)
+    end_millimetres: float = Field(ge=0)
+    stray_end_share: float = Field(0.0, ge=0, le=1)
+    stray_end_millimetres: float = Field(0.0, ge=0)
+
+
+class PerceptionModel(Model):
+    """An error model. `measured` is false while figures are assumed."""
+
+    name: str
+    measured: bool
+    provenance: str = Field(min_length=20)
+    seconds_an_estimate: float = Field(gt=0)
+    persistence: float = Field(ge=0, le=1)
+    systematic: float = Field(ge=0, le=1)
+    thread_length_error: float = Field(ge=0)
+    right_share: Shares
+    abstained_share: Shares
+    right: Errors
+    wrong: Errors
+
+
+def perception_model(path: Path) -> PerceptionModel:
+    """Read an error model (TOML). Raises BadInput when the file is not one."""
+    try:
+        return PerceptionModel.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except (OSError, tomllib.TOMLDecodeError, ValidationError) as error:
+        reason = str(error).replace("\n", " ")[:200]
+        raise BadInput(f"{path}: no perception model ({reason}); see data/stitch/perception_thesis.toml") from error
+
+
+@dataclass(frozen=True)
+class Seen:
+    """An estimate in the world frame: unit normal (3,), ends (3,) [m]; `right` is known to the simulator alone."""
+
+    normal: np.ndarray
+    tip: np.ndarray
+    swage: np.ndarray
+    right: bool
+
+    @property
+    def pose(self) -> np.ndarray:
+        """The needle's pose (4, 4) that the estimate amounts to."""
+        return from_ends(self.normal, self.tip, self.swage)
+
+
+class Eyes:
+    """Sees needles with the errors of a model; `looks` and `right` count estimates, also for the 42 % of the thesis."""
+
+    def __init__(self, model: PerceptionModel, random: np.random.Generator) -> None:
+        self.model = model
+        self.random = random
+        self.looks = self.right = self.abstained = 0
+        self._ends: np.ndarray | None = None
+        self._fate = "right"
+        self._shared = np.zeros((3, 3))
+        self._stray = np.zeros((3, 3))
+
+    def look(self, needle: np.ndarray, place: str) -> Seen | None:
+        """Return one estimate of a needle at its true pose (4, 4); None when it is abstained from."""
+        ends = needle[:3, :3] @ np.column_stack([TIP, SWAGE]) + needle[:3, 3:4]
+        moved = self._ends is None or float(np.abs(ends - self._ends).max()) > STILL
+        if moved or self.random.random() > self.model.persistence:
+            self._draw(place)
+        self._ends = ends
+        self.looks += 1
+        if self._fate == "abstained":
+            self.abstained += 1
+            return None
+        self.right += self._fate == "right"
+        errors = self.model.right if self._fate == "right" else self.model.wrong
+        shared = self.model.systematic
+        draw = np.sqrt(shared) * self._shared + np.sqrt(1.0 - shared) * self.random.standard_normal((3, 3))
+        normal = needle[:3, 2] + np.tan(np.radians(errors.normal_degrees)) * draw[0]
+        offsets = draw[1:] * errors.end_millimetres / 1000.0 + self._stray[1:]
+        tip, swage = ends[:, 0] + offsets[0], ends[:, 1] + offsets[1]
+        return Seen(normal / np.linalg.norm(normal), tip, swage, self._fate == "right")
+
+    def _draw(self, place: str) -> None:
+        random, model = self.random, self.model
+        self._shared = random.standard_normal((3, 3))
+        self._stray = np.zeros((3, 3))
+        if random.random() < model.right_share.at(place):
+            self._fate = "right"
+            return
+        self._fate = "abstained" if random.random() < model.abstained_share.at(place) else "wrong"
+        if random.random() < model.wrong.stray_end_share:
+            direction = random.standard_normal(3)
+            row = int(random.integers(1, 3))
+            self._stray[row] = direction / np.linalg.norm(direction) * model.wrong.stray_end_millimetres / 1000.0

@@ -1,0 +1,318 @@
+"""Motion primitives, wound, thread, jaws, perception model, state machine and the trials' tables."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.stitch.trials_records import Run, read_runs
+from benchmarks.stitch.trials_tables import metrics, table
+from schemas.errors import BadInput
+from stages.suture.motion import primitives
+from stages.suture.motion.constants import OpenConstants, cinch_length
+from stages.suture.motion.needle import RADIUS, SWAGE, TIP, from_ends, point_at, turned, upright
+from stages.suture.robot.arms import ARMS
+from stages.suture.trials.bench import CORNER, HOME
+from stages.suture.trials.drawing import draw_strip
+from stages.suture.trials.extraction import GRASPING, nearer_end
+from stages.suture.trials.gripping import close
+from stages.suture.trials.handover import farther_end, handed_over
+from stages.suture.trials.insertion import nominal_needle
+from stages.suture.trials.machine import Outcome, run_trial
+from stages.suture.trials.perception import FOLDER, Errors, Eyes, PerceptionModel, Seen, Shares, perception_model
+from stages.suture.trials.recording import Recorder
+from stages.suture.trials.rope import PARTICLES, drape, line, winding
+from stages.suture.trials.settings import POLICIES, World
+from stages.suture.trials.thread import Thread, draw, pull_through
+from stages.suture.trials.wound import CHORD, entry, exit_, passage
+
+STILL_WORLD = World(
+    thread_shortest=0.30, thread_longest=0.30, loading_normal=0, loading_in_plane=0, hand_eye=0, closing_normal=0,
+    closing_in_plane=0, insertion_slip=0, knock=0, knock_held=0, stitch_noise=0, sweep_height_noise=0,
+)  # fmt: skip
+
+
+def perfect(name: str = "ours") -> PerceptionModel:
+    model = perception_model(FOLDER / f"perception_{name}.toml")
+    every = Shares(corner_left=1, corner_right=1, elsewhere=1, tissue=1)
+    return model.model_copy(
+        update={
+            "right_share": every,
+            "right": Errors(normal_degrees=0.01, end_millimetres=0.01),
+            "thread_length_error": 0.0,
+        }
+    )
+
+
+def insertion_of(needle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Tips and directions along the insertion of suture 0 that is planned for the nominal needle."""
+    nominal = nominal_needle(0)
+    tool = HOME["right"]
+    path = primitives.insertion(tool, exit_(0) - entry(0), nominal[:3, 2], nominal[:3, 3])
+    needles = path @ np.linalg.inv(tool) @ needle
+    return needles[:, :3, :3] @ TIP + needles[:, :3, 3], -needles[:, :3, 1]
+
+
+def test_insertion_turns_by_45_degrees_about_the_normal_after_the_push() -> None:
+    tips, directions = insertion_of(nominal_needle(0))
+    assert np.allclose(tips[primitives.STEPS - 1], exit_(0), atol=1e-12)
+    angle = np.arccos(directions[-1] @ directions[0])
+    assert np.isclose(np.degrees(angle), 45.0)
+    centre = nominal_needle(0)[:3, 3] + exit_(0) - entry(0)
+    assert np.allclose(np.linalg.norm(tips[primitives.STEPS :] - centre, axis=1), RADIUS)
+    assert tips[-1, 2] > tips[primitives.STEPS, 2]
+
+
+def test_45_degrees_of_the_needle_span_entry_and_exit() -> None:
+    assert np.isclose(np.linalg.norm(exit_(0) - entry(0)), CHORD)
+    pushed = nominal_needle(2)
+    assert np.allclose(point_at(pushed, 0.0), entry(2), atol=1e-9)
+    pushed[:3, 3] += exit_(2) - entry(2)
+    assert np.allclose(point_at(pushed, 0.0), exit_(2), atol=1e-9)
+    assert np.allclose(point_at(pushed, np.pi / 4), entry(2), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("shift", "tilt", "fault"),
+    [
+        ([0, 0, 0], 0.0, None),
+        ([0, 0, -0.003], 0.0, "not the wound"),
+        ([0, 0.004, 0], 0.0, "not the wound"),
+        ([0, 0, 0.006], 0.0, "missed"),
+        ([0, 0, 0], 40.0, "slid off"),
+        ([0, 0, 0.0015], -12.0, None),
+    ],
+)
+def test_what_a_tip_path_comes_to(shift: list[float], tilt: float, fault: str | None) -> None:
+    needle = nominal_needle(0)
+    needle[:3, 3] += shift
+    tip = point_at(needle, 0.0)
+    needle = turned(needle, np.array([0.0, 1.0, 0.0]), -np.radians(tilt), tip)
+    found = passage(*insertion_of(needle), 0)
+    assert (found.fault is None) if fault is None else (found.fault is not None and fault in found.fault)
+
+
+def test_extraction_approaches_from_a_centimetre_and_advances_by_one_and_a_half() -> None:
+    point = np.array([0.011, 0.0, 0.008])
+    path = primitives.approach(point, GRASPING, 0.015)
+    assert np.isclose(np.linalg.norm(path[0, :3, 3] - point), 0.010)
+    assert np.isclose(path[0, 2, 3], path[-1, 2, 3])
+    assert np.isclose(np.linalg.norm(path[-1, :3, 3] - path[0, :3, 3]), 0.015)
+    turn = primitives.rotating_out(path[-1], np.array([0.0, 1.0, 0.0]), np.zeros(3))
+    cosine = (np.trace(turn[-1, :3, :3] @ turn[0, :3, :3].T) - 1) / 2
+    assert np.isclose(np.degrees(np.arccos(cosine)), 80.0)
+
+
+def test_cinch_length_is_the_thesis_formula() -> None:
+    constants = OpenConstants(desired_length=0.1, length_each=0.02)
+    assert [round(cinch_length(k, constants), 6) for k in range(6)] == [0.1, 0.08, 0.06, 0.04, 0.02, 0.0]
+
+
+def test_extraction_takes_the_nearer_end_and_handover_the_farther_one() -> None:
+    seen = Seen(np.array([0.0, 1.0, 0.0]), np.array([0.01, 0, 0]), np.array([-0.01, 0, 0]), True)
+    left = np.array([0.05, 0.0, 0.05])
+    assert nearer_end(seen, left) is seen.tip
+    assert farther_end(seen, left) is seen.swage
+
+
+def test_normal_to_y_and_the_final_turn() -> None:
+    normal = np.array([0.3, 0.9, -0.2]) / np.linalg.norm([0.3, 0.9, -0.2])
+    after = primitives.normal_to_y(CORNER, normal)
+    assert np.allclose(after[:3, :3] @ CORNER[:3, :3].T @ normal, [0, 1, 0])
+    assert np.allclose(after[:3, 3], CORNER[:3, 3])
+    assert np.allclose(primitives.final_turn(CORNER)[-1][:3, 2], [0.0, 0.0, -1.0])
+
+
+def test_both_arms_reach_home_corner_and_wound() -> None:
+    assert all(ARMS[name].reaches(pose) for name, pose in HOME.items())
+    assert ARMS["right"].reaches(CORNER)
+    far = CORNER.copy()
+    far[0, 3] += 0.2
+    assert not ARMS["right"].reaches(far)
+
+
+def test_a_hanging_rope_keeps_its_length_and_stays_off_pad_and_driver() -> None:
+    start, end = np.array([-0.03, 0.02, 0.03]), np.array([0.03, 0.02, 0.03])
+    points, steps, length = line(start, end), 150, 0.12
+    capsules = np.zeros((steps, 1, 7))
+    capsules[:, 0, :3], capsules[:, 0, 3:6], capsules[:, 0, 6] = [-0.02, 0.0, 0.012], [-0.02, 0.05, 0.012], 0.004
+    rest = np.linspace(0.06, length, steps)
+    drape(points, rest, np.tile(start, (steps, 1)), np.tile(end, (steps, 1)), True, capsules, 0.005, 0.005)
+    assert np.allclose(points[[0, -1]], [start, end])
+    assert np.isclose(np.linalg.norm(np.diff(points, axis=0), axis=1).sum(), length, rtol=0.05)
+    inner = points[1:-1]
+    assert inner[:, 2].min() > -1e-4
+    assert ((inner[:, 0] / 0.005) ** 2 + (inner[:, 2] / 0.005) ** 2).min() > 0.9
+    assert np.hypot(inner[:, 0] + 0.02, inner[:, 2] - 0.012).min() > 0.0035
+
+
+def test_crossing_threads_lie_on_each_other() -> None:
+    angle = np.linspace(0, 2 * np.pi, PARTICLES)
+    points = np.column_stack([0.02 * np.cos(angle), 0.02 * np.sin(2 * angle), 0.01 + 0 * angle])
+    points[:, 2] += 1e-5 * np.sin(angle)
+    steps = 30
+    rest = np.full(steps, np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    ends = np.tile(points[0], (steps, 1)), np.tile(points[-1], (steps, 1))
+    drape(points, rest, *ends, True, np.zeros((steps, 1, 7)), 0.005, 0.005)
+    quarter, three = PARTICLES // 4, 3 * PARTICLES // 4
+    gaps = np.linalg.norm(points[quarter - 4 : quarter + 4, None] - points[None, three - 4 : three + 4], axis=2)
+    assert gaps.min() > 1.5e-4
+
+
+def test_winding_counts_turns() -> None:
+    angle = np.linspace(0, 3 * np.pi, PARTICLES)
+    helix = np.column_stack([0.005 * np.cos(angle), 0.005 * np.sin(angle), np.linspace(0.002, 0.02, PARTICLES)])
+    assert np.isclose(winding(helix, np.zeros(3), np.array([0.0, 0.0, 1.0])), 1.5, atol=0.05)
+    assert winding(helix + [0.02, 0, 0], np.zeros(3), np.array([0.0, 0.0, 1.0])) < 0.2
+
+
+def test_thread_is_neither_made_nor_lost() -> None:
+    world, thread, used, loose = World(), Thread(0.30), 0.0, 0.0
+    for suture, distance in enumerate((0.10, 0.08, 0.09, 0.05)):
+        assert not pull_through(thread, suture, distance, 10.0, 0.0, world).lost
+        used += thread.used_by(suture, 0.0)
+        loose += thread.slack
+        assert np.isclose(thread.working + thread.tail + used + loose, 0.30)
+        assert np.isclose(thread.working, distance)
+    assert loose > 0.01
+    assert thread.through == 4
+
+
+def test_thread_that_holds_is_short_and_one_that_ends_is_lost() -> None:
+    world = World()
+    thread = Thread(0.05, tail=0.10, through=4)
+    assert np.isclose(draw(thread, 0.06, 0.1, world).short, 0.01)
+    assert draw(thread, 0.30, 1e3, world).lost
+    assert draw(thread, 0.06, 1e3, world).short == 0.0
+    assert np.isclose(thread.tail, 0.09)
+
+
+def test_jaws_catch_flatten_and_miss() -> None:
+    world, random = STILL_WORLD, np.random.default_rng(0)
+    needle = upright(np.array([0.0, 0.0, 0.02]), np.radians(67.5))
+    path = primitives.approach(point_at(needle, 0.0), GRASPING, 0.015)
+    tilted = turned(needle, np.array([1.0, 0.0, 0.0]), np.radians(15.0), point_at(needle, 0.0))
+    closing = close(path[-1], tilted, world, random)
+    assert closing.caught is not None and 0.3 < closing.quality < 1.0
+    away = path[-1].copy()
+    away[1, 3] += 0.01
+    assert close(away, needle, world, random).caught is None
+
+
+def test_estimates_are_as_often_right_as_the_model_says() -> None:
+    model = perception_model(FOLDER / "perception_thesis.toml")
+    eyes = Eyes(model, np.random.default_rng(5))
+    random = np.random.default_rng(6)
+    errors = []
+    for _ in range(1500):
+        needle = upright(random.standard_normal(3), 0.3)
+        seen = eyes.look(needle, "corner_right")
+        assert seen is not None
+        if seen.right:
+            errors.append(seen.tip - point_at(needle, 0.0))
+    assert abs(eyes.right / eyes.looks - 0.70) < 0.04
+    assert np.isclose(np.std(errors), model.right.end_millimetres / 1000, rtol=0.1)
+
+
+def test_a_needle_that_stays_shares_its_error() -> None:
+    model = perception_model(FOLDER / "perception_thesis.toml").model_copy(
+        update={"persistence": 1.0, "systematic": 1.0}
+    )
+    eyes = Eyes(model, np.random.default_rng(1))
+    needle = upright(np.zeros(3), 0.3)
+    first, second = eyes.look(needle, "elsewhere"), eyes.look(needle, "elsewhere")
+    assert first is not None and second is not None
+    assert np.allclose(first.tip, second.tip)
+
+
+def test_ends_and_normal_give_the_pose() -> None:
+    needle = upright(np.array([0.01, 0.02, 0.03]), 1.1)
+    ends = needle[:3, :3] @ np.column_stack([TIP, SWAGE]) + needle[:3, 3:4]
+    assert np.allclose(from_ends(needle[:3, 2], ends[:, 0], ends[:, 1]), needle)
+
+
+@pytest.mark.parametrize("text", ["", "name = 'x'", "[[", "name = 'x'\nright_share = 3"])
+def test_a_file_that_is_no_perception_model(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(text)
+    with pytest.raises(BadInput, match="no perception model"):
+        perception_model(path)
+
+
+@pytest.mark.parametrize("arm", ["thesis", "ours"])
+def test_without_errors_six_sutures_close_the_wound(arm: str) -> None:
+    policy = replace(POLICIES[arm], constants=replace(POLICIES[arm].constants, desired_length=0.115))
+    outcome = run_trial(policy, 0, replace(STILL_WORLD, hold=20.0), perfect())
+    assert outcome.errors == []
+    assert outcome.sutures == outcome.sutures_neutral == outcome.attempts == 6
+    assert outcome.stopped_short == 0
+
+
+def test_both_readings_of_the_handover_test() -> None:
+    ends = np.array([0.01, 0, 0]), np.array([-0.01, 0, 0])
+    still = Seen(np.array([0.0, 1.0, 0.0]), *ends, True)
+    turned_by_30 = Seen(np.array([0.5, np.sqrt(0.75), 0.0]), *ends, True)
+    flipped = Seen(np.array([0.0, -1.0, 0.0]), *ends, True)
+    used = POLICIES["thesis"]
+    other = replace(used, retries_when_unchanged=False)
+    for after, changed in ((still, False), (flipped, False), (turned_by_30, True)):
+        assert handed_over(used, still, after) is changed
+        assert handed_over(other, still, after) is not changed
+
+
+def test_a_trial_is_its_seed_and_ends_with_an_error_or_a_closed_wound() -> None:
+    for seed in range(3):
+        first, second = run_trial(POLICIES["thesis"], seed), run_trial(POLICIES["thesis"], seed)
+        assert first == second
+        assert first.closed != bool(first.errors)
+        assert first.sutures_neutral <= first.sutures <= first.attempts
+
+
+def test_a_supervised_trial_has_at_most_two_interventions() -> None:
+    outcome = run_trial(POLICIES["thesis_supervised"], 1)
+    assert len(outcome.errors) <= 3 and outcome.interventions <= 2
+    assert outcome.closed or len(outcome.errors) == 3
+
+
+def test_frames_are_recorded_and_drawn(tmp_path: Path) -> None:
+    recorder = Recorder()
+    run_trial(POLICIES["thesis"], 0, STILL_WORLD, perfect(), recorder)
+    recorder.write(tmp_path / "frames.npz")
+    with np.load(tmp_path / "frames.npz", allow_pickle=False) as frames:
+        arrays = {name: frames[name] for name in frames.files}
+    assert {"b: inserted", "c: swept", "e: turned out", "g: both hold", "k: 90 degrees about y"} <= set(arrays["panel"])
+    assert arrays["thread"].shape == (len(arrays["panel"]), PARTICLES, 3)
+    assert draw_strip(tmp_path / "strip.png", arrays, suture=0, most=3) == 3
+    assert (tmp_path / "strip.png").stat().st_size > 5000
+    with pytest.raises(ValueError, match="no frame"):
+        draw_strip(tmp_path / "none.png", arrays, suture=9)
+
+
+def test_tables_count_as_they_say(tmp_path: Path) -> None:
+    def run(arm: str, seed: int, sutures: int, errors: str) -> Run:
+        return Run(
+            arm=arm, seed=seed, sutures=sutures, sutures_neutral=sutures, attempts=sutures + len(errors), seconds=100.0,
+            errors=errors, reasons=["why"] * len(errors), interventions=0, looks=10, right=4, abstained=0,
+            stopped_short=0, thread_length=0.3, cpu_seconds=0.1,
+        )  # fmt: skip
+
+    runs = [
+        run("thesis", 1000, 3, "I"),
+        run("thesis", 1001, 1, "E"),
+        run("ours", 1000, 6, ""),
+        run("ours", 1001, 4, "T"),
+    ]
+    log = tmp_path / "runs.jsonl"
+    log.write_text("".join(one.model_dump_json() + "\n" for one in runs) + '{"arm": "cut')
+    assert read_runs(log) == runs
+    figures = metrics(runs)
+    assert figures["thesis/trials/sutures_to_failure"] == 2.0
+    assert np.isclose(figures["thesis/trials/single_suture_rate"], 4 / 6, atol=1e-5)
+    assert figures["thesis/trials/errors_i"] == figures["ours/trials/errors_t"] == 1.0
+    assert figures["ours/trials/sutures_ratio"] == 2.5
+    assert figures["ours/trials/full_wound_rate"] == 0.5
+    assert "*printed*" in table(runs) and "| ours | T | why | 1 |" in table(runs)
+    assert Outcome(sutures=6).closed
