@@ -9,7 +9,9 @@ from pydantic import Field
 from stages.kit.stage import Parameters
 
 TierName = Literal["tier0_cups", "tier0_bowls", "tier0_utensils", "tier1", "tier2", "tier3"]
-PolicyName = Literal["random", "random_piles", "pull", "stack", "ours", "ours_without_loaded_pulls", "ours_careful"]
+PolicyName = Literal[
+    "random", "random_piles", "pull", "stack", "ours", "ours_without_loaded_pulls", "ours_careful", "ours_one_pile"
+]  # fmt: skip
 ChancesName = Literal["exact", "thesis", "thesis_failures"]
 
 

@@ -35,10 +35,11 @@ RULES: dict[str, Rules] = {
     "ours": Rules(),
     "ours_without_loaded_pulls": Rules(loaded_pulls=False),
     "ours_careful": Rules(clamped_stacks=True, most_utensils=2),
+    "ours_one_pile": Rules(both_piles=False, most_utensils=2),
 }
 """What our policies allow themselves. `ours_careful`: onto two dishes that are lifted side by side only dishes of their
 own kind are stacked, and two utensils a pile at most; the first findings in physics ask for that (what stands free in a
-dish falls out then, more utensils slide off)."""
+dish falls out then, more utensils slide off). `ours_one_pile`: onto two things that are lifted side by side nothing."""
 
 
 def rules_of(policy: str) -> Rules:
