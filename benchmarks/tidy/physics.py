@@ -24,8 +24,8 @@ TIERS = ("tier0_cups", "tier0_bowls", "tier0_utensils", "tier1", "tier2")
 ARMS = ("random", "pull", "stack", "ours_one_pile", "ours_careful", "ours")
 """All that can be asked for."""
 RUN = ("random", "pull", "stack", "ours_one_pile", "ours_careful")
-"""Run unless said otherwise: things that stand free in a dish fall out when two dishes are lifted side by side, and more
-than two utensils slide off (docs/TIDY_PHYSICS.md), which `ours` does not know."""
+"""Run unless said otherwise: things that stand free in a dish fall out when two dishes are lifted side by side, and
+more than two utensils slide off (docs/TIDY_PHYSICS.md), which `ours` does not know."""
 SIGHTS = ("image", "truth")
 SCENES = 20
 

@@ -1,4 +1,4 @@
-"""Arrays out of NPZ and NPY files that nobody vouches for: sizes are checked before memory is taken, objects are refused."""
+"""Arrays out of NPZ and NPY files that nobody vouches for: sizes are checked first, objects are refused."""
 
 from __future__ import annotations
 
