@@ -82,7 +82,8 @@ def level_place(
         checker.put_down(upright)
         opening = model.description.opening
         model.robot.set(Configuration(base, down[-1], opening))
-        checker.allow(touch=touch)
+        # The load may have come nearer to the hand than a search likes; going straight up leaves it beside.
+        checker.allow(touch=tuple(model.world.bodies[item].links))
         back = world_from_tool.copy()
         back[:3, 3] -= RETREAT * back[:3, 2]
         away = planner.line(base, down[-1], back, tally)

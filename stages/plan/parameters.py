@@ -66,7 +66,7 @@ class PlanParameters(Parameters):
 
 STAGE = Stage(
     name="plan",
-    version=6,
+    version=7,
     summary="Plan what a robot does in the scene, execute it in physics, check the goal or say why not",
     parameters=PlanParameters,
     reads={"scene": InteractiveScene, "ground_truth": Optionally(GroundTruth)},

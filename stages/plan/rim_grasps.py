@@ -27,13 +27,18 @@ FLOOR = 0.008
 """What is lower than this in a flat thing is its floor [m]."""
 BREADTH = 0.011
 """Half the breadth of a finger tip [m]."""
+WALL_SPAN = 0.035
+"""The course of a wall is read this far to both sides of the fingers [m]."""
+MOST_ASKEW = 0.12
+"""Angle between the closing fingers and the wall's normal, above which they turn the thing until it fits [rad]."""
 
 
 def rim_grasps(
     points: np.ndarray, world_from_body: np.ndarray, random: np.random.Generator, headings: int = 24,
     uncertainty: float = 0.0,
 ) -> list[Grasp]:  # fmt: skip
-    """Return grasps straight from above with one finger outside and one inside of the outermost wall.
+    """Return grasps straight from above with one finger outside and one inside of the outermost wall. Where there are
+    any square to the wall, only those.
 
     `points` (N, 3) are of the surface, body frame. Per heading through the middle (along the body's axes also
     beside it) the wall is where the outermost points near the rim are; it must be thin and free behind. The rim may be
@@ -50,6 +55,7 @@ def rim_grasps(
     yaw = float(np.arctan2(world_from_body[1, 0], world_from_body[0, 0]))
     even = yaw + 2 * np.pi * np.arange(headings) / headings
     found: list[Grasp] = []
+    square: list[bool] = []
     beside = [(heading, offset) for heading in even[:: headings // 4] for offset in OFFSETS]
     for heading, offset in [*((heading, 0.0) for heading in even), *beside]:
         outward = np.array([np.cos(heading), np.sin(heading)])
@@ -70,9 +76,28 @@ def rim_grasps(
         pose[:3, :3] = np.column_stack([np.cross(closing, approach), closing, approach])
         pose[:2, 3] = middle + outward * (along.max() - thickness / 2) + across * offset
         pose[2, 3] = rim - depth
+        is_square = askew(relative @ across - offset, relative @ outward) < MOST_ASKEW
         for turned in (pose, pose @ np.diag([-1.0, -1.0, 1.0, 1.0])):
             found.append(Grasp(inverse(world_from_body) @ turned, thickness, np.pi / 2))
-    return [found[index] for index in random.permutation(len(found)).tolist()]
+            square.append(is_square)
+    return [found[index] for index in random.permutation(len(found)).tolist() if square[index] or not any(square)]
+
+
+def askew(across: np.ndarray, outward: np.ndarray) -> float:
+    """Return by what angle [rad] the outermost wall near `across` = 0 is not square to the outward axis.
+
+    `across` and `outward` (N,) [m] are coordinates of points along the wall and away from the middle.
+    """
+    edges = np.linspace(-WALL_SPAN, WALL_SPAN, 8)
+    middles, farthest = [], []
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        inside = (across >= low) & (across < high) & (outward > 0)
+        if inside.any():
+            middles.append((low + high) / 2)
+            farthest.append(outward[inside].max())
+    if len(middles) < 3:
+        return 0.0
+    return float(abs(np.arctan(np.polyfit(middles, farthest, 1)[0])))
 
 
 def has_rim(model: WorldModel, item: str, uncertainty: float) -> bool:

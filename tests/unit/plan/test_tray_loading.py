@@ -14,7 +14,7 @@ from schemas.contact_graph import ContactGraphFile
 from stages.kit.geometry.transforms import apply, transform_from_yaw
 from stages.kit.simulation.robot_description import load_robot
 from stages.kit.simulation.shapes import surface_points
-from stages.plan.rim_grasps import DEPTH, FOOT_ROOM, LEAST_DEPTH, has_rim, rim_grasps
+from stages.plan.rim_grasps import DEPTH, FOOT_ROOM, LEAST_DEPTH, askew, has_rim, rim_grasps
 from stages.plan.tray_loading import GRAVITY, PALM_ROOM, free_lanes, holding_moments, lifts_left, load_moments
 from stages.plan.world_model import WorldModel
 from tests.unit.simulation.handmade_scene import HandmadeBody, floor, table, write_scene
@@ -233,3 +233,25 @@ def test_a_high_rim_is_not_taken_to_be_higher() -> None:
     assert len(sure) == len(unsure) > 0
     for first, second in zip(sure, unsure, strict=True):
         np.testing.assert_array_equal(first.body_from_tool, second.body_from_tool)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7])
+def test_fingers_close_square_to_straight_walls(yaw: float) -> None:
+    """A hand that closes askew on a wall turns the tray under its load until the wall fits."""
+    pose = transform_from_yaw(yaw, np.array([0.3, -0.2, 0.75]))
+    found = rim_grasps(tray_points(0.05), pose, np.random.default_rng(0))
+    assert found
+    for grasp in found:
+        closing = np.abs(grasp.body_from_tool[:2, 1])
+        assert min(closing) < 0.12
+
+
+def test_a_round_rim_is_square_everywhere() -> None:
+    angles = np.linspace(-np.pi, np.pi, 2000)
+    for heading in (0.0, 0.5, 2.0):
+        ring = 0.085 * np.column_stack([np.cos(angles), np.sin(angles)])
+        outward = np.array([np.cos(heading), np.sin(heading)])
+        assert askew(ring @ [-outward[1], outward[0]], ring @ outward) < 0.02
+    wall = np.column_stack([np.linspace(-0.1, 0.1, 400), np.full(400, 0.12)])
+    turned = wall @ np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
+    assert askew(turned[:, 0], turned[:, 1]) == pytest.approx(0.3, abs=0.02)
