@@ -19,7 +19,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 
 from schemas.errors import BadInput
 from stages.kit.formats.masks import PanopticReader, decode_panoptic_png, encode_panoptic_png, write_panoptic_zip
-from stages.kit.formats.numpy_files import read_arrays
+from stages.kit.formats.numpy_files import read_array, read_arrays
 
 FILES = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -230,3 +230,20 @@ def test_garbage_is_no_picture(garbage: bytes) -> None:
     for data in (garbage, encode_panoptic_png(IDS)[:33] + garbage):
         with contextlib.suppress(BadInput):
             assert decode_panoptic_png(data).dtype == np.int32
+
+
+def test_a_bare_array_is_read_and_refused_alike(tmp_path: Path) -> None:
+    path = tmp_path / "depth.npy"
+    np.save(path, np.arange(6.0).reshape(2, 3))
+    np.testing.assert_array_equal(read_array(path), np.arange(6.0).reshape(2, 3))
+    whole = path.read_bytes()
+    for damaged, said in ((whole[:-1], "there are|needs"), (whole + b"x", "or more"), (b"", "no array header")):
+        path.write_bytes(damaged)
+        with pytest.raises(BadInput, match=said) as refusal:
+            read_array(path, "save it again")
+        assert str(path) in refusal.value.message and refusal.value.hint == "save it again"
+    np.save(path, np.array([{}], dtype=object), allow_pickle=True)
+    with pytest.raises(BadInput, match="holds object"):
+        read_array(path)
+    with pytest.raises(BadInput, match="No such file"):
+        read_array(tmp_path / "none.npy")

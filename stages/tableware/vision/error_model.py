@@ -16,7 +16,7 @@ from schemas.base import Model
 from stages.tableware.vision.detections import Detection
 from stages.tableware.world.items import TABLE_SIDES, UTENSILS, Kind, Table
 
-FILE = Path(__file__).resolve().parents[3] / "data" / "annotations" / "tableware" / "error_model.json"
+FILE = Path(__file__).resolve().parents[3] / "data" / "tableware" / "error_model.json"
 
 
 class KindErrors(Model):

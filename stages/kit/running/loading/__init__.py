@@ -17,6 +17,13 @@ from stages.kit.running.loading.scenes import (
     LoadedContactGraph,
     LoadedInteractiveScene,
 )
+from stages.kit.running.loading.tableware import (
+    LoadedTablewareDetections,
+    LoadedTablewareEvaluation,
+    LoadedTablewarePlan,
+    LoadedTablewareScene,
+    LoadedTablewareTrial,
+)
 
 __all__ = [
     "LoadedArtifact",
@@ -35,6 +42,11 @@ __all__ = [
     "LoadedReport",
     "LoadedSegments",
     "LoadedSequence",
+    "LoadedTablewareDetections",
+    "LoadedTablewareEvaluation",
+    "LoadedTablewarePlan",
+    "LoadedTablewareScene",
+    "LoadedTablewareTrial",
     "load",
     "load_run",
 ]

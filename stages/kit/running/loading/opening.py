@@ -21,6 +21,13 @@ from stages.kit.running.loading.scenes import (
     LoadedContactGraph,
     LoadedInteractiveScene,
 )
+from stages.kit.running.loading.tableware import (
+    LoadedTablewareDetections,
+    LoadedTablewareEvaluation,
+    LoadedTablewarePlan,
+    LoadedTablewareScene,
+    LoadedTablewareTrial,
+)
 from stages.kit.running.reading import open_artifact
 from stages.kit.running.run_folders import artifacts_of
 
@@ -39,6 +46,11 @@ CLASSES: dict[str, type[LoadedArtifact]] = {
     "report": LoadedReport,
     "segments": LoadedSegments,
     "sequence": LoadedSequence,
+    "tableware_detections": LoadedTablewareDetections,
+    "tableware_evaluation": LoadedTablewareEvaluation,
+    "tableware_plan": LoadedTablewarePlan,
+    "tableware_scene": LoadedTablewareScene,
+    "tableware_trial": LoadedTablewareTrial,
 }
 """Kind -> what it is loaded as; other kinds as LoadedArtifact."""
 
