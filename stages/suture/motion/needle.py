@@ -9,12 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from stages.kit.geometry.transforms import transform_from
+from stages.suture.rig import NEEDLE_RADIUS
 
-RADIUS = 0.012
-"""Of the GS-21 half circle [m] (section 4.1)."""
 SAMPLES = 121
 ARC = np.linspace(0.0, np.pi, SAMPLES)
-ARC_POINTS = RADIUS * np.column_stack([np.cos(ARC), np.sin(ARC), np.zeros(SAMPLES)])
+ARC_POINTS = NEEDLE_RADIUS * np.column_stack([np.cos(ARC), np.sin(ARC), np.zeros(SAMPLES)])
 ARC_TANGENTS = np.column_stack([-np.sin(ARC), np.cos(ARC), np.zeros(SAMPLES)])
 TIP, SWAGE = ARC_POINTS[0], ARC_POINTS[-1]
 UP_THE_WOUND = np.array([0.0, 1.0, 0.0])
@@ -35,7 +34,7 @@ def turned(pose: np.ndarray, axis: np.ndarray, angle: float, centre: np.ndarray)
 
 def point_at(pose: np.ndarray, angle: float) -> np.ndarray:
     """Return the point (3,) [m] at an arc angle [rad from the tip] of a needle at `pose` (4, 4)."""
-    return pose[:3, 3] + RADIUS * (np.cos(angle) * pose[:3, 0] + np.sin(angle) * pose[:3, 1])
+    return pose[:3, 3] + NEEDLE_RADIUS * (np.cos(angle) * pose[:3, 0] + np.sin(angle) * pose[:3, 1])
 
 
 def upright(centre: np.ndarray, tip_angle: float) -> np.ndarray:

@@ -7,7 +7,8 @@ import numpy as np
 from stages.kit.geometry.transforms import inverse
 from stages.suture.motion import primitives
 from stages.suture.motion.constants import EXTRACTION_ADVANCE, MOVED, RETRIES, cinch_length
-from stages.suture.motion.needle import ARC_POINTS, RADIUS, point_at, turned
+from stages.suture.motion.needle import ARC_POINTS, point_at, turned
+from stages.suture.rig import NEEDLE_RADIUS
 from stages.suture.trials.bench import HOME, Bench, Failed, Hold
 from stages.suture.trials.gripping import close, thread_between
 from stages.suture.trials.perception import Seen
@@ -115,7 +116,7 @@ def _loads(bench: Bench, needles: np.ndarray, shift: float) -> np.ndarray:
     """Return the force [N] on the grasp along a turn of the needle (K, 4, 4): friction in tissue, and how far needle
     and holes are apart."""
     world = bench.world
-    in_tissue = SPANNED * RADIUS * 1000.0
+    in_tissue = SPANNED * NEEDLE_RADIUS * 1000.0
     loads = np.empty(len(needles))
     for step, needle in enumerate(needles):
         points = ARC_POINTS @ needle[:3, :3].T + needle[:3, 3]

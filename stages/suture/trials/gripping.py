@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.kit.geometry.transforms import inverse, transform_from
-from stages.suture.motion.needle import ARC, ARC_POINTS, ARC_TANGENTS, RADIUS, about
+from stages.suture.motion.needle import ARC, ARC_POINTS, ARC_TANGENTS, about
+from stages.suture.rig import NEEDLE_RADIUS
 from stages.suture.trials.settings import World
 
 
@@ -56,7 +57,7 @@ def close(tool: np.ndarray, needle: np.ndarray, world: World, random: np.random.
     held = transform_from(rotation @ tool_from_needle[:3, :3], rotation @ (tool_from_needle[:3, 3] - point) + middle)
     flatness = abs(float(flat[0]))
     quality = (1.0 - 0.5 * abs(point[0]) / world.jaw_half_width) * (1.0 - 0.4 * abs(point[2]) / world.jaw_half_depth)
-    shift = abs(float(point[1])) + RADIUS * sine
+    shift = abs(float(point[1])) + NEEDLE_RADIUS * sine
     return Closing(tool @ held, quality * (0.6 + 0.4 * flatness), float(ARC[row]), shift, True)
 
 

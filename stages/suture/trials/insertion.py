@@ -9,7 +9,8 @@ import numpy as np
 from stages.kit.geometry.transforms import apply, inverse, transform_from
 from stages.suture.motion import primitives
 from stages.suture.motion.constants import CORRECTION_TURN, NORMAL_SAMPLES
-from stages.suture.motion.needle import RADIUS, TIP, UP_THE_WOUND, about, point_at, turned, upright
+from stages.suture.motion.needle import TIP, UP_THE_WOUND, about, point_at, turned, upright
+from stages.suture.rig import NEEDLE_RADIUS
 from stages.suture.trials.bench import CORNER, Bench, Failed
 from stages.suture.trials.perception import Seen
 from stages.suture.trials.wound import CHORD, HOLE_HEIGHT, SPANNED, entry, exit_, passage
@@ -168,7 +169,7 @@ def insert(bench: Bench, belief: Believed) -> None:
 def nominal_needle(suture: int) -> np.ndarray:
     """Return the pose (4, 4) of a needle that is ready for insertion as planned, its tip at the entry."""
     centre = (entry(suture) + exit_(suture)) / 2.0
-    centre = np.array([centre[0] - CHORD, centre[1], HOLE_HEIGHT + RADIUS * np.cos(START_ANGLE)])
+    centre = np.array([centre[0] - CHORD, centre[1], HOLE_HEIGHT + NEEDLE_RADIUS * np.cos(START_ANGLE)])
     needle = upright(centre, START_ANGLE)
     assert np.allclose(point_at(needle, 0.0), entry(suture))
     return needle

@@ -12,10 +12,10 @@ from math import cos, pi, sin, sqrt
 
 import numpy as np
 
-from stages.suture.motion.needle import RADIUS
+from stages.suture.rig import NEEDLE_RADIUS
 
 SPANNED = pi / 4
-CHORD = 2.0 * RADIUS * sin(SPANNED / 2)
+CHORD = 2.0 * NEEDLE_RADIUS * sin(SPANNED / 2)
 RIDGE_HALF_WIDTH, RIDGE_HEIGHT = 0.005, 0.005
 HOLE_HEIGHT = RIDGE_HEIGHT * sqrt(1.0 - (CHORD / 2 / RIDGE_HALF_WIDTH) ** 2)
 SPACING, FIRST = 0.005, 0.0125

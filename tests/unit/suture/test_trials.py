@@ -13,7 +13,8 @@ from benchmarks.stitch.trials_tables import metrics, table
 from schemas.errors import BadInput
 from stages.suture.motion import primitives
 from stages.suture.motion.constants import OpenConstants, cinch_length
-from stages.suture.motion.needle import RADIUS, SWAGE, TIP, from_ends, point_at, turned, upright
+from stages.suture.motion.needle import SWAGE, TIP, from_ends, point_at, turned, upright
+from stages.suture.rig import NEEDLE_RADIUS
 from stages.suture.robot.arms import ARMS
 from stages.suture.trials.bench import CORNER, HOME
 from stages.suture.trials.drawing import draw_strip
@@ -62,7 +63,7 @@ def test_insertion_turns_by_45_degrees_about_the_normal_after_the_push() -> None
     angle = np.arccos(directions[-1] @ directions[0])
     assert np.isclose(np.degrees(angle), 45.0)
     centre = nominal_needle(0)[:3, 3] + exit_(0) - entry(0)
-    assert np.allclose(np.linalg.norm(tips[primitives.STEPS :] - centre, axis=1), RADIUS)
+    assert np.allclose(np.linalg.norm(tips[primitives.STEPS :] - centre, axis=1), NEEDLE_RADIUS)
     assert tips[-1, 2] > tips[primitives.STEPS, 2]
 
 
