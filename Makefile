@@ -168,6 +168,7 @@ tidy: setup ## Clearing tables (TIDY): tables 7.1 to 7.3, joint planner, optimum
 	$(if $(filter fast,$(PARTS)),$(PYTHON) -m benchmarks.tidy $(if $(QUICK),--quick) --out $(TIDY)/fast)
 	$(if $(filter seen,$(PARTS)),$(PYTHON) -m benchmarks.tidy.seen $(if $(QUICK),--quick) --out $(TIDY)/seen)
 	$(if $(filter physics,$(PARTS)),$(PYTHON) -m benchmarks.tidy.physics $(if $(QUICK),--quick) --out $(TIDY)/physics)
+	$(if $(filter physics,$(PARTS)),$(PYTHON) -m benchmarks.tidy.physics_pulls $(if $(QUICK),--quick) --out $(TIDY)/pulls)
 	$(if $(filter detect,$(PARTS)),$(PYTHON) -m benchmarks.tidy.detect $(if $(QUICK),--quick) --out $(TIDY)/detect)
 	$(if $(and $(filter detect,$(PARTS)),$(wildcard $(REAL_DATA)/tableware)),$(PYTHON) -m benchmarks.tidy.detect_real --data $(REAL_DATA)/tableware --out $(TIDY)/detect_real)
 	$(PYTHON) -m benchmarks.tidy.gather --out $(TIDY)

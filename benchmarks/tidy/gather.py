@@ -2,8 +2,8 @@
 
     python -m benchmarks.tidy.gather --out FOLDER
 
-Parts are the folders `fast`, `seen`, `physics`, `detect` and `detect_real` below FOLDER, each with metrics.json
-and table.md.
+Parts are the folders `fast`, `seen`, `physics`, `pulls`, `detect` and `detect_real` below FOLDER, each with
+metrics.json and table.md.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 
 from schemas.errors import BadInput
 
-PARTS = ("fast", "seen", "physics", "detect", "detect_real")
+PARTS = ("fast", "seen", "physics", "pulls", "detect", "detect_real")
 
 
 def gather(folder: Path) -> tuple[dict[str, float], str]:
