@@ -146,7 +146,8 @@ def main() -> None:
                 stream.write(json.dumps(row) + "\n")
     figures = metrics(rows)
     (options.out / "metrics.json").write_text(json.dumps(figures, indent=1, sort_keys=True) + "\n")
-    print(json.dumps(figures, indent=1, sort_keys=True))
+    (options.out / "table.md").write_text(table(figures), encoding="utf-8")
+    print(options.out / "table.md")
 
 
 def _read(path: Path) -> list[dict[str, object]]:
@@ -177,6 +178,36 @@ def metrics(rows: list[dict[str, object]]) -> dict[str, float]:
         else:
             figures[f"ours/{case}/kept_share"] = round(float(np.mean([float(str(row["kept"])) for row in group])), 3)
     return figures
+
+
+THESIS = {
+    "cups/20": 0.19, "cups/30": 0.13, "cups/40": 0.07, "bowls/20": 0.21, "bowls/30": 0.24, "bowls/40": 0.16,
+}  # fmt: skip
+"""Expected divergence of table 7.3."""
+
+
+def table(figures: dict[str, float]) -> str:
+    """Return table 7.3 with the thesis's divergence beside ours, and the shares of piles that arrived whole."""
+    cases = sorted({name.rsplit("/", 1)[0].removeprefix("ours/") for name in figures})
+    pulls = [case for case in cases if case.startswith("pull/")]
+    lines = ["## Table 7.3: pulls in physics", "",
+             "| pull, length [cm] | n | initial [cm] | final [cm] | divergence | thesis |", "|---|--:|--:|--:|--:|--:|"]  # fmt: skip
+    for case in pulls:
+        count, *values = (
+            figures[f"ours/{case}/{measure}"]
+            for measure in ("pulls", "initial_distance_cm", "final_distance_cm", "expected_divergence")
+        )
+        shown = " | ".join(f"{value:.2f}" for value in values)
+        name = case.removeprefix("pull/")
+        lines.append(f"| {name} | {count:g} | {shown} | {THESIS.get(name, float('nan')):.2f} |")
+    if len(cases) > len(pulls):
+        lines += ["", "| pile | n | kept |", "|---|--:|--:|"]
+    lines += [
+        f"| {case} | {figures[f'ours/{case}/pulls']:g} | {100 * figures[f'ours/{case}/kept_share']:.0f} % |"
+        for case in cases
+        if case not in pulls
+    ]
+    return "\n".join(lines) + "\n"
 
 
 if __name__ == "__main__":
