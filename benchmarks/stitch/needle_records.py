@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from benchmarks.run_log import read_log
 from schemas.base import Model
 
 
@@ -54,10 +55,4 @@ class Estimate(Model):
 
 def read_estimates(path: Path) -> list[Estimate]:
     """Return the estimates of a log; a line that was cut off at the end is taken out of the file."""
-    if not path.exists():
-        return []
-    text = path.read_text(encoding="utf-8")
-    whole = text[: text.rfind("\n") + 1]
-    if whole != text:
-        path.write_text(whole, encoding="utf-8")
-    return [Estimate.model_validate_json(line) for line in whole.split("\n") if line]
+    return read_log(path, Estimate)

@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.run_log import whole_lines
 from stages.tableware.planning.actions import Pull, pull_grasp
 from stages.tableware.planning.rules import Rules
 from stages.tableware.simulation.holds import PAD, PAD_WIDTH
@@ -151,13 +152,7 @@ def main() -> None:
 
 
 def _read(path: Path) -> list[dict[str, object]]:
-    if not path.exists():
-        return []
-    text = path.read_text(encoding="utf-8")
-    whole = text[: text.rfind("\n") + 1]
-    if whole != text:
-        path.write_text(whole, encoding="utf-8")
-    return [json.loads(line) for line in whole.split("\n") if line]
+    return [json.loads(line) for line in whole_lines(path)]
 
 
 def metrics(rows: list[dict[str, object]]) -> dict[str, float]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.run_log import read_log
 from schemas.base import Model
 
 
@@ -45,13 +46,7 @@ class PhysicsRun(Model):
 
 def read_runs(path: Path) -> list[PhysicsRun]:
     """Return the trials of a log; a line that was cut off at the end is taken out of the file."""
-    if not path.exists():
-        return []
-    text = path.read_text(encoding="utf-8")
-    whole = text[: text.rfind("\n") + 1]
-    if whole != text:
-        path.write_text(whole, encoding="utf-8")
-    return [PhysicsRun.model_validate_json(line) for line in whole.split("\n") if line]
+    return read_log(path, PhysicsRun)
 
 
 def paired(runs: list[PhysicsRun]) -> dict[tuple[str, str], dict[str, list[PhysicsRun]]]:

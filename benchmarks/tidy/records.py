@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from benchmarks.run_log import read_log
 from schemas.base import Model
 
 
@@ -31,10 +32,4 @@ class Run(Model):
 
 def read_runs(path: Path) -> list[Run]:
     """Return the trials of a log; a line that was cut off at the end is taken out of the file."""
-    if not path.exists():
-        return []
-    text = path.read_text(encoding="utf-8")
-    whole = text[: text.rfind("\n") + 1]
-    if whole != text:
-        path.write_text(whole, encoding="utf-8")
-    return [Run.model_validate_json(line) for line in whole.split("\n") if line]
+    return read_log(path, Run)

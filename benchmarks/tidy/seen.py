@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.run_log import read_log
 from benchmarks.tidy.arms import WORLDS
 from benchmarks.tidy.detect import conditions
 from benchmarks.tidy.tables import interval
@@ -62,13 +63,7 @@ def trial(tier: str, seed: int, arm: str) -> SeenRun:
 
 def read_seen(path: Path) -> list[SeenRun]:
     """Return the trials of a log, but for a line that was cut off."""
-    if not path.exists():
-        return []
-    text = path.read_text(encoding="utf-8")
-    whole = text[: text.rfind("\n") + 1]
-    if whole != text:
-        path.write_text(whole, encoding="utf-8")
-    return [SeenRun.model_validate_json(line) for line in whole.split("\n") if line]
+    return read_log(path, SeenRun)
 
 
 def metrics(runs: list[SeenRun]) -> dict[str, float]:

@@ -174,6 +174,12 @@ def _masks(table: Table) -> tuple[np.ndarray, np.ndarray]:
 
 
 @njit(cache=True)
+def _meets(items, masks, others):  # type: ignore[no-untyped-def]
+    """Whether the mask of any of a set of items (bits) has a bit in common with `others`."""
+    return any(items >> item & 1 and masks[item] & others for item in range(masks.shape[0]))
+
+
+@njit(cache=True)
 def _solve(  # type: ignore[no-untyped-def]
     count, below, above, number_of, starts, seconds, lost, slips, stays, blockers, worth, per_trip
 ):
@@ -185,36 +191,25 @@ def _solve(  # type: ignore[no-untyped-def]
     time, trips, losses = np.zeros(size), np.zeros(size), np.zeros(size)
     best[0] = 0.0
     for left in range(1, size):
-        stands = True
-        for item in range(count):
-            if left >> item & 1 and below[item] & ~left:
-                stands = False
-                break
-        if not stands:
+        if _meets(left, below, ~left):  # something would stand on what has gone
             continue
         part = left
         while part:
             group = number_of[part]
             rest = left & ~part
-            if group >= 0 and best[rest] < best[left]:
-                lifted = True
-                for item in range(count):
-                    if part >> item & 1 and above[item] & rest:
-                        lifted = False
-                        break
-                if lifted:
-                    for option in range(starts[group], starts[group + 1]):
-                        if not blockers[option] & rest:
-                            slip = slips[option]
-                            value = seconds[option] + worth * lost[option] + per_trip + best[rest]
-                            if slip > 0.0:
-                                value += slip * (best[rest | stays[option]] - best[rest])
-                            if value < best[left]:
-                                best[left], chosen[left] = value, option
-                                again = rest | stays[option]
-                                time[left] = seconds[option] + (1.0 - slip) * time[rest] + slip * time[again]
-                                trips[left] = 1.0 + (1.0 - slip) * trips[rest] + slip * trips[again]
-                                losses[left] = lost[option] + (1.0 - slip) * losses[rest] + slip * losses[again]
+            if group >= 0 and best[rest] < best[left] and not _meets(part, above, rest):
+                for option in range(starts[group], starts[group + 1]):
+                    if not blockers[option] & rest:
+                        slip = slips[option]
+                        value = seconds[option] + worth * lost[option] + per_trip + best[rest]
+                        if slip > 0.0:
+                            value += slip * (best[rest | stays[option]] - best[rest])
+                        if value < best[left]:
+                            best[left], chosen[left] = value, option
+                            again = rest | stays[option]
+                            time[left] = seconds[option] + (1.0 - slip) * time[rest] + slip * time[again]
+                            trips[left] = 1.0 + (1.0 - slip) * trips[rest] + slip * trips[again]
+                            losses[left] = lost[option] + (1.0 - slip) * losses[rest] + slip * losses[again]
             part = (part - 1) & left
     return chosen, time, trips, losses
 
@@ -227,26 +222,15 @@ def _one_trip_more(count, below, above, number_of, starts, seconds, blockers, be
     chosen = np.full(size, -1, np.int64)
     best[0] = 0.0
     for left in range(1, size):
-        stands = True
-        for item in range(count):
-            if left >> item & 1 and below[item] & ~left:
-                stands = False
-                break
-        if not stands:
+        if _meets(left, below, ~left):  # something would stand on what has gone
             continue
         part = left
         while part:
             group = number_of[part]
             rest = left & ~part
-            if group >= 0 and before[rest] < best[left]:
-                lifted = True
-                for item in range(count):
-                    if part >> item & 1 and above[item] & rest:
-                        lifted = False
-                        break
-                if lifted:
-                    for option in range(starts[group], starts[group + 1]):
-                        if not blockers[option] & rest and seconds[option] + before[rest] < best[left]:
-                            best[left], chosen[left] = seconds[option] + before[rest], option
+            if group >= 0 and before[rest] < best[left] and not _meets(part, above, rest):
+                for option in range(starts[group], starts[group + 1]):
+                    if not blockers[option] & rest and seconds[option] + before[rest] < best[left]:
+                        best[left], chosen[left] = seconds[option] + before[rest], option
             part = (part - 1) & left
     return best, chosen
