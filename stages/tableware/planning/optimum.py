@@ -176,7 +176,10 @@ def _masks(table: Table) -> tuple[np.ndarray, np.ndarray]:
 @njit(cache=True)
 def _meets(items, masks, others):  # type: ignore[no-untyped-def]
     """Whether the mask of any of a set of items (bits) has a bit in common with `others`."""
-    return any(items >> item & 1 and masks[item] & others for item in range(masks.shape[0]))
+    for item in range(masks.shape[0]):  # noqa: SIM110 numba compiles no generators
+        if items >> item & 1 and masks[item] & others:
+            return True
+    return False
 
 
 @njit(cache=True)
