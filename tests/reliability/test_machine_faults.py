@@ -546,6 +546,7 @@ def test_interruption_is_remembered(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_interruptions_wait_insist_and_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """Signals of this very process: kept back while libraries load, repeated while a step swallows them, then gone."""
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)}
+    hook = sys.unraisablehook
     monkeypatch.setattr(interruption, "_requested", False)
     monkeypatch.setattr(interruption, "REPEAT_SECONDS", 0.02)
     try:
@@ -574,8 +575,35 @@ def test_interruptions_wait_insist_and_end(monkeypatch: pytest.MonkeyPatch) -> N
         with interruption.waiting(), interruption.insisting():
             pass
     finally:
+        sys.unraisablehook = hook
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def test_an_interruption_lost_in_a_finalizer_prints_nothing() -> None:
+    """The interpreter prints what a finalizer raises; of a repeated interruption nothing, of anything else all."""
+    script = (
+        "import os, signal\n"
+        "from stages.kit.running import interruption\n"
+        "interruption.install()\n"
+        "class Fails:\n"
+        "    def __del__(self):\n"
+        "        raise ValueError('of its own')\n"
+        "class Slow:\n"
+        "    def __del__(self):\n"
+        "        os.kill(os.getpid(), signal.SIGTERM)\n"
+        "        [None for _ in range(1000)]\n"
+        "Fails()\n"
+        "with interruption.insisting():\n"
+        "    Slow()\n"
+        "try:\n"
+        "    interruption.raise_if_requested()\n"
+        "except KeyboardInterrupt:\n"
+        "    print('heard')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=REPOSITORY, capture_output=True, text=True)
+    assert done.stdout == "heard\n" and done.returncode == 0
+    assert "of its own" in done.stderr and "KeyboardInterrupt" not in done.stderr
 
 
 def test_a_reader_that_leaves(tmp_path: Path) -> None:
