@@ -63,8 +63,8 @@ class TablewareTrialFile(Model):
 
 
 class TablewareTrial(Artifact):
-    """`trial.json`, `trial.txt`, `keyframes.png` (the table before each action), `clearing.gif`,
-    `shapes/<kind>.ply`."""
+    """`trial.json`, `trial.txt`, `keyframes.png` (the table before each action), `physics.png` (moments of it, where
+    that was in physics), `clearing.gif`, `shapes/<kind>.ply`."""
 
     kind: ClassVar[str] = "tableware_trial"
     description: ClassVar[str] = "a table being cleared in a simulator"

@@ -1,6 +1,7 @@
 """Pulls in physics: table 7.3 of Srinivas 2024, and what a pulled dish may carry.
 
-    python -m benchmarks.tidy.physics_pulls --out FOLDER [--quick] [--part divergence|loads|pairs ...] [--seconds S]
+    python -m benchmarks.tidy.physics_pulls --out FOLDER [--quick] [--part divergence|loads|pairs ...]
+                                            [--piles NAME ...] [--speeds METRES_PER_SECOND ...] [--seconds S]
 
 divergence: a pull of 20, 30 or 40 cm is aimed from a nominal place; the dish stands elsewhere, drawn uniformly where
 the closed fingers still go down inside it (10 placements a row, as the thesis). Initial and final distance: from where
@@ -33,7 +34,7 @@ LENGTHS = (20, 30, 40)
 PLACEMENTS = 10
 LOADS = ("c", "b", "cc", "bb", "bc", "bu", "bcc", "ccc", "bbb")
 SPEEDS = (0.1, 0.2, 0.3)
-REPEATS = 5
+REPEATS = 10
 KINDS: dict[str, Kind] = {"c": "cup", "b": "bowl", "u": "fork"}
 INSIDE = 0.030
 """Height [m] above the foot at which the fingers must fit for a placement to count as around the hand."""
@@ -112,6 +113,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--quick", action="store_true", help="two pulls a row")
     parser.add_argument("--part", nargs="+", default=["divergence", "loads", "pairs"])
+    parser.add_argument("--piles", nargs="+", default=list(LOADS), choices=LOADS)
+    parser.add_argument("--speeds", nargs="+", type=float, default=list(SPEEDS), help="of loads [m/s]")
     parser.add_argument("--seconds", type=float, help="stop after this time")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
@@ -131,11 +134,11 @@ def main() -> None:
         jobs += [
             (f"load/{letters}/{speed}", number, load, (letters, speed, number))
             for number in range(repeats)
-            for letters in LOADS
-            for speed in SPEEDS
+            for letters in options.piles
+            for speed in options.speeds
         ]
     if "pairs" in options.part:
-        jobs += [(f"pair/{letters}", n, pair, (letters, n)) for n in range(repeats) for letters in LOADS]
+        jobs += [(f"pair/{letters}", n, pair, (letters, n)) for n in range(repeats) for letters in options.piles]
     started = time.monotonic()
     for case, number, work, arguments in jobs:
         if options.seconds is not None and time.monotonic() - started > options.seconds:

@@ -120,7 +120,19 @@ WORLD_TITLES = {
     "fast/exact": "nothing misses or slips",
     "fast/drops": "as `fast`, and things fall as often as the thesis's trials failed",
 }
-SHOWN = ("random", "random_piles", "stack", "pull", "ours", "ours_without_loaded_pulls", "ours_careful", "optimum")
+SHOWN = (
+    "random",
+    "random_piles",
+    "stack",
+    "pull",
+    "ours",
+    "ours_without_loaded_pulls",
+    "ours_side_by_side",
+    "ours_bold",
+    "optimum",
+)
+OURS = tuple(arm for arm in SHOWN if arm.startswith("ours"))
+COMPARED = ("stack", "pull", *OURS)
 
 
 def table(runs: list[Run]) -> str:
@@ -219,7 +231,7 @@ def _aims(figures: dict[str, float], tiers: list[str], world: str) -> list[str]:
         return f"{100 * figures[name]:.{digits}f} %" if name in figures else "-"
 
     for tier in tiers:
-        for arm in SHOWN[4:7]:
+        for arm in OURS:
             at = f"{arm}/{tier}/{world}"
             if f"{at}/time" not in figures:
                 continue
@@ -230,10 +242,10 @@ def _aims(figures: dict[str, float], tiers: list[str], world: str) -> list[str]:
                 f"| {form(f'{at}/faster_than_pull')} | {form(f'{at}/delay5/faster_than_pull')} "
                 f"| {1e3 * plan[0]:.0f} / {1e3 * plan[1]:.0f} |"
             )
-    lines += ["", "| tier | " + " | ".join(f"`{arm}`" for arm in SHOWN[2:7]) + " |", "|---|---|---|---|---|---|"]
+    lines += ["", *_head(["tier"], list(COMPARED))]
     for tier in tiers:
         cells = []
-        for arm in SHOWN[2:7]:
+        for arm in COMPARED:
             at = f"{arm}/{tier}/{world}/objects_per_trip_ratio"
             cells.append(
                 f"{figures[at]:.2f} / {figures.get(f'{at}_piles', float('nan')):.2f}" if at in figures else "-"

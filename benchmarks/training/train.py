@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -22,10 +21,10 @@ import numpy as np
 import torch
 from torch.nn import functional
 
+from benchmarks.training.run_state import read_state, write_state
 from benchmarks.training.samples import FrameSet, varied
 from benchmarks.training.targets import IGNORED, Targets
 from schemas.errors import BadInput
-from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
 from stages.segment.network.features import CHANNELS
 from stages.segment.network.model import PanopticNetwork, Widths
 from stages.segment.network.weights import save_checkpoint
@@ -153,14 +152,7 @@ class Run:
 
     def save(self) -> None:
         """Write the state, whole or not at all, and the checkpoint as it would be used now."""
-        tensors = {f"network.{name}": value for name, value in self.network.state_dict().items()}
-        tensors |= {f"average.{name}": value for name, value in self.average.items()}
-        for number, entry in self.optimizer.state_dict()["state"].items():
-            tensors |= {f"optimizer.{number}.{name}": value for name, value in entry.items()}
-        self.out.mkdir(parents=True, exist_ok=True)
-        arrays = {name: value.detach().contiguous().numpy() for name, value in tensors.items()}
-        write_safetensors(self.out / "state.new", arrays, {"step": str(self.step)})
-        os.replace(self.out / "state.new", self.out / "state.safetensors")
+        write_state(self.out, self.network, self.average, self.optimizer, self.step)
         facts = {"step": self.step, "seconds": round(self.seconds, 1), "plan": _plan_record(self.plan)}
         (self.out / "state.json").write_text(json.dumps(facts, indent=1) + "\n")
         save_checkpoint(
@@ -173,25 +165,8 @@ class Run:
         facts = json.loads((self.out / "state.json").read_text())
         if facts["plan"] != _plan_record(self.plan):
             raise BadInput(f"{self.out}: holds a run of another plan", hint="take another --out, or the same settings")
-        arrays, metadata = read_safetensors(self.out / "state.safetensors")
-        tensors = {name: torch.from_numpy(array) for name, array in arrays.items()}
-        parts: dict[str, dict[str, torch.Tensor]] = {"network": {}, "average": {}, "optimizer": {}}
-        for name, value in tensors.items():
-            head, _, rest = name.partition(".")
-            parts[head][rest] = value
-        self.network.load_state_dict(parts["network"])
-        self.average = parts["average"]
-        parameters = list(self.network.parameters())
-        entries: dict[int, dict[str, torch.Tensor]] = {}
-        for name, value in parts["optimizer"].items():
-            number, _, rest = name.partition(".")
-            # The fused optimiser walks through memory: its state must lie there in the order of the parameter.
-            like = parameters[int(number)]
-            laid = torch.empty_like(like).copy_(value) if value.shape == like.shape else value
-            entries.setdefault(int(number), {})[rest] = laid.detach()
-        state = self.optimizer.state_dict()
-        self.optimizer.load_state_dict({"state": entries, "param_groups": state["param_groups"]})
-        self.step, self.seconds = int(metadata["step"]), facts["seconds"]
+        self.average, self.step = read_state(self.out, self.network, self.optimizer)
+        self.seconds = facts["seconds"]
 
 
 def _plan_record(plan: Plan) -> dict[str, int | list[str]]:

@@ -10,7 +10,7 @@ from stages.kit.stage import Parameters
 
 TierName = Literal["tier0_cups", "tier0_bowls", "tier0_utensils", "tier1", "tier2", "tier3"]
 PolicyName = Literal[
-    "random", "random_piles", "pull", "stack", "ours", "ours_without_loaded_pulls", "ours_careful", "ours_one_pile"
+    "random", "random_piles", "pull", "stack", "ours", "ours_without_loaded_pulls", "ours_side_by_side", "ours_bold"
 ]  # fmt: skip
 ChancesName = Literal["exact", "thesis", "thesis_failures"]
 

@@ -82,7 +82,7 @@ def draw_table(table: Table, width: int, action: Action | None = None, caption: 
     if action is not None:
         _draw_action(sheet, action)
     image = image.resize((width, round(height / SUPERSAMPLING)), Image.Resampling.LANCZOS)
-    return _captioned(image, caption) if caption else image
+    return captioned(image, caption) if caption else image
 
 
 def _draw_item(sheet: _Sheet, item: Item, level: int) -> None:
@@ -156,7 +156,8 @@ def _font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
     return ImageFont.load_default(max(6.0, size))
 
 
-def _captioned(image: Image.Image, caption: str) -> Image.Image:
+def captioned(image: Image.Image, caption: str) -> Image.Image:
+    """Return a picture with lines of text below it."""
     size = max(11, round(image.width * 0.042))
     lines = _wrapped(caption, image.width - 8, size)
     sheet = Image.new("RGB", (image.width, image.height + round(1.3 * size) * max(2, len(lines)) + 6), "#ffffff")

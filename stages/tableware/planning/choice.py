@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from schemas.tableware_plan import TimesOfActions
 from stages.tableware.options import ActionTimes
 from stages.tableware.planning.joint import JointPolicy
@@ -31,15 +33,16 @@ def as_times(model: TimeModel) -> TimesOfActions:
     return TimesOfActions(trip=model.trip, stack=model.stack, pull=model.pull, delay=model.delay)
 
 
+_BORNE = Rules(both_piles=False, most_utensils=2, loaded_cups=False)
 RULES: dict[str, Rules] = {
-    "ours": Rules(),
-    "ours_without_loaded_pulls": Rules(loaded_pulls=False),
-    "ours_careful": Rules(clamped_stacks=True, most_utensils=2),
-    "ours_one_pile": Rules(both_piles=False, most_utensils=2),
+    "ours": _BORNE,
+    "ours_without_loaded_pulls": replace(_BORNE, loaded_pulls=False),
+    "ours_side_by_side": replace(_BORNE, both_piles=True, most_beside=2, utensils_beside=False),
+    "ours_bold": Rules(),
 }
-"""What our policies allow themselves. `ours_careful`: onto two dishes that are lifted side by side only dishes of their
-own kind are stacked, and two utensils a pile at most; the first findings in physics ask for that (what stands free in a
-dish falls out then, more utensils slide off). `ours_one_pile`: onto two things that are lifted side by side nothing."""
+"""What our policies allow themselves. `ours`: what physics bears (docs/TIDY_PHYSICS.md), nothing is put onto two things
+that are lifted side by side, two utensils a pile, cups that utensils lie across stay as they are. `ours_side_by_side`
+makes piles of two for that too, of which physics loses some; `ours_bold` does whatever the jaws allow."""
 
 
 def rules_of(policy: str) -> Rules:

@@ -42,13 +42,16 @@ class Rules:
     """Utensils in one pile (ours)."""
     utensils_in_cups: bool = False
     """Whether utensils are put on cups; the thesis allows any dish. One that lies there already may stay."""
+    loaded_cups: bool = True
+    """Whether a cup that a utensil lies across is put onto another cup, or a further utensil on that one (ours)."""
     loaded_pulls: bool = True
     """Whether a dish that carries others may be pulled."""
     both_piles: bool = True
     """Whether more is stacked onto a pair of dishes that stand side by side, before one grasp takes all (ours)."""
-    clamped_stacks: bool = False
-    """Whether onto a pair of dishes that stand side by side only dishes of their own kind are stacked, which the jaws
-    then clamp with them; what stands free in a dish falls out when two are lifted side by side (ours)."""
+    most_beside: int = 9
+    """Things in a pile that is made to be lifted beside another (ours). What stands there as a pile may be more."""
+    utensils_beside: bool = True
+    """Whether utensils are put onto a dish that is then lifted beside another (ours)."""
 
     def __post_init__(self) -> None:
         values = tuple(getattr(self, one.name) for one in fields(self))
@@ -104,8 +107,10 @@ def can_stack(upper: str, lower: str, rules: Rules) -> bool:
     top, bottom = lower[-1], upper[0]
     if bottom == "u":
         fits = top != "c" or rules.utensils_in_cups
+        fits = fits and (rules.loaded_cups or not lower.rstrip("u").endswith("c"))
     else:
         fits = top != "u" and _MEASURES[bottom].rim_radius <= _MEASURES[top].rim_radius
+        fits = fits and (rules.loaded_cups or "cu" not in upper)
     return fits and can_hold(upper, rules) and can_hold(lower + upper, rules)
 
 
@@ -153,15 +158,23 @@ def _share_out(
     """Return how many of each kind of part, in the order of `pile_order`, go onto `high`, the others onto `low`."""
     if not kinds:
         return () if can_hold_two(low, high, rules) else None
-    lows, highs = (_grown(pile, kinds[0], counts[0], rules) for pile in (low, high))
-    if rules.clamped_stacks:
-        lows, highs = (piles if len(set(piles[-1])) == 1 else piles[:1] for piles in (lows, highs))
+    lows, highs = (_beside(_grown(pile, kinds[0], counts[0], rules), rules) for pile in (low, high))
     for number in range(counts[0] + 1):
         if counts[0] - number < len(lows) and number < len(highs):
             rest = _share_out(lows[counts[0] - number], highs[number], kinds[1:], counts[1:], rules)
             if rest is not None:
                 return (number, *rest)
     return None
+
+
+def _beside(piles: list[str], rules: Rules) -> list[str]:
+    """Return the piles, each the one before with something on it, that are made to be lifted beside another."""
+    count = 1
+    while count < len(piles) and len(piles[count]) <= rules.most_beside:
+        if piles[0][0] != "u" and "u" in piles[count] and not rules.utensils_beside:
+            break
+        count += 1
+    return piles[:count]
 
 
 def _grown(pile: str, part: str, count: int, rules: Rules) -> list[str]:

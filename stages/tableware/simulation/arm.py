@@ -24,12 +24,17 @@ BASE = np.array([0.0, -0.46, 0.15])
 """Where the arm stands, higher than the table top: else the upper arm sweeps dishes off it when it reaches far [m]."""
 PAD_FRICTION, BACK_FRICTION = 1.6, 0.3
 """Of rubber pads, and of the bare metal that pushes a dish from inside; Bullet multiplies the two of a contact."""
+PAD_STIFFNESS, PAD_DAMPING = 4.0e4, 2.0e2
+"""Give of the rubber [N/m, N s/m]: 2.5 MPa over a patch of 22 by 3 mm, 4 mm thick. Rigid pads would hold one of two
+utensils that lie on each other, the one wider by a tenth of a millimetre."""
 JOINT_EFFORTS = np.array([150.0, 150.0, 150.0, 28.0, 28.0, 28.0])
 """Torques [N m] of the UR5's joints."""
 CLOSING_SPEED = 0.06
 """Of each finger [m/s]."""
 PAUSE = 0.15
 """Before and after each movement of the fingers [s]."""
+ROOM_TO_TURN = pi
+"""The last joint turns two half turns either way from its middle; an empty hand begins within one of them [rad]."""
 WRIST_OFFSET = 0.10915
 """Distance of the arm's plane from the axis of its first joint [m]."""
 
@@ -55,6 +60,10 @@ class Arm:
             links[info[12].decode()], joints[info[1].decode()] = index, index
         self.joints = [joints[name] for name in self.description.arm_joints]
         self.fingers = [joints[name] for name in self.description.finger_joints]
+        for index in self.fingers:
+            engine.changeDynamics(
+                self.body_id, index, contactStiffness=PAD_STIFFNESS, contactDamping=PAD_DAMPING, physicsClientId=client
+            )
         self.touch_with(PAD_FRICTION)
         gear = engine.createConstraint(
             self.body_id, self.fingers[0], self.body_id, self.fingers[1], engine.JOINT_GEAR, [0, 1, 0], [0, 0, 0],
@@ -104,7 +113,8 @@ class Arm:
 
     def solve(self, pose: np.ndarray, *, held: bool = False) -> np.ndarray | None:
         """Return joint values (6,) for a tool pose, None where it is not reached. With nothing held the one turned by
-        half a turn will do as well, as the fingers are alike: the answer that moves the joints least is taken."""
+        half a turn will do as well, as the fingers are alike: the answer that moves the joints least is taken, of those
+        that leave the last joint room for half a turn either way."""
         near = self.target
         found = []
         for half_turn in (False,) if held else (False, True):
@@ -120,12 +130,14 @@ class Arm:
             starts = [np.array([first, -1.4, 1.6, -1.77, -pi / 2, last]) for last in (near[5], 0.0, 2.0, 4.0)]
             solution = inverse_kinematics(self.chain, wanted, np.array(starts))
             if solution.found and solution.arm[2] > 0.0:
-                arm = solution.arm
-                turns = np.round((near[5] - arm[5]) / (2 * pi)) * 2 * pi
-                if abs(arm[5] + turns) < 2 * pi:
+                for turns in (-2 * pi, 0.0, 2 * pi):
+                    arm = solution.arm.copy()
                     arm[5] += turns
-                found.append(arm)
-        return min(found, key=lambda arm: float(np.abs(arm - near).max())) if found else None
+                    if abs(arm[5]) < 2 * pi:
+                        found.append(arm)
+        if not found:
+            return None
+        return min(found, key=lambda arm: (not held and abs(arm[5]) > ROOM_TO_TURN, float(np.abs(arm - near).max())))
 
     # --- motion -----------------------------------------------------------------------------------------------
 

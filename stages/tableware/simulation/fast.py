@@ -36,6 +36,8 @@ from stages.tableware.world.footprints import footprint, gap
 from stages.tableware.world.items import Table
 
 MOST_ACTIONS, MOST_IDLE = 400, 8
+STILL = 0.004
+"""What moved less than this [m] has not been moved."""
 
 
 @dataclass
@@ -209,6 +211,16 @@ class Done:
     end: float
     dropped: tuple[str, ...] = ()
     troubles: tuple[str, ...] = ()
+    seen: Table = Table(())
+    """On which the action was decided."""
+
+    @property
+    def idle(self) -> bool:
+        """Whether nothing was moved or taken away."""
+        if set(self.before.by_name) != set(self.after.by_name):
+            return False
+        places = ((item.position, self.after.by_name[name].position) for name, item in self.before.by_name.items())
+        return all(hypot(here[0] - there[0], here[1] - there[1]) < STILL for here, there in places)
 
 
 def truth(world: World) -> Table:
@@ -223,7 +235,12 @@ def do_in(world: World, action: Action, seen: Table) -> Done:
     world.do(action, seen)
     after, end = world.table, world.trial.seconds
     dropped = tuple(name for name in getattr(world, "fallen", ()) if name not in fallen)
-    return Done(action, before, after, start, end, dropped, tuple(getattr(world, "troubles", ())))
+    return Done(action, before, after, start, end, dropped, tuple(getattr(world, "troubles", ())), seen)
+
+
+def most_actions(table: Table) -> int:
+    """Return after how many actions a trial ends whose actions are tried again."""
+    return 3 * len(table.items) + 4
 
 
 def run_in(
@@ -231,17 +248,24 @@ def run_in(
     policy: Policy,
     see: Callable[[World], Table] = truth,
     told: Callable[[Done], None] = lambda done: None,
+    again: Callable[[Table, Done, int], Action] | None = None,
 ) -> Trial:
     """Let a policy clear the table of any world, one action an image; `told` hears of each action. It ends when nothing
-    is seen, when eight actions in a row have changed nothing, and after 400. What is left counts as left."""
+    is seen, when eight actions in a row have changed nothing, and after 400. What is left counts as left.
+
+    `again` decides instead of the policy after a number of actions in a row, the last of which it is told, that changed
+    nothing; then the trial ends when nothing is seen, or after 3 actions an item and 4.
+    """
     idle = 0
-    for _ in range(MOST_ACTIONS):
+    last: Done | None = None
+    for _ in range(MOST_ACTIONS if again is None else most_actions(world.table)):
         seen = see(world)
-        if not seen.items or idle == MOST_IDLE:
+        if not seen.items or (again is None and idle == MOST_IDLE):
             break
-        done = do_in(world, policy.decide(seen), seen)
-        idle = idle + 1 if done.after.items == done.before.items else 0
-        told(done)
+        action = again(seen, last, idle) if again is not None and idle and last is not None else policy.decide(seen)
+        last = do_in(world, action, seen)
+        idle = idle + 1 if last.idle else 0
+        told(last)
     return world.trial
 
 

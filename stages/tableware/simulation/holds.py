@@ -25,6 +25,8 @@ DEPTH_TWO = 0.030
 ROOM = 0.007
 """Between an open pad and the wall on each side [m]."""
 PALM_ROOM = 0.003
+PAIR_SHIFTS = (0.0, 0.01, -0.01, 0.02, -0.02)
+"""Where two utensils side by side are taken, from the middle between them along them [m], the best first."""
 FREE = 0.003
 """What open jaws keep from others [m]."""
 ABOVE = 0.0005
@@ -90,6 +92,8 @@ def rim_hold(
     base = family[0]
     x, y = center or (base.position[0], base.position[1])
     low_lip = min(item.lip for item in family)
+    if base.on is not None and table.by_name[base.on].is_dish:  # the fingers must not close on what it stands in
+        most = min(most, max(0.006, low_lip - table.by_name[base.on].lip - 0.002))
     depth = reach_below(family, most)
     tip = low_lip - depth
     lean = atan2(base.measures.rim_radius - base.measures.foot_radius, base.measures.height)
@@ -150,34 +154,31 @@ def pair_hold(table: Table, first: str, second: str, point: tuple[float, float, 
         apart = abs(float(across @ (np.array(other.position[:2]) - np.array(one.position[:2]))))
         opening = min(0.085, apart + one.measures.width + 0.014)
         tip = min(one.position[2], other.position[2]) + ABOVE
-        along = touching(one, other, yaw)
-        place = np.array([point[0] + along * cos(yaw), point[1] + along * sin(yaw), tip])
-        pose = tool_pose(place, yaw + pi / 2)
-        return Hold(pose, opening, jaw_clearance(pose, opening, others, []))
+        best: Hold | None = None
+        for along in PAIR_SHIFTS:  # held away from their middles they would hang and swing
+            place = np.array([point[0] + along * cos(yaw), point[1] + along * sin(yaw), tip])
+            pose = tool_pose(place, yaw + pi / 2)
+            clearance = jaw_clearance(pose, opening, others, [])
+            if best is None or clearance > best.clearance:
+                best = Hold(pose, opening, min(clearance, FREE))
+            if clearance >= FREE:
+                break
+        assert best is not None
+        return best
     families = [walls(table, name) for name in (first, second)]
-    tip = max(min(item.lip for item in family) for family in families)
     lips = [item.lip for family in families for item in family]
-    tip = min(item.lip for family in families for item in family) - max(
-        0.003, min(DEPTH_TWO, JAW_HEIGHT - PALM_ROOM - (max(lips) - min(lips)))
-    )
+    depth = max(0.003, min(DEPTH_TWO, JAW_HEIGHT - PALM_ROOM - (max(lips) - min(lips))))
+    tip = min(lips) - depth
     pose = tool_pose(np.array([point[0], point[1], tip]), closing)
+    ahead = np.array([cos(closing), sin(closing)])
+    reach = 0.0
+    for base, family in zip((one, other), families, strict=True):
+        inner = min(item.measures.inner_radius(tip - item.position[2]) for item in family)
+        middle = abs(float(ahead @ (np.array(base.position[:2]) - np.array(point[:2]))))
+        reach = max(reach, middle - inner)
     own = [item for name in (first, second) for item in cargo(table, name)]
-    return Hold(pose, 0.085, jaw_clearance(pose, 0.085, others, own))
-
-
-def touching(one: Item, other: Item, yaw: float) -> float:
-    """Return how far [m] from the middle between two utensils, along `yaw` [rad], they meet when pushed together: the
-    middle of where their widths add up to the most. Pads that press elsewhere would turn them."""
-    axis = np.array([cos(yaw), sin(yaw)])
-    middle = (np.array(one.position[:2]) + np.array(other.position[:2])) / 2
-    places = np.arange(-0.08, 0.081, 0.005)
-    totals = np.zeros(len(places))
-    for item in (one, other):
-        forwards = 1.0 if cos(item.yaw - yaw) >= 0.0 else -1.0
-        offset = float(axis @ (np.array(item.position[:2]) - middle))
-        totals += [half_width(item, forwards * (float(place) - offset)) for place in places]
-    meeting = places[totals >= totals.max() - 0.0015]
-    return float(meeting.min() + meeting.max()) / 2
+    opening = min(0.085, 2.0 * (reach + ROOM))
+    return Hold(pose, opening, jaw_clearance(pose, opening, others, own))
 
 
 def half_width(item: Item, along: float) -> float:
@@ -189,11 +190,16 @@ def half_width(item: Item, along: float) -> float:
 
 
 def bar_hold(table: Table, name: str, opening: float = 0.032) -> Hold:
-    """Return how a utensil, or a pile of utensils, is taken across its middle."""
+    """Return how a utensil, or a pile of utensils, is taken across its middle; a pile where all are equally wide, else
+    the pads close on the widest only."""
     item = table.by_name[name]
     others = [i for p in table.stacks for i in p if name not in {o.name for o in p}]
+    pile = [item, *table.load(name)]
+    shifts = sorted(np.arange(-0.045, 0.0451, 0.005), key=abs)
+    if len(pile) > 1:
+        shifts = sorted(shifts, key=lambda shift: (round(unevenness(pile, float(shift)), 4), abs(shift)))
     best: Hold | None = None
-    for shift in (0.0, 0.015, -0.015, 0.03, -0.03, 0.045, -0.045):
+    for shift in shifts:
         x = item.position[0] + shift * cos(item.yaw)
         y = item.position[1] + shift * sin(item.yaw)
         tip = item.position[2] + (ABOVE if item.position[2] < 0.001 else -0.0005 if item.on is None else ABOVE)
@@ -205,3 +211,17 @@ def bar_hold(table: Table, name: str, opening: float = 0.032) -> Hold:
             break
     assert best is not None
     return best
+
+
+def unevenness(pile: list[Item], shift: float) -> float:
+    """Return by how much [m] the half widths of utensils that lie on each other differ under pads at `shift` [m] from
+    the lowest one's middle towards its head."""
+    base = pile[0]
+    axis = np.array([cos(base.yaw), sin(base.yaw)])
+    widths = []
+    for item in pile:
+        forwards = 1.0 if cos(item.yaw - base.yaw) >= 0.0 else -1.0
+        offset = float(axis @ (np.array(item.position[:2]) - np.array(base.position[:2])))
+        reach = PAD_WIDTH / 2 + 0.001
+        widths += [half_width(item, forwards * (shift + along - offset)) for along in np.linspace(-reach, reach, 7)]
+    return max(widths) - min(widths)

@@ -38,6 +38,8 @@ TRAVEL = 0.17
 """Height of the fingertips on the way above everything [m]."""
 SPREAD = 0.72
 """Share of a dish's inner radius to which the fingers open when they pull it from inside."""
+EMPTY = 0.0008
+"""Fingers that are nearer to each other than this [m] hold nothing: the thinnest wall has 3 mm."""
 LIFT = 0.06
 """By how much what is held goes above everything else [m]."""
 
@@ -52,15 +54,16 @@ class Speeds:
     pull: float = 0.15
     carry: float = 0.7
     force: float = 40.0
-    firm: float = 80.0
+    """For dishes, however many: twice as much presses the lowest of three nested cups out of the others."""
     gentle: float = 20.0
     """For a utensil that is taken alone, or a pile of them."""
-    edge: float = 10.0
+    edge: float = 5.0
     """For two utensils side by side: pressed harder, flat things edge to edge spring out of the fingers."""
     cage: float = 6.0
     """Around a utensil that is pulled."""
-    carry_two: float = 0.4
-    lift_two: float = 0.09
+    carry_loose: float = 0.4
+    """With things that stand or lie free in what is held."""
+    lift_loose: float = 0.09
 
 
 class PhysicsTable:
@@ -78,7 +81,11 @@ class PhysicsTable:
         self.table = self.top.read()
         self.trial = Trial(left=len(self.table.items))
         self.troubles: list[str] = []
-        """What could not be done, in order."""
+        """What could not be done in the last action, in order."""
+        self.vain: tuple[str, ...] = ()
+        """What the hand closed on in vain in the last action: nothing was between the fingers."""
+        self.fallen: list[str] = []
+        """Everything that fell off the table or over, in order."""
         self._key("start")
 
     def close(self) -> None:
@@ -106,7 +113,7 @@ class PhysicsTable:
         """Carry out an action that was decided on `seen`, by default the true table; a composite one without looking in
         between. What then is where is read from the bodies."""
         seen = seen or self.table
-        self.troubles = []
+        self.troubles, self.vain = [], ()
         try:
             if isinstance(action, PullGrasp):
                 self._pull(action.u_P, seen)
@@ -132,34 +139,40 @@ class PhysicsTable:
         lying = len(self.top.bodies) - len(self.table.items)
         self.trial.moved = len(self.top.binned)
         self.trial.dropped = len(self.top.lost) + lying
+        gone = [*self.top.lost, *(name for name in self.top.bodies if name not in self.table.by_name)]
+        self.fallen = [name for name in self.fallen if name in gone]
+        self.fallen += [name for name in gone if name not in self.fallen]
         self.trial.left = len(self.table.items)
         self.trial.seconds = self.arm.seconds
 
     def _grasp(self, action: Grasp, seen: Table) -> None:
-        self.trial.trips += 1
         names = [name for name in action.items if name in seen.by_name]
         if len(names) == 2:
             hold = pair_hold(seen, names[0], names[1], action.p_G, action.theta_G)
+            if hold.clearance < 0.0:
+                raise MotionFailed("in_collision", f"open jaws do not fit around {' and '.join(names)}")
         elif seen.by_name[names[0]].is_dish:
             hold = rim_hold(seen, names[0], action.theta_G)
         else:
             hold = bar_hold(seen, names[0])
-        self._take(hold, self._force(seen, names))
+        self._take(hold, self._force(seen, names), names)
         self._to_bin(seen, names)
 
     def _force(self, seen: Table, names: list[str]) -> float:
         """Return the force [N] of each finger for some piles."""
-        count = sum(1 + len(seen.load(name)) for name in names)
         if all(not seen.by_name[name].is_dish for name in names):
             return self.speeds.edge if len(names) == 2 else self.speeds.gentle
-        return self.speeds.force if count == 1 else self.speeds.firm
+        return self.speeds.force
 
-    def _take(self, hold: Hold, force: float) -> None:
-        """Go there and close."""
+    def _take(self, hold: Hold, force: float, names: list[str]) -> None:
+        """Go there and close. Raises MotionFailed when nothing is there."""
         self._above(hold.pose, hold.opening)
         self._descend(hold.pose)
         self.arm.close(force)
         self._key("closed")
+        if self.arm.finger_gap() < EMPTY:
+            self.vain = tuple(names)
+            raise MotionFailed("not_held", f"the fingers closed on nothing where {' and '.join(names)} should be")
 
     def _above(self, pose: np.ndarray, opening: float) -> None:
         """Bring the empty hand over a pose, with the fingers at an opening."""
@@ -197,17 +210,21 @@ class PhysicsTable:
         self.top.wake_near([np.array(seen.by_name[name].position[:2]) for name in held], 0.03)
         pose = self.arm.pose_of(self.arm.target)
         lowest = min(seen.by_name[name].position[2] for name in held)
-        highest = max([item.lip for item in self.table.items if item.name not in held], default=0.0)
+        highest = max([item.lip for item in seen.items if item.name not in held], default=0.0)
         clear = highest + LIFT - lowest
         up = _raised(pose, pose[2, 3] + max(clear, 0.06))
         self.arm.move_line(_raised(pose, pose[2, 3] + 0.01), 0.05)
         two = len(names) == 2
-        self.arm.move_line(up, self.speeds.lift_two if two else self.speeds.lift)
+        loose = any(cargo(seen, name) for name in names if seen.by_name[name].is_dish)
+        self.arm.move_line(up, self.speeds.lift_loose if loose else self.speeds.lift)
         self.top.sleep()
         self._key("lifted")
+        if self.arm.finger_gap() < EMPTY:
+            raise MotionFailed("not_held", f"{' and '.join(names)} slipped out of the fingers")
+        self.trial.trips += 1
         offset = np.zeros(2) if two else np.array(seen.by_name[names[0]].position[:2]) - pose[:2, 3]
         goal = self._bin_pose(up, offset)
-        self.arm.move_joints(goal, self.speeds.carry_two if two else self.speeds.carry)
+        self.arm.move_joints(goal, self.speeds.carry_loose if loose else self.speeds.carry)
         self._key("over the bin")
         self.arm.open_to(min(0.085, self.arm.finger_gap() + 0.03))
         self.arm.wait(0.15)
@@ -247,7 +264,7 @@ class PhysicsTable:
         if item.is_dish:
             self._pull_dish(action, seen)
         else:
-            self._pull_bar(action, item)
+            self._pull_bar(action, seen)
 
     def _pull_dish(self, action: Pull, seen: Table) -> None:
         start, end = np.array(action.p_S[:2]), np.array(action.p_E[:2])
@@ -279,16 +296,21 @@ class PhysicsTable:
             self.arm.touch_with(PAD_FRICTION)
         self.arm.move_line(_raised(away, TRAVEL + 0.03), self.speeds.descend)
 
-    def _pull_bar(self, action: Pull, item: Item) -> None:
-        """Close lightly on a utensil where it lies, lead it over the table, let go: a loose cage slides along it."""
-        tip = 0.0012
-        pose = tool_pose(np.array([*action.p_S[:2], tip]), action.theta_S)
-        self._above(pose, 0.032)
-        self._descend(pose)
+    def _pull_bar(self, action: Pull, seen: Table) -> None:
+        """Close lightly on a utensil where it lies, lead it over the table, let go: a loose cage slides along it. It is
+        taken where the jaws fit, at its middle if they do there."""
+        item = seen.by_name[action.item]
+        turn = (action.theta_E - action.theta_S + pi / 2) % pi - pi / 2
+        hold = bar_hold(seen, action.item)
+        tip = np.array([0.0, 0.0, hold.pose[2, 3]])
+        offset = hold.pose[:2, 3] - np.array(item.position[:2])
+        rotation = np.array([[cos(turn), -sin(turn)], [sin(turn), cos(turn)]])
+        self._above(hold.pose, hold.opening)
+        self._descend(hold.pose)
         self.arm.close(self.speeds.cage)
         self._key("inside")
-        turn = (action.theta_E - action.theta_S + pi / 2) % pi - pi / 2
-        there = tool_pose(np.array([*action.p_E[:2], tip]), action.theta_S + turn)
+        goal = np.array([*action.p_E[:2], 0.0]) + np.array([*(rotation @ offset), 0.0]) + tip
+        there = tool_pose(goal, action.theta_S + turn)
         self.arm.move_line(there, self.speeds.pull)
         self._key("pulled")
         self.arm.open_to(0.022)
@@ -306,7 +328,7 @@ class PhysicsTable:
             hold = rim_hold(seen, name, action.u_G.theta_G, min(room, max(nested, 0.012)))
         else:
             hold = bar_hold(seen, name)
-        self._take(hold, self._force(seen, [name]))
+        self._take(hold, self._force(seen, [name]), [name])
         pose = self.arm.pose_of(self.arm.target)
         held = {name, *(load.name for load in seen.load(name))}
         self.top.wake_near([np.array(item.position[:2])], 0.03)

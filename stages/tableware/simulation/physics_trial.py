@@ -9,17 +9,16 @@ from typing import Literal
 
 from stages.tableware.planning.actions import Action, Grasp, Pull, PullGrasp, Stack, StackGrasp, grasp
 from stages.tableware.planning.policies import Policy, liftable
-from stages.tableware.planning.rules import Rules
-from stages.tableware.simulation.fast import Trial
+from stages.tableware.planning.rules import Rules, letters
+from stages.tableware.sight import Eyes
+from stages.tableware.simulation.fast import Done, Trial, most_actions, run_in, truth
 from stages.tableware.simulation.physics import PhysicsTable, Speeds
-from stages.tableware.vision.detection import detect
-from stages.tableware.vision.detections import as_table
 from stages.tableware.world.items import Item, Table
 
 NEAR = 0.015
 """An item that is seen within this [m] of where one of its kind stands is seen rightly."""
-STILL = 0.004
-"""What moved less than this [m] has not been moved."""
+LEAST_CONFIDENCE = 0.3
+"""Of what is planned for, as the command's."""
 
 Sight = Literal["truth", "image"]
 
@@ -34,6 +33,20 @@ class Outcome:
     perception: int = 0
     policy: int = 0
     troubles: tuple[str, ...] = ()
+    losses: tuple[str, ...] = ()
+    """Of each item that was lost what it is and in which action, as `fork: take uu`."""
+
+    def hear(self, done: Done) -> None:
+        """Take down an action."""
+        self.actions += 1
+        self.troubles = (*self.troubles, *done.troubles)
+        kinds = {item.name: item.kind for item in done.before.items}
+        what = said(done.action, done.seen)
+        self.losses = (*self.losses, *(f"{kinds.get(name, 'item')}: {what}" for name in done.dropped))
+        if all(_rightly(item, done.before) for item in meant(done.action, done.seen)):
+            self.policy += len(done.dropped)
+        else:
+            self.perception += len(done.dropped)
 
 
 def run_physics_trial(
@@ -42,56 +55,38 @@ def run_physics_trial(
 ) -> Outcome:  # fmt: skip
     """Clear a table in physics, looking before each action, until nothing is seen or 3 actions an item are spent.
 
-    Where an action has changed nothing the next takes a pile alone, from another side; all policies do so.
+    What the eyes doubt is refused as in the command. After an action that changed nothing comes `alone`, whatever the
+    policy.
     """
     world = PhysicsTable(table, speeds=speeds, record=record)
+    eyes = Eyes(seed, "usual", "dark_on_white", LEAST_CONFIDENCE)
     try:
-        return _run(world, policy, seed, sight)
+        outcome = Outcome(world.trial)
+        most = most_actions(world.table)
+        run_in(world, policy, eyes if sight == "image" else truth, outcome.hear, alone)
     finally:
         world.close()
-
-
-def _run(world: PhysicsTable, policy: Policy, seed: int, sight: Sight) -> Outcome:
-    outcome = Outcome(world.trial)
-    stuck = 0
-    for number in range(3 * len(world.table.items) + 4):
-        if not world.table.items:
-            break
-        before = world.table
-        seen = before
-        if sight == "image":
-            color, depth, camera = world.image(1000 * seed + number)
-            seen = as_table(detect(color, depth, camera))
-            outcome.looks += 1
-            if not seen.items:
-                break
-        action = policy.decide(seen) if not stuck else _alone(seen, stuck)
-        right = all(_rightly(item, before) for item in _meant(action, seen))
-        lost = world.trial.dropped
-        world.do(action, seen)
-        outcome.actions += 1
-        outcome.troubles = (*outcome.troubles, *world.troubles)
-        newly = world.trial.dropped - lost
-        if right:
-            outcome.policy += newly
-        else:
-            outcome.perception += newly
-        stuck = stuck + 1 if _same(before, world.table) else 0
-    left = len(world.table.items)
-    if left and sight == "image" and outcome.actions < 3 * len(world.top.items) + 4:
-        outcome.perception += left
+    outcome.looks = eyes.images
+    if sight == "image" and outcome.actions < most:
+        outcome.perception += outcome.trial.left
     else:
-        outcome.policy += left
+        outcome.policy += outcome.trial.left
     return outcome
 
 
-def _alone(seen: Table, stuck: int) -> Action:
-    """Return a grasp of another pile than the last time, a quarter turn on."""
-    pile = seen.stacks[(stuck - 1) % len(seen.stacks)]
-    return grasp(seen, liftable(seen, pile, Rules()), 0.5 * pi * stuck)
+def alone(seen: Table, last: Done, idle: int) -> Action:
+    """Return a grasp after actions that changed nothing, a quarter turn on each time: first of the pile that was meant,
+    alone, then of the highest thing of one pile after another."""
+    if idle == 1:
+        for item in meant(last.action, last.seen):
+            pile = next((pile for pile in seen.stacks if any(other.name == item.name for other in pile)), None)
+            if pile is not None:
+                return grasp(seen, liftable(seen, pile, Rules()), 0.5 * pi)
+    return grasp(seen, seen.tops[(idle - 1) % len(seen.tops)].name, 0.5 * pi * idle)
 
 
-def _meant(action: Action, seen: Table) -> list[Item]:
+def meant(action: Action, seen: Table) -> list[Item]:
+    """Return the items that an action is about."""
     names: tuple[str, ...]
     if isinstance(action, Grasp):
         names = action.items
@@ -107,6 +102,16 @@ def _meant(action: Action, seen: Table) -> list[Item]:
     return [seen.by_name[name] for name in names if name in seen.by_name]
 
 
+def said(action: Action, seen: Table) -> str:
+    """Return what an action does with which piles, as `take cc|c`, `pull-grasp b to bu`, `stack u on b`."""
+    piles = [letters((item, *seen.load(item.name))) for item in meant(action, seen)]
+    if isinstance(action, Grasp):
+        return f"take {'|'.join(piles)}"
+    if isinstance(action, (Pull, PullGrasp)):
+        return f"{'pull' if isinstance(action, Pull) else 'pull-grasp'} {' to '.join(piles)}"
+    return f"{'stack' if isinstance(action, Stack) else 'stack-grasp'} {' on '.join(piles)}"
+
+
 def _rightly(item: Item, truth: Table) -> bool:
     """Whether an item of this kind stands there, on as many others."""
     for other in truth.items:
@@ -115,14 +120,3 @@ def _rightly(item: Item, truth: Table) -> bool:
         if same and apart < NEAR and abs(other.position[2] - item.position[2]) < 0.01:
             return True
     return False
-
-
-def _same(before: Table, after: Table) -> bool:
-    """Whether nothing has been moved or taken away."""
-    if set(before.by_name) != set(after.by_name):
-        return False
-    return all(
-        hypot(item.position[0] - after.by_name[name].position[0], item.position[1] - after.by_name[name].position[1])
-        < STILL
-        for name, item in before.by_name.items()
-    )

@@ -8,11 +8,19 @@ import numpy as np
 import pytest
 
 from benchmarks.tidy.physics_pulls import divergence
-from benchmarks.tidy.physics_records import PhysicsRun, metrics
+from benchmarks.tidy.physics_records import PhysicsRun, metrics, table
+from benchmarks.tidy.physics_times import fit
 from stages.kit.motion.kinematics import arm_chain, forward
 from stages.kit.simulation.robot_description import load_robot
-from stages.tableware.planning.actions import grasp, grasp_two, stack
+from stages.tableware.parameters import SimulateParameters
+from stages.tableware.planning.actions import Action, Grasp, grasp, grasp_two, stack
+from stages.tableware.simulate_stage import times_of
+from stages.tableware.simulation.arm_times import FILE, ArmTimes, arm_times
+from stages.tableware.simulation.fast import Done, Trial, most_actions, run_in
+from stages.tableware.simulation.holds import unevenness
 from stages.tableware.simulation.physics import PhysicsTable
+from stages.tableware.simulation.physics_pictures import key_frames
+from stages.tableware.simulation.physics_trial import alone, said
 from stages.tableware.simulation.pieces import DISH_DENSITY, MARGIN, shell_pieces, solid
 from stages.tableware.simulation.recording import Recording
 from stages.tableware.world.dish_shapes import shell_volume
@@ -94,6 +102,108 @@ def test_two_cups_side_by_side_come_in_one_trip() -> None:
     world.close()
 
 
+def test_two_utensils_side_by_side_are_held_level_though_their_heads_touch() -> None:
+    tilts: list[float] = []
+
+    def watch(world: PhysicsTable, label: str) -> None:
+        if label == "over the bin":
+            tilts.extend(world.top.lean(name) for name in world.top.bodies)
+
+    items = (make_item("a", "spoon", 0.0, 0.1, 0.1), make_item("b", "fork", 0.003, 0.128, 0.1))
+    world = PhysicsTable(Table(items), record=watch)
+    world.do(grasp_two(world.table, "a", "b"))
+    assert (world.trial.moved, world.trial.trips) == (2, 1)
+    assert max(tilts) < 0.15
+    world.close()
+
+
+def test_pads_that_give_hold_two_utensils_of_unequal_width_that_lie_on_each_other() -> None:
+    spoon = make_item("low", "spoon", 0.0, 0.1, 0.3)
+    fork = make_item("high", "fork", 0.0015, 0.1, 0.3, z=0.003, on="low")
+    assert unevenness([spoon, fork], -0.01) < unevenness([spoon, fork], 0.01)
+    world = PhysicsTable(Table((spoon, fork)))
+    world.do(grasp(world.table, "low"))
+    assert (world.trial.moved, world.trial.left) == (2, 0)
+    world.close()
+
+
+def test_jaws_that_do_not_fit_are_not_closed() -> None:
+    items = [make_item("a", "cup", 0.1, 0.1), make_item("b", "cup", 0.195, 0.1)]
+    items.append(make_item("across", "fork", 0.1, 0.1, 0.0, z=0.08, on="a"))
+    world = PhysicsTable(Table(tuple(items)))
+    world.do(grasp_two(world.table, "a", "b"))
+    assert world.troubles and (world.trial.moved, world.trial.trips, world.trial.left) == (0, 0, 3)
+    world.close()
+
+
+def test_after_an_idle_action_the_pile_that_was_meant_is_taken_alone_then_the_highest_things() -> None:
+    rise = MEASURES["cup"].nesting_rise
+    cups = (
+        make_item("a", "cup", 0.1, 0.0),
+        make_item("b", "cup", 0.2, 0.0),
+        make_item("c", "cup", 0.1, 0.0, z=rise, on="a"),
+    )
+    seen = Table(cups)
+    done = Done(grasp_two(seen, "b", "a"), seen, seen, 0.0, 0.3, seen=seen)
+    assert done.idle and said(done.action, seen) == "take c|cc"
+    first, second = alone(seen, done, 1), alone(seen, done, 2)
+    assert isinstance(first, Grasp) and first.items == ("b",)
+    assert isinstance(second, Grasp) and second.items == ("c",)
+
+
+def test_a_trial_whose_actions_are_tried_again_ends() -> None:
+    class Still:
+        """A table that nothing moves on."""
+
+        def __init__(self) -> None:
+            self.table, self.trial, self.asked = Table((make_item("a", "cup", 0.0, 0.0),)), Trial(left=1), 0
+
+        def do(self, action: Action, seen: Table | None = None) -> None:
+            self.asked += 1
+
+    class Once:
+        """Says how often it was asked."""
+
+        asked = 0
+
+        def decide(self, table: Table) -> Action:
+            self.asked += 1
+            return grasp(table, "a")
+
+    world, policy = Still(), Once()
+    run_in(world, policy, again=alone)
+    assert (policy.asked, world.asked) == (1, most_actions(world.table))
+
+
+def test_key_frames_are_in_order_and_end_with_the_last() -> None:
+    labels = ["start", "closed", "lifted", "over the bin", "released", "done"] * 5
+    rows = key_frames(labels, 6)
+    assert len(rows) == 6 and rows == sorted(rows) and rows[-1] == len(labels) - 1
+    assert key_frames(["start", "lifted", "done"], 6) == [1, 2]
+
+
+def test_the_times_of_the_arm_are_found_back_and_those_kept_say_where_they_are_from() -> None:
+    def run(trips: int, stacks: int, pulls: int, dropped: int = 0) -> PhysicsRun:
+        return PhysicsRun(
+            arm="pull", tier="tier1", seed=trips, sight="truth", trips=trips,
+            time=6.0 * trips + 5.0 * stacks + 4.0 * pulls + 90 * dropped, moved=12, pulls=pulls, stacks=stacks,
+            dropped=dropped, left=0, actions=6, perception=0, policy=0, troubles=(), cpu_seconds=1.0,
+        )  # fmt: skip
+
+    found = fit([run(6, 0, 4), run(12, 0, 0), run(6, 6, 0), run(5, 2, 1), run(9, 9, 9, dropped=1)])
+    assert found == pytest.approx((6.0, 5.0, 4.0, 0.0), abs=1e-6)
+    kept = ArmTimes.read(FILE)
+    assert kept.trials > 0 and "tuning seeds" in kept.conditions
+    assert arm_times(5.0).whole_trip == pytest.approx(kept.trip + 10.0)
+
+
+def test_in_physics_policies_plan_by_the_times_of_the_arm() -> None:
+    assert times_of(SimulateParameters(simulator="physics")) == arm_times()
+    given = times_of(SimulateParameters(simulator="physics", stack_seconds=1.5))
+    assert (given.stack, given.trip) == (1.5, arm_times().trip)
+    assert times_of(SimulateParameters(simulator="fast")).trip != arm_times().trip
+
+
 def test_a_cup_is_stacked_into_another() -> None:
     world = PhysicsTable(Table((make_item("a", "cup", -0.1, 0.1), make_item("b", "cup", 0.15, 0.05))))
     world.do(stack(world.table, "a", "b"))
@@ -133,3 +243,26 @@ def test_figures_are_of_tables_that_all_arms_ran() -> None:
     assert figures["ours/tier1/physics/failures_perception"] == 1.0
     assert figures["ours/tier1/physics/failures_policy"] == 0.0
     assert figures["ours/tier1/physics/items_lost_share"] == 0.25
+
+
+def test_far_bins_add_to_each_trip_and_ours_is_what_was_planned_for_them() -> None:
+    def run(arm: str, time: float, trips: int) -> PhysicsRun:
+        return PhysicsRun(
+            arm=arm, tier="tier2", seed=1, sight="truth", time=time, trips=trips, moved=12, pulls=0, stacks=0,
+            dropped=0, left=0, actions=6, perception=0, policy=0, troubles=(), cpu_seconds=1.0,
+        )  # fmt: skip
+
+    runs = [
+        run("random", 70.0, 12),
+        run("pull", 60.0, 7),
+        run("stack", 65.0, 6),
+        run("ours", 55.0, 8),
+        run("ours_far", 64.0, 4),
+    ]
+    figures = metrics(runs)
+    assert figures["ours/tier2/physics/truth/time"] == 55.0
+    assert figures["ours/tier2/physics/truth/delay5/time"] == 104.0
+    assert figures["random/tier2/physics/truth/delay3/time"] == 142.0
+    assert figures["pull/tier2/physics/truth/delay5/no_slower_share"] == 0.0
+    assert figures["ours/tier2/physics/truth/no_slower_share"] == 1.0
+    assert "| truth | `ours` | 1 | 0: 0.0%" in table(runs)

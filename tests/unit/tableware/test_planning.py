@@ -130,9 +130,10 @@ def test_a_split_is_one_that_the_jaws_hold() -> None:
     assert split_over_two("b", "b", ("b",) * 4, RULES) is not None
     assert split_over_two("b", "b", ("b",) * 5, RULES) is None  # seven bowls: four in one pile
     assert split_over_two("b", "b", ("c",), replace(RULES, both_piles=False)) is None
-    clamped = replace(RULES, clamped_stacks=True)
-    assert split_over_two("b", "b", ("b", "b"), clamped) is not None
-    assert split_over_two("b", "b", ("c",), clamped) is None and split_over_two("bc", "bc", (), clamped) is not None
+    two = replace(RULES, most_beside=2)
+    assert split_over_two("b", "b", ("b", "c"), two) is not None and split_over_two("b", "b", ("b",) * 3, two) is None
+    bare = replace(RULES, utensils_beside=False)
+    assert split_over_two("b", "b", ("c", "u"), RULES) is not None and split_over_two("b", "b", ("u",), bare) is None
 
 
 def test_what_is_not_understood_is_kept_clear_of() -> None:
@@ -248,7 +249,7 @@ def test_a_pile_that_is_more_than_seen_is_dropped() -> None:
 
 
 def test_physics_that_is_not_there_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulate_stage, "PHYSICS", "stages.tableware.simulation.no_such_module")
+    monkeypatch.setattr(simulate_stage, "SIMULATION", "stages.tableware.no_such_package")
     with pytest.raises(MissingDependency, match="no physics"):
         simulate_stage.open_world("physics", Table(()), MODEL, EXACT, 0)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.tidy.gather import gather
+from benchmarks.gather import gather
 from benchmarks.tidy.records import Run
 from benchmarks.tidy.seen import SeenRun, metrics, read_seen, table
 from benchmarks.tidy.tables import table as fast_table
@@ -16,15 +16,15 @@ from schemas.errors import BadInput
 
 def test_parts_are_gathered_and_must_agree(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="no part"):
-        gather(tmp_path)
+        gather("tidy", tmp_path)
     for part, figures in (("fast", {"a/time": 1.0}), ("seen", {"b/time": 2.0})):
         (tmp_path / part).mkdir()
         (tmp_path / part / "metrics.json").write_text(json.dumps(figures))
         (tmp_path / part / "table.md").write_text(f"# {part}\n")
-    assert gather(tmp_path) == ({"a/time": 1.0, "b/time": 2.0}, "# fast\n\n# seen\n")
+    assert gather("tidy", tmp_path) == ({"a/time": 1.0, "b/time": 2.0}, "# fast\n\n# seen\n")
     (tmp_path / "seen" / "metrics.json").write_text('{"a/time": 2.0}')
     with pytest.raises(BadInput, match="a/time is 2.0 here and 1.0"):
-        gather(tmp_path)
+        gather("tidy", tmp_path)
 
 
 def test_failures_are_counted_by_whose_fault_they_are(tmp_path: Path) -> None:

@@ -1,0 +1,36 @@
+"""What actions cost the arm in physics: the time model by which our policy plans there.
+
+The file is written by `python -m benchmarks.tidy.physics_times` from trials on tuning seeds; it says which.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import Field
+
+from schemas.base import Model
+from stages.tableware.planning.time_model import TimeModel
+
+FILE = Path(__file__).resolve().parents[3] / "data" / "tableware" / "physics_times.json"
+
+
+class ArmTimes(Model):
+    """Least squares over trials: seconds = trips x trip + stackings x stack + pulls x pull."""
+
+    trip: float = Field(gt=0.0)
+    stack: float = Field(ge=0.0)
+    pull: float = Field(ge=0.0)
+    residual: float
+    """Standard deviation of a trial's seconds about the fit."""
+    trials: int
+    date: str
+    commit: str
+    command: str
+    conditions: str
+
+
+def arm_times(delay: float = 0.0) -> TimeModel:
+    """Return the arm's time model with a bin that is `delay` [s] farther each way."""
+    found = ArmTimes.read(FILE)
+    return TimeModel(found.trip, found.stack, found.pull, delay)

@@ -1,0 +1,144 @@
+"""Key frames of a trial in physics as pictures: arm, table, bin and dishes, seen from across the table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import ceil
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from PIL import Image
+
+from schemas.scene_parts import Camera
+from stages.kit.formats.link_poses import link_poses
+from stages.kit.formats.urdf_file import parse_urdf
+from stages.kit.geometry.transforms import look_at
+from stages.kit.rendering.ray_casting import SceneRenderer
+from stages.kit.simulation.robot_description import load_robot
+from stages.kit.simulation.shapes import link_shapes, paint
+from stages.tableware.simulation.arm import BASE
+from stages.tableware.simulation.tabletop import BIN_CENTER, BIN_SIDE
+from stages.tableware.table_pictures import captioned
+from stages.tableware.world.dish_shapes import item_mesh
+from stages.tableware.world.items import TABLE_SIDES, make_item
+from stages.tableware.world.shape_files import COLORS
+
+EYE, TARGET = np.array([0.62, 1.02, 0.80]), np.array([0.14, -0.12, 0.0])
+FIELD_OF_VIEW = np.deg2rad(58.0)
+ASPECT = 0.62
+TABLE_COLOR, BIN_COLOR, ARM_COLOR, HAND_COLOR = (236, 232, 224), (120, 128, 140), (176, 184, 194), (90, 98, 110)
+BIN_DEPTH, WALL = 0.12, 0.008
+HAND_LINKS = ("hand", "left_finger", "right_finger")
+SHOWN = ("inside", "pulled", "placed", "lifted", "over the bin", "released")
+"""Moments that are shown, of all that are recorded."""
+MOST_FRAMES = 64
+
+
+class PhysicsPictures:
+    """Draws the frames of `Recording.arrays()`."""
+
+    def __init__(self, frames: Mapping[str, np.ndarray], width: int) -> None:
+        self._frames = frames
+        height = round(ASPECT * width)
+        focal = 0.5 * width / float(np.tan(FIELD_OF_VIEW / 2))
+        self._camera = Camera(width=width, height=height, fx=focal, fy=focal, cx=width / 2 - 0.5, cy=height / 2 - 0.5)
+        self._view = look_at(EYE, TARGET)
+        self._robot = load_robot("ur5")
+        self._urdf = parse_urdf(self._robot.urdf)
+        self._links = link_shapes(self._robot.urdf.read_text(encoding="utf-8"), "visual")
+        self._items = [
+            _painted(item_mesh(make_item(str(name), str(kind), 0.0, 0.0)), COLORS[str(kind)])  # type: ignore[arg-type, index]
+            for name, kind in zip(frames["names"], frames["kinds"], strict=True)
+        ]
+        self._still = _table_and_bin()
+
+    def draw(self, number: int, caption: str = "") -> Image.Image:
+        """Return one frame, with a line of text below it."""
+        meshes = [*self._still, *self._arm(self._frames["joints"][number])]
+        for mesh, pose in zip(self._items, self._frames["poses"][number], strict=True):
+            if np.isfinite(pose).all():
+                meshes.append(mesh.copy().apply_transform(pose))
+        picture = SceneRenderer(list(enumerate(meshes, start=1))).render(self._camera, self._view)
+        image = Image.fromarray(picture.color)
+        return captioned(image, caption) if caption else image
+
+    def _arm(self, joints: np.ndarray) -> list[trimesh.Trimesh]:
+        values = dict(zip(self._robot.arm_joints, joints[:6].tolist(), strict=True))
+        values |= {name: float(joints[6]) / 2 for name in self._robot.finger_joints}
+        meshes = []
+        for link, pose in link_poses(self._urdf, values).items():
+            world = pose.copy()
+            world[:3, 3] += BASE
+            for shape in self._links.get(link, ()):
+                mesh = shape.copy().apply_transform(world)
+                meshes.append(_painted(mesh, HAND_COLOR if link in HAND_LINKS else ARM_COLOR))
+        return meshes
+
+
+def key_frames(labels: Sequence[str], most: int) -> list[int]:
+    """Return the rows of at most `most` frames that show something, in order, evenly chosen; the last is always one."""
+    rows = [row for row, label in enumerate(labels) if label in SHOWN]
+    rows = [*rows, len(labels) - 1] if len(labels) else []
+    if len(rows) <= most:
+        return rows
+    return [rows[round(place)] for place in np.linspace(0, len(rows) - 1, most)]
+
+
+def draw_physics_strip(
+    frames: Mapping[str, np.ndarray], words: Sequence[str], width: int, most: int = 12
+) -> Image.Image:
+    """Return key frames in rows of four; `words` says for each frame what is being done."""
+    columns, gap = 4, 8
+    each = (width - gap * (columns + 1)) // columns
+    pictures = PhysicsPictures(frames, each)
+    rows = key_frames([str(label) for label in frames["labels"]], most)
+    drawn = [pictures.draw(row, _caption(frames, words, row)) for row in rows]
+    tallest = max((picture.height for picture in drawn), default=1)
+    sheet = Image.new("RGB", (width, ceil(len(drawn) / columns) * (tallest + gap) + gap), "#ffffff")
+    for number, picture in enumerate(drawn):
+        row, column = divmod(number, columns)
+        sheet.paste(picture, (gap + column * (each + gap), gap + row * (tallest + gap)))
+    return sheet
+
+
+def write_physics_animation(path: Path, frames: Mapping[str, np.ndarray], words: Sequence[str], width: int) -> None:
+    """Write a GIF of the key frames."""
+    pictures = PhysicsPictures(frames, width)
+    rows = key_frames([str(label) for label in frames["labels"]], MOST_FRAMES)
+    drawn = [pictures.draw(row, _caption(frames, words, row)) for row in rows]
+    tallest = max(picture.height for picture in drawn)
+    even = []
+    for picture in drawn:
+        sheet = Image.new("RGB", (width, tallest), "#ffffff")
+        sheet.paste(picture, (0, 0))
+        even.append(sheet.quantize(96))
+    times = [300] * (len(even) - 1) + [1500]
+    even[0].save(path, save_all=True, append_images=even[1:], duration=times, loop=0, optimize=False)
+
+
+def _caption(frames: Mapping[str, np.ndarray], words: Sequence[str], row: int) -> str:
+    return f"{float(frames['seconds'][row]):.0f} s: {words[row]}, {frames['labels'][row]}"
+
+
+def _painted(mesh: trimesh.Trimesh, color: tuple[int, int, int]) -> trimesh.Trimesh:
+    paint(mesh, np.array([*color, 255], dtype=np.uint8))
+    return mesh
+
+
+def _box(
+    size: tuple[float, float, float], center: tuple[float, float, float], color: tuple[int, int, int]
+) -> trimesh.Trimesh:
+    return _painted(trimesh.creation.box(size, trimesh.transformations.translation_matrix(center)), color)
+
+
+def _table_and_bin() -> list[trimesh.Trimesh]:
+    x, y = BIN_CENTER
+    meshes = [_box((*TABLE_SIDES, 0.03), (0.0, 0.0, -0.015), TABLE_COLOR)]
+    meshes.append(_box((BIN_SIDE, BIN_SIDE, WALL), (x, y, -BIN_DEPTH), BIN_COLOR))
+    for side in (-1.0, 1.0):
+        reach = side * (BIN_SIDE + WALL) / 2
+        meshes.append(_box((WALL, BIN_SIDE, BIN_DEPTH), (x + reach, y, -BIN_DEPTH / 2), BIN_COLOR))
+        meshes.append(_box((BIN_SIDE, WALL, BIN_DEPTH), (x, y + reach, -BIN_DEPTH / 2), BIN_COLOR))
+    meshes.append(_box((0.16, 0.16, float(BASE[2])), (float(BASE[0]), float(BASE[1]), float(BASE[2]) / 2), BIN_COLOR))
+    return meshes
