@@ -14,6 +14,9 @@ from schemas.panoptic_map import PanopticMap
 from schemas.plan import Plan
 from schemas.segments import Segments
 from schemas.sequence import Sequence
+from schemas.suture_needle import SutureNeedle, SutureThread
+from schemas.suture_scene import SutureScene
+from schemas.suture_trial import SutureEvaluation, SutureTrial
 from schemas.tableware_detections import TablewareDetections
 from schemas.tableware_plan import TablewarePlan
 from schemas.tableware_scene import TablewareScene
@@ -37,6 +40,11 @@ __all__ = [
     "Report",
     "Segments",
     "Sequence",
+    "SutureEvaluation",
+    "SutureNeedle",
+    "SutureScene",
+    "SutureThread",
+    "SutureTrial",
     "TablewareDetections",
     "TablewareEvaluation",
     "TablewarePlan",

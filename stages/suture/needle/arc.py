@@ -14,6 +14,8 @@ SEEN_GAIN, MISSED_LOSS = 1.8, 0.8
 needle can be lost (glare, tissue), what is not needle is seldom seen just there."""
 CORRELATED = 4.0
 HALF = len(CIRCLE_ANGLES) // 2
+UNSEEN_WIDTH, SEEN_WIDTH = 0.3, 1.3
+"""Widths [px] of the wire up to which a mask does not show it, and from which it does."""
 TAPER_ANGLE = 0.7
 """The tip's taper runs over this angle of the arc [rad]: 8.4 mm, as needles of this kind are ground."""
 
@@ -29,12 +31,22 @@ class Arc:
     likelihood: float
 
 
-def place_arc(fit: CircleFit) -> Arc:
-    """Return the half circle that best holds what is seen and leaves out what is not."""
+def place_arc(fit: CircleFit, tip_at_start: bool | None = None) -> Arc:
+    """Return the half circle that best holds what is seen and leaves out what is not.
+
+    Where it is known which end is the tip, nothing is held against the arc for not being seen where its taper is
+    thinner than a pixel or so: masks end before the tip does.
+    """
     seen = np.isfinite(fit.offsets)
-    evidence = np.where(seen, SEEN_GAIN, np.where(fit.hidden, 0.0, -MISSED_LOSS)).sum(axis=0) / CORRELATED
-    doubled = np.concatenate([[0.0], np.cumsum(np.concatenate([evidence, evidence]))])
-    scores = doubled[HALF : HALF + len(evidence)] - doubled[: len(evidence)]
+    gain = np.where(seen, SEEN_GAIN, 0.0).sum(axis=0) / CORRELATED
+    loss = np.where(seen | fit.hidden, 0.0, MISSED_LOSS) / CORRELATED
+    rows = (np.arange(len(CIRCLE_ANGLES))[:, None] + np.arange(HALF)) % len(CIRCLE_ANGLES)
+    counted: np.ndarray | float = 1.0
+    if tip_at_start is not None:
+        from_tip = (np.arange(HALF) + 0.5) * (CIRCLE_ANGLES[1] - CIRCLE_ANGLES[0])
+        width = fit.expected[:, rows] * _profile(from_tip if tip_at_start else from_tip[::-1])
+        counted = np.clip((width - UNSEEN_WIDTH) / (SEEN_WIDTH - UNSEEN_WIDTH), 0.0, 1.0)
+    scores = gain[rows].sum(axis=1) - (loss[:, rows] * counted).sum(axis=(0, 2))
     best = int(np.argmax(scores))
     weight = np.exp(scores - scores[best])
     away = (CIRCLE_ANGLES - CIRCLE_ANGLES[best] + np.pi) % (2 * np.pi) - np.pi

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
 from stages.suture.needle.arc import Arc, place_arc, tip_at_start
+from stages.suture.needle.filter import either_way
 from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
 from stages.suture.needle.refine import CircleFit, EyeMask, refine
 from stages.suture.needle.starts import (
@@ -33,6 +34,12 @@ NARROW_BANDS = (4.0, 3.0, 3.0, 2.5, 2.5)
 LARGEST_TURN = np.radians(9.0)
 LARGEST_SHIFT = 0.0016
 LEAST_SEEN = 0.15
+TEMPERATURE = 2.0
+"""Of the scores by which other poses count in the covariance."""
+EDGE_ON_SCALE, EDGE_ON_ANGLE = 4.0, 15.0
+"""Near edge-on both halves of the ring run into one mask, and middles of its runs err alike: the fit's covariance is
+larger by this factor (beside one) where the needle is edge-on, less over this angle [degrees]. Both of these, as the
+temperature, were chosen on tuning seeds so that ellipsoids hold what they should."""
 LEAST_LEAD = 3.0
 """By so much (log-likelihood and weighted score) the pose must beat the best one elsewhere."""
 
@@ -41,6 +48,23 @@ LEAST_LEAD = 3.0
 class _Candidate:
     fit: CircleFit
     score: float
+
+
+@dataclass(frozen=True)
+class _Final:
+    score: float
+    fit: CircleFit
+    arc: Arc
+
+    @property
+    def pose(self) -> NeedlePose:
+        """The pose whose tip is the arc's start."""
+        normal = self.fit.frame[:, 2]
+        x_axis = np.cos(self.arc.start) * self.fit.frame[:, 0] + np.sin(self.arc.start) * self.fit.frame[:, 1]
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.stack([x_axis, np.cross(normal, x_axis), normal], axis=1)
+        matrix[:3, 3] = self.fit.centre
+        return NeedlePose(matrix)
 
 
 def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | None = None) -> NeedleEstimate:
@@ -77,8 +101,7 @@ def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | 
     chosen = _chosen(rig, eyes, candidates, distances, pixels)
     if isinstance(chosen, str):
         return NeedleEstimate.none(chosen)
-    fit, arc, rival = chosen
-    return _answer(observation, fit, arc, rival)
+    return _answer(observation, chosen)
 
 
 def _chosen(
@@ -87,10 +110,9 @@ def _chosen(
     candidates: list[_Candidate],
     distances: tuple[np.ndarray, np.ndarray],
     pixels: tuple[np.ndarray, np.ndarray],
-) -> tuple[CircleFit, Arc, float] | str:
-    """Return the best of the best few circles after a close fit, its arc, and by how much it beats the best one that
-    lies elsewhere; or why there is none. Best is the likelihood of what lies on the circle together with the share of
-    the masks that the circle explains."""
+) -> list[_Final] | str:
+    """Return the best few circles after a close fit, best first; or why there is none. Best is the likelihood of what
+    lies on the circle together with the share of the masks that the circle explains."""
     distinct: list[CircleFit] = []
     for candidate in candidates:
         fit = candidate.fit
@@ -106,11 +128,8 @@ def _chosen(
         fit = refine(rig, eyes, fit.frame, fit.centre, NARROW_BANDS, fit.shift, (arc.start + np.pi / 2, 1.75))
         arc = place_arc(fit)
         explained = score(rig, fit.frame, fit.centre, fit.shift, distances, eyes, pixels)
-        finals.append((arc.likelihood + EXPLAINED_WEIGHT * explained, fit, arc))
-    finals.sort(key=lambda final: -final[0])
-    best, fit, arc = finals[0]
-    elsewhere = [other for other, f, _ in finals[1:] if _differ(f.frame, f.centre, fit.frame, fit.centre, 10.0, 0.0015)]
-    return fit, arc, best - max(elsewhere, default=-1e9)
+        finals.append(_Final(arc.likelihood + EXPLAINED_WEIGHT * explained, fit, arc))
+    return sorted(finals, key=lambda final: -final.score)
 
 
 def _without(mask: np.ndarray, thread: np.ndarray | None) -> np.ndarray:
@@ -227,20 +246,31 @@ def _differ(
     return cosine < np.cos(np.radians(degrees)) or float(np.linalg.norm(centre - other_centre)) > far
 
 
-def _answer(observation: NeedleObservation, fit: CircleFit, arc: Arc, rival: float) -> NeedleEstimate:
-    """Return the pose with its covariance, or abstain where it is not known well enough."""
-    odds = tip_at_start(fit, arc, observation.rig, (observation.left_thread, observation.right_thread))
-    matrix = np.eye(4)
-    x_axis = np.cos(arc.start) * fit.frame[:, 0] + np.sin(arc.start) * fit.frame[:, 1]
-    normal = fit.frame[:, 2]
-    matrix[:3, :3] = np.stack([x_axis, np.cross(normal, x_axis), normal], axis=1)
-    matrix[:3, 3] = fit.centre
-    pose = NeedlePose(matrix)
-    if odds < 0:
-        pose = pose.swapped()
-    covariance = _covariance(fit, arc)
+def _answer(observation: NeedleObservation, finals: list[_Final]) -> NeedleEstimate:
+    """Return the best pose with its covariance, or abstain where it is not known well enough."""
+    best = finals[0]
+    odds = tip_at_start(best.fit, best.arc, observation.rig, (observation.left_thread, observation.right_thread))
+    named = replace(best, arc=place_arc(best.fit, odds >= 0))
+    covariance = _edge_on_factor(named.pose) * _covariance(named.fit, named.arc) + _spread(finals)
+    pose = named.pose if odds >= 0 else named.pose.swapped()
     probability = float(1.0 / (1.0 + np.exp(-abs(odds))))
-    return NeedleEstimate(pose, covariance, probability, _why_abstain(covariance, arc, fit, rival))
+    return NeedleEstimate(pose, covariance, probability, _why_abstain(covariance, finals))
+
+
+def _edge_on_factor(pose: NeedlePose) -> float:
+    return 1.0 + EDGE_ON_SCALE * float(np.exp(-((pose.degrees_from_edge_on() / EDGE_ON_ANGLE) ** 2)))
+
+
+def _spread(finals: list[_Final]) -> np.ndarray:
+    """Return what other poses that explain the masks about as well add to the covariance (6, 6) of the best."""
+    best = finals[0]
+    weights = np.array([np.exp((final.score - best.score) / TEMPERATURE) for final in finals])
+    weights /= weights.sum()
+    total = np.zeros((6, 6))
+    for weight, final in zip(weights[1:], finals[1:], strict=True):
+        step, _ = either_way(best.pose, final.pose)
+        total += weight * np.outer(step, step)
+    return total
 
 
 def _covariance(fit: CircleFit, arc: Arc) -> np.ndarray:
@@ -256,8 +286,9 @@ def _covariance(fit: CircleFit, arc: Arc) -> np.ndarray:
     return carry @ local @ carry.T
 
 
-def _why_abstain(covariance: np.ndarray, arc: Arc, fit: CircleFit, rival: float) -> str:
+def _why_abstain(covariance: np.ndarray, finals: list[_Final]) -> str:
     """Return why the pose should not be used, or nothing."""
+    fit, arc = finals[0].fit, finals[0].arc
     if arc.seen.min() < LEAST_SEEN:
         return f"One eye sees {100 * arc.seen.min():.0f} % of the needle on the best circle."
     normal = fit.frame[:, 2]
@@ -268,6 +299,11 @@ def _why_abstain(covariance: np.ndarray, arc: Arc, fit: CircleFit, rival: float)
     shift = float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
     if shift > LARGEST_SHIFT:
         return f"The needle's centre is known to {1000 * shift:.1f} mm only."
-    if rival < LEAST_LEAD:
+    elsewhere = [
+        final.score
+        for final in finals[1:]
+        if _differ(final.fit.frame, final.fit.centre, fit.frame, fit.centre, 10.0, 0.0015)
+    ]
+    if finals[0].score - max(elsewhere, default=-1e9) < LEAST_LEAD:
         return "Two different poses explain what both eyes see about equally well."
     return ""

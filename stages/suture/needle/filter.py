@@ -49,7 +49,7 @@ def _carried(estimate: NeedleEstimate, motion: np.ndarray, steps: int) -> tuple[
     ), rotation @ estimate.covariance @ rotation.T + drift + floor
 
 
-def _either_way(pose: NeedlePose, other: NeedlePose) -> tuple[np.ndarray, bool]:
+def either_way(pose: NeedlePose, other: NeedlePose) -> tuple[np.ndarray, bool]:
     """Return the difference to `other`, or to it with tip and swage exchanged where that is the smaller turn."""
     straight, exchanged = difference(pose, other), difference(pose, other.swapped())
     if np.linalg.norm(exchanged[3:]) < np.linalg.norm(straight[3:]):
@@ -74,7 +74,7 @@ def fuse(frames: list[tuple[NeedleEstimate, np.ndarray]]) -> NeedleEstimate:
     for pose, covariance, _ in usable:
         agreeing = []
         for index, (other, other_covariance, _) in enumerate(usable):
-            step, exchanged = _either_way(pose, other)
+            step, exchanged = either_way(pose, other)
             if step @ np.linalg.solve(covariance + other_covariance, step) < AGREES:
                 agreeing.append((index, exchanged))
         # sure frames count for more than unsure ones, which agree with anything

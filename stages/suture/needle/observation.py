@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from schemas.errors import BadInput
 from stages.suture.rig import NeedlePose, StereoRig
+
+AROUND = 31
+"""Side [px] of the square with whose mean a pixel is compared."""
+VIOLET, DARK = 0.018, 15.0
+"""How much more violet than around a thread is, as a share of the brightness; what is added to the brightness so that
+noise in the dark is not violet."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +80,14 @@ class NeedleEstimate:
 
 
 def violet(image: np.ndarray) -> np.ndarray:
-    """Return where (H, W) bool an RGB picture (H, W, 3) uint8 shows violet thread: more blue than green for its
-    brightness; neither steel (grey) nor the pad (red to yellow) is."""
-    red, green, blue = (image[..., channel].astype(np.int16) for channel in range(3))
-    return (blue - green) * 100 > 7 * (red + green + blue)
+    """Return where (H, W) bool an RGB picture (H, W, 3) uint8 shows violet thread.
+
+    A thread of three pixels takes on the colour of what is behind it, so colours are compared with those around: for
+    its brightness thread is less green than their mean, and more blue against green. Steel is not the first, red and
+    the pad are not the second.
+    """
+    red, green, blue = (cv2.GaussianBlur(image, (0, 0), 0.8).astype(np.float32)[..., k] for k in range(3))
+    brightness = red + green + blue + DARK
+    purple, blueness = ((red + blue) / 2.0 - green) / brightness, (blue - green) / brightness
+    around = (AROUND, AROUND)
+    return np.minimum(purple - cv2.blur(purple, around), blueness - cv2.blur(blueness, around)) > VIOLET

@@ -9,7 +9,9 @@ best. It does not say which endpoint is the tip, so none is.
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from stages.suture.needle.filter import difference
 from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
 from stages.suture.rig import NeedlePose
 
@@ -47,6 +49,27 @@ def thesis_estimate(observation: NeedleObservation, seed: int = 0) -> NeedleEsti
     tip, swage = (origin + end[0] * first + end[1] * second for end in ends)
     body = points[inliers].mean(axis=0) - centre
     return NeedleEstimate(_pose(centre, normal, tip, swage, body), np.full((6, 6), np.inf), 0.5, "")
+
+
+def thesis_average(estimates: list[NeedleEstimate], motions: list[np.ndarray]) -> NeedleEstimate:
+    """Return the mean of the thesis's estimates carried to the last frame: the thesis averages ten normals."""
+    poses = [
+        NeedlePose(motion @ one.pose.camera_from_needle)
+        for one, motion in zip(estimates, motions, strict=True)
+        if one.pose is not None
+    ]
+    if not poses:
+        return NeedleEstimate.none("No frame shows the needle.")
+    first = poses[-1]
+    total = np.zeros(6)
+    for pose in poses:
+        straight, exchanged = difference(first, pose), difference(first, pose.swapped())
+        total += straight if np.linalg.norm(straight[3:]) <= np.linalg.norm(exchanged[3:]) else exchanged
+    mean = total / len(poses)
+    matrix = first.camera_from_needle.copy()
+    matrix[:3, :3] = Rotation.from_rotvec(mean[3:]).as_matrix() @ matrix[:3, :3]
+    matrix[:3, 3] += mean[:3]
+    return NeedleEstimate(NeedlePose(matrix), np.full((6, 6), np.inf), 0.5, "")
 
 
 def _pose(centre: np.ndarray, normal: np.ndarray, tip: np.ndarray, swage: np.ndarray, body: np.ndarray) -> NeedlePose:

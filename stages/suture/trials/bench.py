@@ -91,7 +91,9 @@ class Bench:
             swages = needles[:, :3, :3] @ SWAGE + needles[:, :3, 3]
         self._drape(arm, path, swages, bar)
         self.tools[arm], self.needle = path[-1], needles[-1]
-        self.seconds += travel_time(path, self.world.speed)
+        started, self.seconds = self.seconds, self.seconds + travel_time(path, self.world.speed)
+        if self.recorder is not None:
+            self.recorder.follow(arm, path, needles, started, self.seconds)
 
     def go(self, arm: str, pose: np.ndarray, bar: bool = False) -> None:
         """Move a driver straight to a pose (4, 4)."""

@@ -21,13 +21,15 @@ from stages.suture.trials.wound import exit_
 @dataclass
 class Outcome:
     """What a trial came to. `sutures` as in section 4.1 (inserted, extracted, tensioned), `sutures_neutral` as in
-    section 2.2 (also back at a neutral place without a tangle); errors with their class and reason, in order."""
+    section 2.2 (also back at a neutral place without a tangle); errors with their class and reason, in order, and at
+    which suture (0 first) and second each happened."""
 
     sutures: int = 0
     sutures_neutral: int = 0
     attempts: int = 0
     seconds: float = 0.0
     errors: list[tuple[str, str]] = field(default_factory=list)
+    error_places: list[tuple[int, float]] = field(default_factory=list)
     interventions: int = 0
     looks: int = 0
     right: int = 0
@@ -69,14 +71,18 @@ def run_trial(
             throw(bench, outcome)
         except Failed as failure:
             outcome.errors.append((failure.kind, failure.reason))
+            outcome.error_places.append((thrown, bench.seconds))
             bench.record(f"failed {failure.kind}")
             if outcome.interventions >= policy.interventions:
                 break
             outcome.interventions += 1
             recover(bench, given, thrown)
+            bench.record("supervisor")
     outcome.seconds = bench.seconds
     outcome.looks, outcome.right, outcome.abstained = bench.eyes.looks, bench.eyes.right, bench.eyes.abstained
     outcome.stopped_short = bench.stopped_short
+    if outcome.closed:
+        bench.record("closed")
     return outcome
 
 

@@ -65,7 +65,10 @@ def perception_model(path: Path) -> PerceptionModel:
     try:
         return PerceptionModel.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
     except (OSError, tomllib.TOMLDecodeError, ValidationError) as error:
-        reason = str(error).replace("\n", " ")[:200]
+        reason = " ".join(str(error).split())[:200]
+        if isinstance(error, ValidationError):
+            first = error.errors()[0]
+            reason = f"{'.'.join(str(part) for part in first['loc']) or 'document'}: {first['msg']}"
         raise BadInput(f"{path}: no perception model ({reason}); see data/stitch/perception_thesis.toml") from error
 
 

@@ -135,5 +135,10 @@ def test_difference_and_moved_are_inverse():
 
 
 def test_violet_is_thread_and_steel_is_not():
-    colours = np.array([[[110, 60, 130], [128, 128, 130], [190, 150, 130]]], dtype=np.uint8)
-    assert violet(colours).tolist() == [[True, False, False]]
+    """Lines of three pixels over a pad: thread that took on half of the pad's colour, steel, and a red slit."""
+    picture = np.full((60, 90, 3), (190, 150, 130), dtype=np.uint8)
+    lines = {20: (147, 112, 115), 45: (128, 128, 130), 70: (215, 105, 95)}
+    for column, colour in lines.items():
+        picture[:, column - 1 : column + 2] = colour
+    found = violet(picture)
+    assert found[:, 20].all() and not found[:, 30:].any() and not found[:, :17].any()

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from benchmarks.stitch.trials_records import Run, read_runs
-from benchmarks.stitch.trials_tables import metrics, table
 from schemas.errors import BadInput
+from stages.suture.evaluation.trial_figures import metrics, table
 from stages.suture.motion import primitives
 from stages.suture.motion.constants import OpenConstants, cinch_length
 from stages.suture.motion.needle import SWAGE, TIP, from_ends, point_at, turned, upright
@@ -296,7 +296,7 @@ def test_tables_count_as_they_say(tmp_path: Path) -> None:
     def run(arm: str, seed: int, sutures: int, errors: str) -> Run:
         return Run(
             arm=arm, seed=seed, sutures=sutures, sutures_neutral=sutures, attempts=sutures + len(errors), seconds=100.0,
-            errors=errors, reasons=["why"] * len(errors), interventions=0, looks=10, right=4, abstained=0,
+            errors=errors, reasons=("why",) * len(errors), interventions=0, looks=10, right=4, abstained=0,
             stopped_short=0, thread_length=0.3, cpu_seconds=0.1,
         )  # fmt: skip
 

@@ -1,0 +1,132 @@
+"""The step `suture evaluate`: trials in the layout of table 4.1 and figure 4.1; poses and threads against the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.evaluation import MetricsFile
+from schemas.suture_needle import SutureNeedle, SutureThread
+from schemas.suture_scene import StereoRigRecord, SutureScene, SutureSceneFile, SutureView
+from schemas.suture_trial import SutureEvaluation, SutureTrial
+from stages.kit.formats.numpy_files import read_arrays
+from stages.kit.stage import Context
+from stages.suture.evaluation import needle_figures, trial_figures
+from stages.suture.evaluation.judgement import Estimate, NeedleTruth, judged
+from stages.suture.evaluation.thread_figures import ThreadError, thread_error, thread_metrics, thread_rows
+from stages.suture.needle.records import as_estimate
+from stages.suture.parameters import EvaluateParameters
+from stages.suture.rig import NeedlePose
+
+ROUNDING = 1e-9
+"""Of a baseline [m]."""
+
+
+def run(
+    trials: SutureTrial | None,
+    scene: SutureScene | None,
+    needle: SutureNeedle | None,
+    needle_thesis: SutureNeedle | None,
+    thread: SutureThread | None,
+    *,
+    parameters: EvaluateParameters,
+    context: Context,
+) -> SutureEvaluation:
+    """Write metrics.json, table.md and the plots of whatever is given."""
+    from stages.suture.evaluation import plots
+
+    figures: dict[str, float | None] = {}
+    parts: list[str] = []
+    notes: list[str] = []
+    (context.output / "plots").mkdir()
+    if trials is not None:
+        file = trials.trial
+        figures.update(trial_figures.metrics(file.runs))
+        parts.append(trial_figures.table(file.runs).rstrip())
+        notes += [f"{one.arm} sees by {one.model}: ASSUMED figures" for one in file.perception if not one.measured]
+        with context.progress.step("histogram"):
+            plots.histogram(context.output / "plots" / "sutures.png", file.runs)
+    if scene is not None:
+        truth = scene.scene
+        poses = [one for one in (needle_thesis, needle) if one is not None]
+        groups = _groups([record for one in poses for record in judge(one, truth)])
+        if groups:
+            figures.update(needle_figures.metrics(groups))
+            parts.append("\n".join(["# The needle's pose", "", *needle_figures.rows("case", groups)]))
+            notes += [f"needle: masks are {one.needle.masks_from}" for one in poses[:1]]
+            with context.progress.step("errors"):
+                plots.pose_errors(context.output / "plots" / "needle.png", groups)
+        if thread is not None:
+            errors = thread_errors(thread, scene)
+            figures.update(thread_metrics(errors))
+            parts.append("\n".join(["# The thread", "", *thread_rows(errors)]))
+            notes.append(f"thread: masks are {thread.thread.masks_from}")
+    label = parameters.label or "simulated and rendered; nothing here is about real tissue"
+    MetricsFile(label=label, metrics=dict(sorted(figures.items())), notes=tuple(notes)).write(
+        context.output / "metrics.json"
+    )
+    told = [f"{label}.", *(f"{note}." for note in notes)]
+    context.output.joinpath("table.md").write_text("\n\n".join([*parts, *told]) + "\n", encoding="utf-8")
+    return SutureEvaluation(root=context.output, summary={"figures": len(figures), "tables": len(parts)})
+
+
+def same_rig(rig: StereoRigRecord, other: StereoRigRecord) -> bool:
+    """Whether two rigs are one but for the rounding of a calibration matrix."""
+    return rig.camera == other.camera and abs(rig.baseline - other.baseline) < ROUNDING
+
+
+def judge(needle: SutureNeedle, truth: SutureSceneFile) -> list[Estimate]:
+    """Return every frame's estimate, and the filtered one, beside the truth. Raises BadInput for another scene's."""
+    file = needle.needle
+    if not same_rig(file.rig, truth.rig):
+        raise BadInput(f"{needle.root}: its rig is not the scene's", hint="give the scene that the needle was seen in")
+    records = []
+    for one in file.frames:
+        view = _view(truth, one.frame, needle)
+        records.append(judged(file.estimator, "frames", view.seed, _true(truth, one.frame), as_estimate(one.estimate)))
+    if file.filtered is not None:
+        last = file.frames[-1].frame
+        records.append(judged(file.estimator, "filtered", truth.seed, _true(truth, last), as_estimate(file.filtered)))
+    return records
+
+
+def _view(truth: SutureSceneFile, frame: int, needle: SutureNeedle) -> SutureView:
+    if frame >= len(truth.views):
+        raise BadInput(
+            f"{needle.root}: frame {frame} is not among the scene's {len(truth.views)}",
+            hint="give the scene that the needle was seen in",
+        )
+    return truth.views[frame]
+
+
+def _true(truth: SutureSceneFile, frame: int) -> NeedleTruth:
+    view = truth.views[frame]
+    return NeedleTruth(NeedlePose(np.array(view.camera_from_needle)), view.holder, view.place, view.seen)
+
+
+def _groups(records: list[Estimate]) -> dict[str, list[Estimate]]:
+    """Return the issue's cases that the records fill."""
+    frames = [record for record in records if record.case == "frames"]
+    fused = [record for record in records if record.case == "filtered"]
+    named = {
+        "needle_visible": [record for record in frames if record.visible],
+        "needle_all": frames,
+        "needle_visible_filtered": [record for record in fused if record.visible],
+        "needle_all_filtered": fused,
+    }
+    return {name: found for name, found in named.items() if found}
+
+
+def thread_errors(thread: SutureThread, scene: SutureScene) -> list[ThreadError]:
+    """Return every frame's error of the thread. Raises BadInput for another scene's, or arrays that are not there."""
+    file = thread.thread
+    errors = []
+    for one in file.frames:
+        if one.frame >= len(scene.scene.views):
+            raise BadInput(f"{thread.root}: frame {one.frame} is not in the scene", hint="give the thread's own scene")
+        (true,) = read_arrays(scene.path("threads.npz"), f"thread_{one.frame:06d}")
+        points = np.zeros((0, 3))
+        if one.points:
+            (points,) = read_arrays(thread.path("threads.npz"), f"points_{one.frame:06d}")
+        errors.append(thread_error(points, one.length, true))
+    return errors

@@ -1,0 +1,1 @@
+"""Figures of needle poses and of trials, and their tables and plots."""

@@ -1,0 +1,161 @@
+"""Masks of needle, thread and what hides them, from wherever they come."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+
+from schemas.errors import BadInput, MissingDependency
+from schemas.sequence import Sequence
+from schemas.suture_needle import MaskSource
+from schemas.suture_scene import SutureScene
+from stages.suture.needle.observation import NeedleObservation, violet
+from stages.suture.options import CHECKPOINT, MaskOptions
+from stages.suture.pairs import Pair
+from stages.suture.rig import StereoRig
+from stages.suture.truth_files import SIDES, eyes_of_truth, read_label_image
+from stages.suture.world.corruption import spoiled_drivers, spoiled_mask, spoiled_thread
+from stages.suture.world.render import Eye
+from stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, RIGHT_DRIVER, THREAD
+
+if TYPE_CHECKING:
+    from stages.suture.segmentation.infer import Masks
+
+SEED_OF_MASKS = 5
+BUNDLED = Path(__file__).resolve().parents[2] / "data" / CHECKPOINT
+OTHER_MASKS = "--segmentation spoiled, or --masks FOLDER"
+DRIVER_GROWTH = 5
+"""Side [px] of the square by which learned masks of drivers grow: their rims hide the needle too."""
+WHITE = 255
+"""Needle in a mask file of black and white."""
+SOURCES = {
+    "network": "a learned segmenter ({0})",
+    "files": "mask files ({0})",
+    "truth": "the rendered truth",
+    "spoiled": "the rendered truth with the structured errors of a learned mask",
+}
+
+
+@dataclass(frozen=True)
+class EyeMasks:
+    """Of the left and the right eye each (H, W) bool: `needle`, `thread`, and what may hide them (None: not known)."""
+
+    needle: tuple[np.ndarray, np.ndarray]
+    thread: tuple[np.ndarray, np.ndarray]
+    hidden: tuple[np.ndarray, np.ndarray] | tuple[None, None]
+
+    def observation(self, rig: StereoRig, disparity: np.ndarray | None) -> NeedleObservation:
+        """Return what an estimator of the needle is given."""
+        return NeedleObservation(rig, *self.needle, disparity, *self.thread, *self.hidden)
+
+
+MaskMaker = Callable[[Pair], EyeMasks]
+
+
+def spoiled_masks(left: Eye, right: Eye, seed: int) -> tuple[EyeMasks, np.random.Generator]:
+    """Return the truth of both eyes spoiled as a learned mask is, and the generator as it was left.
+
+    Thread is found by its violet where an eye has a picture, else it is the true one with patches lost.
+    """
+    random = np.random.default_rng([SEED_OF_MASKS, seed])
+    needle = spoiled_mask(left, random), spoiled_mask(right, random)
+    threads = []
+    for eye in (left, right):
+        thread = spoiled_thread(eye, random)
+        threads.append(thread if eye.image is None else violet(eye.image))
+    hidden = spoiled_drivers(left, random), spoiled_drivers(right, random)
+    return EyeMasks(needle, (threads[0], threads[1]), hidden), random
+
+
+def open_masks(
+    sequence: Sequence, masks: Path | None, segmenter: Path | None, parameters: MaskOptions, size: tuple[int, int]
+) -> tuple[MaskMaker, MaskSource, str]:
+    """Return what makes a frame's masks, of which source, and the source in words; `size` is (rows, columns).
+
+    Raises BadInput for a truth that is not there, MissingDependency for a network that is not.
+    """
+    source: Any = parameters.segmentation
+    if source == "auto":
+        source = "files" if masks is not None else "network"
+    said = SOURCES[source].format((masks or segmenter or BUNDLED).name)
+    if source == "files":
+        assert masks is not None
+        return _from_files(masks, size), source, said
+    if source == "network":
+        return _from_network(segmenter), source, said
+    if not isinstance(sequence, SutureScene):
+        raise BadInput(
+            f"{sequence.root}: no masks: a {sequence.kind!r} has no truth to take them from",
+            hint="give --masks FOLDER or --segmenter CHECKPOINT",
+        )
+    return _from_truth(sequence, source == "spoiled", size), source, said
+
+
+def _from_files(folder: Path, size: tuple[int, int]) -> MaskMaker:
+    if not folder.is_dir():
+        raise BadInput(
+            f"{folder}: no folder of masks", hint="give a folder with 000000_left.png, 000000_right.png, ..."
+        )
+
+    def make(pair: Pair) -> EyeMasks:
+        eyes = [read_label_image(folder / f"{pair.index:06d}_{side}.png", size) for side in SIDES]
+        needle = tuple((eye == NEEDLE) | (eye == WHITE) for eye in eyes)
+        thread = tuple(eye == THREAD for eye in eyes)
+        hidden = tuple((eye == LEFT_DRIVER) | (eye == RIGHT_DRIVER) for eye in eyes)
+        return EyeMasks(needle, thread, hidden)  # type: ignore[arg-type]
+
+    return make
+
+
+def _from_truth(scene: SutureScene, spoiled: bool, size: tuple[int, int]) -> MaskMaker:
+    views, folder = scene.scene.views, scene.path("truth")
+
+    def make(pair: Pair) -> EyeMasks:
+        if pair.index >= len(views):
+            raise BadInput(f"{scene.root}: frame {pair.index} has no truth", hint="make the scene again")
+        left, right = eyes_of_truth(folder, pair.index, size)
+        if spoiled:
+            shown = Eye(pair.left, left.bodies, left.depth, left.sees)
+            other = Eye(pair.right, right.bodies, right.depth, right.sees)
+            return spoiled_masks(shown, other, views[pair.index].seed)[0]
+        return EyeMasks(
+            (left.mask(NEEDLE), right.mask(NEEDLE)),
+            (left.mask(THREAD), right.mask(THREAD)),
+            (left.mask(LEFT_DRIVER, RIGHT_DRIVER), right.mask(LEFT_DRIVER, RIGHT_DRIVER)),
+        )
+
+    return make
+
+
+def _from_network(checkpoint: Path | None) -> MaskMaker:
+    segmenter = open_segmenter(checkpoint)
+
+    def make(pair: Pair) -> EyeMasks:
+        return learned_masks(segmenter.masks(pair.left), segmenter.masks(pair.right))
+
+    return make
+
+
+def learned_masks(left: Masks, right: Masks) -> EyeMasks:
+    """Return what the segmenter found in both eyes; drivers, grown a little, may hide the needle."""
+    square = np.ones((DRIVER_GROWTH, DRIVER_GROWTH), np.uint8)
+    hidden = tuple(cv2.dilate(eye.driver.astype(np.uint8), square) > 0 for eye in (left, right))
+    return EyeMasks((left.needle, right.needle), (left.thread, right.thread), hidden)  # type: ignore[arg-type]
+
+
+def open_segmenter(checkpoint: Path | None) -> Any:
+    """Return the segmenter of a checkpoint, or of the one in data/. Raises MissingDependency without one."""
+    try:
+        infer = importlib.import_module("stages.suture.segmentation.infer")
+    except ImportError as error:
+        raise MissingDependency(f"the learned segmenter cannot be loaded: {error}", hint=OTHER_MASKS) from None
+    path = checkpoint if checkpoint is not None else BUNDLED
+    if not path.is_file():
+        raise MissingDependency(f"{path}: there is no checkpoint of the segmenter", hint=OTHER_MASKS)
+    return infer.Segmenter.load(path)

@@ -1,0 +1,198 @@
+"""The step `suture needle`: every pair's masks to a pose or an abstention, the frames filtered to one, and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from schemas.disparity import Disparity
+from schemas.errors import BadInput
+from schemas.sequence import Sequence
+from schemas.suture_needle import NeedleFrame, SutureNeedle, SutureNeedleFile
+from schemas.suture_scene import SutureScene, SutureView
+from stages.kit.formats.disparity_file import DisparityReader
+from stages.kit.stage import Context
+from stages.suture.masks import EyeMasks, MaskMaker, open_masks
+from stages.suture.motion_reports import motions_to_last
+from stages.suture.needle.drawing import draw_eyes, said
+from stages.suture.needle.estimate import estimate
+from stages.suture.needle.filter import fuse
+from stages.suture.needle.observation import NeedleEstimate
+from stages.suture.needle.records import as_estimate_record
+from stages.suture.needle.thesis import thesis_average, thesis_estimate
+from stages.suture.pairs import Pair, StereoPairs
+from stages.suture.parameters import NeedleParameters
+from stages.suture.rig import NEEDLE_RADIUS, NeedlePose
+
+
+def run(
+    sequence: Sequence,
+    disparity: Disparity | None,
+    masks: Path | None,
+    segmenter: Path | None,
+    *,
+    parameters: NeedleParameters,
+    context: Context,
+) -> SutureNeedle:
+    """Estimate the needle in every pair. The outcome is `abstained` when no pose can be given."""
+    views = sequence.scene.views if isinstance(sequence, SutureScene) else ()
+    with StereoPairs(sequence) as pairs:
+        size = (pairs.camera.height, pairs.camera.width)
+        make, source, told = open_masks(sequence, masks, segmenter, parameters, size)
+        motion = _motion(sequence, parameters, len(pairs))
+        maps = _disparity_maps(disparity)
+        try:
+            frames, answers = _estimates(pairs, make, maps, views, motion != "none", parameters, context)
+        finally:
+            if maps is not None:
+                maps.close()
+        record = pairs.record
+    if not frames:
+        raise BadInput(f"{sequence.root}: no frame has both eyes", hint="ingest both eyes")
+    fused = _filtered(answers, motion, views, parameters.estimator)
+    statement = _statement(answers, fused)
+    SutureNeedleFile(
+        statement=statement,
+        estimator=parameters.estimator,
+        masks=source,
+        masks_from=told,
+        disparity="" if disparity is None else disparity.disparity.detail,
+        rig=record,
+        needle_radius=NEEDLE_RADIUS,
+        frames=tuple(frames),
+        filtered=None if fused is None else as_estimate_record(fused),
+        filter=motion,  # type: ignore[arg-type]
+    ).write(context.output / "needle.json")
+    answered = sum(not answer.abstained for answer in answers)
+    known = answered > 0 if fused is None else not fused.abstained
+    summary: dict[str, object] = {"frames": len(frames), "answered": answered, "masks": source, "filter": motion}
+    if not known:
+        summary["reason"] = statement
+    return SutureNeedle(root=context.output, outcome="ok" if known else "abstained", summary=summary)
+
+
+class _Maps:
+    """The disparities of a `disparity` artifact by stamp."""
+
+    def __init__(self, disparity: Disparity) -> None:
+        self._root = disparity.root
+        self._reader = DisparityReader(disparity.path("disparity.mcap"))
+        self._stamps = set(self._reader.stamps)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._reader.__exit__(None, None, None)
+
+    def of(self, pair: Pair) -> np.ndarray | None:
+        """Return a pair's disparity (H, W) float32, NaN unknown; None where the step left the frame out. Raises
+        BadInput for a map of another size."""
+        if pair.stamp not in self._stamps:
+            return None
+        found = self._reader.read(pair.stamp).disparity
+        if found.shape != pair.left.shape[:2]:
+            raise BadInput(
+                f"{self._root}: the disparity of frame {pair.index} is {found.shape[1]} x {found.shape[0]}, the "
+                f"pictures are {pair.left.shape[1]} x {pair.left.shape[0]}",
+                hint="make the disparity of this sequence",
+            )
+        return found
+
+
+def _disparity_maps(disparity: Disparity | None) -> _Maps | None:
+    return None if disparity is None else _Maps(disparity)
+
+
+def _motion(sequence: Sequence, parameters: NeedleParameters, frames: int) -> str:
+    """Return how the needle is carried from frame to frame. Raises BadInput where kinematics are asked for and are not
+    there."""
+    scene = sequence.scene if isinstance(sequence, SutureScene) else None
+    reported = scene is not None and scene.arrangement == "motion" and frames > 1
+    if parameters.filter == "auto":
+        return "kinematics" if reported else "none"
+    if parameters.filter == "kinematics" and not reported:
+        raise BadInput(
+            f"{sequence.root}: it reports no motion of the needle between frames", hint="--filter still, or none"
+        )
+    return parameters.filter
+
+
+def _estimates(
+    pairs: StereoPairs,
+    make: MaskMaker,
+    maps: _Maps | None,
+    views: tuple[SutureView, ...],
+    follows: bool,
+    parameters: NeedleParameters,
+    context: Context,
+) -> tuple[list[NeedleFrame], list[NeedleEstimate]]:
+    """Return every frame's record and estimate, and draw the first few."""
+    frames: list[NeedleFrame] = []
+    answers: list[NeedleEstimate] = []
+    guess: NeedlePose | None = None
+    matched = 0
+    for pair in context.progress.track(pairs, total=len(pairs), description="needles"):
+        disparity = None if maps is None else maps.of(pair)
+        matched += disparity is not None
+        seen = make(pair)
+        observation = seen.observation(pairs.rig, disparity)
+        if parameters.estimator == "thesis":
+            answer = thesis_estimate(observation, context.seed)
+        else:
+            answer = estimate(observation, context.seed, guess if follows else None)
+        guess = answer.pose if not answer.abstained else None
+        answers.append(answer)
+        pixels = (int(seen.needle[0].sum()), int(seen.needle[1].sum()))
+        frames.append(
+            NeedleFrame(frame=pair.index, time=pair.time, estimate=as_estimate_record(answer), mask_pixels=pixels)
+        )
+        if len(frames) <= parameters.pictures:
+            _draw(context.output / "pictures", pair, seen, pairs, answer, views)
+    if maps is not None and frames and not matched:
+        raise BadInput("the disparity has none of the sequence's frames", hint="make the disparity of this sequence")
+    return frames, answers
+
+
+def _draw(
+    folder: Path,
+    pair: Pair,
+    seen: EyeMasks,
+    pairs: StereoPairs,
+    answer: NeedleEstimate,
+    views: tuple[SutureView, ...],
+) -> None:
+    folder.mkdir(exist_ok=True)
+    truth = NeedlePose(np.array(views[pair.index].camera_from_needle)) if pair.index < len(views) else None
+    picture = draw_eyes((pair.left, pair.right), seen.needle, pairs.rig, answer, truth)
+    path = folder / f"{pair.index:06d}.png"
+    if not cv2.imwrite(str(path), picture[..., ::-1]):
+        raise OSError(f"{path} could not be written")
+
+
+def _filtered(
+    answers: list[NeedleEstimate], motion: str, views: tuple[SutureView, ...], estimator: str
+) -> NeedleEstimate | None:
+    """Return one estimate in the last frame from all frames, None where they are not filtered."""
+    if motion == "none":
+        return None
+    steps = [np.eye(4)] * (len(answers) - 1)
+    if motion == "kinematics":
+        reports: Mapping[int, object] = {view.frame: view.reported_motion for view in views}
+        steps = [np.array(reports[index]) for index in range(1, len(answers))]
+    to_last = motions_to_last(steps)
+    if estimator == "thesis":
+        return thesis_average(answers, to_last)
+    return fuse(list(zip(answers, to_last, strict=True)))
+
+
+def _statement(answers: list[NeedleEstimate], fused: NeedleEstimate | None) -> str:
+    if fused is not None:
+        return f"filtered over {len(answers)} frames: {said(fused)}"
+    if len(answers) == 1:
+        return said(answers[0])
+    found = [answer for answer in answers if not answer.abstained]
+    if found:
+        return f"the needle is known in {len(found)} of {len(answers)} frames"
+    return f"the needle is known in none of {len(answers)} frames; in the last: {answers[-1].abstained}"

@@ -1,0 +1,126 @@
+"""The step `suture simulate`: trials of the state machine, one of them recorded with its motions."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.suture_trial import SutureEvent, SuturePerception, SutureRun, SutureTrial, SutureTrialFile
+from stages.kit.stage import Context
+from stages.suture.motion.constants import THROWS
+from stages.suture.parameters import SimulateParameters
+from stages.suture.trials.machine import run_trial
+from stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
+from stages.suture.trials.recording import Recorder
+from stages.suture.trials.records import run_of
+from stages.suture.trials.settings import POLICIES, World
+
+PANELS_SHOWN = 13
+CLASSES = {"I": "insertion", "E": "extraction", "H": "handover", "T": "thread"}
+
+
+def run(perception: Path | None, *, parameters: SimulateParameters, context: Context) -> SutureTrial:
+    """Run every arm on the same seeds. The outcome of a single trial that did not close the wound is `not_closed`."""
+    world = World()
+    models = {arm: _model(arm, perception) for arm in parameters.arms}
+    recorder = Recorder()
+    runs: list[SutureRun] = []
+    recorded = (context.seed, parameters.record or parameters.arms[0])
+    pairs = [(seed, arm) for seed in range(context.seed, context.seed + parameters.trials) for arm in parameters.arms]
+    for seed, arm in context.progress.track(pairs, total=len(pairs), description="trials"):
+        kept = recorder if (seed, arm) == recorded else None
+        runs.append(run_of(arm, seed, run_trial(POLICIES[arm], seed, world, models[arm], kept)))
+    statement = _statement(runs)
+    SutureTrialFile(
+        statement=statement,
+        runs=tuple(runs),
+        perception=tuple(
+            SuturePerception(
+                arm=arm, model=model.name, measured=model.measured, provenance=" ".join(model.provenance.split())
+            )
+            for arm, model in models.items()
+        ),
+        world={name: float(value) for name, value in asdict(world).items()},
+        recorded_arm=recorded[1],
+        recorded_seed=recorded[0],
+        events=tuple(
+            SutureEvent(seconds=round(seconds, 3), suture=suture, what=panel)
+            for seconds, suture, panel in zip(recorder.seconds, recorder.sutures, recorder.panels, strict=True)
+        ),
+    ).write(context.output / "trial.json")
+    context.output.joinpath("trial.txt").write_text(
+        trial_text(statement, runs, models, recorder, recorded), encoding="utf-8"
+    )
+    recorder.write(context.output / "frames.npz")
+    np.savez_compressed(context.output / "motions.npz", allow_pickle=False, **recorder.motions())
+    with context.progress.step("strip"):
+        from stages.suture.trials.drawing import draw_strip
+
+        draw_strip(context.output / "strip.png", recorder.arrays(), most=PANELS_SHOWN)
+    summary: dict[str, object] = {
+        "trials": len(runs),
+        "arms": " ".join(parameters.arms),
+        "sutures": sum(one.sutures for one in runs),
+        "attempts": sum(one.attempts for one in runs),
+        "errors": "".join(one.errors for one in runs)[:40],
+    }
+    failed = len(runs) == 1 and runs[0].sutures < THROWS
+    if failed:
+        summary["reason"] = statement
+    return SutureTrial(root=context.output, outcome="not_closed" if failed else "ok", summary=summary)
+
+
+def _model(arm: str, given: Path | None) -> PerceptionModel:
+    """Return how an arm sees: the user's error model, or the arm's own. Raises BadInput for a file that is none."""
+    if given is not None:
+        if given.is_dir():
+            raise BadInput(f"{given}: a folder is no perception model", hint="give a TOML file")
+        return perception_model(given)
+    return perception_model(FOLDER / f"perception_{POLICIES[arm].perception}.toml")
+
+
+def _statement(runs: list[SutureRun]) -> str:
+    if len(runs) > 1:
+        thrown = sum(one.sutures for one in runs)
+        closed = sum(one.sutures >= THROWS for one in runs)
+        return f"{len(runs)} trials threw {thrown} sutures; {closed} closed the wound"
+    (one,) = runs
+    text = f"{one.arm}, seed {one.seed}: {one.sutures} of {THROWS} sutures in {one.seconds:.0f} s"
+    return text + (f"; ended by {failure_of(one)}" if one.sutures < THROWS and one.errors else "")
+
+
+def failure_of(run: SutureRun) -> str:
+    """Return what ended a trial, with its class: `I (insertion): ...`; empty where nothing did."""
+    if not run.errors or run.sutures >= THROWS:
+        return ""
+    kind = run.errors[-1]
+    return f"{kind} ({CLASSES[kind]}): {run.reasons[-1]}"
+
+
+def trial_text(
+    statement: str,
+    runs: list[SutureRun],
+    models: dict[str, PerceptionModel],
+    recorder: Recorder,
+    recorded: tuple[int, str],
+) -> str:
+    """Return the trials as people read them; `recorded` are seed and arm of the recorded one."""
+    lines = [statement, ""]
+    lines += [
+        f"{arm} sees by {model.name} ({'measured' if model.measured else 'ASSUMED'})" for arm, model in models.items()
+    ]
+    lines += ["", f"recorded: {recorded[1]}, seed {recorded[0]}"]
+    lines += [
+        f"{seconds:8.1f} s  suture {suture + 1}  {panel}"
+        for seconds, suture, panel in zip(recorder.seconds, recorder.sutures, recorder.panels, strict=True)
+    ]
+    lines += ["", "arm                seed  sutures  seconds  errors  ended by"]
+    lines += [
+        f"{one.arm:18} {one.seed:4}  {one.sutures:7}  {one.seconds:7.0f}  {one.errors or '-':6}  "
+        f"{failure_of(one) or ('the wound is closed' if one.sutures >= THROWS else '-')}"
+        for one in runs
+    ]
+    return "\n".join(lines) + "\n"

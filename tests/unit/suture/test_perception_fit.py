@@ -1,0 +1,76 @@
+"""The error model that is fitted to measured estimates, and the parts of `make stitch` put together."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.gather import gather
+from benchmarks.stitch.perception import as_toml, fitted
+from schemas.errors import BadInput
+from stages.suture.evaluation.judgement import Estimate
+from stages.suture.needle.estimate import _edge_on_factor
+from stages.suture.rig import NeedlePose
+from stages.suture.trials.perception import FOLDER, perception_model
+
+
+def estimate(case: str, seed: int, holder: str = "air", answered: bool = True, wrong: str = "") -> Estimate:
+    swapped, stray = wrong == "swapped", wrong == "stray"
+    return Estimate(
+        arm="ours", case=case, seed=seed, holder=holder, place="corner", degrees_from_edge_on=40.0, seen=0.9,
+        answered=answered, guessed=True, reason="" if answered else "why", normal_error_deg=20.0 if stray else 2.0,
+        centre_error_mm=3.0 if stray else 0.3, tip_error_mm=24.0 if swapped else 1.0,
+        swage_error_mm=24.0 if swapped else 12.0 if stray else 1.0, end_error_mm=1.0, swapped=swapped, mahalanobis=4.0,
+        tip_probability=0.9,
+    )  # fmt: skip
+
+
+def records() -> list[Estimate]:
+    found = []
+    for case in ("geometry_corner_left", "geometry_corner_right", "rendered"):
+        found += [estimate(case, seed) for seed in range(16)]
+        found += [estimate(case, 16, answered=False), estimate(case, 17, wrong="swapped")]
+        found += [estimate(case, 18, wrong="stray"), estimate(case, 19, answered=False)]
+    return [*found, *(estimate("geometry", seed, holder="tissue") for seed in range(10))]
+
+
+def test_shares_and_spreads_are_those_of_the_estimates(tmp_path: Path) -> None:
+    thesis = perception_model(FOLDER / "perception_thesis.toml")
+    model = fitted(records(), thesis, 0.2, 0.05, "Measured here and now, for a test.")
+    assert model.measured and model.right_share.corner_left == model.right_share.elsewhere == 0.8
+    assert model.right_share.tissue == 1.0 and model.abstained_share.tissue == 0.5
+    assert model.abstained_share.corner_right == 0.5  # four failures: those of all places count
+    assert model.right.normal_degrees == pytest.approx(np.sqrt(2.0), abs=1e-3)
+    assert model.right.end_millimetres == pytest.approx(np.sqrt(1.0 / 3.0), abs=1e-3)
+    assert model.wrong.stray_end_share == 1.0 and model.wrong.stray_end_millimetres == 18.0
+    assert model.persistence == thesis.persistence
+    path = tmp_path / "model.toml"
+    path.write_text(as_toml(model))
+    assert perception_model(path).model_dump(exclude={"provenance"}) == model.model_dump(exclude={"provenance"})
+    with pytest.raises(ValueError, match="tissue: 0 views"):
+        fitted(records()[:-10], thesis, 0.2, 0.05, "Measured here and now, for a test.")
+
+
+def test_parts_are_put_together_and_must_agree(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="no part"):
+        gather("stitch", tmp_path)
+    for part, value in (("needle", 1.0), ("trials", 2.0)):
+        (tmp_path / part).mkdir()
+        (tmp_path / part / "metrics.json").write_text(json.dumps({f"ours/{part}/x": value}))
+        (tmp_path / part / "table.md").write_text(f"# {part}\n")
+    figures, text = gather("stitch", tmp_path)
+    assert figures == {"ours/needle/x": 1.0, "ours/trials/x": 2.0} and text == "# needle\n\n# trials\n"
+    (tmp_path / "trials" / "metrics.json").write_text(json.dumps({"ours/needle/x": 3.0}))
+    with pytest.raises(BadInput, match="in another part"):
+        gather("stitch", tmp_path)
+
+
+def test_a_needle_seen_edge_on_is_less_sure() -> None:
+    facing, edge_on = np.eye(4), np.eye(4)
+    facing[2, 3] = edge_on[2, 3] = 0.3
+    edge_on[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    assert _edge_on_factor(NeedlePose(facing)) == pytest.approx(1.0)
+    assert _edge_on_factor(NeedlePose(edge_on)) == pytest.approx(5.0)
