@@ -1,57 +1,11 @@
-"""Figures of merit of the needle's pose with 95 % intervals, and their tables."""
+"""The needle benchmark's cases as the issue names them, and their tables."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-
-import numpy as np
-
-from benchmarks.stitch.needle_records import Estimate
-from benchmarks.stitch.needle_trials import ARMS, CASES
-from stages.kit.measurement.proportions import wilson_interval
-
-INSIDE_95 = 12.592
-"""The 95 % point of chi-squared with 6 degrees of freedom."""
-MEASURES: dict[str, Callable[[list[Estimate]], float]] = {
-    "views": lambda records: float(len(records)),
-    "within_tolerance": lambda records: float(np.mean([r.within for r in records])),
-    "right_guess": lambda records: float(np.mean([r.right for r in records])),
-    "abstained": lambda records: float(np.mean([not r.answered for r in records])),
-    "wrong_though_answered": lambda records: float(np.mean([r.answered and not r.right for r in records])),
-    "normal_error_deg": lambda records: _median(r.normal_error_deg for r in records if r.answered),
-    "normal_error_deg_p95": lambda records: _percentile(r.normal_error_deg for r in records if r.answered),
-    "centre_error_mm": lambda records: _median(r.centre_error_mm for r in records if r.answered),
-    "centre_error_mm_p95": lambda records: _percentile(r.centre_error_mm for r in records if r.answered),
-    "tip_error_mm": lambda records: _median(r.tip_error_mm for r in records if r.answered),
-    "tip_error_mm_p95": lambda records: _percentile(r.tip_error_mm for r in records if r.answered),
-    "tip_within_2mm": lambda records: float(np.mean([r.answered and r.tip_error_mm <= 2.0 for r in records])),
-    "end_error_mm": lambda records: _median(r.end_error_mm for r in records if r.answered),
-    "swap_rate": lambda records: _mean(r.swapped for r in records if r.answered),
-    "inside_95": lambda records: _mean(
-        r.mahalanobis <= INSIDE_95 for r in records if r.answered and r.mahalanobis >= 0
-    ),
-    "cpu_seconds": lambda records: _median(r.seconds for r in records),
-    "hertz": lambda records: 1.0 / max(_median(r.seconds for r in records), 1e-9),
-}
-
-
-def _values(numbers: Iterable[float]) -> list[float]:
-    return [float(number) for number in numbers]
-
-
-def _median(numbers: Iterable[float]) -> float:
-    values = _values(numbers)
-    return float(np.median(values)) if values else -1.0
-
-
-def _percentile(numbers: Iterable[float]) -> float:
-    values = _values(numbers)
-    return float(np.quantile(values, 0.95)) if values else -1.0
-
-
-def _mean(numbers: Iterable[float]) -> float:
-    values = _values(numbers)
-    return float(np.mean(values)) if values else -1.0
+from benchmarks.stitch.needle_trials import CASES
+from stages.suture.evaluation.judgement import Estimate
+from stages.suture.evaluation.needle_figures import metrics as figures_of
+from stages.suture.evaluation.needle_figures import rows
 
 
 def groups(records: list[Estimate]) -> dict[str, list[Estimate]]:
@@ -81,71 +35,18 @@ def groups(records: list[Estimate]) -> dict[str, list[Estimate]]:
 
 def metrics(records: list[Estimate]) -> dict[str, float]:
     """Return `<arm>/<case>/<measure>` -> number."""
-    result = {}
-    for case, found in groups(records).items():
-        for arm in ARMS:
-            of_arm = [record for record in found if record.arm == arm]
-            if of_arm:
-                for measure, function in MEASURES.items():
-                    result[f"{arm}/{case}/{measure}"] = round(function(of_arm), 4)
-    return result
-
-
-def _share(records: list[Estimate], test: Callable[[Estimate], bool]) -> str:
-    """Return a percentage with its 95 % interval."""
-    hits = sum(test(record) for record in records)
-    low, high = wilson_interval(hits, len(records))
-    return f"{100 * hits / len(records):.1f} ({100 * low:.0f}–{100 * high:.0f})"
-
-
-def _row(name: str, records: list[Estimate]) -> str:
-    figures = {measure: function(records) for measure, function in MEASURES.items()}
-    inside = "–" if figures["inside_95"] < 0 else f"{100 * figures['inside_95']:.0f}"
-    cells = [
-        name,
-        str(len(records)),
-        _share(records, lambda record: record.within),
-        f"{100 * figures['abstained']:.1f}",
-        f"{100 * figures['wrong_though_answered']:.1f}",
-        f"{figures['normal_error_deg']:.1f} / {figures['normal_error_deg_p95']:.1f}",
-        f"{figures['centre_error_mm']:.2f} / {figures['centre_error_mm_p95']:.2f}",
-        f"{figures['tip_error_mm']:.2f} / {figures['tip_error_mm_p95']:.2f}",
-        f"{100 * figures['tip_within_2mm']:.1f}",
-        f"{100 * figures['swap_rate']:.1f}",
-        inside,
-        f"{1000 * figures['cpu_seconds']:.0f}",
-    ]
-    return "| " + " | ".join(cells) + " |"
-
-
-HEADER = (
-    "| {0} | views | within 1 mm and 10° % (95 % interval) | abstained % | wrong though answered % "
-    "| normal ° median / p95 | centre mm median / p95 | tip mm median / p95 | tip within 2 mm % | swapped % "
-    "| inside 95 % ellipsoid % | CPU ms |\n"
-    "|---|---|---|---|---|---|---|---|---|---|---|---|"
-)
+    return figures_of(groups(records))
 
 
 def table(records: list[Estimate]) -> str:
     """Return the tables in Markdown: by case, then by place and by holder, edge-on views and all."""
-    lines = ["# The needle's pose", "", HEADER.format("case, arm")]
-    for case, found in groups(records).items():
-        for arm in ARMS:
-            of_arm = [record for record in found if record.arm == arm]
-            if of_arm:
-                lines.append(_row(f"{case}, {arm}", of_arm))
+    lines = ["# The needle's pose", "", *rows("case", groups(records))]
     views = [record for record in records if record.case == "geometry"]
-    for title, key in (("place", "place"), ("holder", "holder")):
-        lines += ["", f"## Visible views of the geometry form by {title}", "", HEADER.format(f"{title}, arm")]
-        for value in sorted({getattr(record, key) for record in views}):
-            for arm in ARMS:
-                found = [r for r in views if getattr(r, key) == value and r.arm == arm and r.visible]
-                if found:
-                    lines.append(_row(f"{value}, {arm}", found))
-    lines += ["", "## Geometry form by angle from edge-on", "", HEADER.format("angle, arm")]
-    for low, high in ((0, 5), (5, 15), (15, 30), (30, 60), (60, 90)):
-        for arm in ARMS:
-            found = [r for r in views if low < r.degrees_from_edge_on <= high and r.arm == arm]
-            if found:
-                lines.append(_row(f"{low}–{high}°, {arm}", found))
+    for key in ("place", "holder"):
+        values = sorted({getattr(record, key) for record in views})
+        found = {value: [r for r in views if getattr(r, key) == value and r.visible] for value in values}
+        lines += ["", f"## Visible views of the geometry form by {key}", "", *rows(key, found)]
+    bins = ((0, 5), (5, 15), (15, 30), (30, 60), (60, 90))
+    turned = {f"{low}–{high}°": [r for r in views if low < r.degrees_from_edge_on <= high] for low, high in bins}
+    lines += ["", "## Geometry form by angle from edge-on", "", *rows("angle", turned)]
     return "\n".join(lines) + "\n"

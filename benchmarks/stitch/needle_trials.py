@@ -12,23 +12,24 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from benchmarks.stitch.needle_records import Estimate
 from stages.kit.geometry.transforms import inverse
+from stages.suture.evaluation.judgement import Estimate, judged
+from stages.suture.masks import spoiled_masks
+from stages.suture.motion_reports import motions_to_last, reported_motion
 from stages.suture.needle.estimate import estimate
-from stages.suture.needle.filter import STEP_SHIFT, STEP_TURN, difference, fuse
-from stages.suture.needle.observation import NeedleEstimate, NeedleObservation, violet
-from stages.suture.needle.thesis import thesis_estimate
+from stages.suture.needle.filter import fuse
+from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
+from stages.suture.needle.thesis import thesis_average, thesis_estimate
 from stages.suture.rig import ENDOSCOPE, TWO_CAMERAS, NeedlePose, StereoRig
-from stages.suture.world.corruption import noisy_disparity, spoiled_drivers, spoiled_mask, spoiled_thread
+from stages.suture.world.corruption import noisy_disparity
 from stages.suture.world.render import StereoView, render
 from stages.suture.world.sampling import seen_scene
 from stages.suture.world.scene import NeedleScene, moved_scene, random_motions
 
 CALIBRATION_ERROR = 0.15
 FRAMES = 10
-SEED_OF_MASKS, SEED_OF_MOTION = 5, 6
+SEED_OF_MOTION = 6
 
 
 @dataclass(frozen=True)
@@ -66,15 +67,8 @@ ARMS = ("thesis", "ours")
 
 def observe(view: StereoView, noise: float, seed: int) -> NeedleObservation:
     """Return what an estimator is given of a view; the picture, where there is one, shows the thread."""
-    random = np.random.default_rng([SEED_OF_MASKS, seed])
-    left_mask, right_mask = spoiled_mask(view.left, random), spoiled_mask(view.right, random)
-    threads = []
-    for eye in (view.left, view.right):
-        thread = spoiled_thread(eye, random)
-        threads.append(thread if eye.image is None else violet(eye.image))
-    hidden = spoiled_drivers(view.left, random), spoiled_drivers(view.right, random)
-    disparity = noisy_disparity(view, noise, random)
-    return NeedleObservation(view.rig, left_mask, right_mask, disparity, *threads, *hidden)
+    masks, random = spoiled_masks(view.left, view.right, seed)
+    return masks.observation(view.rig, noisy_disparity(view, noise, random))
 
 
 def run(case: Case, seed: int) -> list[Estimate]:
@@ -99,14 +93,14 @@ def _sequence(case: Case, seed: int, scene: NeedleScene) -> list[Estimate]:
     true_motions = random_motions(scene, case.frames)
     answers: dict[str, list[NeedleEstimate]] = {arm: [] for arm in ARMS}
     seconds = dict.fromkeys(ARMS, 0.0)
-    reported = [np.eye(4)]
+    reported: list[np.ndarray] = []
     guess: NeedlePose | None = None
     for index, motion in enumerate(true_motions):
         frame = moved_scene(scene, motion, index)
         if index > 0:
             step = motion @ inverse(true_motions[index - 1])
             at = scene.camera_from_world @ step @ inverse(scene.camera_from_world)
-            reported.append(_with_error(at, frame.pose.centre, random))
+            reported.append(reported_motion(at, frame.pose.centre, random))
         view = render(frame, pictures=case.rendered)
         observation = observe(view, case.disparity_noise, frame.seed)
         started = time.process_time()
@@ -117,83 +111,7 @@ def _sequence(case: Case, seed: int, scene: NeedleScene) -> list[Estimate]:
         answers["ours"].append(ours)
         seconds["thesis"] += middle - started
         seconds["ours"] += time.process_time() - middle
-    to_last = [np.eye(4)]
-    for step in reversed(reported[1:]):
-        to_last.append(to_last[-1] @ step)
-    to_last.reverse()
+    to_last = motions_to_last(reported)
     fused = {"ours": fuse(list(zip(answers["ours"], to_last, strict=True)))}
-    fused["thesis"] = _average(answers["thesis"], to_last)
+    fused["thesis"] = thesis_average(answers["thesis"], to_last)
     return [judged(arm, case.name, seed, view, fused[arm], seconds[arm] / case.frames) for arm in ARMS]
-
-
-def _with_error(motion: np.ndarray, centre: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Return a motion (4, 4) as kinematics report it: turned and shifted a little about the needle's centre."""
-    turn = Rotation.from_rotvec(random.normal(0.0, STEP_TURN, 3)).as_matrix()
-    error = np.eye(4)
-    error[:3, :3] = turn
-    error[:3, 3] = centre - turn @ centre + random.normal(0.0, STEP_SHIFT, 3)
-    return error @ motion
-
-
-def _average(estimates: list[NeedleEstimate], motions: list[np.ndarray]) -> NeedleEstimate:
-    """Return the mean of the thesis's estimates carried to the last frame: the thesis averages ten normals."""
-    poses = [
-        NeedlePose(motion @ one.pose.camera_from_needle)
-        for one, motion in zip(estimates, motions, strict=True)
-        if one.pose is not None
-    ]
-    if not poses:
-        return NeedleEstimate.none("No frame shows the needle.")
-    first = poses[-1]
-    total = np.zeros(6)
-    for pose in poses:
-        straight, exchanged = difference(first, pose), difference(first, pose.swapped())
-        total += straight if np.linalg.norm(straight[3:]) <= np.linalg.norm(exchanged[3:]) else exchanged
-    mean = total / len(poses)
-    matrix = first.camera_from_needle.copy()
-    matrix[:3, :3] = Rotation.from_rotvec(mean[3:]).as_matrix() @ matrix[:3, :3]
-    matrix[:3, 3] += mean[:3]
-    return NeedleEstimate(NeedlePose(matrix), np.full((6, 6), np.inf), 0.5, "")
-
-
-def judged(arm: str, case: str, seed: int, view: StereoView, answer: NeedleEstimate, seconds: float) -> Estimate:
-    """Return the record of one answer."""
-    truth = view.pose
-    common = {
-        "arm": arm,
-        "case": case,
-        "seed": seed,
-        "holder": view.holder,
-        "place": view.place,
-        "degrees_from_edge_on": truth.degrees_from_edge_on(),
-        "seen": view.seen,
-        "answered": answer.pose is not None and not answer.abstained,
-        "guessed": answer.pose is not None,
-        "reason": answer.abstained,
-        "tip_probability": answer.tip_probability,
-        "seconds": seconds,
-    }
-    pose = answer.pose
-    if pose is None:
-        errors = dict.fromkeys(
-            ("normal_error_deg", "centre_error_mm", "tip_error_mm", "swage_error_mm", "end_error_mm"), -1.0
-        )
-        return Estimate(**common, **errors, swapped=False, mahalanobis=-1.0)
-    to_tip, to_swage = np.linalg.norm(pose.tip - truth.tip), np.linalg.norm(pose.tip - truth.swage)
-    swapped = bool(to_swage < to_tip)
-    named = pose.swapped() if swapped else pose
-    mahalanobis = -1.0
-    if np.isfinite(answer.covariance).all():
-        step = difference(named, truth)
-        mahalanobis = float(step @ np.linalg.solve(answer.covariance, step))
-    return Estimate(
-        **common,
-        normal_error_deg=float(np.degrees(np.arccos(min(1.0, abs(float(pose.normal @ truth.normal)))))),
-        centre_error_mm=1000.0 * float(np.linalg.norm(pose.centre - truth.centre)),
-        tip_error_mm=1000.0 * float(to_tip),
-        swage_error_mm=1000.0 * float(np.linalg.norm(pose.swage - truth.swage)),
-        end_error_mm=1000.0
-        * float(max(np.linalg.norm(named.tip - truth.tip), np.linalg.norm(named.swage - truth.swage))),
-        swapped=swapped,
-        mahalanobis=mahalanobis,
-    )

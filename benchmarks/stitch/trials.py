@@ -16,10 +16,11 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.stitch.trials_records import Run, read_runs, run_of
-from benchmarks.stitch.trials_tables import metrics, table
+from benchmarks.stitch.trials_records import Run, read_runs
+from stages.suture.evaluation.trial_figures import metrics, table
 from stages.suture.trials.machine import run_trial
 from stages.suture.trials.recording import Recorder
+from stages.suture.trials.records import run_of
 from stages.suture.trials.settings import POLICIES
 
 REPORTING, TUNING, TRIALS, QUICK, FRAMES = 1000, 0, 100, 10, 13
@@ -34,7 +35,8 @@ def one(arm: str, seed: int) -> Run:
     """Run a trial and return its record."""
     started = time.process_time()
     outcome = run_trial(ARMS[arm], seed)
-    return run_of(arm, seed, outcome, time.process_time() - started)
+    spent = round(time.process_time() - started, 3)
+    return Run(**run_of(arm, seed, outcome).model_dump(), cpu_seconds=spent)
 
 
 def main() -> None:
@@ -68,7 +70,7 @@ def main() -> None:
 
 def pictures(folder: Path, runs: list[Run], seed: int) -> None:
     """Write the histogram of figure 4.1, the key frames (npz) of one trial and a strip (png) of its first motions."""
-    from benchmarks.stitch.trials_pictures import histogram
+    from stages.suture.evaluation.plots import histogram
     from stages.suture.trials.drawing import draw_strip
 
     histogram(folder / "sutures.png", runs)

@@ -1,0 +1,230 @@
+"""Train the network that finds needle and thread; stop and start again at will.
+
+    python -m benchmarks.stitch.segmentation_train --out FOLDER [--quick] [--steps N] [--batch N] [--seed N]
+    python -m benchmarks.stitch.segmentation_train --out OTHER --views FOLDER/views --start CHECKPOINT [--steps N]
+
+Views that are not in FOLDER/views yet are rendered first (seeds 0 to 99 before the two cameras, 200 to 211 before the
+endoscope; 450 to 455 validate). A step's samples depend on the seed and on the number of the step alone, and the state
+is written every few minutes, so that a run that was stopped ends with the bytes of one that was not, on the same
+machine. The result is `segmentation.safetensors`, the moving average of the weights.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import math
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch.nn import functional
+
+from benchmarks.stitch.segmentation_samples import Views, masks_of, sample
+from benchmarks.stitch.segmentation_views import kept_view
+from benchmarks.training.run_state import read_state, write_state
+from schemas.errors import BadInput
+from stages.suture.rig import ENDOSCOPE, TWO_CAMERAS
+from stages.suture.segmentation.checkpoint import load_network, save_network
+from stages.suture.segmentation.infer import Segmenter, normalised
+from stages.suture.segmentation.model import CLASSES, SutureNetwork
+
+WEIGHT_DECAY, WARM_UP = 0.02, 0.03
+AVERAGE_DECAY, GRADIENT_NORM = 0.997, 5.0
+SAMPLES_A_PICTURE = 2
+CAMERAS, ENDOSCOPES, VALIDATION = range(100), range(200, 212), range(450, 456)
+CAMERAS_REFINED = range(150)
+"""A refinement sees more views."""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Peak learning rate, weights of the classes in the loss, share of the crops about the needle."""
+
+    peak_rate: float
+    weights: tuple[float, float, float]
+    needles: float
+
+
+FIRST, REFINED = Phase(4e-3, (1.0, 1.0, 0.3), 0.35), Phase(2e-3, (2.0, 1.0, 0.3), 0.55)
+"""The needle is the rarest class and bright jaws the hardest background: a second run goes on with more of it."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run is."""
+
+    steps: int
+    batch: int
+    seed: int
+    pictures: int
+    start: str = ""
+
+    @property
+    def phase(self) -> Phase:
+        """What the run asks for: a beginning, or a refinement of the checkpoint with the digest `start`."""
+        return REFINED if self.start else FIRST
+
+
+def rate_at(step: int, steps: int, peak: float) -> float:
+    """Return the learning rate: a linear rise to `peak`, then half a cosine down to a hundredth."""
+    warm = max(1, round(WARM_UP * steps))
+    if step < warm:
+        return peak * (step + 1) / warm
+    share = (step - warm) / max(1, steps - warm)
+    return peak * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * share)))
+
+
+def batch_of(views: Views, plan: Plan, step: int) -> tuple[torch.Tensor, torch.Tensor]:
+    """Return inputs (batch, 3, H, W) and targets (batch, 3, H, W) of a step."""
+    number = max(plan.batch // SAMPLES_A_PICTURE, 1)
+    per_epoch = max(1, len(views) // number)
+    epoch, place = divmod(step, per_epoch)
+    order = np.random.default_rng([plan.seed, 1, epoch]).permutation(len(views))
+    made = []
+    for index in order[place * number : (place + 1) * number]:
+        picture, bodies = views[int(index)]
+        for turn in range(plan.batch // number):
+            random = np.random.default_rng([plan.seed, 2, step, int(index), turn])
+            made.append(sample(picture, bodies, random, plan.phase.needles))
+    inputs = normalised(torch.from_numpy(np.stack([image for image, _ in made])))
+    return inputs, torch.from_numpy(np.stack([masks for _, masks in made]))
+
+
+def loss_of(logits: torch.Tensor, targets: torch.Tensor, weights: tuple[float, float, float]) -> torch.Tensor:
+    """Return cross entropy and 1 - Dice (over the batch, Milletari et al. 2016), summed over the weighted classes."""
+    entropy = functional.binary_cross_entropy_with_logits(logits, targets, reduction="none").mean(dim=(0, 2, 3))
+    found = torch.sigmoid(logits)
+    both = (found * targets).sum(dim=(0, 2, 3))
+    each = (found * found).sum(dim=(0, 2, 3)) + (targets * targets).sum(dim=(0, 2, 3))
+    dice = 1.0 - (2.0 * both + 1.0) / (each + 1.0)
+    return (torch.tensor(weights) * (8.0 * entropy + dice)).sum()
+
+
+class Run:
+    """A training run and its state on disk."""
+
+    def __init__(self, plan: Plan, out: Path, start: Path | None = None) -> None:
+        self.plan, self.out, self.step, self.seconds = plan, out, 0, 0.0
+        torch.manual_seed(plan.seed)
+        network = SutureNetwork() if start is None else load_network(start)[0]
+        self.network = network.to(memory_format=torch.channels_last)
+        self.average = {name: value.clone() for name, value in self.network.state_dict().items()}
+        self.optimizer = torch.optim.AdamW(
+            self.network.parameters(), lr=plan.phase.peak_rate, weight_decay=WEIGHT_DECAY, fused=True
+        )
+        if (out / "state.json").is_file():
+            self._restore()
+
+    def train_step(self, views: Views) -> float:
+        """Take one step and return its loss."""
+        started = time.process_time()
+        self.network.train()
+        inputs, targets = batch_of(views, self.plan, self.step)
+        for group in self.optimizer.param_groups:
+            group["lr"] = rate_at(self.step, self.plan.steps, self.plan.phase.peak_rate)
+        with torch.autocast("cpu", torch.bfloat16):
+            logits = self.network(inputs)
+        loss = loss_of(logits.float(), targets, self.plan.phase.weights)
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), GRADIENT_NORM)
+        self.optimizer.step()
+        self.step += 1
+        decay = min(AVERAGE_DECAY, self.step / (self.step + 10))
+        with torch.no_grad():
+            for name, value in self.network.state_dict().items():
+                if value.is_floating_point():
+                    self.average[name].lerp_(value, 1 - decay)
+                else:
+                    self.average[name].copy_(value)
+        self.seconds += time.process_time() - started
+        return float(loss.detach())
+
+    def averaged(self) -> SutureNetwork:
+        """Return a network with the moving average of the weights, for use."""
+        network = SutureNetwork()
+        network.load_state_dict(self.average)
+        return network.eval()
+
+    def save(self) -> None:
+        """Write the state, whole or not at all, and the checkpoint as it would be used now."""
+        write_state(self.out, self.network, self.average, self.optimizer, self.step)
+        facts = {"step": self.step, "cpu_seconds": round(self.seconds, 1), "plan": asdict(self.plan)}
+        (self.out / "state.json").write_text(json.dumps(facts, indent=1) + "\n")
+        description = (
+            f"trained on {self.plan.pictures} rendered pictures, step {self.step} of {self.plan.steps}, "
+            f"batch {self.plan.batch}, seed {self.plan.seed}" + (", a refinement" if self.plan.start else "")
+        )
+        save_network(self.out / "segmentation.safetensors", self.averaged(), description)
+
+    def _restore(self) -> None:
+        facts = json.loads((self.out / "state.json").read_text())
+        if facts["plan"] != asdict(self.plan):
+            raise BadInput(f"{self.out}: holds a run of another plan", hint="take another --out, or the same settings")
+        self.average, self.step = read_state(self.out, self.network, self.optimizer)
+        self.seconds = facts["cpu_seconds"]
+
+
+def overlap(network: SutureNetwork, views: Views) -> dict[str, float]:
+    """Return the intersection over union of every class over all pixels of the views' pictures."""
+    segmenter = Segmenter(network, "")
+    both, either = np.zeros(len(CLASSES)), np.zeros(len(CLASSES))
+    for index in range(len(views)):
+        picture, bodies = views[index]
+        found, truth = segmenter.probabilities(picture) > 0.5, masks_of(bodies) > 0.5
+        both += (found & truth).sum(axis=(1, 2))
+        either += (found | truth).sum(axis=(1, 2))
+    shares = both / np.maximum(either, 1)
+    return {name: round(float(share), 4) for name, share in zip(CLASSES, shares, strict=True)}
+
+
+def main() -> None:
+    """Render what is missing, then train or go on with a training."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--views", type=Path, help="where rendered views are kept; OUT/views if not given")
+    parser.add_argument("--start", type=Path, help="refine this checkpoint")
+    parser.add_argument("--quick", action="store_true", help="proves the recipe: 4 views, 40 steps")
+    parser.add_argument("--steps", type=int, default=2000)
+    parser.add_argument("--batch", type=int, default=8)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--save-every", type=float, default=240.0, help="seconds between states")
+    options = parser.parse_args()
+    torch.set_num_threads(1)
+    folder = options.views or options.out / "views"
+    few = 2 if options.quick else None
+    cameras = CAMERAS if options.start is None else CAMERAS_REFINED
+    stems = [kept_view(folder, TWO_CAMERAS, seed) for seed in cameras[:few]]
+    stems += [kept_view(folder, ENDOSCOPE, seed) for seed in ENDOSCOPES[:few]]
+    validation = Views([kept_view(folder, TWO_CAMERAS, seed) for seed in VALIDATION[:few]])
+    views = Views(stems)
+    digest = "" if options.start is None else hashlib.sha256(options.start.read_bytes()).hexdigest()[:16]
+    plan = Plan(40 if options.quick else options.steps, options.batch, options.seed, len(views), digest)
+    run = Run(plan, options.out, options.start)
+    options.out.mkdir(parents=True, exist_ok=True)
+    saved, losses = time.perf_counter(), []
+    while run.step < plan.steps:
+        losses.append(run.train_step(views))
+        last = run.step == plan.steps
+        line: dict[str, object] = {}
+        if run.step % 50 == 0 or last:
+            line = {"step": run.step, "cpu_seconds": round(run.seconds), "loss": round(float(np.mean(losses)), 4)}
+            losses = []
+        if run.step % 600 == 0 or last:
+            line["overlap"] = overlap(run.averaged(), validation)
+        if line:
+            with (options.out / "log.jsonl").open("a") as log:
+                log.write(json.dumps(line) + "\n")
+            print(line, flush=True)
+        if time.perf_counter() - saved > options.save_every or last:
+            run.save()
+            saved = time.perf_counter()
+    print(f"{plan.steps} steps in {run.seconds / 60:.1f} CPU min: {options.out / 'segmentation.safetensors'}")
+
+
+if __name__ == "__main__":
+    main()

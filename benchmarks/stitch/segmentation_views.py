@@ -1,0 +1,79 @@
+"""Rendered pairs of the needle world, kept on disk: pictures and each pixel's body as PNG, truth by the scene's seed.
+
+    python -m benchmarks.stitch.segmentation_views --out FOLDER --first N --count N [--endoscope]
+
+A view that is there already is not rendered again, so that a stopped run goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from schemas.errors import BadInput
+from stages.suture.rig import ENDOSCOPE, TWO_CAMERAS, StereoRig
+from stages.suture.world.render import render
+from stages.suture.world.sampling import seen_scene
+
+CALIBRATION_ERROR = 0.15
+"""Standard deviation of the right eye's error [px], as in the needle benchmark's ordinary cases."""
+EYES = ("left", "right")
+
+
+def view_name(rig: StereoRig, seed: int) -> str:
+    """Return the name under which the view of `seed` is kept."""
+    return f"{'endoscope' if rig.baseline < 0.02 else 'cameras'}_{seed:05d}"
+
+
+def kept_view(folder: Path, rig: StereoRig, seed: int) -> Path:
+    """Return the stem (without `_left.png`, ...) of the view of `seed`; it is rendered if it is not there yet."""
+    stem = folder / view_name(rig, seed)
+    if not _file(stem, EYES[-1], "bodies").is_file():
+        folder.mkdir(parents=True, exist_ok=True)
+        view = render(seen_scene(seed, rig, calibration_error=CALIBRATION_ERROR)[0])
+        for eye, seen in zip(EYES, (view.left, view.right), strict=True):
+            assert seen.image is not None
+            _write(_file(stem, eye, "rgb"), seen.image[..., ::-1])
+            _write(_file(stem, eye, "bodies"), seen.bodies)
+    return stem
+
+
+def read_eye(stem: Path, eye: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the picture (H, W, 3) uint8 RGB and the bodies (H, W) uint8 of one eye ("left" or "right")."""
+    picture = cv2.imread(str(_file(stem, eye, "rgb")), cv2.IMREAD_COLOR)
+    bodies = cv2.imread(str(_file(stem, eye, "bodies")), cv2.IMREAD_GRAYSCALE)
+    if picture is None or bodies is None:
+        raise BadInput(f"{stem}: the kept view cannot be read", hint="delete its files; it will be rendered again")
+    return np.ascontiguousarray(picture[..., ::-1]), np.asarray(bodies, dtype=np.uint8)
+
+
+def _file(stem: Path, eye: str, kind: str) -> Path:
+    return stem.with_name(f"{stem.name}_{eye}_{kind}.png")
+
+
+def _write(path: Path, image: np.ndarray) -> None:
+    """Write a PNG whole or not at all."""
+    half = path.with_name("half_" + path.name)
+    cv2.imwrite(str(half), image)
+    os.replace(half, path)
+
+
+def main() -> None:
+    """Parse the command line and render."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.stitch.segmentation_views", description=__doc__)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--first", type=int, required=True)
+    parser.add_argument("--count", type=int, required=True)
+    parser.add_argument("--endoscope", action="store_true", help="the endoscope's rig instead of the two cameras")
+    options = parser.parse_args()
+    rig = ENDOSCOPE if options.endoscope else TWO_CAMERAS
+    for seed in range(options.first, options.first + options.count):
+        kept_view(options.out, rig, seed)
+
+
+if __name__ == "__main__":
+    main()
