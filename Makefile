@@ -169,9 +169,23 @@ tidy: setup ## Clearing tables (TIDY): tables 7.1 to 7.3, joint planner, optimum
 	$(if $(filter seen,$(PARTS)),$(PYTHON) -m benchmarks.tidy.seen $(if $(QUICK),--quick) --out $(TIDY)/seen)
 	$(if $(filter physics,$(PARTS)),$(PYTHON) -m benchmarks.tidy.physics $(if $(QUICK),--quick) --out $(TIDY)/physics)
 	$(if $(filter physics,$(PARTS)),$(PYTHON) -m benchmarks.tidy.physics_pulls $(if $(QUICK),--quick) --out $(TIDY)/pulls)
+	$(if $(filter physics,$(PARTS)),$(PYTHON) -m benchmarks.tidy.physics_holds $(if $(QUICK),--repeats 1) --out $(TIDY)/holds)
 	$(if $(filter detect,$(PARTS)),$(PYTHON) -m benchmarks.tidy.detect $(if $(QUICK),--quick) --out $(TIDY)/detect)
 	$(if $(and $(filter detect,$(PARTS)),$(wildcard $(REAL_DATA)/tableware)),$(PYTHON) -m benchmarks.tidy.detect_real --data $(REAL_DATA)/tableware --out $(TIDY)/detect_real)
-	$(PYTHON) -m benchmarks.tidy.gather --out $(TIDY)
+	$(PYTHON) -m benchmarks.gather tidy --out $(TIDY)
+
+.PHONY: stitch
+# chain: every command on two rendered scenes and trials, into a report; the other parts are the benchmarks below, together
+# about two hours of one core. Stopped runs go on where they were. STITCH_PARTS="chain trials" runs some of them.
+STITCH_PARTS ?= chain needle segmentation thread trials
+STITCH := $(OUTPUTS)/experiments/stitch$(if $(QUICK),-quick)
+stitch: setup ## Suturing (STITCH): scene to disparity, needle, thread; trials, table 4.1, report (QUICK=1; STITCH_PARTS=...)
+	$(if $(filter chain,$(STITCH_PARTS)),$(PYTHON) -m benchmarks.stitch.chain $(if $(QUICK),--quick) --out $(STITCH)/chain)
+	$(if $(filter needle,$(STITCH_PARTS)),$(PYTHON) -m benchmarks.stitch.needle $(if $(QUICK),--quick) --out $(STITCH)/needle)
+	$(if $(filter segmentation,$(STITCH_PARTS)),$(PYTHON) -m benchmarks.stitch.segmentation $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --out $(STITCH)/segmentation)
+	$(if $(filter thread,$(STITCH_PARTS)),$(PYTHON) -m benchmarks.stitch.thread $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --out $(STITCH)/thread)
+	$(if $(filter trials,$(STITCH_PARTS)),$(PYTHON) -m benchmarks.stitch.trials $(if $(QUICK),--quick) --out $(STITCH)/trials)
+	$(PYTHON) -m benchmarks.gather stitch --out $(STITCH)
 
 .PHONY: stitch-needle
 # Five hundred rendered views and more without pictures, about forty minutes of one core; a stopped run goes on.
@@ -182,6 +196,19 @@ stitch-needle: setup ## The needle's pose: the thesis's estimator and ours on re
 # A hundred reporting seeds an arm, about three CPU minutes; a stopped run goes on where it was.
 stitch-trials: setup ## Whole suture trials in the simulator: table 4.1, the thesis's arms and ours (QUICK=1: ten trials)
 	$(PYTHON) -m benchmarks.stitch.trials $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/stitch-trials$(if $(QUICK),-quick)
+
+.PHONY: stitch-train stitch-segmentation stitch-thread
+# Rendered views are kept in one folder for all three: 168 to train on and to validate with, 100 to report on.
+STITCH_VIEWS := $(OUTPUTS)/experiments/stitch-views
+stitch-train: setup ## Train the needle and thread network anew, half a CPU hour with rendering (QUICK=1: 40 steps)
+	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-train$(if $(QUICK),-quick)
+	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --steps 3000 --start $(OUTPUTS)/experiments/stitch-train$(if $(QUICK),-quick)/segmentation.safetensors --out $(OUTPUTS)/experiments/stitch-train-refined$(if $(QUICK),-quick)
+
+stitch-segmentation: setup ## The network's masks on held-out views, and the needle's pose from them (QUICK=1: four views)
+	$(PYTHON) -m benchmarks.stitch.segmentation $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-segmentation$(if $(QUICK),-quick)
+
+stitch-thread: setup ## Threads as curves in space, from true and from learned masks (QUICK=1: four views)
+	$(PYTHON) -m benchmarks.stitch.thread $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-thread$(if $(QUICK),-quick)
 
 .PHONY: llm3
 # A hundred reporting seeds a cell, about ten minutes of one core; a stopped run goes on where it was.

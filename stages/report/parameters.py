@@ -21,6 +21,10 @@ from schemas.kinds import (
     Report,
     Segments,
     Sequence,
+    SutureEvaluation,
+    SutureNeedle,
+    SutureThread,
+    SutureTrial,
     TablewareDetections,
     TablewareEvaluation,
     TablewarePlan,
@@ -52,7 +56,7 @@ def check_inputs(parameters: ReportParameters, inputs: Mapping[str, Any]) -> Non
 
 STAGE = Stage(
     name="report",
-    version=6,
+    version=7,
     summary="Write one self-contained HTML page about a run: pictures, graph, figures, times, how it was made",
     parameters=ReportParameters,
     reads={
@@ -71,6 +75,10 @@ STAGE = Stage(
         "tableware_plan": Optionally(TablewarePlan),
         "tableware_trial": Optionally(TablewareTrial),
         "tableware_evaluation": Optionally(TablewareEvaluation),
+        "suture_needle": Optionally(SutureNeedle),
+        "suture_thread": Optionally(SutureThread),
+        "suture_trial": Optionally(SutureTrial),
+        "suture_evaluation": Optionally(SutureEvaluation),
         "evaluation": Optionally(Evaluation),
         "baseline_evaluation": Optionally(Evaluation),
     },

@@ -23,6 +23,8 @@ from schemas.panoptic_map import PanopticMap
 from schemas.plan import Plan
 from schemas.segments import Segments
 from schemas.sequence import Sequence
+from schemas.suture_needle import SutureNeedle, SutureThread
+from schemas.suture_trial import SutureEvaluation, SutureTrial
 from schemas.tableware_detections import TablewareDetections
 from schemas.tableware_plan import TablewarePlan
 from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
@@ -44,6 +46,7 @@ from stages.report.placed_models import ModelShelf
 from stages.report.provenance import made_of
 from stages.report.stereo_section import stereo_view
 from stages.report.surfaces import Model, cad_model, map_model, true_model
+from stages.report.suture_section import suture_view
 from stages.report.tableware_section import tableware_view
 from stages.report.views import Label, View, oblique_view, place_labels, render, top_view
 
@@ -57,7 +60,7 @@ SECTIONS = (
     ("frames", "Frames", "frames"), ("stereo", "Stereo", "stereo"), ("map", "Map", "map_text"),
     ("graph", "Contact graph", "graph"),
     ("cad", "CAD scene", "cad_views"), ("scene", "Interactive scene", "bodies"), ("plan", "Plan", "plan"),
-    ("packing", "Packing", "packing"), ("tableware", "Tableware", "tableware"),
+    ("packing", "Packing", "packing"), ("tableware", "Tableware", "tableware"), ("suture", "Suturing", "suture"),
     ("figures", "Figures", "groups"), ("cost", "Time and memory", "made"), ("made", "How it was made", "made"),
 )  # fmt: skip
 
@@ -93,6 +96,10 @@ def run(
     tableware_plan: TablewarePlan | None = None,
     tableware_trial: TablewareTrial | None = None,
     tableware_evaluation: TablewareEvaluation | None = None,
+    suture_needle: SutureNeedle | None = None,
+    suture_thread: SutureThread | None = None,
+    suture_trial: SutureTrial | None = None,
+    suture_evaluation: SutureEvaluation | None = None,
     evaluation: Evaluation | None = None,
     baseline_evaluation: Evaluation | None = None,
     *,
@@ -107,6 +114,8 @@ def run(
         "tableware_detections": tableware_detections, "tableware_plan": tableware_plan,
         "tableware_trial": tableware_trial,
         "tableware_evaluation": tableware_evaluation,
+        "suture_needle": suture_needle, "suture_thread": suture_thread, "suture_trial": suture_trial,
+        "suture_evaluation": suture_evaluation,
         "evaluation": evaluation, "baseline_evaluation": baseline_evaluation,
     }  # fmt: skip
     artifacts = {role: artifact for role, artifact in given.items() if artifact is not None}
@@ -140,6 +149,9 @@ def run(
             values["tableware"] = tableware_view(
                 tableware_detections, tableware_plan, tableware_trial, tableware_evaluation, 1100
             )
+    if any(role.startswith("suture_") for role in artifacts):
+        with context.progress.step("suture"):
+            values["suture"] = suture_view(suture_needle, suture_thread, suture_trial, suture_evaluation, 1100)
     if evaluation is not None:
         with context.progress.step("figures"):
             _add_figures(values, evaluation, baseline_evaluation)
@@ -154,7 +166,8 @@ def run(
 def _empty_page() -> dict[str, Any]:
     empty = (
         "frames stereo legend map_views graph cad_views replacements bodies fixed_bodies groups notes plots tables "
-        "metrics tiles plan packing tableware baseline has_intervals plan_ok checked objects_changed objects_kept trees"
+        "metrics tiles plan packing tableware suture baseline has_intervals plan_ok checked objects_changed "
+        "objects_kept trees"
     )
     texts = "frames_text map_text graph_text graph_errors cad_text scene_text figures_text"
     values: dict[str, Any] = dict.fromkeys(empty.split(), None)
@@ -180,6 +193,8 @@ def _title(ground_truth: GroundTruth | None, sequence: Sequence | None, artifact
         return "Boxes and a basket"
     if artifacts and all(role.startswith("tableware_") for role in artifacts):
         return "A table to clear"
+    if artifacts and all(role.startswith("suture_") for role in artifacts):
+        return "Suture throws"
     if ground_truth is not None and ground_truth.truth.source == "generated":
         return "A generated room, reconstructed"
     return "A scanned room, reconstructed" if sequence is not None else "A reconstructed room"
@@ -197,6 +212,8 @@ def _lead(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts
         "tableware_detections": "a table that was looked at", "tableware_plan": "a plan to clear a table",
         "tableware_trial": "a table being cleared",
         "tableware_evaluation": "a comparison of policies",
+        "suture_needle": "a needle that was looked at", "suture_thread": "a thread that was traced",
+        "suture_trial": "sutures thrown in a simulator", "suture_evaluation": "their figures",
     }  # fmt: skip
     if isinstance(plan := artifacts.get("plan"), Plan):
         status = plan.plan.status

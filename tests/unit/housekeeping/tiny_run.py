@@ -9,6 +9,7 @@ import trimesh
 
 from schemas.cad_library import CadLibrary
 from tests.unit.viewing import artifacts
+from tests.unit.viewing.suture_artifacts import make_suture
 from tests.unit.viewing.tableware_artifacts import make_tableware
 
 
@@ -40,4 +41,5 @@ def make_tiny_run(folder: Path) -> Path:
     artifacts.make_trajectory(folder)
     artifacts.make_export(folder)
     make_tableware(folder)
+    make_suture(folder)
     return folder

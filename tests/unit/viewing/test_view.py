@@ -24,6 +24,7 @@ from stages.kit.viewing.library_view import row_places
 from stages.kit.viewing.segments_view import segment_images
 from stages.kit.viewing.view import VIEWERS, view_artifact
 from tests.unit.viewing import artifacts
+from tests.unit.viewing.suture_artifacts import make_suture
 from tests.unit.viewing.tableware_artifacts import make_tableware
 
 
@@ -41,6 +42,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     artifacts.make_plan(folder)
     artifacts.make_packing(folder)
     make_tableware(folder)
+    make_suture(folder)
     artifacts.make_ground_truth(folder, library)
     artifacts.make_evaluation(folder)
     artifacts.make_report(folder)
@@ -83,6 +85,11 @@ EXPECTED = {
         "/world/robot/panda_hand",
         "/world/layout",
     },
+    "suture_scene": {"/world/camera/color", "/world/camera/right", "/world/truth/needle", "/world/truth/thread"},
+    "suture_needle": {"/needle", "/world/needle", "/world/filtered", "/world/left_eye", "/world/eyes/needle"},
+    "suture_thread": {"/thread", "/world/thread", "/world/eyes/thread"},
+    "suture_trial": {"/trial", "/world/needle", "/world/thread", "/world/driver_left", "/world/strip/panels"},
+    "suture_evaluation": {"/figures", "/world/plots/sutures"},
     "tableware_detections": {"/seen", "/world/items/1_cup", "/world/items/2_unknown", "/world/overlay"},
     "tableware_scene": {"/world/items/cup_1", "/world/table", "/world/camera/color"},
     "tableware_plan": {"/plan", "/world/strip", "/world/stackings/1", "/world/table"},

@@ -17,6 +17,13 @@ from stages.kit.running.loading.scenes import (
     LoadedContactGraph,
     LoadedInteractiveScene,
 )
+from stages.kit.running.loading.suture import (
+    LoadedSutureEvaluation,
+    LoadedSutureNeedle,
+    LoadedSutureScene,
+    LoadedSutureThread,
+    LoadedSutureTrial,
+)
 from stages.kit.running.loading.tableware import (
     LoadedTablewareDetections,
     LoadedTablewareEvaluation,
@@ -42,6 +49,11 @@ __all__ = [
     "LoadedReport",
     "LoadedSegments",
     "LoadedSequence",
+    "LoadedSutureEvaluation",
+    "LoadedSutureNeedle",
+    "LoadedSutureScene",
+    "LoadedSutureThread",
+    "LoadedSutureTrial",
     "LoadedTablewareDetections",
     "LoadedTablewareEvaluation",
     "LoadedTablewarePlan",

@@ -21,6 +21,13 @@ from stages.kit.running.loading.scenes import (
     LoadedContactGraph,
     LoadedInteractiveScene,
 )
+from stages.kit.running.loading.suture import (
+    LoadedSutureEvaluation,
+    LoadedSutureNeedle,
+    LoadedSutureScene,
+    LoadedSutureThread,
+    LoadedSutureTrial,
+)
 from stages.kit.running.loading.tableware import (
     LoadedTablewareDetections,
     LoadedTablewareEvaluation,
@@ -46,6 +53,11 @@ CLASSES: dict[str, type[LoadedArtifact]] = {
     "report": LoadedReport,
     "segments": LoadedSegments,
     "sequence": LoadedSequence,
+    "suture_evaluation": LoadedSutureEvaluation,
+    "suture_needle": LoadedSutureNeedle,
+    "suture_scene": LoadedSutureScene,
+    "suture_thread": LoadedSutureThread,
+    "suture_trial": LoadedSutureTrial,
     "tableware_detections": LoadedTablewareDetections,
     "tableware_evaluation": LoadedTablewareEvaluation,
     "tableware_plan": LoadedTablewarePlan,
