@@ -2,8 +2,8 @@
 
 An exception that a signal handler raises gets lost inside callbacks of native libraries, inside finalizers, and in
 libraries that import others between `try` and `except BaseException`. While a step works it is therefore raised again
-every second until it arrives, and the runner asks once more before a result takes its place. Where the interpreter loses
-it (a finalizer, a callback that has nobody to raise to) it would print a traceback beside our one line: not for these.
+every second until it arrives, and the runner asks once more before a result takes its place. Where the interpreter
+loses it (a finalizer, a callback that has nobody to raise to) it would print a traceback beside our one line: silenced.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def install() -> None:
 
 
 def report_unraisable(lost: sys.UnraisableHookArgs) -> None:
-    """Hook for exceptions that cannot be raised: as Python does, but silent about an interruption, which is repeated."""
+    """Hook for exceptions that cannot be raised: as Python's, but silent about an interruption, which is repeated."""
     if not (_requested and issubclass(lost.exc_type, KeyboardInterrupt)):
         sys.__unraisablehook__(lost)
 
