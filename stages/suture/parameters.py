@@ -174,7 +174,7 @@ THREAD = Stage(
 )
 SIMULATE = Stage(
     name="suture simulate",
-    version=1,
+    version=2,
     summary="Throw running sutures with two simulated arms until a failure that ends the trial, or six",
     parameters=SimulateParameters,
     reads={"perception": Optionally(External("error model of perception (TOML) that every arm sees by"))},

@@ -120,6 +120,7 @@ def recover(bench: Bench, random: np.random.Generator, thrown: int) -> None:
         wanted = cinch_length(made, bench.policy.constants)
         more = min(max(0.0, wanted - thread.working), max(0.0, thread.tail - LEFT_IN_FIRST_HOLE))
         thread.working, thread.tail = thread.working + more, thread.tail - more
+        bench.tail_reckoned -= more
     elif thrown == 0:
         thread.working += max(0.0, thread.tail)
         thread.tail = 0.0
