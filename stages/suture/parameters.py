@@ -187,7 +187,7 @@ SIMULATE = Stage(
 )
 EVALUATE = Stage(
     name="suture evaluate",
-    version=1,
+    version=2,
     summary="Figures of trials (table 4.1, figure 4.1) and of needle poses and threads against the truth",
     parameters=EvaluateParameters,
     reads={

@@ -68,6 +68,8 @@ class Bench:
     anchor: np.ndarray | None = None
     holes: tuple[np.ndarray, ...] = ()
     """Where the needle in tissue really went in and came out, (3,) each."""
+    expected: Seen | None = None
+    """Where the robot believes the needle to lie that it has just inserted."""
     rope: np.ndarray = field(default_factory=lambda: np.zeros((PARTICLES, 3)))
     seconds: float = 0.0
     busy: dict[str, float] = field(default_factory=dict)

@@ -189,11 +189,18 @@ def insert(bench: Bench, belief: Believed) -> None:
     bench.record("b: inserted")
     if found.fault is not None:
         raise Failed("I", found.fault)
+    bench.expected = as_planned(belief, tools[-1])
     bench.holes = tuple(hole for hole in (found.entered, found.left) if hole is not None)
     bench.hold = None
     away = bench.tools["right"].copy()
     away[:3, 3] += np.array([-0.02, 0.0, 0.03])
     bench.withdraw("right", away)
+
+
+def as_planned(belief: Believed, tool: np.ndarray) -> Seen:
+    """Return where the believed needle lies once its driver is at `tool` (4, 4)."""
+    tip, centre = apply(tool, belief.tip), apply(tool, belief.centre)
+    return Seen(tool[:3, :3] @ belief.normal, tip, 2.0 * centre - tip, False)
 
 
 def beside_wound(suture: int) -> np.ndarray:

@@ -88,6 +88,8 @@ class Policy:
     centres_jaws: bool = False
     """The left jaws close on the wire beside the seen end in their middle, not 5 mm beyond the end; a turn that was
     cut short is finished, not made again."""
+    expects: bool = False
+    """A needle in tissue that cannot be known is taken to lie as its insertion was planned, at the first try."""
     watches_slack: bool = False
     """Looks at the stitch after cinching and pulls on by what is seen to be loose."""
     fuses_looks: bool = False
@@ -108,6 +110,7 @@ OURS = Policy(
     moves_both=True,
     checks_place=True,
     centres_jaws=True,
+    expects=True,
     watches_slack=True,
     fuses_looks=True,
     checks_turn=True,

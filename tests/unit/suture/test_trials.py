@@ -21,7 +21,7 @@ from stages.suture.trials.drawing import draw_strip
 from stages.suture.trials.extraction import GRASPING, grasp_point, left_to_turn, nearer_end
 from stages.suture.trials.gripping import close
 from stages.suture.trials.handover import farther_end, handed_over, middle, turned_about
-from stages.suture.trials.insertion import fused, in_driver, nominal_needle
+from stages.suture.trials.insertion import as_planned, believed, fused, in_driver, nominal_needle
 from stages.suture.trials.machine import Outcome, run_trial
 from stages.suture.trials.perception import FOLDER, Errors, Eyes, PerceptionModel, Seen, Shares, perception_model
 from stages.suture.trials.recording import Recorder
@@ -294,9 +294,9 @@ def test_each_driver_has_its_clock() -> None:
 
 def test_a_needle_seen_where_it_cannot_be_is_not_believed() -> None:
     away = np.array([[0.05, 0.05, 0.05]])
-    for arm, believed in (("ours", False), ("thesis", True)):
+    for arm, trusted in (("ours", False), ("thesis", True)):
         bench = bench_of(POLICIES[arm])
-        assert (bench.look("corner_right", away) is not None) is believed
+        assert (bench.look("corner_right", away) is not None) is trusted
         assert bench.look("corner_right", bench.jaws("right")) is not None
 
 
@@ -337,6 +337,17 @@ def test_looks_from_several_poses_count_together() -> None:
     normal, far, near = fused(kept, CORNER)
     assert np.allclose(normal, needle[:3, 2]) and np.allclose(far, point_at(needle, 0.0))
     assert np.allclose(near, point_at(needle, np.pi))
+
+
+def test_the_needle_is_expected_where_its_insertion_was_planned() -> None:
+    nominal, tool = nominal_needle(1), HOME["right"]
+    ends = point_at(nominal, 0.0), point_at(nominal, np.pi)
+    belief = believed(tool, tool[:3, :3], nominal[:3, 2], ends)
+    path = primitives.insertion(tool, exit_(1) - entry(1), nominal[:3, 2], nominal[:3, 3])
+    after = path[-1] @ np.linalg.inv(tool) @ nominal
+    expected = as_planned(belief, path[-1])
+    assert np.allclose(expected.pose, after)
+    assert np.isclose(left_to_turn(expected), np.radians(80.0))
 
 
 def test_pulling_on_takes_slack_before_tail() -> None:
@@ -410,6 +421,10 @@ def test_tables_count_as_they_say(tmp_path: Path) -> None:
     assert np.isclose(figures["thesis/trials/single_suture_rate"], 4 / 6, atol=1e-5)
     assert figures["thesis/trials/errors_i"] == figures["ours/trials/errors_t"] == 1.0
     assert figures["ours/trials/sutures_ratio"] == 2.5
+    assert np.isclose(figures["ours/trials/seconds_ratio"], (200 / 11) / (200 / 6), atol=1e-5)
+    assert np.isclose(figures["ours/trials/seconds_completed_ratio"], 0.4)
+    assert figures["ours/trials/sutures_ratio_low"] == 2.0 and figures["ours/trials/sutures_ratio_high"] == 4.0
+    assert "| ours / thesis | 2.50 [2.00, 4.00] |" in table(runs)
     assert figures["ours/trials/full_wound_rate"] == 0.5
     assert "*printed*" in table(runs) and "| ours | T | why | 1 |" in table(runs)
     assert Outcome(sutures=6).closed
