@@ -4,10 +4,10 @@
 
 Reporting seeds 1200 to 1399 (1000 to 1099 were run with policies before this one), tuning seeds (`--tuning`) 0 to 199;
 `--quick` takes the first ten. Writes runs.jsonl, metrics.json, table.md, sutures.png and, of the first seed, the key
-frames and a strip of an `ours` trial. `--seconds` stops early, between two seeds. Beside the arms of the issue:
-`ours_thesis_eyes` has our policies and the thesis's error model of perception, `ours_one_at_a_time` never moves both
-drivers at once, `thesis_other_test` is the thesis with the other reading of its handover test; `--without` takes one
-mechanism at a time from `ours`.
+frames and the strip of a suture of an `ours` trial. `--seconds` stops early, between two seeds. Beside the arms of the
+issue: `ours_thesis_eyes` has our policies and the thesis's error model of perception, `ours_one_at_a_time` never moves
+both drivers at once, `thesis_other_test` is the thesis with the other reading of its handover test; `--without` takes
+one mechanism at a time from `ours`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from stages.suture.trials.recording import Recorder
 from stages.suture.trials.records import run_of
 from stages.suture.trials.settings import POLICIES
 
-REPORTING, TUNING, TRIALS, QUICK, FRAMES = 1200, 0, 200, 10, 13
+REPORTING, TUNING, TRIALS, QUICK, FRAMES = 1200, 0, 200, 10, 18
 ARMS = {
     **POLICIES,
     "ours_thesis_eyes": replace(POLICIES["ours"], perception="thesis"),

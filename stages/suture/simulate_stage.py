@@ -18,7 +18,7 @@ from stages.suture.trials.recording import Recorder
 from stages.suture.trials.records import run_of
 from stages.suture.trials.settings import POLICIES, World
 
-PANELS_SHOWN = 13
+PANELS_SHOWN = 18
 CLASSES = {"I": "insertion", "E": "extraction", "H": "handover", "T": "thread"}
 
 

@@ -175,6 +175,16 @@ class Bench:
         if self.recorder is not None:
             self.recorder.keep(panel, self.suture, self.seconds, self.tools, self.needle, self.rope)
 
+    def record_past(
+        self, panel: str, seconds: float, arm: str, tool: np.ndarray, needle: np.ndarray, rope: np.ndarray
+    ) -> None:
+        """Keep a key frame of a moment within the last motion: poses (4, 4) then, and the thread (N, 3) before it,
+        whose end is led to the needle."""
+        if self.recorder is not None:
+            share = np.linspace(0.0, 1.0, len(rope))[:, None]
+            led = rope + share * (point_at(needle, np.pi) - rope[-1])
+            self.recorder.keep(panel, self.suture, seconds, {**self.tools, arm: tool}, needle, led)
+
     def lay_thread(self) -> None:
         """Lay the thread anew between its anchor (or its free end on the pad) and the needle, and let it fall."""
         swage = point_at(self.needle, np.pi)

@@ -11,7 +11,7 @@ from stages.suture.motion import primitives
 from stages.suture.motion.constants import CORRECTION_TURN, NORMAL_SAMPLES
 from stages.suture.motion.needle import TIP, UP_THE_WOUND, point_at, turned, upright
 from stages.suture.rig import NEEDLE_RADIUS
-from stages.suture.trials.bench import CORNER, Bench, Failed
+from stages.suture.trials.bench import CORNER, Bench, Failed, travel_time
 from stages.suture.trials.perception import Seen
 from stages.suture.trials.wound import CHORD, HOLE_HEIGHT, SPANNED, entry, exit_, passage
 
@@ -182,10 +182,14 @@ def insert(bench: Bench, belief: Believed) -> None:
             for tool, share in zip(tools, shares, strict=True)
         ]
     )
+    started, lain = bench.seconds, bench.rope.copy()
     bench.move("right", tools)
     bench.needle = needles[-1]
     tips = needles[:, :3, :3] @ TIP + needles[:, :3, 3]
     found = passage(tips, -needles[:, :3, 1], bench.suture)
+    pushed = len(tools) // 2 - 1
+    bench.record_past("a: pushed in", started + travel_time(tools[: pushed + 1], bench.world.speed), "right",
+                      tools[pushed], needles[pushed], lain)  # fmt: skip
     bench.record("b: inserted")
     if found.fault is not None:
         raise Failed("I", found.fault)

@@ -17,7 +17,7 @@ from stages.suture.motion.needle import SWAGE, TIP, from_ends, point_at, turned,
 from stages.suture.rig import NEEDLE_RADIUS
 from stages.suture.robot.arms import ARMS
 from stages.suture.trials.bench import CORNER, HOME, Bench, loaded
-from stages.suture.trials.drawing import draw_strip
+from stages.suture.trials.drawing import draw_strip, whole_suture
 from stages.suture.trials.extraction import GRASPING, grasp_point, left_to_turn, nearer_end
 from stages.suture.trials.gripping import close
 from stages.suture.trials.handover import farther_end, handed_over, middle, turned_about
@@ -391,10 +391,16 @@ def test_frames_are_recorded_and_drawn(tmp_path: Path) -> None:
     recorder.write(tmp_path / "frames.npz")
     with np.load(tmp_path / "frames.npz", allow_pickle=False) as frames:
         arrays = {name: frames[name] for name in frames.files}
-    assert {"b: inserted", "c: swept", "e: turned out", "g: both hold", "k: 90 degrees about y"} <= set(arrays["panel"])
+    assert {"a: pushed in", "b: inserted", "c: swept", "e: turned out", "g: both hold", "k: 90 degrees about y"} <= set(
+        arrays["panel"]
+    )
     assert arrays["thread"].shape == (len(arrays["panel"]), PARTICLES, 3)
     assert draw_strip(tmp_path / "strip.png", arrays, suture=0, most=3) == 3
     assert (tmp_path / "strip.png").stat().st_size > 5000
+    shown = [str(arrays["panel"][row])[0] for row in whole_suture(arrays)]
+    assert "".join(dict.fromkeys(shown)) == "abcdefghijk" and shown == sorted(shown)
+    few = {name: array[:3] for name, array in arrays.items()}
+    assert list(whole_suture(few)) == [0, 1, 2]
     with pytest.raises(ValueError, match="no frame"):
         draw_strip(tmp_path / "none.png", arrays, suture=9)
 
