@@ -30,6 +30,11 @@ def interval(values: np.ndarray, weights: np.ndarray | None = None) -> tuple[flo
     return float(np.percentile(drawn, 2.5)), float(np.percentile(drawn, 97.5))
 
 
+def interval_of(values: Sequence[float]) -> tuple[float, float]:
+    """Return the interval of the mean of plain numbers."""
+    return interval(np.array(values, dtype=float))
+
+
 def by_arm(runs: Sequence[SutureRun]) -> dict[str, dict[int, SutureRun]]:
     """Return arm -> seed -> run."""
     groups: dict[str, dict[int, SutureRun]] = {}

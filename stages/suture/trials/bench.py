@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from stages.suture.trials.rope import PARTICLES, drape, winding
 from stages.suture.trials.settings import Policy, World
 from stages.suture.trials.thread import Drawn, Thread, draw
 from stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT
+
+if TYPE_CHECKING:
+    from stages.suture.trials.sight import LookingEyes
 
 HOME = {
     "right": transform_from(jaws(np.array([0.5, 0.0, -0.85])), np.array([-0.050, 0.0, 0.055])),
@@ -56,7 +60,7 @@ class Bench:
 
     policy: Policy
     world: World
-    eyes: Eyes
+    eyes: Eyes | LookingEyes
     random: np.random.Generator
     hand_eye: np.ndarray
     thread: Thread
