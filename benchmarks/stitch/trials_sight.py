@@ -3,8 +3,8 @@
     python -m benchmarks.stitch.trials_sight --out FOLDER [--sight geometry|pictures] [--arm ours] [--count N]
         [--first SEED] [--seconds S]
 
-`geometry`: masks spoiled as a learned mask's, 20 s of one core a trial; `pictures`: rendered pictures and the network's
-masks, five minutes. Writes looks.jsonl (a stopped run goes on) and table.md: sutures and seconds of both, and what
+`geometry`: masks spoiled as a learned mask's, 15 s of one core a trial; `pictures`: rendered pictures and the network's
+masks, 80 s. Writes looks.jsonl (a stopped run goes on) and table.md: sutures and seconds of both, and what
 became of the looks by place, which is what the error model's shares say. `--seconds` stops between two trials.
 """
 

@@ -63,7 +63,7 @@ class SimulateParameters(Parameters):
     sight: Literal["model", "geometry", "pictures"] = Field(
         "model",
         description="The needle is seen by an error `model`; or by the arm's estimator on views that are rendered of "
-        "the trial: `geometry` with spoiled masks (20 s a trial), `pictures` with the network's (5 minutes)",
+        "the trial: `geometry` with spoiled masks (15 s a trial), `pictures` with the network's (80 s)",
     )
 
 
