@@ -1,11 +1,14 @@
 """Suture trials of every arm on the same seeds; a stopped run goes on where it was.
 
     python -m benchmarks.stitch.trials --out FOLDER [--quick] [--tuning] [--arms NAME ...] [--count N] [--seconds S]
+        [--without] [--perception FILE]
 
-Reporting seeds 1000 to 1099, tuning seeds (`--tuning`) 0 to 99; `--quick` takes the first ten. Writes runs.jsonl,
-metrics.json, table.md, sutures.png and, of the first seed, the key frames and a strip of an `ours` trial.
-`--seconds` stops early, between two seeds. Beside the arms of the issue: `ours_thesis_eyes` has our policies and the
-thesis's error model of perception, `thesis_other_test` is the thesis with the other reading of its handover test.
+Reporting seeds 1200 to 1399 (1000 to 1099 were run with policies before this one), tuning seeds (`--tuning`) 0 to 199;
+`--quick` takes the first ten. Writes runs.jsonl, metrics.json, table.md, sutures.png and, of the first seed, the key
+frames and the strip of a suture of an `ours` trial. `--seconds` stops early, between two seeds. Beside the arms of the
+issue: `ours_thesis_eyes` has our policies and the thesis's error model of perception, `ours_one_at_a_time` never moves
+both drivers at once, `thesis_other_test` is the thesis with the other reading of its handover test; `--without` takes
+one mechanism at a time from `ours`; `--perception` lets every arm see by another error model.
 """
 
 from __future__ import annotations
@@ -19,22 +22,29 @@ from pathlib import Path
 from benchmarks.stitch.trials_records import Run, read_runs
 from stages.suture.evaluation.trial_figures import metrics, table
 from stages.suture.trials.machine import run_trial
+from stages.suture.trials.perception import PerceptionModel, perception_model
 from stages.suture.trials.recording import Recorder
 from stages.suture.trials.records import run_of
 from stages.suture.trials.settings import POLICIES
 
-REPORTING, TUNING, TRIALS, QUICK, FRAMES = 1000, 0, 100, 10, 13
+REPORTING, TUNING, TRIALS, QUICK, FRAMES = 1200, 0, 200, 10, 18
 ARMS = {
     **POLICIES,
     "ours_thesis_eyes": replace(POLICIES["ours"], perception="thesis"),
+    "ours_one_at_a_time": replace(POLICIES["ours"], moves_both=False),
     "thesis_other_test": replace(POLICIES["thesis"], retries_when_unchanged=False),
 }
+MECHANISMS = (
+    "servoes_ends", "keeps_books", "cinches_before_handover", "checks_place", "centres_jaws", "expects",
+    "watches_slack", "fuses_looks", "checks_turn", "sweeps",
+)  # fmt: skip
+WITHOUT = {f"ours_without_{name}": replace(POLICIES["ours"], **{name: False}) for name in MECHANISMS}
 
 
-def one(arm: str, seed: int) -> Run:
-    """Run a trial and return its record."""
+def one(arm: str, seed: int, model: PerceptionModel | None = None) -> Run:
+    """Run a trial and return its record; `model` replaces the arm's own."""
     started = time.process_time()
-    outcome = run_trial(ARMS[arm], seed)
+    outcome = run_trial((ARMS | WITHOUT)[arm], seed, model=model)
     spent = round(time.process_time() - started, 3)
     return Run(**run_of(arm, seed, outcome).model_dump(), cpu_seconds=spent)
 
@@ -46,6 +56,8 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="ten trials an arm")
     parser.add_argument("--tuning", action="store_true", help="tuning seeds instead of reporting seeds")
     parser.add_argument("--arms", nargs="+", default=list(ARMS), choices=list(ARMS))
+    parser.add_argument("--perception", type=Path, help="an error model for every arm, instead of its own")
+    parser.add_argument("--without", action="store_true", help="ours, and ours without each of its mechanisms")
     parser.add_argument("--count", type=int, default=TRIALS, help="trials an arm")
     parser.add_argument("--seconds", type=float, help="stop after this time")
     options = parser.parse_args()
@@ -53,12 +65,14 @@ def main() -> None:
     log = options.out / "runs.jsonl"
     first = TUNING if options.tuning else REPORTING
     seeds = range(first, first + (QUICK if options.quick else options.count))
+    model = perception_model(options.perception) if options.perception else None
+    arms = ["ours", *WITHOUT] if options.without else options.arms
     done = {(run.arm, run.seed) for run in read_runs(log)}
     started = time.monotonic()
     for seed in seeds:
         if options.seconds is not None and time.monotonic() - started > options.seconds:
             break
-        rows = [one(arm, seed) for arm in options.arms if (arm, seed) not in done]
+        rows = [one(arm, seed, model) for arm in arms if (arm, seed) not in done]
         with log.open("a", encoding="utf-8") as stream:
             stream.writelines(run.model_dump_json() + "\n" for run in rows)
     runs = [run for run in read_runs(log) if run.seed in seeds]
@@ -73,7 +87,7 @@ def pictures(folder: Path, runs: list[Run], seed: int) -> None:
     from stages.suture.evaluation.plots import histogram
     from stages.suture.trials.drawing import draw_strip
 
-    histogram(folder / "sutures.png", runs)
+    histogram(folder / "sutures.png", [run for run in runs if run.arm in POLICIES])
     recorder = Recorder()
     run_trial(ARMS["ours"], seed, recorder=recorder)
     recorder.write(folder / "frames.npz")

@@ -94,8 +94,8 @@ def suture_view(
         thread_pictures=_pictures(thread, "thread", width),
         trial="" if file is None else file.statement,
         strip=strip,
-        strip_text="" if file is None else f"{file.recorded_arm}, seed {file.recorded_seed}: the first motions, from "
-        "the cameras' side and from above",
+        strip_text="" if file is None else f"{file.recorded_arm}, seed {file.recorded_seed}: a suture's motions, a "
+        "to k of the thesis's figure 3.2, from the cameras and from above",
         runs=() if file is None else tuple(_run_row(one) for one in file.runs[:MOST_RUNS]),
         runs_left_out=0 if file is None else max(0, len(file.runs) - MOST_RUNS),
         assumed=() if file is None else tuple(one.arm for one in file.perception if not one.measured),

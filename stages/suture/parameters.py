@@ -60,6 +60,11 @@ class SimulateParameters(Parameters):
     arms: tuple[str, ...] = Field(("ours",), description="Policies: " + ", ".join(ARM_NAMES))
     trials: int = Field(1, ge=1, le=2000, description="Trials of each arm")
     record: str = Field("", description="Arm whose first trial is recorded with its motions; empty: the first arm")
+    sight: Literal["model", "geometry", "pictures"] = Field(
+        "model",
+        description="The needle is seen by an error `model`; or by the arm's estimator on views that are rendered of "
+        "the trial: `geometry` with spoiled masks (15 s a trial), `pictures` with the network's (80 s)",
+    )
 
 
 class EvaluateParameters(Parameters):
@@ -96,6 +101,8 @@ def check_simulate(parameters: SimulateParameters, inputs: Mapping[str, Any]) ->
             raise UsageError(f"--arms: there is no arm {arm!r}", hint=f"choose of {', '.join(ARM_NAMES)}")
     if parameters.record and parameters.record not in parameters.arms:
         raise UsageError(f"--record {parameters.record} is none of the arms", hint=f"--arms {parameters.record}")
+    if parameters.sight != "model" and inputs.get("perception") is not None:
+        raise UsageError(f"--perception is no error model of --sight {parameters.sight}", hint="leave one of them out")
     if len(set(parameters.arms)) != len(parameters.arms):
         raise UsageError(f"--arms: an arm is named twice ({' '.join(parameters.arms)})", hint="name each once")
 
@@ -174,7 +181,7 @@ THREAD = Stage(
 )
 SIMULATE = Stage(
     name="suture simulate",
-    version=1,
+    version=2,
     summary="Throw running sutures with two simulated arms until a failure that ends the trial, or six",
     parameters=SimulateParameters,
     reads={"perception": Optionally(External("error model of perception (TOML) that every arm sees by"))},
@@ -187,7 +194,7 @@ SIMULATE = Stage(
 )
 EVALUATE = Stage(
     name="suture evaluate",
-    version=1,
+    version=2,
     summary="Figures of trials (table 4.1, figure 4.1) and of needle poses and threads against the truth",
     parameters=EvaluateParameters,
     reads={

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +19,10 @@ from stages.suture.trials.recording import Recorder
 from stages.suture.trials.records import run_of
 from stages.suture.trials.settings import POLICIES, World
 
-PANELS_SHOWN = 13
+if TYPE_CHECKING:
+    from stages.suture.trials.sight import LookingEyes
+
+PANELS_SHOWN = 18
 CLASSES = {"I": "insertion", "E": "extraction", "H": "handover", "T": "thread"}
 
 
@@ -32,17 +36,13 @@ def run(perception: Path | None, *, parameters: SimulateParameters, context: Con
     pairs = [(seed, arm) for seed in range(context.seed, context.seed + parameters.trials) for arm in parameters.arms]
     for seed, arm in context.progress.track(pairs, total=len(pairs), description="trials"):
         kept = recorder if (seed, arm) == recorded else None
-        runs.append(run_of(arm, seed, run_trial(POLICIES[arm], seed, world, models[arm], kept)))
+        eyes = _eyes(models[arm], seed, parameters.sight)
+        runs.append(run_of(arm, seed, run_trial(POLICIES[arm], seed, world, models[arm], kept, eyes)))
     statement = _statement(runs)
     SutureTrialFile(
         statement=statement,
         runs=tuple(runs),
-        perception=tuple(
-            SuturePerception(
-                arm=arm, model=model.name, measured=model.measured, provenance=" ".join(model.provenance.split())
-            )
-            for arm, model in models.items()
-        ),
+        perception=tuple(_perception(arm, model, parameters.sight) for arm, model in models.items()),
         world={name: float(value) for name, value in asdict(world).items()},
         recorded_arm=recorded[1],
         recorded_seed=recorded[0],
@@ -52,7 +52,7 @@ def run(perception: Path | None, *, parameters: SimulateParameters, context: Con
         ),
     ).write(context.output / "trial.json")
     context.output.joinpath("trial.txt").write_text(
-        trial_text(statement, runs, models, recorder, recorded), encoding="utf-8"
+        trial_text(statement, runs, models, recorder, recorded, parameters.sight), encoding="utf-8"
     )
     recorder.write(context.output / "frames.npz")
     np.savez_compressed(context.output / "motions.npz", allow_pickle=False, **recorder.motions())
@@ -82,6 +82,25 @@ def _model(arm: str, given: Path | None) -> PerceptionModel:
     return perception_model(FOLDER / f"perception_{POLICIES[arm].perception}.toml")
 
 
+def _eyes(model: PerceptionModel, seed: int, sight: str) -> LookingEyes | None:
+    if sight == "model":
+        return None
+    from stages.suture.trials.sight import LookingEyes
+
+    return LookingEyes(model, seed, sight == "pictures")
+
+
+def _perception(arm: str, model: PerceptionModel, sight: str) -> SuturePerception:
+    """Return what is said of how an arm sees."""
+    if sight == "model":
+        told = " ".join(model.provenance.split())
+        return SuturePerception(arm=arm, model=model.name, measured=model.measured, provenance=told)
+    from stages.suture.trials.sight import SIGHTS
+
+    whose = "the thesis's estimator" if model.name == "thesis" else "our estimator"
+    return SuturePerception(arm=arm, model=sight, measured=True, provenance=f"{whose}: {SIGHTS[sight]}")
+
+
 def _statement(runs: list[SutureRun]) -> str:
     if len(runs) > 1:
         thrown = sum(one.sutures for one in runs)
@@ -106,11 +125,13 @@ def trial_text(
     models: dict[str, PerceptionModel],
     recorder: Recorder,
     recorded: tuple[int, str],
+    sight: str = "model",
 ) -> str:
     """Return the trials as people read them; `recorded` are seed and arm of the recorded one."""
     lines = [statement, ""]
     lines += [
-        f"{arm} sees by {model.name} ({'measured' if model.measured else 'ASSUMED'})" for arm, model in models.items()
+        f"{arm} sees by {said.model} ({'measured' if said.measured else 'ASSUMED'})"
+        for arm, said in ((arm, _perception(arm, model, sight)) for arm, model in models.items())
     ]
     lines += ["", f"recorded: {recorded[1]}, seed {recorded[0]}"]
     lines += [

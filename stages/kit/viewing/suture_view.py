@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import trimesh
 
 from schemas.errors import BadInput
 from schemas.scene_parts import Box
@@ -18,9 +19,12 @@ STEEL, THREAD, TIP, TRUE = (0.75, 0.2, 0.18), (0.48, 0.31, 0.69), (0.9, 0.55, 0.
 ARM_COLORS = ((0.18, 0.44, 0.7), (0.3, 0.6, 0.42))
 """Right, left."""
 PAD = (0.12, 0.12, 0.004)
-RIDGE = (0.012, 0.1, 0.004)
+RIDGE = (0.005, 0.05, 0.005)
+"""Half its width, half its length, its height [m]: half an ellipse across, as the simulator has it."""
+REMOTE_CENTRES = ((-0.12, 0.0, 0.15), (0.12, 0.0, 0.15))
+"""Of the right and the left arm [m]: every shaft goes through its own."""
 NEEDLE_RADIUS = 0.012
-SHAFT, JAW = 0.08, 0.012
+JAW = 0.0102
 WIRE, LINE = 0.0005, 0.0003
 ARC = np.linspace(0.0, np.pi, 40)
 
@@ -83,8 +87,9 @@ def draw_suture_trial(trial: SutureTrial, canvas: Canvas) -> None:
     canvas.document("trial", "```\n" + trial.path("trial.txt").read_text(encoding="utf-8") + "```")
     canvas.picture("strip/panels", trial.path("strip.png").read_bytes())
     top = Box(center=(0.0, 0.0, -PAD[2] / 2), size=PAD)
-    ridge = Box(center=(0.0, 0.0, RIDGE[2] / 2), size=RIDGE)
-    canvas.boxes("pad", [top, ridge], ["pad", "wound"], [(0.93, 0.78, 0.7), (0.85, 0.6, 0.5)], show_labels=False)
+    canvas.boxes("pad", [top], ["pad"], [(0.93, 0.78, 0.7)], show_labels=False)
+    wound = ridge()
+    canvas.mesh("wound", wound, np.tile(np.array([217, 153, 128], np.uint8), (len(wound.vertices), 1)))
     names = ("seconds", "arm", "world_from_tool", "world_from_needle")
     seconds, arms, tools, needles = read_arrays(trial.path("motions.npz"), *names)
     if not len(seconds) == len(arms) == len(tools) == len(needles):
@@ -92,7 +97,7 @@ def draw_suture_trial(trial: SutureTrial, canvas: Canvas) -> None:
     for row in range(len(seconds)):
         canvas.time(float(seconds[row]))
         _driver(int(arms[row]), tools[row], canvas)
-        canvas.line("needle", [arc_points(needles[row], NEEDLE_RADIUS)], [STEEL], radius=WIRE)
+        _needle(needles[row], canvas)
     at, both, held, threads = read_arrays(
         trial.path("frames.npz"), "seconds", "world_from_tool", "world_from_needle", "thread"
     )
@@ -100,7 +105,7 @@ def draw_suture_trial(trial: SutureTrial, canvas: Canvas) -> None:
         canvas.time(float(moment))
         for arm in (0, 1):
             _driver(arm, both[event, arm], canvas)
-        canvas.line("needle", [arc_points(held[event], NEEDLE_RADIUS)], [STEEL], radius=WIRE)
+        _needle(held[event], canvas)
         canvas.line("thread", [threads[event]], [THREAD], radius=LINE)
 
 
@@ -128,12 +133,25 @@ def _pose(path: str, estimate: NeedleEstimateRecord, radius: float, canvas: Canv
     canvas.points(f"{path}_tip", arc[:1], np.array([[230, 140, 40]], np.uint8), radius=2 * WIRE)
 
 
+def ridge() -> trimesh.Trimesh:
+    """Return the raised wound as a mesh [m]."""
+    x, z = RIDGE[0] * np.cos(ARC), RIDGE[2] * np.sin(ARC)
+    ends = [np.stack([x, np.full_like(x, y), z], axis=1) for y in (-RIDGE[1], RIDGE[1])]
+    return trimesh.Trimesh(np.concatenate(ends)).convex_hull
+
+
+def _needle(pose: np.ndarray, canvas: Canvas) -> None:
+    arc = arc_points(pose, NEEDLE_RADIUS)
+    canvas.line("needle", [arc], [STEEL], radius=WIRE)
+    canvas.points("needle_tip", arc[:1], np.array([[230, 140, 40]], np.uint8), radius=2 * WIRE)
+
+
 def _driver(arm: int, tool: np.ndarray, canvas: Canvas) -> None:
-    """Draw a driver's jaw and shaft: the tool's z points along it to its tip."""
-    tip, along = tool[:3, 3], tool[:3, 2]
+    """Draw a driver's jaw, along the tool's z, and its shaft from the wrist to the arm's remote centre."""
+    tip, wrist = tool[:3, 3], tool[:3, 3] - JAW * tool[:3, 2]
     canvas.line(
         f"driver_{('right', 'left')[arm]}",
-        [np.stack([tip, tip - JAW * along]), np.stack([tip - JAW * along, tip - SHAFT * along])],
+        [np.stack([tip, wrist]), np.stack([wrist, np.array(REMOTE_CENTRES[arm])])],
         [ARM_COLORS[arm], ARM_COLORS[arm]],
         radius=0.0015,
     )

@@ -10,6 +10,7 @@ from schemas.suture_trial import SutureRun
 
 SEED_OF_INTERVALS, DRAWS = 0, 2000
 KINDS = "IEHT"
+PAIRS = (("ours", "thesis"), ("ours_one_at_a_time", "thesis"), ("ours_supervised", "thesis_supervised"))
 THESIS: dict[str, tuple[float, float, float, float, float, tuple[int, int, int, int], float | None]] = {
     "sensing_only": (1.40, 51.6, 0.0, 0.0, 106.8, (9, 6, 0, 0), None),
     "thread_handling": (1.80, 55.9, 20.0, 0.0, 117.9, (6, 5, 2, 2), None),
@@ -29,6 +30,11 @@ def interval(values: np.ndarray, weights: np.ndarray | None = None) -> tuple[flo
     return float(np.percentile(drawn, 2.5)), float(np.percentile(drawn, 97.5))
 
 
+def interval_of(values: Sequence[float]) -> tuple[float, float]:
+    """Return the interval of the mean of plain numbers."""
+    return interval(np.array(values, dtype=float))
+
+
 def by_arm(runs: Sequence[SutureRun]) -> dict[str, dict[int, SutureRun]]:
     """Return arm -> seed -> run."""
     groups: dict[str, dict[int, SutureRun]] = {}
@@ -42,7 +48,8 @@ def metrics(runs: Sequence[SutureRun]) -> dict[str, float]:
 
     `single_suture_rate` is completed over attempted throws; `seconds_per_suture` the seconds of all trials over
     attempted throws (`seconds_per_completed` over completed ones); errors are counts over all trials. Ratios of
-    ours to the thesis's arm are over the same seeds.
+    ours to the thesis's arm are over the same seeds: `sutures_ratio`, `seconds_ratio` (attempted) and
+    `seconds_completed_ratio`, their intervals of draws of pairs.
     """
     groups = by_arm(runs)
     figures: dict[str, float] = {}
@@ -72,17 +79,39 @@ def metrics(runs: Sequence[SutureRun]) -> dict[str, float]:
             figures[f"{arm}/trials/errors_{kind.lower()}"] = float(sum(run.errors.count(kind) for run in rows))
         figures[f"{arm}/trials/seen_right_share"] = sum(run.right for run in rows) / max(1, sum(r.looks for r in rows))
         figures[f"{arm}/trials/count"] = float(len(rows))
-    for ours, rival in (("ours", "thesis"), ("ours_supervised", "thesis_supervised")):
-        both = sorted(set(groups.get(ours, {})) & set(groups.get(rival, {})))
-        if both:
-            mine, other = [groups[ours][seed] for seed in both], [groups[rival][seed] for seed in both]
-            put(
-                ours, "sutures_ratio", *(np.array([run.sutures for run in rows], dtype=float) for rows in (mine, other))
-            )
-            figures[f"{ours}/trials/seconds_ratio"] = (
-                sum(run.seconds for run in mine) / sum(run.attempts for run in mine)
-            ) / (sum(run.seconds for run in other) / sum(run.attempts for run in other))
+    for ours, rival in PAIRS:
+        figures |= ratios(ours, groups.get(ours, {}), groups.get(rival, {}))
     return {name: round(value, 5) for name, value in figures.items()}
+
+
+def ratios(arm: str, ours: dict[int, SutureRun], rival: dict[int, SutureRun]) -> dict[str, float]:
+    """Return the figures of `arm` over its rival's on the seeds (keys) of both, with 95 % bootstrap intervals."""
+    seeds = sorted(set(ours) & set(rival))
+    if not seeds:
+        return {}
+    rows = np.random.default_rng(SEED_OF_INTERVALS).integers(len(seeds), size=(DRAWS, len(seeds)))
+    pair = [[group[seed] for seed in seeds] for group in (ours, rival)]
+    sutures, attempts, seconds = (
+        np.array([[getattr(run, name) for run in runs] for runs in pair], dtype=float)
+        for name in ("sutures", "attempts", "seconds")
+    )
+    figures: dict[str, float] = {}
+    for name, above, below in (
+        ("sutures_ratio", sutures, np.ones_like(sutures)),
+        ("seconds_ratio", seconds, attempts),
+        ("seconds_completed_ratio", seconds, sutures),
+    ):
+        figures[f"{arm}/trials/{name}"] = float(_over(above.sum(axis=1), below.sum(axis=1)))
+        drawn = _over(above[:, rows].sum(axis=2), below[:, rows].sum(axis=2))
+        for end, percent in (("low", 2.5), ("high", 97.5)):
+            figures[f"{arm}/trials/{name}_{end}"] = float(np.percentile(drawn, percent))
+    return figures
+
+
+def _over(above: np.ndarray, below: np.ndarray) -> np.ndarray:
+    """Return the ratio of two ratios whose parts are (2, ...): ours, the rival's."""
+    each = above / np.maximum(below, 1e-9)
+    return np.asarray(each[0] / np.maximum(each[1], 1e-9))
 
 
 def table(runs: Sequence[SutureRun]) -> str:
@@ -117,6 +146,7 @@ def table(runs: Sequence[SutureRun]) -> str:
                 f"| *printed* | 15 | {mean:.2f} | {single} % | {three} % | {full} % | {seconds} "
                 f"| {' '.join(map(str, counts))} | {'–' if between is None else between} | – |"
             )
+    lines += _pairs_table(figures)
     lines += ["", "## What ended trials\n", "| arm | class | reason | count |", "|---|---|---|---|"]
     for arm, group in groups.items():
         counted: dict[tuple[str, str], int] = {}
@@ -127,3 +157,20 @@ def table(runs: Sequence[SutureRun]) -> str:
         for (kind, reason), count in sorted(counted.items(), key=lambda item: -item[1]):
             lines.append(f"| {arm} | {kind} | {reason} | {count} |")
     return "\n".join(lines) + "\n"
+
+
+def _pairs_table(figures: dict[str, float]) -> list[str]:
+    """Return the lines on ratios of arms on the same seeds; none where no arms are paired."""
+    rows = []
+    for ours, rival in PAIRS:
+        cells = []
+        for name in ("sutures_ratio", "seconds_ratio", "seconds_completed_ratio"):
+            at = f"{ours}/trials/{name}"
+            if at in figures:
+                cells.append(f"{figures[at]:.2f} [{figures[f'{at}_low']:.2f}, {figures[f'{at}_high']:.2f}]")
+        if cells:
+            rows.append(f"| {ours} / {rival} | {' | '.join(cells)} |")
+    if not rows:
+        return []
+    head = "| | sutures | seconds an attempted throw | seconds a completed suture |"
+    return ["", "## Ratios over the same seeds", "", head, "|---|---|---|---|", *rows]

@@ -79,9 +79,11 @@ def approach(point: np.ndarray, rotation: np.ndarray, advance: float) -> np.ndar
     return straight(start, end)
 
 
-def rotating_out(grasp: np.ndarray, normal: np.ndarray, centre: np.ndarray) -> np.ndarray:
+def rotating_out(
+    grasp: np.ndarray, normal: np.ndarray, centre: np.ndarray, angle: float = EXTRACTION_TURN
+) -> np.ndarray:
     """Return the path of the grasping tool that turns the needle out: 80 degrees about its axis (figure 3.2 e)."""
-    return turning(grasp, normal, -EXTRACTION_TURN, centre)
+    return turning(grasp, normal, -angle, centre)
 
 
 def pull(start: np.ndarray, direction: np.ndarray, length: float) -> np.ndarray:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from stages.kit.geometry.transforms import inverse, transform_from
-from stages.suture.motion.needle import SWAGE, about, point_at, turned, upright
+from stages.suture.motion.needle import ARC_POINTS, SWAGE, about, point_at, turned, upright
 from stages.suture.motion.primitives import jaws, straight
 from stages.suture.robot.arms import ARMS
 from stages.suture.trials.perception import Eyes, Seen
@@ -16,6 +17,9 @@ from stages.suture.trials.rope import PARTICLES, drape, winding
 from stages.suture.trials.settings import Policy, World
 from stages.suture.trials.thread import Drawn, Thread, draw
 from stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT
+
+if TYPE_CHECKING:
+    from stages.suture.trials.sight import LookingEyes
 
 HOME = {
     "right": transform_from(jaws(np.array([0.5, 0.0, -0.85])), np.array([-0.050, 0.0, 0.055])),
@@ -26,6 +30,9 @@ CORNER = transform_from(jaws(np.array([1.0, 0.0, 0.0])), np.array([-0.045, -0.03
 SHAFT, SHAFT_RADIUS = 0.06, 0.004
 TURNING_RADIUS = 0.02
 SETTLING = 30
+PASSES = 0.010
+"""A needle seen farther than this [m] from where it must be is not believed: jaws are 12 mm deep, and thread that pulls
+turns a needle about their middle."""
 CHECKED_EVERY = 5
 """Every so many poses of a path the arm is asked whether it reaches them, and at the last."""
 
@@ -53,7 +60,7 @@ class Bench:
 
     policy: Policy
     world: World
-    eyes: Eyes
+    eyes: Eyes | LookingEyes
     random: np.random.Generator
     hand_eye: np.ndarray
     thread: Thread
@@ -65,15 +72,22 @@ class Bench:
     anchor: np.ndarray | None = None
     holes: tuple[np.ndarray, ...] = ()
     """Where the needle in tissue really went in and came out, (3,) each."""
+    expected: Seen | None = None
+    """Where the robot believes the needle to lie that it has just inserted."""
     rope: np.ndarray = field(default_factory=lambda: np.zeros((PARTICLES, 3)))
     seconds: float = 0.0
+    busy: dict[str, float] = field(default_factory=dict)
+    """Until when [s] a driver that was sent aside is under way."""
+    tail_reckoned: float = 0.0
+    """What a robot that keeps books believes to lie before the first hole [m]."""
     stopped_short: int = 0
 
-    def move(self, arm: str, path: np.ndarray, bar: bool = False) -> None:
+    def move(self, arm: str, path: np.ndarray, bar: bool = False, aside: bool = False) -> None:
         """Lead a driver along poses (K, 4, 4); the needle goes with it when held, the thread with the needle.
 
         A path that leaves the arm's reach ends where it does (counted in `stopped_short`). `bar`: the jaws are wide
-        open across the thread, as in sweeping.
+        open across the thread, as in sweeping. `aside`: the clock goes on at once, and the driver's own next motion
+        begins when it is there.
         """
         asked = np.arange(len(path) - 1, -1, -CHECKED_EVERY)[::-1]
         reached = ARMS[arm].reaches(path[asked])
@@ -91,36 +105,53 @@ class Bench:
             swages = needles[:, :3, :3] @ SWAGE + needles[:, :3, 3]
         self._drape(arm, path, swages, bar)
         self.tools[arm], self.needle = path[-1], needles[-1]
-        started, self.seconds = self.seconds, self.seconds + travel_time(path, self.world.speed)
+        started = max(self.seconds, self.busy.get(arm, 0.0))
+        ended = started + travel_time(path, self.world.speed)
         if self.recorder is not None:
-            self.recorder.follow(arm, path, needles, started, self.seconds)
+            self.recorder.follow(arm, path, needles, started, ended, aside)
+        if aside:
+            self.busy[arm] = ended
+        else:
+            self.seconds = ended
 
     def go(self, arm: str, pose: np.ndarray, bar: bool = False) -> None:
         """Move a driver straight to a pose (4, 4)."""
         self.move(arm, straight(self.tools[arm], pose), bar)
 
     def withdraw(self, arm: str, pose: np.ndarray) -> None:
-        """Take an empty driver out of the way; costs no time where the arm moves both drivers at once."""
-        before = self.seconds
-        self.go(arm, pose)
-        if self.policy.moves_both:
-            self.seconds = before
+        """Take an empty driver away, while the other one goes on where the policy moves both at once."""
+        self.move(arm, straight(self.tools[arm], pose), aside=self.policy.moves_both)
 
-    def look(self, place: str) -> Seen | None:
-        """Return one estimate of the needle in the robot's frame as it believes it (with the hand-eye error)."""
+    def wait_at(self, arm: str, pose: np.ndarray) -> None:
+        """Send an empty driver to where it will be wanted, if the policy moves both drivers at once."""
+        if self.policy.moves_both:
+            self.withdraw(arm, pose)
+
+    def look(self, place: str, where: np.ndarray | None = None) -> Seen | None:
+        """Return one estimate of the needle in the robot's frame as it believes it (with the hand-eye error).
+
+        `where` (K, 3) [m]: points of which one must lie on the needle, else a policy that checks does not believe it.
+        """
         self.seconds += self.eyes.model.seconds_an_estimate
         seen = self.eyes.look(self.needle, place)
         if seen is None:
             return None
-        return Seen(seen.normal, seen.tip + self.hand_eye, seen.swage + self.hand_eye, seen.right)
+        seen = Seen(seen.normal, seen.tip + self.hand_eye, seen.swage + self.hand_eye, seen.right)
+        if where is not None and self.policy.checks_place and not passes(seen, where):
+            return None
+        return seen
 
-    def look_until(self, place: str, most: int = 10) -> Seen | None:
+    def look_until(self, place: str, most: int = 10, where: np.ndarray | None = None) -> Seen | None:
         """Look again while the needle cannot be known, at most `most` times; None then."""
         for _ in range(most):
-            seen = self.look(place)
+            seen = self.look(place, where)
             if seen is not None:
                 return seen
         return None
+
+    def jaws(self, arm: str) -> np.ndarray:
+        """Return the point (1, 3) [m] between a driver's jaws."""
+        return np.asarray(self.tools[arm][None, :3, 3])
 
     def turn_in_grip(self, degrees_normal: float, degrees_in_plane: float) -> None:
         """Turn the held needle in the jaws by random angles of these spreads, about the held point."""
@@ -147,6 +178,16 @@ class Bench:
         """Keep a key frame when the trial is recorded."""
         if self.recorder is not None:
             self.recorder.keep(panel, self.suture, self.seconds, self.tools, self.needle, self.rope)
+
+    def record_past(
+        self, panel: str, seconds: float, arm: str, tool: np.ndarray, needle: np.ndarray, rope: np.ndarray
+    ) -> None:
+        """Keep a key frame of a moment within the last motion: poses (4, 4) then, and the thread (N, 3) before it,
+        whose end is led to the needle."""
+        if self.recorder is not None:
+            share = np.linspace(0.0, 1.0, len(rope))[:, None]
+            led = rope + share * (point_at(needle, np.pi) - rope[-1])
+            self.recorder.keep(panel, self.suture, seconds, {**self.tools, arm: tool}, needle, led)
 
     def lay_thread(self) -> None:
         """Lay the thread anew between its anchor (or its free end on the pad) and the needle, and let it fall."""
@@ -206,6 +247,13 @@ class Bench:
             self.rope, rest, np.ascontiguousarray(first), np.ascontiguousarray(swages), self.anchor is not None,
             capsules, RIDGE_HALF_WIDTH, RIDGE_HEIGHT,
         )  # fmt: skip
+
+
+def passes(seen: Seen, where: np.ndarray) -> bool:
+    """Whether a seen needle goes through one of the points (K, 3) [m]."""
+    pose = seen.pose
+    arc = ARC_POINTS @ pose[:3, :3].T + pose[:3, 3]
+    return bool(np.linalg.norm(arc[:, None] - where[None], axis=2).min() < PASSES)
 
 
 def travel_time(path: np.ndarray, speed: float) -> float:

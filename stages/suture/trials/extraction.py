@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.kit.geometry.transforms import inverse
+from stages.kit.geometry.transforms import inverse, transform_from
 from stages.suture.motion import primitives
-from stages.suture.motion.constants import EXTRACTION_ADVANCE, MOVED, RETRIES, cinch_length
-from stages.suture.motion.needle import ARC_POINTS, point_at, turned
+from stages.suture.motion.constants import (
+    APPROACH_OFFSET,
+    EXTRACTION_ADVANCE,
+    EXTRACTION_TURN,
+    INSERTION_TURN,
+    MOVED,
+    RETRIES,
+    cinch_length,
+)
+from stages.suture.motion.needle import ARC_POINTS, UP_THE_WOUND, point_at, turned
 from stages.suture.rig import NEEDLE_RADIUS
-from stages.suture.trials.bench import HOME, Bench, Failed, Hold
+from stages.suture.trials.bench import HOME, Bench, Failed, Hold, passes
 from stages.suture.trials.gripping import close, thread_between
+from stages.suture.trials.insertion import BESIDE
 from stages.suture.trials.perception import Seen
-from stages.suture.trials.thread import pull_through
+from stages.suture.trials.thread import pull_on, pull_through
 from stages.suture.trials.wound import SPANNED, exit_
 
 GRASPING = primitives.jaws(np.array([-1.0, 0.0, 0.0]))
@@ -22,6 +31,15 @@ LONGEST_PULL = 0.115
 TAIL_TO_LEAVE = 0.030
 """What bookkeeping leaves behind the first hole [m]."""
 BOOK_MARGIN = 0.002
+WANTED = 0.080
+"""Thread [m] between stitch and needle that handover and pose correction take."""
+LAST_DRAWN = 3
+"""From this suture (0 to 5) on, friction in the stitches made holds the tail: what is wanted later is drawn here."""
+BACK = np.array([0.015, 0.0, 0.005])
+INWARDS, LEAST_TURN = np.radians(12.0), np.radians(10.0)
+LOOKS_AFTER = 20
+PULLS_ON, LOOSE_SEEN, LOOSE_ERROR = 2, 0.003, 0.001
+"""How often thread seen loose is pulled on, from what length [m] on, and what it is off by [m] beside its share."""
 
 
 def sweep(bench: Bench) -> None:
@@ -32,7 +50,10 @@ def sweep(bench: Bench) -> None:
     bench.go("left", path[0])
     bench.move("left", path, bar=True)
     bench.record("c: swept")
-    bench.withdraw("left", HOME["left"])
+    if bench.policy.moves_both:
+        bench.go("left", transform_from(GRASPING, exit_(bench.suture) + BESIDE))
+    else:
+        bench.withdraw("left", HOME["left"])
 
 
 def nearer_end(seen: Seen, driver: np.ndarray) -> np.ndarray:
@@ -46,18 +67,17 @@ def extract(bench: Bench) -> None:
     Believes what it sees: an end that moved less than 2 cm means another try. Raises Failed (E) when the needle is
     still in the wound once the robot goes on or gives up, (T) when thread comes along in the jaws or about them.
     """
-    for _ in range(1 + RETRIES):
+    wound = exit_(bench.suture)[None]
+    for attempt in range(1 + RETRIES):
         bench.overhead()
-        bench.go("left", HOME["left"])
-        before = bench.look_until("tissue")
+        _stand_back(bench, attempt)
+        before = bench.look_until("tissue", where=wound)
+        if before is None and bench.policy.expects and attempt == 0:
+            before = bench.expected
         if before is None:
             continue
         out, pinched = _attempt(bench, before)
-        after = bench.look_until("elsewhere" if out else "tissue")
-        driver = bench.tools["left"][:3, 3]
-        moved = after is None or (
-            float(np.linalg.norm(nearer_end(after, driver) - nearer_end(before, HOME["left"][:3, 3]))) >= MOVED
-        )
+        moved = _seems_out(bench, before, out)
         if out and pinched:
             raise Failed("T", "thread was grasped with the needle")
         if out and bench.tangled("left"):
@@ -71,11 +91,53 @@ def extract(bench: Bench) -> None:
     raise Failed("E", "no try to extract the needle succeeded")
 
 
+def _stand_back(bench: Bench, attempt: int) -> None:
+    """Take the left driver to where it does not hide the needle."""
+    if not bench.policy.moves_both:
+        bench.go("left", HOME["left"])
+    elif attempt > 0:
+        back = bench.tools["left"].copy()
+        back[:3, 3] += BACK
+        bench.go("left", back)
+
+
+def _seems_out(bench: Bench, before: Seen, out: bool) -> bool:
+    """Whether the robot takes the needle for extracted: the seen end moved by 2 cm; or, for a policy that checks, the
+    needle is seen in the jaws and not where it was."""
+    place = "elsewhere" if out else "tissue"
+    if bench.policy.checks_place:
+        jaws = bench.jaws("left")
+        after = bench.look_until(place, LOOKS_AFTER, np.concatenate([jaws, exit_(bench.suture)[None]]))
+        return after is None or (passes(after, jaws) and not passes(after, exit_(bench.suture)[None]))
+    after = bench.look_until(place)
+    driver = bench.tools["left"][:3, 3]
+    return after is None or (
+        float(np.linalg.norm(nearer_end(after, driver) - nearer_end(before, HOME["left"][:3, 3]))) >= MOVED
+    )
+
+
+def grasp_point(seen: Seen, inwards: float) -> np.ndarray:
+    """Return the point (3,) [m] of a seen needle that lies `inwards` [rad of the arc] from its end nearer to the left
+    driver's place."""
+    home = HOME["left"][:3, 3]
+    at_tip = np.linalg.norm(seen.tip - home) < np.linalg.norm(seen.swage - home)
+    return point_at(seen.pose, inwards if at_tip else np.pi - inwards)
+
+
+def left_to_turn(seen: Seen) -> float:
+    """Return how far a needle that was inserted as planned is still to be turned out [rad]; some of it always."""
+    along = seen.pose[:3, 0]
+    turned_out = float(np.arctan2(along[0], -along[2])) - (SPANNED / 2 + INSERTION_TURN)
+    return float(np.clip(EXTRACTION_TURN - turned_out, LEAST_TURN, EXTRACTION_TURN))
+
+
 def _attempt(bench: Bench, seen: Seen) -> tuple[bool, bool]:
     """Return whether the needle came out, and whether thread was caught with it."""
     world = bench.world
-    point = nearer_end(seen, bench.tools["left"][:3, 3])
-    path = primitives.approach(point, GRASPING, EXTRACTION_ADVANCE)
+    if bench.policy.centres_jaws:
+        path = primitives.approach(grasp_point(seen, INWARDS), GRASPING, APPROACH_OFFSET)
+    else:
+        path = primitives.approach(nearer_end(seen, bench.tools["left"][:3, 3]), GRASPING, EXTRACTION_ADVANCE)
     bench.go("left", path[0])
     bench.move("left", path)
     bench.record("d: at the needle")
@@ -91,9 +153,10 @@ def _attempt(bench: Bench, seen: Seen) -> tuple[bool, bool]:
     share = closing.quality * (world.pinched_share if pinched else 1.0)
     grip = inverse(bench.tools["left"]) @ closing.caught
     centre, normal = seen.pose[:3, 3], seen.normal
-    if normal @ closing.caught[:3, 2] < 0:
+    if normal @ UP_THE_WOUND < 0:
         normal = -normal
-    turn = primitives.rotating_out(bench.tools["left"], normal, centre)
+    angle = left_to_turn(seen) if bench.policy.centres_jaws else EXTRACTION_TURN
+    turn = primitives.rotating_out(bench.tools["left"], normal, centre, angle)
     needles = turn @ grip
     loads = _loads(bench, needles, closing.shift)
     over = np.flatnonzero(loads > world.hold * share)
@@ -148,19 +211,17 @@ def cinch(bench: Bench) -> None:
     noise = world.stitch_noise * bench.random.standard_normal()
     if policy.cinches:
         bench.overhead()
-        wanted = cinch_length(bench.suture, policy.constants)
+        distance = max(distance, cinch_length(bench.suture, policy.constants))
         if policy.keeps_books:
-            # The thread's length is seen with an error; the plan leaves a tail at first, later takes what there is.
-            seen = thread.working * (1.0 + bench.eyes.model.thread_length_error * bench.random.standard_normal())
-            bench.seconds += bench.eyes.model.seconds_an_estimate
-            spare = TAIL_TO_LEAVE if bench.suture == 0 else -BOOK_MARGIN
-            wanted = seen - thread.used_by(bench.suture, 0.0) - spare
-        distance = min(LONGEST_PULL, max(distance, wanted))
+            distance = _booked(bench)
+        distance = min(LONGEST_PULL, distance)
         _pull_to(bench, distance)
     force = world.hold * (bench.hold.quality if bench.hold else 0.0)
     drawn = pull_through(thread, bench.suture, distance, force, noise, world)
     bench.lay_thread()
     bench.yield_to(drawn)
+    if policy.watches_slack:
+        _pull_on(bench)
     bench.record("e: cinched" if policy.cinches else "e: pulled")
     if bench.hold is None:
         raise Failed("T", "taut thread pulled the needle out of the jaws")
@@ -168,3 +229,42 @@ def cinch(bench: Bench) -> None:
         raise Failed("T", f"{thread.slack * 1000:.0f} mm of slack stay in the stitch")
     if bench.tangled("left"):
         raise Failed("T", "thread is wound about the left driver")
+
+
+def _booked(bench: Bench) -> float:
+    """Return how far [m] from the exit to pull, by the seen length of thread: all that the stitch leaves, and from the
+    tail what the next throws will want, while few stitches hold it.
+
+    The thread is seen with an error, once a stitch; what is left of the tail is reckoned from the first look.
+    """
+    suture, model = bench.suture, bench.eyes.model
+    bench.seconds += model.seconds_an_estimate
+    seen = bench.thread.working * (1.0 + model.thread_length_error * bench.random.standard_normal())
+    left = seen - bench.thread.used_by(suture, 0.0)
+    if suture == 0:
+        pull = min(WANTED, left - TAIL_TO_LEAVE)
+        bench.tail_reckoned = left - pull
+        return pull
+    wanted = WANTED + bench.thread.used_by(suture + 1, 0.0) * (suture == LAST_DRAWN) if suture <= LAST_DRAWN else 0.0
+    spare = max(0.0, bench.tail_reckoned - TAIL_TO_LEAVE)
+    drawn = min(spare, max(0.0, wanted - left))
+    bench.tail_reckoned -= drawn
+    return left + max(drawn, BOOK_MARGIN)
+
+
+def _pull_on(bench: Bench) -> None:
+    """Look at the stitch, and pull on by what is seen to be loose, until nothing is (our own)."""
+    thread, model, world = bench.thread, bench.eyes.model, bench.world
+    for _ in range(PULLS_ON):
+        bench.seconds += model.seconds_an_estimate
+        error = np.hypot(LOOSE_ERROR, model.thread_length_error * thread.slack) * bench.random.standard_normal()
+        loose = thread.slack + error
+        if loose < LOOSE_SEEN or bench.hold is None:
+            return
+        bench.overhead()
+        away = bench.tools["left"].copy()
+        away[:3, 3] += loose * OUTWARDS
+        anchor, bench.anchor = bench.anchor, None
+        bench.go("left", away)
+        bench.anchor = anchor
+        bench.yield_to(pull_on(thread, loose, world.hold * bench.hold.quality, world))

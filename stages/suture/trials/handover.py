@@ -12,10 +12,10 @@ import numpy as np
 
 from stages.kit.geometry.transforms import inverse, transform_from
 from stages.suture.motion import primitives
-from stages.suture.motion.constants import APPROACH_OFFSET, HANDOVER_OFFSET, RETRIES
+from stages.suture.motion.constants import APPROACH_OFFSET, HANDOVER_OFFSET, RETRIES, THROWS
 from stages.suture.motion.needle import UP_THE_WOUND, about, point_at, turned
 from stages.suture.trials.bench import HOME, Bench, Failed, Hold
-from stages.suture.trials.extraction import GRASPING
+from stages.suture.trials.extraction import GRASPING, LAST_DRAWN, TAIL_TO_LEAVE, WANTED
 from stages.suture.trials.gripping import close
 from stages.suture.trials.perception import Seen
 from stages.suture.trials.settings import Policy
@@ -27,7 +27,10 @@ PRESENTING = about(UP_THE_WOUND, -np.pi / 4) @ GRASPING
 PLACE = np.array([0.010, 0.0, 0.045])
 TAKING = primitives.jaws(np.array([1.0, 0.0, 0.0]))
 RELEASED = 0.012
-WORKING_WANTED, LONGEST_PUSH = 0.080, 0.05
+LONGEST_PUSH, SHORT_BY = 0.05, 0.005
+BEFORE_TAKING = np.array([-0.045, 0.0, 0.0])
+"""Where the right driver waits, seen from the place of handover [m]."""
+LOOKS, TURNED, TURNED_EACH, INWARDS = 3, np.radians(4.0), np.radians(1.5), np.radians(12.0)
 
 
 def farther_end(seen: Seen, driver: np.ndarray) -> np.ndarray:
@@ -43,6 +46,7 @@ def hand_over(bench: Bench) -> None:
     bench.overhead()
     if bench.hold is None:
         raise Failed("H", "no needle in the left driver")
+    bench.wait_at("right", transform_from(TAKING, PLACE + BEFORE_TAKING))
     bench.go("left", transform_from(PRESENTING, PLACE))
     if bench.policy.cinches_before_handover:
         _cinch_before(bench)
@@ -50,16 +54,16 @@ def hand_over(bench: Bench) -> None:
     offset = np.zeros(3)
     for _ in range(1 + RETRIES):
         bench.overhead()
-        before = bench.look_until("elsewhere")
+        before = _looks(bench)
         if before is not None:
-            point = farther_end(before, bench.tools["left"][:3, 3])
+            point = _taken_at(bench, before)
             path = primitives.approach(point + offset, TAKING, APPROACH_OFFSET)
             bench.go("right", path[0])
             bench.move("right", path)
             grip = _close(bench)
-            after = bench.look_until("elsewhere")
+            after = _looks(bench)
             bench.record("g: both hold" if grip else "g: missed")
-            if after is not None and handed_over(bench.policy, before, after):
+            if after is not None and _believes(bench, before, after):
                 _release(bench, grip)
                 return
             back = bench.tools["right"].copy()
@@ -68,6 +72,53 @@ def hand_over(bench: Bench) -> None:
         angle = bench.random.uniform(0, 2 * np.pi)
         offset = bench.random.uniform(0, HANDOVER_OFFSET) * np.array([np.cos(angle), np.sin(angle), 0.0])
     raise Failed("H", "no try to hand the needle over was believed to have succeeded")
+
+
+def _looks(bench: Bench) -> Seen | None:
+    """Look at the presented needle: once, or so often that one mistake does not decide."""
+    if not bench.policy.checks_turn:
+        return bench.look_until("elsewhere")
+    jaws = bench.jaws("left")
+    found = [seen for seen in (bench.look_until("elsewhere", where=jaws) for _ in range(LOOKS)) if seen is not None]
+    return middle(found) if found else None
+
+
+def middle(looks: list[Seen]) -> Seen:
+    """Return the middle of looks at one needle: normals have no sign, ends are medians."""
+    normals = np.array([seen.normal if seen.normal @ looks[0].normal > 0 else -seen.normal for seen in looks])
+    normal = np.median(normals, axis=0)
+    tip = np.median([seen.tip for seen in looks], axis=0)
+    swage = np.median([seen.swage for seen in looks], axis=0)
+    return Seen(normal / np.linalg.norm(normal), tip, swage, all(seen.right for seen in looks))
+
+
+def _taken_at(bench: Bench, seen: Seen) -> np.ndarray:
+    """Return the point (3,) [m] that the right driver's jaws close on: the far end, or a little inwards of it."""
+    holder = bench.tools["left"][:3, 3]
+    if not bench.policy.centres_jaws:
+        return farther_end(seen, holder)
+    at_tip = farther_end(seen, holder) is seen.tip
+    return point_at(seen.pose, INWARDS if at_tip else np.pi - INWARDS)
+
+
+def _believes(bench: Bench, before: Seen, after: Seen) -> bool:
+    """Whether the robot takes the needle for held by the right driver too."""
+    if not bench.policy.checks_turn:
+        return handed_over(bench.policy, before, after)
+    angles = turned_about(before, after, bench.tools["left"][:3, 3])
+    return min(angles) > TURNED_EACH and sum(angles) / 2.0 > TURNED
+
+
+def turned_about(before: Seen, after: Seen, holder: np.ndarray) -> tuple[float, float]:
+    """Return by what angles [rad] about the vertical a needle's normal and its far end turned, seen from the driver at
+    (3,) that holds it. Jaws that hold the needle too turn it so as they move."""
+
+    def angle(first: np.ndarray, second: np.ndarray) -> float:
+        return float(np.arctan2(first[0] * second[1] - first[1] * second[0], first[:2] @ second[:2]))
+
+    same = after.normal if after.normal @ before.normal > 0 else -after.normal
+    ends = [farther_end(seen, holder) - holder for seen in (before, after)]
+    return angle(before.normal, same), angle(ends[0], ends[1])
 
 
 def _close(bench: Bench) -> Hold | None:
@@ -109,26 +160,29 @@ def _release(bench: Bench, grip: Hold | None) -> None:
 
 
 def _cinch_before(bench: Bench) -> None:
-    """Push the thread that hangs from the needle sideways with the right driver: it draws more through the stitches and
-    clears the place of the grasp.
+    """Push the thread that hangs from the needle sideways with the right driver, where it is seen to be too short for
+    what comes: it draws more through the stitches and clears the place of the grasp.
 
     A push by s at the middle of a straight thread of length h lengthens it to 2 sqrt((h / 2)^2 + s^2).
     """
-    if bench.anchor is None or bench.hold is None:
+    thread, world, model = bench.thread, bench.world, bench.eyes.model
+    if bench.anchor is None or bench.hold is None or bench.suture >= THROWS:
+        return
+    bench.seconds += model.seconds_an_estimate
+    seen = thread.working * (1.0 + model.thread_length_error * bench.random.standard_normal())
+    spare = bench.tail_reckoned - TAIL_TO_LEAVE
+    if seen > WANTED - SHORT_BY or bench.suture > LAST_DRAWN or spare < SHORT_BY:
         return
     bench.overhead()
-    thread, world = bench.thread, bench.world
-    middle = (bench.anchor + point_at(bench.needle, np.pi)) / 2.0
-    start = transform_from(TAKING, middle + np.array([-0.02, -0.02, 0.0]))
+    hanging = bench.tools["left"][:3, 3]
+    half = float(np.linalg.norm(bench.anchor - hanging)) / 2.0
+    wanted = min(2.0 * float(np.hypot(half, LONGEST_PUSH)), WANTED, seen + spare)
+    push = float(np.sqrt(max(0.0, (wanted / 2.0) ** 2 - half**2)))
+    bench.tail_reckoned -= max(0.0, wanted - seen)
+    start = transform_from(TAKING, (bench.anchor + hanging) / 2.0 + np.array([-0.02, -0.01, 0.0]))
     bench.go("right", start)
-    span = float(np.linalg.norm(bench.anchor - point_at(bench.needle, np.pi)))
-    reach = 2.0 * float(np.hypot(span / 2.0, LONGEST_PUSH))
-    wanted = min(reach, WORKING_WANTED, thread.working + max(0.0, thread.tail - 0.02))
-    # Stops where the needle would begin to slip: the thread is felt through the left driver's grip.
-    if thread.resistance(world) < 0.5 * world.hold * bench.hold.quality:
-        draw(thread, wanted, 0.5 * world.hold * bench.hold.quality, world)
-    push = start.copy()
-    push[1, 3] += 0.02 + LONGEST_PUSH
-    bench.go("right", push)
+    bench.yield_to(draw(thread, wanted, 0.5 * world.hold * bench.hold.quality, world))
+    end = start.copy()
+    end[1, 3] += 0.01 + push
+    bench.go("right", end)
     bench.record("f: cinched before handover")
-    bench.withdraw("right", HOME["right"])

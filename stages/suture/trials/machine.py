@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from stages.suture.trials.recording import Recorder
 from stages.suture.trials.settings import Policy, World
 from stages.suture.trials.thread import LEFT_IN_FIRST_HOLE, Thread
 from stages.suture.trials.wound import exit_
+
+if TYPE_CHECKING:
+    from stages.suture.trials.sight import LookingEyes
 
 
 @dataclass
@@ -49,8 +53,12 @@ def run_trial(
     world: World | None = None,
     model: PerceptionModel | None = None,
     recorder: Recorder | None = None,
+    eyes: LookingEyes | None = None,
 ) -> Outcome:
-    """Throw up to six sutures; the same seed gives every arm the same needle, thread and calibration error."""
+    """Throw up to six sutures; the same seed gives every arm the same needle, thread and calibration error.
+
+    `eyes` look at rendered views of the trial; without them the needle is seen by the error model.
+    """
     world = world or World()
     model = model or perception_model(FOLDER / f"perception_{policy.perception}.toml")
     given = np.random.default_rng([seed, 0])
@@ -58,9 +66,11 @@ def run_trial(
     hand_eye = world.hand_eye * given.standard_normal(3)
     needle, hold = loaded(world, given)
     bench = Bench(
-        policy, world, Eyes(model, np.random.default_rng([seed, 2])), np.random.default_rng([seed, 1]), hand_eye,
-        Thread(length), needle, hold, recorder,
+        policy, world, eyes or Eyes(model, np.random.default_rng([seed, 2])), np.random.default_rng([seed, 1]),
+        hand_eye, Thread(length), needle, hold, recorder,
     )  # fmt: skip
+    if eyes is not None:
+        eyes.watch(bench)
     bench.tools["right"] = CORNER.copy()
     bench.lay_thread()
     outcome = Outcome(thread_length=length)
@@ -120,6 +130,7 @@ def recover(bench: Bench, random: np.random.Generator, thrown: int) -> None:
         wanted = cinch_length(made, bench.policy.constants)
         more = min(max(0.0, wanted - thread.working), max(0.0, thread.tail - LEFT_IN_FIRST_HOLE))
         thread.working, thread.tail = thread.working + more, thread.tail - more
+        bench.tail_reckoned -= more
     elif thrown == 0:
         thread.working += max(0.0, thread.tail)
         thread.tail = 0.0

@@ -74,3 +74,12 @@ def pull_through(thread: Thread, suture: int, distance: float, force: float, noi
     drawn = draw(thread, distance, force, world)
     thread.through += 1
     return drawn
+
+
+def pull_on(thread: Thread, more: float, force: float, world: World) -> Drawn:
+    """Draw a stitch that was made tighter by `more` [m]: its slack comes first, then the tail as far as it gives."""
+    eased = min(max(0.0, more), thread.slack)
+    thread.slack -= eased
+    thread.working += eased
+    # `through` counts this stitch already, whose friction the slack has overcome.
+    return draw(thread, thread.working + max(0.0, more) - eased, force, world)

@@ -16,18 +16,18 @@ from stages.suture.motion.constants import OpenConstants, cinch_length
 from stages.suture.motion.needle import SWAGE, TIP, from_ends, point_at, turned, upright
 from stages.suture.rig import NEEDLE_RADIUS
 from stages.suture.robot.arms import ARMS
-from stages.suture.trials.bench import CORNER, HOME
-from stages.suture.trials.drawing import draw_strip
-from stages.suture.trials.extraction import GRASPING, nearer_end
+from stages.suture.trials.bench import CORNER, HOME, Bench, loaded
+from stages.suture.trials.drawing import draw_strip, whole_suture
+from stages.suture.trials.extraction import GRASPING, grasp_point, left_to_turn, nearer_end
 from stages.suture.trials.gripping import close
-from stages.suture.trials.handover import farther_end, handed_over
-from stages.suture.trials.insertion import nominal_needle
+from stages.suture.trials.handover import farther_end, handed_over, middle, turned_about
+from stages.suture.trials.insertion import as_planned, believed, fused, in_driver, nominal_needle
 from stages.suture.trials.machine import Outcome, run_trial
 from stages.suture.trials.perception import FOLDER, Errors, Eyes, PerceptionModel, Seen, Shares, perception_model
 from stages.suture.trials.recording import Recorder
 from stages.suture.trials.rope import PARTICLES, drape, line, winding
-from stages.suture.trials.settings import POLICIES, World
-from stages.suture.trials.thread import Thread, draw, pull_through
+from stages.suture.trials.settings import POLICIES, Policy, World
+from stages.suture.trials.thread import Thread, draw, pull_on, pull_through
 from stages.suture.trials.wound import CHORD, entry, exit_, passage
 
 STILL_WORLD = World(
@@ -243,13 +243,120 @@ def test_a_file_that_is_no_perception_model(tmp_path: Path, text: str) -> None:
         perception_model(path)
 
 
-@pytest.mark.parametrize("arm", ["thesis", "ours"])
-def test_without_errors_six_sutures_close_the_wound(arm: str) -> None:
+@pytest.mark.parametrize(("arm", "length"), [("thesis", 0.30), ("ours", 0.30), ("ours", 0.22), ("ours", 0.40)])
+def test_without_errors_six_sutures_close_the_wound(arm: str, length: float) -> None:
     policy = replace(POLICIES[arm], constants=replace(POLICIES[arm].constants, desired_length=0.115))
-    outcome = run_trial(policy, 0, replace(STILL_WORLD, hold=20.0), perfect())
+    world = replace(STILL_WORLD, hold=20.0, thread_shortest=length, thread_longest=length)
+    outcome = run_trial(policy, 0, world, perfect())
     assert outcome.errors == []
     assert outcome.sutures == outcome.sutures_neutral == outcome.attempts == 6
     assert outcome.stopped_short == 0
+
+
+def bench_of(policy: Policy, recorder: Recorder | None = None) -> Bench:
+    """A bench whose right driver holds the needle in the corner."""
+    needle, hold = loaded(STILL_WORLD, np.random.default_rng(0))
+    bench = Bench(
+        policy, STILL_WORLD, Eyes(perfect(), np.random.default_rng(1)), np.random.default_rng(2), np.zeros(3),
+        Thread(0.3), needle, hold, recorder,
+    )  # fmt: skip
+    bench.tools["right"] = CORNER.copy()
+    return bench
+
+
+def shifted(pose: np.ndarray, *metres: float) -> np.ndarray:
+    moved = pose.copy()
+    moved[:3, 3] += metres
+    return moved
+
+
+def test_each_driver_has_its_clock() -> None:
+    recorder = Recorder()
+    bench = bench_of(POLICIES["ours"], recorder)
+    bench.wait_at("left", shifted(HOME["left"], 0.0, 0.0, -0.014))
+    assert bench.seconds == 0.0
+    bench.record("under way")
+    bench.go("right", shifted(CORNER, 0.007, 0.0, 0.0))
+    assert np.isclose(bench.seconds, 1.0)
+    bench.go("left", HOME["left"])
+    assert np.isclose(bench.seconds, 4.0)
+    motions = recorder.motions()
+    assert (np.diff(motions["seconds"]) >= 0).all() and np.isclose(motions["seconds"][-1], 4.0)
+    swages = motions["world_from_needle"][:, :3, 3]
+    assert (np.diff(swages[:, 0]) >= -1e-12).all() and np.isclose(np.ptp(swages[:, 0]), 0.007)
+    assert np.linalg.norm(recorder.tools[0][1][:3, 3] - HOME["left"][:3, 3]) < 0.004
+    other = bench_of(POLICIES["thesis"])
+    other.wait_at("left", shifted(HOME["left"], 0.0, 0.0, -0.014))
+    assert np.allclose(other.tools["left"], HOME["left"])
+    other.withdraw("left", shifted(HOME["left"], 0.0, 0.0, -0.014))
+    assert np.isclose(other.seconds, 2.0)
+
+
+def test_a_needle_seen_where_it_cannot_be_is_not_believed() -> None:
+    away = np.array([[0.05, 0.05, 0.05]])
+    for arm, trusted in (("ours", False), ("thesis", True)):
+        bench = bench_of(POLICIES[arm])
+        assert (bench.look("corner_right", away) is not None) is trusted
+        assert bench.look("corner_right", bench.jaws("right")) is not None
+
+
+def test_a_turn_that_was_cut_short_is_finished() -> None:
+    def seen(turned_out: float) -> Seen:
+        needle = upright(np.zeros(3), np.radians(22.5 + 45.0 + turned_out))
+        return Seen(needle[:3, 2], point_at(needle, 0.0), point_at(needle, np.pi), True)
+
+    assert np.allclose(np.degrees([left_to_turn(seen(angle)) for angle in (0.0, 30.0, 79.0)]), [80.0, 50.0, 10.0])
+    inwards = grasp_point(seen(0.0), 0.3)
+    assert np.isclose(np.linalg.norm(inwards), NEEDLE_RADIUS)
+    assert np.isclose(np.linalg.norm(inwards - seen(0.0).tip), 2 * NEEDLE_RADIUS * np.sin(0.15))
+
+
+def test_jaws_that_hold_turn_normal_and_end() -> None:
+    holder, up = np.array([0.02, 0.0, 0.04]), np.array([0.0, 0.0, 1.0])
+    needle = upright(np.array([0.008, 0.0, 0.04]), 1.2)
+
+    def seen(pose: np.ndarray, sign: float = 1.0) -> Seen:
+        return Seen(sign * pose[:3, 2], point_at(pose, 0.0), point_at(pose, np.pi), True)
+
+    after = turned(needle, up, np.radians(15.0), holder)
+    assert np.allclose(np.degrees(turned_about(seen(needle), seen(after, -1.0), holder)), 15.0)
+    strange = Seen(np.array([0.0, 0.0, 1.0]), *(np.full(3, 9.0),) * 2, False)
+    held = middle([seen(needle), strange, seen(needle, -1.0)])
+    assert np.allclose(held.normal, needle[:3, 2]) and np.allclose(held.tip, point_at(needle, 0.0))
+
+
+def test_looks_from_several_poses_count_together() -> None:
+    needle, hold = loaded(STILL_WORLD, np.random.default_rng(0))
+    kept = []
+    for error, turn in ((0.001, 0.0), (-0.001, 0.4)):
+        tool = turned(CORNER, np.array([0.0, 1.0, 0.0]), turn, CORNER[:3, 3])
+        pose = tool @ hold.grip
+        offset = tool[:3, :3] @ np.array([0.0, 0.0, error])
+        look = Seen(pose[:3, 2], point_at(pose, 0.0) + offset, point_at(pose, np.pi) + offset, True)
+        kept.append(in_driver([look] * 3, tool))
+    normal, far, near = fused(kept, CORNER)
+    assert np.allclose(normal, needle[:3, 2]) and np.allclose(far, point_at(needle, 0.0))
+    assert np.allclose(near, point_at(needle, np.pi))
+
+
+def test_the_needle_is_expected_where_its_insertion_was_planned() -> None:
+    nominal, tool = nominal_needle(1), HOME["right"]
+    ends = point_at(nominal, 0.0), point_at(nominal, np.pi)
+    belief = believed(tool, tool[:3, :3], nominal[:3, 2], ends)
+    path = primitives.insertion(tool, exit_(1) - entry(1), nominal[:3, 2], nominal[:3, 3])
+    after = path[-1] @ np.linalg.inv(tool) @ nominal
+    expected = as_planned(belief, path[-1])
+    assert np.allclose(expected.pose, after)
+    assert np.isclose(left_to_turn(expected), np.radians(80.0))
+
+
+def test_pulling_on_takes_slack_before_tail() -> None:
+    world, thread = World(), Thread(0.06, tail=0.10, slack=0.008, through=2)
+    assert pull_on(thread, 0.005, 10.0, world).short == 0.0
+    assert np.allclose([thread.working, thread.slack, thread.tail], [0.065, 0.003, 0.10])
+    assert pull_on(thread, 0.005, 10.0, world).short == 0.0
+    assert np.allclose([thread.working, thread.slack, thread.tail], [0.070, 0.0, 0.098])
+    assert np.isclose(pull_on(thread, 0.005, 0.1, world).short, 0.005)
 
 
 def test_both_readings_of_the_handover_test() -> None:
@@ -284,10 +391,16 @@ def test_frames_are_recorded_and_drawn(tmp_path: Path) -> None:
     recorder.write(tmp_path / "frames.npz")
     with np.load(tmp_path / "frames.npz", allow_pickle=False) as frames:
         arrays = {name: frames[name] for name in frames.files}
-    assert {"b: inserted", "c: swept", "e: turned out", "g: both hold", "k: 90 degrees about y"} <= set(arrays["panel"])
+    assert {"a: pushed in", "b: inserted", "c: swept", "e: turned out", "g: both hold", "k: 90 degrees about y"} <= set(
+        arrays["panel"]
+    )
     assert arrays["thread"].shape == (len(arrays["panel"]), PARTICLES, 3)
     assert draw_strip(tmp_path / "strip.png", arrays, suture=0, most=3) == 3
     assert (tmp_path / "strip.png").stat().st_size > 5000
+    shown = [str(arrays["panel"][row])[0] for row in whole_suture(arrays)]
+    assert "".join(dict.fromkeys(shown)) == "abcdefghijk" and shown == sorted(shown)
+    few = {name: array[:3] for name, array in arrays.items()}
+    assert list(whole_suture(few)) == [0, 1, 2]
     with pytest.raises(ValueError, match="no frame"):
         draw_strip(tmp_path / "none.png", arrays, suture=9)
 
@@ -314,6 +427,10 @@ def test_tables_count_as_they_say(tmp_path: Path) -> None:
     assert np.isclose(figures["thesis/trials/single_suture_rate"], 4 / 6, atol=1e-5)
     assert figures["thesis/trials/errors_i"] == figures["ours/trials/errors_t"] == 1.0
     assert figures["ours/trials/sutures_ratio"] == 2.5
+    assert np.isclose(figures["ours/trials/seconds_ratio"], (200 / 11) / (200 / 6), atol=1e-5)
+    assert np.isclose(figures["ours/trials/seconds_completed_ratio"], 0.4)
+    assert figures["ours/trials/sutures_ratio_low"] == 2.0 and figures["ours/trials/sutures_ratio_high"] == 4.0
+    assert "| ours / thesis | 2.50 [2.00, 4.00] |" in table(runs)
     assert figures["ours/trials/full_wound_rate"] == 0.5
     assert "*printed*" in table(runs) and "| ours | T | why | 1 |" in table(runs)
     assert Outcome(sutures=6).closed
