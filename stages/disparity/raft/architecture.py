@@ -50,6 +50,13 @@ class Architecture:
         return self.shared
 
 
+SMALL = Architecture(
+    widths=(16, 32, 48), hidden=(48, 48, 8), scales=2, features=64, motion=(32, 48), head=64, mask=64, downsample=3,
+    shared=True,
+)  # fmt: skip
+"""Of the network that is trained here, on our own renderings."""
+
+
 def architecture_of(shapes: Shapes, where: str) -> Architecture:
     """Return the sizes of a checkpoint with tensors of these shapes. Raises BadInput for one of another network."""
     try:

@@ -190,7 +190,7 @@ def test_tensors_that_do_not_fit_are_named(tmp_path: Path, fault: str) -> None:
 def test_the_correlation_is_that_of_a_plain_loop() -> None:
     torch.manual_seed(0)
     left, right = torch.randn(1, 5, 2, 8), torch.randn(1, 5, 2, 8)
-    column = torch.tensor([[-3.0, 0.0, 0.5, 1.25, 3.0, 6.75, 7.0, 20.0]] * 2)
+    column = torch.tensor([[[-3.0, 0.0, 0.5, 1.25, 3.0, 6.75, 7.0, 20.0]] * 2])
     found = RowCorrelation(left, right, 2, 1).at(column)
     for row in range(2):
         line = [float(left[0, :, row, 2] @ right[0, :, row, k]) / math.sqrt(5) for k in range(8)]
@@ -209,7 +209,7 @@ def test_upsampling_takes_means_of_cells() -> None:
     weights = torch.zeros(1, 9, 2, 2, 2, 3)
     weights[:, 4] = 100.0  # the cell itself
     weights[:, 4, 0, 1], weights[:, 5, 0, 1] = 0.0, 100.0  # upper right pixel: the cell to the right
-    full = upsampled(coarse, weights.reshape(1, 36, 2, 3), 2)
+    full = upsampled(coarse, weights.reshape(1, 36, 2, 3), 2)[0]
     assert full.shape == (4, 6)
     assert full[0].tolist() == pytest.approx([0, 2, 2, 4, 4, 0])
     assert full[1].tolist() == pytest.approx([0, 0, 2, 2, 4, 4])
