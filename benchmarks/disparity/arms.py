@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import cv2
 import numpy as np
 
 from stages.disparity.parameters import DisparityParameters
+from stages.disparity.raft.checkpoint import load_network
+from stages.disparity.raft.matching import estimated, moved_right
+from stages.disparity.raft.matching import match as raft_match
 from stages.kit.stereo.disparity_map import DisparityMap
 from stages.kit.stereo.semi_global import SemiGlobalSettings, gray_of, match
 
@@ -57,7 +61,34 @@ def ours(trusted: bool = False, **settings: object) -> Arm:
     return arm
 
 
-ARMS: dict[str, tuple[str, Arm]] = {
+def network(weights: Path, updates: int) -> Arm:
+    """Return RAFT-Stereo with a checkpoint, both directions; its search begins where ours does."""
+    loaded = load_network(weights)
+
+    def arm(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
+        return raft_match(loaded, left, right, updates, SemiGlobalSettings().agreement, "cpu", limits[0])
+
+    return arm
+
+
+def one_way(weights: Path, updates: int) -> Arm:
+    """Return the same without the check against the other direction: a disparity for every pixel."""
+    loaded = load_network(weights)
+
+    def arm(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
+        found = estimated(loaded, left, moved_right(right, limits[0]), updates, "cpu") + limits[0]
+        return DisparityMap(found, np.ones_like(found))
+
+    return arm
+
+
+def constant(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
+    """The middle of what ours finds, everywhere: what a network must beat to have learned anything."""
+    found = np.full(left.shape[:2], np.nanmedian(match(left, right).disparity), np.float32)
+    return DisparityMap(found, np.ones_like(found))
+
+
+CLASSICAL: dict[str, tuple[str, Arm]] = {
     "opencv_default": ("OpenCV StereoSGBM, defaults", opencv_default),
     "opencv_usual": ("OpenCV StereoSGBM, its example's settings", opencv_usual),
     "opencv_blocks": ("OpenCV StereoBM, defaults", opencv_blocks),
@@ -67,3 +98,19 @@ ARMS: dict[str, tuple[str, Arm]] = {
     "ours_unrefined": ("ours without sub-pixel refinement", ours(refine=False)),
     "ours_trusted": (f"ours where confidence is {TRUSTED:g} or more", ours(trusted=True)),
 }
+NETWORK = {
+    "small": "small RAFT-Stereo, both directions",
+    "small_one_way": "small RAFT-Stereo, one direction, unchecked",
+    "constant": "the median of ours, everywhere",
+}
+WORDS = {name: words for name, (words, _) in CLASSICAL.items()} | NETWORK
+"""Arm -> what it is."""
+
+
+def arms_of(weights: Path | None, updates: int) -> dict[str, Arm]:
+    """Return the arms by name; with a checkpoint those too that show what it does."""
+    arms = {name: arm for name, (_, arm) in CLASSICAL.items()}
+    if weights is None:
+        return arms
+    ours_too = {"small": network(weights, updates), "small_one_way": one_way(weights, updates), "constant": constant}
+    return arms | ours_too

@@ -54,10 +54,11 @@ def room_stems(
 ) -> list[Path]:
     """Return the stems of the pairs of a generated room of this seed (width, height [px]); every n-th frame of
     `frames` is kept."""
-    stems = [folder / f"room_{seed:05d}_{frame:03d}" for frame in range(0, frames, every)]
+    stems = [folder / f"room_{seed:05d}_{frame:03d}_of_{frames:03d}" for frame in range(0, frames, every)]
     if not all(_file(stem, "left").is_file() for stem in stems):
-        for frame, pair in enumerate(_room_pairs(folder / f"room_{seed:05d}", library, seed, frames, size, every)):
-            keep(stems[frame], pair)
+        work = folder / f"room_{seed:05d}_{frames:03d}"
+        for stem, pair in zip(stems, _room_pairs(work, library, seed, frames, size, every), strict=True):
+            keep(stem, pair)
     return stems
 
 

@@ -70,7 +70,7 @@ def check_inputs(parameters: DisparityParameters, inputs: Mapping[str, Any]) -> 
 
 STAGE = Stage(
     name="disparity",
-    version=1,
+    version=2,
     summary="Match the stereo pairs of a sequence: disparity, confidence, and the depth that the other steps read",
     parameters=DisparityParameters,
     reads={

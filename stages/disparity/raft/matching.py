@@ -29,18 +29,35 @@ def open_raft(
 
 
 def match(
-    network: RaftStereo, left: np.ndarray, right: np.ndarray, iterations: int, agreement: float, device: str
+    network: RaftStereo,
+    left: np.ndarray,
+    right: np.ndarray,
+    iterations: int,
+    agreement: float,
+    device: str,
+    lowest: int = 0,
 ) -> DisparityMap:
-    """Match a rectified pair (H, W, 3) uint8 RGB of one size. Raises ValueError for two sizes."""
+    """Match a rectified pair (H, W, 3) uint8 RGB of one size, whose disparities begin at `lowest` [px]: the right
+    picture is moved by so much before. Raises ValueError for two sizes."""
     if left.shape != right.shape:
         raise ValueError(f"the eyes have different sizes: {left.shape} and {right.shape}")
-    forward = estimated(network, left, right, iterations, device)
-    backward = estimated(network, mirrored(right), mirrored(left), iterations, device)[:, ::-1]
+    moved = moved_right(right, lowest)
+    forward = estimated(network, left, moved, iterations, device)
+    backward = estimated(network, mirrored(moved), mirrored(left), iterations, device)[:, ::-1]
     difference = left_right_difference(forward, backward)
-    kept = (difference <= agreement) & (forward > 0)
-    disparity = np.where(kept, forward, np.nan).astype(np.float32)
+    kept = (difference <= agreement) & (forward + lowest > 0)
+    disparity = np.where(kept, forward + lowest, np.nan).astype(np.float32)
     difference[~kept] = np.inf
     return DisparityMap(disparity, confidence_of(difference, disparity, gray_of(left)))
+
+
+def moved_right(picture: np.ndarray, columns: int) -> np.ndarray:
+    """Return a picture (H, W, 3) moved to the right; its first column fills what it leaves."""
+    if columns == 0:
+        return picture
+    columns = min(columns, picture.shape[1] - 1)
+    first = np.repeat(picture[:, :1], columns, axis=1)
+    return np.concatenate([first, picture[:, :-columns]], axis=1)
 
 
 def estimated(network: RaftStereo, left: np.ndarray, right: np.ndarray, iterations: int, device: str) -> np.ndarray:

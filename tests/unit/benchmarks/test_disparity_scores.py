@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.disparity.__main__ import scores, table
-from benchmarks.disparity.arms import ARMS
+from benchmarks.disparity.arms import CLASSICAL
 from stages.kit.stereo.disparity_map import DisparityMap
 
 
@@ -20,7 +20,7 @@ def test_scores_are_the_closed_form() -> None:
 
 
 def test_cases_that_were_not_run_have_no_table() -> None:
-    metrics = {f"{arm}/motorcycle/{measure}": 1.0 for arm in ARMS for measure in (
+    metrics = {f"{arm}/motorcycle/{measure}": 1.0 for arm in CLASSICAL for measure in (
         "bad2", "bad2_all", "epe", "median", "coverage", "cpu_seconds"
     )}  # fmt: skip
     text = table(metrics | {"pairs/motorcycle/count": 1.0})
