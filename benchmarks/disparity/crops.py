@@ -12,7 +12,7 @@ from benchmarks.disparity.shapes import shapes_pair
 from stages.suture.world.tubes import NEEDLE
 
 HEIGHT, WIDTH = 128, 256
-LEAST, LARGEST = 1.0, 112.0
+LEAST, LARGEST = 1.0, 96.0
 """Disparities that are learned [px]; others in a crop count as unknown."""
 TEXTURES = 60
 Sample = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -50,7 +50,7 @@ def kept_sample(pair: KeptPair, random: np.random.Generator) -> Sample:
     disparity = pair.disparity[part]
     known = disparity[np.isfinite(disparity)]
     lowest = float(np.percentile(known, 1)) if len(known) else 0.0
-    shift = int(min(max(0.0, lowest - random.uniform(2, 40)), left_edge))
+    shift = int(min(max(0.0, lowest - random.uniform(2, 28)), left_edge))
     right = pair.right[part[0], left_edge - shift : left_edge - shift + columns]
     size = (WIDTH, HEIGHT)
     eyes = [
@@ -64,8 +64,9 @@ def kept_sample(pair: KeptPair, random: np.random.Generator) -> Sample:
 def _place(pair: KeptPair, rows: int, columns: int, random: np.random.Generator) -> tuple[int, int]:
     """Return the upper left corner of a crop, in two of three crops about the needle where there is one."""
     height, width = pair.left.shape[:2]
-    low = np.zeros(2)
+    farthest = float(np.nanpercentile(pair.disparity[::8, ::8], 1))
     high = np.array([height - rows, width - columns])
+    low = np.array([0, min(farthest, high[1])])  # further left the right picture has nothing
     needle = np.argwhere(pair.bodies == NEEDLE)
     if len(needle) and random.random() < 2 / 3:
         middle = needle[int(random.integers(len(needle)))] - random.uniform(0.2, 0.8, 2) * [rows, columns]
@@ -76,9 +77,11 @@ def _place(pair: KeptPair, rows: int, columns: int, random: np.random.Generator)
 
 
 def counted(disparity: np.ndarray) -> np.ndarray:
-    """Return disparities (H, W) float32 with NaN where they are not learned."""
+    """Return disparities (H, W) float32 with NaN where they are not learned: out of reach, or outside of the right
+    picture."""
     with np.errstate(invalid="ignore"):
-        return np.where((disparity >= LEAST) & (disparity <= LARGEST), disparity, np.nan).astype(np.float32)
+        inside = np.arange(disparity.shape[1]) - disparity >= 0
+        return np.where(inside & (disparity >= LEAST) & (disparity <= LARGEST), disparity, np.nan).astype(np.float32)
 
 
 def two_eyes(left: np.ndarray, right: np.ndarray, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ import numpy as np
 
 CANVAS = (176, 464)
 """Rows and columns of a drawn texture [px]."""
-LARGEST = 90.0
+LARGEST = 70.0
 """Disparities of layers end here [px]."""
 Window = tuple[np.ndarray, np.ndarray]
 """Low and high (column, row) on the canvas."""
@@ -68,15 +68,15 @@ def shapes_pair(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return left and right (height, width, 3) float32 RGB, 0 to 255, and the disparity (height, width) float32 [px] of
     the left, known everywhere, hidden places too."""
-    far = random.uniform(2, 40)
+    far = random.uniform(2, 28)
     corner = random.uniform([0, 0], [CANVAS[1] - width - 170, CANVAS[0] - height])
     window = (corner, corner + [width + 0.5 * far, height])
     slope = 0.15 * random.random() ** 2
     layers: list[Layer] = [(_colors(bank, random), None, _plane(random, far, slope, height, width))]
-    nearer = np.sort(far + random.exponential(12, int(random.integers(2, 8))))
+    nearer = np.sort(far + random.exponential(10, int(random.integers(1, 6))))
     for disparity in np.minimum(nearer, LARGEST):
         layers.append((_colors(bank, random), _shape(random, window), _plane(random, disparity, 0.08, height, width)))
-    for _ in range(int(random.integers(0, 4))):
+    for _ in range(int(random.integers(0, 3))):
         near = min(layers[-1][2][0] + random.uniform(1, 15), LARGEST)
         layers.append((_colors(bank, random), _curve(random, window), _plane(random, near, 0.05, height, width)))
     left, right = np.zeros((height, width, 3), np.float32), np.zeros((height, width, 3), np.float32)
@@ -121,7 +121,7 @@ def _shape(random: np.random.Generator, window: Window) -> np.ndarray:
     drawn = np.zeros(CANVAS, np.uint8)
     for _ in range(int(random.integers(1, 4))):
         place = random.uniform(*window)
-        size = np.exp(random.uniform(np.log(8), np.log(110), 2))
+        size = np.exp(random.uniform(np.log(14), np.log(130), 2))
         if random.random() < 0.4:
             ends = [int(v) for v in 16 * place], [int(v) for v in 16 * size]
             cv2.ellipse(drawn, ends[0], ends[1], random.uniform(0, 180), 0, 360, 255, -1, cv2.LINE_AA, 4)
@@ -135,7 +135,7 @@ def _shape(random: np.random.Generator, window: Window) -> np.ndarray:
 def _curve(random: np.random.Generator, window: Window) -> np.ndarray:
     """Return the opacity (*CANVAS) float32 of thin bows in a window, as needles and threads are."""
     drawn = np.zeros(CANVAS, np.uint8)
-    for _ in range(int(random.integers(1, 5))):
+    for _ in range(int(random.integers(1, 3))):
         turns = np.cumsum(random.normal(random.normal(0, 0.06), 0.03, 60))
         steps = random.uniform(2, 6) * np.stack([np.cos(turns), np.sin(turns)], axis=1)
         points = random.uniform(*window) + np.cumsum(steps, axis=0)

@@ -31,7 +31,7 @@ from stages.disparity.raft.checkpoint import save_network
 from stages.disparity.raft.network import RaftStereo
 from stages.suture.rig import ENDOSCOPE
 
-PEAK_RATE, WEIGHT_DECAY, WARM_UP = 8e-4, 1e-4, 0.05
+PEAK_RATE, WEIGHT_DECAY, WARM_UP = 1e-3, 1e-4, 0.05
 AVERAGE_DECAY, GRADIENT_NORM = 0.995, 1.0
 FIRST_MOVES = 0.05
 """The head of the updates begins with weights this much smaller, so that the first disparities are small."""
@@ -207,7 +207,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--pairs", type=Path, help="where rendered pairs are kept; OUT/pairs if not given")
     parser.add_argument("--quick", action="store_true", help="proves the recipe: few pairs, 10 steps")
-    parser.add_argument("--steps", type=int, default=3000)
+    parser.add_argument("--steps", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--save-every", type=float, default=120.0, help="seconds between states")
     options = parser.parse_args()
@@ -215,7 +215,7 @@ def main() -> None:
     sources = Sources(options.pairs or options.out / "pairs", options.seed, options.quick)
     held_out = texture_bank(options.seed + 1000, TEXTURES)
     pairs = len(sources.rooms.stems) + len(sources.needles.stems)
-    plan = Plan(10 if options.quick else options.steps, 3, 2, 1, 5, options.seed, pairs)
+    plan = Plan(10 if options.quick else options.steps, 2, 1, 1, 4, options.seed, pairs)
     options.out.mkdir(parents=True, exist_ok=True)
     run = Run(plan, options.out)
     saved, losses = time.perf_counter(), []

@@ -51,8 +51,7 @@ class Architecture:
 
 
 SMALL = Architecture(
-    widths=(16, 32, 48), hidden=(48, 48, 8), scales=2, features=64, motion=(32, 48), head=64, mask=64, downsample=3,
-    shared=True,
+    widths=(8, 24, 32), hidden=(32, 32, 8), scales=2, features=48, motion=(24, 32), head=32, mask=32, shared=True
 )  # fmt: skip
 """Of the network that is trained here, on our own renderings."""
 
