@@ -8,24 +8,33 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from stages.disparity.raft.architecture import SMALL
 from stages.disparity.raft.checkpoint import load_network
 from stages.disparity.raft.network import RaftStereo
 from stages.kit.stereo.consistency import confidence_of, left_right_difference
 from stages.kit.stereo.disparity_map import DisparityMap
 from stages.kit.stereo.semi_global import gray_of, mirrored
 
+UPDATES, SMALL_UPDATES = 32, 8
+"""Updates of the disparity by default: of the authors' networks, and of the small one, which is trained with four."""
+
 
 def open_raft(
-    weights: Path, iterations: int, agreement: float, device: str
+    weights: Path, iterations: int | None, agreement: float, device: str
 ) -> tuple[Callable[[np.ndarray, np.ndarray, tuple[int, int]], DisparityMap], str]:
-    """Return the matcher (left and right (H, W, 3) uint8 RGB, limits that it does not need) and what it is.
+    """Return the matcher (left and right (H, W, 3) uint8 RGB, limits of the search) and what it is.
 
+    The small network has seen small disparities alone and begins where the search does; the others need no limits.
     Raises BadInput for a checkpoint that does not fit.
     """
     network = load_network(weights).to(device)
-    scale = 2**network.sizes.downsample
-    detail = f"RAFT-Stereo, {Path(weights).name}, {iterations} updates at 1/{scale} of the size, both directions"
-    return lambda left, right, limits: match(network, left, right, iterations, agreement, device), detail
+    small, scale = network.sizes == SMALL, 2**network.sizes.downsample
+    updates = iterations or (SMALL_UPDATES if small else UPDATES)
+
+    def matcher(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
+        return match(network, left, right, updates, agreement, device, limits[0] if small else 0)
+
+    return matcher, f"RAFT-Stereo, {Path(weights).name}, {updates} updates at 1/{scale} of the size, both directions"
 
 
 def match(

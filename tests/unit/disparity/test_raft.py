@@ -11,12 +11,14 @@ import torch
 
 from cli.weights_command import convert_weights
 from schemas.errors import BadInput, MissingDependency, UsageError
+from stages.disparity.raft import matching
+from stages.disparity.raft.architecture import SMALL as TRAINED_HERE
 from stages.disparity.raft.architecture import Architecture, architecture_of
-from stages.disparity.raft.checkpoint import convert, load_network, network_of
+from stages.disparity.raft.checkpoint import convert, load_network, network_of, save_network
 from stages.disparity.raft.correlation import RowCorrelation
-from stages.disparity.raft.matching import match
 from stages.disparity.raft.network import RaftStereo, padded, upsampled
 from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from tests.unit.disparity.pairs import pair
 
 SMALL = Architecture(
     widths=(4, 6, 8), hidden=(8, 8, 8), features=8, motion=(4, 8), head=8, mask=8, radius=2, downsample=2
@@ -136,9 +138,32 @@ def test_both_directions_give_a_confidence() -> None:
     tensors = {name.removeprefix("module."): tensor.numpy() for name, tensor in small_state().items()}
     random = np.random.default_rng(0)
     left, right = (random.integers(0, 255, (48, 64, 3), np.uint8) for _ in range(2))
-    found = match(network_of(tensors, "small"), left, right, 2, 1.0, "cpu")
+    found = matching.match(network_of(tensors, "small"), left, right, 2, 1.0, "cpu")
     assert found.disparity.shape == (48, 64) and (found.confidence[~found.known] == 0).all()
     assert (found.disparity[found.known] > 0).all()
+
+
+def test_the_small_network_begins_where_the_search_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    save_network(tmp_path / "ours.safetensors", RaftStereo(TRAINED_HERE), "random")
+    torch.save(small_state(), tmp_path / "theirs.pth")
+    seen = []
+    monkeypatch.setattr(matching, "match", lambda *given: seen.append((given[3], given[6])))
+    picture = np.zeros((32, 32, 3), np.uint8)
+    for name, iterations in (("ours.safetensors", None), ("ours.safetensors", 3), ("theirs.pth", None)):
+        matcher, detail = matching.open_raft(tmp_path / name, iterations, 1.0, "cpu")
+        matcher(picture, picture, (7, 16))
+        assert f"{seen[-1][0]} updates at 1/4" in detail
+    assert seen == [(8, 7), (3, 7), (32, 0)]
+
+
+def test_disparities_count_from_where_the_search_begins(monkeypatch: pytest.MonkeyPatch) -> None:
+    def half(network: object, left: np.ndarray, right: np.ndarray, iterations: int, device: str) -> np.ndarray:
+        return np.full(left.shape[:2], 1.5, np.float32)
+
+    monkeypatch.setattr(matching, "estimated", half)
+    left, right = pair()[:2]
+    found = matching.match(RaftStereo(SMALL), left, right, 1, 1.0, "cpu", 10)
+    assert found.known.any() and (found.disparity[found.known] == 11.5).all()
 
 
 class Evil:
