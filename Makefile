@@ -221,7 +221,7 @@ STEREO_NETWORK ?= data/disparity/raft_stereo_small.safetensors
 bench-disparity: setup ## Disparity beside OpenCV's matchers: Middlebury, endoscope, rooms, needles (QUICK=1: fewer frames; REAL_DATA=folder)
 	OMP_NUM_THREADS=1 $(PYTHON) -m benchmarks.disparity $(if $(QUICK),--quick) --data $(REAL_DATA) $(if $(wildcard $(STEREO_NETWORK)),--network $(STEREO_NETWORK)) --out $(OUTPUTS)/experiments/bench-disparity$(if $(QUICK),-quick)
 
-bench-reconstruct-stereo: setup ## Rooms reconstructed from two eyes beside a depth camera, two reporting seeds (QUICK=1: one, few small frames)
+bench-reconstruct-stereo: setup ## Rooms reconstructed from two eyes beside a depth camera, a reporting seed (QUICK=1: few small frames)
 	$(PYTHON) -m benchmarks.disparity.reconstruction $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-reconstruct-stereo$(if $(QUICK),-quick)
 
 # Half an hour of one core with rendering; stop it and start it again at will.

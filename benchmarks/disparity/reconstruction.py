@@ -21,8 +21,8 @@ from stages.kit.running.chain import run_pipeline
 from stages.kit.running.pipelines import Pipeline, pipeline_path, read_pipeline
 
 ARMS = ("two_eyes", "depth_camera")
-SEEDS, QUICK_SEEDS = (1100, 1101), (100,)
-"""Reporting seeds, and a tuning seed that proves that the comparison runs."""
+SEEDS, QUICK_SEEDS = (1100,), (100,)
+"""A reporting seed, and a tuning seed that proves that the comparison runs."""
 QUICK = {"frames": "12", "width": "320", "height": "240", "clutter": "low"}
 FARTHEST = 4.0
 """Depth is compared up to here [m], where the pipeline ends; its error grows with its square."""
