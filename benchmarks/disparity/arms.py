@@ -82,6 +82,18 @@ def one_way(weights: Path, updates: int) -> Arm:
     return arm
 
 
+def filled(weights: Path, updates: int) -> Arm:
+    """Return ours with its holes filled by the network, as far as its two directions agree."""
+    both_ways = network(weights, updates)
+
+    def arm(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
+        sure, other = match(left, right), both_ways(left, right, limits)
+        disparity = np.where(sure.known, sure.disparity, other.disparity)
+        return DisparityMap(disparity, np.where(sure.known, sure.confidence, other.confidence))
+
+    return arm
+
+
 def constant(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
     """The middle of what ours finds, everywhere: what a network must beat to have learned anything."""
     found = np.full(left.shape[:2], np.nanmedian(match(left, right).disparity), np.float32)
@@ -101,6 +113,7 @@ CLASSICAL: dict[str, tuple[str, Arm]] = {
 NETWORK = {
     "small": "small RAFT-Stereo, both directions",
     "small_one_way": "small RAFT-Stereo, one direction, unchecked",
+    "filled": "ours, holes filled by small RAFT-Stereo",
     "constant": "the median of ours, everywhere",
 }
 WORDS = {name: words for name, (words, _) in CLASSICAL.items()} | NETWORK
@@ -112,5 +125,5 @@ def arms_of(weights: Path | None, updates: int) -> dict[str, Arm]:
     arms = {name: arm for name, (_, arm) in CLASSICAL.items()}
     if weights is None:
         return arms
-    ours_too = {"small": network(weights, updates), "small_one_way": one_way(weights, updates), "constant": constant}
-    return arms | ours_too
+    makers = {"small": network, "small_one_way": one_way, "filled": filled}
+    return arms | {name: maker(weights, updates) for name, maker in makers.items()} | {"constant": constant}
