@@ -18,6 +18,7 @@ import numpy as np
 
 from benchmarks.disparity.arms import WORDS, Arm, arms_of
 from benchmarks.disparity.cases import CASES, Pair, Setting
+from stages.disparity.raft.matching import SMALL_UPDATES
 from stages.kit.stereo.disparity_map import DisparityMap
 from stages.kit.stereo.pictures import confidence_colors, disparity_colors
 from stages.kit.stereo.search_range import search_range
@@ -108,7 +109,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--tuning", action="store_true")
     parser.add_argument("--network", type=Path, help="checkpoint of RAFT-Stereo whose arms run too")
-    parser.add_argument("--updates", type=int, default=8, help="of the network's disparity")
+    parser.add_argument("--updates", type=int, default=SMALL_UPDATES, help="of the network's disparity")
     parser.add_argument("--cases", nargs="+", choices=tuple(CASES), default=tuple(CASES))
     options = parser.parse_args()
     cv2.setNumThreads(1)

@@ -28,6 +28,7 @@ from benchmarks.training.run_state import read_state, write_state
 from schemas.errors import BadInput
 from stages.disparity.raft.architecture import SMALL
 from stages.disparity.raft.checkpoint import save_network
+from stages.disparity.raft.matching import SMALL_UPDATES
 from stages.disparity.raft.network import RaftStereo
 from stages.suture.rig import ENDOSCOPE
 
@@ -190,7 +191,7 @@ def validation(run: Run, bank: list[np.ndarray], count: int = 24) -> dict[str, f
     left, right, truth = tensors_of(samples)
     network = run.averaged()
     with torch.inference_mode():
-        found = network.updates(left, right, 8)[0]
+        found = network.updates(left, right, SMALL_UPDATES)[0]
     known = torch.isfinite(truth)
     error = (found - truth)[known].abs()
     middle = torch.nanmedian(truth.flatten(1), dim=1).values[:, None, None]

@@ -36,7 +36,7 @@ class DisparityParameters(Parameters):
         None, ge=16, le=4096, description="So many disparities are searched, a multiple of 16; with lowest_disparity"
     )
     iterations: int | None = Field(
-        None, ge=1, le=128, description="`raft-stereo`: updates of the disparity; default: 32, of our small network 8"
+        None, ge=1, le=128, description="`raft-stereo`: updates of the disparity; default: 32, of our small network 5"
     )
     minimum_confidence: float = Field(0.3, ge=0, le=1, description="Less confident disparities give no depth")
     maximum_depth: float = Field(20.0, gt=0, le=65.0, description="Farther depth is left out [m]")

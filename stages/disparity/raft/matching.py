@@ -15,7 +15,7 @@ from stages.kit.stereo.consistency import confidence_of, left_right_difference
 from stages.kit.stereo.disparity_map import DisparityMap
 from stages.kit.stereo.semi_global import gray_of, mirrored
 
-UPDATES, SMALL_UPDATES = 32, 8
+UPDATES, SMALL_UPDATES = 32, 5
 """Updates of the disparity by default: of the authors' networks, and of the small one, which is trained with four."""
 
 
