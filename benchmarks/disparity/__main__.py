@@ -11,12 +11,13 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from benchmarks.disparity.arms import WORDS, Arm, arms_of
+from benchmarks.disparity.arms import DERIVED, WORDS, Arm, arms_of
 from benchmarks.disparity.cases import CASES, Pair, Setting
 from stages.disparity.raft.matching import SMALL_UPDATES
 from stages.kit.stereo.disparity_map import DisparityMap
@@ -34,6 +35,7 @@ MEASURES = {
 }
 SHOWN = ("opencv_default", "small_one_way", "ours")
 """Arms of the picture, as far as they ran."""
+Figures = dict[str, dict[str, dict[str, float]]]
 
 
 def scores(found: DisparityMap, truth: np.ndarray) -> dict[str, float]:
@@ -53,16 +55,28 @@ def scores(found: DisparityMap, truth: np.ndarray) -> dict[str, float]:
     }
 
 
-def measured(pair: Pair, arm: Arm) -> tuple[DisparityMap, dict[str, dict[str, float]]]:
-    """Return what an arm makes of a pair, and its scores with CPU time (one thread): of the whole ("") and of parts."""
+def measured(pair: Pair, arms: Mapping[str, Arm]) -> tuple[dict[str, DisparityMap], Figures]:
+    """Return what every arm makes of a pair, those that are made of others included, and arm -> part ("" is the whole
+    picture) -> its scores with the CPU time of the arm (one thread)."""
     limits = search_range(gray_of(pair.left), gray_of(pair.right))
-    started = time.process_time()
-    found = arm(pair.left, pair.right, limits)
-    spent = {"cpu_seconds": time.process_time() - started}
-    figures = {"": scores(found, pair.truth) | spent}
-    for name, part in pair.parts.items():
-        figures[name] = scores(found, np.where(part, pair.truth, np.nan).astype(np.float32)) | spent
-    return found, figures
+    maps, spent = {}, {}
+    for name, arm in arms.items():
+        started = time.process_time()
+        maps[name] = arm(pair.left, pair.right, limits)
+        spent[name] = time.process_time() - started
+    for name, (_, needed, make) in DERIVED.items():
+        if all(one in maps for one in needed):
+            maps[name] = make(maps)
+            spent[name] = sum(spent[one] for one in needed)
+    whole = {"": np.ones(pair.truth.shape, bool)}
+    figures = {
+        name: {
+            part: scores(found, np.where(inside, pair.truth, np.nan)) | {"cpu_seconds": spent[name]}
+            for part, inside in (whole | pair.parts).items()
+        }
+        for name, found in maps.items()
+    }
+    return maps, figures
 
 
 def picture(pair: Pair, maps: dict[str, DisparityMap]) -> np.ndarray:
@@ -121,20 +135,19 @@ def main() -> None:
     for case in options.cases:
         rows: dict[str, dict[str, list[dict[str, float]]]] = {}
         for number, pair in enumerate(CASES[case](setting)):
-            maps = {}
-            for name, arm in arms.items():
-                maps[name], figures = measured(pair, arm)
-                for part, values in figures.items():
+            maps, figures = measured(pair, arms)
+            for name, of_parts in figures.items():
+                for part, values in of_parts.items():
                     rows.setdefault(part, {}).setdefault(name, []).append(values)
             if number == 0:
                 cv2.imwrite(str(options.out / f"{case}.png"), picture(pair, maps)[..., ::-1])
-            print(f"{pair.name}: " + ", ".join(f"{name} {rows[''][name][-1]['bad2']:.1f}" for name in arms), flush=True)
+            print(f"{pair.name}: " + ", ".join(f"{name} {figures[name]['']['bad2']:.1f}" for name in maps), flush=True)
         for part, of_arms in rows.items():
             key = f"{case}_{part}" if part else case
             metrics[f"pairs/{key}/count"] = len(of_arms["ours"])
             for name, figures_of_all in of_arms.items():
                 for measure in MEASURES:
-                    values = [figures[measure] for figures in figures_of_all]
+                    values = [one[measure] for one in figures_of_all]
                     metrics[f"{name}/{key}/{measure}"] = round(float(np.nanmean(values)), 4)
         kept.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
         (options.out / "table.md").write_text(table(metrics))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import cv2
@@ -48,17 +48,10 @@ def opencv_blocks(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) 
     return opencv_map(matcher, left, right, limits[0])
 
 
-def ours(trusted: bool = False, **settings: object) -> Arm:
-    """Return our matcher, which finds its range itself; `trusted`: only what gives depth."""
+def ours(**settings: object) -> Arm:
+    """Return our matcher, which finds its range itself."""
     chosen = SemiGlobalSettings(**settings)  # type: ignore[arg-type]
-
-    def arm(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
-        found = match(left, right, chosen)
-        if not trusted:
-            return found
-        return DisparityMap(np.where(found.confidence >= TRUSTED, found.disparity, np.nan), found.confidence)
-
-    return arm
+    return lambda left, right, limits: match(left, right, chosen)
 
 
 def network(weights: Path, updates: int) -> Arm:
@@ -82,21 +75,22 @@ def one_way(weights: Path, updates: int) -> Arm:
     return arm
 
 
-def filled(weights: Path, updates: int) -> Arm:
+def trusted(maps: Mapping[str, DisparityMap]) -> DisparityMap:
+    """Return what of ours gives depth."""
+    found = maps["ours"]
+    return DisparityMap(np.where(found.confidence >= TRUSTED, found.disparity, np.nan), found.confidence)
+
+
+def filled(maps: Mapping[str, DisparityMap]) -> DisparityMap:
     """Return ours with its holes filled by the network, as far as its two directions agree."""
-    both_ways = network(weights, updates)
-
-    def arm(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
-        sure, other = match(left, right), both_ways(left, right, limits)
-        disparity = np.where(sure.known, sure.disparity, other.disparity)
-        return DisparityMap(disparity, np.where(sure.known, sure.confidence, other.confidence))
-
-    return arm
+    sure, other = maps["ours"], maps["small"]
+    disparity = np.where(sure.known, sure.disparity, other.disparity)
+    return DisparityMap(disparity, np.where(sure.known, sure.confidence, other.confidence))
 
 
-def constant(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
+def constant(maps: Mapping[str, DisparityMap]) -> DisparityMap:
     """The middle of what ours finds, everywhere: what a network must beat to have learned anything."""
-    found = np.full(left.shape[:2], np.nanmedian(match(left, right).disparity), np.float32)
+    found = np.full_like(maps["ours"].disparity, np.nanmedian(maps["ours"].disparity))
     return DisparityMap(found, np.ones_like(found))
 
 
@@ -108,22 +102,25 @@ CLASSICAL: dict[str, tuple[str, Arm]] = {
     "ours": ("**ours**", ours()),
     "ours_high": ("ours, effort high", ours(effort="high")),
     "ours_unrefined": ("ours without sub-pixel refinement", ours(refine=False)),
-    "ours_trusted": (f"ours where confidence is {TRUSTED:g} or more", ours(trusted=True)),
 }
+DERIVED: dict[str, tuple[str, tuple[str, ...], Callable[[Mapping[str, DisparityMap]], DisparityMap]]] = {
+    "ours_trusted": (f"ours where confidence is {TRUSTED:g} or more", ("ours",), trusted),
+    "filled": ("ours, holes filled by small RAFT-Stereo", ("ours", "small"), filled),
+    "constant": ("the median of ours, everywhere", ("ours",), constant),
+}
+"""Arm -> what it is, the arms that it is made of (its time is theirs), and how."""
 NETWORK = {
     "small": "small RAFT-Stereo, both directions",
     "small_one_way": "small RAFT-Stereo, one direction, unchecked",
-    "filled": "ours, holes filled by small RAFT-Stereo",
-    "constant": "the median of ours, everywhere",
 }
-WORDS = {name: words for name, (words, _) in CLASSICAL.items()} | NETWORK
-"""Arm -> what it is."""
+WORDS = {name: words for name, (words, _) in CLASSICAL.items()}
+WORDS |= {"ours_trusted": DERIVED["ours_trusted"][0]} | NETWORK | {name: words for name, (words, *_) in DERIVED.items()}
+"""Arm -> what it is, in the order of the tables."""
 
 
 def arms_of(weights: Path | None, updates: int) -> dict[str, Arm]:
-    """Return the arms by name; with a checkpoint those too that show what it does."""
+    """Return the arms that look at pictures, by name; with a checkpoint those too that show what it does."""
     arms = {name: arm for name, (_, arm) in CLASSICAL.items()}
     if weights is None:
         return arms
-    makers = {"small": network, "small_one_way": one_way, "filled": filled}
-    return arms | {name: maker(weights, updates) for name, maker in makers.items()} | {"constant": constant}
+    return arms | {"small": network(weights, updates), "small_one_way": one_way(weights, updates)}

@@ -23,6 +23,8 @@ from stages.kit.running.pipelines import Pipeline, pipeline_path, read_pipeline
 ARMS = ("two_eyes", "depth_camera")
 SEEDS, QUICK_SEEDS = (1100,), (100,)
 """A reporting seed, and a tuning seed that proves that the comparison runs."""
+GIVEN = {"frames": "60"}
+"""Variables of the pipeline that are not its defaults."""
 QUICK = {"frames": "12", "width": "320", "height": "240", "clutter": "low"}
 FARTHEST = 4.0
 """Depth is compared up to here [m], where the pipeline ends; its error grows with its square."""
@@ -130,7 +132,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+")
     parser.add_argument("--quick", action="store_true", help="one room, few small frames")
     options = parser.parse_args()
-    given = QUICK if options.quick else {}
+    given = QUICK if options.quick else GIVEN
     kept = options.out / "metrics.json"
     metrics: dict[str, float] = json.loads(kept.read_text()) if kept.exists() else {}
     for seed in options.seeds or (QUICK_SEEDS if options.quick else SEEDS):

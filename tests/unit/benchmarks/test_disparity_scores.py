@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.disparity.__main__ import measured, scores, table
-from benchmarks.disparity.arms import CLASSICAL, WORDS, arms_of
+from benchmarks.disparity.arms import CLASSICAL, DERIVED, WORDS, arms_of
 from benchmarks.disparity.cases import Pair
 from benchmarks.disparity.reconstruction import depth_figures, pipeline_of
 from benchmarks.disparity.reconstruction import table as table_of_rooms
@@ -45,9 +45,20 @@ def test_parts_of_a_picture_are_scored_by_themselves() -> None:
     def arm(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
         return DisparityMap(np.where(needle, 20.0, 7.5).astype(np.float32), np.ones(truth.shape, np.float32))
 
-    found = measured(pair, arm)[1]
+    maps, figures = measured(pair, {"ours": arm})
+    found = figures["ours"]
     assert found[""]["bad2"] == pytest.approx(25) and found["needle"]["bad2"] == pytest.approx(100)
     assert np.isnan(found["none"]["bad2"]) and found["none"]["cpu_seconds"] >= 0
+    assert set(maps) == {"ours", "ours_trusted", "constant"}  # the network did not run
+    assert (maps["constant"].disparity == 7.5).all() and figures["constant"]["needle"]["bad2"] == 0
+
+
+def test_holes_of_ours_are_filled_by_the_network() -> None:
+    sure = DisparityMap(np.array([[3.0, np.nan, np.nan]], np.float32), np.array([[1.0, 0.0, 0.0]], np.float32))
+    other = DisparityMap(np.array([[5.0, 6.0, np.nan]], np.float32), np.array([[0.5, 0.5, 0.0]], np.float32))
+    found = DERIVED["filled"][2]({"ours": sure, "small": other})
+    np.testing.assert_array_equal(found.disparity, [[3.0, 6.0, np.nan]])
+    np.testing.assert_array_equal(found.confidence, [[1.0, 0.5, 0.0]])
 
 
 def test_arms_of_the_network_need_a_checkpoint() -> None:
