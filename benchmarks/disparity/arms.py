@@ -10,8 +10,7 @@ import numpy as np
 
 from stages.disparity.parameters import DisparityParameters
 from stages.disparity.raft.checkpoint import load_network
-from stages.disparity.raft.matching import estimated, moved_right
-from stages.disparity.raft.matching import match as raft_match
+from stages.disparity.raft.matching import estimated, larger, moved_right, open_raft, smaller, start_of
 from stages.kit.stereo.disparity_map import DisparityMap
 from stages.kit.stereo.semi_global import SemiGlobalSettings, gray_of, match
 
@@ -55,13 +54,8 @@ def ours(**settings: object) -> Arm:
 
 
 def network(weights: Path, updates: int) -> Arm:
-    """Return RAFT-Stereo with a checkpoint, both directions; its search begins where ours does."""
-    loaded = load_network(weights)
-
-    def arm(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
-        return raft_match(loaded, left, right, updates, SemiGlobalSettings().agreement, "cpu", limits[0])
-
-    return arm
+    """Return RAFT-Stereo with a checkpoint as the step `disparity` runs it, both directions."""
+    return open_raft(weights, updates, SemiGlobalSettings().agreement, "cpu")[0]
 
 
 def one_way(weights: Path, updates: int) -> Arm:
@@ -69,7 +63,9 @@ def one_way(weights: Path, updates: int) -> Arm:
     loaded = load_network(weights)
 
     def arm(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
-        found = estimated(loaded, left, moved_right(right, limits[0]), updates, "cpu") + limits[0]
+        lowest, shrink = start_of(left, right)
+        eyes = smaller(left, shrink), moved_right(smaller(right, shrink), lowest)
+        found = larger(estimated(loaded, *eyes, updates, "cpu") + lowest, left.shape, shrink)
         return DisparityMap(found, np.ones_like(found))
 
     return arm

@@ -20,7 +20,7 @@ ROOM_SEEDS = (1000,)
 TUNING_SEEDS = (100,)
 """The sub-pixel table and the settings were looked at with this one."""
 ROOM_FRAMES = 8
-NEEDLE_SEEDS, TUNING_NEEDLES = range(3000, 3006), range(300, 304)
+NEEDLE_SEEDS, TUNING_NEEDLES = range(3100, 3106), range(300, 304)
 """Scenes of the needle world."""
 ROWS_AGREE = 0.75
 """Matched features of the endoscope count as truth when their rows differ by no more than this [px]."""

@@ -18,6 +18,7 @@ from stages.disparity.raft.checkpoint import convert, load_network, network_of, 
 from stages.disparity.raft.correlation import RowCorrelation
 from stages.disparity.raft.network import RaftStereo, padded, upsampled
 from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from stages.kit.stereo.disparity_map import DisparityMap
 from tests.unit.disparity.pairs import pair
 
 SMALL = Architecture(
@@ -143,17 +144,27 @@ def test_both_directions_give_a_confidence() -> None:
     assert (found.disparity[found.known] > 0).all()
 
 
-def test_the_small_network_begins_where_the_search_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_small_network_stays_within_its_reach(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save_network(tmp_path / "ours.safetensors", RaftStereo(TRAINED_HERE), "random")
     torch.save(small_state(), tmp_path / "theirs.pth")
     seen = []
-    monkeypatch.setattr(matching, "match", lambda *given: seen.append((given[3], given[6])))
-    picture = np.zeros((32, 32, 3), np.uint8)
-    for name, iterations in (("ours.safetensors", None), ("ours.safetensors", 3), ("theirs.pth", None)):
+
+    def recorded(network: object, left: np.ndarray, *given: object) -> DisparityMap:
+        seen.append((left.shape[:2], given[1], given[4:]))
+        return DisparityMap(np.full(left.shape[:2], 10.0, np.float32), np.ones(left.shape[:2], np.float32))
+
+    monkeypatch.setattr(matching, "match", recorded)
+    picture = np.zeros((40, 60, 3), np.uint8)
+    for name, iterations, found, value in (
+        ("ours.safetensors", None, (20.0, 60.0), 10.0), ("ours.safetensors", 3, (200.0, 340.0), 20.0),
+        ("theirs.pth", None, (200.0, 340.0), 10.0),
+    ):  # fmt: skip
+        monkeypatch.setattr(matching, "usual_range", lambda left, right, found=found: found)
         matcher, detail = matching.open_raft(tmp_path / name, iterations, 1.0, "cpu")
-        matcher(picture, picture, (7, 16))
-        assert f"{seen[-1][0]} updates at 1/4" in detail
-    assert seen == [(5, 7), (3, 7), (32, 0)]
+        whole = matcher(picture, picture, (7, 16))
+        assert whole.disparity.shape == whole.confidence.shape == (40, 60) and (whole.disparity == value).all()
+        assert f"{seen[-1][1]} updates at 1/4" in detail
+    assert seen == [((40, 60), 5, (14,)), ((20, 30), 3, (94,)), ((40, 60), 32, ())]
 
 
 def test_disparities_count_from_where_the_search_begins(monkeypatch: pytest.MonkeyPatch) -> None:
