@@ -208,7 +208,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--pairs", type=Path, help="where rendered pairs are kept; OUT/pairs if not given")
     parser.add_argument("--quick", action="store_true", help="proves the recipe: few pairs, 10 steps")
-    parser.add_argument("--steps", type=int, default=2000)
+    parser.add_argument("--steps", type=int, default=1750)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--save-every", type=float, default=120.0, help="seconds between states")
     options = parser.parse_args()

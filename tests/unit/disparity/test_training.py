@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import tomllib
 from pathlib import Path
 
 import cv2
@@ -16,8 +18,10 @@ from benchmarks.disparity.train import FILE, Plan, Run, Sources, loss_of, tensor
 from schemas.errors import BadInput
 from stages.disparity.raft.architecture import SMALL
 from stages.disparity.raft.checkpoint import load_network
-from stages.disparity.raft.matching import moved_right
+from stages.disparity.raft.matching import moved_right, open_raft
 from stages.disparity.raft.network import RaftStereo
+from stages.kit.running.chain import REPOSITORY
+from tests.unit.disparity.pairs import pair
 
 PLAN = Plan(steps=4, shapes=1, rooms=0, needles=0, updates=2, seed=3, pairs=0)
 
@@ -145,3 +149,21 @@ def test_samples_are_those_of_their_step(bank: list[np.ndarray]) -> None:
     other = tensors_of(OnlyShapes(bank).samples(PLAN, 1))
     assert torch.equal(first[0], second[0]) and not torch.equal(first[0], other[0])
     assert first[0].shape == (1, 3, HEIGHT, WIDTH) and first[2].shape == (1, HEIGHT, WIDTH)
+
+
+def test_the_checkpoint_that_comes_with_it_is_the_one_its_record_describes() -> None:
+    path = REPOSITORY / "data" / "disparity" / "raft_stereo_small.safetensors"
+    facts = tomllib.loads(path.with_suffix(".toml").read_text())
+    assert hashlib.sha256(path.read_bytes()).hexdigest() == facts["sha256"]
+    network = load_network(path)
+    assert network.sizes == SMALL and path.stat().st_size < 5e6
+    assert sum(parameter.numel() for parameter in network.parameters()) == facts["parameters"]
+
+
+def test_the_checkpoint_that_comes_with_it_finds_a_wall() -> None:
+    left, right, truth, seen = pair()
+    matcher, detail = open_raft(REPOSITORY / "data" / "disparity" / "raft_stereo_small.safetensors", None, 1.0, "cpu")
+    found = matcher(left, right, (0, 48))
+    error = np.abs(found.disparity - truth)[found.known & seen]
+    assert "5 updates at 1/4" in detail and found.known.mean() > 0.6
+    assert np.median(error) < 0.5 and np.mean(error > 2) < 0.1
