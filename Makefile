@@ -215,9 +215,18 @@ stitch-thread: setup ## Threads as curves in space, from true and from learned m
 llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2, harder suites (QUICK=1: ten instances)
 	$(PYTHON) -m benchmarks.llm3 $(if $(QUICK),--quick) $(if $(FRESH),--fresh) --out $(OUTPUTS)/experiments/llm3$(if $(QUICK),-quick)
 
-.PHONY: bench-disparity
-bench-disparity: setup ## Disparity beside OpenCV's matchers: Middlebury, endoscope, generated rooms (QUICK=1: fewer frames; REAL_DATA=folder)
-	OMP_NUM_THREADS=1 $(PYTHON) -m benchmarks.disparity $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-disparity$(if $(QUICK),-quick)
+.PHONY: bench-disparity bench-reconstruct-stereo train-stereo
+# Rendered pairs are kept below the output folder; the network's arms run when its checkpoint is there.
+STEREO_NETWORK ?= data/disparity/raft_stereo_small.safetensors
+bench-disparity: setup ## Disparity beside OpenCV's matchers: Middlebury, endoscope, rooms, needles (QUICK=1: fewer frames; REAL_DATA=folder)
+	OMP_NUM_THREADS=1 $(PYTHON) -m benchmarks.disparity $(if $(QUICK),--quick) --data $(REAL_DATA) $(if $(wildcard $(STEREO_NETWORK)),--network $(STEREO_NETWORK)) --out $(OUTPUTS)/experiments/bench-disparity$(if $(QUICK),-quick)
+
+bench-reconstruct-stereo: setup ## Rooms reconstructed from two eyes beside a depth camera, a reporting seed (QUICK=1: few small frames)
+	$(PYTHON) -m benchmarks.disparity.reconstruction $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-reconstruct-stereo$(if $(QUICK),-quick)
+
+# Half an hour of one core with rendering; stop it and start it again at will.
+train-stereo: setup ## Train the small RAFT-Stereo on our own renderings (QUICK=1: 10 steps)
+	$(PYTHON) -m benchmarks.disparity.train $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/train-stereo$(if $(QUICK),-quick)
 
 .PHONY: pictures
 pictures: setup ## Take the README's pictures out of the demo run

@@ -1,25 +1,27 @@
-"""The pairs: a Middlebury pair, frames of an endoscope, generated rooms."""
+"""The pairs: a Middlebury pair, frames of an endoscope, generated rooms, rendered needles."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+from benchmarks.disparity.rendered_pairs import kept, made, needle_stem, room_stems
 from stages.kit.formats.frames import FrameReader
-from stages.kit.running.chain import run_command
 from stages.kit.stereo.rectification import matched_features
 from stages.kit.stereo.semi_global import gray_of
+from stages.suture.world.tubes import NEEDLE, THREAD
 
 ROOM_SEEDS = (1000,)
 """Reporting seed of the recipe `room`."""
 TUNING_SEEDS = (100,)
 """The sub-pixel table and the settings were looked at with this one."""
 ROOM_FRAMES = 8
-BASELINE, PICTURE_NOISE = 0.12, 2.0
+NEEDLE_SEEDS, TUNING_NEEDLES = range(3100, 3106), range(300, 304)
+"""Scenes of the needle world."""
 ROWS_AGREE = 0.75
 """Matched features of the endoscope count as truth when their rows differ by no more than this [px]."""
 
@@ -37,13 +39,6 @@ class Setting:
     """Rooms of the tuning seeds instead of the reporting ones."""
 
 
-def made(arguments: list[str]) -> None:
-    """Run a command of ours. Raises RuntimeError when it fails."""
-    code, _ = run_command([*arguments, "--quiet"])
-    if code != 0:
-        raise RuntimeError(f"scenewright {' '.join(arguments)} ended with {code}")
-
-
 @dataclass(frozen=True)
 class Pair:
     """A rectified pair and what is known of it."""
@@ -54,6 +49,8 @@ class Pair:
     right: np.ndarray
     truth: np.ndarray
     """(H, W) disparity [px], NaN where it is not known."""
+    parts: dict[str, np.ndarray] = field(default_factory=dict)
+    """Name -> (H, W) bool: parts of the picture that are scored by themselves too."""
 
 
 def motorcycle(setting: Setting) -> Iterator[Pair]:
@@ -101,23 +98,27 @@ def rooms(setting: Setting) -> Iterator[Pair]:
     shapes = ["--shapes-per-class", "4", "--small-shapes-per-class", "4"]
     made(["library", "build", *shapes, "--seed", "1", "--out", str(library)])
     for seed in TUNING_SEEDS if setting.tuning else ROOM_SEEDS:
-        truth, sequence = setting.work / f"room-{seed}", setting.work / f"room-{seed}-sequence"
-        made(["synthesize", "--library", str(library), "--frames", str(ROOM_FRAMES), "--seed", str(seed),
-             "--stereo-baseline", str(BASELINE), "--picture-noise", str(PICTURE_NOISE), "--no-depth-noise",
-             "--out", str(truth)]
-        )  # fmt: skip
-        made(["ingest", "--log", str(truth / "log.mcap"), "--out", str(sequence)])
-        with FrameReader(sequence / "frames.mcap") as reader:
-            focal = reader.camera.fx
-            for frame in reader.frames(("color", "right", "depth"), every=4 if setting.quick else 2):
-                assert frame.color is not None and frame.right is not None and frame.depth is not None
-                with np.errstate(divide="ignore"):
-                    disparity = np.where(frame.depth > 0, focal * BASELINE / frame.depth, np.nan).astype(np.float32)
-                yield Pair(f"room {seed} frame {frame.index}", frame.color, frame.right, disparity)
+        every = 4 if setting.quick else 2
+        for stem in room_stems(setting.work / "pairs", library, seed, ROOM_FRAMES, every=every):
+            pair = kept(stem)
+            yield Pair(stem.name, pair.left, pair.right, pair.disparity)
+
+
+def needles(setting: Setting) -> Iterator[Pair]:
+    """Scenes of the needle world before two cameras 6 cm apart: needle, thread, and all else, which is the pad and the
+    drivers."""
+    seeds = TUNING_NEEDLES if setting.tuning else NEEDLE_SEEDS
+    for seed in seeds[:2] if setting.quick else seeds:
+        stem = needle_stem(setting.work / "pairs", seed)
+        pair = kept(stem)
+        needle, thread = pair.bodies == NEEDLE, pair.bodies == THREAD
+        parts = {"needle": needle, "thread": thread, "background": ~(needle | thread)}
+        yield Pair(stem.name, pair.left, pair.right, pair.disparity, parts)
 
 
 CASES: dict[str, Callable[[Setting], Iterator[Pair]]] = {
     "motorcycle": motorcycle,
     "endoscope": endoscope,
     "rooms": rooms,
+    "needles": needles,
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 
+import cv2
 import numpy as np
 
 from schemas.disparity import RowReport
@@ -26,6 +27,11 @@ LARGEST_TURN = math.radians(3)
 """A turn of the right eye over this is no small one: the calibration is of other cameras."""
 LEAST_GAIN = 0.7
 """A correction must bring the row error to this share of what it was."""
+
+BLANK_SPAN, BLANK_SQUARE = 4.0, 15
+"""An eye is blank when its means over squares of so many pixels span fewer grey levels than this."""
+NO_PARALLAX = 0.1
+"""Median disparity [px] of matched features under which both eyes see the same."""
 
 
 def stereo_cameras(reader: FrameReader, sequence: Sequence) -> dict[str, float]:
@@ -77,9 +83,21 @@ def check_eyes(
             f"{found.matches} matched features lie further right in the right picture",
             hint="exchange the two eyes (--color-topic and --right-topic, or the folders left/ and right/)",
         )
+    if found.checked and abs(found.median_disparity) < NO_PARALLAX:
+        logger.warning(
+            "%s: %d matched features of %r have a median disparity of %.2f px: one picture twice, or nothing near",
+            sequence.root, found.matches, name, found.median_disparity,
+        )  # fmt: skip
     report = row_report(found, name, len(pairs), parameters)
     _tell(report, sequence, parameters, camera, logger)
     return report
+
+
+def is_blank(picture: np.ndarray) -> bool:
+    """Return whether a picture (H, W, 3) uint8 shows nothing but noise: a covered or dead camera, or a bare wall."""
+    means = cv2.blur(gray_of(picture).astype(np.float32), (BLANK_SQUARE, BLANK_SQUARE))
+    low, high = np.percentile(means, [1, 99])
+    return bool(high - low < BLANK_SPAN)
 
 
 def row_report(found: RowCheck, name: str, frames: int, parameters: DisparityParameters) -> RowReport:

@@ -35,7 +35,9 @@ class DisparityParameters(Parameters):
     levels: int | None = Field(
         None, ge=16, le=4096, description="So many disparities are searched, a multiple of 16; with lowest_disparity"
     )
-    iterations: int = Field(32, ge=1, le=128, description="`raft-stereo`: updates of the disparity")
+    iterations: int | None = Field(
+        None, ge=1, le=128, description="`raft-stereo`: updates of the disparity; default: 32, of our small network 5"
+    )
     minimum_confidence: float = Field(0.3, ge=0, le=1, description="Less confident disparities give no depth")
     maximum_depth: float = Field(20.0, gt=0, le=65.0, description="Farther depth is left out [m]")
     rectification: Literal["correct", "report", "refuse"] = Field(
@@ -70,7 +72,7 @@ def check_inputs(parameters: DisparityParameters, inputs: Mapping[str, Any]) -> 
 
 STAGE = Stage(
     name="disparity",
-    version=1,
+    version=2,
     summary="Match the stereo pairs of a sequence: disparity, confidence, and the depth that the other steps read",
     parameters=DisparityParameters,
     reads={

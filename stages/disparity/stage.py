@@ -13,7 +13,7 @@ import numpy as np
 from schemas.disparity import Disparity, DisparityFile, FrameDisparity, RowReport
 from schemas.errors import BadInput
 from schemas.sequence import Sequence, SequenceFile
-from stages.disparity.eyes import check_eyes, stereo_cameras
+from stages.disparity.eyes import check_eyes, is_blank, stereo_cameras
 from stages.disparity.parameters import DisparityParameters
 from stages.kit.formats.disparity_file import DisparityWriter
 from stages.kit.formats.foxglove import nanoseconds
@@ -27,7 +27,7 @@ from stages.kit.stereo.search_range import search_range
 
 Matcher = Callable[[np.ndarray, np.ndarray, tuple[int, int]], DisparityMap]
 """Left and right (H, W, 3) uint8 RGB, and the limits of the search -> map."""
-NO_RIGHT_EYE, NOTHING_MATCHES = "no_right_eye", "nothing_matches"
+NO_RIGHT_EYE, BLANK_EYE, NOTHING_MATCHES = "no_right_eye", "blank_eye", "nothing_matches"
 
 
 @dataclass
@@ -98,6 +98,9 @@ def _match_all(
             frame = reader.read(index, ("color", "right", "labels") if has_labels else ("color", "right"))
             if frame.color is None or frame.right is None:
                 written.left_out[NO_RIGHT_EYE] += 1
+                continue
+            if is_blank(frame.color) != is_blank(frame.right):
+                written.left_out[BLANK_EYE] += 1
                 continue
             camera, baseline = cameras[frame.camera_name], baselines[frame.camera_name]
             left, right = frame.color, _put_right(frame, rows[frame.camera_name], reader)

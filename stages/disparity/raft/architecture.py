@@ -50,6 +50,12 @@ class Architecture:
         return self.shared
 
 
+SMALL = Architecture(
+    widths=(8, 24, 32), hidden=(32, 32, 8), scales=2, features=48, motion=(24, 32), head=32, mask=32, shared=True
+)  # fmt: skip
+"""Of the network that is trained here, on our own renderings."""
+
+
 def architecture_of(shapes: Shapes, where: str) -> Architecture:
     """Return the sizes of a checkpoint with tensors of these shapes. Raises BadInput for one of another network."""
     try:

@@ -70,3 +70,13 @@ def convert(source: Path, target: Path) -> None:
     tensors = read_tensors(source)
     network_of(tensors, str(source))
     write_safetensors(target, tensors, {"format": FORMAT, "source": Path(source).name})
+
+
+def save_network(path: Path, network: RaftStereo, description: str) -> None:
+    """Write a network of ours as safetensors of float16."""
+    tensors = {
+        name: tensor.detach().to(torch.float16).contiguous().numpy()
+        for name, tensor in network.state_dict().items()
+        if not name.endswith(COUNTER)
+    }
+    write_safetensors(path, tensors, {"format": FORMAT, "description": description})

@@ -10,27 +10,27 @@ from torch.nn import functional
 
 
 class RowCorrelation:
-    """The pyramid of correlations of two feature maps (1, C, h, w)."""
+    """The pyramid of correlations of two feature maps (N, C, h, w)."""
 
     def __init__(self, left: torch.Tensor, right: torch.Tensor, levels: int, radius: int) -> None:
-        _, channels, height, width = left.shape
-        rows = torch.matmul(left[0].permute(1, 2, 0), right[0].permute(1, 0, 2)) / math.sqrt(channels)
-        volume = rows.reshape(height * width, 1, right.shape[3])
-        self.size, self.radius = (height, width), radius
+        count, channels, height, width = left.shape
+        rows = torch.matmul(left.permute(0, 2, 3, 1), right.permute(0, 2, 1, 3)) / math.sqrt(channels)
+        volume = rows.reshape(count * height * width, 1, right.shape[3])
+        self.size, self.radius = (count, height, width), radius
         self.pyramid = [volume]
         for _ in range(levels - 1):
             volume = functional.avg_pool1d(volume, 2) if volume.shape[2] > 1 else volume
             self.pyramid.append(volume)
 
     def at(self, column: torch.Tensor) -> torch.Tensor:
-        """Return correlations (1, levels * (2 radius + 1), h, w) around columns (h, w) of the right map [px], finest
-        level first, between pixels by linear interpolation; outside of the row they are zero."""
+        """Return correlations (N, levels * (2 radius + 1), h, w) around columns (N, h, w) of the right map [px],
+        finest level first, between pixels by linear interpolation; outside of the row they are zero."""
         around = torch.arange(-self.radius, self.radius + 1, dtype=column.dtype, device=column.device)
         found = []
         for level, volume in enumerate(self.pyramid):
             wanted = column.reshape(-1, 1) / 2**level + around
             found.append(sampled(volume[:, 0], wanted))
-        return torch.cat(found, dim=1).T.reshape(1, -1, *self.size)
+        return torch.cat(found, dim=1).reshape(*self.size, -1).permute(0, 3, 1, 2)
 
 
 def sampled(rows: torch.Tensor, places: torch.Tensor) -> torch.Tensor:

@@ -16,7 +16,7 @@ DIVISOR = 32
 
 
 class RaftStereo(nn.Module):
-    """RAFT-Stereo for one pair at a time."""
+    """RAFT-Stereo: `forward` for one pair, `updates` for the training."""
 
     def __init__(self, sizes: Architecture | None = None) -> None:
         super().__init__()
@@ -36,35 +36,47 @@ class RaftStereo(nn.Module):
     def forward(self, left: torch.Tensor, right: torch.Tensor, iterations: int) -> torch.Tensor:
         """Return the disparity (H, W) [px] of the left of two pictures (3, H, W) float, 0 to 255, RGB."""
         height, width = left.shape[1:]
-        pictures = padded(torch.stack([left, right]) * (2 / 255.0) - 1.0)
-        features, scales = self._encode(pictures)
+        full = self.updates(padded(left[None]), padded(right[None]), iterations)[0][0]
+        top, left_edge = (full.shape[0] - height) // 2, (full.shape[1] - width) // 2
+        return full[top : top + height, left_edge : left_edge + width]
+
+    def updates(
+        self, left: torch.Tensor, right: torch.Tensor, iterations: int
+    ) -> tuple[torch.Tensor, list[torch.Tensor]]:
+        """Return the disparity (N, H, W) [px] of pictures (N, 3, H, W) whose sizes are multiples of DIVISOR, and the
+        coarse disparities (N, h, w) [coarse px] after every update. Gradients stop between updates, as in the
+        paper."""
+        features, scales = self._encode(torch.cat([left, right]) * (2 / 255.0) - 1.0)
         states = [state for state, _ in scales]
         context = [
             list(convolution(told).chunk(3, dim=1))
             for convolution, (_, told) in zip(self.context_zqr_convs, scales, strict=True)
         ]
-        correlation = RowCorrelation(features[:1], features[1:], self.sizes.levels, self.sizes.radius)
-        start = torch.arange(features.shape[3], dtype=features.dtype, device=features.device)
-        start = start.expand(features.shape[2], -1)
-        column = start
+        first, second = features.float().chunk(2)
+        with torch.autocast(features.device.type, enabled=False):
+            correlation = RowCorrelation(first, second, self.sizes.levels, self.sizes.radius)
+        start = torch.arange(first.shape[3], dtype=first.dtype, device=first.device)
+        start = start.expand(first.shape[0], *first.shape[2:])
+        column, found = start, []
         for _ in range(iterations):
-            flow = torch.stack([column - start, torch.zeros_like(start)])[None]
+            column = column.detach()
+            flow = torch.stack([column - start, torch.zeros_like(start)], dim=1)
             if self.sizes.slow_fast:
                 self.update_block.coarse_step(states, context, only_coarsest=True)
                 self.update_block.coarse_step(states, context)
             self.update_block.coarse_step(states, context)
             change = self.update_block.fine_step(states, context, flow, correlation.at(column))
-            column = column + change[0, 0]
-        weights = self.update_block.upsampling_weights(states)
-        full = upsampled((start - column)[None, None], weights, 2**self.sizes.downsample)
-        top, left_edge = (full.shape[0] - height) // 2, (full.shape[1] - width) // 2
-        return full[top : top + height, left_edge : left_edge + width]
+            column = column + change[:, 0].float()
+            found.append(start - column)
+        weights = self.update_block.upsampling_weights(states).float()
+        return upsampled(found[-1][:, None], weights, 2**self.sizes.downsample), found
 
     def _encode(self, pictures: torch.Tensor) -> tuple[torch.Tensor, list[tuple[torch.Tensor, torch.Tensor]]]:
+        count = len(pictures) // 2
         if self.sizes.shared:
             finest = self.cnet.trunk(pictures)
-            return self.conv2(finest), self.cnet.scales(finest[:1], self.sizes.scales)
-        return self.fnet(pictures), self.cnet.scales(self.cnet.trunk(pictures[:1]), self.sizes.scales)
+            return self.conv2(finest), self.cnet.scales(finest[:count], self.sizes.scales)
+        return self.fnet(pictures), self.cnet.scales(self.cnet.trunk(pictures[:count]), self.sizes.scales)
 
 
 def padded(pictures: torch.Tensor) -> torch.Tensor:
@@ -75,9 +87,10 @@ def padded(pictures: torch.Tensor) -> torch.Tensor:
 
 
 def upsampled(coarse: torch.Tensor, weights: torch.Tensor, factor: int) -> torch.Tensor:
-    """Return a map (1, 1, h, w) at `factor` times the size (h * factor, w * factor): every pixel is a mean of the nine
-    cells around its own, with `weights` (1, 9 * factor^2, h, w) through a softmax; values grow by the factor."""
-    height, width = coarse.shape[2:]
-    shares = torch.softmax(weights.reshape(9, factor, factor, height, width), dim=0)
-    cells = functional.unfold(factor * coarse, 3, padding=1).reshape(9, 1, 1, height, width)
-    return (shares * cells).sum(dim=0).permute(2, 0, 3, 1).reshape(height * factor, width * factor)
+    """Return maps (N, 1, h, w) at `factor` times the size, (N, h * factor, w * factor): every pixel is a mean of the
+    nine cells around its own, with `weights` (N, 9 * factor^2, h, w) through a softmax; values grow by the factor."""
+    count, _, height, width = coarse.shape
+    shares = torch.softmax(weights.reshape(count, 9, factor, factor, height, width), dim=1)
+    cells = functional.unfold(factor * coarse, 3, padding=1).reshape(count, 9, 1, 1, height, width)
+    spread = (shares * cells).sum(dim=1).permute(0, 3, 1, 4, 2)
+    return spread.reshape(count, height * factor, width * factor)

@@ -43,7 +43,7 @@ class MotionEncoder(nn.Module):
         self.conv = nn.Conv2d(2 * inside, outside - 2, 3, 1, 1)
 
     def forward(self, flow: torch.Tensor, correlation: torch.Tensor) -> torch.Tensor:
-        """(1, 2, h, w), (1, planes, h, w) -> (1, outside, h, w), whose last two channels are the flow itself."""
+        """(N, 2, h, w), (N, planes, h, w) -> (N, outside, h, w), whose last two channels are the flow itself."""
         seen = torch.relu(self.convc2(torch.relu(self.convc1(correlation))))
         moved = torch.relu(self.convf2(torch.relu(self.convf1(flow))))
         return torch.cat([torch.relu(self.conv(torch.cat([seen, moved], dim=1))), flow], dim=1)
@@ -57,7 +57,7 @@ class FlowHead(nn.Module):
         self.conv1, self.conv2 = nn.Conv2d(hidden, inside, 3, 1, 1), nn.Conv2d(inside, 2, 3, 1, 1)
 
     def forward(self, state: torch.Tensor) -> torch.Tensor:
-        """(1, hidden, h, w) -> (1, 2, h, w)."""
+        """(N, hidden, h, w) -> (N, 2, h, w)."""
         return self.conv2(torch.relu(self.conv1(state)))
 
 
@@ -93,13 +93,13 @@ class UpdateBlock(nn.Module):
         flow: torch.Tensor,
         correlation: torch.Tensor,
     ) -> torch.Tensor:
-        """Advance the finest unit in place and return the change of the flow (1, 2, h, w)."""
+        """Advance the finest unit in place and return the change of the flow (N, 2, h, w)."""
         above = [stretched(states[1], states[0])] if self.scales > 1 else []
         states[0] = self.gru08(states[0], context[0], [self.encoder(flow, correlation), *above])
         return self.flow_head(states[0])
 
     def upsampling_weights(self, states: list[torch.Tensor]) -> torch.Tensor:
-        """Return the weights (1, 9 * factor^2, h, w) of the nine cells around, before they are made to add up to 1."""
+        """Return the weights (N, 9 * factor^2, h, w) of the nine cells around, before they are made to add up to 1."""
         return 0.25 * self.mask(states[0])
 
 

@@ -21,7 +21,7 @@ FEATURES = 1500
 MATCH_RATIO = 0.8
 """The best match must be this much nearer than the second (Lowe, IJCV 2004, section 7.1)."""
 LARGEST_ROW_SHARE = 0.05
-"""Matches further apart than this share of the height are mistakes, whatever the calibration."""
+"""Matches further apart than this share of the height are mistakes, as long as fewer than half are."""
 LEAST_MATCHES = 40
 """Fewer say nothing."""
 INLIER_ROWS = 1.5
@@ -55,8 +55,8 @@ class RowCheck:
 
 
 def matched_features(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions (N, 2) and (N, 2) [px] of features of two pictures (H, W) uint8 that are each other's best match
-    and lie in nearly the same row."""
+    """Return positions (N, 2) and (N, 2) [px] of features of two pictures (H, W) uint8 that are each other's best
+    match, in whatever rows."""
     detector = cv2.SIFT.create(nfeatures=FEATURES)
     points, descriptors = [], []
     for picture in (left, right):
@@ -75,18 +75,23 @@ def matched_features(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, n
     if not pairs:
         return np.zeros((0, 2)), np.zeros((0, 2))
     chosen = np.array(pairs)
-    first, second = points[0][chosen[:, 0]], points[1][chosen[:, 1]]
-    near = np.abs(first[:, 1] - second[:, 1]) <= LARGEST_ROW_SHARE * left.shape[0]
-    return first[near], second[near]
+    return points[0][chosen[:, 0]], points[1][chosen[:, 1]]
 
 
 def check_rows(pairs: Sequence[tuple[np.ndarray, np.ndarray]], camera: Camera) -> RowCheck:
-    """Return the verdict over matched positions [(N, 2) left, (N, 2) right] [px] of several frames of one camera."""
+    """Return the verdict over matched positions [(N, 2) left, (N, 2) right] [px] of several frames of one camera. When
+    most matches lie in rows far apart, no turn is fitted."""
     left = np.concatenate([np.zeros((0, 2)), *[first for first, _ in pairs]])
     right = np.concatenate([np.zeros((0, 2)), *[second for _, second in pairs]])
+    rows = right[:, 1] - left[:, 1]
+    near = np.abs(rows) <= LARGEST_ROW_SHARE * camera.height
+    if len(rows) >= LEAST_MATCHES and near.mean() < 0.5:
+        error = float(np.median(np.abs(rows)))
+        error_90 = float(np.percentile(np.abs(rows), 90))
+        return RowCheck(len(rows), True, float(np.median(rows)), error, error_90, corrected_error=error)
+    left, right, rows = left[near], right[near], rows[near]
     if len(left) < LEAST_MATCHES:
         return RowCheck(len(left), False)
-    rows = right[:, 1] - left[:, 1]
     pitch, roll = fitted_turn(right, rows, camera)
     rest = rows - row_shift(right, pitch, roll, camera)
     aligned = np.abs(rest) <= max(INLIER_ROWS, 3 * float(np.median(np.abs(rest))))

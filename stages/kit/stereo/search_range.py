@@ -35,6 +35,18 @@ def search_range(left: np.ndarray, right: np.ndarray) -> tuple[int, int]:
     return low, STEP * max(1, -(-(high - low) // STEP))
 
 
+def usual_range(left: np.ndarray, right: np.ndarray) -> tuple[float, float]:
+    """Return the 3rd and the 97th percentile of the disparities [px] that the small copies of a pair (H, W) uint8
+    show, (0, 0) without any: where most of the pair lies, while `search_range` holds what is rare too."""
+    factor = max(1, -(-left.shape[1] // SMALL_WIDTH))
+    small = [shrunken(picture, factor) for picture in (left, right)]
+    found = small_disparities(small[0], small[1], STEP * max(1, -(-int(LARGEST_SHARE * small[0].shape[1]) // STEP)))
+    if len(found) < 50:
+        return 0.0, 0.0
+    low, high = np.percentile(found, [3, 97]) * factor
+    return float(low), float(high)
+
+
 def shrunken(picture: np.ndarray, factor: int) -> np.ndarray:
     """Return a picture (H, W) uint8 whose pixels are the means of squares of `factor` pixels."""
     if factor == 1:

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from benchmarks.disparity.__main__ import scores, table
-from benchmarks.disparity.arms import ARMS
+from benchmarks.disparity.__main__ import measured, scores, table
+from benchmarks.disparity.arms import CLASSICAL, DERIVED, WORDS, arms_of
+from benchmarks.disparity.cases import Pair
+from benchmarks.disparity.reconstruction import depth_figures, pipeline_of
+from benchmarks.disparity.reconstruction import table as table_of_rooms
+from schemas.scene_parts import Camera
+from stages.kit.formats.frames import FrameWriter
+from stages.kit.running.pipelines import resolve_variables, step_arguments
 from stages.kit.stereo.disparity_map import DisparityMap
 
 
@@ -20,8 +28,74 @@ def test_scores_are_the_closed_form() -> None:
 
 
 def test_cases_that_were_not_run_have_no_table() -> None:
-    metrics = {f"{arm}/motorcycle/{measure}": 1.0 for arm in ARMS for measure in (
+    metrics = {f"{arm}/motorcycle/{measure}": 1.0 for arm in CLASSICAL for measure in (
         "bad2", "bad2_all", "epe", "median", "coverage", "cpu_seconds"
     )}  # fmt: skip
     text = table(metrics | {"pairs/motorcycle/count": 1.0})
     assert "### motorcycle (1 pair)" in text and "rooms" not in text
+
+
+def test_parts_of_a_picture_are_scored_by_themselves() -> None:
+    picture = np.zeros((4, 40, 3), np.uint8)
+    truth = np.full((4, 40), 7.0, np.float32)
+    needle = np.zeros(truth.shape, bool)
+    needle[:, :10] = True
+    pair = Pair("one", picture, picture, truth, {"needle": needle, "none": np.zeros_like(needle)})
+
+    def arm(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
+        return DisparityMap(np.where(needle, 20.0, 7.5).astype(np.float32), np.ones(truth.shape, np.float32))
+
+    maps, figures = measured(pair, {"ours": arm})
+    found = figures["ours"]
+    assert found[""]["bad2"] == pytest.approx(25) and found["needle"]["bad2"] == pytest.approx(100)
+    assert np.isnan(found["none"]["bad2"]) and found["none"]["cpu_seconds"] >= 0
+    assert set(maps) == {"ours", "ours_trusted", "constant"}  # the network did not run
+    assert (maps["constant"].disparity == 7.5).all() and figures["constant"]["needle"]["bad2"] == 0
+
+
+def test_holes_of_ours_are_filled_by_the_network() -> None:
+    sure = DisparityMap(np.array([[3.0, np.nan, np.nan]], np.float32), np.array([[1.0, 0.0, 0.0]], np.float32))
+    other = DisparityMap(np.array([[5.0, 6.0, np.nan]], np.float32), np.array([[0.5, 0.5, 0.0]], np.float32))
+    found = DERIVED["filled"][2]({"ours": sure, "small": other})
+    np.testing.assert_array_equal(found.disparity, [[3.0, 6.0, np.nan]])
+    np.testing.assert_array_equal(found.confidence, [[1.0, 0.5, 0.0]])
+
+
+def test_arms_of_the_network_need_a_checkpoint() -> None:
+    assert set(arms_of(None, 8)) == set(CLASSICAL) and "small" in WORDS
+
+
+def test_rooms_from_two_eyes_and_from_a_depth_camera_differ_in_the_log_alone() -> None:
+    two, depth = (
+        {
+            step.name: step_arguments(step, "run", resolve_variables(pipeline_of(arm), {}))
+            for step in pipeline_of(arm).step
+        }
+        for arm in ("two_eyes", "depth_camera")
+    )  # fmt: skip
+    assert "--stereo-baseline" in two["ground_truth"] and "--stereo-baseline" not in depth["ground_truth"]
+    assert "--no-depth" not in depth["ground_truth"] and depth["sequence"][0] == "ingest"
+    same = [name for name in depth if two[name] == depth[name]]
+    assert set(two) - set(depth) == {"stereo_pairs"} and set(depth) - set(same) == {"ground_truth", "sequence"}
+
+
+def test_depth_is_compared_frame_by_frame(tmp_path: Path) -> None:
+    camera = Camera(width=8, height=6, fx=10.0, fy=10.0, cx=3.5, cy=2.5)
+    color = np.zeros((6, 8, 3), np.uint8)
+    for name, shift in (("exact", 0.0), ("found", 0.01)):
+        (tmp_path / name).mkdir()
+        with FrameWriter(tmp_path / name / "frames.mcap", camera) as writer:
+            for number in range(6):
+                depth = np.full((6, 8), 2.0 + shift, np.float32)
+                depth[0] = 5.0  # too far to be compared
+                if name == "found":
+                    depth[1] = 0.0
+                writer.write(0.1 * number, color, depth)
+    found = depth_figures(tmp_path / "found", tmp_path / "exact")
+    assert found["depth_share"] == pytest.approx(80)
+    assert found["depth_median_mm"] == pytest.approx(10, abs=1e-3)
+
+
+def test_the_table_has_a_column_a_room_and_arm() -> None:
+    text = table_of_rooms({"two_eyes/room_7/map/pq": 0.5, "depth_camera/room_7/map/pq": 0.75})
+    assert "room 7, two eyes" in text and "| 0.5 | 0.75 |" in text

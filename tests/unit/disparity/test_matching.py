@@ -7,7 +7,7 @@ import pytest
 
 from stages.kit.stereo.consistency import confidence_of, left_right_difference, same_surface
 from stages.kit.stereo.disparity_map import depth_of
-from stages.kit.stereo.search_range import search_range
+from stages.kit.stereo.search_range import search_range, usual_range
 from stages.kit.stereo.semi_global import Effort, SemiGlobalSettings, match
 from stages.kit.stereo.subpixel import UNLOCKED, smoothed, unlocked
 from tests.unit.disparity.pairs import BASELINE, BOX_DISPARITY, CAMERA, pair
@@ -49,6 +49,12 @@ def test_confident_pixels_are_right_more_often() -> None:
 def test_the_search_range_holds_every_disparity_and_not_much_more() -> None:
     low, levels = search_range(LEFT[..., 0], RIGHT[..., 0])
     assert low <= TRUTH.min() and BOX_DISPARITY < low + levels <= 64 and levels % 16 == 0
+
+
+def test_the_usual_range_is_where_most_of_a_pair_lies() -> None:
+    low, high = usual_range(LEFT[..., 0], RIGHT[..., 0])
+    assert low == pytest.approx(TRUTH.min(), abs=1.5) and high == pytest.approx(BOX_DISPARITY, abs=1.5)
+    assert usual_range(np.full((80, 120), 90, np.uint8), np.full((80, 120), 90, np.uint8)) == (0.0, 0.0)
 
 
 def test_a_pair_without_a_match_is_searched_wholly_and_gives_nothing() -> None:

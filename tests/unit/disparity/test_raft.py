@@ -11,12 +11,15 @@ import torch
 
 from cli.weights_command import convert_weights
 from schemas.errors import BadInput, MissingDependency, UsageError
+from stages.disparity.raft import matching
+from stages.disparity.raft.architecture import SMALL as TRAINED_HERE
 from stages.disparity.raft.architecture import Architecture, architecture_of
-from stages.disparity.raft.checkpoint import convert, load_network, network_of
+from stages.disparity.raft.checkpoint import convert, load_network, network_of, save_network
 from stages.disparity.raft.correlation import RowCorrelation
-from stages.disparity.raft.matching import match
 from stages.disparity.raft.network import RaftStereo, padded, upsampled
 from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from stages.kit.stereo.disparity_map import DisparityMap
+from tests.unit.disparity.pairs import pair
 
 SMALL = Architecture(
     widths=(4, 6, 8), hidden=(8, 8, 8), features=8, motion=(4, 8), head=8, mask=8, radius=2, downsample=2
@@ -136,9 +139,42 @@ def test_both_directions_give_a_confidence() -> None:
     tensors = {name.removeprefix("module."): tensor.numpy() for name, tensor in small_state().items()}
     random = np.random.default_rng(0)
     left, right = (random.integers(0, 255, (48, 64, 3), np.uint8) for _ in range(2))
-    found = match(network_of(tensors, "small"), left, right, 2, 1.0, "cpu")
+    found = matching.match(network_of(tensors, "small"), left, right, 2, 1.0, "cpu")
     assert found.disparity.shape == (48, 64) and (found.confidence[~found.known] == 0).all()
     assert (found.disparity[found.known] > 0).all()
+
+
+def test_the_small_network_stays_within_its_reach(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    save_network(tmp_path / "ours.safetensors", RaftStereo(TRAINED_HERE), "random")
+    torch.save(small_state(), tmp_path / "theirs.pth")
+    seen = []
+
+    def recorded(network: object, left: np.ndarray, *given: object) -> DisparityMap:
+        seen.append((left.shape[:2], given[1], given[4:]))
+        return DisparityMap(np.full(left.shape[:2], 10.0, np.float32), np.ones(left.shape[:2], np.float32))
+
+    monkeypatch.setattr(matching, "match", recorded)
+    picture = np.zeros((40, 60, 3), np.uint8)
+    for name, iterations, found, value in (
+        ("ours.safetensors", None, (20.0, 60.0), 10.0), ("ours.safetensors", 3, (200.0, 340.0), 20.0),
+        ("theirs.pth", None, (200.0, 340.0), 10.0),
+    ):  # fmt: skip
+        monkeypatch.setattr(matching, "usual_range", lambda left, right, found=found: found)
+        matcher, detail = matching.open_raft(tmp_path / name, iterations, 1.0, "cpu")
+        whole = matcher(picture, picture, (7, 16))
+        assert whole.disparity.shape == whole.confidence.shape == (40, 60) and (whole.disparity == value).all()
+        assert f"{seen[-1][1]} updates at 1/4" in detail
+    assert seen == [((40, 60), 5, (14,)), ((20, 30), 3, (94,)), ((40, 60), 32, ())]
+
+
+def test_disparities_count_from_where_the_search_begins(monkeypatch: pytest.MonkeyPatch) -> None:
+    def half(network: object, left: np.ndarray, right: np.ndarray, iterations: int, device: str) -> np.ndarray:
+        return np.full(left.shape[:2], 1.5, np.float32)
+
+    monkeypatch.setattr(matching, "estimated", half)
+    left, right = pair()[:2]
+    found = matching.match(RaftStereo(SMALL), left, right, 1, 1.0, "cpu", 10)
+    assert found.known.any() and (found.disparity[found.known] == 11.5).all()
 
 
 class Evil:
@@ -190,7 +226,7 @@ def test_tensors_that_do_not_fit_are_named(tmp_path: Path, fault: str) -> None:
 def test_the_correlation_is_that_of_a_plain_loop() -> None:
     torch.manual_seed(0)
     left, right = torch.randn(1, 5, 2, 8), torch.randn(1, 5, 2, 8)
-    column = torch.tensor([[-3.0, 0.0, 0.5, 1.25, 3.0, 6.75, 7.0, 20.0]] * 2)
+    column = torch.tensor([[[-3.0, 0.0, 0.5, 1.25, 3.0, 6.75, 7.0, 20.0]] * 2])
     found = RowCorrelation(left, right, 2, 1).at(column)
     for row in range(2):
         line = [float(left[0, :, row, 2] @ right[0, :, row, k]) / math.sqrt(5) for k in range(8)]
@@ -209,7 +245,7 @@ def test_upsampling_takes_means_of_cells() -> None:
     weights = torch.zeros(1, 9, 2, 2, 2, 3)
     weights[:, 4] = 100.0  # the cell itself
     weights[:, 4, 0, 1], weights[:, 5, 0, 1] = 0.0, 100.0  # upper right pixel: the cell to the right
-    full = upsampled(coarse, weights.reshape(1, 36, 2, 3), 2)
+    full = upsampled(coarse, weights.reshape(1, 36, 2, 3), 2)[0]
     assert full.shape == (4, 6)
     assert full[0].tolist() == pytest.approx([0, 2, 2, 4, 4, 0])
     assert full[1].tolist() == pytest.approx([0, 0, 2, 2, 4, 4])

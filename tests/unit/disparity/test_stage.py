@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -134,6 +135,44 @@ def test_blank_walls_give_an_empty_artifact_with_the_reason(tmp_path: Path) -> N
     made = matched(ingest(write_folder(tmp_path / "log", [(blank, blank)]), tmp_path / "sequence"), tmp_path / "out")
     assert made.outcome == "empty" and "nothing_matches" in made.summary["reason"]
     assert made.disparity.rows[0].verdict == "not_checked" and made.disparity.left_out == {"nothing_matches": 1}
+
+
+def covered(picture: np.ndarray) -> np.ndarray:
+    """What a covered camera records: noise about black."""
+    noise = np.random.default_rng(0).normal(4, 3, picture.shape)
+    return np.clip(noise, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("spoil", [np.zeros_like, covered])
+def test_a_covered_eye_leaves_its_frames_out(tmp_path: Path, which: int, spoil: Callable) -> None:
+    bad = [LEFT, RIGHT]
+    bad[which] = spoil(bad[which])
+    log = write_folder(tmp_path / "log", [(LEFT, RIGHT), (bad[0], bad[1])])
+    made = matched(ingest(log, tmp_path / "sequence"), tmp_path / "disparity")
+    assert made.outcome == "ok" and made.summary["frames"] == 1 and made.disparity.left_out == {"blank_eye": 1}
+
+
+def test_eyes_that_are_all_covered_give_an_empty_artifact(tmp_path: Path) -> None:
+    log = write_folder(tmp_path / "log", [(LEFT, np.zeros_like(RIGHT))])
+    made = matched(ingest(log, tmp_path / "sequence"), tmp_path / "disparity")
+    assert made.outcome == "empty" and "1 blank_eye" in made.summary["reason"]
+
+
+def test_one_picture_twice_gives_no_depth_and_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    sequence = ingest(write_folder(tmp_path / "log", [(LEFT, LEFT)]), tmp_path / "sequence")
+    with caplog.at_level("WARNING"):
+        made = matched(sequence, tmp_path / "disparity")
+    assert made.outcome == "empty" and "one picture twice" in caplog.text
+
+
+@pytest.mark.parametrize("wrong", ["rows", "turn", "upside_down"])
+def test_eyes_far_from_rectified_are_said_to_be(tmp_path: Path, wrong: str) -> None:
+    right = {"rows": np.roll(RIGHT, 30, 0), "turn": turned(RIGHT, 0.1, 0.0), "upside_down": RIGHT[::-1, ::-1]}[wrong]
+    sequence = ingest(write_folder(tmp_path / "log", [(LEFT, np.ascontiguousarray(right))]), tmp_path / "sequence")
+    made = matched(sequence, tmp_path / "disparity")
+    assert made.outcome in ("not_rectified", "empty")
+    assert made.disparity.rows[0].verdict == "not_rectified" and made.disparity.rows[0].row_error > 10  # type: ignore[operator]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,243 @@
+"""Train the small RAFT-Stereo on our own renderings; stop and start again at will.
+
+    python -m benchmarks.disparity.train --out FOLDER [--pairs FOLDER] [--quick] [--steps N] [--seed N]
+
+A step sees random shapes (made on the fly), crops of generated rooms (seeds 300 to 303) and of the needle world (seeds
+0 to 27, endoscope 200 to 205), which are rendered first. Its samples depend on the seed and the step's number alone,
+and the state is written every few minutes: a run that was stopped ends with the bytes of one that was not, on the same
+machine. The result is `raft_stereo_small.safetensors`, the moving average of the weights.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch.nn import functional
+
+from benchmarks.disparity.crops import TEXTURES, Kept, Sample, kept_sample, shapes_sample
+from benchmarks.disparity.rendered_pairs import made, needle_stem, room_stems
+from benchmarks.disparity.shapes import texture_bank
+from benchmarks.training.run_state import read_state, write_state
+from schemas.errors import BadInput
+from stages.disparity.raft.architecture import SMALL
+from stages.disparity.raft.checkpoint import save_network
+from stages.disparity.raft.matching import SMALL_UPDATES
+from stages.disparity.raft.network import RaftStereo
+from stages.suture.rig import ENDOSCOPE
+
+PEAK_RATE, WEIGHT_DECAY, WARM_UP = 1e-3, 1e-4, 0.05
+AVERAGE_DECAY, GRADIENT_NORM = 0.995, 1.0
+FIRST_MOVES = 0.05
+"""The head of the updates begins with weights this much smaller, so that the first disparities are small."""
+GAMMA = 0.85
+"""Weight of an update's error against the next one's."""
+ROOMS, NEEDLES, ENDOSCOPES = range(300, 304), range(28), range(200, 206)
+ROOM_FRAMES, ROOM_SIZE = 16, (480, 360)
+VALIDATION_SEED = 7
+"""Of shapes that are never trained on."""
+NEEDLE_CALIBRATION = 0.15
+"""Error of the right eye of trained needles [px]."""
+FILE = "raft_stereo_small.safetensors"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run is: steps; samples of each kind a step; updates of the disparity; seed."""
+
+    steps: int
+    shapes: int
+    rooms: int
+    needles: int
+    updates: int
+    seed: int
+    pairs: int
+
+
+class Sources:
+    """Where samples come from."""
+
+    def __init__(self, folder: Path, plan_seed: int, quick: bool) -> None:
+        few = 1 if quick else None
+        library = folder / "cad_library"
+        shapes = ["--shapes-per-class", "4", "--small-shapes-per-class", "4"]
+        made(["library", "build", *shapes, "--seed", "1", "--out", str(library)])
+        frames = 2 if quick else ROOM_FRAMES
+        rooms = [stem for seed in ROOMS[:few] for stem in room_stems(folder, library, seed, frames, ROOM_SIZE)]
+        needles = [needle_stem(folder, seed, calibration_error=NEEDLE_CALIBRATION) for seed in NEEDLES[:few]]
+        needles += [needle_stem(folder, seed, ENDOSCOPE, NEEDLE_CALIBRATION) for seed in ENDOSCOPES[:few]]
+        self.rooms, self.needles = Kept(rooms), Kept(needles)
+        self.bank = texture_bank(plan_seed, TEXTURES)
+
+    def samples(self, plan: Plan, step: int) -> list[Sample]:
+        """Return the samples of a step."""
+        numbers = range(plan.shapes + plan.rooms + plan.needles)
+        generators = [np.random.default_rng([plan.seed, 2, step, number]) for number in numbers]
+        found = [shapes_sample(self.bank, random) for random in generators[: plan.shapes]]
+        for kind, chosen in (
+            (self.rooms, generators[plan.shapes : plan.shapes + plan.rooms]),
+            (self.needles, generators[plan.shapes + plan.rooms :]),
+        ):
+            found += [kept_sample(kind.any(random), random) for random in chosen]
+        return found
+
+
+def tensors_of(samples: list[Sample]) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Return left, right (N, 3, H, W) float32 and disparity (N, H, W)."""
+    left, right, disparity = (torch.from_numpy(np.stack([sample[k] for sample in samples])) for k in range(3))
+    return left.permute(0, 3, 1, 2).float(), right.permute(0, 3, 1, 2).float(), disparity
+
+
+def rate_at(step: int, steps: int) -> float:
+    """Return the learning rate: a linear rise, then half a cosine down to a hundredth."""
+    warm = max(1, round(WARM_UP * steps))
+    if step < warm:
+        return PEAK_RATE * (step + 1) / warm
+    return PEAK_RATE * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * (step - warm) / max(1, steps - warm))))
+
+
+def loss_of(full: torch.Tensor, coarse: list[torch.Tensor], truth: torch.Tensor) -> torch.Tensor:
+    """Return the mean distance [px] over known pixels, a weighted mean over the updates (Lipson et al., section 3.4).
+    The coarse disparities are spread by bilinear interpolation, which is cheaper than the learned one."""
+    known = torch.isfinite(truth)
+    factor = truth.shape[2] // coarse[0].shape[2]
+    spread = functional.interpolate(factor * torch.stack(coarse, dim=1), truth.shape[1:], mode="bilinear")
+    each = (spread - torch.nan_to_num(truth)[:, None]).abs() * known[:, None]
+    distances = each.sum(dim=(0, 2, 3)) / known.sum()
+    weights = torch.tensor([GAMMA ** (len(coarse) - k) for k in range(len(coarse))])
+    return ((full - truth)[known].abs().mean() + (weights * distances).sum()) / (1 + weights.sum())
+
+
+class Run:
+    """A training run and its state on disk."""
+
+    def __init__(self, plan: Plan, out: Path) -> None:
+        self.plan, self.out, self.step, self.seconds = plan, out, 0, 0.0
+        torch.manual_seed(plan.seed)
+        self.network = RaftStereo(SMALL).to(memory_format=torch.channels_last)
+        for module in self.network.modules():
+            if isinstance(module, torch.nn.Conv2d):
+                torch.nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
+        with torch.no_grad():
+            self.network.update_block.flow_head.conv2.weight *= FIRST_MOVES
+        self.average = {name: value.clone() for name, value in self.network.state_dict().items()}
+        self.optimizer = torch.optim.AdamW(
+            self.network.parameters(), lr=PEAK_RATE, weight_decay=WEIGHT_DECAY, fused=True
+        )
+        for parameter in self.network.parameters():  # a unit that is not used has a state too
+            parameter.grad = torch.zeros_like(parameter)
+        if (out / "state.json").is_file():
+            self._restore()
+
+    def train_step(self, sources: Sources) -> float:
+        """Take one step and return the error of the last update [px]."""
+        started = time.process_time()
+        self.network.train()
+        left, right, truth = tensors_of(sources.samples(self.plan, self.step))
+        for group in self.optimizer.param_groups:
+            group["lr"] = rate_at(self.step, self.plan.steps)
+        self.optimizer.zero_grad(set_to_none=False)
+        with torch.autocast("cpu", torch.bfloat16):
+            full, coarse = self.network.updates(left, right, self.plan.updates)
+        loss_of(full, coarse, truth).backward()
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), GRADIENT_NORM)
+        self.optimizer.step()
+        self.step += 1
+        decay = min(AVERAGE_DECAY, self.step / (self.step + 10))
+        with torch.no_grad():
+            for name, value in self.network.state_dict().items():
+                if value.is_floating_point():
+                    self.average[name].lerp_(value, 1 - decay)
+                else:
+                    self.average[name].copy_(value)
+        self.seconds += time.process_time() - started
+        return float((full.detach() - truth)[torch.isfinite(truth)].abs().mean())
+
+    def averaged(self) -> RaftStereo:
+        """Return a network with the moving average of the weights, for use."""
+        network = RaftStereo(SMALL)
+        network.load_state_dict(self.average)
+        return network.eval()
+
+    def save(self) -> None:
+        """Write the state, whole or not at all, and the checkpoint as it would be used now."""
+        write_state(self.out, self.network, self.average, self.optimizer, self.step)
+        facts = {"step": self.step, "cpu_seconds": round(self.seconds, 1), "plan": asdict(self.plan)}
+        (self.out / "state.json").write_text(json.dumps(facts, indent=1) + "\n")
+        description = (
+            f"trained on random shapes and {self.plan.pairs} rendered pairs, step {self.step} of {self.plan.steps}, "
+            f"seed {self.plan.seed}"
+        )
+        save_network(self.out / FILE, self.averaged(), description)
+
+    def _restore(self) -> None:
+        facts = json.loads((self.out / "state.json").read_text())
+        if facts["plan"] != asdict(self.plan):
+            raise BadInput(f"{self.out}: holds a run of another plan", hint="take another --out, or the same settings")
+        self.average, self.step = read_state(self.out, self.network, self.optimizer)
+        self.seconds = facts["cpu_seconds"]
+
+
+def validation(run: Run, bank: list[np.ndarray], count: int = 24) -> dict[str, float]:
+    """Return error [px] and bad-2 [%] on shapes that are not trained on, beside the best constant's error (the median
+    of each sample's truth)."""
+    samples = [shapes_sample(bank, np.random.default_rng([VALIDATION_SEED, number])) for number in range(count)]
+    left, right, truth = tensors_of(samples)
+    network = run.averaged()
+    with torch.inference_mode():
+        found = network.updates(left, right, SMALL_UPDATES)[0]
+    known = torch.isfinite(truth)
+    error = (found - truth)[known].abs()
+    middle = torch.nanmedian(truth.flatten(1), dim=1).values[:, None, None]
+    return {
+        "error": round(float(error.mean()), 3),
+        "bad2": round(100 * float((error > 2).float().mean()), 2),
+        "constant": round(float((middle - truth)[known].abs().mean()), 3),
+    }
+
+
+def main() -> None:
+    """Render what is missing, then train or go on with a training."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--pairs", type=Path, help="where rendered pairs are kept; OUT/pairs if not given")
+    parser.add_argument("--quick", action="store_true", help="proves the recipe: few pairs, 10 steps")
+    parser.add_argument("--steps", type=int, default=1750)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--save-every", type=float, default=120.0, help="seconds between states")
+    options = parser.parse_args()
+    torch.set_num_threads(1)
+    sources = Sources(options.pairs or options.out / "pairs", options.seed, options.quick)
+    held_out = texture_bank(options.seed + 1000, TEXTURES)
+    pairs = len(sources.rooms.stems) + len(sources.needles.stems)
+    plan = Plan(10 if options.quick else options.steps, 2, 1, 1, 4, options.seed, pairs)
+    options.out.mkdir(parents=True, exist_ok=True)
+    run = Run(plan, options.out)
+    saved, losses = time.perf_counter(), []
+    while run.step < plan.steps:
+        losses.append(run.train_step(sources))
+        last = run.step == plan.steps
+        line: dict[str, object] = {}
+        if run.step % 50 == 0 or last:
+            line = {"step": run.step, "cpu_seconds": round(run.seconds), "error": round(float(np.mean(losses)), 3)}
+            losses = []
+        if run.step % 500 == 0 or last:
+            line["held_out"] = validation(run, held_out)
+        if line:
+            with (options.out / "log.jsonl").open("a") as log:
+                log.write(json.dumps(line) + "\n")
+            print(line, flush=True)
+        if time.perf_counter() - saved > options.save_every or last:
+            run.save()
+            saved = time.perf_counter()
+    print(f"{plan.steps} steps in {run.seconds / 60:.1f} CPU min: {options.out / FILE}")
+
+
+if __name__ == "__main__":
+    main()
