@@ -92,8 +92,8 @@ def hypotheses(observation: NeedleObservation, seed: int = 0, guess: NeedlePose 
     coarse.sort(key=lambda outline: outline.misfit)
     for outline in coarse[:MIRRORED]:
         coarse.append(fit_outline(rig, sheets, _mirrored(outline.pose), still, COARSE_LEVELS))
-    coarse.sort(key=lambda outline: outline.misfit)
-    return _weighed(rig, eyes, sheets, _fine(rig, sheets, _finalists(coarse)))
+    ordered = [rival.outline for rival in _weighed(rig, eyes, sheets, coarse)]
+    return _weighed(rig, eyes, sheets, _fine(rig, sheets, _finalists(ordered)))
 
 
 def _finalists(coarse: list[Outline]) -> list[Outline]:

@@ -30,11 +30,11 @@ COVERED = 2.0
 """Mask within this many pixels of the outline is explained by it."""
 LEAST_WIDTH = 1.3
 """Masks need not show a wire thinner than this [px]."""
-MOST_FREE, MOST_NEAR = 60.0, 100.0
-PER_MISFIT, PER_FREE, PER_NEAR, PER_MISSING, PER_THREAD = -0.100, -0.083, -0.050, -0.036, 1.35
-"""Log-weights: of a pixel of misfit; of a pixel of mask that is left over far from thread and drivers (at most 60)
-or near them (100); of one of PIECES that one eye misses; of thread beyond the swage in both eyes and not beyond the
-tip, half of it for one eye."""
+MOST_LEFT_OVER = 150
+PER_MISFIT, PER_LEFT_OVER, PER_LOST, PER_HIDDEN, PER_MISSING, PER_THREAD = -0.145, -0.031, -0.022, -0.007, -0.049, 1.22
+"""Log-weights: of a pixel of misfit but for the lost; of a pixel of mask that is left over (at most MOST_LEFT_OVER); of
+a pixel's misfit for mask lost by one eye, or by both as in tissue; of a piece that one eye alone misses; of thread
+beyond the swage in both eyes and not beyond the tip, half of it for one eye."""
 BEYOND = np.linspace(0.0005, 0.0035, 7)
 """Where beyond an end thread is looked for [m], along the arc's tangent."""
 CLOSE = 3
@@ -43,15 +43,30 @@ CLOSE = 3
 
 @dataclass(frozen=True)
 class Evidence:
-    """What an outline leaves: pixels of mask `free`, `near` others; which of PIECES each eye sees (2, PIECES); pieces
-    that one eye alone misses; thread beyond the swage less thread beyond the tip (-2 to 2); the log-weight of all."""
+    """What an outline leaves: pixels of mask `left_over`; `lost`, `hidden`: the misfit for mask that one eye or both do
+    not have; which of PIECES each eye sees (2, PIECES); pieces that one eye alone misses; thread beyond the swage less
+    thread beyond the tip (-2 to 2)."""
 
-    free: float
-    near: float
+    misfit: float
+    left_over: float
+    lost: float
+    hidden: float
     seen: np.ndarray
     missing: int
     thread: float
-    log_weight: float
+
+    @property
+    def log_weight(self) -> float:
+        """How probable the outline is: the logarithm, up to what is the same for all of a view."""
+        rest = self.misfit - self.lost - self.hidden
+        return (
+            PER_MISFIT * rest
+            + PER_LEFT_OVER * min(self.left_over, MOST_LEFT_OVER)
+            + PER_LOST * self.lost
+            + PER_HIDDEN * self.hidden
+            + PER_MISSING * self.missing
+            + PER_THREAD * self.thread
+        )
 
 
 @numba.njit(cache=True, fastmath=True)
@@ -61,7 +76,8 @@ def _explain(
     camera: np.ndarray,
     growth: float,
     signed: np.ndarray,
-    kind: np.ndarray,
+    weight: np.ndarray,
+    free: np.ndarray,
     silent: np.ndarray,
     corner: np.ndarray,
     drawn: np.ndarray,
@@ -69,12 +85,13 @@ def _explain(
     eye: int,
     on_circle: np.ndarray,
     radii: np.ndarray,
-    covered: np.ndarray,
     state: np.ndarray,
-) -> None:
-    """Add to `covered` (3,) the pixels of mask of each kind within 2 px of the outline; write each piece's `state`
-    (K,): 0 seen, 1 missing, 2 nothing can be said."""
+    lost: np.ndarray,
+) -> float:
+    """Return the pixels of free mask within COVERED of the outline; write each piece's `state` (K,), 0 seen, 1 missing,
+    2 nothing can be said, and its part in the misfit for mask that is not there, `lost` (K,)."""
     height, width = signed.shape
+    covered = 0.0
     _, pixels = trace(pose, shift, camera, corner, eye, on_circle, radii)
     draw(pixels, growth, COVERED + 0.5, 1, drawn, piece)
     for k in range(len(pixels) - 1):
@@ -83,8 +100,10 @@ def _explain(
             for column in range(first, last + 1):
                 if piece[row, column] == k:
                     piece[row, column] = -1
-                    if drawn[row, column] <= COVERED and signed[row, column] < 0.0:
-                        covered[kind[row, column]] += 1.0
+                    if drawn[row, column] < 0.0 and signed[row, column] > COVERED:
+                        lost[k] += weight[row, column] * min(max(2.0 * pixels[k, 2] - 0.3, 0.05), 1.0)
+                    if drawn[row, column] <= COVERED and free[row, column]:
+                        covered += 1.0
         column = int(np.floor(0.5 * (pixels[k, 0] + pixels[k + 1, 0]) + 0.5))
         row = int(np.floor(0.5 * (pixels[k, 1] + pixels[k + 1, 1]) + 0.5))
         if not (0 <= column < width and 0 <= row < height):
@@ -95,25 +114,29 @@ def _explain(
             state[k] = 2
         else:
             state[k] = 1
+    return covered
 
 
 def evidence_of(
     rig: StereoRig, eyes: tuple[EyeMask, EyeMask], sheets: tuple[Sheet, Sheet], outline: Outline
 ) -> Evidence:
-    """Return what speaks for an outline."""
-    left_over = np.zeros(3)
-    states = np.zeros((2, PIECES), dtype=np.int64)
+    """Return what speaks for an outline and against it."""
+    left_over = 0.0
+    states, lost = np.zeros((2, PIECES), dtype=np.int64), np.zeros((2, PIECES))
     for eye, s in enumerate(sheets):
-        covered = np.zeros(3)
-        given = (s.signed, s.kind, s.silent, s.corner, s.drawn, s.piece, eye, ON_CIRCLE, RADII, covered, states[eye])
-        _explain(outline.pose.camera_from_needle, outline.shift, camera_of(rig), GROWTH, *given)
-        left_over += np.bincount(s.kind[s.signed < 0], minlength=3) - covered
-    free, near = float(left_over[0]), float(left_over[1])
-    missing = int(((states == 1) & (states[::-1] == 0)).any(axis=0).sum())
-    thread = sum(_thread_beyond(rig, eyes[eye], outline, eye) for eye in (0, 1))
-    log_weight = PER_MISFIT * outline.misfit + PER_FREE * min(free, MOST_FREE) + PER_NEAR * min(near, MOST_NEAR)
-    log_weight += PER_MISSING * missing + PER_THREAD * thread
-    return Evidence(free, near, states == 0, missing, thread, log_weight)
+        given = (s.signed, s.weight, s.free, s.silent, s.corner, s.drawn, s.piece, eye, ON_CIRCLE, RADII)
+        place = outline.pose.camera_from_needle, outline.shift, camera_of(rig), GROWTH
+        left_over += float(s.free.sum()) - _explain(*place, *given, states[eye], lost[eye])
+    hidden = (states > 0).all(axis=0)
+    return Evidence(
+        misfit=outline.misfit,
+        left_over=left_over,
+        lost=float(lost[:, ~hidden].sum()),
+        hidden=float(lost[:, hidden].sum()),
+        seen=states == 0,
+        missing=int(((states == 1) & (states[::-1] == 0)).any(axis=0).sum()),
+        thread=sum(_thread_beyond(rig, eyes[eye], outline, eye) for eye in (0, 1)),
+    )
 
 
 def _thread_beyond(rig: StereoRig, eye: EyeMask, outline: Outline, which: int) -> float:

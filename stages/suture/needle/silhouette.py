@@ -43,21 +43,18 @@ OFF_BY = 0.8
 """Where drawn and found outline are off by this [px] a polishing step counts them half: lumps are not the wire."""
 UNDETERMINED = np.diag([1.0 / 0.06**2] * 3 + [1.0 / 3.0**2] * 3 + [0.0] * 2)
 """Holds what the masks do not determine, in units of 60 mm and 3 rad."""
-NEAR_OTHERS = 19
-"""Side [px] of the square by which thread and drivers grow to where mask is likely to be theirs."""
-FREE, NEAR, HIDDEN = 0, 1, 2
 
 
 @dataclass(frozen=True)
 class Sheet:
     """One eye's window for the fit: `signed` (h, w) float32 distance [px] to the mask's outline, negative inside;
-    `weight` (h, w) float32 of each pixel; `kind` (h, w) uint8: FREE, NEAR thread or a driver, HIDDEN by a driver;
-    `silent` (h, w) bool where missing mask says nothing; `corner` (2,): its first column and row; `total`: the misfit
+    `weight` (h, w) float32 of each pixel; `free` (h, w) bool: mask where no driver should be; `silent` (h, w) bool
+    where missing mask says nothing; `corner` (2,): its first column and row; `total`: the misfit
     without a needle; `drawn`, `piece` (h, w): room for the drawing, `piece` -1 between uses."""
 
     signed: np.ndarray
     weight: np.ndarray
-    kind: np.ndarray
+    free: np.ndarray
     silent: np.ndarray
     corner: np.ndarray
     total: float
@@ -85,11 +82,10 @@ def sheet_of(eye: EyeMask) -> Sheet:
     silent = eye.hidden | _grown(eye.thread, 3)
     weight[silent & ~eye.mask] = 0.0
     weight[eye.hidden & eye.mask] = HIDDEN_WEIGHT
-    kind = np.where(_grown(eye.thread | eye.hidden, NEAR_OTHERS), NEAR, FREE).astype(np.uint8)
-    kind[eye.hidden] = HIDDEN
+    free = eye.mask & ~eye.hidden
     drawn, piece = np.zeros(mask.shape, dtype=np.float32), np.full(mask.shape, -1, dtype=np.int16)
     total = float(weight[eye.mask].sum())
-    return Sheet(signed, weight.astype(np.float32), kind, silent, eye.corner, total, drawn, piece)
+    return Sheet(signed, weight.astype(np.float32), free, silent, eye.corner, total, drawn, piece)
 
 
 def _grown(mask: np.ndarray, side: int) -> np.ndarray:
