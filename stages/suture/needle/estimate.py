@@ -27,13 +27,15 @@ TOLERANCE = (0.001, np.radians(10.0))
 """What a robot needs of the centre [m] and of the plane [rad] to grasp the needle."""
 BASIN = (0.003, np.radians(20.0))
 """Other outlines within this [m], [rad] of the best one are in its covariance."""
-VARIANCE = 0.3
+VARIANCE = 0.36
 """Of a pixel's misfit, neighbours that err alike counted in; chosen so that ellipsoids hold what they should."""
 LEAST_PROBABILITY = 0.5
 """Of being within TOLERANCE, below which the pose is not answered."""
 MOST_OF_IT = 0.8
 """Of the probability, about one pose: what is not known then is where in its neighbourhood the needle is."""
-LEAST_SEEN = 0.15
+LEAST_SEEN = 0.1
+MOST_SURE = 1.0 - 1e-5
+"""Of tip and swage: the evidence is no better than that."""
 DRAWS = 200
 
 
@@ -186,16 +188,24 @@ def _answer(rivals: list[Hypothesis], random: np.random.Generator) -> NeedleEsti
     """Return the pose about which most of the probability lies, with its covariance, or abstain."""
     draws = random.standard_normal((DRAWS, 6))
     chances = [_chance(rival, rivals, draws) for rival in rivals]
-    best = rivals[int(np.argmax(chances))]
     chance = max(chances)
-    about = [other for other in rivals if _near(either_way(best.pose, other.pose)[0], BASIN)]
-    same = sum(other.probability for other in about if not either_way(best.pose, other.pose)[1])
-    exchanged = sum(other.probability for other in about) - same
-    pose = best.pose if same >= exchanged else best.pose.swapped()
-    sure = max(same, exchanged) / (same + exchanged)
+    # rivals are ordered: of those about one place the likeliest says where on its circle the needle lies
+    best = next(rival for rival, own in zip(rivals, chances, strict=True) if own >= 0.9 * chance)
+    about = [other for other in rivals if _about(best.pose, other.pose)]
+    along = sum(other.probability for other in about if best.pose.normal @ other.pose.normal > 0)
+    everything = sum(other.probability for other in about)
+    pose = best.pose if 2.0 * along >= everything else best.pose.swapped()
+    sure = max(along, everything - along) / everything
     why = _why_abstain(best, chance, about)
-    covariance = _covariance(best, rivals if why else about)
-    return NeedleEstimate(pose, covariance, float(np.clip(sure, 0.5, 1.0 - 1e-6)), why)
+    near = [other for other in about if _near(either_way(best.pose, other.pose)[0], BASIN)]
+    covariance = _covariance(best, rivals if why else near)
+    return NeedleEstimate(pose, covariance, float(np.clip(sure, 0.5, MOST_SURE)), why)
+
+
+def _about(pose: NeedlePose, other: NeedlePose) -> bool:
+    """Whether two poses have about the same circle, wherever on it the needle lies and which end is the tip."""
+    cosine = abs(float(pose.normal @ other.normal))
+    return bool(np.linalg.norm(pose.centre - other.centre) < BASIN[0] and cosine > np.cos(BASIN[1]))
 
 
 def _chance(hypothesis: Hypothesis, rivals: list[Hypothesis], draws: np.ndarray) -> float:

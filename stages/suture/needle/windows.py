@@ -14,8 +14,8 @@ MARGIN = 40
 
 @dataclass(frozen=True)
 class EyeMask:
-    """A window of one eye's mask: `mask`, `hidden` (a driver may hide the needle), `thread` (h, w) bool, and its first
-    column and row."""
+    """A window of one eye's mask: `mask`, `hidden` (a driver may hide the needle), `thread`, each (h, w)
+    bool, and the window's first column and row."""
 
     mask: np.ndarray
     hidden: np.ndarray
@@ -68,10 +68,6 @@ def _window(mask: np.ndarray, thread: np.ndarray | None, hidden: np.ndarray | No
     # a smoothed mask has no single pixels and no single holes
     soft = cv2.GaussianBlur(mask[crop].astype(np.float32), (3, 3), 0.7)
     nothing = np.zeros(soft.shape, dtype=bool)
-    return EyeMask(
-        soft >= 0.5,
-        nothing if hidden is None else np.ascontiguousarray(hidden[crop]),
-        nothing if thread is None else np.ascontiguousarray(thread[crop]),
-        left,
-        top,
-    )
+    of_thread = nothing if thread is None else np.ascontiguousarray(thread[crop])
+    covered = nothing if hidden is None else np.ascontiguousarray(hidden[crop])
+    return EyeMask(soft >= 0.5, covered, of_thread, left, top)
