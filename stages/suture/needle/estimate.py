@@ -29,7 +29,7 @@ BASIN = (0.003, np.radians(20.0))
 """Other outlines within this [m], [rad] of the best one are in its covariance."""
 VARIANCE = 0.36
 """Of a pixel's misfit, neighbours that err alike counted in; chosen so that ellipsoids hold what they should."""
-LEAST_PROBABILITY = 0.5
+LEAST_PROBABILITY = 0.45
 """Of being within TOLERANCE, below which the pose is not answered."""
 MOST_OF_IT = 0.8
 """Of the probability, about one pose: what is not known then is where in its neighbourhood the needle is."""

@@ -33,8 +33,8 @@ COVERED = 2.0
 LEAST_WIDTH = 1.3
 """Masks need not show a wire thinner than this [px]."""
 MOST_LEFT_OVER = 150
-PER_MISFIT, PER_LEFT_OVER, PER_LOST, PER_HIDDEN, PER_MISSING, PER_TAPER = -0.115, -0.056, -0.025, -0.012, -0.055, -0.033
-PER_THREAD = np.array([1.2, -0.66, -0.31])
+PER_MISFIT, PER_LEFT_OVER, PER_LOST, PER_HIDDEN, PER_MISSING, PER_TAPER = -0.071, -0.076, -0.039, -0.043, -0.072, -0.030
+PER_THREAD = np.array([1.45, -0.68, -0.20])
 """Log-weights: of a pixel of misfit but for the lost; of a pixel of mask that is left over (at most MOST_LEFT_OVER); of
 a pixel's misfit for mask lost by one eye, or by both as in tissue; of a piece that one eye alone misses; of the
 squared width (in units of WIDTH_SIGMA, at most 9 a piece) that the mask is off by near the ends; of thread in one eye
