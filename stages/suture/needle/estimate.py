@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stages.suture.needle.evidence import Evidence, evidence_of
+from stages.suture.needle.evidence import Evidence, evidence_of, left_over
 from stages.suture.needle.filter import difference, either_way
 from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
 from stages.suture.needle.silhouette import Outline, Sheet, fit_outline, sheet_of
@@ -34,6 +34,8 @@ LEAST_PROBABILITY = 0.45
 MOST_OF_IT = 0.8
 """Of the probability, about one pose: what is not known then is where in its neighbourhood the needle is."""
 LEAST_SEEN = 0.1
+SECOND_PIXELS, SECOND_SEEN = 150, 0.5
+"""A second needle leaves so many pixels of mask in either eye, and each eye sees so much of its arc."""
 MOST_SURE = 1.0 - 1e-5
 """Of tip and swage: the evidence is no better than that."""
 DRAWS = 200
@@ -74,17 +76,48 @@ def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | 
     swapped = _eyes_swapped(observation.rig, masks)
     if swapped:
         return NeedleEstimate.none(swapped)
-    rivals = hypotheses(observation, seed, guess)
+    eyes = windows(observation)
+    sheets = (sheet_of(eyes[0]), sheet_of(eyes[1]))
+    rivals = _hypotheses(observation, eyes, sheets, seed, guess)
     if not rivals:
         return NeedleEstimate.none("No circle of the needle's radius passes through what both eyes see.")
-    return _answer(rivals, np.random.default_rng(seed))
+    answer = _answer(rivals, np.random.default_rng(seed))
+    if not answer.abstained:
+        rest = left_over(observation.rig, eyes, sheets, rivals[0].outline)
+        return replace(answer, abstained=_second_needle(observation, rivals[0], rest, seed))
+    return answer
 
 
 def hypotheses(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | None = None) -> list[Hypothesis]:
-    """Return the outlines that explain both masks best, most probable first."""
-    rig, random = observation.rig, np.random.default_rng(seed)
+    """Return the outlines that explain both masks best, most probable first; each mask must have a pixel."""
     eyes = windows(observation)
-    sheets = (sheet_of(eyes[0]), sheet_of(eyes[1]))
+    return _hypotheses(observation, eyes, (sheet_of(eyes[0]), sheet_of(eyes[1])), seed, guess)
+
+
+def _second_needle(
+    observation: NeedleObservation, first: Hypothesis, rest: tuple[np.ndarray, np.ndarray], seed: int
+) -> str:
+    """Return a sentence if what the first needle leaves of the masks looks like another one."""
+    if min(int(mask.sum()) for mask in rest) < SECOND_PIXELS:
+        return ""
+    alone = replace(observation, left_mask=rest[0], right_mask=rest[1], disparity=None)
+    second = next(iter(hypotheses(alone, seed)), None)
+    if second is None or second.evidence.seen.mean(axis=1).min() < SECOND_SEEN:
+        return ""
+    if second.evidence.left_over > 0.5 * sum(int(mask.sum()) for mask in rest):
+        return ""
+    apart = 1000.0 * float(np.linalg.norm(second.pose.centre - first.pose.centre))
+    return f"Two needles are seen, {apart:.0f} mm apart: which one is meant cannot be known."
+
+
+def _hypotheses(
+    observation: NeedleObservation,
+    eyes: tuple[EyeMask, EyeMask],
+    sheets: tuple[Sheet, Sheet],
+    seed: int,
+    guess: NeedlePose | None,
+) -> list[Hypothesis]:
+    rig, random = observation.rig, np.random.default_rng(seed)
     points = _disparity_points(observation, random)
     begun = starts(rig, eyes, points, STARTS, SAMPLED, random)
     if guess is not None:

@@ -45,7 +45,7 @@ TAPERED = np.flatnonzero((ANGLES[:-1] < TAPER_ANGLE) | (ANGLES[1:] > np.pi - TAP
 BEYOND = np.linspace(0.0005, 0.0035, 7)
 """Where beyond an end thread is looked for [m], along the arc's tangent."""
 CLOSE = 3
-"""Thread within so many pixels counts."""
+"""Thread within so many pixels of a place counts; mask farther than this from the outline is not the needle's."""
 
 
 @dataclass(frozen=True)
@@ -142,9 +142,26 @@ def evidence_of(
     states, lost = np.zeros((2, PIECES), dtype=np.int64), np.zeros((2, PIECES))
     excess = np.zeros((2, PIECES))
     for eye, s in enumerate(sheets):
-        given = (s.signed, s.weight, s.free, s.silent, s.corner, s.drawn, s.piece, eye, ON_CIRCLE, RADII)
-        place = outline.pose.camera_from_needle, outline.shift, camera_of(rig), GROWTH
-        left_over += float(s.free.sum()) - _explain(*place, *given, states[eye], lost[eye], excess[eye])
+        covered = _explain(
+            outline.pose.camera_from_needle,
+            outline.shift,
+            camera_of(rig),
+            GROWTH,
+            s.signed,
+            s.weight,
+            s.free,
+            s.silent,
+            s.corner,
+            s.drawn,
+            s.piece,
+            eye,
+            ON_CIRCLE,
+            RADII,
+            states[eye],
+            lost[eye],
+            excess[eye],
+        )
+        left_over += float(s.free.sum()) - covered
     hidden = (states > 0).all(axis=0)
     return Evidence(
         misfit=outline.misfit,
@@ -175,3 +192,20 @@ def _threads(rig: StereoRig, eye: EyeMask, outline: Outline, which: int) -> np.n
         columns = slice(max(column - CLOSE, 0), max(column + CLOSE + 1, 0))
         found.append(bool(eye.thread[rows, columns].any()))
     return np.array(found).reshape(3, -1).mean(axis=1)
+
+
+def left_over(
+    rig: StereoRig, eyes: tuple[EyeMask, EyeMask], sheets: tuple[Sheet, Sheet], outline: Outline
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what (H, W) bool of each eye's mask, where no driver should be, lies beyond CLOSE of the outline."""
+    found = []
+    for which, (eye, s) in enumerate(zip(eyes, sheets, strict=True)):
+        place = outline.pose.camera_from_needle, outline.shift, camera_of(rig), s.corner, which, ON_CIRCLE, RADII
+        _, pixels = trace(*place)
+        draw(pixels, GROWTH, CLOSE + 0.5, 1, s.drawn, s.piece)
+        rest = s.free & ~((s.piece >= 0) & (s.drawn <= CLOSE))
+        s.piece[:] = -1
+        whole = np.zeros((rig.height, rig.width), dtype=bool)
+        whole[eye.row : eye.row + rest.shape[0], eye.column : eye.column + rest.shape[1]] = rest
+        found.append(whole)
+    return found[0], found[1]

@@ -31,7 +31,7 @@ GROWTH = 0.03
 """Masks are wider than the wire by this on either side [px]."""
 CALIBRATION_SIGMA = 0.3
 """Prior standard deviation [px] of the right image's shift."""
-PIXEL_VARIANCE = 0.8
+PIXEL_VARIANCE = 0.4
 """Variance of a pixel's misfit with neighbours that err alike counted in; the calibration's prior is set against it."""
 LOST_WEIGHT, LOST_DISTANCE = 0.1, 2.0
 """Weight of a pixel that should be mask and is far from any; it falls to that over this distance [px]."""
@@ -179,7 +179,7 @@ def _compare(
 ) -> float:
     """Return the misfit less what it is without a needle; add to the normal equations (8, 8), (8,)."""
     height, width = signed.shape
-    reach, stride = 3.0 * tau + 0.7, 2 if tau > 2.0 else 1
+    reach, stride = 3.0 * tau + 0.7, 2 if tau > 1.0 else 1
     area = float(stride * stride)
     points, pixels = trace(pose, shift, camera, corner, eye, on_circle, radii)
     draw(pixels, growth, reach, stride, drawn, piece)
