@@ -3,9 +3,10 @@
     python -m benchmarks.stitch.segmentation --out FOLDER [--views FOLDER] [--checkpoint FILE] [--quick] [--tuning]
         [--count N] [--seconds S]
 
-Reporting seeds begin at 1300 (those from 1000 on were seen with an earlier estimator), tuning seeds (`--tuning`) at 450. Writes segmentation.jsonl (a picture a line),
-needle.jsonl (the estimators on spoiled true masks and on learned ones), metrics.json and table.md. A stopped run goes
-on; `--seconds` stops early, between two views. Times are CPU times of one thread.
+Reporting seeds begin at 1300 (those from 1000 on were seen with an earlier estimator), tuning seeds (`--tuning`) at
+450. Writes segmentation.jsonl (a picture a line), needle.jsonl (the estimators on spoiled true masks and on learned
+ones), metrics.json and table.md. A stopped run goes on; `--seconds` stops early, between two views. Times are CPU times
+of one thread.
 """
 
 from __future__ import annotations
