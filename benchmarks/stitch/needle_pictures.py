@@ -25,7 +25,7 @@ def main() -> None:
     """Parse the command line and draw."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.stitch.needle_pictures", description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[3, 7, 13, 15])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[3, 7, 248, 440])
     options = parser.parse_args()
     case = CASES["rendered"]
     rows = []

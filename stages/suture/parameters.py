@@ -142,7 +142,7 @@ SCENE = Stage(
 )
 NEEDLE = Stage(
     name="suture needle",
-    version=1,
+    version=2,
     summary="Find the needle's pose in stereo pairs, with its covariance, or say why it cannot be known (STITCH)",
     parameters=NeedleParameters,
     reads={

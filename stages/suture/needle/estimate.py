@@ -4,67 +4,61 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 
-from stages.suture.needle.arc import Arc, place_arc, tip_at_start
-from stages.suture.needle.filter import either_way
+from stages.suture.needle.evidence import Evidence, evidence_of, left_over
+from stages.suture.needle.filter import difference, either_way
 from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
-from stages.suture.needle.refine import CircleFit, EyeMask, refine
-from stages.suture.needle.starts import (
-    FARTHEST,
-    NEAREST,
-    SCORED,
-    TRIPLES,
-    circles_through,
-    frame_of,
-    row_points,
-    score,
-)
+from stages.suture.needle.silhouette import Outline, Sheet, fit_outline, sheet_of
+from stages.suture.needle.starts import FARTHEST, NEAREST, starts
+from stages.suture.needle.windows import EyeMask, needle_masks, windows
 from stages.suture.rig import NeedlePose, StereoRig
 
-MARGIN = 40
 FEWEST_PIXELS = 30
-KEPT_STARTS = 8
-FINALISTS = 6
-EXPLAINED_WEIGHT = 60.0
-"""Of the score (0 to 2) against the log-likelihood when finalists are compared."""
-WIDE_BANDS = (12.0, 10.0, 8.0, 6.0, 5.0, 4.0)
-NARROW_BANDS = (4.0, 3.0, 3.0, 2.5, 2.5)
-LARGEST_TURN = np.radians(9.0)
-LARGEST_SHIFT = 0.0016
-LEAST_SEEN = 0.15
-TEMPERATURE = 2.0
-"""Of the scores by which other poses count in the covariance."""
-EDGE_ON_SCALE, EDGE_ON_ANGLE = 4.0, 15.0
-"""Near edge-on both halves of the ring run into one mask, and middles of its runs err alike: the fit's covariance is
-larger by this factor (beside one) where the needle is edge-on, less over this angle [degrees]. Both of these, as the
-temperature, were chosen on tuning seeds so that ellipsoids hold what they should."""
-LEAST_LEAD = 3.0
-"""By so much (log-likelihood and weighted score) the pose must beat the best one elsewhere."""
+STARTS, MIRRORED, FINALISTS = 14, 3, 6
+COARSE_LEVELS, NARROW_LEVELS = ((3.0, 5), (1.5, 3)), ((1.5, 4), (0.7, 8))
+"""Widths of the outline [px], and the most steps with each."""
+POLISH = 4
+SAMPLED = 90
+"""Pixels of each mask on which starts are scored."""
+SAME, ALIKE = (0.001, np.radians(15.0)), (0.0003, np.radians(3.0))
+"""Two outlines nearer than this [m], [rad] are one, before and after the close fit."""
+TOLERANCE = (0.001, np.radians(10.0))
+"""What a robot needs of the centre [m] and of the plane [rad] to grasp the needle."""
+BASIN = (0.003, np.radians(20.0))
+"""Other outlines within this [m], [rad] of the best one are in its covariance."""
+VARIANCE = 0.36
+"""Of a pixel's misfit, neighbours that err alike counted in; chosen so that ellipsoids hold what they should."""
+LEAST_PROBABILITY = 0.45
+"""Of being within TOLERANCE, below which the pose is not answered."""
+MOST_OF_IT = 0.8
+"""Of the probability, about one pose: what is not known then is where in its neighbourhood the needle is."""
+LEAST_SEEN = 0.1
+SECOND_PIXELS, SECOND_SEEN = 150, 0.5
+"""A second needle leaves so many pixels of mask in either eye, and each eye sees so much of its arc."""
+MOST_SURE = 1.0 - 1e-5
+"""Of tip and swage: the evidence is no better than that."""
+DRAWS = 200
 
 
 @dataclass(frozen=True)
-class _Candidate:
-    fit: CircleFit
-    score: float
+class Hypothesis:
+    """A fitted outline, what speaks for it, and how probable it is among its rivals."""
 
-
-@dataclass(frozen=True)
-class _Final:
-    score: float
-    fit: CircleFit
-    arc: Arc
+    outline: Outline
+    evidence: Evidence
+    probability: float
 
     @property
     def pose(self) -> NeedlePose:
-        """The pose whose tip is the arc's start."""
-        normal = self.fit.frame[:, 2]
-        x_axis = np.cos(self.arc.start) * self.fit.frame[:, 0] + np.sin(self.arc.start) * self.fit.frame[:, 1]
-        matrix = np.eye(4)
-        matrix[:3, :3] = np.stack([x_axis, np.cross(normal, x_axis), normal], axis=1)
-        matrix[:3, 3] = self.fit.centre
-        return NeedlePose(matrix)
+        """The outline's pose."""
+        return self.outline.pose
+
+    def covariance(self) -> np.ndarray:
+        """Return the covariance (6, 6) of centre [m] and rotation vector [rad], camera frame; no calibration in it."""
+        # what the masks do not determine is known to 100 mm and 3 rad
+        tiny = np.diag([1.0 / 0.1**2] * 3 + [1.0 / 3.0**2] * 3 + [0.0] * 2)
+        return VARIANCE * np.linalg.inv(self.outline.information + tiny)[:6, :6]
 
 
 def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | None = None) -> NeedleEstimate:
@@ -74,83 +68,132 @@ def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | 
     rig or images that cannot be.
     """
     observation.check()
-    rig = observation.rig
-    counts = tuple(
-        int(_without(mask, thread).sum())
-        for mask, thread in (
-            (observation.left_mask, observation.left_thread),
-            (observation.right_mask, observation.right_thread),
-        )
-    )
+    masks = needle_masks(observation)
+    counts = [int(mask.sum()) for mask in masks]
     if min(counts) < FEWEST_PIXELS:
         side = "left" if counts[0] <= counts[1] else "right"
         return NeedleEstimate.none(f"The {side} eye sees {min(counts)} pixels of needle; {FEWEST_PIXELS} are needed.")
-    eyes = (
-        _window(_without(observation.left_mask, observation.left_thread), observation.left_hidden),
-        _window(_without(observation.right_mask, observation.right_thread), observation.right_hidden),
-    )
-    swapped = _eyes_swapped(rig, observation)
+    swapped = _eyes_swapped(observation.rig, masks)
     if swapped:
         return NeedleEstimate.none(swapped)
-    distances = (_distance_to_mask(eyes[0]), _distance_to_mask(eyes[1]))
-    random = np.random.default_rng(seed)
-    pixels = (_some_pixels(eyes[0], 90, random), _some_pixels(eyes[1], 90, random))
-    candidates = _candidates(observation, eyes, distances, pixels, guess, random)
-    if not candidates:
+    eyes = windows(observation)
+    sheets = (sheet_of(eyes[0]), sheet_of(eyes[1]))
+    rivals = _hypotheses(observation, eyes, sheets, seed, guess)
+    if not rivals:
         return NeedleEstimate.none("No circle of the needle's radius passes through what both eyes see.")
-    chosen = _chosen(rig, eyes, candidates, distances, pixels)
-    if isinstance(chosen, str):
-        return NeedleEstimate.none(chosen)
-    return _answer(observation, chosen)
+    answer = _answer(rivals, np.random.default_rng(seed))
+    if not answer.abstained:
+        rest = left_over(observation.rig, eyes, sheets, rivals[0].outline)
+        return replace(answer, abstained=_second_needle(observation, rivals[0], rest, seed))
+    return answer
 
 
-def _chosen(
-    rig: StereoRig,
+def hypotheses(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | None = None) -> list[Hypothesis]:
+    """Return the outlines that explain both masks best, most probable first; each mask must have a pixel."""
+    eyes = windows(observation)
+    return _hypotheses(observation, eyes, (sheet_of(eyes[0]), sheet_of(eyes[1])), seed, guess)
+
+
+def _second_needle(
+    observation: NeedleObservation, first: Hypothesis, rest: tuple[np.ndarray, np.ndarray], seed: int
+) -> str:
+    """Return a sentence if what the first needle leaves of the masks looks like another one."""
+    if min(int(mask.sum()) for mask in rest) < SECOND_PIXELS:
+        return ""
+    alone = replace(observation, left_mask=rest[0], right_mask=rest[1], disparity=None)
+    second = next(iter(hypotheses(alone, seed)), None)
+    if second is None or second.evidence.seen.mean(axis=1).min() < SECOND_SEEN:
+        return ""
+    if second.evidence.left_over > 0.5 * sum(int(mask.sum()) for mask in rest):
+        return ""
+    apart = 1000.0 * float(np.linalg.norm(second.pose.centre - first.pose.centre))
+    return f"Two needles are seen, {apart:.0f} mm apart: which one is meant cannot be known."
+
+
+def _hypotheses(
+    observation: NeedleObservation,
     eyes: tuple[EyeMask, EyeMask],
-    candidates: list[_Candidate],
-    distances: tuple[np.ndarray, np.ndarray],
-    pixels: tuple[np.ndarray, np.ndarray],
-) -> list[_Final] | str:
-    """Return the best few circles after a close fit, best first; or why there is none. Best is the likelihood of what
-    lies on the circle together with the share of the masks that the circle explains."""
-    distinct: list[CircleFit] = []
-    for candidate in candidates:
-        fit = candidate.fit
-        if candidate.score > 0 and all(_differ(fit.frame, fit.centre, o.frame, o.centre, 4.0, 0.001) for o in distinct):
-            distinct.append(fit)
-        if len(distinct) == FINALISTS:
+    sheets: tuple[Sheet, Sheet],
+    seed: int,
+    guess: NeedlePose | None,
+) -> list[Hypothesis]:
+    rig, random = observation.rig, np.random.default_rng(seed)
+    points = _disparity_points(observation, random)
+    begun = starts(rig, eyes, points, STARTS, SAMPLED, random)
+    if guess is not None:
+        begun.insert(0, guess)
+    still = np.zeros(2)
+    coarse = [fit_outline(rig, sheets, pose, still, COARSE_LEVELS) for pose in begun]
+    coarse.sort(key=lambda outline: outline.misfit)
+    for outline in coarse[:MIRRORED]:
+        coarse.append(fit_outline(rig, sheets, _mirrored(outline.pose), still, COARSE_LEVELS))
+    ordered = [rival.outline for rival in _weighed(rig, eyes, sheets, coarse)]
+    return _weighed(rig, eyes, sheets, _fine(rig, sheets, _finalists(ordered)))
+
+
+def _finalists(coarse: list[Outline]) -> list[Outline]:
+    """Return the best few outlines, none of them like another with tip and swage exchanged or not."""
+    kept: list[Outline] = []
+    for outline in coarse:
+        if NEAREST < outline.pose.centre[2] < FARTHEST and not any(
+            _near(either_way(outline.pose, other.pose)[0], SAME) for other in kept
+        ):
+            kept.append(outline)
+        if len(kept) == FINALISTS:
             break
-    if not distinct:
-        return "No circle of the needle's radius passes through what both eyes see."
-    finals = []
-    for fit in distinct:
-        arc = place_arc(fit)
-        fit = refine(rig, eyes, fit.frame, fit.centre, NARROW_BANDS, fit.shift, (arc.start + np.pi / 2, 1.75))
-        arc = place_arc(fit)
-        explained = score(rig, fit.frame, fit.centre, fit.shift, distances, eyes, pixels)
-        finals.append(_Final(arc.likelihood + EXPLAINED_WEIGHT * explained, fit, arc))
-    return sorted(finals, key=lambda final: -final.score)
+    return kept
 
 
-def _without(mask: np.ndarray, thread: np.ndarray | None) -> np.ndarray:
-    """Return the needle's mask without what is known to be thread."""
-    return mask if thread is None else mask & ~thread
+def _fine(rig: StereoRig, sheets: tuple[Sheet, Sheet], finalists: list[Outline]) -> list[Outline]:
+    """Return every finalist fitted closely, and again with tip and swage exchanged; none like another."""
+    found: list[Outline] = []
+    for finalist in finalists:
+        one = fit_outline(rig, sheets, finalist.pose, finalist.shift, NARROW_LEVELS, POLISH)
+        other = fit_outline(rig, sheets, one.pose.swapped(), one.shift, NARROW_LEVELS, POLISH)
+        for outline in (one, other):
+            if not any(_near(difference(outline.pose, rival.pose), ALIKE) for rival in found):
+                found.append(outline)
+    return found
 
 
-def _window(mask: np.ndarray, hidden: np.ndarray | None) -> EyeMask:
-    """Return the part of an eye's mask that holds all of it, with a margin, smoothed."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    top, bottom = max(int(rows[0]) - MARGIN, 0), min(int(rows[-1]) + MARGIN, mask.shape[0])
-    left, right = max(int(columns[0]) - MARGIN, 0), min(int(columns[-1]) + MARGIN, mask.shape[1])
-    crop = mask[top:bottom, left:right]
-    soft = cv2.GaussianBlur(crop.astype(np.float32), (3, 3), 0.7)
-    covered = np.zeros(crop.shape, dtype=bool) if hidden is None else hidden[top:bottom, left:right]
-    return EyeMask(soft, np.ascontiguousarray(covered), left, top)
+def _weighed(
+    rig: StereoRig, eyes: tuple[EyeMask, EyeMask], sheets: tuple[Sheet, Sheet], outlines: list[Outline]
+) -> list[Hypothesis]:
+    """Return the outlines with their probabilities among each other, most probable first."""
+    weighed = [(outline, evidence_of(rig, eyes, sheets, outline)) for outline in outlines]
+    if not weighed:
+        return []
+    logs = np.array([evidence.log_weight for _, evidence in weighed])
+    shares = np.exp(logs - logs.max())
+    shares /= shares.sum()
+    found = [Hypothesis(*pair, float(share)) for pair, share in zip(weighed, shares, strict=True)]
+    return sorted(found, key=lambda hypothesis: -hypothesis.probability)
 
 
-def _eyes_swapped(rig: StereoRig, observation: NeedleObservation) -> str:
+def _near(step: np.ndarray, limits: tuple[float, float]) -> bool:
+    """Whether a step (6,) between poses is within limits [m], [rad]."""
+    return bool(np.linalg.norm(step[:3]) < limits[0] and np.linalg.norm(step[3:]) < limits[1])
+
+
+def _tolerable(steps: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Return which (N,) of the steps (N, 6) between poses leave centre and plane (unit `normal`) within TOLERANCE."""
+    turns = steps[:, 3:] - (steps[:, 3:] @ normal)[:, None] * normal
+    tilts = np.linalg.norm(turns, axis=1)
+    return (np.linalg.norm(steps[:, :3], axis=1) < TOLERANCE[0]) & (tilts < TOLERANCE[1])
+
+
+def _mirrored(pose: NeedlePose) -> NeedlePose:
+    """Return the pose mirrored in depth about its centre: one eye cannot tell them apart, and two near eyes hardly."""
+    sight = pose.centre / np.linalg.norm(pose.centre)
+    x, y = (axis - 2.0 * (axis @ sight) * sight for axis in pose.camera_from_needle[:3, :2].T)
+    matrix = np.eye(4)
+    matrix[:3] = np.stack([x, y, np.cross(x, y), pose.centre], axis=1)
+    return NeedlePose(matrix)
+
+
+def _eyes_swapped(rig: StereoRig, masks: tuple[np.ndarray, np.ndarray]) -> str:
     """Return a sentence if the needle lies farther right in the right eye, which no point in front of both can."""
-    left, right = (np.flatnonzero(m.any(axis=0)) for m in (observation.left_mask, observation.right_mask))
+    left, right = (np.flatnonzero(mask.any(axis=0)) for mask in masks)
     ends = left[0] - right[0], left[-1] - right[-1]
     if max(ends) < 0.5 * rig.focal * rig.baseline / FARTHEST:
         return (
@@ -159,17 +202,6 @@ def _eyes_swapped(rig: StereoRig, observation: NeedleObservation) -> str:
             "Are left and right exchanged?"
         )
     return ""
-
-
-def _distance_to_mask(eye: EyeMask) -> np.ndarray:
-    return cv2.distanceTransform((eye.soft < 0.5).astype(np.uint8), cv2.DIST_L2, 3)
-
-
-def _some_pixels(eye: EyeMask, count: int, random: np.random.Generator) -> np.ndarray:
-    """Return about `count` (P, 2) pixels (column, row) of the mask in the whole image."""
-    rows, columns = np.nonzero(eye.soft >= 0.5)
-    chosen = random.integers(0, len(rows), count) if len(rows) else np.empty(0, dtype=int)
-    return np.stack([columns[chosen] + eye.column, rows[chosen] + eye.row], axis=1).astype(float)
 
 
 def _disparity_points(observation: NeedleObservation, random: np.random.Generator) -> np.ndarray:
@@ -185,125 +217,60 @@ def _disparity_points(observation: NeedleObservation, random: np.random.Generato
     return points[usable]
 
 
-def _candidates(
-    observation: NeedleObservation,
-    eyes: tuple[EyeMask, EyeMask],
-    distances: tuple[np.ndarray, np.ndarray],
-    pixels: tuple[np.ndarray, np.ndarray],
-    guess: NeedlePose | None,
-    random: np.random.Generator,
-) -> list[_Candidate]:
-    """Return refined circles, best first."""
-    rig = observation.rig
-    no_shift = np.zeros(2)
-    starts = []
-    for points in (row_points(rig, eyes), _disparity_points(observation, random)):
-        centres, normals = circles_through(points, TRIPLES, random)
-        for centre, normal in zip(centres[:SCORED], normals[:SCORED], strict=True):
-            frame = frame_of(normal)
-            starts.append((score(rig, frame, centre, no_shift, distances, eyes, pixels), frame, centre))
-    starts.sort(key=lambda start: -start[0])
-    if guess is not None:
-        starts.insert(0, (2.0, guess.camera_from_needle[:3, :3].copy(), guess.centre.copy()))
-    kept: list[tuple[np.ndarray, np.ndarray]] = []
-    for _, frame, centre in starts:
-        if all(_differ(frame, centre, other[0], other[1], 12.0, 0.0025) for other in kept):
-            kept.append((frame, centre))
-        if len(kept) == KEPT_STARTS:
-            break
-    candidates = []
-    for frame, centre in kept:
-        candidates.append(_refined(rig, eyes, distances, pixels, frame, centre))
-    candidates.sort(key=lambda candidate: -candidate.score)
-    for candidate in candidates[:2]:
-        # one eye cannot tell a plane from its mirror image about the line of sight, and two near eyes hardly can
-        sight = candidate.fit.centre / np.linalg.norm(candidate.fit.centre)
-        normal = candidate.fit.frame[:, 2]
-        mirrored = 2.0 * (normal @ sight) * sight - normal
-        candidates.append(_refined(rig, eyes, distances, pixels, frame_of(mirrored), candidate.fit.centre))
-    candidates.sort(key=lambda candidate: -candidate.score)
-    return candidates
+def _answer(rivals: list[Hypothesis], random: np.random.Generator) -> NeedleEstimate:
+    """Return the pose about which most of the probability lies, with its covariance, or abstain."""
+    draws = random.standard_normal((DRAWS, 6))
+    chances = [_chance(rival, rivals, draws) for rival in rivals]
+    chance = max(chances)
+    # rivals are ordered: of those about one place the likeliest says where on its circle the needle lies
+    best = next(rival for rival, own in zip(rivals, chances, strict=True) if own >= 0.9 * chance)
+    about = [other for other in rivals if _about(best.pose, other.pose)]
+    along = sum(other.probability for other in about if best.pose.normal @ other.pose.normal > 0)
+    everything = sum(other.probability for other in about)
+    pose = best.pose if 2.0 * along >= everything else best.pose.swapped()
+    sure = max(along, everything - along) / everything
+    why = _why_abstain(best, chance, about)
+    near = [other for other in about if _near(either_way(best.pose, other.pose)[0], BASIN)]
+    covariance = _covariance(best, rivals if why else near)
+    return NeedleEstimate(pose, covariance, float(np.clip(sure, 0.5, MOST_SURE)), why)
 
 
-def _refined(
-    rig: StereoRig,
-    eyes: tuple[EyeMask, EyeMask],
-    distances: tuple[np.ndarray, np.ndarray],
-    pixels: tuple[np.ndarray, np.ndarray],
-    frame: np.ndarray,
-    centre: np.ndarray,
-) -> _Candidate:
-    fit = refine(rig, eyes, frame, centre, WIDE_BANDS)
-    if not np.isfinite(fit.centre).all() or not NEAREST < fit.centre[2] < FARTHEST:
-        return _Candidate(fit, -1.0)
-    return _Candidate(fit, score(rig, fit.frame, fit.centre, fit.shift, distances, eyes, pixels))
+def _about(pose: NeedlePose, other: NeedlePose) -> bool:
+    """Whether two poses have about the same circle, wherever on it the needle lies and which end is the tip."""
+    cosine = abs(float(pose.normal @ other.normal))
+    return bool(np.linalg.norm(pose.centre - other.centre) < BASIN[0] and cosine > np.cos(BASIN[1]))
 
 
-def _differ(
-    frame: np.ndarray, centre: np.ndarray, other_frame: np.ndarray, other_centre: np.ndarray, degrees: float, far: float
-) -> bool:
-    cosine = abs(float(frame[:, 2] @ other_frame[:, 2]))
-    return cosine < np.cos(np.radians(degrees)) or float(np.linalg.norm(centre - other_centre)) > far
-
-
-def _answer(observation: NeedleObservation, finals: list[_Final]) -> NeedleEstimate:
-    """Return the best pose with its covariance, or abstain where it is not known well enough."""
-    best = finals[0]
-    odds = tip_at_start(best.fit, best.arc, observation.rig, (observation.left_thread, observation.right_thread))
-    named = replace(best, arc=place_arc(best.fit, odds >= 0))
-    covariance = _edge_on_factor(named.pose) * _covariance(named.fit, named.arc) + _spread(finals)
-    pose = named.pose if odds >= 0 else named.pose.swapped()
-    probability = float(1.0 / (1.0 + np.exp(-abs(odds))))
-    return NeedleEstimate(pose, covariance, probability, _why_abstain(covariance, finals))
-
-
-def _edge_on_factor(pose: NeedlePose) -> float:
-    return 1.0 + EDGE_ON_SCALE * float(np.exp(-((pose.degrees_from_edge_on() / EDGE_ON_ANGLE) ** 2)))
-
-
-def _spread(finals: list[_Final]) -> np.ndarray:
-    """Return what other poses that explain the masks about as well add to the covariance (6, 6) of the best."""
-    best = finals[0]
-    weights = np.array([np.exp((final.score - best.score) / TEMPERATURE) for final in finals])
-    weights /= weights.sum()
-    total = np.zeros((6, 6))
-    for weight, final in zip(weights[1:], finals[1:], strict=True):
-        step, _ = either_way(best.pose, final.pose)
-        total += weight * np.outer(step, step)
+def _chance(hypothesis: Hypothesis, rivals: list[Hypothesis], draws: np.ndarray) -> float:
+    """Return the probability that the needle is within TOLERANCE of a hypothesis."""
+    total = 0.0
+    for rival in rivals:
+        step, _ = either_way(hypothesis.pose, rival.pose)
+        if rival.probability > 0.01 and np.linalg.norm(step[:3]) < 5.0 * TOLERANCE[0]:
+            spread = draws @ np.linalg.cholesky(rival.covariance()).T
+            total += rival.probability * float(_tolerable(step + spread, hypothesis.pose.normal).mean())
     return total
 
 
-def _covariance(fit: CircleFit, arc: Arc) -> np.ndarray:
-    """Return the covariance (6, 6) of centre [m] and rotation vector [rad], camera frame, calibration summed out."""
-    tiny = np.diag([1.0] * 3 + [1e-4] * 2 + [0.0] * 2)
-    marginal = np.linalg.inv(fit.information + tiny)[:5, :5]
-    carry = np.zeros((6, 6))
-    carry[:3, :3] = np.eye(3)
-    carry[3:, 3:] = fit.frame
-    local = np.zeros((6, 6))
-    local[:5, :5] = marginal
-    local[5, 5] = arc.deviation**2
-    return carry @ local @ carry.T
+def _covariance(best: Hypothesis, others: list[Hypothesis]) -> np.ndarray:
+    """Return the covariance (6, 6) about the best pose of what `others` (the best among them) say together."""
+    total = np.zeros((6, 6))
+    for other in others:
+        step, _ = either_way(best.pose, other.pose)
+        total += other.probability * (other.covariance() + np.outer(step, step))
+    return total / sum(other.probability for other in others)
 
 
-def _why_abstain(covariance: np.ndarray, finals: list[_Final]) -> str:
+def _why_abstain(best: Hypothesis, chance: float, about: list[Hypothesis]) -> str:
     """Return why the pose should not be used, or nothing."""
-    fit, arc = finals[0].fit, finals[0].arc
-    if arc.seen.min() < LEAST_SEEN:
-        return f"One eye sees {100 * arc.seen.min():.0f} % of the needle on the best circle."
-    normal = fit.frame[:, 2]
-    in_plane = np.eye(3) - np.outer(normal, normal)
-    turn = float(np.sqrt(np.linalg.eigvalsh(in_plane @ covariance[3:, 3:] @ in_plane)[-1]))
-    if turn > LARGEST_TURN:
-        return f"The needle's plane is known to {np.degrees(turn):.0f} degrees only (edge-on, or too little is seen)."
-    shift = float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
-    if shift > LARGEST_SHIFT:
-        return f"The needle's centre is known to {1000 * shift:.1f} mm only."
-    elsewhere = [
-        final.score
-        for final in finals[1:]
-        if _differ(final.fit.frame, final.fit.centre, fit.frame, fit.centre, 10.0, 0.0015)
-    ]
-    if finals[0].score - max(elsewhere, default=-1e9) < LEAST_LEAD:
-        return "Two different poses explain what both eyes see about equally well."
-    return ""
+    seen = float(best.evidence.seen.mean(axis=1).min())
+    if seen < LEAST_SEEN:
+        return f"One eye sees {100 * seen:.0f} % of the needle where it best fits."
+    if chance >= LEAST_PROBABILITY:
+        return ""
+    if sum(other.probability for other in about) < MOST_OF_IT:
+        return f"Different poses explain what both eyes see; the likeliest is right with {100 * chance:.0f} %."
+    covariance = _covariance(best, about)
+    shift = 1000.0 * float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
+    turn = np.degrees(float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1])))
+    return f"The needle is known to {shift:.1f} mm and {turn:.0f} degrees only (edge-on, or too little is seen)."

@@ -8,28 +8,71 @@ scored on both masks: how much of the best half circle lies on mask, and how muc
 
 from __future__ import annotations
 
+import cv2
 import numba
 import numpy as np
 
-from stages.suture.needle.refine import EyeMask
-from stages.suture.rig import NEEDLE_RADIUS, StereoRig
+from stages.suture.needle.windows import EyeMask
+from stages.suture.rig import NEEDLE_RADIUS, NeedlePose, StereoRig
 
 NEAREST, FARTHEST = 0.04, 0.80
-TRIPLES = 4000
-SCORED = 400
-STATIONS = 60
+TRIPLES = 6000
+SCORED_ROWS, SCORED_DISPARITY = 1200, 300
+LONGEST_RUN = 16
+DIFFERENT = np.radians(12.0), 0.0025, np.radians(60.0)
+"""Two starts differ if their planes [rad], centres [m] or the directions of their arcs' middles [rad] do by this."""
 CLOSE = 3.0
 """Mask within this many pixels beyond the wire's half width of the curve counts as on it."""
 
 
+def starts(
+    rig: StereoRig,
+    eyes: tuple[EyeMask, EyeMask],
+    points: np.ndarray,
+    count: int,
+    sampled: int,
+    random: np.random.Generator,
+) -> list[NeedlePose]:
+    """Return up to `count` poses that are not alike, best first; either end may be the tip.
+
+    `points` (N, 3) [m] are the disparity's; circles are scored on `sampled` pixels of each mask.
+    """
+    distances = (eyes[0].distance(), eyes[1].distance())
+    pixels = (eyes[0].some_pixels(sampled, random), eyes[1].some_pixels(sampled, random))
+    scores, poses = [], []
+    for given, often, most in (
+        (*_row_points(rig, eyes), SCORED_ROWS),
+        (points, np.ones(len(points)), SCORED_DISPARITY),
+    ):
+        centres, normals = _circles_through(given, often, TRIPLES, random)
+        found = _scored(rig, eyes, distances, pixels, centres[:most], normals[:most])
+        scores.append(found[0])
+        poses.append(found[1])
+    ordered = np.concatenate(poses)[np.argsort(-np.concatenate(scores), kind="stable")]
+    kept: list[np.ndarray] = []
+    for pose in ordered:
+        if all(_differ(pose, other) for other in kept):
+            kept.append(pose)
+        if len(kept) == count:
+            break
+    return [NeedlePose(pose) for pose in kept]
+
+
+def _differ(pose: np.ndarray, other: np.ndarray) -> bool:
+    """Whether plane, centre or the direction of the arc's middle differ between two poses (4, 4)."""
+    plane, middle = abs(float(pose[:3, 2] @ other[:3, 2])), float(pose[:3, 1] @ other[:3, 1])
+    far = float(np.linalg.norm(pose[:3, 3] - other[:3, 3]))
+    return plane < np.cos(DIFFERENT[0]) or far > DIFFERENT[1] or middle < np.cos(DIFFERENT[2])
+
+
 @numba.njit(cache=True)
-def _runs(soft: np.ndarray, longest: int) -> np.ndarray:
-    """Return (R, 2): row and middle column of the runs of mask (soft >= 0.5) of at most `longest` pixels."""
+def _runs(mask: np.ndarray, longest: int) -> np.ndarray:
+    """Return (R, 2): row and middle column of the runs of mask of at most `longest` pixels."""
     found = []
-    for row in range(soft.shape[0]):
+    for row in range(mask.shape[0]):
         start = -1
-        for column in range(soft.shape[1] + 1):
-            inside = column < soft.shape[1] and soft[row, column] >= 0.5
+        for column in range(mask.shape[1] + 1):
+            inside = column < mask.shape[1] and mask[row, column]
             if inside and start < 0:
                 start = column
             elif not inside and start >= 0:
@@ -42,33 +85,42 @@ def _runs(soft: np.ndarray, longest: int) -> np.ndarray:
     return result
 
 
-def row_points(rig: StereoRig, eyes: tuple[EyeMask, EyeMask]) -> np.ndarray:
-    """Return candidate points (N, 3) [m]: pairs of runs in one row of both eyes, between NEAREST and FARTHEST."""
-    left, right = _runs(eyes[0].soft, 16), _runs(eyes[1].soft, 16)
+def _row_points(rig: StereoRig, eyes: tuple[EyeMask, EyeMask]) -> tuple[np.ndarray, np.ndarray]:
+    """Return candidate points (N, 3) [m], pairs of runs in one row of both eyes between NEAREST and FARTHEST, and how
+    often (N,) to draw each: less where many lie on one piece of the left mask, so that small pieces are not missed."""
+    left, right = _runs(eyes[0].mask, LONGEST_RUN), _runs(eyes[1].mask, LONGEST_RUN)
+    _, labels = cv2.connectedComponents(eyes[0].mask.astype(np.uint8))
+    piece = labels[left[:, 0].astype(int), left[:, 1].astype(int)] if len(left) else np.empty(0, dtype=int)
     left, right = left + [eyes[0].row, eyes[0].column], right + [eyes[1].row, eyes[1].column]
     first = np.searchsorted(right[:, 0], left[:, 0], side="left")
     last = np.searchsorted(right[:, 0], left[:, 0], side="right")
     counts = last - first
     if counts.sum() == 0:
-        return np.empty((0, 3))
+        return np.empty((0, 3)), np.empty(0)
     of_left = np.repeat(np.arange(len(left)), counts)
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     of_right = np.repeat(first, counts) + within
     disparity = left[of_left, 1] - right[of_right, 1]
     reach = rig.focal * rig.baseline
     keep = (disparity > reach / FARTHEST) & (disparity < reach / NEAREST)
-    return rig.triangulate(left[of_left][keep][:, ::-1], disparity[keep])
+    of_piece = piece[of_left][keep]
+    often = 1.0 / np.sqrt(np.bincount(of_piece)[of_piece])
+    return rig.triangulate(left[of_left][keep][:, ::-1], disparity[keep]), often
 
 
-def circles_through(points: np.ndarray, count: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Return centres (C, 3) and unit normals (C, 3) of circles of the needle's radius through about three of `points`.
+def _circles_through(
+    points: np.ndarray, often: np.ndarray, count: int, random: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return centres (C, 3) and unit normals (C, 3) of circles of the needle's radius through about three of
+    `points`, each of which is drawn as `often` as it says.
 
     Only triples whose own circle has a radius within 35 % of the needle's are used; the needle's circle keeps their
     plane and their middle point.
     """
     if len(points) < 3:
         return np.empty((0, 3)), np.empty((0, 3))
-    triples = random.integers(0, len(points), (count, 3))
+    drawn = np.searchsorted(np.cumsum(often) / often.sum(), random.random((count, 3)))
+    triples = np.minimum(drawn, len(points) - 1)
     a, b, c = points[triples[:, 0]], points[triples[:, 1]], points[triples[:, 2]]
     ab, ac = b - a, c - a
     normal = np.cross(ab, ac)
@@ -88,40 +140,43 @@ def circles_through(points: np.ndarray, count: int, random: np.random.Generator)
     return centre, normal / np.sqrt(squared)[:, None]
 
 
-def frame_of(normal: np.ndarray) -> np.ndarray:
-    """Return a right-handed frame (3, 3) whose third column is the unit `normal` (3,)."""
-    helper = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.7 else np.array([0.0, 1.0, 0.0])
-    u = np.cross(helper, normal)
-    u /= np.linalg.norm(u)
-    return np.stack([u, np.cross(normal, u), normal], axis=1)
-
-
 @numba.njit(cache=True, fastmath=True)
 def _score(
-    frame: np.ndarray,
     centre: np.ndarray,
-    shift: np.ndarray,
+    normal: np.ndarray,
     camera: np.ndarray,
     distances: tuple[np.ndarray, np.ndarray],
     hidden: tuple[np.ndarray, np.ndarray],
     corners: np.ndarray,
     pixels: tuple[np.ndarray, np.ndarray],
+    pose: np.ndarray,
 ) -> float:
-    """Return 0..2: share of the best half circle that lies on mask, plus share of the mask that it explains."""
+    """Return 0..2: share of the best half circle that lies on mask, plus share of the mask that it explains; write that
+    half circle's pose (3, 4)."""
     count = 60
     columns, rows, good = np.empty((2, count)), np.empty((2, count)), np.zeros((2, count))
     width = 0.0005 * camera[0] / max(centre[2], 0.01)
+    # any two directions in the plane
+    u, v = np.empty(3), np.empty(3)
+    if abs(normal[0]) < 0.7:
+        u[0], u[1], u[2] = 0.0, -normal[2], normal[1]
+    else:
+        u[0], u[1], u[2] = normal[2], 0.0, -normal[0]
+    u /= np.sqrt(u[0] ** 2 + u[1] ** 2 + u[2] ** 2)
+    v[0] = normal[1] * u[2] - normal[2] * u[1]
+    v[1] = normal[2] * u[0] - normal[0] * u[2]
+    v[2] = normal[0] * u[1] - normal[1] * u[0]
     for station in range(count):
         angle = 2 * np.pi * station / count
         a, b = 0.012 * np.cos(angle), 0.012 * np.sin(angle)
-        x = centre[0] + a * frame[0, 0] + b * frame[0, 1]
-        y = centre[1] + a * frame[1, 0] + b * frame[1, 1]
-        z = max(centre[2] + a * frame[2, 0] + b * frame[2, 1], 0.01)
+        x = centre[0] + a * u[0] + b * v[0]
+        y = centre[1] + a * u[1] + b * v[1]
+        z = max(centre[2] + a * u[2] + b * v[2], 0.01)
         for eye in range(2):
-            u = camera[0] * (x - eye * camera[3]) / z + camera[1] + eye * shift[0]
-            v = camera[0] * y / z + camera[2] + eye * shift[1]
-            columns[eye, station], rows[eye, station] = u, v
-            column, row = int(u + 0.5) - int(corners[eye, 0]), int(v + 0.5) - int(corners[eye, 1])
+            columns[eye, station] = camera[0] * (x - eye * camera[3]) / z + camera[1]
+            rows[eye, station] = camera[0] * y / z + camera[2]
+            column = int(columns[eye, station] + 0.5) - int(corners[eye, 0])
+            row = int(rows[eye, station] + 0.5) - int(corners[eye, 1])
             distance = distances[eye]
             if 0 <= column < distance.shape[1] and 0 <= row < distance.shape[0]:
                 if hidden[eye][row, column]:
@@ -141,7 +196,7 @@ def _score(
     explained = 0.0
     for eye in range(2):
         near = 0
-        reach = (width + 3.0) ** 2
+        reach = (width + CLOSE) ** 2
         for index in range(len(pixels[eye])):
             for k in range(half):
                 station = (at + k) % count
@@ -151,23 +206,45 @@ def _score(
                     near += 1
                     break
         explained += near / max(len(pixels[eye]), 1)
+    turn = 2 * np.pi * at / count
+    for i in range(3):
+        pose[i, 0] = np.cos(turn) * u[i] + np.sin(turn) * v[i]
+        pose[i, 1] = np.cos(turn) * v[i] - np.sin(turn) * u[i]
+        pose[i, 2], pose[i, 3] = normal[i], centre[i]
     return best / (2.0 * half) + 0.5 * explained
 
 
-def score(
-    rig: StereoRig,
-    frame: np.ndarray,
-    centre: np.ndarray,
-    shift: np.ndarray,
+@numba.njit(cache=True)
+def _scores(
+    centres: np.ndarray,
+    normals: np.ndarray,
+    camera: np.ndarray,
     distances: tuple[np.ndarray, np.ndarray],
-    eyes: tuple[EyeMask, EyeMask],
+    hidden: tuple[np.ndarray, np.ndarray],
+    corners: np.ndarray,
     pixels: tuple[np.ndarray, np.ndarray],
-) -> float:
-    """Return how well (0..2) the circle explains both masks.
+    poses: np.ndarray,
+    scores: np.ndarray,
+) -> None:
+    for index in range(len(centres)):
+        scores[index] = _score(centres[index], normals[index], camera, distances, hidden, corners, pixels, poses[index])
+
+
+def _scored(
+    rig: StereoRig,
+    eyes: tuple[EyeMask, EyeMask],
+    distances: tuple[np.ndarray, np.ndarray],
+    pixels: tuple[np.ndarray, np.ndarray],
+    centres: np.ndarray,
+    normals: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how well (C,) each circle's best half explains both masks, 0 to 2, and that half's pose (C, 4, 4).
 
     `distances` are each window's distances [px] to its mask, `pixels` (P, 2) some of each mask's pixels (column, row).
     """
     camera = np.array([rig.focal, rig.centre[0], rig.centre[1], rig.baseline])
     corners = np.array([[eyes[0].column, eyes[0].row], [eyes[1].column, eyes[1].row]], dtype=float)
     hidden = (eyes[0].hidden, eyes[1].hidden)
-    return float(_score(np.ascontiguousarray(frame), centre, shift, camera, distances, hidden, corners, pixels))
+    poses, scores = np.tile(np.eye(4), (len(centres), 1, 1)), np.empty(len(centres))
+    _scores(centres, normals, camera, distances, hidden, corners, pixels, poses, scores)
+    return scores, poses

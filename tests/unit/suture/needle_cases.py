@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from stages.kit.geometry.transforms import transform_from
 from stages.suture.needle.observation import NeedleObservation
 from stages.suture.rig import TWO_CAMERAS, NeedlePose, StereoRig
+from stages.suture.world.tubes import needle_radii
 
 
 def pose_at(tilt_degrees: float = 50.0, roll_degrees: float = 70.0, depth: float = 0.35) -> NeedlePose:
@@ -18,13 +19,14 @@ def pose_at(tilt_degrees: float = 50.0, roll_degrees: float = 70.0, depth: float
 
 
 def drawn_mask(rig: StereoRig, pose: NeedlePose, eye: int, first: float = 0.0, last: float = np.pi) -> np.ndarray:
-    """Return one eye's mask of the arc from angle `first` to `last`, a wire of even thickness."""
-    points = pose.points(np.linspace(first, last, 400))
+    """Return one eye's mask of the arc from angle `first` to `last`, a wire that tapers to its tip."""
+    angles = np.linspace(first, last, 200)
+    points = pose.points(angles)
     pixels = rig.right(points) if eye else rig.left(points)
     canvas = np.zeros((rig.height, rig.width), dtype=np.uint8)
-    thickness = max(round(0.001 * rig.focal / pose.centre[2]), 1)
-    scaled = np.round(pixels * 16).astype(np.int32).reshape(-1, 1, 2)
-    cv2.polylines(canvas, [scaled], False, 1, thickness, cv2.LINE_8, 4)
+    radii = needle_radii(angles) * rig.focal / pose.centre[2]
+    for (column, row), radius in zip(np.round(pixels * 16).astype(int), np.round(radii * 16).astype(int), strict=True):
+        cv2.circle(canvas, (int(column), int(row)), int(radius), 1, -1, cv2.LINE_8, 4)
     return canvas > 0
 
 

@@ -48,8 +48,9 @@ def test_ours_finds_it_without_any_disparity(clean):
 
 @pytest.mark.parametrize("at_swage", [True, False])
 def test_thread_at_one_end_says_which_end_is_the_swage(clean, at_swage):
-    truth, observation = clean
+    truth, _ = clean
     shown = truth if at_swage else truth.swapped()
+    observation = observed(shown)
     tangent = np.array([[0.0, -1.0, 0.0]]) @ shown.camera_from_needle[:3, :3].T
     beyond = shown.swage + np.linspace(0.0003, 0.008, 60)[:, None] * tangent
     threads = []
@@ -94,6 +95,37 @@ def test_a_stub_of_needle_abstains():
     pose = pose_at()
     stub = NeedleObservation(TWO_CAMERAS, *(drawn_mask(TWO_CAMERAS, pose, eye, 1.4, 1.75) for eye in (0, 1)))
     assert estimate(stub).abstained != ""
+
+
+def test_a_needle_seen_edge_on_is_known_by_its_outline():
+    for tilt in (86.0, 90.0):
+        truth = pose_at(tilt, 60.0)
+        answer = estimate(replace(observed(truth), disparity=None))
+        assert answer.pose is not None and truth.degrees_from_edge_on() < 15.0
+        assert np.linalg.norm(answer.pose.centre - truth.centre) < 1e-3
+        assert _plane_degrees(answer.pose, truth) < 3.0
+
+
+def test_two_needles_are_not_taken_for_one(clean):
+    truth, observation = clean
+    step = np.array([-0.02, 0.012, 0.01, 0.5, 0.3, 0.0])
+    other = observed(moved_pose(truth, step))
+    both = NeedleObservation(
+        TWO_CAMERAS, observation.left_mask | other.left_mask, observation.right_mask | other.right_mask
+    )
+    assert "Two needles" in estimate(both).abstained
+
+
+def test_lost_stretches_and_lumps_do_not_move_the_outline(clean):
+    truth, observation = clean
+    masks = [observation.left_mask.copy(), observation.right_mask.copy()]
+    for project, mask in zip((TWO_CAMERAS.left, TWO_CAMERAS.right), masks, strict=True):
+        lost, lump = np.round(project(truth.points(np.array([1.2, 2.2])))).astype(int)
+        mask[lost[1] - 9 : lost[1] + 10, lost[0] - 9 : lost[0] + 10] = False
+        mask[lump[1] : lump[1] + 12, lump[0] : lump[0] + 4] = True
+    answer = estimate(NeedleObservation(TWO_CAMERAS, masks[0], masks[1]))
+    assert answer.abstained == ""
+    assert np.linalg.norm(answer.pose.centre - truth.centre) < 6e-4 and _plane_degrees(answer.pose, truth) < 1.5
 
 
 def test_ransac_finds_plane_and_circle_among_outliers():

@@ -12,8 +12,6 @@ from benchmarks.gather import gather
 from benchmarks.stitch.perception import as_toml, fitted
 from schemas.errors import BadInput
 from stages.suture.evaluation.judgement import Estimate
-from stages.suture.needle.estimate import _edge_on_factor
-from stages.suture.rig import NeedlePose
 from stages.suture.trials.perception import FOLDER, perception_model
 
 
@@ -66,11 +64,3 @@ def test_parts_are_put_together_and_must_agree(tmp_path: Path) -> None:
     (tmp_path / "trials" / "metrics.json").write_text(json.dumps({"ours/needle/x": 3.0}))
     with pytest.raises(BadInput, match="in another part"):
         gather("stitch", tmp_path)
-
-
-def test_a_needle_seen_edge_on_is_less_sure() -> None:
-    facing, edge_on = np.eye(4), np.eye(4)
-    facing[2, 3] = edge_on[2, 3] = 0.3
-    edge_on[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
-    assert _edge_on_factor(NeedlePose(facing)) == pytest.approx(1.0)
-    assert _edge_on_factor(NeedlePose(edge_on)) == pytest.approx(5.0)

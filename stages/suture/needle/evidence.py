@@ -1,0 +1,211 @@
+"""How probable each of several fitted outlines is, by what it explains of both masks and what it leaves.
+
+Log-weights are linear in a few counts; their factors were fitted by conditional logistic regression (which of a view's
+outlines is the right one) on 300 tuning views, so that the shares they give are probabilities.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from stages.suture.needle.silhouette import (
+    ANGLES,
+    GROWTH,
+    ON_CIRCLE,
+    PIECES,
+    RADII,
+    TAPER_ANGLE,
+    Outline,
+    Sheet,
+    box_of,
+    camera_of,
+    draw,
+    trace,
+)
+from stages.suture.needle.windows import EyeMask
+from stages.suture.rig import NEEDLE_RADIUS, StereoRig
+
+COVERED = 2.0
+"""Mask within this many pixels of the outline is explained by it."""
+LEAST_WIDTH = 1.3
+"""Masks need not show a wire thinner than this [px]."""
+MOST_LEFT_OVER = 150
+PER_MISFIT, PER_LEFT_OVER, PER_LOST, PER_HIDDEN, PER_MISSING, PER_TAPER = -0.071, -0.076, -0.039, -0.043, -0.072, -0.030
+PER_THREAD = np.array([1.45, -0.68, -0.20])
+"""Log-weights: of a pixel of misfit but for the lost; of a pixel of mask that is left over (at most MOST_LEFT_OVER); of
+a pixel's misfit for mask lost by one eye, or by both as in tissue; of a piece that one eye alone misses; of the
+squared width (in units of WIDTH_SIGMA, at most 9 a piece) that the mask is off by near the ends; of thread in one eye
+beyond the swage, beyond the tip, and along the arc before the tip."""
+WIDTH_SIGMA = 0.8
+"""Standard deviation [px] of the mask's width along a piece."""
+TAPERED = np.flatnonzero((ANGLES[:-1] < TAPER_ANGLE) | (ANGLES[1:] > np.pi - TAPER_ANGLE))
+BEYOND = np.linspace(0.0005, 0.0035, 7)
+"""Where beyond an end thread is looked for [m], along the arc's tangent."""
+CLOSE = 3
+"""Thread within so many pixels of a place counts; mask farther than this from the outline is not the needle's."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What an outline leaves: pixels of mask `left_over`; `lost`, `hidden`: the misfit for mask that one eye or both do
+    not have; which of PIECES each eye sees (2, PIECES); pieces that one eye alone misses; how far widths near the ends
+    are off; thread beyond the swage, beyond the tip and before it (3,), both eyes together (0 to 2)."""
+
+    misfit: float
+    left_over: float
+    lost: float
+    hidden: float
+    seen: np.ndarray
+    missing: int
+    taper: float
+    threads: np.ndarray
+
+    @property
+    def log_weight(self) -> float:
+        """How probable the outline is: the logarithm, up to what is the same for all of a view."""
+        rest = self.misfit - self.lost - self.hidden
+        return (
+            PER_MISFIT * rest
+            + PER_LEFT_OVER * min(self.left_over, MOST_LEFT_OVER)
+            + PER_LOST * self.lost
+            + PER_HIDDEN * self.hidden
+            + PER_MISSING * self.missing
+            + PER_TAPER * self.taper
+            + float(PER_THREAD @ self.threads)
+        )
+
+
+@numba.njit(cache=True, fastmath=True)
+def _explain(
+    pose: np.ndarray,
+    shift: np.ndarray,
+    camera: np.ndarray,
+    growth: float,
+    signed: np.ndarray,
+    weight: np.ndarray,
+    free: np.ndarray,
+    silent: np.ndarray,
+    corner: np.ndarray,
+    drawn: np.ndarray,
+    piece: np.ndarray,
+    eye: int,
+    on_circle: np.ndarray,
+    radii: np.ndarray,
+    state: np.ndarray,
+    lost: np.ndarray,
+    excess: np.ndarray,
+) -> float:
+    """Return the pixels of free mask within COVERED of the outline; write each piece's `state` (K,), 0 seen, 1 missing,
+    2 nothing can be said, and its part in the misfit for mask that is not there, `lost` (K,)."""
+    height, width = signed.shape
+    covered = 0.0
+    _, pixels = trace(pose, shift, camera, corner, eye, on_circle, radii)
+    draw(pixels, growth, COVERED + 0.5, 1, drawn, piece)
+    for k in range(len(pixels) - 1):
+        first, last, top, bottom = box_of(pixels, k, growth + COVERED + 0.5, 1, height, width)
+        area = 0.0
+        for row in range(top, bottom + 1):
+            for column in range(first, last + 1):
+                if piece[row, column] == k:
+                    piece[row, column] = -1
+                    if drawn[row, column] < 0.0 and signed[row, column] > COVERED:
+                        lost[k] += weight[row, column] * min(max(2.0 * pixels[k, 2] - 0.3, 0.05), 1.0)
+                    if drawn[row, column] <= COVERED and free[row, column]:
+                        covered += 1.0
+                        area += 1.0
+                    if drawn[row, column] <= 0.0 and not silent[row, column]:
+                        area -= 1.0
+        column = int(np.floor(0.5 * (pixels[k, 0] + pixels[k + 1, 0]) + 0.5))
+        row = int(np.floor(0.5 * (pixels[k, 1] + pixels[k + 1, 1]) + 0.5))
+        if not (0 <= column < width and 0 <= row < height):
+            state[k] = 1
+        elif signed[row, column] < 1.0:
+            state[k] = 0
+            if not silent[row, column]:
+                length = np.hypot(pixels[k + 1, 0] - pixels[k, 0], pixels[k + 1, 1] - pixels[k, 1])
+                excess[k] = area / max(length, 1.0)
+        elif silent[row, column] or pixels[k, 2] + pixels[k + 1, 2] < LEAST_WIDTH:
+            state[k] = 2
+        else:
+            state[k] = 1
+    return covered
+
+
+def evidence_of(
+    rig: StereoRig, eyes: tuple[EyeMask, EyeMask], sheets: tuple[Sheet, Sheet], outline: Outline
+) -> Evidence:
+    """Return what speaks for an outline and against it."""
+    left_over = 0.0
+    states, lost = np.zeros((2, PIECES), dtype=np.int64), np.zeros((2, PIECES))
+    excess = np.zeros((2, PIECES))
+    for eye, s in enumerate(sheets):
+        covered = _explain(
+            outline.pose.camera_from_needle,
+            outline.shift,
+            camera_of(rig),
+            GROWTH,
+            s.signed,
+            s.weight,
+            s.free,
+            s.silent,
+            s.corner,
+            s.drawn,
+            s.piece,
+            eye,
+            ON_CIRCLE,
+            RADII,
+            states[eye],
+            lost[eye],
+            excess[eye],
+        )
+        left_over += float(s.free.sum()) - covered
+    hidden = (states > 0).all(axis=0)
+    return Evidence(
+        misfit=outline.misfit,
+        left_over=left_over,
+        lost=float(lost[:, ~hidden].sum()),
+        hidden=float(lost[:, hidden].sum()),
+        seen=states == 0,
+        missing=int(((states == 1) & (states[::-1] == 0)).any(axis=0).sum()),
+        taper=float(np.minimum((excess[:, TAPERED] / WIDTH_SIGMA) ** 2, 9.0).sum()),
+        threads=_threads(rig, eyes[0], outline, 0) + _threads(rig, eyes[1], outline, 1),
+    )
+
+
+def _threads(rig: StereoRig, eye: EyeMask, outline: Outline, which: int) -> np.ndarray:
+    """Return the shares (3,) of places where an eye has thread: beyond the swage, beyond the tip, on the arc before the
+    tip."""
+    if not eye.thread.any():
+        return np.zeros(3)
+    pose = outline.pose
+    beyond = -BEYOND[:, None] * pose.camera_from_needle[:3, 1]
+    places = np.concatenate([pose.swage + beyond, pose.tip + beyond, pose.points(BEYOND / NEEDLE_RADIUS)])
+    pixels = rig.right(places) + outline.shift if which else rig.left(places)
+    if not np.isfinite(pixels).all():
+        return np.zeros(3)
+    found = []
+    for column, row in np.round(pixels - eye.corner).astype(int):
+        rows = slice(max(row - CLOSE, 0), max(row + CLOSE + 1, 0))
+        columns = slice(max(column - CLOSE, 0), max(column + CLOSE + 1, 0))
+        found.append(bool(eye.thread[rows, columns].any()))
+    return np.array(found).reshape(3, -1).mean(axis=1)
+
+
+def left_over(
+    rig: StereoRig, eyes: tuple[EyeMask, EyeMask], sheets: tuple[Sheet, Sheet], outline: Outline
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what (H, W) bool of each eye's mask, where no driver should be, lies beyond CLOSE of the outline."""
+    found = []
+    for which, (eye, s) in enumerate(zip(eyes, sheets, strict=True)):
+        place = outline.pose.camera_from_needle, outline.shift, camera_of(rig), s.corner, which, ON_CIRCLE, RADII
+        _, pixels = trace(*place)
+        draw(pixels, GROWTH, CLOSE + 0.5, 1, s.drawn, s.piece)
+        rest = s.free & ~((s.piece >= 0) & (s.drawn <= CLOSE))
+        s.piece[:] = -1
+        whole = np.zeros((rig.height, rig.width), dtype=bool)
+        whole[eye.row : eye.row + rest.shape[0], eye.column : eye.column + rest.shape[1]] = rest
+        found.append(whole)
+    return found[0], found[1]
