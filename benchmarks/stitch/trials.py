@@ -3,7 +3,7 @@
     python -m benchmarks.stitch.trials --out FOLDER [--quick] [--tuning] [--arms NAME ...] [--count N] [--seconds S]
         [--without] [--perception FILE]
 
-Reporting seeds 1200 to 1399 (1000 to 1099 were run with policies before this one), tuning seeds (`--tuning`) 0 to 199;
+Reporting seeds 1400 to 1599 (1000 to 1399 were run with perception or policies before this), tuning seeds (`--tuning`) 0 to 199;
 `--quick` takes the first ten. Writes runs.jsonl, metrics.json, table.md, sutures.png and, of the first seed, the key
 frames and the strip of a suture of an `ours` trial. `--seconds` stops early, between two seeds. Beside the arms of the
 issue: `ours_thesis_eyes` has our policies and the thesis's error model of perception, `ours_one_at_a_time` never moves
@@ -27,7 +27,7 @@ from stages.suture.trials.recording import Recorder
 from stages.suture.trials.records import run_of
 from stages.suture.trials.settings import POLICIES
 
-REPORTING, TUNING, TRIALS, QUICK, FRAMES = 1200, 0, 200, 10, 18
+REPORTING, TUNING, TRIALS, QUICK, FRAMES = 1400, 0, 200, 10, 18
 ARMS = {
     **POLICIES,
     "ours_thesis_eyes": replace(POLICIES["ours"], perception="thesis"),
