@@ -4,11 +4,11 @@
         [--without] [--perception FILE]
 
 Reporting seeds 1400 to 1599 (1000 to 1399 were run with perception or policies before this), tuning seeds (`--tuning`)
-0 to 199; `--quick` takes the first ten. Writes runs.jsonl, metrics.json, table.md, sutures.png and, of the first seed, the key
-frames and the strip of a suture of an `ours` trial. `--seconds` stops early, between two seeds. Beside the arms of the
-issue: `ours_thesis_eyes` has our policies and the thesis's error model of perception, `ours_one_at_a_time` never moves
-both drivers at once, `thesis_other_test` is the thesis with the other reading of its handover test; `--without` takes
-one mechanism at a time from `ours`; `--perception` lets every arm see by another error model.
+0 to 199; `--quick` takes the first ten. Writes runs.jsonl, metrics.json, table.md, sutures.png and, of the first seed,
+the key frames and the strip of a suture of an `ours` trial. `--seconds` stops early, between two seeds. Beside the arms
+of the issue: `ours_thesis_eyes` has our policies and the thesis's error model of perception, `ours_one_at_a_time` never
+moves both drivers at once, `thesis_other_test` is the thesis with the other reading of its handover test; `--without`
+takes one mechanism at a time from `ours`; `--perception` lets every arm see by another error model.
 """
 
 from __future__ import annotations
