@@ -33,11 +33,16 @@ def as_times(model: TimeModel) -> TimesOfActions:
     return TimesOfActions(trip=model.trip, stack=model.stack, pull=model.pull, delay=model.delay)
 
 
-_BORNE = Rules(both_piles=False, most_utensils=2, loaded_cups=False)
+_BOWLS = ("b", "bb", "bc", "bcc", "bbc")
+_PAIRS = frozenset(
+    {("u", "u"), ("c", "c"), ("c", "cc"), ("cc", "cc"), ("b", "bbb"), ("bb", "bbb"), ("bbb", "bc")}
+    | {(one, other) for one in _BOWLS for other in _BOWLS if one <= other}
+)
+_BORNE = Rules(most_utensils=2, beside=_PAIRS)
 RULES: dict[str, Rules] = {
     "ours": _BORNE,
     "ours_without_loaded_pulls": replace(_BORNE, loaded_pulls=False),
-    "ours_side_by_side": replace(_BORNE, both_piles=True, most_beside=2, utensils_beside=False),
+    "ours_careful": replace(_BORNE, laden_beside=False),
     "ours_bold": Rules(),
 }
 """What our policies allow themselves. `ours`: what physics bears (docs/TIDY_PHYSICS.md), nothing is put onto two things

@@ -124,10 +124,14 @@ class Chances:
     drop_loaded_pull: float = 0.0
 
     @property
+    def drops(self) -> bool:
+        """Whether anything may fall off the table."""
+        return any((self.drop_single, self.drop_two, self.drop_stack, self.drop_pull, self.drop_loaded_pull))
+
+    @property
     def sure(self) -> bool:
         """Whether nothing slips or drops."""
-        drops = (self.drop_single, self.drop_two, self.drop_stack, self.drop_pull, self.drop_loaded_pull)
-        return not any(drops) and all(chance >= 1.0 for chance in self.hold.values())
+        return not self.drops and all(chance >= 1.0 for chance in self.hold.values())
 
     def holds(self, first: str, second: str) -> float:
         """Return the chance for two piles by the letters of their lowest things; unlike ones as the worse of both."""
