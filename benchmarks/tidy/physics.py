@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.tidy.physics_records import PhysicsRun, metrics, read_runs, table
@@ -36,6 +37,8 @@ ARMS = ("random", "pull", "stack", *RULES)
 """All that can be asked for."""
 RUN = ("random", "pull", "stack", "ours", "ours_far")
 """Run unless said otherwise."""
+CHANCES = replace(EXACT, spills=True)
+"""What our planner is told of physics."""
 SIGHTS = ("truth", "image")
 SCENES = 20
 FIRST = 1014
@@ -45,7 +48,7 @@ def policy(arm: str, seed: int) -> Policy:
     """Return an arm's policy; ours plan by the arm's own times."""
     if arm in RULES:
         rules, delay = RULES[arm]
-        return JointPolicy(rules, arm_times(delay), EXACT)
+        return JointPolicy(rules, arm_times(delay), CHANCES)
     return make_policy(arm, arm_times(), EXACT, seed)
 
 

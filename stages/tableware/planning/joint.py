@@ -72,10 +72,16 @@ class Plan:
         return float(self.solution.lost[self.optimum.everything])
 
 
+def rules_in(rules: Rules, chances: Chances) -> Rules:
+    """Return the rules of a planner that knows what spills in its world."""
+    return replace(rules, laden_beside=False) if chances.spills else rules
+
+
 def plan(
     table: Table, rules: Rules, model: TimeModel, chances: Chances, slack: float | None = None, worth: float = WORTH
 ) -> Plan:
     """Return the plan for a table, or the first portion of one with more than 16 items; `slack`: None takes ours."""
+    rules = rules_in(rules, chances)
     portion = _portion(table)
     optimum = Optimum(portion, rules, model, chances, worth)
     plans = [Plan(optimum, optimum.solve())]
@@ -151,7 +157,7 @@ class JointPolicy:
         found: Plan | None = None,
     ) -> None:
         self._make = lambda table: plan(table, rules, model, chances, slack, worth)
-        self._rules = rules
+        self._rules = rules_in(rules, chances)
         self._first, self._plan = found, found
         self._trip: Trip | None = None
         self._expected: frozenset[tuple[str, str | None]] | None = None

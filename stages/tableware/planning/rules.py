@@ -42,8 +42,6 @@ class Rules:
     """Utensils in one pile (ours)."""
     utensils_in_cups: bool = False
     """Whether utensils are put on cups; the thesis allows any dish. One that lies there already may stay."""
-    loaded_cups: bool = True
-    """Whether a cup that a utensil lies across is put onto another cup, or a further utensil on that one (ours)."""
     loaded_pulls: bool = True
     """Whether a dish that carries others may be pulled."""
     both_piles: bool = True
@@ -94,10 +92,11 @@ def can_hold_two(first: str, second: str, rules: Rules) -> bool:
     all lips between the jaws. Utensils go with utensils only."""
     if not (can_hold(first, rules) and can_hold(second, rules)):
         return False
-    if rules.beside is not None and (min(first, second), max(first, second)) not in rules.beside:
-        laden = any("u" in pile and pile[0] != "u" for pile in (first, second))
-        if not (laden and rules.laden_beside):
+    if any(pile[0] != "u" and "u" in pile for pile in (first, second)):
+        if not rules.laden_beside:
             return False
+    elif rules.beside is not None and (min(first, second), max(first, second)) not in rules.beside:
+        return False
     one, other = lips(first), lips(second)
     if not one or not other:
         return not one and not other
@@ -112,10 +111,8 @@ def can_stack(upper: str, lower: str, rules: Rules) -> bool:
     top, bottom = lower[-1], upper[0]
     if bottom == "u":
         fits = top != "c" or rules.utensils_in_cups
-        fits = fits and (rules.loaded_cups or not lower.rstrip("u").endswith("c"))
     else:
         fits = top != "u" and _MEASURES[bottom].rim_radius <= _MEASURES[top].rim_radius
-        fits = fits and (rules.loaded_cups or "cu" not in upper)
     return fits and can_hold(upper, rules) and can_hold(lower + upper, rules)
 
 

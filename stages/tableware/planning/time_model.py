@@ -110,13 +110,15 @@ class Chances:
     """What goes wrong in the fast simulator. All arms live in the same world.
 
     hold: letters of what two piles stand on -> chance that a multi-object grasp keeps the second; else it stays.
-    noise: whether pulls miss as measured. drop_*: chance that an action lets something fall off the table, which is
-    lost and a failure: grasps of one pile and of two, stackings, pulls of a dish that carries nothing and of one that
-    does.
+    noise: whether pulls miss as measured. spills: whether the utensils on dishes that are lifted side by side stay on
+    the table, as they do in physics, where the dishes hang by 20 degrees. drop_*: chance that an action lets something
+    fall off the table, which is lost and a failure: grasps of one pile and of two, stackings, pulls of a dish that
+    carries nothing and of one that does.
     """
 
     hold: Mapping[str, float] = field(default_factory=dict)
     noise: bool = False
+    spills: bool = False
     drop_single: float = 0.0
     drop_two: float = 0.0
     drop_stack: float = 0.0
@@ -165,6 +167,11 @@ def with_thesis_failures() -> Chances:
         measured(), drop_single=single, drop_two=single, drop_stack=stacking, drop_pull=pulling,
         drop_loaded_pull=pulling,
     )  # fmt: skip
+
+
+def with_spills() -> Chances:
+    """Return the thesis's world, in which utensils slide off dishes that are lifted side by side, as in physics."""
+    return replace(measured(), spills=True)
 
 
 def _chance_of_failures(policy: int, single: float) -> float:

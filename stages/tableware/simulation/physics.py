@@ -160,17 +160,8 @@ class PhysicsTable:
             hold = rim_hold(seen, names[0], action.theta_G)
         else:
             hold = bar_hold(seen, names[0])
-        self._take(hold, self._force(seen, names), names)
+        self._take(hold, finger_force(seen, names, self.speeds), names)
         self._to_bin(seen, names)
-
-    def _force(self, seen: Table, names: list[str]) -> float:
-        """Return the force [N] of each finger for some piles."""
-        if all(not seen.by_name[name].is_dish for name in names):
-            return self.speeds.edge if len(names) == 2 else self.speeds.gentle
-        held = [item for name in names for item in walls(seen, name)]
-        if all(item.kind == "cup" for item in held):
-            return self.speeds.cups
-        return self.speeds.heavy if len(names) == 2 and len(held) >= HEAVY else self.speeds.force
 
     def _take(self, hold: Hold, force: float, names: list[str]) -> None:
         """Go there and close. Raises MotionFailed when nothing is there."""
@@ -336,7 +327,7 @@ class PhysicsTable:
             hold = rim_hold(seen, name, action.u_G.theta_G, min(room, max(nested, 0.012)))
         else:
             hold = bar_hold(seen, name)
-        self._take(hold, self._force(seen, [name]), [name])
+        self._take(hold, finger_force(seen, [name], self.speeds), [name])
         pose = self.arm.pose_of(self.arm.target)
         held = {name, *(load.name for load in seen.load(name))}
         self.top.wake_near([np.array(item.position[:2])], 0.03)
@@ -447,6 +438,16 @@ def push_place(seen: Table, name: str, direction: np.ndarray) -> Push | None:
                 if clearance > 0.002:
                     return Push(start, reach, tip, closing, opening)
     return None
+
+
+def finger_force(seen: Table, names: list[str], speeds: Speeds) -> float:
+    """Return the force [N] of each finger for some piles."""
+    if all(not seen.by_name[name].is_dish for name in names):
+        return speeds.edge if len(names) == 2 else speeds.gentle
+    held = [item for name in names for item in walls(seen, name)]
+    if all(item.kind == "cup" for item in held):
+        return speeds.cups
+    return speeds.heavy if len(names) == 2 and len(held) >= HEAVY else speeds.force
 
 
 def _raised(pose: np.ndarray, height: float) -> np.ndarray:
