@@ -2,9 +2,9 @@
 
     python -m benchmarks.tidy.physics_holds --out FOLDER [--cases NAME ...] [--repeats N] [--first N]
 
-A case names its piles, lower things first: `c` cup, `b` bowl, `p` plate, `u` utensil; `cc|c` are two cups in one another
-beside a third. Places, directions, gaps (dishes 0 to 12 mm, utensils as a pull leaves them) are drawn from the number.
-One JSON line a grasp in holds.jsonl; a stopped run goes on.
+A case names its piles, lower things first: `c` cup, `b` bowl, `p` plate, `u` utensil; `cc|c` are two cups in one
+another beside a third. Places, directions, gaps (dishes 0 to 12 mm, utensils as a pull leaves them) are drawn from the
+number. One JSON line a grasp in holds.jsonl; a stopped run goes on.
 """
 
 from __future__ import annotations

@@ -51,15 +51,16 @@ _PAIRS = frozenset(
     {("u", "u"), ("c", "c"), ("c", "cc"), ("cc", "cc"), ("b", "bbb"), ("bb", "bbb"), ("bbb", "bc")}
     | {(one, other) for one in _BOWLS for other in _BOWLS if one <= other}
 )
-_BORNE = Rules(most_utensils=2, beside=_PAIRS)
+_BORNE = Rules(most_utensils=2, plates_alone=True, beside=_PAIRS)
 RULES: dict[str, Rules] = {
     "ours": _BORNE,
     "ours_without_loaded_pulls": replace(_BORNE, loaded_pulls=False),
     "ours_bold": Rules(),
 }
-"""What our policies allow themselves. `ours`: what physics bears (docs/TIDY_PHYSICS.md): two utensils a pile, and side
-by side the pairs of piles that came whole in every grasp measured there. Dishes that carry utensils are lifted side by
-side as they stand only where the world's chances say that nothing spills. `ours_bold`: whatever the jaws allow."""
+"""What our policies allow themselves. `ours`: what physics bears (docs/TIDY_PHYSICS.md): two utensils a pile, plates
+alone, and side by side the pairs of piles that came whole in every grasp measured there. Dishes that carry utensils are
+lifted side by side as they stand only where the world's chances say that nothing spills. `ours_bold`: whatever the jaws
+allow."""
 
 
 def rules_of(policy: str) -> Rules:

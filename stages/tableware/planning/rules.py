@@ -42,6 +42,8 @@ class Rules:
     """Utensils in one pile (ours)."""
     utensils_in_cups: bool = False
     """Whether utensils are put on cups; the thesis allows any dish. One that lies there already may stay."""
+    plates_alone: bool = False
+    """Whether a plate is lifted only with nothing on it (ours)."""
     loaded_pulls: bool = True
     """Whether a dish that carries others may be pulled."""
     both_piles: bool = True
@@ -81,6 +83,8 @@ def lips(pile: str) -> tuple[float, ...]:
 @lru_cache(maxsize=65536)
 def can_hold(pile: str, rules: Rules) -> bool:
     """Return whether one grasp lifts the whole pile: its lips differ by no more than the jaws' height (section 6.4)."""
+    if rules.plates_alone and "p" in pile and len(pile) > 1:
+        return False
     heights = lips(pile)
     spread = max(heights) - min(heights) if heights else 0.0
     return spread <= rules.jaw_height and pile.count("u") <= rules.most_utensils

@@ -23,6 +23,8 @@ DEPTH = 0.020
 PAIR_DEPTHS, PAIR_ROOMS, PAIR_FREE = (0.030, 0.022, 0.014), (0.007, 0.004), 0.001
 """When two dishes are pressed together: how far the pads reach below the lowest lip, how far open ones keep from the
 walls, the best first, and what they keep from all else there [m]."""
+FLAT_DEPTH, MOST_LEAN = 0.008, 0.5
+"""The first for a plate, whose rim is nearer to the table; the most that the hand leans [rad]: plates slant by more."""
 ROOM = 0.007
 """Between an open pad and the wall on each side [m]."""
 PALM_ROOM = 0.003
@@ -95,12 +97,15 @@ def rim_hold(
     low_lip = min(item.lip for item in family)
     if base.on is not None and table.by_name[base.on].is_dish:  # the fingers must not close on what it stands in
         most = min(most, max(0.006, low_lip - table.by_name[base.on].lip - 0.002))
-    depth = reach_below(family, most)
+    depth = reach_below(family, min(most, FLAT_DEPTH) if base.kind == "plate" else most)
     tip = low_lip - depth
-    lean = atan2(base.measures.rim_radius - base.measures.foot_radius, base.measures.height)
+    slant = atan2(base.measures.rim_radius - base.measures.foot_radius, base.measures.height)
+    lean = min(slant, MOST_LEAN)
     outer = max(item.measures.outer_radius(tip - item.position[2]) for item in family)
     inner = min(item.measures.inner_radius(tip - item.position[2]) for item in family)
     middle, opening = (outer + inner) / 2, (outer - inner) * cos(lean) + 2 * ROOM
+    if slant > lean:  # a flat rim rises outwards between the pads
+        opening += depth / cos(slant) * sin(slant - lean)
     others = [item for pile in table.stacks for item in pile if base.name not in {other.name for other in pile}]
     own = cargo(table, name)
     best: Hold | None = None

@@ -83,7 +83,7 @@ def test_a_nested_stack_stands_still_as_high_as_the_shapes_say() -> None:
     world.close()
 
 
-@pytest.mark.parametrize("kind", ["cup", "bowl", "fork"])
+@pytest.mark.parametrize("kind", ["cup", "bowl", "plate", "fork"])
 def test_a_thing_alone_is_lifted_by_friction_and_binned(kind: str) -> None:
     recording = Recording()
     world = PhysicsTable(Table((make_item("it", kind, 0.1, 0.1, 0.4),)), record=recording)  # type: ignore[arg-type]
