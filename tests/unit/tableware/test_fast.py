@@ -73,7 +73,7 @@ def test_three_of_a_kind_fit_between_the_jaws_and_four_do_not() -> None:
     assert can_stack("c", "b", rules) and not can_stack("b", "c", rules) and not can_stack("c", "bu", rules)
     assert can_stack("u", "b", rules) and not can_stack("u", "c", rules)
     assert can_stack("u", "c", Rules(utensils_in_cups=True))
-    assert can_hold("pb", rules) and not can_hold("pb", Rules(plates_alone=True))
+    assert can_hold("pp", rules) and not can_hold("pp", Rules(plates_alone=True))
     assert can_stack("u", "cu", rules) and can_stack("cu", "c", rules)
 
 

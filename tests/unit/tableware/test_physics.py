@@ -93,7 +93,8 @@ def test_a_thing_alone_is_lifted_by_friction_and_binned(kind: str) -> None:
     arrays = recording.arrays()
     assert arrays["poses"].shape == (len(recording.labels), 1, 4, 4)
     lifted = recording.labels.index("lifted")
-    assert arrays["poses"][lifted, 0, 2, 3] > 0.04 and np.isnan(arrays["poses"][-1]).all()
+    least = 0.02 if kind == "plate" else 0.04  # a plate hangs from its rim
+    assert arrays["poses"][lifted, 0, 2, 3] > least and np.isnan(arrays["poses"][-1]).all()
     world.close()
 
 
