@@ -8,6 +8,7 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
+from benchmarks.tidy.physics_holds import held
 from benchmarks.tidy.physics_pulls import divergence
 from benchmarks.tidy.physics_records import PhysicsRun, metrics, table
 from benchmarks.tidy.physics_times import fit
@@ -103,6 +104,12 @@ def test_two_cups_side_by_side_come_in_one_trip() -> None:
     world.do(grasp_two(world.table, "a", "b"))
     assert (world.trial.moved, world.trial.trips) == (2, 1)
     world.close()
+
+
+def test_nested_cups_beside_nested_cups_do_not_creep_out_of_the_grasp() -> None:
+    row = held("cc|cc", 1)
+    assert row["stood"] and (row["moved"], row["dropped"]) == (4, 0)
+    assert float(str(row["tilt"])) < 15.0
 
 
 def test_two_utensils_side_by_side_are_held_level_though_their_heads_touch() -> None:
