@@ -138,7 +138,7 @@ class TablewarePlanFile(Model):
     source: Literal["detections", "image", "truth"]
     """Where the items come from."""
     times: TimesOfActions
-    chances: Literal["exact", "thesis", "thesis_failures"]
+    chances: Literal["exact", "thesis", "thesis_spills", "thesis_failures"]
     items: tuple[TablewareItem, ...] = Field(max_length=MOST_ITEMS)
     """What is planned for."""
     steps: tuple[TablewareStep, ...]

@@ -10,11 +10,19 @@ import numpy as np
 from benchmarks.tidy.records import Run
 from stages.tableware.planning.actions import Action
 from stages.tableware.planning.choice import RULES
-from stages.tableware.planning.joint import JointPolicy, plan
+from stages.tableware.planning.joint import JointPolicy, plan, rules_in
 from stages.tableware.planning.optimum import Optimum
 from stages.tableware.planning.policies import Policy, PullPolicy, RandomOne, RandomPile, StackPolicy
 from stages.tableware.planning.rules import Rules
-from stages.tableware.planning.time_model import EXACT, Chances, TimeModel, fitted, measured, with_thesis_failures
+from stages.tableware.planning.time_model import (
+    EXACT,
+    Chances,
+    TimeModel,
+    fitted,
+    measured,
+    with_spills,
+    with_thesis_failures,
+)
 from stages.tableware.simulation.fast import Trial, run_trial
 from stages.tableware.world.items import Table
 from stages.tableware.world.scenes import make_table
@@ -22,11 +30,16 @@ from stages.tableware.world.scenes import make_table
 OURS = RULES
 SIMPLE = ("random", "random_piles", "stack", "pull")
 ARMS = (*SIMPLE, *OURS, "optimum")
-WORLDS: dict[str, Chances] = {"fast": measured(), "fast/exact": EXACT, "fast/drops": with_thesis_failures()}
+WORLDS: dict[str, Chances] = {
+    "fast": measured(),
+    "fast/exact": EXACT,
+    "fast/spills": with_spills(),
+    "fast/drops": with_thesis_failures(),
+}
 """As the thesis's robot slips and misses; as planned; slipping, missing, and dropping as often as its trials failed."""
-DROPS_ON = ("tier1", "tier2")
+DROPS_ON, SPILLS_ON = ("tier1", "tier2"), ("tier2",)
 DELAYS = (0, 3, 5)
-DRAWS, DRAWS_OF_THE_AIMS = 20, 100
+DRAWS, DRAWS_OF_THE_AIMS = 20, 40
 """Of what chance decides on a table: the second on tiers 1 and 2, where the aims are."""
 
 
@@ -44,9 +57,11 @@ class _Remembering:
 
 
 def applies(tier: str, world: str, arm: str, tag: str) -> bool:
-    """Return whether an arm is run: drops are for the mixed tables."""
+    """Return whether an arm is run: drops are for the mixed tables, spills for those with laden dishes."""
     if tag and tier == "tier3":
         return False
+    if world == "fast/spills":
+        return tier in SPILLS_ON
     return not (world == "fast/drops" and (arm == "optimum" or tier not in DROPS_ON))
 
 
@@ -106,7 +121,7 @@ def _draws(
 def _optimum(table: Table, model: TimeModel, chances: Chances, case: str, seed: int) -> Run:
     """Return what the optimum expects by its own account: exact where nothing slips."""
     began = process_time()
-    optimum = Optimum(table, Rules(), model, chances)
+    optimum = Optimum(table, rules_in(Rules(), chances), model, chances)
     best = optimum.solve()
     planning = process_time() - began
     trips, everything = optimum.trips(best), optimum.everything

@@ -2,9 +2,9 @@
 
     python -m benchmarks.tidy.physics_holds --out FOLDER [--cases NAME ...] [--repeats N] [--first N]
 
-A case names its piles, lower things first: `c` cup, `b` bowl, `u` fork or spoon; `cc|c` are two cups in one another
-beside a third. Places, directions, gaps (dishes 0 to 12 mm, utensils as a pull leaves them) are drawn from the number.
-One JSON line a grasp in holds.jsonl; a stopped run goes on.
+A case names its piles, lower things first: `c` cup, `b` bowl, `p` plate, `u` utensil; `cc|c` are two cups in one
+another beside a third. Places, directions, gaps (dishes 0 to 12 mm, utensils as a pull leaves them) are drawn from the
+number. One JSON line a grasp in holds.jsonl; a stopped run goes on.
 """
 
 from __future__ import annotations
@@ -28,9 +28,10 @@ from stages.tableware.world.items import Item, Kind, Table, make_item, stand_hei
 CASES = (
     "c", "b", "u", "cc", "bb", "ccc", "bbb", "bc", "bcc", "bu", "buu", "buuuu", "bcu", "cu", "uu",
     "c|c", "b|b", "u|u", "cc|c", "cc|cc", "bb|b", "bb|bb", "ccc|ccc", "bbb|bbb", "cu|c", "bu|b", "bu|bu", "bc|b",
-    "bc|bc", "uu|u", "uu|uu",
+    "bc|bc", "uu|u", "uu|uu", "bb|bc", "bcc|bc", "bcc|bcc", "bcc|bb", "bbc|b", "bbc|bc", "bbc|bb", "bbc|bbc", "bbc|bcc",
+    "bbb|b", "bbb|bc", "bbb|bb", "ccc|c", "bcu|bc", "bcu|bcu", "bccuu", "bbcc", "cccuu", "buuu", "p", "pp", "pbc",
 )  # fmt: skip
-KINDS: dict[str, Kind] = {"c": "cup", "b": "bowl"}
+KINDS: dict[str, Kind] = {"c": "cup", "b": "bowl", "p": "plate"}
 NUDGE = 0.001
 """Standard deviation [m] of where a utensil comes to lie on what carries it, along each axis."""
 

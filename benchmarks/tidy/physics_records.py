@@ -194,7 +194,8 @@ def _all_tiers(groups: Groups) -> list[str]:
 def _delays(figures: dict[str, float], groups: Groups) -> list[str]:
     """Seconds with a bin that is farther."""
     lines = [
-        "Seconds with a bin 3 s and 5 s farther (ratio: Random's over these / objects per trip); `ours` planned for it",
+        "Seconds with a bin 3 s and 5 s farther (ratio: Random's over these / objects per trip); `ours` planned for it "
+        "where `ours_far` ran",
         "",
         "| tier | sight | delay | " + " | ".join(f"`{arm}`" for arm in ("random", "pull", "stack", OURS)) + " |",
         "|---|---|---|---|---|---|---|",

@@ -118,6 +118,7 @@ WORLD_TITLES = {
     "fast": "pulls miss as in table 7.3, second piles slip as Pull's trips in table 7.2 imply",
     "fast/thesis15": "the same world on fifteen tables as in the thesis, three a cell",
     "fast/exact": "nothing misses or slips",
+    "fast/spills": "as `fast`, and utensils slide off dishes that are lifted side by side, as they do in physics",
     "fast/drops": "as `fast`, and things fall as often as the thesis's trials failed",
 }
 SHOWN = (
@@ -127,7 +128,6 @@ SHOWN = (
     "pull",
     "ours",
     "ours_without_loaded_pulls",
-    "ours_side_by_side",
     "ours_bold",
     "optimum",
 )

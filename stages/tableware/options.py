@@ -10,9 +10,9 @@ from stages.kit.stage import Parameters
 
 TierName = Literal["tier0_cups", "tier0_bowls", "tier0_utensils", "tier1", "tier2", "tier3"]
 PolicyName = Literal[
-    "random", "random_piles", "pull", "stack", "ours", "ours_without_loaded_pulls", "ours_side_by_side", "ours_bold"
+    "random", "random_piles", "pull", "stack", "ours", "ours_without_loaded_pulls", "ours_bold"
 ]  # fmt: skip
-ChancesName = Literal["exact", "thesis", "thesis_failures"]
+ChancesName = Literal["exact", "thesis", "thesis_spills", "thesis_failures"]
 
 
 class ActionTimes(Parameters):
@@ -25,6 +25,7 @@ class ActionTimes(Parameters):
     delay: float = Field(0.0, ge=0.0, le=60.0, description="Seconds that a farther bin adds to each trip, each way")
     chances: ChancesName = Field(
         "thesis",
-        description="What goes wrong: nothing, pulls that miss and second piles that slip as the thesis measured, or "
-        "drops besides, as often as its trials failed",
+        description="What goes wrong: nothing; pulls that miss and second piles that slip, as the thesis measured; "
+        "besides, utensils that slide off dishes lifted side by side, as in physics, or drops as often as its trials "
+        "failed",
     )

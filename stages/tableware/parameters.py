@@ -106,7 +106,7 @@ SCENE = Stage(
 )
 PLAN = Stage(
     name="tableware plan",
-    version=1,
+    version=2,
     summary="Plan how to clear a table: pulls, stackings, multi-object and single grasps (TIDY)",
     parameters=PlanParameters,
     reads={"detections": Optionally(TablewareDetections), "scene": Optionally(TablewareScene)},
@@ -118,7 +118,7 @@ PLAN = Stage(
 )
 SIMULATE = Stage(
     name="tableware simulate",
-    version=2,
+    version=3,
     summary="Let a policy, or a plan, clear a table in the fast simulator or in physics",
     parameters=SimulateParameters,
     reads={"scene": TablewareScene, "plan": Optionally(TablewarePlan)},
@@ -130,7 +130,7 @@ SIMULATE = Stage(
 )
 EVALUATE = Stage(
     name="tableware evaluate",
-    version=1,
+    version=2,
     summary="Compare policies over many seeded tables in the fast simulator, with intervals",
     parameters=EvaluateParameters,
     reads={},

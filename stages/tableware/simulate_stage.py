@@ -42,10 +42,10 @@ def run(
     table = as_table(file.items)
     model, chances = times_of(parameters), chances_of(parameters.chances)
     eyes = Eyes(context.seed, file.light, file.colors, parameters.least_confidence)
-    policy = make_policy(parameters.policy, model, chances, context.seed)
+    in_physics = parameters.simulator == "physics"
+    policy = make_policy(parameters.policy, model, replace(chances, spills=chances.spills or in_physics), context.seed)
     planned = None if plan is None else planned_actions(plan, table)
     done: list[Done] = []
-    in_physics = parameters.simulator == "physics"
     recording = physics_part("recording").Recording() if in_physics else None
     world = open_world(parameters.simulator, table, model, chances, context.seed, recording)
     try:

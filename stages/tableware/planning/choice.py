@@ -9,12 +9,25 @@ from stages.tableware.options import ActionTimes
 from stages.tableware.planning.joint import JointPolicy
 from stages.tableware.planning.policies import THESIS, Policy, PullPolicy, RandomOne, RandomPile, StackPolicy
 from stages.tableware.planning.rules import Rules
-from stages.tableware.planning.time_model import EXACT, Chances, TimeModel, fitted, measured, with_thesis_failures
+from stages.tableware.planning.time_model import (
+    EXACT,
+    Chances,
+    TimeModel,
+    fitted,
+    measured,
+    with_spills,
+    with_thesis_failures,
+)
 
 
 def chances_of(name: str) -> Chances:
     """Return the chances of a world by its name."""
-    return {"exact": lambda: EXACT, "thesis": measured, "thesis_failures": with_thesis_failures}[name]()
+    return {
+        "exact": lambda: EXACT,
+        "thesis": measured,
+        "thesis_spills": with_spills,
+        "thesis_failures": with_thesis_failures,
+    }[name]()
 
 
 def time_model(options: ActionTimes) -> TimeModel:
@@ -33,16 +46,21 @@ def as_times(model: TimeModel) -> TimesOfActions:
     return TimesOfActions(trip=model.trip, stack=model.stack, pull=model.pull, delay=model.delay)
 
 
-_BORNE = Rules(both_piles=False, most_utensils=2, loaded_cups=False)
+_BOWLS = ("b", "bb", "bc", "bcc", "bbc")
+_PAIRS = frozenset(
+    {("u", "u"), ("c", "c"), ("c", "cc"), ("cc", "cc"), ("b", "bbb"), ("bb", "bbb"), ("bbb", "bc")}
+    | {(one, other) for one in _BOWLS for other in _BOWLS if one <= other}
+)
+_BORNE = Rules(most_utensils=2, plates_alone=True, beside=_PAIRS)
 RULES: dict[str, Rules] = {
     "ours": _BORNE,
     "ours_without_loaded_pulls": replace(_BORNE, loaded_pulls=False),
-    "ours_side_by_side": replace(_BORNE, both_piles=True, most_beside=2, utensils_beside=False),
     "ours_bold": Rules(),
 }
-"""What our policies allow themselves. `ours`: what physics bears (docs/TIDY_PHYSICS.md), nothing is put onto two things
-that are lifted side by side, two utensils a pile, cups that utensils lie across stay as they are. `ours_side_by_side`
-makes piles of two for that too, of which physics loses some; `ours_bold` does whatever the jaws allow."""
+"""What our policies allow themselves. `ours`: what physics bears (docs/TIDY_PHYSICS.md): two utensils a pile, plates
+alone, and side by side the pairs of piles that came whole in every grasp measured there. Dishes that carry utensils are
+lifted side by side as they stand only where the world's chances say that nothing spills. `ours_bold`: whatever the jaws
+allow."""
 
 
 def rules_of(policy: str) -> Rules:

@@ -2,14 +2,14 @@
 
 The exact optimum (optimum.py) of expected time and risk, slips counted in, where the table is small enough, which the
 thesis's tables are; larger ones are cleared in portions, each by its own optimum. Of the plans nearly as fast as the
-fastest (`slack`) the one with the fewest trips is taken, which loses least when the bin is farther than thought; where
-nothing is left to chance, only of those no slower than Pull and Stack would be. The plan says what is best for whatever
+fastest (`slack`) the one with the fewest trips is taken, which loses least when the bin is farther than thought, but
+only of those no slower than Pull and Stack are to be expected. The plan says what is best for whatever
 may be left, so that after a slip nothing is planned anew unless something moved.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from stages.tableware.planning.actions import (
     Action,
@@ -26,13 +26,17 @@ from stages.tableware.planning.actions import (
 )
 from stages.tableware.planning.optimum import MOST_ITEMS, Optimum, Solution, Trip
 from stages.tableware.planning.policies import Policy, PullPolicy, StackPolicy, liftable
-from stages.tableware.planning.rules import Rules, can_grasp_two
+from stages.tableware.planning.rules import Rules, can_grasp_two, letters
 from stages.tableware.planning.time_model import Chances, TimeModel
+from stages.tableware.planning.trip_options import slip_cost
 from stages.tableware.world.items import Table
 
-SLACK, SLACK_WHEN_SURE = 0.01, 0.029
-"""How much slower than the fastest, as a share of its cost, a plan with fewer trips may be: where something may slip,
-and where nothing does."""
+SLACK = 0.029
+"""How much slower than the fastest, as a share of its cost, a plan with fewer trips may be."""
+MARGIN = 0.005
+"""By how much it is to be faster than Pull and Stack for that, as these are reckoned without misses of pulls."""
+UNLIKELY = 0.03
+"""What is less likely than this is not followed further when Pull's time is reckoned; it counts as `slip_cost`."""
 CHARGES = (1.0, 2.0, 4.0, 8.0)
 """Seconds charged for a trip beyond what it takes, to find plans with fewer of them."""
 WORTH = 60.0
@@ -68,17 +72,25 @@ class Plan:
         return float(self.solution.lost[self.optimum.everything])
 
 
+def rules_in(rules: Rules, chances: Chances) -> Rules:
+    """Return the rules of a planner that knows what spills in its world."""
+    return replace(rules, laden_beside=False) if chances.spills else rules
+
+
 def plan(
     table: Table, rules: Rules, model: TimeModel, chances: Chances, slack: float | None = None, worth: float = WORTH
 ) -> Plan:
     """Return the plan for a table, or the first portion of one with more than 16 items; `slack`: None takes ours."""
+    rules = rules_in(rules, chances)
     portion = _portion(table)
     optimum = Optimum(portion, rules, model, chances, worth)
     plans = [Plan(optimum, optimum.solve())]
     least = _cost(plans[0], worth)
-    limit = least * (1.0 + (slack if slack is not None else SLACK_WHEN_SURE if chances.sure else SLACK))
-    if slack is None and chances.sure:
-        limit = max(least, min(limit, *(_alone(policy, portion, model) for policy in (PullPolicy(), StackPolicy()))))
+    limit = least * (1.0 + (SLACK if slack is None else slack))
+    if slack is None and not chances.drops:
+        limit = max(
+            least, min(limit, *(_alone(rival, portion, model, chances) for rival in (PullPolicy(), StackPolicy())))
+        )
     if chances.sure and limit > least:
         return Plan(optimum, optimum.fewest_trips(plans[0].solution, limit + 1e-9))
     for charge in CHARGES if limit > least else ():
@@ -89,8 +101,9 @@ def plan(
     return min(plans, key=lambda one: (round(one.expected_trips, 6), _cost(one, worth)))
 
 
-def _alone(policy: Policy, table: Table, model: TimeModel) -> float:
-    """Return the seconds that a policy of the thesis would take where nothing goes wrong."""
+def _alone(policy: Policy, table: Table, model: TimeModel, chances: Chances, likely: float = 1.0) -> float:
+    """Return the seconds to be expected of a policy of the thesis, where pulls do not miss and nothing falls. A slip
+    is followed where that is likely enough, for `likely` is the chance that it comes to this table."""
     time = 0.0
     while table.items:
         action = policy.decide(table)
@@ -99,7 +112,15 @@ def _alone(policy: Policy, table: Table, model: TimeModel) -> float:
         elif isinstance(action, StackGrasp):
             time, table, action = time + model.stack, after_stack(table, action.u_S), action.u_G
         assert isinstance(action, Grasp)  # these policies neither pull nor stack without grasping
-        time, table = time + model.whole_trip, table.without(taken(table, action))
+        time, rest = time + model.whole_trip, table.without(taken(table, action))
+        if len(action.items) == 2:
+            hold = chances.holds(*(letters((table.by_name[name],)) for name in action.items))
+            if likely * (1.0 - hold) >= UNLIKELY:
+                stayed = table.without(taken(table, replace(action, items=action.items[:1])))
+                time += (1.0 - hold) * _alone(policy, stayed, model, chances, likely * (1.0 - hold))
+                return time + hold * _alone(policy, rest, model, chances, likely * hold)
+            time += (1.0 - hold) * slip_cost(model)
+        table = rest
     return time
 
 
@@ -136,7 +157,7 @@ class JointPolicy:
         found: Plan | None = None,
     ) -> None:
         self._make = lambda table: plan(table, rules, model, chances, slack, worth)
-        self._rules = rules
+        self._rules = rules_in(rules, chances)
         self._first, self._plan = found, found
         self._trip: Trip | None = None
         self._expected: frozenset[tuple[str, str | None]] | None = None

@@ -42,16 +42,17 @@ class Rules:
     """Utensils in one pile (ours)."""
     utensils_in_cups: bool = False
     """Whether utensils are put on cups; the thesis allows any dish. One that lies there already may stay."""
-    loaded_cups: bool = True
-    """Whether a cup that a utensil lies across is put onto another cup, or a further utensil on that one (ours)."""
+    plates_alone: bool = False
+    """Whether a plate is lifted only with nothing on it (ours)."""
     loaded_pulls: bool = True
     """Whether a dish that carries others may be pulled."""
     both_piles: bool = True
     """Whether more is stacked onto a pair of dishes that stand side by side, before one grasp takes all (ours)."""
-    most_beside: int = 9
-    """Things in a pile that is made to be lifted beside another (ours). What stands there as a pile may be more."""
-    utensils_beside: bool = True
-    """Whether utensils are put onto a dish that is then lifted beside another (ours)."""
+    beside: frozenset[tuple[str, str]] | None = None
+    """The pairs of piles, in the order of their letters, that are lifted side by side; None: all that the jaws hold
+    (ours). Dishes that carry utensils are `laden_beside`'s."""
+    laden_beside: bool = True
+    """Whether dishes that carry utensils are lifted beside others as they stand (ours)."""
 
     def __post_init__(self) -> None:
         values = tuple(getattr(self, one.name) for one in fields(self))
@@ -82,6 +83,8 @@ def lips(pile: str) -> tuple[float, ...]:
 @lru_cache(maxsize=65536)
 def can_hold(pile: str, rules: Rules) -> bool:
     """Return whether one grasp lifts the whole pile: its lips differ by no more than the jaws' height (section 6.4)."""
+    if rules.plates_alone and "p" in pile and len(pile) > 1:
+        return False
     heights = lips(pile)
     spread = max(heights) - min(heights) if heights else 0.0
     return spread <= rules.jaw_height and pile.count("u") <= rules.most_utensils
@@ -92,6 +95,11 @@ def can_hold_two(first: str, second: str, rules: Rules) -> bool:
     """Return whether one grasp lifts two piles that stand side by side: similar grasp heights (the lowest lips), and
     all lips between the jaws. Utensils go with utensils only."""
     if not (can_hold(first, rules) and can_hold(second, rules)):
+        return False
+    if any(pile[0] != "u" and "u" in pile for pile in (first, second)):
+        if not rules.laden_beside:
+            return False
+    elif rules.beside is not None and (min(first, second), max(first, second)) not in rules.beside:
         return False
     one, other = lips(first), lips(second)
     if not one or not other:
@@ -107,10 +115,8 @@ def can_stack(upper: str, lower: str, rules: Rules) -> bool:
     top, bottom = lower[-1], upper[0]
     if bottom == "u":
         fits = top != "c" or rules.utensils_in_cups
-        fits = fits and (rules.loaded_cups or not lower.rstrip("u").endswith("c"))
     else:
         fits = top != "u" and _MEASURES[bottom].rim_radius <= _MEASURES[top].rim_radius
-        fits = fits and (rules.loaded_cups or "cu" not in upper)
     return fits and can_hold(upper, rules) and can_hold(lower + upper, rules)
 
 
@@ -140,6 +146,8 @@ def split_over_two(first: str, second: str, parts: tuple[str, ...], rules: Rules
     Utensils lie side by side alone: their piles get nothing more."""
     if parts and not rules.both_piles:
         return None
+    if parts and rules.beside is not None and rules.laden_beside:
+        rules = replace(rules, laden_beside=False)
     kinds = tuple(sorted(set(parts), key=pile_order))
     numbers = _share_out(first, second, kinds, tuple(parts.count(kind) for kind in kinds), rules)
     if numbers is None:
@@ -158,23 +166,13 @@ def _share_out(
     """Return how many of each kind of part, in the order of `pile_order`, go onto `high`, the others onto `low`."""
     if not kinds:
         return () if can_hold_two(low, high, rules) else None
-    lows, highs = (_beside(_grown(pile, kinds[0], counts[0], rules), rules) for pile in (low, high))
+    lows, highs = (_grown(pile, kinds[0], counts[0], rules) for pile in (low, high))
     for number in range(counts[0] + 1):
         if counts[0] - number < len(lows) and number < len(highs):
             rest = _share_out(lows[counts[0] - number], highs[number], kinds[1:], counts[1:], rules)
             if rest is not None:
                 return (number, *rest)
     return None
-
-
-def _beside(piles: list[str], rules: Rules) -> list[str]:
-    """Return the piles, each the one before with something on it, that are made to be lifted beside another."""
-    count = 1
-    while count < len(piles) and len(piles[count]) <= rules.most_beside:
-        if piles[0][0] != "u" and "u" in piles[count] and not rules.utensils_beside:
-            break
-        count += 1
-    return piles[:count]
 
 
 def _grown(pile: str, part: str, count: int, rules: Rules) -> list[str]:

@@ -110,13 +110,15 @@ class Chances:
     """What goes wrong in the fast simulator. All arms live in the same world.
 
     hold: letters of what two piles stand on -> chance that a multi-object grasp keeps the second; else it stays.
-    noise: whether pulls miss as measured. drop_*: chance that an action lets something fall off the table, which is
-    lost and a failure: grasps of one pile and of two, stackings, pulls of a dish that carries nothing and of one that
-    does.
+    noise: whether pulls miss as measured. spills: whether the utensils on dishes that are lifted side by side stay on
+    the table, as they do in physics, where the dishes hang by 20 degrees. drop_*: chance that an action lets something
+    fall off the table, which is lost and a failure: grasps of one pile and of two, stackings, pulls of a dish that
+    carries nothing and of one that does.
     """
 
     hold: Mapping[str, float] = field(default_factory=dict)
     noise: bool = False
+    spills: bool = False
     drop_single: float = 0.0
     drop_two: float = 0.0
     drop_stack: float = 0.0
@@ -124,10 +126,14 @@ class Chances:
     drop_loaded_pull: float = 0.0
 
     @property
+    def drops(self) -> bool:
+        """Whether anything may fall off the table."""
+        return any((self.drop_single, self.drop_two, self.drop_stack, self.drop_pull, self.drop_loaded_pull))
+
+    @property
     def sure(self) -> bool:
         """Whether nothing slips or drops."""
-        drops = (self.drop_single, self.drop_two, self.drop_stack, self.drop_pull, self.drop_loaded_pull)
-        return not any(drops) and all(chance >= 1.0 for chance in self.hold.values())
+        return not self.drops and all(chance >= 1.0 for chance in self.hold.values())
 
     def holds(self, first: str, second: str) -> float:
         """Return the chance for two piles by the letters of their lowest things; unlike ones as the worse of both."""
@@ -161,6 +167,11 @@ def with_thesis_failures() -> Chances:
         measured(), drop_single=single, drop_two=single, drop_stack=stacking, drop_pull=pulling,
         drop_loaded_pull=pulling,
     )  # fmt: skip
+
+
+def with_spills() -> Chances:
+    """Return the thesis's world, in which utensils slide off dishes that are lifted side by side, as in physics."""
+    return replace(measured(), spills=True)
 
 
 def _chance_of_failures(policy: int, single: float) -> float:

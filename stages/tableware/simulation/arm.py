@@ -33,6 +33,8 @@ CLOSING_SPEED = 0.06
 """Of each finger [m/s]."""
 PAUSE = 0.15
 """Before and after each movement of the fingers [s]."""
+STEP = 0.02
+"""Between two poses of the tool on a straight way [m]."""
 ROOM_TO_TURN = pi
 """The last joint turns two half turns either way from its middle; an empty hand begins within one of them [rad]."""
 WRIST_OFFSET = 0.10915
@@ -147,26 +149,35 @@ class Arm:
 
     def move_through(self, ends: list[np.ndarray], speed: float) -> None:
         """Lead the tool along straight lines through poses, slower where joints cannot follow. Raises MotionFailed."""
+        try:
+            path, length = self._path(ends, STEP)
+        except MotionFailed:  # near a singular pose the joints turn far within a step
+            path, length = self._path(ends, STEP / 5.0)
+        if length < 1e-5:
+            return
+        times, points = time_path(path, *self._limits(1.0))
+        if times[-1] <= 0.0:  # so short a way that the joints' values do not change
+            return
+        times = times * max(1.0, length / speed / float(times[-1]))
+        self._run(times, points)
+
+    def _path(self, ends: list[np.ndarray], step: float) -> tuple[np.ndarray, float]:
+        """Return joint values (K, 6) along straight lines through poses, a pose each `step` [m], and their length [m].
+        Raises MotionFailed."""
         poses, start, length = [], self.pose_of(self.target), 0.0
         for end in ends:
             if end[:3, 1] @ start[:3, 1] < 0.0:
                 end = end.copy()
                 end[:3, :2] *= -1.0
-            poses.extend(straight_poses(start, end, step=0.02))
+            poses.extend(straight_poses(start, end, step=step))
             length += float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
             start = end
-        if length < 1e-5:
-            return
         in_base = []
         for pose in poses:
             pose = pose.copy()
             pose[:3, 3] -= BASE
             in_base.append(pose)
-        rows = follow(self.chain, in_base, self.target)
-        path = np.vstack([self.target, rows])
-        times, points = time_path(path, *self._limits(1.0))
-        times = times * max(1.0, length / speed / float(times[-1]))
-        self._run(times, points)
+        return np.vstack([self.target, follow(self.chain, in_base, self.target)]), length
 
     def move_joints(self, end: np.ndarray, share: float) -> None:
         """Move all joints to `end` (6,) at a share of the arm's speed and acceleration, with physics."""

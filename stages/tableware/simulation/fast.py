@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import hypot
+from math import atan2, cos, hypot, pi, sin
 from typing import Literal, Protocol
 from zlib import crc32
 
@@ -32,8 +32,8 @@ from stages.tableware.planning.actions import (
 from stages.tableware.planning.policies import Policy
 from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold, letters
 from stages.tableware.planning.time_model import Chances, TimeModel, placement_error
-from stages.tableware.world.footprints import footprint, gap
-from stages.tableware.world.items import Table
+from stages.tableware.world.footprints import footprint, gap, overlapped
+from stages.tableware.world.items import TABLE_SIDES, Item, Table
 
 MOST_ACTIONS, MOST_IDLE = 400, 8
 STILL = 0.004
@@ -173,6 +173,9 @@ class FastWorld:
             elif self._goes_wrong(self._chances.drop_two, "lift", here[1]):
                 self._drop(here[1])
                 here = here[:1]
+            elif self._chances.spills:
+                self._spill(first, second)
+                self._spill(second, first)
         elif here and self._goes_wrong(self._chances.drop_single, "lift", here[0]):
             self._drop(here[0])
             return
@@ -183,6 +186,25 @@ class FastWorld:
             names = taken(self.table, Grasp((name,), action.p_G, action.theta_G))
             self.trial.moved += len(names)
             self.table = self.table.without(names)
+
+    def _spill(self, base: Item, beside: Item) -> None:
+        """Lay the utensils of a dish that is lifted beside another on the table: where there is room next to where it
+        stood, on the far side first."""
+        away = atan2(base.position[1] - beside.position[1], base.position[0] - beside.position[0])
+        for utensil in (item for item in self.table.load(base.name) if base.is_dish and not item.is_dish):
+            others = [footprint(item) for item in self.table.items if item.name != utensil.name]
+            for reach in np.arange(base.measures.rim_radius, max(TABLE_SIDES), 0.02):
+                for turn in sorted(np.linspace(-pi, pi, 16, endpoint=False), key=abs):
+                    x = base.position[0] + reach * cos(away + float(turn))
+                    y = base.position[1] + reach * sin(away + float(turn))
+                    print_ = footprint(utensil, float(x), float(y), utensil.yaw)
+                    if print_.on_table and not overlapped((print_,), others).any():
+                        break
+                else:
+                    continue
+                self.table = self.table.moved(utensil.name, float(x), float(y))
+                self.troubles.append(f"{utensil.name} slid off")
+                break
 
     def _there(self, *names: str) -> bool:
         missing = tuple(name for name in names if name not in self.table.by_name)

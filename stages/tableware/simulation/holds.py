@@ -20,8 +20,11 @@ JAW_HEIGHT, PAD, PAD_WIDTH, KNUCKLE = 0.045, 0.007, 0.022, 0.014
 """Height of the fingertips, their thickness and width, thickness of the knuckles above them [m]; see ur5.urdf."""
 DEPTH = 0.020
 """How far the pads reach below the lowest lip where they can [m]."""
-DEPTH_TWO = 0.030
-"""The same when two dishes are pressed together."""
+PAIR_DEPTHS, PAIR_ROOMS, PAIR_FREE = (0.030, 0.022, 0.014), (0.007, 0.004), 0.001
+"""When two dishes are pressed together: how far the pads reach below the lowest lip, how far open ones keep from the
+walls, the best first, and what they keep from all else there [m]."""
+FLAT_DEPTH, MOST_LEAN = 0.008, 0.5
+"""The first for a plate, whose rim is nearer to the table; the most that the hand leans [rad]: plates slant by more."""
 ROOM = 0.007
 """Between an open pad and the wall on each side [m]."""
 PALM_ROOM = 0.003
@@ -94,12 +97,15 @@ def rim_hold(
     low_lip = min(item.lip for item in family)
     if base.on is not None and table.by_name[base.on].is_dish:  # the fingers must not close on what it stands in
         most = min(most, max(0.006, low_lip - table.by_name[base.on].lip - 0.002))
-    depth = reach_below(family, most)
+    depth = reach_below(family, min(most, FLAT_DEPTH) if base.kind == "plate" else most)
     tip = low_lip - depth
-    lean = atan2(base.measures.rim_radius - base.measures.foot_radius, base.measures.height)
+    slant = atan2(base.measures.rim_radius - base.measures.foot_radius, base.measures.height)
+    lean = min(slant, MOST_LEAN)
     outer = max(item.measures.outer_radius(tip - item.position[2]) for item in family)
     inner = min(item.measures.inner_radius(tip - item.position[2]) for item in family)
     middle, opening = (outer + inner) / 2, (outer - inner) * cos(lean) + 2 * ROOM
+    if slant > lean:  # a flat rim rises outwards between the pads
+        opening += depth / cos(slant) * sin(slant - lean)
     others = [item for pile in table.stacks for item in pile if base.name not in {other.name for other in pile}]
     own = cargo(table, name)
     best: Hold | None = None
@@ -118,13 +124,14 @@ def rim_hold(
 
 def jaw_clearance(pose: np.ndarray, opening: float, others: list[Item], own: list[Item]) -> float:
     """Return the least distance [m] between open jaws and other things, seen from above at the height of each thing's
-    upper edge; of the own pile's cargo the inner pad only has to keep clear."""
+    upper edge; of the own pile's cargo the inner pad only has to keep clear. A utensil in a dish counts however low its
+    middle is: one that slid from the rim leans there, an end of it above the rim."""
     least = 1.0
     tip = pose[2, 3]
-    for item in [*others, *own]:
-        if item.lip < tip - 0.002:
+    for number, item in enumerate([*own, *others]):
+        if item.lip < tip - 0.002 and (item.is_dish or number >= len(own)):
             continue
-        top = min(item.lip, tip + 0.10)
+        top = max(tip, min(item.lip, tip + 0.10))
         knuckles = item.lip > tip + JAW_HEIGHT
         thickness = KNUCKLE if knuckles else PAD
         backwards = (top - tip) / max(-pose[2, 2], 0.5)
@@ -165,19 +172,37 @@ def pair_hold(table: Table, first: str, second: str, point: tuple[float, float, 
                 break
         assert best is not None
         return best
-    families = [walls(table, name) for name in (first, second)]
+    best = None
+    for depth in PAIR_DEPTHS:
+        for room in PAIR_ROOMS:
+            hold = _dish_pair(table, (first, second), point, closing, depth, room, others)
+            if best is None or hold.clearance > best.clearance + 1e-6:
+                best = hold
+            if hold.clearance >= PAIR_FREE:
+                return hold
+    assert best is not None
+    return best
+
+
+def _dish_pair(
+    table: Table, names: tuple[str, str], point: tuple[float, float, float], closing: float, depth: float, room: float,
+    others: list[Item],
+) -> Hold:  # fmt: skip
+    """Return how two dishes are taken at most `depth` [m] below the lower lip, with `room` [m] between open pads and
+    walls."""
+    families = [walls(table, name) for name in names]
     lips = [item.lip for family in families for item in family]
-    depth = max(0.003, min(DEPTH_TWO, JAW_HEIGHT - PALM_ROOM - (max(lips) - min(lips))))
-    tip = min(lips) - depth
+    tip = min(lips) - max(0.003, min(depth, JAW_HEIGHT - PALM_ROOM - (max(lips) - min(lips))))
     pose = tool_pose(np.array([point[0], point[1], tip]), closing)
     ahead = np.array([cos(closing), sin(closing)])
     reach = 0.0
-    for base, family in zip((one, other), families, strict=True):
+    for name, family in zip(names, families, strict=True):
+        base = table.by_name[name]
         inner = min(item.measures.inner_radius(tip - item.position[2]) for item in family)
         middle = abs(float(ahead @ (np.array(base.position[:2]) - np.array(point[:2]))))
         reach = max(reach, middle - inner)
-    own = [item for name in (first, second) for item in cargo(table, name)]
-    opening = min(0.085, 2.0 * (reach + ROOM))
+    own = [item for name in names for item in cargo(table, name)]
+    opening = min(0.085, 2.0 * (reach + room))
     return Hold(pose, opening, jaw_clearance(pose, opening, others, own))
 
 

@@ -40,6 +40,7 @@ SPREAD = 0.72
 """Share of a dish's inner radius to which the fingers open when they pull it from inside."""
 EMPTY = 0.0008
 """Fingers that are nearer to each other than this [m] hold nothing: the thinnest wall has 3 mm."""
+HEAVY = 4
 LIFT = 0.06
 """By how much what is held goes above everything else [m]."""
 
@@ -54,7 +55,11 @@ class Speeds:
     pull: float = 0.15
     carry: float = 0.7
     force: float = 40.0
-    """For dishes, however many: twice as much presses the lowest of three nested cups out of the others."""
+    """For bowls and plates."""
+    heavy: float = 120.0
+    """For two piles of bowls, `HEAVY` walls together: with 40 N the outer ones slip."""
+    cups: float = 20.0
+    """For cups, however many: pressed harder, one of some nested ones is wedged out of the others."""
     gentle: float = 20.0
     """For a utensil that is taken alone, or a pile of them."""
     edge: float = 5.0
@@ -155,14 +160,8 @@ class PhysicsTable:
             hold = rim_hold(seen, names[0], action.theta_G)
         else:
             hold = bar_hold(seen, names[0])
-        self._take(hold, self._force(seen, names), names)
+        self._take(hold, finger_force(seen, names, self.speeds), names)
         self._to_bin(seen, names)
-
-    def _force(self, seen: Table, names: list[str]) -> float:
-        """Return the force [N] of each finger for some piles."""
-        if all(not seen.by_name[name].is_dish for name in names):
-            return self.speeds.edge if len(names) == 2 else self.speeds.gentle
-        return self.speeds.force
 
     def _take(self, hold: Hold, force: float, names: list[str]) -> None:
         """Go there and close. Raises MotionFailed when nothing is there."""
@@ -328,14 +327,15 @@ class PhysicsTable:
             hold = rim_hold(seen, name, action.u_G.theta_G, min(room, max(nested, 0.012)))
         else:
             hold = bar_hold(seen, name)
-        self._take(hold, self._force(seen, [name]), [name])
+        self._take(hold, finger_force(seen, [name], self.speeds), [name])
         pose = self.arm.pose_of(self.arm.target)
         held = {name, *(load.name for load in seen.load(name))}
         self.top.wake_near([np.array(item.position[:2])], 0.03)
         highest = max([other.lip for other in seen.items if other.name not in held], default=0.0)
         up = _raised(pose, pose[2, 3] + max(highest + 0.04 - item.position[2], 0.04))
+        loose = item.is_dish and bool(cargo(seen, name))
         self.arm.move_line(_raised(pose, pose[2, 3] + 0.01), 0.05)
-        self.arm.move_line(up, self.speeds.lift)
+        self.arm.move_line(up, self.speeds.lift_loose if loose else self.speeds.lift)
         self.top.sleep()
         self._key("lifted")
         drop = 0.002 if item.is_dish else 0.003
@@ -343,7 +343,7 @@ class PhysicsTable:
         values = self.arm.solve(over, held=True)
         if values is None:
             raise MotionFailed("no_inverse_kinematics", "the arm does not reach the place")
-        self.arm.move_joints(values, self.speeds.carry)
+        self.arm.move_joints(values, self.speeds.carry_loose if loose else self.speeds.carry)
         self.top.wake_near([np.array(onto.position[:2])], 0.03)
         down = over.copy()
         down[2, 3] = pose[2, 3] + action.p_L[2] - item.position[2] + drop
@@ -434,10 +434,20 @@ def push_place(seen: Table, name: str, direction: np.ndarray) -> Push | None:
                 continue
             for start in (reach * 0.5, reach - 0.006, reach - 0.003):
                 point = np.append(center + start * direction, tip)
-                clearance = jaw_clearance(tool_pose(point, closing), opening, load, [])
+                clearance = jaw_clearance(tool_pose(point, closing), opening, [], load)
                 if clearance > 0.002:
                     return Push(start, reach, tip, closing, opening)
     return None
+
+
+def finger_force(seen: Table, names: list[str], speeds: Speeds) -> float:
+    """Return the force [N] of each finger for some piles."""
+    if all(not seen.by_name[name].is_dish for name in names):
+        return speeds.edge if len(names) == 2 else speeds.gentle
+    held = [item for name in names for item in walls(seen, name)]
+    if all(item.kind == "cup" for item in held):
+        return speeds.cups
+    return speeds.heavy if len(names) == 2 and len(held) >= HEAVY else speeds.force
 
 
 def _raised(pose: np.ndarray, height: float) -> np.ndarray:

@@ -16,13 +16,13 @@ from schemas.tableware_plan import TablewareAction
 from stages.tableware import simulate_stage
 from stages.tableware.planning.actions import Grasp, grasp, grasp_two, pull, pull_grasp, stack, stack_grasp
 from stages.tableware.planning.choice import make_policy
-from stages.tableware.planning.joint import JointPolicy, plan
+from stages.tableware.planning.joint import JointPolicy, _alone, plan, rules_in
 from stages.tableware.planning.optimum import Optimum, seconds
 from stages.tableware.planning.policies import PullPolicy, StackPolicy
 from stages.tableware.planning.reasons import impossible_pairs
 from stages.tableware.planning.records import as_action, as_record, risk_of
 from stages.tableware.planning.refusals import Doubt, Unknown, accept, statement
-from stages.tableware.planning.rules import Rules, can_grasp_two, can_pull, can_put, split_over_two
+from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold_two, can_pull, can_put, split_over_two
 from stages.tableware.planning.time_model import (
     EXACT,
     FAILED_TRIALS,
@@ -32,13 +32,14 @@ from stages.tableware.planning.time_model import (
     fitted,
     measured,
     trips_of,
+    with_spills,
     with_thesis_failures,
 )
 from stages.tableware.sight import named_as, understood, without_places
 from stages.tableware.simulation.fast import FastWorld, run_in, run_trial
 from stages.tableware.table_pictures import draw_strip, draw_table
 from stages.tableware.vision.detections import Detection
-from stages.tableware.world.footprints import Footprint, gap, overlapped
+from stages.tableware.world.footprints import Footprint, footprint, gap, overlapped
 from stages.tableware.world.items import Table, make_item
 from stages.tableware.world.scenes import make_table
 
@@ -130,10 +131,41 @@ def test_a_split_is_one_that_the_jaws_hold() -> None:
     assert split_over_two("b", "b", ("b",) * 4, RULES) is not None
     assert split_over_two("b", "b", ("b",) * 5, RULES) is None  # seven bowls: four in one pile
     assert split_over_two("b", "b", ("c",), replace(RULES, both_piles=False)) is None
-    two = replace(RULES, most_beside=2)
-    assert split_over_two("b", "b", ("b", "c"), two) is not None and split_over_two("b", "b", ("b",) * 3, two) is None
-    bare = replace(RULES, utensils_beside=False)
-    assert split_over_two("b", "b", ("c", "u"), RULES) is not None and split_over_two("b", "b", ("u",), bare) is None
+    some = replace(RULES, beside=frozenset({("b", "bc"), ("bc", "bc")}))
+    assert split_over_two("b", "b", ("c",), some) is not None and split_over_two("b", "b", ("c", "c"), some) is not None
+    assert split_over_two("b", "b", ("b",), some) is None and not can_hold_two("b", "b", some)
+
+
+def test_laden_dishes_go_side_by_side_only_as_they_stand_and_where_nothing_spills() -> None:
+    some = replace(RULES, beside=frozenset({("b", "b"), ("b", "bc")}))
+    assert can_hold_two("bu", "bc", some) and can_hold_two("b", "b", some) and not can_hold_two("bc", "bc", some)
+    assert split_over_two("b", "b", ("u",), some) is None and split_over_two("bu", "b", ("c",), some) is None
+    dry = rules_in(some, with_spills())
+    assert not can_hold_two("bu", "bc", dry) and can_hold_two("b", "bc", dry) and rules_in(some, measured()) is some
+
+
+def test_what_spills_lies_on_the_table_and_is_planned_around() -> None:
+    bowls = (make_item("a", "bowl", -0.087, 0.0), make_item("b", "bowl", 0.087, 0.0))
+    fork = replace(make_item("f", "fork", -0.087, 0.0, 0.3, on="a"), position=(-0.087, 0.0, 0.07))
+    table = Table((*bowls, fork))
+    chances = Chances(spills=True)
+    world = FastWorld(table, MODEL, chances, 0)
+    world.do(grasp_two(table, "a", "b"))
+    assert world.trial.moved == 2 and world.trial.dropped == 0 and world.table.by_name["f"].on is None
+    assert footprint(world.table.by_name["f"]).on_table and world.troubles == ["f slid off"]
+    sure, warned = plan(table, RULES, MODEL, EXACT), plan(table, RULES, MODEL, chances)
+    assert len(sure.trips[0].bases) == 2 and all(len(trip.bases) == 1 for trip in warned.trips)
+
+
+@pytest.mark.parametrize("tier", ["tier1", "tier2"])
+def test_pull_takes_as_long_as_is_reckoned(tier: str) -> None:
+    chances, model = replace(measured(), noise=False), fitted(tier)
+    for seed in (3, 5):
+        table = make_table(tier, seed)
+        drawn = [run_trial(table, PullPolicy(), model, chances, (seed, draw)).seconds for draw in range(60)]
+        assert _alone(PullPolicy(), table, model, chances) == pytest.approx(np.mean(drawn), rel=0.025)
+        stack = run_trial(table, StackPolicy(), model, chances, 0).seconds
+        assert _alone(StackPolicy(), table, model, chances) == pytest.approx(stack)
 
 
 def test_what_is_not_understood_is_kept_clear_of() -> None:
