@@ -45,8 +45,10 @@ class Amount:
 
     @property
     def frame_megapixels(self) -> float:
-        """Megapixels of one frame."""
-        return self.megapixels / self.frames if self.frames and self.megapixels is not None else USUAL_FRAME
+        """Megapixels of one frame; less than one frame says nothing about its size."""
+        if self.frames is None or self.frames < 1.0 or self.megapixels is None:
+            return USUAL_FRAME
+        return self.megapixels / self.frames
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cli.main import run
@@ -58,6 +58,7 @@ def test_the_table_is_about_steps_that_there_are() -> None:
     assert set(FORMULAS) <= set(all_stages())
 
 
+@example("ingest", 0.0, 5e-324, 1.0)
 @given(st.sampled_from(sorted(FORMULAS)), st.floats(0, 1e7), st.floats(0, 1e6), st.floats(0, 1e6))
 def test_estimates_are_sane_whatever_the_input(name: str, megabytes: float, frames: float, megapixels: float) -> None:
     stage = all_stages()[name]
