@@ -18,6 +18,8 @@ COLORS = {"cup": (235, 70, 60), "bowl": (40, 180, 70), "plate": (60, 120, 240), 
 """sRGB by kind; None is unknown."""
 SURE = 0.9
 FONT, LINE = cv2.FONT_HERSHEY_SIMPLEX, 20
+HALO = ((-1, 0), (1, 0), (0, -1), (0, 1))
+"""Offsets [px] of a label's dark edge."""
 
 
 def draw_sight(color: np.ndarray, sight: Sight) -> np.ndarray:
@@ -104,7 +106,8 @@ def _write(picture: np.ndarray, labels: list[tuple[tuple[int, int], str, tuple[i
         while any(abs(v - row) < 14 and left < right and start < left + width for start, right, row in taken):
             v += 14
         taken.append((left, left + width, v))
-        cv2.putText(picture, text, (left, v), FONT, 0.42, (0, 0, 0), 3, cv2.LINE_AA)
+        for du, dv in HALO:  # a thicker text is a wider one, it would not lie behind
+            cv2.putText(picture, text, (left + du, v + dv), FONT, 0.42, (0, 0, 0), 1, cv2.LINE_AA)
         cv2.putText(picture, text, (left, v), FONT, 0.42, tuple(min(255, c + 60) for c in tone), 1, cv2.LINE_AA)
 
 
