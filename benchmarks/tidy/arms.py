@@ -39,7 +39,7 @@ WORLDS: dict[str, Chances] = {
 """As the thesis's robot slips and misses; as planned; slipping, missing, and dropping as often as its trials failed."""
 DROPS_ON, SPILLS_ON = ("tier1", "tier2"), ("tier2",)
 DELAYS = (0, 3, 5)
-DRAWS, DRAWS_OF_THE_AIMS = 20, 40
+DRAWS, DRAWS_OF_THE_AIMS = 20, 400
 """Of what chance decides on a table: the second on tiers 1 and 2, where the aims are."""
 
 
