@@ -11,9 +11,6 @@ machine. The result is `raft_stereo_small.safetensors`, the moving average of th
 from __future__ import annotations
 
 import argparse
-import json
-import math
-import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -24,8 +21,7 @@ from torch.nn import functional
 from benchmarks.disparity.crops import TEXTURES, Kept, Sample, kept_sample, shapes_sample
 from benchmarks.disparity.rendered_pairs import made, needle_stem, room_stems
 from benchmarks.disparity.shapes import texture_bank
-from benchmarks.training.run_state import read_state, write_state
-from schemas.errors import BadInput
+from benchmarks.training.run import TrainingRun, rate_at, train
 from stages.disparity.raft.architecture import SMALL
 from stages.disparity.raft.checkpoint import save_network
 from stages.disparity.raft.matching import SMALL_UPDATES
@@ -33,7 +29,6 @@ from stages.disparity.raft.network import RaftStereo
 from stages.suture.rig import ENDOSCOPE
 
 PEAK_RATE, WEIGHT_DECAY, WARM_UP = 1e-3, 1e-4, 0.05
-AVERAGE_DECAY, GRADIENT_NORM = 0.995, 1.0
 FIRST_MOVES = 0.05
 """The head of the updates begins with weights this much smaller, so that the first disparities are small."""
 GAMMA = 0.85
@@ -94,14 +89,6 @@ def tensors_of(samples: list[Sample]) -> tuple[torch.Tensor, torch.Tensor, torch
     return left.permute(0, 3, 1, 2).float(), right.permute(0, 3, 1, 2).float(), disparity
 
 
-def rate_at(step: int, steps: int) -> float:
-    """Return the learning rate: a linear rise, then half a cosine down to a hundredth."""
-    warm = max(1, round(WARM_UP * steps))
-    if step < warm:
-        return PEAK_RATE * (step + 1) / warm
-    return PEAK_RATE * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * (step - warm) / max(1, steps - warm))))
-
-
 def loss_of(full: torch.Tensor, coarse: list[torch.Tensor], truth: torch.Tensor) -> torch.Tensor:
     """Return the mean distance [px] over known pixels, a weighted mean over the updates (Lipson et al., section 3.4).
     The coarse disparities are spread by bilinear interpolation, which is cheaper than the learned one."""
@@ -114,49 +101,29 @@ def loss_of(full: torch.Tensor, coarse: list[torch.Tensor], truth: torch.Tensor)
     return ((full - truth)[known].abs().mean() + (weights * distances).sum()) / (1 + weights.sum())
 
 
-class Run:
+class Run(TrainingRun):
     """A training run and its state on disk."""
 
+    average_decay, gradient_norm, keeps_gradients = 0.995, 1.0, True
+
     def __init__(self, plan: Plan, out: Path) -> None:
-        self.plan, self.out, self.step, self.seconds = plan, out, 0, 0.0
+        self.plan = plan
         torch.manual_seed(plan.seed)
-        self.network = RaftStereo(SMALL).to(memory_format=torch.channels_last)
-        for module in self.network.modules():
+        network = RaftStereo(SMALL).to(memory_format=torch.channels_last)
+        for module in network.modules():
             if isinstance(module, torch.nn.Conv2d):
                 torch.nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
         with torch.no_grad():
-            self.network.update_block.flow_head.conv2.weight *= FIRST_MOVES
-        self.average = {name: value.clone() for name, value in self.network.state_dict().items()}
-        self.optimizer = torch.optim.AdamW(
-            self.network.parameters(), lr=PEAK_RATE, weight_decay=WEIGHT_DECAY, fused=True
-        )
-        for parameter in self.network.parameters():  # a unit that is not used has a state too
-            parameter.grad = torch.zeros_like(parameter)
-        if (out / "state.json").is_file():
-            self._restore()
+            network.update_block.flow_head.conv2.weight *= FIRST_MOVES
+        super().__init__(network, asdict(plan), out, PEAK_RATE, WEIGHT_DECAY)
 
     def train_step(self, sources: Sources) -> float:
         """Take one step and return the error of the last update [px]."""
-        started = time.process_time()
         self.network.train()
         left, right, truth = tensors_of(sources.samples(self.plan, self.step))
-        for group in self.optimizer.param_groups:
-            group["lr"] = rate_at(self.step, self.plan.steps)
-        self.optimizer.zero_grad(set_to_none=False)
         with torch.autocast("cpu", torch.bfloat16):
             full, coarse = self.network.updates(left, right, self.plan.updates)
-        loss_of(full, coarse, truth).backward()
-        torch.nn.utils.clip_grad_norm_(self.network.parameters(), GRADIENT_NORM)
-        self.optimizer.step()
-        self.step += 1
-        decay = min(AVERAGE_DECAY, self.step / (self.step + 10))
-        with torch.no_grad():
-            for name, value in self.network.state_dict().items():
-                if value.is_floating_point():
-                    self.average[name].lerp_(value, 1 - decay)
-                else:
-                    self.average[name].copy_(value)
-        self.seconds += time.process_time() - started
+        self.descend(loss_of(full, coarse, truth), rate_at(self.step, self.plan.steps, PEAK_RATE, WARM_UP))
         return float((full.detach() - truth)[torch.isfinite(truth)].abs().mean())
 
     def averaged(self) -> RaftStereo:
@@ -166,22 +133,13 @@ class Run:
         return network.eval()
 
     def save(self) -> None:
-        """Write the state, whole or not at all, and the checkpoint as it would be used now."""
-        write_state(self.out, self.network, self.average, self.optimizer, self.step)
-        facts = {"step": self.step, "cpu_seconds": round(self.seconds, 1), "plan": asdict(self.plan)}
-        (self.out / "state.json").write_text(json.dumps(facts, indent=1) + "\n")
+        """Write the state, and the checkpoint as it would be used now."""
+        super().save()
         description = (
             f"trained on random shapes and {self.plan.pairs} rendered pairs, step {self.step} of {self.plan.steps}, "
             f"seed {self.plan.seed}"
         )
         save_network(self.out / FILE, self.averaged(), description)
-
-    def _restore(self) -> None:
-        facts = json.loads((self.out / "state.json").read_text())
-        if facts["plan"] != asdict(self.plan):
-            raise BadInput(f"{self.out}: holds a run of another plan", hint="take another --out, or the same settings")
-        self.average, self.step = read_state(self.out, self.network, self.optimizer)
-        self.seconds = facts["cpu_seconds"]
 
 
 def validation(run: Run, bank: list[np.ndarray], count: int = 24) -> dict[str, float]:
@@ -217,26 +175,11 @@ def main() -> None:
     held_out = texture_bank(options.seed + 1000, TEXTURES)
     pairs = len(sources.rooms.stems) + len(sources.needles.stems)
     plan = Plan(10 if options.quick else options.steps, 2, 1, 1, 4, options.seed, pairs)
-    options.out.mkdir(parents=True, exist_ok=True)
     run = Run(plan, options.out)
-    saved, losses = time.perf_counter(), []
-    while run.step < plan.steps:
-        losses.append(run.train_step(sources))
-        last = run.step == plan.steps
-        line: dict[str, object] = {}
-        if run.step % 50 == 0 or last:
-            line = {"step": run.step, "cpu_seconds": round(run.seconds), "error": round(float(np.mean(losses)), 3)}
-            losses = []
-        if run.step % 500 == 0 or last:
-            line["held_out"] = validation(run, held_out)
-        if line:
-            with (options.out / "log.jsonl").open("a") as log:
-                log.write(json.dumps(line) + "\n")
-            print(line, flush=True)
-        if time.perf_counter() - saved > options.save_every or last:
-            run.save()
-            saved = time.perf_counter()
-    print(f"{plan.steps} steps in {run.seconds / 60:.1f} CPU min: {options.out / FILE}")
+    train(
+        run, plan.steps, lambda: {"error": run.train_step(sources)}, options.save_every,
+        lambda: {"held_out": validation(run, held_out)}, 500,
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -13,9 +13,6 @@ from __future__ import annotations
 
 import argparse
 import hashlib
-import json
-import math
-import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -25,15 +22,14 @@ from torch.nn import functional
 
 from benchmarks.stitch.segmentation_samples import Views, masks_of, sample
 from benchmarks.stitch.segmentation_views import kept_view
-from benchmarks.training.run_state import read_state, write_state
-from schemas.errors import BadInput
+from benchmarks.training.run import TrainingRun, rate_at, train
 from stages.suture.rig import ENDOSCOPE, TWO_CAMERAS
 from stages.suture.segmentation.checkpoint import load_network, save_network
 from stages.suture.segmentation.infer import Segmenter, normalised
 from stages.suture.segmentation.model import CLASSES, SutureNetwork
 
 WEIGHT_DECAY, WARM_UP = 0.02, 0.03
-AVERAGE_DECAY, GRADIENT_NORM = 0.997, 5.0
+FILE = "segmentation.safetensors"
 SAMPLES_A_PICTURE = 2
 CAMERAS, ENDOSCOPES, VALIDATION = range(100), range(200, 212), range(450, 456)
 CAMERAS_REFINED = range(150)
@@ -69,15 +65,6 @@ class Plan:
         return REFINED if self.start else FIRST
 
 
-def rate_at(step: int, steps: int, peak: float) -> float:
-    """Return the learning rate: a linear rise to `peak`, then half a cosine down to a hundredth."""
-    warm = max(1, round(WARM_UP * steps))
-    if step < warm:
-        return peak * (step + 1) / warm
-    share = (step - warm) / max(1, steps - warm)
-    return peak * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * share)))
-
-
 def batch_of(views: Views, plan: Plan, step: int) -> tuple[torch.Tensor, torch.Tensor]:
     """Return inputs (batch, 3, H, W) and targets (batch, 3, H, W) of a step."""
     number = max(plan.batch // SAMPLES_A_PICTURE, 1)
@@ -104,44 +91,25 @@ def loss_of(logits: torch.Tensor, targets: torch.Tensor, weights: tuple[float, f
     return (torch.tensor(weights) * (8.0 * entropy + dice)).sum()
 
 
-class Run:
+class Run(TrainingRun):
     """A training run and its state on disk."""
 
+    average_decay, gradient_norm = 0.997, 5.0
+
     def __init__(self, plan: Plan, out: Path, start: Path | None = None) -> None:
-        self.plan, self.out, self.step, self.seconds = plan, out, 0, 0.0
+        self.plan = plan
         torch.manual_seed(plan.seed)
         network = SutureNetwork() if start is None else load_network(start)[0]
-        self.network = network.to(memory_format=torch.channels_last)
-        self.average = {name: value.clone() for name, value in self.network.state_dict().items()}
-        self.optimizer = torch.optim.AdamW(
-            self.network.parameters(), lr=plan.phase.peak_rate, weight_decay=WEIGHT_DECAY, fused=True
-        )
-        if (out / "state.json").is_file():
-            self._restore()
+        super().__init__(network, asdict(plan), out, plan.phase.peak_rate, WEIGHT_DECAY)
 
     def train_step(self, views: Views) -> float:
         """Take one step and return its loss."""
-        started = time.process_time()
         self.network.train()
         inputs, targets = batch_of(views, self.plan, self.step)
-        for group in self.optimizer.param_groups:
-            group["lr"] = rate_at(self.step, self.plan.steps, self.plan.phase.peak_rate)
         with torch.autocast("cpu", torch.bfloat16):
             logits = self.network(inputs)
         loss = loss_of(logits.float(), targets, self.plan.phase.weights)
-        self.optimizer.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(self.network.parameters(), GRADIENT_NORM)
-        self.optimizer.step()
-        self.step += 1
-        decay = min(AVERAGE_DECAY, self.step / (self.step + 10))
-        with torch.no_grad():
-            for name, value in self.network.state_dict().items():
-                if value.is_floating_point():
-                    self.average[name].lerp_(value, 1 - decay)
-                else:
-                    self.average[name].copy_(value)
-        self.seconds += time.process_time() - started
+        self.descend(loss, rate_at(self.step, self.plan.steps, self.plan.phase.peak_rate, WARM_UP))
         return float(loss.detach())
 
     def averaged(self) -> SutureNetwork:
@@ -151,22 +119,13 @@ class Run:
         return network.eval()
 
     def save(self) -> None:
-        """Write the state, whole or not at all, and the checkpoint as it would be used now."""
-        write_state(self.out, self.network, self.average, self.optimizer, self.step)
-        facts = {"step": self.step, "cpu_seconds": round(self.seconds, 1), "plan": asdict(self.plan)}
-        (self.out / "state.json").write_text(json.dumps(facts, indent=1) + "\n")
+        """Write the state, and the checkpoint as it would be used now."""
+        super().save()
         description = (
             f"trained on {self.plan.pictures} rendered pictures, step {self.step} of {self.plan.steps}, "
             f"batch {self.plan.batch}, seed {self.plan.seed}" + (", a refinement" if self.plan.start else "")
         )
-        save_network(self.out / "segmentation.safetensors", self.averaged(), description)
-
-    def _restore(self) -> None:
-        facts = json.loads((self.out / "state.json").read_text())
-        if facts["plan"] != asdict(self.plan):
-            raise BadInput(f"{self.out}: holds a run of another plan", hint="take another --out, or the same settings")
-        self.average, self.step = read_state(self.out, self.network, self.optimizer)
-        self.seconds = facts["cpu_seconds"]
+        save_network(self.out / FILE, self.averaged(), description)
 
 
 def overlap(network: SutureNetwork, views: Views) -> dict[str, float]:
@@ -205,25 +164,10 @@ def main() -> None:
     digest = "" if options.start is None else hashlib.sha256(options.start.read_bytes()).hexdigest()[:16]
     plan = Plan(40 if options.quick else options.steps, options.batch, options.seed, len(views), digest)
     run = Run(plan, options.out, options.start)
-    options.out.mkdir(parents=True, exist_ok=True)
-    saved, losses = time.perf_counter(), []
-    while run.step < plan.steps:
-        losses.append(run.train_step(views))
-        last = run.step == plan.steps
-        line: dict[str, object] = {}
-        if run.step % 50 == 0 or last:
-            line = {"step": run.step, "cpu_seconds": round(run.seconds), "loss": round(float(np.mean(losses)), 4)}
-            losses = []
-        if run.step % 600 == 0 or last:
-            line["overlap"] = overlap(run.averaged(), validation)
-        if line:
-            with (options.out / "log.jsonl").open("a") as log:
-                log.write(json.dumps(line) + "\n")
-            print(line, flush=True)
-        if time.perf_counter() - saved > options.save_every or last:
-            run.save()
-            saved = time.perf_counter()
-    print(f"{plan.steps} steps in {run.seconds / 60:.1f} CPU min: {options.out / 'segmentation.safetensors'}")
+    train(
+        run, plan.steps, lambda: {"loss": run.train_step(views)}, options.save_every,
+        lambda: {"overlap": overlap(run.averaged(), validation)}, 600,
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -11,9 +11,6 @@ The result is `panoptic.safetensors`: the moving average of the weights.
 from __future__ import annotations
 
 import argparse
-import json
-import math
-import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -21,10 +18,9 @@ import numpy as np
 import torch
 from torch.nn import functional
 
-from benchmarks.training.run_state import read_state, write_state
+from benchmarks.training.run import TrainingRun, rate_at, train
 from benchmarks.training.samples import FrameSet, varied
 from benchmarks.training.targets import IGNORED, Targets
-from schemas.errors import BadInput
 from stages.segment.network.features import CHANNELS
 from stages.segment.network.model import PanopticNetwork, Widths
 from stages.segment.network.weights import save_checkpoint
@@ -33,8 +29,6 @@ PEAK_RATE, WEIGHT_DECAY = 4e-3, 0.02
 WARM_UP, WHOLE_FRAMES = 0.04, 0.12
 """Shares of the steps: the rate rises during the first; the last of them see whole frames instead of crops."""
 CENTRE_WEIGHT, OFFSET_WEIGHT = 200.0, 0.05
-AVERAGE_DECAY = 0.998
-GRADIENT_NORM = 10.0
 SMOOTHING = 0.05
 
 
@@ -47,15 +41,6 @@ class Plan:
     seed: int
     classes: tuple[str, ...]
     frames: int
-
-
-def rate_at(step: int, steps: int) -> float:
-    """Return the learning rate: a linear rise, then half a cosine down to a hundredth."""
-    warm = max(1, round(WARM_UP * steps))
-    if step < warm:
-        return PEAK_RATE * (step + 1) / warm
-    share = (step - warm) / max(1, steps - warm)
-    return PEAK_RATE * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * share)))
 
 
 def batch_of(frames: FrameSet, plan: Plan, step: int) -> tuple[torch.Tensor, list[Targets]]:
@@ -107,41 +92,25 @@ def class_weights(frames: FrameSet, classes: tuple[str, ...]) -> torch.Tensor:
     return torch.tensor(weights / np.average(weights, weights=counts), dtype=torch.float32)
 
 
-class Run:
+class Run(TrainingRun):
     """A training run and its state on disk."""
 
+    average_decay, gradient_norm = 0.998, 10.0
+
     def __init__(self, plan: Plan, out: Path, widths: Widths) -> None:
-        self.plan, self.out, self.widths, self.step, self.seconds = plan, out, widths, 0, 0.0
+        self.plan, self.widths = plan, widths
         torch.manual_seed(plan.seed)
-        self.network = PanopticNetwork(len(CHANNELS), len(plan.classes), widths).to(memory_format=torch.channels_last)
-        self.average = {name: value.clone() for name, value in self.network.state_dict().items()}
-        self.optimizer = torch.optim.AdamW(
-            self.network.parameters(), lr=PEAK_RATE, weight_decay=WEIGHT_DECAY, fused=True
-        )
-        if (out / "state.json").is_file():
-            self._restore()
+        network = PanopticNetwork(len(CHANNELS), len(plan.classes), widths)
+        super().__init__(network, _plan_record(plan), out, PEAK_RATE, WEIGHT_DECAY)
 
     def train_step(self, frames: FrameSet, class_weight: torch.Tensor) -> dict[str, float]:
         """Take one step and return the parts of its loss."""
         self.network.train()
         inputs, targets = batch_of(frames, self.plan, self.step)
-        for group in self.optimizer.param_groups:
-            group["lr"] = rate_at(self.step, self.plan.steps)
         with torch.autocast("cpu", torch.bfloat16):
             outputs = self.network(inputs)
         loss, parts = loss_of(outputs, targets, class_weight)
-        self.optimizer.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(self.network.parameters(), GRADIENT_NORM)
-        self.optimizer.step()
-        self.step += 1
-        decay = min(AVERAGE_DECAY, self.step / (self.step + 10))
-        with torch.no_grad():
-            for name, value in self.network.state_dict().items():
-                if value.is_floating_point():
-                    self.average[name].lerp_(value, 1 - decay)
-                else:
-                    self.average[name].copy_(value)
+        self.descend(loss, rate_at(self.step, self.plan.steps, PEAK_RATE, WARM_UP))
         return parts
 
     def averaged(self) -> PanopticNetwork:
@@ -151,22 +120,13 @@ class Run:
         return network.eval()
 
     def save(self) -> None:
-        """Write the state, whole or not at all, and the checkpoint as it would be used now."""
-        write_state(self.out, self.network, self.average, self.optimizer, self.step)
-        facts = {"step": self.step, "seconds": round(self.seconds, 1), "plan": _plan_record(self.plan)}
-        (self.out / "state.json").write_text(json.dumps(facts, indent=1) + "\n")
+        """Write the state, and the checkpoint as it would be used now."""
+        super().save()
         save_checkpoint(
             self.out / "panoptic.safetensors", self.averaged(), self.plan.classes, self.widths,
             f"trained on {self.plan.frames} frames of generated rooms and tabletops, "
             f"step {self.step} of {self.plan.steps}, batch {self.plan.batch}, seed {self.plan.seed}",
         )  # fmt: skip
-
-    def _restore(self) -> None:
-        facts = json.loads((self.out / "state.json").read_text())
-        if facts["plan"] != _plan_record(self.plan):
-            raise BadInput(f"{self.out}: holds a run of another plan", hint="take another --out, or the same settings")
-        self.average, self.step = read_state(self.out, self.network, self.optimizer)
-        self.seconds = facts["seconds"]
 
 
 def _plan_record(plan: Plan) -> dict[str, int | list[str]]:
@@ -189,24 +149,7 @@ def main() -> None:
     plan = Plan(arguments.steps, arguments.batch, arguments.seed, frames.class_names(), len(frames))
     run = Run(plan, arguments.out, Widths())
     class_weight = class_weights(frames, plan.classes)
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    began, saved, sums, seen = time.perf_counter() - run.seconds, time.perf_counter(), {}, 0
-    while run.step < plan.steps:
-        parts = run.train_step(frames, class_weight)
-        run.seconds = time.perf_counter() - began
-        sums = {name: sums.get(name, 0.0) + value for name, value in parts.items()}
-        seen += 1
-        if run.step % 50 == 0 or run.step == plan.steps:
-            means = {name: round(value / seen, 5) for name, value in sums.items()}
-            line = {"step": run.step, "seconds": round(run.seconds), **means}
-            with (arguments.out / "log.jsonl").open("a") as log:
-                log.write(json.dumps(line) + "\n")
-            print(line, flush=True)
-            sums, seen = {}, 0
-        if time.perf_counter() - saved > arguments.save_every or run.step == plan.steps:
-            run.save()
-            saved = time.perf_counter()
-    print(f"{plan.steps} steps in {run.seconds / 60:.1f} min: {arguments.out / 'panoptic.safetensors'}")
+    train(run, plan.steps, lambda: run.train_step(frames, class_weight), arguments.save_every)
 
 
 if __name__ == "__main__":

@@ -10,9 +10,10 @@ import pytest
 import torch
 
 from benchmarks.training.data import DEPTH_UNIT, HEIGHT, WIDTH, Sample, write_shard
+from benchmarks.training.run import rate_at
 from benchmarks.training.samples import FrameSet, as_sample, varied
 from benchmarks.training.targets import IGNORED, make_targets
-from benchmarks.training.train import Plan, Run, class_weights, rate_at
+from benchmarks.training.train import PEAK_RATE, WARM_UP, Plan, Run, class_weights
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from stages.segment.network.features import CHANNELS
@@ -83,7 +84,7 @@ def test_as_it_is_nothing_is_changed(frames: FrameSet) -> None:
 
 
 def test_the_rate_rises_and_falls() -> None:
-    rates = [rate_at(step, 200) for step in range(200)]
+    rates = [rate_at(step, 200, PEAK_RATE, WARM_UP) for step in range(200)]
     top = int(np.argmax(rates))
     assert rates[:top] == sorted(rates[:top]) and rates[top:] == sorted(rates[top:], reverse=True)
     assert rates[-1] < 0.02 * rates[top]
