@@ -1,6 +1,6 @@
 """Scenewright from Python: `from scenewright import load, load_run` (docs/PYTHON.md)."""
 
 from schemas.errors import BadInput, ScenewrightError
-from stages.kit.running.loading import LoadedArtifact, load, load_run
+from stages.engine.loading import LoadedArtifact, load, load_run
 
 __all__ = ["BadInput", "LoadedArtifact", "ScenewrightError", "load", "load_run"]

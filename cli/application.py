@@ -9,7 +9,7 @@ import typer
 
 from cli import housekeeping
 from cli.step_command import make_command
-from stages.kit.running.discovery import all_stages
+from stages.engine.discovery import all_stages
 
 HELP = """Turn robot logs into scenes a robot can act in, and act in them.
 

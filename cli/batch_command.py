@@ -37,10 +37,10 @@ def batch(
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> int:
     """Run a pipeline over a data set; exits with the gravest code of its scenes (docs/BATCH.md)."""
-    from stages.kit.running.batch import session
-    from stages.kit.running.batch.expansion import read_batch
-    from stages.kit.running.batch.resuming import RETRY
-    from stages.kit.running.batch.slurm_executor import parse_task
+    from stages.engine.batch import session
+    from stages.engine.batch.expansion import read_batch
+    from stages.engine.batch.resuming import RETRY
+    from stages.engine.batch.slurm_executor import parse_task
 
     if retry not in RETRY:
         raise UsageError(f"--retry {retry!r}: not one of {', '.join(RETRY)}", hint="see --help")

@@ -22,7 +22,7 @@ def diff(
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> int:
     """Say what two runs differ in: parameters, versions, inputs, outcomes, measures, files, sizes, times."""
-    from stages.kit.running.comparison import compare
+    from stages.engine.comparison import compare
 
     found = compare(first, second)
     if json_output:

@@ -48,7 +48,7 @@ def _settings(pairs: list[str] | None) -> dict[str, str]:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from stages.kit.running.keys import library_version
+        from stages.kit.library_versions import library_version
 
         _out(library_version("scenewright"))
         raise typer.Exit
@@ -77,10 +77,10 @@ def run(
     debug: Debug = False,
 ) -> int:
     """Run a pipeline: the same commands that the Makefile chains."""
-    from stages.kit.running.chain import run_pipeline
-    from stages.kit.running.memory_limit import parse_limit
-    from stages.kit.running.pipeline_estimation import warn_or_refuse
-    from stages.kit.running.pipelines import pipeline_path, read_pipeline, resolve_variables
+    from stages.engine.chain import run_pipeline
+    from stages.engine.memory_limit import parse_limit
+    from stages.engine.pipeline_estimation import warn_or_refuse
+    from stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables
 
     flags = {"--force": force, "--dry-run": dry_run, "--quiet": quiet, "--debug": debug}
     extra = tuple(flag for flag, given in flags.items() if given)
@@ -116,8 +116,8 @@ def run(
 
 def verify(paths: Paths, json_output: Json = False, debug: Debug = False) -> int:
     """Re-hash artifacts and follow their inputs back to the log."""
-    from stages.kit.running.verification import Finding
-    from stages.kit.running.verification import verify as verify_artifact
+    from stages.engine.verification import Finding
+    from stages.engine.verification import verify as verify_artifact
 
     seen: dict[Path, Finding] = {}
     for path in paths:
@@ -144,7 +144,7 @@ def migrate(
     debug: Debug = False,
 ) -> int:
     """Bring an artifact to the current schema version, into a new folder."""
-    from stages.kit.running.migration import migrate as migrate_artifact
+    from stages.engine.migration import migrate as migrate_artifact
 
     migrate_artifact(path, out)
     _out(str(out))
@@ -157,7 +157,7 @@ def view(
     debug: Debug = False,
 ) -> int:
     """Open an artifact in Rerun (an extra: pip install rerun-sdk), or write an .rrd file."""
-    from stages.kit.viewing.view import view_artifact
+    from cli.viewing.view import view_artifact
 
     view_artifact(path, save)
     if save is not None:
@@ -175,8 +175,8 @@ def models(
     """List the networks that steps can use (source, licence, checksum) and the weight files in the cache; serve one."""
     if context.invoked_subcommand is not None:
         return 0
-    from stages.kit.running.known_models import identify, known_models
-    from stages.kit.running.model_cache import add_model, cache_folder, cached_models
+    from stages.engine.known_models import identify, known_models
+    from stages.engine.model_cache import add_model, cache_folder, cached_models
 
     if check is not None:
         _out(identify(check).name)
@@ -204,7 +204,7 @@ def models(
 
 def doctor(json_output: Json = False, debug: Debug = False) -> int:
     """Say what is there, what is missing and how to get it."""
-    from stages.kit.running.diagnosis import diagnose
+    from stages.engine.diagnosis import diagnose
 
     checks = diagnose()
     if json_output:
@@ -221,7 +221,7 @@ def schemas(
     out: Annotated[Path, typer.Option("--out", help="Folder.")] = Path("schemas/json"), debug: Debug = False
 ) -> int:
     """Export the JSON Schemas of the manifest and every payload file."""
-    from stages.kit.running.json_schemas import json_schemas
+    from stages.engine.json_schemas import json_schemas
 
     out.mkdir(parents=True, exist_ok=True)
     for name, text in json_schemas().items():
@@ -235,8 +235,8 @@ def makefile(
     debug: Debug = False,
 ) -> int:
     """Print the makefile of a pipeline."""
-    from stages.kit.running.make_rules import makefile_for
-    from stages.kit.running.pipelines import pipeline_path, read_pipeline
+    from stages.engine.make_rules import makefile_for
+    from stages.engine.pipelines import pipeline_path, read_pipeline
 
     sys.stdout.write(makefile_for(read_pipeline(pipeline_path(pipeline))))
     return 0

@@ -35,10 +35,10 @@ def inspect(
     Exits with 3 when it would be.
     """
     from schemas.sequence import Sequence
+    from stages.engine.reading import open_artifact
     from stages.ingest.preflight.inspection import inspect_log, inspect_sequence
     from stages.ingest.preflight.settings import ingest_parameters
     from stages.kit.progress import progress_for
-    from stages.kit.running.reading import open_artifact
 
     progress = progress_for(sys.stderr.isatty(), quiet=quiet or json_output)
     if not (path / MANIFEST_NAME).exists():

@@ -43,7 +43,7 @@ def run(arguments: list[str]) -> int:
     from typer.exceptions import TyperException
 
     from schemas.errors import ScenewrightError
-    from stages.kit.running import interruption
+    from stages.engine import interruption
 
     debug = "--debug" in arguments
     _set_up_logging(logging.WARNING if "--quiet" in arguments else logging.DEBUG if debug else logging.INFO)
@@ -107,7 +107,7 @@ def _keep_standard_output_for_data() -> None:
 def main() -> None:
     """Run the command line of this process."""
     _refuse_foreign_packages()
-    from stages.kit.running import interruption
+    from stages.engine import interruption
 
     try:
         interruption.install()

@@ -16,10 +16,10 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from schemas.errors import UsageError
+from stages.engine.memory_limit import parse_limit
+from stages.engine.runner import RunResult, run_stage
+from stages.kit.configuration import parameters_for, read_config
 from stages.kit.progress import progress_for
-from stages.kit.running.configuration import parameters_for, read_config
-from stages.kit.running.memory_limit import parse_limit
-from stages.kit.running.runner import RunResult, run_stage
 from stages.kit.stage import External, Optionally, Stage
 
 OUTCOME_EXIT_CODE = 4

@@ -17,7 +17,7 @@ def timeline(
     """Say what appeared, went, was renamed and was attached elsewhere while mapping went on, a line for each change."""
     from schemas.contact_graph import ContactGraph, GraphSnapshot
     from schemas.errors import BadInput
-    from stages.kit.running.reading import open_artifact
+    from stages.engine.reading import open_artifact
 
     artifact = open_artifact(folder, ContactGraph)
     grown = artifact.timeline if isinstance(artifact, ContactGraph) else None

@@ -30,7 +30,7 @@ def urdf_check(
 
     problems = check_urdf(file, root)
     if not problems:
-        from stages.kit.simulation.rest_penetration import resting_penetrations
+        from stages.urdf.rest_penetration import resting_penetrations
 
         problems = [
             Problem("penetration", f"link {p.first!r}", f"lies {1000 * p.depth:.1f} mm in link {p.second!r} at rest")

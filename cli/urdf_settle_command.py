@@ -30,12 +30,12 @@ def urdf_settle(
     through the floor, for each joint that meets something in the first tenth of its range, and for each pair of bodies
     more than 5 mm in each other. Exits with 3 when there is any.
     """
-    from stages.kit.simulation.settle_report import SettleReport, settle_report
+    from stages.urdf.settle_report import SettleReport, settle_report
 
     limits = {"moved_limit": moved, "turned_limit": math.radians(turned)}
     report: SettleReport = settle_report(scene, seconds if engine == "bullet" else 0.0, **limits)
     if engine == "mujoco":
-        from stages.kit.simulation.mujoco_settle import mujoco_motions
+        from stages.urdf.mujoco_settle import mujoco_motions
 
         report = replace(report, seconds=seconds, bodies=mujoco_motions(scene, seconds, **limits))
     lines = [f"{body.name}: falls through the floor" for body in report.unsettled if body.fell_through]

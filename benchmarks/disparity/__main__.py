@@ -20,10 +20,10 @@ import numpy as np
 from benchmarks.disparity.arms import DERIVED, WORDS, Arm, arms_of
 from benchmarks.disparity.cases import CASES, Pair, Setting
 from stages.disparity.raft.matching import SMALL_UPDATES
+from stages.disparity.search_range import search_range
+from stages.disparity.semi_global import gray_of
 from stages.kit.stereo.disparity_map import DisparityMap
 from stages.kit.stereo.pictures import confidence_colors, disparity_colors
-from stages.kit.stereo.search_range import search_range
-from stages.kit.stereo.semi_global import gray_of
 
 MEASURES = {
     "bad2": "bad-2, of known [%]",

@@ -11,8 +11,8 @@ import numpy as np
 from stages.disparity.parameters import DisparityParameters
 from stages.disparity.raft.checkpoint import load_network
 from stages.disparity.raft.matching import estimated, larger, moved_right, open_raft, smaller, start_of
+from stages.disparity.semi_global import SemiGlobalSettings, gray_of, match
 from stages.kit.stereo.disparity_map import DisparityMap
-from stages.kit.stereo.semi_global import SemiGlobalSettings, gray_of, match
 
 Arm = Callable[[np.ndarray, np.ndarray, tuple[int, int]], DisparityMap]
 TRUSTED: float = DisparityParameters().minimum_confidence  # type: ignore[call-arg]

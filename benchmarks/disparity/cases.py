@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 
 from benchmarks.disparity.rendered_pairs import kept, made, needle_stem, room_stems
+from stages.disparity.rectification import matched_features
+from stages.disparity.semi_global import gray_of
 from stages.kit.formats.frames import FrameReader
-from stages.kit.stereo.rectification import matched_features
-from stages.kit.stereo.semi_global import gray_of
 from stages.suture.world.tubes import NEEDLE, THREAD
 
 ROOM_SEEDS = (1000,)

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.disparity.rendered_pairs import made
+from stages.engine.chain import run_pipeline
+from stages.engine.pipelines import Pipeline, pipeline_path, read_pipeline
 from stages.kit.formats.frames import FrameReader
-from stages.kit.running.chain import run_pipeline
-from stages.kit.running.pipelines import Pipeline, pipeline_path, read_pipeline
 
 ARMS = ("two_eyes", "depth_camera")
 SEEDS, QUICK_SEEDS = (1100,), (100,)

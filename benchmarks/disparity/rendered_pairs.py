@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 
 from schemas.errors import BadInput
+from stages.engine.chain import run_command
 from stages.kit.formats.frames import FrameReader
-from stages.kit.running.chain import run_command
 from stages.suture.rig import TWO_CAMERAS, StereoRig
 from stages.suture.world.render import render
 from stages.suture.world.sampling import seen_scene

@@ -29,15 +29,15 @@ from benchmarks.graph.rooms import (
 )
 from schemas.contact_graph import ContactGraphFile
 from schemas.kinds import PanopticMap, Segments, Sequence
+from stages.engine.reading import open_artifact
 from stages.evaluate.correspondence import point_overlaps
 from stages.evaluate.truth import TrueRoom
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.stage import run as fuse
 from stages.graph.parameters import GraphParameters
 from stages.graph.stage import run as build_graph
+from stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
 from stages.kit.formats.ply_files import read_ply
-from stages.kit.measurement.plots import SERIES_COLORS, STYLE, plt, save
-from stages.kit.running.reading import open_artifact
 
 ROOMS = (("kitchen", 2000), ("office", 2000))
 FRAMES, SIZE = 60, (640, 480)

@@ -28,11 +28,11 @@ from benchmarks.scene.perfect_maps import perfect_map
 from schemas.contact_graph import ContactGraphFile
 from schemas.kinds import GroundTruth
 from schemas.scene_parts import Relation
+from stages.engine.reading import open_artifact
 from stages.evaluate.graph_measures import GraphComparison, optional_nodes
 from stages.evaluate.truth import TrueRoom
 from stages.graph.parameters import GraphParameters
 from stages.graph.stage import run as build_graph
-from stages.kit.running.reading import open_artifact
 
 METHODS: tuple[Literal["ours", "thesis"], ...] = ("ours", "thesis")
 TUNING, REPORTING = (40, 41, 42, 43), (1000, 1001, 1002, 1003)

@@ -13,13 +13,13 @@ import numpy as np
 
 from schemas.contact_graph import ContactGraphFile
 from schemas.kinds import GroundTruth
+from stages.engine.chain import run_command
+from stages.engine.reading import open_artifact
 from stages.evaluate.graph_measures import GraphComparison, compare_graphs, optional_nodes
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.truth import TrueRoom, load_truth
 from stages.kit.measurement.edge_agreement import BESIDE_THE_TREE, DIRECTED, EdgeAgreement, edge_agreement
 from stages.kit.progress import SilentProgress
-from stages.kit.running.chain import run_command
-from stages.kit.running.reading import open_artifact
 from stages.kit.stage import Context
 
 OPTIONS = EvaluateParameters.model_validate({})

@@ -15,6 +15,7 @@ from benchmarks.mapping.rooms import RoomFolder
 from schemas.kinds import GroundTruth, PanopticMap
 from schemas.kinds import Sequence as SequenceArtifact
 from schemas.vocabulary import load_vocabulary
+from stages.engine.reading import open_artifact
 from stages.evaluate.graph_measures import box_candidates
 from stages.evaluate.map_measures import (
     instance_candidates,
@@ -33,7 +34,6 @@ from stages.kit.formats.frames import Frame, FrameReader
 from stages.kit.measurement.average_precision import Candidates
 from stages.kit.measurement.panoptic_quality import ClassQuality
 from stages.kit.progress import SilentProgress
-from stages.kit.running.reading import open_artifact
 from stages.kit.stage import Context
 from stages.segment.choice import BackendRequest, choose_backend
 from stages.segment.fusion import fuse

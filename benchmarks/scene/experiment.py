@@ -23,6 +23,7 @@ from schemas.panoptic_map import PanopticMap
 from stages.cad.candidates import Shortlist
 from stages.cad.model_surfaces import ModelSurface
 from stages.cad.stage import choose_and_write, find_candidates
+from stages.engine.reading import open_artifact
 from stages.evaluate.correspondence import point_overlaps
 from stages.evaluate.map_measures import label_true_points, load_map
 from stages.evaluate.parameters import EvaluateParameters
@@ -30,10 +31,9 @@ from stages.evaluate.replacement_measures import ObjectResult, replacements_of
 from stages.evaluate.truth import TrueRoom, load_truth
 from stages.graph.stage import run as build_graph
 from stages.kit.progress import SilentProgress
-from stages.kit.running.reading import open_artifact
-from stages.kit.simulation.settle_report import SettleReport, settle_report
 from stages.kit.stage import Context
 from stages.urdf.parameters import UrdfParameters
+from stages.urdf.settle_report import SettleReport, settle_report
 from stages.urdf.stage import run as write_urdf
 
 

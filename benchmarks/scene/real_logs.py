@@ -24,10 +24,10 @@ from schemas.cad_library import CadLibrary
 from schemas.ground_truth import GroundTruth
 from schemas.panoptic_map import PanopticMap
 from stages.cad.stage import run as replace_objects
+from stages.engine.reading import open_artifact
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.truth import load_truth
 from stages.graph.stage import run as build_graph
-from stages.kit.running.reading import open_artifact
 
 ANNOTATIONS = Path(__file__).resolve().parents[2] / "data" / "annotations" / "real"
 

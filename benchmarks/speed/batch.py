@@ -33,14 +33,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from stages.engine.batch.expansion import Batch, PlannedRun, make_jobs, read_batch, scene_command
+from stages.engine.batch.job import Job
+from stages.engine.batch.local_executor import LocalExecutor, processors
+from stages.engine.batch.results import SceneResult
+from stages.engine.batch.scheduler import run_jobs
+from stages.engine.batch.session import BatchEnd, run_batch
+from stages.engine.chain import REPOSITORY
 from stages.kit.measurement.tables import Table, as_markdown
-from stages.kit.running.batch.expansion import Batch, PlannedRun, make_jobs, read_batch, scene_command
-from stages.kit.running.batch.job import Job
-from stages.kit.running.batch.local_executor import LocalExecutor, processors
-from stages.kit.running.batch.results import SceneResult
-from stages.kit.running.batch.scheduler import run_jobs
-from stages.kit.running.batch.session import BatchEnd, run_batch
-from stages.kit.running.chain import REPOSITORY
 
 AIM_EFFICIENCY = 1.8
 """Scenes per second on two cores over those on one."""

@@ -4,7 +4,7 @@
 
 Arms: `plain` (convex segments, one merging pass), `geometric` (patches over the table, geometry and colour, a table of
 rules), `ours` (the same patches, trained trees). Cases: `learn`, on which constants were set and trees trained, and
-`test`. Measures: stages/kit/measurement/object_masks.py; objects are label // 10 from 2 up, parts the raw labels.
+`test`. Measures: benchmarks/tables/object_masks.py; objects are label // 10 from 2 up, parts the raw labels.
 Writes metrics.json, table.md and frames.png, the worst and the best frames.
 """
 
@@ -23,11 +23,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from benchmarks.tables.object_masks import ObjectMaskScore, score_object_masks
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
+from stages.kit.drawing.palette import instance_color
 from stages.kit.measurement.bootstrap import bootstrap_interval
-from stages.kit.measurement.object_masks import ObjectMaskScore, score_object_masks
-from stages.kit.measurement.palette import instance_color
 from stages.segment.objects.backend import BUNDLED
 from stages.segment.objects.boosting import read_trees
 from stages.segment.objects.pairs import FEATURES

@@ -27,15 +27,15 @@ import cv2
 import numpy as np
 
 from benchmarks.mapping.rooms import REPORTING, make_room
+from benchmarks.tables.object_masks import score_object_masks
 from schemas.kinds import Sequence
 from schemas.scene_parts import Camera
 from schemas.vocabulary import load_vocabulary
+from stages.engine.chain import run_command
+from stages.engine.reading import open_artifact
+from stages.kit.drawing.palette import entity_color
 from stages.kit.formats.frames import Frame, FrameReader
-from stages.kit.measurement.object_masks import score_object_masks
-from stages.kit.measurement.palette import entity_color
 from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
-from stages.kit.running.chain import run_command
-from stages.kit.running.reading import open_artifact
 from stages.segment.fusion import fuse
 from stages.segment.geometric import segment_depth
 from stages.segment.network.backend import Predictor, load_predictor

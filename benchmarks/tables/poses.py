@@ -26,20 +26,20 @@ import numpy as np
 
 from benchmarks.mapping.drift import drifting_poses
 from schemas.kinds import GroundTruth, Segments, Sequence, Trajectory
+from stages.engine.chain import run_command
+from stages.engine.reading import open_artifact
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.stage import run as evaluate
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.stage import run as fuse
+from stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
 from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.trajectories import read_tum, write_tum
 from stages.kit.geometry.cameras import intrinsic_matrix
 from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.measurement.plots import SERIES_COLORS, STYLE, plt, save
 from stages.kit.measurement.pose_error import align_rigidly, associate, trajectory_error
 from stages.kit.measurement.relative_pose_error import trajectory_drift
 from stages.kit.progress import SilentProgress
-from stages.kit.running.chain import run_command
-from stages.kit.running.reading import open_artifact
 from stages.kit.stage import Context
 from stages.poses.alignment import judge
 from stages.poses.parameters import PosesParameters

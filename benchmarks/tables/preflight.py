@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from schemas.scene_parts import Camera
+from stages.engine.chain import run_command
 from stages.ingest.detection import open_log
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.pose_conventions import BODY_FROM_OPTICAL, MIRROR_Y, OPENGL_AXES
@@ -28,7 +29,6 @@ from stages.ingest.preflight.report import CameraReport, InspectionReport
 from stages.ingest.source import Entry, LoadedFrame, LogSource
 from stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion
 from stages.kit.progress import SilentProgress
-from stages.kit.running.chain import run_command
 
 EXPECTATIONS = Path(__file__).resolve().parent.parent / "expectations" / "real.toml"
 REPORTED_SEEDS = range(200, 212)

@@ -19,9 +19,9 @@ import trimesh
 
 from schemas.kinds import ContactGraph, PanopticMap, Sequence
 from schemas.scene_parts import TREE_RELATIONS
-from stages.kit.running.chain import run_pipeline
-from stages.kit.running.pipelines import pipeline_path, read_pipeline
-from stages.kit.running.reading import open_artifact
+from stages.engine.chain import run_pipeline
+from stages.engine.pipelines import pipeline_path, read_pipeline
+from stages.engine.reading import open_artifact
 
 EXPECTATIONS = Path(__file__).resolve().parent.parent / "expectations" / "real.toml"
 MAXIMUM_FLOOR_HEIGHT = 0.03

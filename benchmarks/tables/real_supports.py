@@ -24,12 +24,12 @@ from benchmarks.tables.tabletop_maps import context_in
 from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth
 from schemas.kinds import PanopticMap, Sequence
+from stages.engine.reading import open_artifact
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.stage import run as evaluate
 from stages.graph.parameters import GraphParameters
 from stages.graph.stage import run as graph_of
 from stages.kit.formats.mesh_files import read_mesh
-from stages.kit.running.reading import open_artifact
 from stages.truth.annotated_points import instances_of
 from stages.truth.parameters import SupportsParameters
 from stages.truth.support_annotation import SupportAnnotation, read_support_annotation

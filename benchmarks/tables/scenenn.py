@@ -21,6 +21,8 @@ from benchmarks.tables.scenenn_scenes import Scene, find_scene
 from benchmarks.tables.scenenn_tables import ALL, Outcome, all_figures, make_tables, read_published
 from schemas.contact_graph import ContactGraphFile
 from schemas.kinds import ContactGraph, GroundTruth, PanopticMap
+from stages.engine.chain import run_command
+from stages.engine.reading import open_artifact
 from stages.evaluate.graph_measures import box_candidates
 from stages.evaluate.map_measures import (
     PredictedMap,
@@ -34,8 +36,6 @@ from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.results import Part
 from stages.evaluate.truth import load_truth
 from stages.kit.measurement.tables import as_markdown
-from stages.kit.running.chain import run_command
-from stages.kit.running.reading import open_artifact
 from stages.kit.stage import Parameters
 
 WHAT_TO_FETCH = (

@@ -17,8 +17,8 @@ from pathlib import Path
 from benchmarks.training.samples import FrameSet
 from benchmarks.training.validation import KNOWN, quality_of
 from schemas.vocabulary import load_vocabulary
+from stages.engine.chain import run_command
 from stages.kit.measurement.panoptic_quality import average_quality
-from stages.kit.running.chain import run_command
 from stages.segment.network.backend import load_predictor
 
 LIBRARY_SEED, LIBRARY_SHAPES = 41, 12

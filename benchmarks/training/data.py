@@ -26,13 +26,13 @@ from benchmarks.training.clutter import Thing, height_map, primitives, put_down
 from schemas.errors import BadInput
 from schemas.kinds import CadLibrary
 from schemas.scene_parts import Camera
+from stages.engine.reading import open_artifact
 from stages.kit.geometry.transforms import look_at, transform_from_yaw
 from stages.kit.rendering.depth_noise import DepthCamera, disturb_depth
 from stages.kit.rendering.light_map import AreaLight
 from stages.kit.rendering.patterns import PATTERNS, Material
 from stages.kit.rendering.ray_casting import Rendering, SceneRenderer
 from stages.kit.rendering.surfaces import TriangleSoup
-from stages.kit.running.reading import open_artifact
 from stages.synthesize.arrangement import Arrangement, arrange, world_meshes
 from stages.synthesize.furniture import Catalogue
 from stages.synthesize.recipes import load_recipe, recipe_names

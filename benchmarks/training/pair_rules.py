@@ -20,9 +20,9 @@ import numpy as np
 from scipy.optimize import minimize
 
 from benchmarks.tables.mosd import CAMERA, LabelledFrame, read_frames
+from benchmarks.tables.object_masks import score_object_masks
 from benchmarks.training.tabletop_pairs import FOLDS, GENERATED, GENERATED_QUICK, generated_frames
 from schemas.errors import BadInput
-from stages.kit.measurement.object_masks import score_object_masks
 from stages.segment.objects.grouping import Recording
 from stages.segment.objects.rules import (
     APART,

@@ -22,10 +22,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.tables.mosd import CAMERA, LabelledFrame, read_frames
+from benchmarks.tables.object_masks import score_object_masks
 from benchmarks.training.tabletops import make_tabletop
 from benchmarks.training.tree_growing import grow_trees
 from schemas.errors import BadInput
-from stages.kit.measurement.object_masks import score_object_masks
 from stages.segment.objects.backend import BUNDLED
 from stages.segment.objects.boosting import NO_TREES, Trees, write_trees
 from stages.segment.objects.grouping import Recording

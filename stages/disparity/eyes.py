@@ -13,9 +13,9 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from schemas.sequence import Sequence
 from stages.disparity.parameters import DisparityParameters
+from stages.disparity.rectification import RowCheck, check_rows, matched_features
+from stages.disparity.semi_global import gray_of
 from stages.kit.formats.frames import FrameReader
-from stages.kit.stereo.rectification import RowCheck, check_rows, matched_features
-from stages.kit.stereo.semi_global import gray_of
 
 LOOKED_AT = 6
 """Frames of a camera whose features are matched."""

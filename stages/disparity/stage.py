@@ -13,17 +13,17 @@ import numpy as np
 from schemas.disparity import Disparity, DisparityFile, FrameDisparity, RowReport
 from schemas.errors import BadInput
 from schemas.sequence import Sequence, SequenceFile
+from stages.disparity import semi_global
 from stages.disparity.eyes import check_eyes, is_blank, stereo_cameras
 from stages.disparity.parameters import DisparityParameters
+from stages.disparity.rectification import straightened
+from stages.disparity.search_range import search_range
 from stages.kit.formats.disparity_file import DisparityWriter
 from stages.kit.formats.foxglove import nanoseconds
 from stages.kit.formats.frames import Frame, FrameReader, FrameWriter
 from stages.kit.formats.trajectories import write_tum
 from stages.kit.stage import Context
-from stages.kit.stereo import semi_global
 from stages.kit.stereo.disparity_map import DisparityMap, depth_of
-from stages.kit.stereo.rectification import straightened
-from stages.kit.stereo.search_range import search_range
 
 Matcher = Callable[[np.ndarray, np.ndarray, tuple[int, int]], DisparityMap]
 """Left and right (H, W, 3) uint8 RGB, and the limits of the search -> map."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from stages.disparity.parameters import DisparityParameters
-from stages.kit.running.keys import library_version
+from stages.kit.library_versions import library_version
 
 
 def versions(parameters: DisparityParameters) -> dict[str, str]:

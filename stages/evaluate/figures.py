@@ -11,11 +11,11 @@ from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import Box
 from stages.evaluate.graph_measures import GraphComparison, upright
 from stages.evaluate.truth import stuff_classes
+from stages.kit.drawing.palette import instance_color
+from stages.kit.drawing.plots import plot_bars, plot_floor_plan, plot_graphs, plot_histograms
 from stages.kit.geometry.boxes import footprint
 from stages.kit.measurement.edge_agreement import edge_errors
-from stages.kit.measurement.palette import instance_color
 from stages.kit.measurement.panoptic_quality import ClassQuality
-from stages.kit.measurement.plots import plot_bars, plot_floor_plan, plot_graphs, plot_histograms
 
 MISSED, WRONG = "#b3261e", "#c2571a"
 

@@ -14,8 +14,8 @@ from scipy.spatial import cKDTree
 
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile
 from schemas.scene_parts import TREE_RELATIONS
+from stages.evaluate.color_difference import color_difference, mean_lab
 from stages.evaluate.model_shapes import ModelShape, PlacedShape, supporting_area
-from stages.kit.measurement.color_difference import color_difference, mean_lab
 
 SIZE_RATIO = 0.20
 """An extent is similar within this share of the true one ..."""

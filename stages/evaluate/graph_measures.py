@@ -11,6 +11,7 @@ from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.ground_truth import TrueObject
 from schemas.scene_parts import Box
 from stages.evaluate.correspondence import merge_stuff_nodes, node_affinity
+from stages.evaluate.graph_edit_distance import EditDistance, graph_edit_distance, support_tree
 from stages.evaluate.map_measures import precision_table, record_precision
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.results import Part
@@ -18,7 +19,6 @@ from stages.evaluate.truth import TrueRoom, thing_classes
 from stages.kit.geometry.boxes import box_iou, box_yaw, turned_to
 from stages.kit.measurement.average_precision import Candidates, class_precision
 from stages.kit.measurement.edge_agreement import edge_agreement
-from stages.kit.measurement.graph_edit_distance import EditDistance, graph_edit_distance, support_tree
 from stages.kit.measurement.tables import Table
 
 ANY_CLASS = "any"

@@ -8,13 +8,14 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.panoptic_map import EntitiesFile, PanopticMap
+from stages.evaluate.mesh_distance import distances_to_mesh, surface_agreement
 from stages.evaluate.parameters import EvaluateParameters
+from stages.evaluate.point_labels import nearest_labels
 from stages.evaluate.results import Part
 from stages.evaluate.surfaces import Surface, read_surface
 from stages.evaluate.truth import TrueRoom, stuff_classes
 from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.measurement.average_precision import Candidates, ClassPrecision, class_precision, mean_precision
-from stages.kit.measurement.mesh_distance import distances_to_mesh, surface_agreement
 from stages.kit.measurement.panoptic_quality import (
     ClassQuality,
     average_quality,
@@ -24,7 +25,6 @@ from stages.kit.measurement.panoptic_quality import (
     overlaps,
     panoptic_quality,
 )
-from stages.kit.measurement.point_labels import nearest_labels
 from stages.kit.measurement.tables import Cell, Table
 
 ANY_CLASS = "any"

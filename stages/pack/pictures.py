@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 from PIL import Image
 
-from stages.kit.measurement.plan_tree import CUT, REACHED, UNMET, Branch, plan_tree
+from stages.kit.drawing.plan_tree import CUT, REACHED, UNMET, Branch, plan_tree
 from stages.pack.environment import PackingWorld, clipped
 from stages.pack.hand import held_block, place_tool_pose
 from stages.pack.loop import PackingRun

@@ -9,9 +9,9 @@ import numpy as np
 from schemas.segments import FrameSegment, Segments
 from schemas.sequence import Sequence
 from schemas.vocabulary import load_vocabulary
+from stages.kit.drawing.palette import entity_color, hex_color, instance_color
 from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.masks import PanopticReader
-from stages.kit.measurement.palette import entity_color, hex_color, instance_color
 from stages.report.images import Picture, jpeg
 
 

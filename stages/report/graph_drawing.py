@@ -9,9 +9,9 @@ from pathlib import Path
 
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.scene_parts import TREE_RELATIONS, Relation
-from stages.kit.measurement.palette import entity_color, hex_color
+from stages.kit.drawing.palette import entity_color, hex_color
+from stages.kit.drawing.tree_layout import tree_layout
 from stages.kit.measurement.relation_evidence import evidence
-from stages.kit.measurement.tree_layout import tree_layout
 
 ROW = 30
 LETTER = 7.1

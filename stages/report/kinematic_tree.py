@@ -9,8 +9,8 @@ from xml.etree.ElementTree import Element
 
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile
 from schemas.scene_parts import TREE_RELATIONS
-from stages.kit.measurement.palette import entity_color, hex_color
-from stages.kit.measurement.tree_layout import tree_layout
+from stages.kit.drawing.palette import entity_color, hex_color
+from stages.kit.drawing.tree_layout import tree_layout
 from stages.kit.simulation.urdf_split import PART_SEPARATOR, owner_of_link, read_urdf
 from stages.report.graph_drawing import GAP, LETTER, ROW, DrawnEdge, DrawnNode, elbow
 

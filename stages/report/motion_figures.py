@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from schemas.plan import Plan, PlanFile, TriedPlan
+from stages.kit.drawing.plan_tree import REACHED, Branch, plan_tree
 from stages.kit.formats.numpy_files import read_arrays
-from stages.kit.measurement.plan_tree import REACHED, Branch, plan_tree
 
 WIDTH, HEIGHT = 10.0, 5.4
 """[inch]"""

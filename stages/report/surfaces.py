@@ -15,10 +15,10 @@ from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth
 from schemas.panoptic_map import PanopticMap
 from schemas.vocabulary import load_vocabulary
+from stages.kit.drawing.palette import LAYOUT_COLORS, UNLABELLED, entity_color
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.measurement.cad_candidates import after_check
-from stages.kit.measurement.palette import LAYOUT_COLORS, UNLABELLED, entity_color
 from stages.kit.rendering.surfaces import TriangleSoup, build_soup, srgb_to_linear
 from stages.report.placed_models import ModelShelf
 

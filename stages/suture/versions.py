@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stages.kit.running.keys import library_version
+from stages.kit.library_versions import library_version
 from stages.suture.options import MaskOptions
 
 

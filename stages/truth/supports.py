@@ -19,9 +19,9 @@ from schemas.panoptic_map import PanopticMap
 from schemas.scene_parts import Box, Relation
 from schemas.sequence import Sequence
 from schemas.vocabulary import load_vocabulary
+from stages.kit.drawing.palette import instance_color
 from stages.kit.formats.ply_files import ColoredMesh, write_ply
 from stages.kit.geometry.boxes import is_round, minimum_box
-from stages.kit.measurement.palette import instance_color
 from stages.kit.stage import Context
 from stages.truth.annotated_points import SPACING, instances_of, seen_points
 from stages.truth.parameters import SupportsParameters

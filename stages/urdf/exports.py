@@ -6,12 +6,12 @@ from pathlib import Path
 
 from schemas.interactive_scene import InteractiveSceneFile
 from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.link_meshes import link_surfaces
-from stages.kit.formats.scene_glb import write_scene_glb
-from stages.kit.formats.scene_mcap import write_scene_mcap
-from stages.kit.formats.srdf_file import write_srdf
 from stages.kit.formats.urdf_file import parse_urdf
-from stages.kit.simulation.resting_contacts import resting_contacts
+from stages.urdf.link_meshes import link_surfaces
+from stages.urdf.resting_contacts import resting_contacts
+from stages.urdf.scene_glb import write_scene_glb
+from stages.urdf.scene_mcap import write_scene_mcap
+from stages.urdf.srdf_file import write_srdf
 
 
 def write_exports(root: Path, scene: InteractiveSceneFile) -> None:

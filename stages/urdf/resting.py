@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 from schemas.base import as_vector
 from stages.kit.formats.scene_bundle import BundleBody
 from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.simulation.settle_report import free_bodies
 from stages.kit.simulation.world import load_scene
+from stages.urdf.settle_report import free_bodies
 
 SECONDS = 3.0
 PADDING, SMALLEST_MOVE, SMALLEST_TURN = 0.002, 0.0005, np.radians(0.5)

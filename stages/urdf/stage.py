@@ -10,12 +10,12 @@ from schemas.errors import UsageError
 from schemas.interactive_scene import InteractiveScene
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.scene_bundle import write_scene_bundle
-from stages.kit.simulation.settle_report import settle_report
 from stages.kit.stage import Context
 from stages.urdf.bodies import scene_bodies
 from stages.urdf.exports import write_exports
 from stages.urdf.parameters import UrdfParameters
 from stages.urdf.resting import rested_bodies
+from stages.urdf.settle_report import settle_report
 
 
 def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) -> InteractiveScene:

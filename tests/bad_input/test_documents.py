@@ -17,9 +17,9 @@ from schemas.errors import BadInput, UsageError
 from schemas.kinds import KINDS
 from schemas.manifest import Manifest
 from schemas.panoptic_map import EntitiesFile
+from stages.engine.pipelines import read_pipeline
+from stages.kit.configuration import read_config
 from stages.kit.formats.cad_models import read_model
-from stages.kit.running.configuration import read_config
-from stages.kit.running.pipelines import read_pipeline
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 MODELS: dict[str, type[Model]] = {

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from stages.kit.running.configuration import parameters_for
+from stages.kit.configuration import parameters_for
 from tests.contract.probe_step import PROBE
 
 REPOSITORY = Path(__file__).resolve().parents[2]

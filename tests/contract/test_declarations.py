@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from schemas.kinds import KINDS
-from stages.kit.running.discovery import all_stages
-from stages.kit.running.json_schemas import json_schemas
-from stages.kit.running.keys import artifact_key
+from stages.engine.discovery import all_stages
+from stages.engine.json_schemas import json_schemas
+from stages.engine.keys import artifact_key
 from stages.kit.stage import Stage
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -61,8 +61,8 @@ def test_help_names_every_option(stage: Stage) -> None:
 def test_key_is_the_same_in_another_process(stage: Stage) -> None:
     here = artifact_key(stage, stage.parameters(), {"a": "b"}, 3, "cpu")
     there = python(
-        "from stages.kit.running.discovery import all_stages as s\n"
-        "from stages.kit.running.keys import artifact_key as k\n"
+        "from stages.engine.discovery import all_stages as s\n"
+        "from stages.engine.keys import artifact_key as k\n"
         f"stage = s()[{stage.name!r}]; print(k(stage, stage.parameters(), {{'a': 'b'}}, 3, 'cpu'))"
     )
     assert here == there
@@ -81,7 +81,7 @@ def test_help_loads_no_heavy_library() -> None:
 def test_a_new_folder_is_a_new_command(tmp_path: Path) -> None:
     """The whole registration of a step is its folder."""
     code = (
-        "import stages.kit.running.discovery as d, sys, pathlib, stages;"
+        "import stages.engine.discovery as d, sys, pathlib, stages;"
         f"root = pathlib.Path({str(tmp_path)!r}); d.STAGES_FOLDER = root; stages.__path__.insert(0, str(root));"
         "from cli.main import run; sys.exit(run(['brandnew', '--help']))"
     )

@@ -14,10 +14,10 @@ from schemas.base import Model
 from schemas.errors import BadInput, UsageError
 from schemas.manifest import MANIFEST_NAME, Manifest
 from schemas.migrations import MIGRATIONS, migration
-from stages.kit.running.digests import content_digest, record_files
-from stages.kit.running.migration import migrate
-from stages.kit.running.reading import open_artifact
-from stages.kit.running.verification import verify
+from stages.engine.digests import content_digest, record_files
+from stages.engine.migration import migrate
+from stages.engine.reading import open_artifact
+from stages.engine.verification import verify
 
 
 class Third(Model):

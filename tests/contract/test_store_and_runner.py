@@ -18,9 +18,9 @@ import pytest
 from schemas.errors import BadInput, MachineFailure, UsageError
 from schemas.manifest import MANIFEST_NAME, Manifest
 from schemas.vocabulary import VOCABULARY_FILE
-from stages.kit.running import store
-from stages.kit.running.runner import RunResult, run_stage
-from stages.kit.running.verification import verify
+from stages.engine import store
+from stages.engine.runner import RunResult, run_stage
+from stages.engine.verification import verify
 from tests.contract.probe_step import PROBE, ProbeParameters
 
 FORK = multiprocessing.get_context("fork")

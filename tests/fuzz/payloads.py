@@ -15,6 +15,11 @@ from schemas.base import Model
 from schemas.errors import BadInput, UsageError
 from schemas.kinds import KINDS
 from schemas.manifest import MANIFEST_NAME, Manifest
+from stages.engine import store
+from stages.engine.pipelines import read_pipeline
+from stages.engine.reading import check_hashes, open_artifact
+from stages.engine.verification import verify
+from stages.kit.configuration import read_config
 from stages.kit.formats.masks import PanopticReader, write_panoptic_zip
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.numpy_files import read_arrays
@@ -29,11 +34,6 @@ from stages.kit.formats.trajectories import (
 )
 from stages.kit.formats.urdf_check import check_urdf
 from stages.kit.formats.urdf_file import parse_urdf
-from stages.kit.running import store
-from stages.kit.running.configuration import read_config
-from stages.kit.running.pipelines import read_pipeline
-from stages.kit.running.reading import check_hashes, open_artifact
-from stages.kit.running.verification import verify
 from tests.fuzz.harness import Harness, as_file, chosen, scratch
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"

@@ -31,7 +31,7 @@ INSTRUMENTED = [
     "stages.kit.formats",
     "stages.kit.language",
     "stages.kit.services",
-    "stages.kit.running",
+    "stages.engine",
     "schemas",
 ]
 """Packages of ours whose branches a fuzzer watches."""

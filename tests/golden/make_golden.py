@@ -10,8 +10,8 @@ from pathlib import Path
 
 from schemas.kinds import KINDS
 from schemas.manifest import MANIFEST_NAME
-from stages.kit.running.digests import content_digest, record_files
-from stages.kit.running.reading import open_artifact
+from stages.engine.digests import content_digest, record_files
+from stages.engine.reading import open_artifact
 
 FOLDER = Path(__file__).resolve().parent
 LARGEST = 60_000

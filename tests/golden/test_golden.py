@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from schemas.kinds import KINDS
-from stages.kit.running.migration import migrate
-from stages.kit.running.reading import open_artifact
-from stages.kit.running.verification import verify
+from stages.engine.migration import migrate
+from stages.engine.reading import open_artifact
+from stages.engine.verification import verify
 
 FOLDER = Path(__file__).resolve().parent
 GOLDEN = sorted(path.parent for path in FOLDER.glob("v*/*/manifest.json"))

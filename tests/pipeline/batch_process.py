@@ -6,8 +6,8 @@ import signal
 import sys
 from pathlib import Path
 
-from stages.kit.running.batch.expansion import read_batch
-from stages.kit.running.batch.session import run_batch
+from stages.engine.batch.expansion import read_batch
+from stages.engine.batch.session import run_batch
 from tests.unit.batch.batches import program_command
 
 

@@ -21,12 +21,12 @@ import pytest
 
 from cli.batch_command import batch as batch_command
 from schemas.errors import MachineFailure, UsageError
-from stages.kit.running.batch.expansion import Batch, read_batch
-from stages.kit.running.batch.folder_lock import folder_lock
-from stages.kit.running.batch.local_executor import processors
-from stages.kit.running.batch.results import RESULTS_NAME, latest_by_job, read_results
-from stages.kit.running.batch.session import BatchEnd, collect_tasks, plan_batch, run_batch, run_task, write_array
-from stages.kit.running.reading import read_manifest
+from stages.engine.batch.expansion import Batch, read_batch
+from stages.engine.batch.folder_lock import folder_lock
+from stages.engine.batch.local_executor import processors
+from stages.engine.batch.results import RESULTS_NAME, latest_by_job, read_results
+from stages.engine.batch.session import BatchEnd, collect_tasks, plan_batch, run_batch, run_task, write_array
+from stages.engine.reading import read_manifest
 from tests.contract.test_command_line import REPOSITORY, scenewright
 from tests.unit.batch.batches import batch_of, lines_of, program_command, write_batch
 

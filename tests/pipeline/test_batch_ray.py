@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from stages.kit.running.batch.ray_executor import RayExecutor
-from stages.kit.running.batch.results import RESULTS_NAME, latest_by_job, read_results
-from stages.kit.running.batch.session import run_batch
-from stages.kit.running.batch.spec import RayOptions
+from stages.engine.batch.ray_executor import RayExecutor
+from stages.engine.batch.results import RESULTS_NAME, latest_by_job, read_results
+from stages.engine.batch.session import run_batch
+from stages.engine.batch.spec import RayOptions
 from tests.unit.batch.batches import batch_of, program_command
 
 ray = pytest.importorskip("ray", reason="the extra `cluster` is not installed")

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from schemas.errors import UsageError
-from stages.kit.running.batch import read_batch, worst_exit_code
-from stages.kit.running.chain import run_pipeline
-from stages.kit.running.make_rules import makefile_for
-from stages.kit.running.pipelines import (
+from stages.engine.batch import read_batch, worst_exit_code
+from stages.engine.chain import run_pipeline
+from stages.engine.make_rules import makefile_for
+from stages.engine.pipelines import (
     PIPELINES_FOLDER,
     pipeline_path,
     read_pipeline,

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from stages.kit.running.digests import content_digest, record_files
-from stages.kit.running.pipelines import pipeline_path, read_pipeline, resolve_variables, step_arguments
-from stages.kit.running.reading import open_artifact
-from stages.kit.running.verification import verify
+from stages.engine.digests import content_digest, record_files
+from stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables, step_arguments
+from stages.engine.reading import open_artifact
+from stages.engine.verification import verify
 from tests.contract.test_command_line import scenewright
 from tests.reliability.kill_chain import SIGNALS, run_trial
 

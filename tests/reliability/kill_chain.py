@@ -25,9 +25,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from schemas.manifest import MANIFEST_NAME, Manifest
-from stages.kit.running.digests import content_digest, record_files
-from stages.kit.running.pipelines import pipeline_path, read_pipeline, resolve_variables, step_arguments
-from stages.kit.running.reading import open_artifact
+from stages.engine.digests import content_digest, record_files
+from stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables, step_arguments
+from stages.engine.reading import open_artifact
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SMALL = {"frames": "16", "width": "160", "height": "120", "voxel_size": "0.05", "seed": "3"}
@@ -40,8 +40,8 @@ COMMIT_SECONDS = 0.06
 """About what hashing, flushing and exchanging takes in this chain."""
 PHASES = ("before work", "during work", "committing", "after")
 WITHOUT_EXCHANGE = (
-    "from stages.kit.running import interruption; interruption.install(); from cli.main import main; "
-    "import stages.kit.running.store as store; store.exchange = lambda first, second: False; main()"
+    "from stages.engine import interruption; interruption.install(); from cli.main import main; "
+    "import stages.engine.store as store; store.exchange = lambda first, second: False; main()"
 )
 """The command line on a file system that cannot exchange two folders in one step."""
 

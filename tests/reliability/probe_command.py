@@ -6,7 +6,7 @@ import importlib
 
 import cli.application
 from cli.main import main
-from stages.kit.running import runner
+from stages.engine import runner
 from tests.contract.probe_step import PROBE
 
 _import_module = importlib.import_module

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from stages.kit.running import interruption, store
+from stages.engine import interruption, store
 from tests.reliability.running import REPOSITORY
 
 PIPELINE = """

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from schemas.manifest import MANIFEST_NAME, Manifest
-from stages.kit.running.runner import run_stage
+from stages.engine.runner import run_stage
 from tests.contract.probe_step import PROBE, ProbeParameters
 from tests.reliability.kill_chain import (
     SIGNALS,

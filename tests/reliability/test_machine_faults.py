@@ -19,10 +19,10 @@ import pytest
 
 from schemas.errors import BadInput, MachineFailure, ScenewrightError, UsageError
 from schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME, Manifest
-from stages.kit.running import interruption, runner, store
-from stages.kit.running.reading import open_artifact
-from stages.kit.running.runner import RunResult, run_stage
-from stages.kit.running.verification import verify
+from stages.engine import interruption, runner, store
+from stages.engine.reading import open_artifact
+from stages.engine.runner import RunResult, run_stage
+from stages.engine.verification import verify
 from tests.contract.probe_step import PROBE, ProbeParameters
 from tests.reliability.running import (
     REPOSITORY,
@@ -584,7 +584,7 @@ def test_an_interruption_lost_in_a_finalizer_prints_nothing() -> None:
     """The interpreter prints what a finalizer raises; of a repeated interruption nothing, of anything else all."""
     script = (
         "import os, signal\n"
-        "from stages.kit.running import interruption\n"
+        "from stages.engine import interruption\n"
         "interruption.install()\n"
         "class Fails:\n"
         "    def __del__(self):\n"

@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 import torch
 
+from stages.disparity.consistency import confidence_of, left_right_difference
 from stages.disparity.raft.architecture import SMALL
 from stages.disparity.raft.checkpoint import load_network
 from stages.disparity.raft.network import RaftStereo
-from stages.kit.stereo.consistency import confidence_of, left_right_difference
+from stages.disparity.search_range import usual_range
+from stages.disparity.semi_global import gray_of, mirrored
 from stages.kit.stereo.disparity_map import DisparityMap
-from stages.kit.stereo.search_range import usual_range
-from stages.kit.stereo.semi_global import gray_of, mirrored
 
 UPDATES, SMALL_UPDATES = 32, 5
 """Updates of the disparity by default: of the authors' networks, and of the small one, which is trained with four."""

@@ -284,8 +284,6 @@ class StepReport(Model):
     step: str
     ready: bool
     missing: tuple[str, ...] = ()
-    available: bool = True
-    """Whether this version has the step."""
 
 
 class InspectionReport(Model):

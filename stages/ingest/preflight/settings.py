@@ -7,7 +7,7 @@ from typing import Any, get_origin
 
 from schemas.errors import UsageError
 from stages.ingest.parameters import STAGE, IngestParameters, check
-from stages.kit.running.configuration import parameters_for
+from stages.kit.configuration import parameters_for
 
 
 def ingest_parameters(pairs: Iterable[str]) -> IngestParameters:

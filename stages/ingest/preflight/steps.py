@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Set
 
 from stages.ingest.preflight.report import StepReport
-from stages.kit.running.discovery import all_stages
 
 NEEDS: dict[str, tuple[str, ...]] = {
     "ingest": ("usable frames",),
@@ -27,7 +26,6 @@ SUBSTITUTES = {"depth": ("disparity", "a stereo pair with a baseline"), "poses":
 
 def step_reports(have: Set[str]) -> tuple[StepReport, ...]:
     """Return a row per step for a log that has what `have` names."""
-    known = set(all_stages())
     rows = []
     for step, needs in NEEDS.items():
         word = step.split()[0]
@@ -37,9 +35,8 @@ def step_reports(have: Set[str]) -> tuple[StepReport, ...]:
                 continue
             maker, source = SUBSTITUTES.get(need, ("", ""))
             if maker and maker != word and source in have:
-                missing.append(f"{need} (make it with `{maker}`{'' if maker in known else ', not in this version'})")
+                missing.append(f"{need} (make it with `{maker}`)")
             else:
                 missing.append(need)
-        available = word == "run" or word in known
-        rows.append(StepReport(step=step, ready=not missing and available, missing=tuple(missing), available=available))
+        rows.append(StepReport(step=step, ready=not missing, missing=tuple(missing)))
     return tuple(rows)

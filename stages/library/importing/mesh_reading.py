@@ -14,8 +14,8 @@ import numpy as np
 import trimesh
 
 from schemas.errors import BadInput
-from stages.kit.formats.collada_file import parse_collada
 from stages.kit.formats.mesh_files import mesh_of_bytes, meshes_of_glb
+from stages.library.importing.collada_file import parse_collada
 from stages.library.importing.pictures import face_colors, read_picture
 from stages.library.importing.source_folder import SourceFolder
 from stages.library.importing.source_model import Declared, Surface, painted_faces

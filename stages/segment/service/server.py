@@ -15,7 +15,7 @@ import numpy as np
 from schemas.base import canonical_json
 from schemas.errors import MachineFailure, ScenewrightError
 from schemas.vocabulary import load_vocabulary
-from stages.kit.running.digests import sha256_of_text
+from stages.kit.digests import sha256_of_text
 from stages.segment.choice import Backend
 from stages.segment.geometric import GeometricSettings, segment_depth
 from stages.segment.service.protocol import (

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from schemas.suture_trial import SutureRun
-from stages.kit.measurement.plots import SERIES_COLORS, STYLE, plt, save
+from stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
 from stages.suture.evaluation.judgement import Estimate
 from stages.suture.motion.constants import THROWS
 

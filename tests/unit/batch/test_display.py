@@ -7,8 +7,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from stages.kit.running.batch.display import Count, LineDisplay, TableDisplay, describe, display_for
-from stages.kit.running.batch.scene_log import LOG_NAME, LogFollower
+from stages.engine.batch.display import Count, LineDisplay, TableDisplay, describe, display_for
+from stages.engine.batch.scene_log import LOG_NAME, LogFollower
 from tests.unit.batch.batches import job, result
 
 

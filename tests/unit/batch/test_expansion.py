@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.errors import UsageError
-from stages.kit.running.batch.expansion import make_jobs, read_batch, shuffled
-from stages.kit.running.batch.spec import (
+from stages.engine.batch.expansion import make_jobs, read_batch, shuffled
+from stages.engine.batch.spec import (
     BatchSpec,
     DataSpec,
     Limits,

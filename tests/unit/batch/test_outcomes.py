@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from stages.kit.running.batch.outcomes import MEANINGS, classify, is_explained, worst_exit_code
+from stages.engine.batch.outcomes import MEANINGS, classify, is_explained, worst_exit_code
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stages.kit.running.batch.quantities import (
+from stages.engine.batch.quantities import (
     format_bytes,
     format_seconds,
     parse_bytes,

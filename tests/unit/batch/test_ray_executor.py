@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from schemas.errors import MissingDependency, UsageError
-from stages.kit.running.batch.ray_executor import RayExecutor, fitting
-from stages.kit.running.batch.spec import RayOptions
+from stages.engine.batch.ray_executor import RayExecutor, fitting
+from stages.engine.batch.spec import RayOptions
 from tests.unit.batch.batches import job, result
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.errors import BadInput, MachineFailure
-from stages.kit.running.batch.results import ResultsFile, SceneResult, latest_by_job, parse_line, read_results
+from stages.engine.batch.results import ResultsFile, SceneResult, latest_by_job, parse_line, read_results
 from tests.unit.batch.batches import result
 
 

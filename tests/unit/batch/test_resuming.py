@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from stages.kit.running.batch.resuming import missing_jobs, reason_to_run
-from stages.kit.running.reading import read_manifest
+from stages.engine.batch.resuming import missing_jobs, reason_to_run
+from stages.engine.reading import read_manifest
 from tests.unit.batch.batches import job, result
 
 

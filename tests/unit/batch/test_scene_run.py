@@ -13,10 +13,10 @@ from pathlib import Path
 import psutil
 import pytest
 
-from stages.kit.running.batch.job import Job
-from stages.kit.running.batch.processes import created_at, descendants, resident_memory
-from stages.kit.running.batch.scene_log import LOG_NAME
-from stages.kit.running.batch.scene_run import LAUNCHER, PROCESS_NAME, run_scene, this_host
+from stages.engine.batch.job import Job
+from stages.engine.batch.processes import created_at, descendants, resident_memory
+from stages.engine.batch.scene_log import LOG_NAME
+from stages.engine.batch.scene_run import LAUNCHER, PROCESS_NAME, run_scene, this_host
 from tests.unit.batch.batches import PROGRAM, job
 
 

@@ -6,9 +6,9 @@ import time
 
 import pytest
 
-from stages.kit.running.batch.job import Job
-from stages.kit.running.batch.results import SceneResult
-from stages.kit.running.batch.scheduler import run_jobs
+from stages.engine.batch.job import Job
+from stages.engine.batch.results import SceneResult
+from stages.engine.batch.scheduler import run_jobs
 from tests.unit.batch.batches import FakeExecutor, job, result
 
 JOBS = [job(f"s{k}") for k in range(10)]

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.errors import UsageError
-from stages.kit.running.batch.results import ResultsFile, read_results
-from stages.kit.running.batch.slurm_executor import (
+from stages.engine.batch.results import ResultsFile, read_results
+from stages.engine.batch.slurm_executor import (
     merge_parts,
     parse_task,
     part_of,
@@ -20,7 +20,7 @@ from stages.kit.running.batch.slurm_executor import (
     task_count,
     write_scripts,
 )
-from stages.kit.running.batch.spec import SlurmOptions
+from stages.engine.batch.spec import SlurmOptions
 from tests.unit.batch.batches import job, result
 
 

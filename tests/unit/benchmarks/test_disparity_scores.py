@@ -13,8 +13,8 @@ from benchmarks.disparity.cases import Pair
 from benchmarks.disparity.reconstruction import depth_figures, pipeline_of
 from benchmarks.disparity.reconstruction import table as table_of_rooms
 from schemas.scene_parts import Camera
+from stages.engine.pipelines import resolve_variables, step_arguments
 from stages.kit.formats.frames import FrameWriter
-from stages.kit.running.pipelines import resolve_variables, step_arguments
 from stages.kit.stereo.disparity_map import DisparityMap
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.kit.stereo.consistency import confidence_of, left_right_difference, same_surface
+from stages.disparity.consistency import confidence_of, left_right_difference, same_surface
+from stages.disparity.search_range import search_range, usual_range
+from stages.disparity.semi_global import Effort, SemiGlobalSettings, match
+from stages.disparity.subpixel import UNLOCKED, smoothed, unlocked
 from stages.kit.stereo.disparity_map import depth_of
-from stages.kit.stereo.search_range import search_range, usual_range
-from stages.kit.stereo.semi_global import Effort, SemiGlobalSettings, match
-from stages.kit.stereo.subpixel import UNLOCKED, smoothed, unlocked
 from tests.unit.disparity.pairs import BASELINE, BOX_DISPARITY, CAMERA, pair
 
 LEFT, RIGHT, TRUTH, SEEN = pair()

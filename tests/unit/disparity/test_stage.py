@@ -190,7 +190,7 @@ def test_options_that_do_not_go_together(options: dict, inputs: dict, message: s
         check_inputs(DisparityParameters(**options), inputs)
 
 
-def test_inspect_calls_the_step_available() -> None:
+def test_inspect_offers_the_step() -> None:
     rows = {row.step: row for row in step_reports({"usable frames", "a stereo pair with a baseline", "colour"})}
-    assert rows["disparity"].ready and rows["disparity"].available
+    assert rows["disparity"].ready
     assert rows["segment"].missing == ("depth (make it with `disparity`)",)

@@ -20,7 +20,7 @@ from stages.disparity.raft.architecture import SMALL
 from stages.disparity.raft.checkpoint import load_network
 from stages.disparity.raft.matching import moved_right, open_raft
 from stages.disparity.raft.network import RaftStereo
-from stages.kit.running.chain import REPOSITORY
+from stages.engine.chain import REPOSITORY
 from tests.unit.disparity.pairs import pair
 
 PLAN = Plan(steps=4, shapes=1, rooms=0, needles=0, updates=2, seed=3, pairs=0)

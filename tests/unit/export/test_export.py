@@ -18,13 +18,13 @@ from scipy.spatial.transform import Rotation
 from schemas.errors import UsageError
 from schemas.manifest import MANIFEST_NAME, Manifest
 from schemas.sequence import Sequence
+from stages.engine.digests import content_digest, record_files
+from stages.engine.discovery import all_stages
+from stages.engine.runner import run_stage
+from stages.engine.verification import verify
 from stages.export.parameters import ExportParameters, check
 from stages.export.tum import LARGEST_MILLIMETRES, depth_units, stamp_text
 from stages.kit.formats.frames import FrameReader
-from stages.kit.running.digests import content_digest, record_files
-from stages.kit.running.discovery import all_stages
-from stages.kit.running.runner import run_stage
-from stages.kit.running.verification import verify
 from tests.unit.export.sequences import CAMERA, OTHER, export, png, write_sequence
 from tests.unit.ingest.tiny_room import camera_poses
 

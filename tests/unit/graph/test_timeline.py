@@ -10,13 +10,13 @@ from cli.timeline_command import timeline as timeline_command
 from schemas.contact_graph import ContactGraph, TimelineFile
 from schemas.errors import BadInput
 from schemas.panoptic_map import SNAPSHOTS, EntitiesFile, PanopticMap
+from stages.engine import reading
 from stages.graph import entities as entities_module
 from stages.graph.parameters import GraphParameters
 from stages.graph.stage import run
 from stages.graph.timeline import lasting_ids
 from stages.graph.tracks import CELL, cells_of
 from stages.kit.progress import SilentProgress
-from stages.kit.running import reading
 from stages.kit.stage import Context
 from tests.panoptic_maps import box_mesh, floor_mesh, table_mesh, write_map
 

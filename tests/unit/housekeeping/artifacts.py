@@ -9,7 +9,8 @@ from typing import Any
 from schemas.evaluation import MetricsFile
 from schemas.kinds import KINDS
 from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest, Provenance
-from stages.kit.running.digests import content_digest, external_digest, record_files
+from stages.engine.digests import content_digest, record_files
+from stages.kit.digests import external_digest
 
 
 def make_artifact(

@@ -16,10 +16,10 @@ import pytest
 from cli.main import run
 from schemas.errors import BadInput
 from schemas.manifest import MANIFEST_NAME, Manifest
-from stages.kit.running import collection
-from stages.kit.running.collection import collect, survey
-from stages.kit.running.runner import run_stage
-from stages.kit.running.verification import verify
+from stages.engine import collection
+from stages.engine.collection import collect, survey
+from stages.engine.runner import run_stage
+from stages.engine.verification import verify
 from tests.unit.housekeeping.artifacts import snapshot
 from tests.unit.housekeeping.small_step import SMALL, SmallParameters
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from cli.main import run
 from schemas.errors import BadInput
 from schemas.manifest import MANIFEST_NAME
-from stages.kit.running.comparison import Change, Figure, compare
+from stages.engine.comparison import Change, Figure, compare
 from tests.unit.housekeeping.artifacts import make_artifact, make_evaluation, snapshot
 
 FINITE = st.floats(-1e6, 1e6, allow_nan=False)

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from cli.main import run
 from schemas.errors import MachineFailure
-from stages.kit.running import estimation
-from stages.kit.running.discovery import all_stages
-from stages.kit.running.estimation import FORMULAS, Amount, Estimate, check, estimate, estimate_step, measured
-from stages.kit.running.pipeline_estimation import estimate_pipeline
-from stages.kit.running.pipelines import pipeline_path, read_pipeline, resolve_variables
+from stages.engine import estimation
+from stages.engine.discovery import all_stages
+from stages.engine.estimation import FORMULAS, Amount, Estimate, check, estimate, estimate_step, measured
+from stages.engine.pipeline_estimation import estimate_pipeline
+from stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables
 from tests.unit.export.sequences import write_sequence
 from tests.unit.housekeeping.artifacts import make_artifact
 from tests.unit.housekeeping.small_step import SMALL, SmallParameters
@@ -120,7 +120,7 @@ def test_dry_runs_say_what_it_costs(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 def test_steps_that_nobody_measured_just_run(tmp_path: Path) -> None:
-    from stages.kit.running.runner import run_stage
+    from stages.engine.runner import run_stage
 
     result = run_stage(SMALL, {}, tmp_path / "a", SmallParameters(), dry_run=True)
     assert result.estimate is None

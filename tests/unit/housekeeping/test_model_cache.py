@@ -10,9 +10,9 @@ import pytest
 
 from cli.main import run
 from schemas.errors import BadInput, MachineFailure, MissingDependency
-from stages.kit.running import model_cache
-from stages.kit.running.known_models import KnownModel
-from stages.kit.running.model_cache import add_model, cache_folder, cached_models, resolve_weights
+from stages.engine import model_cache
+from stages.engine.known_models import KnownModel
+from stages.engine.model_cache import add_model, cache_folder, cached_models, resolve_weights
 
 WEIGHTS = b"weights of a tiny network"
 KNOWN = KnownModel(

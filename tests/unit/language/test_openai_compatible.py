@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 from schemas.errors import BadInput, MissingDependency, UsageError
+from stages.kit.configuration import parameters_for
 from stages.kit.language.failures import LanguageFailed
 from stages.kit.language.messages import Image, say
 from stages.kit.language.openai_compatible import LARGEST_BODY
 from stages.kit.language.opening import open_chat
 from stages.kit.language.options import LanguageParameters
-from stages.kit.running.configuration import parameters_for
 from stages.kit.services.connection import HIDDEN, Connection
 from stages.kit.stage import Stage
 from stages.plan.parameters import STAGE as PLAN

@@ -17,13 +17,13 @@ from cli.main import run as command_line
 from schemas.cad_library import CadLibrary, CadModel, ImportedModel, ImportFile
 from schemas.errors import BadInput, MissingDependency
 from stages.kit.formats.cad_models import load_collision_parts, model_folder, part_transforms, posed_mesh, read_model
-from stages.kit.formats.collada_file import parse_collada
 from stages.kit.formats.urdf_check import check_urdf
 from stages.kit.geometry.transforms import apply
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.library.addition import run
 from stages.library.importing.classes import class_of
+from stages.library.importing.collada_file import parse_collada
 from stages.library.importing.discovery import find_models
 from stages.library.importing.frames import AXES, model_rotation
 from stages.library.importing.grouping import grouped, source_points

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.kit.measurement.color_difference import color_difference, lab_from_linear, linear_from_srgb, mean_lab
+from stages.evaluate.color_difference import color_difference, lab_from_linear, linear_from_srgb, mean_lab
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ import pytest
 
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from schemas.scene_parts import Relation
+from stages.kit.drawing.tree_layout import tree_layout
 from stages.kit.measurement.edge_agreement import edge_agreement, edge_errors
-from stages.kit.measurement.tree_layout import tree_layout
 
 CLASSES = {"floor": "layout", "wall": "layout", "desk": "rigid", "shelf": "rigid", "cup": "rigid", "board": "rigid"}
 

@@ -12,11 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from stages.evaluate.mesh_distance import distances_to_mesh, surface_agreement
+from stages.evaluate.point_labels import nearest_labels
+from stages.kit.drawing.palette import hex_color, instance_color
+from stages.kit.drawing.plots import plot_bars, plot_graphs
+from stages.kit.drawing.tree_layout import tree_layout
 from stages.kit.measurement.bootstrap import bootstrap_interval, figure_interval, paired_interval
-from stages.kit.measurement.mesh_distance import distances_to_mesh, surface_agreement
-from stages.kit.measurement.palette import hex_color, instance_color
-from stages.kit.measurement.plots import plot_bars, plot_graphs
-from stages.kit.measurement.point_labels import nearest_labels
 from stages.kit.measurement.pose_error import (
     align_rigidly,
     associate,
@@ -27,7 +28,6 @@ from stages.kit.measurement.pose_error import (
     yaw_of,
 )
 from stages.kit.measurement.tables import Table, as_csv, as_markdown
-from stages.kit.measurement.tree_layout import tree_layout
 
 
 def test_yaw_error():

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.errors import BadInput
 from schemas.scene_parts import Relation
+from stages.evaluate.graph_edit_distance import SupportTree, graph_edit_distance, support_tree
 from stages.kit.measurement.edge_agreement import edge_agreement
-from stages.kit.measurement.graph_edit_distance import SupportTree, graph_edit_distance, support_tree
 
 
 def tree(*nodes: tuple[str, str, str]) -> SupportTree:

@@ -13,9 +13,9 @@ import pytest
 
 from schemas.errors import BadInput, MissingDependency, UsageError
 from schemas.vocabulary import load_vocabulary
+from stages.engine.hub_cache import is_hub_id
+from stages.engine.model_cache import resolve_weights
 from stages.kit.formats.frames import Frame
-from stages.kit.running.hub_cache import is_hub_id
-from stages.kit.running.model_cache import resolve_weights
 from stages.segment.choice import BackendRequest, choose_backend
 from stages.segment.huggingface import panoptic
 from stages.segment.huggingface.backend import make_backend

@@ -19,14 +19,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from cli.segmentation_server import open_server
 from schemas.errors import BadInput, MachineFailure, MissingDependency, ScenewrightError, UsageError
 from schemas.scene_parts import Camera
 from schemas.segments import Segments
 from schemas.vocabulary import load_vocabulary
+from stages.engine.keys import library_versions
 from stages.kit.formats.frames import Frame, FrameReader
 from stages.kit.formats.masks import encode_panoptic_png
 from stages.kit.progress import SilentProgress
-from stages.kit.running.keys import library_versions
 from stages.kit.services.connection import Connection
 from stages.kit.stage import Context
 from stages.segment.backend_names import BACKENDS, check_backend
@@ -44,7 +45,6 @@ from stages.segment.service.protocol import (
     split_multipart,
 )
 from stages.segment.service.server import SegmentationServer
-from stages.segment.service.serving import open_server
 from stages.segment.settings import geometric_settings
 from stages.segment.stage import run
 from tests.unit.segment.test_stage import Written, payload, write_sequence

@@ -11,7 +11,7 @@ import pytest
 from cli.main import run
 from schemas.contact_graph import SCENE_NODE
 from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.simulation.settle_report import SettleReport, settle_report
+from stages.urdf.settle_report import SettleReport, settle_report
 from tests.unit.simulation.handmade_scene import HandmadeBody, bottle, floor, fridge, kitchen, table, write_scene
 
 

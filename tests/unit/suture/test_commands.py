@@ -15,8 +15,8 @@ from schemas.sequence import SequenceFile
 from schemas.suture_needle import SutureNeedleFile
 from schemas.suture_scene import SutureScene, SutureSceneFile
 from schemas.suture_trial import SutureTrialFile
+from stages.engine.loading import LoadedSutureTrial, load
 from stages.kit.formats.frames import FrameWriter
-from stages.kit.running.loading import LoadedSutureTrial, load
 from stages.report.suture_section import tables_of
 from stages.suture.evaluation.thread_figures import thread_error
 from stages.suture.motion_reports import motions_to_last

@@ -10,8 +10,8 @@ import pytest
 from schemas.scene_parts import Box
 from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
 from stages.kit.geometry.transforms import transform_from_yaw
-from stages.kit.simulation.settle_report import settle_report
 from stages.urdf.resting import rested_bodies
+from stages.urdf.settle_report import settle_report
 from tests.unit.urdf.small_room import graph_of, layout
 
 

@@ -18,8 +18,8 @@ from stages.kit.formats.urdf_file import parse_urdf
 from stages.kit.geometry.solids import hull
 from stages.kit.geometry.substances import FRICTION_OF_LIKE, SUBSTANCES, substance_of
 from stages.kit.simulation.engine import engine
-from stages.kit.simulation.settle_report import settle_report
 from stages.kit.simulation.world import load_scene
+from stages.urdf.settle_report import settle_report
 
 CUP = Carried(Box(center=(0.3, 0.0, 0.8), size=(0.1, 0.1, 0.1)), height=0.75)
 

@@ -29,11 +29,11 @@ from schemas.panoptic_map import EntitiesFile, Entity
 from schemas.plan import Failure, PlanFile, PlannedAction
 from schemas.segments import FrameSegment, FrameSegments, SegmentsFile
 from schemas.sequence import Sequence
+from stages.engine.digests import content_digest, record_files
 from stages.kit.formats.frames import FrameWriter
 from stages.kit.formats.masks import write_panoptic_zip
 from stages.kit.formats.scene_bundle import write_scene_bundle
 from stages.kit.formats.trajectories import write_tum
-from stages.kit.running.digests import content_digest, record_files
 from tests.unit.disparity.pairs import pair, write_folder
 from tests.unit.disparity.running import matched
 from tests.unit.export.sequences import export

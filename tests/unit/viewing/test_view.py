@@ -9,6 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cli.viewing.canvas import import_rerun
+from cli.viewing.graph_view import relation_table
+from cli.viewing.library_view import row_places
+from cli.viewing.segments_view import segment_images
+from cli.viewing.view import VIEWERS, view_artifact
 from schemas.artifact import KINDS
 from schemas.cad_library import CadLibrary
 from schemas.contact_graph import ContactGraphFile
@@ -18,11 +23,6 @@ from schemas.scene_parts import Relation
 from stages.kit.formats.link_poses import joint_motion, link_poses
 from stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
 from stages.kit.measurement.relation_evidence import evidence
-from stages.kit.viewing.canvas import import_rerun
-from stages.kit.viewing.graph_view import relation_table
-from stages.kit.viewing.library_view import row_places
-from stages.kit.viewing.segments_view import segment_images
-from stages.kit.viewing.view import VIEWERS, view_artifact
 from tests.unit.viewing import artifacts
 from tests.unit.viewing.suture_artifacts import make_suture
 from tests.unit.viewing.tableware_artifacts import make_tableware

@@ -1,0 +1,1 @@
+"""The tables of the theses, and what the real logs give."""

@@ -1,0 +1,102 @@
+"""CAD scenes: chosen models where they stand, what else was tried, meshes that stayed, layout, the graph over them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from cli.viewing.canvas import Canvas
+from cli.viewing.graph_view import draw_graph
+from cli.viewing.inputs import input_artifact
+from cli.viewing.meshes import load_mesh
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import SURROUNDINGS, CadCandidate, CadScene, Replacement
+from stages.kit.formats.cad_models import read_model
+from stages.kit.formats.painted_models import painted_mesh
+from stages.kit.measurement.cad_candidates import candidates_of
+
+CANDIDATES = "candidates"
+"""Candidates that were not chosen lie below this path: drawn, but hidden at first, as they stand in the chosen ones."""
+DRAWN_CANDIDATES = 3
+"""Of each object, beside the chosen one."""
+
+
+def draw_cad_scene(cad_scene: CadScene, canvas: Canvas) -> None:
+    """Draw what stands for every node and the next candidates, with tables of decisions and candidates.
+
+    Candidates whose model the scene has no copy of come from the library that it was made from, where that is still
+    there.
+    """
+    library = input_artifact(cad_scene, CadLibrary)
+    roots = [cad_scene.path("models")] + ([library.path("models")] if library is not None else [])
+    rows = ["| node | decision | model | matching error | alignment error [m] |", "|---|---|---|---|---|"]
+    for replacement in cad_scene.scene.replacements:
+        chosen = replacement.chosen
+        _draw_candidates(replacement, roots, canvas)
+        if replacement.decision == "cad" and chosen is not None:
+            folder = roots[0] / chosen.model_id
+            _draw_model(f"cad/{replacement.node}", chosen, folder, canvas, replacement.part_colors)
+            errors = f"{chosen.matching_error:.3f} | {chosen.alignment_error:.3f}"
+            rows.append(f"| {replacement.node} | cad | {chosen.model_id} | {errors} |")
+            continue
+        group = "layout" if replacement.decision == "layout" else "meshes"
+        path = cad_scene.path(group) / f"{replacement.node}.ply"
+        if path.exists():
+            canvas.mesh(f"{group}/{replacement.node}", load_mesh(path), front_only=True)
+        rows.append(f"| {replacement.node} | {replacement.decision} | {replacement.reason} | | |")
+    nameless = cad_scene.path("meshes") / f"{SURROUNDINGS}.ply"
+    if nameless.exists():
+        canvas.mesh(SURROUNDINGS, load_mesh(nameless), front_only=True)
+    draw_graph(cad_scene.graph, canvas, CANDIDATES)
+    canvas.document("replacements", "\n".join(rows))
+    canvas.document(CANDIDATES, candidate_table(cad_scene))
+
+
+def _draw_candidates(replacement: Replacement, roots: list[Path], canvas: Canvas) -> None:
+    others = [candidate for role, candidate in candidates_of(replacement) if "chosen" not in role]
+    for number, candidate in enumerate(others[:DRAWN_CANDIDATES], start=1):
+        folder = next((root / candidate.model_id for root in roots if (root / candidate.model_id).is_dir()), None)
+        if folder is not None:
+            path = f"{CANDIDATES}/{replacement.node}/{number}_{candidate.model_id}"
+            _draw_model(path, candidate, folder, canvas)
+
+
+def _draw_model(
+    path: str,
+    candidate: CadCandidate,
+    folder: Path,
+    canvas: Canvas,
+    colors: Mapping[str, tuple[int, int, int]] | None = None,
+) -> None:
+    canvas.transform(path, np.array(candidate.world_from_model))
+    canvas.mesh(path, painted_mesh(folder, read_model(folder), candidate, colors))
+
+
+def candidate_table(cad_scene: CadScene) -> str:
+    """Return the candidates of every object in Markdown: errors, scale, joints, what was rejected and why."""
+    lines: list[str] = []
+    for replacement in cad_scene.scene.replacements:
+        if replacement.decision == "layout":
+            continue
+        candidates = candidates_of(replacement)
+        lines += [f"### {replacement.node}", "", replacement.reason, ""] if replacement.reason else [
+            f"### {replacement.node}", ""
+        ]  # fmt: skip
+        if candidates:
+            lines += [
+                "| model | | matching error | alignment error [mm] | scale | joints |",
+                "|---|---|--:|--:|--:|---|",
+            ]
+        for role, candidate in candidates:
+            joints = ", ".join(f"{name} {value:.2f}" for name, value in sorted(candidate.joints.items()))
+            lines.append(
+                f"| {candidate.model_id} | {role} | {candidate.matching_error:.3f} | "
+                f"{1000 * candidate.alignment_error:.1f} | {candidate.scale:.3f} | {joints} |"
+            )
+        if replacement.rejected:
+            rejected = ", ".join(f"{count} {reason}" for reason, count in sorted(replacement.rejected.items()))
+            lines += ["", f"Rejected: {rejected}."]
+        lines.append("")
+    return "\n".join(lines)

@@ -1,0 +1,33 @@
+"""Evaluations, reports and exports: figures as a table, plots as pictures, notes as text."""
+
+from __future__ import annotations
+
+from cli.viewing.canvas import Canvas
+from schemas.evaluation import Evaluation, Report
+from schemas.exported_sequence import ExportedSequence
+
+
+def draw_evaluation(evaluation: Evaluation, canvas: Canvas) -> None:
+    """Show all figures and plots."""
+    metrics = evaluation.metrics
+    rows = [f"**{metrics.label}**", "", "| measure | value |", "|---|---|"]
+    for name, value in sorted(metrics.metrics.items()):
+        rows.append(f"| {name} | {'-' if value is None else f'{value:.4g}'} |")
+    rows += ["", *(f"- {note}" for note in metrics.notes)]
+    canvas.document("figures", "\n".join(rows))
+    for table in sorted(evaluation.path("tables").glob("*.md")):
+        canvas.document(f"tables/{table.stem}", table.read_text(encoding="utf-8"))
+    for plot in sorted(evaluation.path("plots").glob("*.png")):
+        canvas.picture(f"plots/{plot.stem}", plot.read_bytes())
+
+
+def draw_report(report: Report, canvas: Canvas) -> None:
+    """Say where the page is: it is made for a browser."""
+    canvas.document("report", f"Open `{report.path('report.html')}` in a browser.")
+
+
+def draw_export(export: ExportedSequence, canvas: Canvas) -> None:
+    """Say what was written: it is made for other tools."""
+    info = export.info
+    rows = [f"{info.frame_count} frames as {info.layout}: open `{export.path(info.log)}`", ""]
+    canvas.document("export", "\n".join([*rows, *(f"- {note}" for note in info.notes)]))

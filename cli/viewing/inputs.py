@@ -1,0 +1,26 @@
+"""Finding what an artifact was made from, for views that show both."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from schemas.artifact import KINDS, Artifact
+from schemas.errors import BadInput
+from stages.engine.reading import open_artifact
+
+Kind = TypeVar("Kind", bound=Artifact)
+
+
+def input_artifact(artifact: Artifact, kind: type[Kind]) -> Kind | None:
+    """Return the input of this kind, or a subclass, where the manifest says it lies; None when it is not there."""
+    if artifact.manifest is None:
+        return None
+    for record in artifact.manifest.inputs:
+        if issubclass(KINDS.get(record.kind, Artifact), kind):
+            try:
+                found = open_artifact(artifact.root / record.path, kind)
+            except BadInput:
+                return None
+            unchanged = found.manifest is not None and found.manifest.content_digest == record.digest
+            return found if unchanged and isinstance(found, kind) else None
+    return None

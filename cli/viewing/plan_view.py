@@ -1,0 +1,83 @@
+"""Plans: the room and the robot as they moved during execution."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from google.protobuf.message import DecodeError
+
+from cli.viewing.canvas import SHELL, Canvas
+from cli.viewing.inputs import input_artifact
+from cli.viewing.robot_view import ROBOT, draw_robot
+from cli.viewing.scene_view import draw_scene_folder
+from schemas.errors import BadInput
+from schemas.ground_truth import GroundTruth
+from schemas.interactive_scene import InteractiveScene
+from schemas.plan import Plan
+from stages.kit.formats.foxglove import JPEG_START, stamp_nanoseconds, transform_matrix
+from stages.kit.formats.mcap_log import McapLog
+
+
+def draw_plan(plan: Plan, canvas: Canvas) -> None:
+    """Draw the room of execution, the robot, both animated, the images that were taken, and the plan as text."""
+    canvas.document("plan", plan_text(plan))
+    canvas.view("world", SHELL)
+    folder = _room(plan)
+    if folder is not None:
+        draw_scene_folder(folder, canvas, animated=True)
+    path = plan.path("execution.mcap")
+    if not path.exists():
+        return
+    with McapLog(path) as log:
+        draw_robot(canvas)
+        _animate(log, canvas)
+
+
+def plan_text(plan: Plan) -> str:
+    """Return the plan, its checks and failures in Markdown."""
+    content = plan.plan
+    rows = [f"**{content.status}**, goal: {', '.join(content.goal) or '-'}", ""]
+    rows += [f"{k}. {action.name}({', '.join(action.arguments)})" for k, action in enumerate(content.actions, 1)]
+    rows += ["", *(f"- {'holds' if c.holds else 'FAILS'}: {c.condition} ({c.detail})" for c in content.checks)]
+    rows += ["", *(f"- {failure.kind}: {failure.message}" for failure in content.failures)]
+    return "\n".join(rows)
+
+
+def _room(plan: Plan) -> Path | None:
+    if plan.plan.executed_in == "ground_truth":
+        truth = input_artifact(plan, GroundTruth)
+        return truth.path("room") if truth is not None else None
+    scene = input_artifact(plan, InteractiveScene)
+    return scene.root if scene is not None else None
+
+
+def _topics(log: McapLog, schema_name: str) -> set[int]:
+    return {
+        channel.id
+        for channel in log.channels.values()
+        if channel.schema_id in log.schemas and log.schemas[channel.schema_id].name == schema_name
+    }
+
+
+def _animate(log: McapLog, canvas: Canvas) -> None:
+    transforms, images = _topics(log, "foxglove.FrameTransforms"), _topics(log, "foxglove.CompressedImage")
+    try:
+        for message in log.messages(transforms | images):
+            if message.channel.id in transforms:
+                for transform in FrameTransforms.FromString(message.data).transforms:
+                    canvas.time(stamp_nanoseconds(transform) * 1e-9)
+                    pose = transform_matrix(transform.translation, transform.rotation)
+                    canvas.transform(_entity(transform.child_frame_id), pose)
+            else:
+                image = CompressedImage.FromString(message.data)
+                canvas.time(stamp_nanoseconds(image) * 1e-9)
+                if image.data.startswith(JPEG_START):
+                    canvas.picture("execution", bytes(image.data))
+    except (DecodeError, ValueError) as error:
+        raise BadInput(f"{log.path}: {error}", hint="make the plan again") from None
+
+
+def _entity(frame: str) -> str:
+    return frame if frame.startswith(ROBOT) else f"scene/{frame}"

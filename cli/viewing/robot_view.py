@@ -1,0 +1,49 @@
+"""The robot's links, and how they move with its joints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cli.viewing.canvas import Canvas
+from cli.viewing.meshes import merged, shape_mesh
+from schemas.errors import BadInput
+from stages.kit.formats.link_poses import link_poses
+from stages.kit.formats.urdf_file import Urdf, parse_urdf
+
+ROBOT = "robot/"
+NAME = "panda"
+
+
+def draw_robot(canvas: Canvas) -> Urdf | None:
+    """Draw the robot's links, each in its own frame, and return its description; None (and a note) where that is not
+    installed: then only the room moves."""
+    from stages.kit.simulation.robot_description import load_robot
+
+    try:
+        robot = load_robot(NAME)
+        urdf = parse_urdf(robot.urdf)
+    except Exception as error:  # noqa: BLE001 (a view without the robot is better than none)
+        canvas.document("robot", f"not drawn: {error}")
+        return None
+    for link in urdf.links:
+        meshes = []
+        for shape in link.visuals:
+            try:
+                meshes.append(shape_mesh(shape, robot.urdf.parent))
+            except BadInput:
+                continue
+        if meshes:
+            mesh = merged(meshes)
+            colors = np.tile(np.array([225, 225, 230], np.uint8), (len(mesh.vertices), 1))
+            canvas.mesh(f"{ROBOT}{link.name}", mesh, colors)
+    return urdf
+
+
+def animate_arm(canvas: Canvas, urdf: Urdf, joints: np.ndarray, period: float) -> None:
+    """Move the links of an arm that stands at the origin through rows of joint values (N, J) [rad], one each `period`
+    [s]. The columns are the first J joints of the description that turn."""
+    names = [joint.name for joint in urdf.joints if joint.type == "revolute"][: joints.shape[1]]
+    for number, row in enumerate(joints):
+        canvas.time(number * period)
+        for link, pose in link_poses(urdf, dict(zip(names, map(float, row), strict=True))).items():
+            canvas.transform(f"{ROBOT}{link}", pose)

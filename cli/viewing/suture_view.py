@@ -1,0 +1,157 @@
+"""Suturing: the rendered pair with the true needle, estimated poses, the thread, a trial over time, figures."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from cli.viewing.canvas import Canvas
+from cli.viewing.sequence_view import draw_sequence
+from schemas.errors import BadInput
+from schemas.scene_parts import Box
+from schemas.suture_needle import NeedleEstimateRecord, SutureNeedle, SutureThread
+from schemas.suture_scene import StereoRigRecord, SutureScene
+from schemas.suture_trial import SutureEvaluation, SutureTrial
+from stages.kit.formats.numpy_files import read_arrays
+from stages.kit.geometry.transforms import apply
+
+STEEL, THREAD, TIP, TRUE = (0.75, 0.2, 0.18), (0.48, 0.31, 0.69), (0.9, 0.55, 0.1), (0.2, 0.7, 0.3)
+ARM_COLORS = ((0.18, 0.44, 0.7), (0.3, 0.6, 0.42))
+"""Right, left."""
+PAD = (0.12, 0.12, 0.004)
+RIDGE = (0.005, 0.05, 0.005)
+"""Half its width, half its length, its height [m]: half an ellipse across, as the simulator has it."""
+REMOTE_CENTRES = ((-0.12, 0.0, 0.15), (0.12, 0.0, 0.15))
+"""Of the right and the left arm [m]: every shaft goes through its own."""
+NEEDLE_RADIUS = 0.012
+JAW = 0.0102
+WIRE, LINE = 0.0005, 0.0003
+ARC = np.linspace(0.0, np.pi, 40)
+
+
+def arc_points(pose: np.ndarray, radius: float) -> np.ndarray:
+    """Return the needle's arc (40, 3) [m] from the tip to the swage, by its pose (4, 4)."""
+    flat = np.stack([radius * np.cos(ARC), radius * np.sin(ARC), np.zeros_like(ARC)], axis=1)
+    return apply(pose, flat)
+
+
+def draw_suture_scene(scene: SutureScene, canvas: Canvas) -> None:
+    """Draw the pictures over time and the true needle and thread in the world of the pad."""
+    draw_sequence(scene, canvas)
+    file = scene.scene
+    for view in file.views:
+        canvas.time(1.0 + view.frame / 10.0)
+        world = np.linalg.inv(np.array(view.camera_from_world))
+        arc = arc_points(world @ np.array(view.camera_from_needle), file.needle_radius)
+        canvas.line("truth/needle", [arc], [TRUE], radius=WIRE)
+        canvas.points("truth/tip", arc[:1], np.array([[230, 140, 40]], np.uint8), radius=2 * WIRE)
+        (thread,) = read_arrays(scene.path("threads.npz"), f"thread_{view.frame:06d}")
+        canvas.line("truth/thread", [apply(world, thread)], [THREAD], radius=LINE)
+
+
+def draw_suture_needle(needle: SutureNeedle, canvas: Canvas) -> None:
+    """Draw poses in the left camera's frame over time, with the pictures."""
+    file = needle.needle
+    rows = [f"{file.statement}", f"masks: {file.masks_from}; estimator {file.estimator}; filter {file.filter}"]
+    rows += [f"- frame {one.frame}: {one.estimate.abstained or 'known'}" for one in file.frames]
+    canvas.document("needle", "\n\n".join(rows))
+    _eyes(file.rig, canvas)
+    for one in file.frames:
+        canvas.time(one.time)
+        _pose("needle", one.estimate, file.needle_radius, canvas)
+        path = needle.path(f"pictures/{one.frame:06d}.png")
+        if path.is_file():
+            canvas.picture("eyes/needle", path.read_bytes())
+    if file.filtered is not None:
+        _pose("filtered", file.filtered, file.needle_radius, canvas)
+
+
+def draw_suture_thread(thread: SutureThread, canvas: Canvas) -> None:
+    """Draw the curves in the left camera's frame over time, with the pictures."""
+    file = thread.thread
+    rows = [f"- frame {one.frame}: {one.status}" for one in file.frames]
+    canvas.document("thread", "\n\n".join([file.statement, f"masks: {file.masks_from}", *rows]))
+    _eyes(file.rig, canvas)
+    for one in file.frames:
+        canvas.time(one.time)
+        if one.points:
+            (points,) = read_arrays(thread.path("threads.npz"), f"points_{one.frame:06d}")
+            canvas.line("thread", [points], [THREAD], radius=LINE)
+        path = thread.path(f"pictures/{one.frame:06d}.png")
+        if path.is_file():
+            canvas.picture("eyes/thread", path.read_bytes())
+
+
+def draw_suture_trial(trial: SutureTrial, canvas: Canvas) -> None:
+    """Draw the recorded trial: both drivers and the needle as they move, the thread at the key frames."""
+    canvas.document("trial", "```\n" + trial.path("trial.txt").read_text(encoding="utf-8") + "```")
+    canvas.picture("strip/panels", trial.path("strip.png").read_bytes())
+    top = Box(center=(0.0, 0.0, -PAD[2] / 2), size=PAD)
+    canvas.boxes("pad", [top], ["pad"], [(0.93, 0.78, 0.7)], show_labels=False)
+    wound = ridge()
+    canvas.mesh("wound", wound, np.tile(np.array([217, 153, 128], np.uint8), (len(wound.vertices), 1)))
+    names = ("seconds", "arm", "world_from_tool", "world_from_needle")
+    seconds, arms, tools, needles = read_arrays(trial.path("motions.npz"), *names)
+    if not len(seconds) == len(arms) == len(tools) == len(needles):
+        raise BadInput(f"{trial.path('motions.npz')}: its arrays differ in length", hint="make the trial again")
+    for row in range(len(seconds)):
+        canvas.time(float(seconds[row]))
+        _driver(int(arms[row]), tools[row], canvas)
+        _needle(needles[row], canvas)
+    at, both, held, threads = read_arrays(
+        trial.path("frames.npz"), "seconds", "world_from_tool", "world_from_needle", "thread"
+    )
+    for event, moment in enumerate(at):
+        canvas.time(float(moment))
+        for arm in (0, 1):
+            _driver(arm, both[event, arm], canvas)
+        _needle(held[event], canvas)
+        canvas.line("thread", [threads[event]], [THREAD], radius=LINE)
+
+
+def draw_suture_evaluation(evaluation: SutureEvaluation, canvas: Canvas) -> None:
+    """Show the tables and the plots."""
+    canvas.document("figures", evaluation.path("table.md").read_text(encoding="utf-8"))
+    for path in sorted(evaluation.path("plots").glob("*.png")):
+        canvas.picture(f"plots/{path.stem}", path.read_bytes())
+
+
+def _eyes(rig: StereoRigRecord, canvas: Canvas) -> None:
+    canvas.camera("left_eye", rig.camera)
+    pose = np.eye(4)
+    pose[0, 3] = rig.baseline
+    canvas.transform("right_eye", pose)
+    canvas.camera("right_eye", rig.camera)
+
+
+def _pose(path: str, estimate: NeedleEstimateRecord, radius: float, canvas: Canvas) -> None:
+    """Draw a pose, orange where it was abstained from, with its tip."""
+    if estimate.camera_from_needle is None:
+        return
+    arc = arc_points(np.array(estimate.camera_from_needle), radius)
+    canvas.line(path, [arc], [TIP if estimate.abstained else STEEL], radius=WIRE, labels=[estimate.abstained or path])
+    canvas.points(f"{path}_tip", arc[:1], np.array([[230, 140, 40]], np.uint8), radius=2 * WIRE)
+
+
+def ridge() -> trimesh.Trimesh:
+    """Return the raised wound as a mesh [m]."""
+    x, z = RIDGE[0] * np.cos(ARC), RIDGE[2] * np.sin(ARC)
+    ends = [np.stack([x, np.full_like(x, y), z], axis=1) for y in (-RIDGE[1], RIDGE[1])]
+    return trimesh.Trimesh(np.concatenate(ends)).convex_hull
+
+
+def _needle(pose: np.ndarray, canvas: Canvas) -> None:
+    arc = arc_points(pose, NEEDLE_RADIUS)
+    canvas.line("needle", [arc], [STEEL], radius=WIRE)
+    canvas.points("needle_tip", arc[:1], np.array([[230, 140, 40]], np.uint8), radius=2 * WIRE)
+
+
+def _driver(arm: int, tool: np.ndarray, canvas: Canvas) -> None:
+    """Draw a driver's jaw, along the tool's z, and its shaft from the wrist to the arm's remote centre."""
+    tip, wrist = tool[:3, 3], tool[:3, 3] - JAW * tool[:3, 2]
+    canvas.line(
+        f"driver_{('right', 'left')[arm]}",
+        [np.stack([tip, wrist]), np.stack([wrist, np.array(REMOTE_CENTRES[arm])])],
+        [ARM_COLORS[arm], ARM_COLORS[arm]],
+        radius=0.0015,
+    )

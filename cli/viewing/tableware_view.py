@@ -1,0 +1,110 @@
+"""Tableware: a table as it stands, a plan as text and pictures, a table being cleared over time, policies compared."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cli.viewing.canvas import Canvas
+from schemas.artifact import Artifact
+from schemas.scene_parts import Box
+from schemas.tableware_detections import TablewareDetections
+from schemas.tableware_plan import TablewarePlan
+from schemas.tableware_scene import TablewareItem, TablewareScene
+from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
+from stages.kit.formats.mesh_files import read_mesh
+
+TABLE = (0.78, 0.61, 0.03)
+"""Extents of the table top [m]; its surface is at z = 0."""
+TABLE_COLOR = (0.93, 0.93, 0.92)
+BIN_AT, BIN_PITCH, BIN_COLUMNS = (0.62, -0.4), 0.2, 5
+"""Where what came to the bin is shown: beside the table, in rows."""
+
+
+def draw_tableware_scene(scene: TablewareScene, canvas: Canvas) -> None:
+    """Draw the table as it truly stands and the image of it."""
+    file = scene.scene
+    _table(canvas)
+    _shapes(scene, file.items, canvas)
+    for item in file.items:
+        canvas.transform(f"items/{item.name}", _pose(item))
+    canvas.transform("camera", np.array(file.world_from_camera))
+    canvas.camera("camera", file.camera)
+    canvas.picture("camera/color", scene.path("color.png").read_bytes())
+
+
+def draw_tableware_detections(found: TablewareDetections, canvas: Canvas) -> None:
+    """Show what was seen: the statement, the picture, and every item as a point at its lip, green by confidence."""
+    told = found.detections
+    canvas.document("seen", "\n\n".join([told.statement, *told.notes]))
+    canvas.picture("overlay", found.path("overlay.png").read_bytes())
+    _table(canvas)
+    for number, item in enumerate(told.items, start=1):
+        share = item.confidence if item.kind is not None else 0.0
+        color = np.array([[round(255 * (1.0 - share)), round(200 * share), 40]], np.uint8)
+        place = np.array([[item.position[0], item.position[1], item.lip]])
+        canvas.points(f"items/{number}_{item.kind or 'unknown'}", place, color, radius=0.01)
+
+
+def draw_tableware_plan(plan: TablewarePlan, canvas: Canvas) -> None:
+    """Show the plan in words, its pictures, and pulls and stackings as lines over the table."""
+    canvas.document("plan", plan.path("plan.txt").read_text(encoding="utf-8"))
+    _table(canvas)
+    for name in ("strip", "detections"):
+        if plan.path(f"{name}.png").is_file():
+            canvas.picture(name, plan.path(f"{name}.png").read_bytes())
+    for number, step in enumerate(plan.plan.steps, start=1):
+        action = step.action
+        pull = action.u_P or (action.u_PG.u_P if action.u_PG else None)
+        put = action.u_S or (action.u_SG.u_S if action.u_SG else None)
+        if pull is not None:
+            canvas.line(f"pulls/{number}", [np.array([pull.p_S, pull.p_E])], [(0.08, 0.5, 0.24)], labels=[pull.item])
+        if put is not None:
+            canvas.line(f"stackings/{number}", [np.array([put.u_G.p_G, put.p_L])], [(0.49, 0.23, 0.93)])
+
+
+def draw_tableware_trial(trial: TablewareTrial, canvas: Canvas) -> None:
+    """Draw the table being cleared: each thing where it is after each action; what was binned stands beside the
+    table."""
+    file = trial.trial
+    canvas.document("trial", trial.path("trial.txt").read_text(encoding="utf-8"))
+    _table(canvas)
+    canvas.picture("keyframes", trial.path("keyframes.png").read_bytes())
+    first = file.steps[0].before if file.steps else ()
+    _shapes(trial, first, canvas)
+    canvas.time(0.0)
+    for item in first:
+        canvas.transform(f"items/{item.name}", _pose(item))
+    binned = 0
+    for step in file.steps:
+        canvas.time(step.end)
+        for item in step.after:
+            canvas.transform(f"items/{item.name}", _pose(item))
+        for name in (*step.binned, *step.dropped):
+            row, column = divmod(binned, BIN_COLUMNS)
+            pose = np.eye(4)
+            pose[:3, 3] = (BIN_AT[0] + BIN_PITCH * row, BIN_AT[1] + BIN_PITCH * column, -0.03)
+            canvas.transform(f"items/{name}", pose)
+            binned += 1
+
+
+def draw_tableware_evaluation(evaluation: TablewareEvaluation, canvas: Canvas) -> None:
+    """Show the table of policies."""
+    canvas.document("policies", evaluation.path("table.md").read_text(encoding="utf-8"))
+
+
+def _table(canvas: Canvas) -> None:
+    top = Box(center=(0.0, 0.0, -TABLE[2] / 2), orientation=(0.0, 0.0, 0.0, 1.0), size=TABLE)
+    canvas.boxes("table", [top], ["table"], [TABLE_COLOR], show_labels=False)
+
+
+def _shapes(artifact: Artifact, items: tuple[TablewareItem, ...], canvas: Canvas) -> None:
+    meshes = {kind: read_mesh(artifact.path(f"shapes/{kind}.ply")) for kind in {item.kind for item in items}}
+    for item in items:
+        canvas.mesh(f"items/{item.name}", meshes[item.kind])
+
+
+def _pose(item: TablewareItem) -> np.ndarray:
+    pose = np.eye(4)
+    pose[:2, :2] = [[np.cos(item.yaw), -np.sin(item.yaw)], [np.sin(item.yaw), np.cos(item.yaw)]]
+    pose[:3, 3] = item.position
+    return pose

@@ -1,0 +1,67 @@
+"""The scenes of a data set: folders, a glob, a list of paths."""
+
+from __future__ import annotations
+
+import glob
+import os
+from pathlib import Path, PurePath
+
+from schemas.errors import UsageError
+from stages.engine.batch.names import distinct, matched_part, names_from_paths
+from stages.engine.batch.spec import DataSpec
+
+
+def _absolute(text: str, base: Path) -> Path:
+    return Path(os.path.abspath(base / Path(text).expanduser()))
+
+
+def _listed(file: Path, where: str) -> list[str]:
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"{where}: list: {error}", hint="a text file with one path a line") from None
+    found = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    if not found:
+        raise UsageError(f"{where}: list: {file} names nothing", hint="one path a line")
+    return found
+
+
+def find_scenes(data: DataSpec, base: Path, where: str) -> list[tuple[str, Path]]:
+    """Return name and absolute path of every scene: folders, then what the glob finds (sorted), then the list.
+
+    `base` is the folder of the batch file, `where` its name for messages. Raises UsageError for a path that does not
+    exist, a glob or list without a match, and a path that is named twice.
+    """
+    if not data.folders and data.glob is None and data.list is None:
+        raise UsageError(f"{where}: data: no folders, glob or list", hint="give at least one")
+    named = [_absolute(folder, base) for folder in data.folders]
+    for folder in named:
+        if not folder.is_dir():
+            raise UsageError(f"{where}: data: {folder}: no such folder", hint="check folders")
+    if data.list is not None:
+        file = _absolute(data.list, base)
+        for line in _listed(file, where):
+            path = _absolute(line, base)
+            if not path.exists():
+                raise UsageError(f"{where}: data: {path}: no such file or folder", hint=f"check {file}")
+            named.append(path)
+    found: dict[Path, str] = {}
+    if data.glob is not None:
+        pattern = str(Path(data.glob).expanduser())
+        matches = sorted(glob.glob(pattern, root_dir=base, recursive=True))
+        if not matches:
+            raise UsageError(f"{where}: data: glob {data.glob}: no match in {base}", hint="check the pattern")
+        found = {_absolute(match, base): matched_part(PurePath(match), pattern) for match in matches}
+    paths = [*named[: len(data.folders)], *found, *named[len(data.folders) :]]
+    seen: dict[str, Path] = {}
+    for path in paths:
+        if not str(path).isprintable():  # such names survive neither JSON nor a log of lines
+            raise UsageError(f"{where}: data: {str(path)!r}: not a printable name", hint="rename it")
+        real = os.path.realpath(path)
+        if real in seen:
+            raise UsageError(f"{where}: data: {path} is named twice", hint="each scene once")
+        seen[real] = path
+    names = dict(zip(named, names_from_paths(named), strict=True)) | found
+    longer = names_from_paths(paths)
+    unique = distinct([[names[path], long] for path, long in zip(paths, longer, strict=True)])
+    return list(zip(unique, paths, strict=True))

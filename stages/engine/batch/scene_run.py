@@ -1,0 +1,254 @@
+"""Running one scene: its own process group, watched for time and memory, everything it says in one log.
+
+Every executor ends here, on whatever machine. What it returns is all the batch learns about the scene.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import select
+import shlex
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import psutil
+
+from stages.engine.batch.artifacts import manifests, measures
+from stages.engine.batch.job import Job
+from stages.engine.batch.outcomes import MACHINE_FAILED, Outcome, classify, signal_name, signal_of
+from stages.engine.batch.processes import created_at, end_group, group_is_alive, resident_memory, signal_group
+from stages.engine.batch.quantities import format_bytes, format_seconds
+from stages.engine.batch.results import SceneResult
+from stages.engine.batch.scene_log import LOG_NAME, LogFollower, clean
+from stages.engine.chain import REPOSITORY
+
+LAUNCHER = Path(__file__).with_name("launcher.py")
+PROCESS_NAME = ".batch-process.json"
+"""Beside the log while a scene runs: who runs it, for the next batch to end it if this one is killed."""
+LONGEST_PAUSE = 0.05
+"""Between two looks at the process [s]."""
+SAMPLE_INTERVAL = 0.25
+"""Between two looks at its memory [s]."""
+MEMORY_GRACE = 1.0
+"""A scene over its memory limit endangers the others: it has this long to stop [s]."""
+
+
+def this_host() -> str:
+    """Return the name of this machine."""
+    return socket.gethostname()
+
+
+@dataclass
+class _Watched:
+    """What watching a process group found."""
+
+    status: int = 0
+    stopped_by: Outcome | None = None
+    peak_memory: int = 0
+
+
+def end_leftover(folder: Path, grace: float) -> None:
+    """End the scene that a killed batch has left running in `folder` on this machine, if there is one."""
+    record = folder / PROCESS_NAME
+    try:
+        facts = json.loads(record.read_text())
+        group, created, host = int(facts["group"]), float(facts["created"]), str(facts["host"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return
+    # The leader may be gone and its step not; while a member lives, no new process gets the number of the group.
+    if host == this_host() and created_at(group) in (created, None) and group_is_alive(group):
+        end_group(group, grace)
+    record.unlink(missing_ok=True)
+
+
+class _Pauses:
+    """Pauses that end early when a process of ours ends, where the kernel can tell (Linux)."""
+
+    def __init__(self, pid: int) -> None:
+        self._descriptor: int | None = None
+        self._seconds = 0.001
+        with suppress(OSError, AttributeError):
+            self._descriptor = os.pidfd_open(pid)
+            self._ended = select.poll()
+            self._ended.register(self._descriptor, select.POLLIN)
+
+    def pause(self) -> None:
+        """Wait a moment."""
+        if self._descriptor is not None:
+            self._ended.poll(1000 * LONGEST_PAUSE)
+        else:
+            time.sleep(self._seconds)
+            self._seconds = min(2 * self._seconds, LONGEST_PAUSE)
+
+    def close(self) -> None:
+        """Free the descriptor."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+
+
+def _has_exited(pid: int) -> bool:
+    """Tell whether our child has ended, without taking its status: its group number stays taken until then."""
+    return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+
+
+def _start(job: Job, log: int) -> subprocess.Popen[bytes]:
+    environment = {**job.environment, **os.environ, "PYTHONPATH": str(REPOSITORY)}
+    process = subprocess.Popen(
+        [sys.executable, "-I", "-S", str(LAUNCHER), str(os.getpid()), *job.command],
+        stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True, env=environment,
+    )  # fmt: skip
+    if job.address_space is not None:
+        with suppress(psutil.Error):
+            psutil.Process(process.pid).rlimit(psutil.RLIMIT_AS, (job.address_space, job.address_space))
+    return process
+
+
+def _watch(job: Job, process: subprocess.Popen[bytes], cancelled: Callable[[], bool]) -> _Watched:
+    """Wait for the end of a scene, and bring it about at a limit."""
+    found = _Watched()
+    begun = time.monotonic()
+    next_sample, kill_at, grace = begun, None, job.grace
+    with closing(_Pauses(process.pid)) as pauses:
+        while not _has_exited(process.pid):
+            now = time.monotonic()
+            if now >= next_sample:
+                memory = resident_memory(process.pid)
+                found.peak_memory = max(found.peak_memory, memory)
+                next_sample = now + min(SAMPLE_INTERVAL, now - begun)  # short scenes are looked at more often
+            else:
+                memory = 0
+            if kill_at is None:
+                if cancelled():
+                    found.stopped_by = "interrupted"
+                elif job.time_limit is not None and now - begun > job.time_limit:
+                    found.stopped_by = "time limit"
+                elif job.memory_limit is not None and memory > job.memory_limit:
+                    found.stopped_by, grace = "memory limit", min(job.grace, MEMORY_GRACE)
+                if found.stopped_by is not None:
+                    signal_group(process.pid, signal.SIGTERM)
+                    kill_at = now + grace
+            elif now > kill_at:
+                signal_group(process.pid, signal.SIGKILL)
+            pauses.pause()
+    signal_group(process.pid, signal.SIGKILL)  # what it started and left behind
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = found.status = os.waitstatus_to_exitcode(status)
+    # A spike between two looks shows in the largest process at least [KiB]. The figure begins with what this process
+    # held when it forked, so it says something only above our own peak.
+    if usage.ru_maxrss > resource.getrusage(resource.RUSAGE_SELF).ru_maxrss:
+        found.peak_memory = max(found.peak_memory, usage.ru_maxrss * 1024)
+    return found
+
+
+def _stop_at_once(process: subprocess.Popen[bytes], grace: float) -> None:
+    """Whatever has interrupted the watching: no scene stays behind."""
+    signal_group(process.pid, signal.SIGTERM)
+    deadline = time.monotonic() + grace
+    while not _has_exited(process.pid) and time.monotonic() < deadline:
+        time.sleep(LONGEST_PAUSE)
+    signal_group(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _describe(job: Job, found: _Watched, follower: LogFollower) -> tuple[Outcome, int, str]:
+    """Return outcome, exit code and reason."""
+    if found.stopped_by == "time limit":
+        return "time limit", MACHINE_FAILED, f"ran longer than {format_seconds(job.time_limit or 0)}"
+    if found.stopped_by == "memory limit":
+        text = f"took {format_bytes(found.peak_memory)}, the limit is {format_bytes(job.memory_limit or 0)}"
+        return "memory limit", MACHINE_FAILED, text
+    outcome, code = classify(found.status)
+    if outcome == "done":
+        return outcome, code, ""
+    number = signal_of(found.status)
+    if number is not None:
+        text = f"died of {signal_name(number)}"
+        if number == signal.SIGKILL:
+            text += " (the kernel does that when memory runs out)"
+        return outcome, code, text
+    return outcome, code, follower.error or follower.last_line or f"exit code {code} and not a word"
+
+
+def run_scene(job: Job, cancelled: Callable[[], bool] = lambda: False, host: str = "") -> SceneResult | None:
+    """Run a scene to its end, within its limits. Returns None when it was stopped because `cancelled()` said so.
+
+    The machine's refusals (a disk that is full or read-only) are results too; nothing is raised for them.
+    """
+    started, begun = datetime.now(UTC), time.monotonic()
+    folder = Path(job.folder)
+    identity = {
+        "job": job.name,
+        "scene": job.scene,
+        "parameters": job.parameters,
+        "seed": job.seed,
+        "fingerprint": job.fingerprint,
+        "host": host or this_host(),
+        "started": started.isoformat(timespec="milliseconds"),
+    }
+    record = folder / PROCESS_NAME
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        end_leftover(folder, job.grace)
+        log = os.open(folder / LOG_NAME, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        try:
+            os.write(log, f"# {identity['started']} {identity['host']}\n# {shlex.join(job.command)}\n".encode())
+            position = os.fstat(log).st_size
+            process = _start(job, log)
+            try:
+                record.write_text(
+                    json.dumps({"group": process.pid, "created": created_at(process.pid) or 0.0, "host": this_host()})
+                )
+                found = _watch(job, process, cancelled)
+            except BaseException:
+                _stop_at_once(process, job.grace)
+                raise
+            finally:
+                record.unlink(missing_ok=True)
+            if found.stopped_by is not None:
+                os.write(log, f"# stopped: {found.stopped_by}\n".encode())
+        finally:
+            os.close(log)
+    except OSError as error:
+        return SceneResult.model_validate(
+            identity
+            | {
+                "outcome": "machine failure",
+                "exit_code": MACHINE_FAILED,
+                "reason": clean(f"{error.filename or folder}: {error.strerror or error}"),
+                "seconds": round(time.monotonic() - begun, 3),
+            }
+        )
+    if found.stopped_by == "interrupted":
+        return None
+    follower = LogFollower(folder / LOG_NAME, job.steps, position)
+    follower.look(final=True)
+    outcome, code, reason = _describe(job, found, follower)
+    steps = job.steps
+    if outcome != "done":
+        reached = steps.index(follower.step) if follower.step is not None else 0
+        steps = steps[: reached + (outcome == "not ok")]
+    made = manifests(folder, steps)
+    return SceneResult.model_validate(
+        identity
+        | {
+            "outcome": outcome,
+            "exit_code": code,
+            "failed_step": None if outcome == "done" else follower.step,
+            "reason": reason,
+            "seconds": round(time.monotonic() - begun, 3),
+            "peak_memory_bytes": found.peak_memory,
+            "artifacts": {step: manifest.content_digest for step, manifest in made.items()},
+            "outcomes": {step: manifest.outcome for step, manifest in made.items() if manifest.outcome != "ok"},
+            "measures": measures(folder, made),
+        }
+    )

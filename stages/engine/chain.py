@@ -1,0 +1,76 @@
+"""Running a pipeline: every step is its own process, with the same command line that make uses."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from stages.engine.interruption import PARENT_VARIABLE
+from stages.engine.pipelines import Pipeline, resolve_variables, step_arguments
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """What one step of a run said."""
+
+    name: str
+    exit_code: int
+    facts: dict[str, Any]
+
+
+def command_prefix() -> list[str]:
+    """Return the words that start scenewright in a new process, whatever the working folder."""
+    return [sys.executable, "-m", "cli"]
+
+
+def run_command(arguments: list[str]) -> tuple[int, str]:
+    """Run one scenewright command; progress and messages pass through, standard output is returned."""
+    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY), PARENT_VARIABLE: str(os.getpid())}
+    process = subprocess.Popen([*command_prefix(), *arguments], stdout=subprocess.PIPE, text=True, env=environment)
+    try:
+        output, _ = process.communicate()
+    except KeyboardInterrupt:
+        process.terminate()
+        process.wait()
+        raise
+    return process.returncode, output
+
+
+def run_pipeline(
+    pipeline: Pipeline,
+    run_folder: Path,
+    given: Mapping[str, str],
+    *,
+    extra: tuple[str, ...] = (),
+    only: tuple[str, ...] = (),
+    announce: Callable[[str], None] = lambda text: None,
+    execute: Callable[[list[str]], tuple[int, str]] = run_command,
+) -> list[StepReport]:
+    """Run the steps in order and stop at the first that does not exit with 0.
+
+    `extra` words are added to every command (`--dry-run`, `--force`). A dry run stops at the first step that would
+    run, as what follows depends on its result. Raises UsageError for unknown or missing variables.
+    """
+    values = resolve_variables(pipeline, given)
+    reports = []
+    for number, step in enumerate(pipeline.step, start=1):
+        if only and step.name not in only:
+            continue
+        announce(f"[{number}/{len(pipeline.step)}] {step.name}")
+        code, output = execute([*step_arguments(step, str(run_folder), values), "--json", *extra])
+        try:
+            facts = json.loads(output) if output.strip() else {}
+        except json.JSONDecodeError:
+            facts = {}
+        reports.append(StepReport(step.name, code, facts))
+        if code != 0 or facts.get("status") == "would run":
+            break
+    return reports

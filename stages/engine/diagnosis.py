@@ -1,0 +1,80 @@
+"""`scenewright doctor`: what is there, what is missing, how to get it."""
+
+from __future__ import annotations
+
+import ctypes.util
+import importlib
+import os
+import shutil
+import sys
+from dataclasses import dataclass
+
+from stages.engine.model_cache import cache_folder, cached_models
+from stages.kit.library_versions import library_version
+
+CORE = {
+    "typer": "typer", "open3d": "open3d", "trimesh": "trimesh", "pycolmap": "pycolmap",
+    "opencv-python-headless": "cv2", "numpy": "numpy", "scipy": "scipy", "torch": "torch", "mcap": "mcap",
+    "pybullet": "pybullet", "pydantic": "pydantic", "numba": "numba", "python-fcl": "fcl", "embreex": "embreex",
+    "shapely": "shapely", "networkx": "networkx", "yourdfpy": "yourdfpy", "matplotlib": "matplotlib",
+    "rosbags": "rosbags", "psutil": "psutil",
+}  # fmt: skip
+EXTRAS = {
+    "rerun-sdk": ("rerun", "viewing artifacts: pip install rerun-sdk"),
+    "ray": ("ray", "batches on a cluster: pip install ray"),
+    "mujoco": ("mujoco", "opening scene.mjcf.xml: pip install mujoco"),
+    "coacd": ("coacd", "library add cuts up hollow collision shapes: pip install coacd"),
+    "atheris": ("atheris", "make fuzz: pip install atheris"),
+    "transformers": ("transformers", "segment --backend huggingface: pip install transformers (without torchvision)"),
+    "onnxruntime": ("onnxruntime", "segment --backend onnx: pip install onnxruntime"),
+}
+"""Distribution -> module, and what it is for."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of the diagnosis."""
+
+    name: str
+    found: str
+    remedy: str = ""
+    required: bool = True
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing has to be done."""
+        return not self.remedy
+
+
+def _import_check(distribution: str, module: str, remedy: str, required: bool) -> Check:
+    version = library_version(distribution)
+    if version == "absent":
+        return Check(distribution, "absent", remedy, required)
+    try:
+        importlib.import_module(module)
+    except Exception as error:
+        return Check(distribution, f"{version}, does not import: {error}", remedy, required)
+    return Check(distribution, version, required=required)
+
+
+def diagnose() -> list[Check]:
+    """Check Python, system libraries, core and extra packages, memory and disk."""
+    checks = []
+    python = ".".join(map(str, sys.version_info[:3]))
+    supported = sys.version_info[:2] == (3, 11)
+    checks.append(Check("python", python, "" if supported else "use Python 3.11 and run: make setup"))
+    usb = ctypes.util.find_library("usb-1.0")
+    checks.append(Check("libusb-1.0-0", usb or "absent", "" if usb else "apt-get install libusb-1.0-0"))
+    checks += [_import_check(name, module, "run: make setup", True) for name, module in CORE.items()]
+    torchvision = library_version("torchvision")
+    if torchvision != "absent":
+        checks.append(Check("torchvision", torchvision, "pip uninstall torchvision (it breaks transformers)", False))
+    checks += [_import_check(name, module, hint, False) for name, (module, hint) in EXTRAS.items()]
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
+    checks.append(Check("memory", f"{memory:.0f} GiB", "" if memory >= 4 else "4 GiB are needed", False))
+    cached = cached_models()
+    size = sum(model.bytes for model in cached) / 1e6
+    checks.append(Check("cached models", f"{len(cached)}, {size:.1f} MB in {cache_folder()}", required=False))
+    free = shutil.disk_usage(".").free / 2**30
+    checks.append(Check("free disk here", f"{free:.0f} GiB", "" if free >= 2 else "free 2 GiB", False))
+    return checks

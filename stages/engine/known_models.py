@@ -1,0 +1,40 @@
+"""Networks that people bring: source, licence and checksum (data/models.toml)."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+from schemas.base import Model
+from schemas.errors import BadInput
+from stages.kit.digests import sha256_of_file
+
+MODELS_FILE = Path(__file__).resolve().parents[2] / "data" / "models.toml"
+
+
+class KnownModel(Model):
+    """One network."""
+
+    name: str
+    purpose: str
+    file: str
+    source: str
+    licence: str
+    sha256: str
+
+
+def known_models() -> tuple[KnownModel, ...]:
+    """Read data/models.toml."""
+    with MODELS_FILE.open("rb") as file:
+        return tuple(KnownModel(**row) for row in tomllib.load(file)["model"])
+
+
+def identify(path: Path) -> KnownModel:
+    """Return the known network whose checksum a file has. Raises BadInput when it is none of them."""
+    if not Path(path).is_file():
+        raise BadInput(f"{path}: no such file", hint="see: scenewright models")
+    digest = sha256_of_file(path)
+    for model in known_models():
+        if model.sha256 == digest:
+            return model
+    raise BadInput(f"{path}: sha256 {digest[:12]}... is no network listed here", hint="see: scenewright models")

@@ -1,0 +1,52 @@
+"""Who made an artifact, where, and what it cost."""
+
+from __future__ import annotations
+
+import platform
+import resource
+import subprocess
+import sys
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+
+from schemas.manifest import Provenance
+from stages.kit.digests import sha256_of_file
+from stages.kit.library_versions import library_version
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+@cache
+def _git(*arguments: str) -> str:
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(REPOSITORY), *arguments], capture_output=True, text=True, timeout=10, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout.strip() if done.returncode == 0 else ""
+
+
+def peak_memory_bytes() -> int:
+    """Return the peak resident memory of this process [bytes]."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else peak * 1024
+
+
+def provenance_now(command: tuple[str, ...], device: str, started: datetime) -> Provenance:
+    """Record the command line, versions, platform, time since `started` and peak memory."""
+    lock = REPOSITORY / "requirements.lock"
+    return Provenance(
+        command=command,
+        package_version=library_version("scenewright"),
+        git_commit=_git("rev-parse", "HEAD"),
+        git_dirty=bool(_git("status", "--porcelain", "--untracked-files=no")),
+        lock_digest=sha256_of_file(lock) if lock.exists() else "",
+        platform=platform.platform(),
+        python=platform.python_version(),
+        device=device,
+        started=started.isoformat(timespec="seconds"),
+        seconds=round((datetime.now(UTC) - started).total_seconds(), 3),
+        peak_memory_bytes=peak_memory_bytes(),
+    )

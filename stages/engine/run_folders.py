@@ -1,0 +1,29 @@
+"""Run folders: which artifacts stand in them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from schemas.errors import BadInput
+from schemas.manifest import MANIFEST_NAME
+from stages.engine.store import complete_interrupted
+
+
+def is_artifact(folder: Path) -> bool:
+    """Whether a folder holds a manifest; an interrupted replacement of it is completed first."""
+    complete_interrupted(folder)
+    return (folder / MANIFEST_NAME).is_file()
+
+
+def artifacts_of(run: Path) -> dict[str, Path]:
+    """Return name -> folder of the artifacts directly in a run folder, by name. Raises BadInput when there are none."""
+    if not run.is_dir():
+        raise BadInput(f"{run}: no such run folder", hint="give the --out of `scenewright run`")
+    found = {
+        entry.name: entry
+        for entry in sorted(run.iterdir())
+        if entry.is_dir() and not entry.is_symlink() and not entry.name.startswith(".") and is_artifact(entry)
+    }
+    if not found:
+        raise BadInput(f"{run}: holds no artifacts", hint="give the --out of `scenewright run`, or an artifact folder")
+    return found

@@ -1,0 +1,161 @@
+"""How far a door or drawer of a scene goes before it meets something: moved alone, without forces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.kit.simulation.engine import engine
+from stages.kit.simulation.world import LoadedBody, PhysicsWorld
+from stages.urdf.scene_penetration import link_depth
+
+STEPS = 100
+"""Positions that the range is divided into."""
+START_SHARE = 0.1
+"""The start of a motion is the first tenth of the range, beginning where the joint is closed."""
+HIT_DEPTH = 0.005
+"""A part that lies deeper than this in something [m] has met it; less is contact."""
+
+
+@dataclass(frozen=True)
+class JointRange:
+    """What became of one joint. Values in radians or metres."""
+
+    body: str
+    joint: str
+    closed: float
+    """Where the motion starts: 0, or the limit nearest to it."""
+    range: float
+    """Upper minus lower limit."""
+    free_share: float
+    """Share of the range that the joint reaches from `closed` before its part meets something, 0 to 1."""
+    hit_link: str | None = None
+    """Link that the part meets first; None when it goes through the whole range."""
+    hit_at: float | None = None
+    """Joint value at which it does."""
+    hit_depth: float = 0.0
+    """How deep the two are in each other there [m]."""
+
+    @property
+    def free_at_start(self) -> bool:
+        """Whether the part meets nothing in the first tenth of the range (`START_SHARE`)."""
+        return self.hit_link is None or self.free_share >= START_SHARE
+
+
+def sweep_joints(world: PhysicsWorld) -> list[JointRange]:
+    """Return one entry a moving joint of a scene, in the order of its bodies. The world is left as it was.
+
+    Each joint goes alone from where it is closed to its limits in steps of a hundredth of its range; every other joint
+    stays at its value. A part meets a neighbour when it lies more than 5 mm in it. Neighbours are all other bodies and
+    the links of the own body that the joint does not connect, except what rides along: bodies that the own body
+    contains, and what stands on those.
+    """
+    ranges = []
+    for body in world.bodies.values():
+        riding = _contents(world, body.name)
+        for joint in body.joints:
+            ranges.append(_sweep(world, body, joint, riding))
+    return ranges
+
+
+def _contents(world: PhysicsWorld, name: str) -> set[str]:
+    """Return the bodies that lie in a body, at any depth, and what stands on them."""
+    inside: set[str] = set()
+    grown = True
+    while grown:
+        more = {
+            body.name
+            for body in world.bodies.values()
+            if body.record.parent in inside or (body.record.parent == name and body.record.relation == "contains")
+        }
+        grown = not more <= inside
+        inside |= more
+    return inside
+
+
+def _sweep(world: PhysicsWorld, body: LoadedBody, joint: str, riding: set[str]) -> JointRange:
+    index = body.joints[joint]
+    info = engine.getJointInfo(body.body_id, index, physicsClientId=world.client)
+    lower, upper = info[8], info[9]
+    if upper < lower:  # a joint without limits
+        lower, upper = -np.pi, np.pi
+    closed = min(max(0.0, lower), upper)
+    moving = _moving_links(world, body, index)
+    parent = info[16]
+    still = [
+        (other.body_id, link, np.array(engine.getAABB(other.body_id, link, physicsClientId=world.client)))
+        for other in world.bodies.values()
+        if other.name not in riding
+        for link in sorted(other.links.values())
+        if other.name != body.name or (link not in moving and link != parent)
+    ]
+    before = world.joint_value(body.name, joint)
+    step = (upper - lower) / STEPS
+    stretches = [_stretch(world, body, joint, closed, limit, step, moving, still) for limit in (upper, lower)]
+    world.set_joint(body.name, joint, before)
+    free = sum(length for length, _ in stretches)
+    hit = next((met for _, met in stretches if met is not None), None)
+    share = 1.0 if upper == lower else free / (upper - lower)
+    if hit is None:
+        return JointRange(body.name, joint, closed, upper - lower, share)
+    return JointRange(body.name, joint, closed, upper - lower, share, hit_link=hit[0], hit_at=hit[2], hit_depth=hit[1])
+
+
+def _stretch(
+    world: PhysicsWorld,
+    body: LoadedBody,
+    joint: str,
+    closed: float,
+    limit: float,
+    step: float,
+    moving: list[int],
+    still: list[tuple[int, int, np.ndarray]],
+) -> tuple[float, tuple[str, float, float] | None]:
+    """Return how far a joint goes from where it is closed towards a limit [rad, m] in steps, and what it meets: the
+    link, how deep [m], at which value."""
+    reached = closed
+    for value in _positions(closed, limit, step):
+        world.set_joint(body.name, joint, value)
+        hit = _hit(world, body, moving, still)
+        if hit is not None:
+            return abs(reached - closed), (*hit, value)
+        reached = value
+    return abs(limit - closed), None
+
+
+def _positions(start: float, end: float, step: float) -> Iterator[float]:
+    """Yield values from start to end, both included; nothing when they are the same."""
+    if start == end or step <= 0:
+        return
+    count = max(1, int(np.ceil(abs(end - start) / step - 1e-9)))
+    yield from np.linspace(start, end, count + 1).tolist()
+
+
+def _moving_links(world: PhysicsWorld, body: LoadedBody, index: int) -> list[int]:
+    """Return the link of a joint and all links below it."""
+    moving = {index}
+    for link in sorted(body.links.values()):  # parents have smaller indices than their children
+        if link >= 0 and engine.getJointInfo(body.body_id, link, physicsClientId=world.client)[16] in moving:
+            moving.add(link)
+    return sorted(moving)
+
+
+def _hit(
+    world: PhysicsWorld, body: LoadedBody, moving: list[int], still: list[tuple[int, int, np.ndarray]]
+) -> tuple[str, float] | None:
+    """Return the link that moving links lie deepest in, and how deep [m]; None when no deeper than `HIT_DEPTH`.
+
+    `still`: body id, link index and bounds (2, 3) of all links that stand still.
+    """
+    deepest: tuple[str, float] | None = None
+    bounds = np.array([entry[2] for entry in still]).reshape(-1, 2, 3)
+    for link in moving:
+        low, high = np.array(engine.getAABB(body.body_id, link, physicsClientId=world.client))
+        for place in np.flatnonzero(((bounds[:, 0] <= high) & (bounds[:, 1] >= low)).all(axis=1)):
+            other, other_link = still[place][:2]
+            depth = link_depth(world, body.body_id, link, other, other_link)
+            if depth > HIT_DEPTH and (deepest is None or depth > deepest[1]):
+                deepest = (world.link_name(other, other_link), depth)
+    return deepest

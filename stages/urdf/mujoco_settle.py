@@ -1,0 +1,79 @@
+"""The same test in MuJoCo: a second engine, without Bullet's padding, that reads scene.mjcf.xml."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from schemas.errors import BadInput, MissingDependency
+from schemas.interactive_scene import InteractiveSceneFile
+from stages.urdf.settle_report import MOVED_LIMIT, TURNED_LIMIT, BodyMotion
+
+MJCF_FILE, KEY_FRAME = "scene.mjcf.xml", "reconstructed"
+
+
+def mujoco_motions(
+    scene_folder: Path, seconds: float, *, moved_limit: float = MOVED_LIMIT, turned_limit: float = TURNED_LIMIT
+) -> tuple[BodyMotion, ...]:
+    """Return what becomes of the movable bodies of a scene in MuJoCo, after `seconds` [s] from the key frame, in the
+    order of scene.json. Distances and angles are of the centre of mass and the principal axes.
+
+    Raises MissingDependency without MuJoCo, BadInput for a scene that it does not load.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise MissingDependency("MuJoCo is not installed", hint="pip install 'scenewright[mujoco]'") from None
+    folder = Path(scene_folder)
+    scene = InteractiveSceneFile.read(folder / "scene.json")
+    path = folder / MJCF_FILE
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+        data = mujoco.MjData(model)
+        names = [body.name for body in scene.bodies if body.movable]
+        numbers = [model.body(name).id for name in names]
+    except (ValueError, KeyError) as error:
+        raise BadInput(f"{path}: MuJoCo does not load it: {error}", hint="run `urdf` again") from None
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, model.key(KEY_FRAME).id)
+    mujoco.mj_forward(model, data)
+    before = [_pose(data, number) for number in numbers]
+    ground = _ground(model, data, scene)
+    mujoco.mj_step(model, data, nstep=round(seconds / model.opt.timestep))
+    mujoco.mj_forward(model, data)
+    motions = []
+    for name, number, (position, rotation) in zip(names, numbers, before, strict=True):
+        now, turned = _pose(data, number)
+        motions.append(
+            BodyMotion(
+                name,
+                moved=float(np.linalg.norm(now - position)),
+                turned=float(Rotation.from_matrix(rotation.T @ turned).magnitude()),
+                fell_through=bool(now[2] < ground),
+                moved_limit=moved_limit,
+                turned_limit=turned_limit,
+            )
+        )
+    return tuple(motions)
+
+
+def _pose(data: Any, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return position (3,) and rotation (3, 3) of a body's inertial frame, world frame."""
+    return np.array(data.xipos[number]), np.array(data.ximat[number]).reshape(3, 3)
+
+
+def _ground(model: Any, data: Any, scene: InteractiveSceneFile) -> float:
+    """Return the height under which no centre of mass may end [m]: the lowest top of a floor, minus infinity without
+    one. Floors collide as boxes."""
+    tops = []
+    for body in scene.bodies:
+        if body.class_name == "floor":
+            entry = model.body(body.name)
+            for geom in range(entry.geomadr[0], entry.geomadr[0] + entry.geomnum[0]):
+                half = np.abs(np.array(data.geom_xmat[geom]).reshape(3, 3)) @ model.geom_size[geom]
+                if model.geom_contype[geom]:
+                    tops.append(float(data.geom_xpos[geom][2] + half[2]))
+    return min(tops, default=-np.inf)

@@ -1,0 +1,120 @@
+"""Who may import whom, read from the import graph: a new step, kit module or backend needs no entry anywhere."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import grimp
+import networkx
+import pytest
+
+from stages.engine.discovery import all_stages
+
+HEAVY = {"open3d", "torch", "cv2", "pybullet", "trimesh", "numba", "matplotlib", "scipy"}
+SHARED_WITH_SYSTEMS_TO_COME = ("language", "motion", "rendering", "tasks")
+"""Packages of the kit that may have fewer than two users today: agents, splats, learned predicates and cutting ask
+language models, plan with symbols, move arms and render too."""
+
+
+@cache
+def graph() -> grimp.ImportGraph:
+    return grimp.build_graph("cli", "stages", "schemas", "benchmarks", include_external_packages=True, cache_dir=None)
+
+
+def floor(module: str) -> str:
+    """`cli`, `schemas`, `benchmarks`, `engine`, `kit`, or the folder of a step."""
+    top, *below = module.split(".")
+    return below[0] if top == "stages" and below else top
+
+
+def ours() -> list[str]:
+    return sorted(module for module in graph().modules if not graph().is_module_squashed(module))
+
+
+def steps() -> set[str]:
+    return {stage.folder for stage in all_stages().values()}
+
+
+def allowed(source: str) -> set[str]:
+    """The floors below, and the own one. Steps meet only in artifacts."""
+    if source == "schemas":
+        return {"schemas"}
+    if source == "kit":
+        return {"schemas", "kit"}
+    if source == "engine":
+        return {"schemas", "kit", "engine"}
+    if source in steps():
+        return {"schemas", "kit", source}
+    return {"schemas", "kit", "engine", "cli", "stages", source, *steps()}
+
+
+def test_every_folder_of_stages_is_the_engine_the_kit_or_a_step() -> None:
+    assert {floor(module) for module in ours()} - {"stages"} == {
+        *("cli", "schemas", "benchmarks", "engine", "kit"),
+        *steps(),
+    }
+
+
+def test_an_import_only_points_down() -> None:
+    wrong = [
+        f"{module} imports {imported}"
+        for module in ours()
+        for imported in sorted(graph().find_modules_directly_imported_by(module))
+        if not graph().is_module_squashed(imported) and floor(imported) not in allowed(floor(module))
+    ]
+    assert not wrong
+
+
+def test_only_benchmarks_may_import_the_command_line() -> None:
+    wrong = [m for m in ours() if floor(m) != "cli" for i in graph().find_modules_directly_imported_by(m)
+             if floor(i) == "cli" and floor(m) != "benchmarks"]  # fmt: skip
+    assert not wrong
+
+
+def test_declarations_import_nothing_heavy() -> None:
+    for folder in steps():
+        assert not HEAVY & graph().find_modules_directly_imported_by(f"stages.{folder}.parameters"), folder
+
+
+def test_the_kit_holds_what_two_or_more_share() -> None:
+    """Counted through the kit's own modules; a benchmark counts as one user, whichever it is."""
+    lonely = {}
+    for module in ours():
+        parts = module.split(".")
+        if floor(module) != "kit" or graph().find_children(module) or parts[2] in SHARED_WITH_SYSTEMS_TO_COME:
+            continue
+        users = {floor(user) for user in _users_of(module)} - {"kit"}
+        if len(users) < 2:
+            lonely[module] = sorted(users)
+    assert not lonely, "what one step uses lives in that step; what none uses goes"
+
+
+def _users_of(module: str) -> set[str]:
+    """Modules that import it, through the kit only: what a step imports is not used by who imports the step."""
+    found: set[str] = set()
+    waiting = [module]
+    while waiting:
+        for user in graph().find_modules_that_directly_import(waiting.pop()):
+            if user not in found:
+                found.add(user)
+                if floor(user) == "kit":
+                    waiting.append(user)
+    return found
+
+
+def test_modules_import_each_other_in_no_circle() -> None:
+    plain = grimp.build_graph(
+        "cli", "stages", "schemas", "benchmarks", exclude_type_checking_imports=True, cache_dir=None
+    )
+    edges = networkx.DiGraph(
+        (module, imported) for module in plain.modules for imported in plain.find_modules_directly_imported_by(module)
+    )
+    circles = [sorted(found) for found in networkx.strongly_connected_components(edges) if len(found) > 1]
+    assert not circles
+
+
+@pytest.mark.parametrize("module", ["stages.fuse.mapping"])
+def test_cores_that_others_will_drive_need_no_stage(module: str) -> None:
+    """An agent that maps while it acts takes the mapper without the step around it."""
+    chain = graph().find_shortest_chain(module, module.rsplit(".", 1)[0] + ".stage")
+    assert chain is None
