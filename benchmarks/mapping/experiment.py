@@ -28,7 +28,7 @@ from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.results import Part
 from stages.evaluate.truth import TrueRoom, load_truth
 from stages.fuse.mapping import PanopticMapper
-from stages.fuse.stage import write_map
+from stages.fuse.stage import new_mapper, write_map
 from stages.graph.stage import run as build_graph
 from stages.kit.formats.frames import Frame, FrameReader
 from stages.kit.measurement.average_precision import Candidates
@@ -123,8 +123,7 @@ def build_maps(
 ) -> dict[str, PanopticMapper]:
     """Return the map of every arm after all frames of a case; adds the time of each to `seconds`."""
     vocabulary = load_vocabulary()
-    things = frozenset(entry.id for entry in vocabulary.classes if entry.kind == "thing")
-    mappers = {arm.name: PanopticMapper(arm.fuse, things) for arm in arms}
+    mappers = {arm.name: new_mapper(arm.fuse, vocabulary) for arm in arms}
     own = {"backend": NETWORK} if case == NETWORK else {"backend": "ground-truth", "corruption": _level(case)}
     backend = choose_backend(BackendRequest(SegmentParameters.model_validate(own), sequence=sequence, reader=reader))
     poses = np.array([entry.frame.world_from_camera for entry in shared])

@@ -113,7 +113,10 @@ def test_modules_import_each_other_in_no_circle() -> None:
     assert not circles
 
 
-@pytest.mark.parametrize("module", ["stages.fuse.mapping"])
+@pytest.mark.parametrize(
+    "module",
+    ["stages.fuse.mapping", "stages.fuse.closing", "stages.fuse.ours", "stages.graph.building", "stages.graph.ours"],
+)
 def test_cores_that_others_will_drive_need_no_stage(module: str) -> None:
     """An agent that maps while it acts takes the mapper without the step around it."""
     chain = graph().find_shortest_chain(module, module.rsplit(".", 1)[0] + ".stage")
