@@ -36,11 +36,10 @@ from stages.kit.measurement.panoptic_quality import ClassQuality
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.fusion import fuse
 from stages.segment.geometric import GeometricFrame, GeometricSettings, segment_depth
 from stages.segment.parameters import SegmentParameters
 from stages.segment.settings import fusion_settings, geometric_settings
-from stages.segment.stage import describe
+from stages.segment.stage import FUSION, describe
 
 DRIFT_STREAM = 11
 
@@ -137,6 +136,7 @@ def build_maps(
         for arm in arms:
             geometric, spent = entry.geometric[geometric_settings(arm.segment)]
             start = time.perf_counter()
+            fuse = FUSION[arm.segment.fusion]
             fused = fuse(geometric.labels, masks, geometric.points, fusion_settings(arm.segment), geometric.small)
             listing = describe(frame.index, fused).segments
             assert frame.depth is not None

@@ -167,7 +167,7 @@ def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standi
 
 def segment_parts(frames: list[CorridorFrame]) -> dict[str, float]:
     """Return processor ms a frame of `segment` without its network, by part, and the peak memory [MB]."""
-    from stages.segment.fusion import fuse
+    from stages.segment.fusion_ours import fuse
     from stages.segment.geometric import segment_depth
     from stages.segment.parameters import SegmentParameters
     from stages.segment.settings import fusion_settings, geometric_settings

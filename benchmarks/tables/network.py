@@ -36,7 +36,7 @@ from stages.engine.reading import open_artifact
 from stages.kit.drawing.palette import entity_color
 from stages.kit.formats.frames import Frame, FrameReader
 from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
-from stages.segment.fusion import fuse
+from stages.segment.fusion_ours import fuse
 from stages.segment.geometric import segment_depth
 from stages.segment.network.backend import Predictor, load_predictor
 from stages.segment.network.features import mount_of_pose

@@ -194,12 +194,12 @@ def _network(request: BackendRequest) -> Backend:
 
 def _objects(request: BackendRequest) -> Backend:
     # Imported here: its loops are compiled when they are first used.
-    from stages.segment.objects.backend import ObjectsBackend
+    from stages.segment.objects.backend import SCORERS, ObjectsBackend
 
     _, reader = request.log()
     parameters = request.parameters
     return ObjectsBackend(
-        load_vocabulary(), reader.camera, learned=parameters.grouping == "learned", largest=parameters.largest_object
+        load_vocabulary(), reader.camera, scorer=SCORERS[parameters.grouping](), largest=parameters.largest_object
     )
 
 
