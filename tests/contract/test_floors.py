@@ -128,3 +128,23 @@ def test_cores_that_others_will_drive_need_no_stage(core: str) -> None:
     """An agent that maps while it acts takes the mapper without the step around it."""
     module = f"stages.{core}"
     assert graph().find_shortest_chain(module, f"stages.{floor(module)}.stage") is None
+
+
+@pytest.mark.parametrize(
+    "baseline",
+    ["graph.thesis", "fuse.thesis", "fuse.separate", "cad.thesis", "segment.fusion_thesis", "segment.fusion_voxblox"],
+)
+def test_a_baseline_reaches_nothing_of_ours(baseline: str) -> None:
+    """Whoever improves our method cannot change the one that it is compared with."""
+    folder = floor(f"stages.{baseline}")
+    reached = graph().find_upstream_modules(f"stages.{baseline}")
+    assert not reached & {f"stages.{folder}.ours", f"stages.{folder}.fusion_ours", *OURS_ALONE}
+
+
+OURS_ALONE = {
+    *("stages.graph.corrected_support", "stages.graph.shared_support", "stages.graph.beside", "stages.graph.hanging"),
+    *("stages.fuse.partition", "stages.fuse.class_scores"),
+    *("stages.cad.apart", "stages.cad.fitting", "stages.cad.scoring"),
+    *("stages.segment.claims",),
+}
+"""What only our methods are made of."""
