@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model, Transform
 from schemas.scene_parts import Camera
 
@@ -73,9 +73,4 @@ class Sequence(Artifact):
     kind: ClassVar[str] = "sequence"
     schema_version: ClassVar[int] = 2
     description: ClassVar[str] = "RGB-D frames with calibration and poses, gravity aligned"
-    json_files: ClassVar[dict[str, type[Model]]] = {"sequence.json": SequenceFile}
-
-    @property
-    def info(self) -> SequenceFile:
-        """The parsed sequence.json."""
-        return SequenceFile.read(self.path("sequence.json"))
+    info = Document(SequenceFile, "sequence.json")

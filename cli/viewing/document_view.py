@@ -9,7 +9,7 @@ from schemas.exported_sequence import ExportedSequence
 
 def draw_evaluation(evaluation: Evaluation, canvas: Canvas) -> None:
     """Show all figures and plots."""
-    metrics = evaluation.metrics
+    metrics = evaluation.info
     rows = [f"**{metrics.label}**", "", "| measure | value |", "|---|---|"]
     for name, value in sorted(metrics.metrics.items()):
         rows.append(f"| {name} | {'-' if value is None else f'{value:.4g}'} |")

@@ -7,20 +7,18 @@ from typing import Any
 
 from pydantic import Field
 
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import CadScene
+from schemas.contact_graph import ContactGraph
 from schemas.errors import UsageError
-from schemas.kinds import (
-    CadLibrary,
-    CadScene,
-    ContactGraph,
-    Evaluation,
-    GroundTruth,
-    InteractiveScene,
-    PanopticMap,
-    Plan,
-    Segments,
-    Sequence,
-    Trajectory,
-)
+from schemas.evaluation import Evaluation
+from schemas.ground_truth import GroundTruth
+from schemas.interactive_scene import InteractiveScene
+from schemas.panoptic_map import PanopticMap
+from schemas.plan import Plan
+from schemas.segments import Segments
+from schemas.sequence import Sequence
+from schemas.trajectory import Trajectory
 from stages.kit.stage import Optionally, Parameters, Stage
 
 

@@ -51,7 +51,7 @@ class PackingView:
 
 def packing_view(packing: Packing, width: int) -> PackingView:
     """Read a packing; pictures are at most `width` wide [px]. Raises BadInput for a picture that cannot be read."""
-    file, instance = packing.packing, packing.instance
+    file, instance = packing.info, packing.instance
     rows = [attempt_row(number, attempt) for number, attempt in enumerate(file.attempts, start=1)]
     paths = {name: packing.path(f"{name}.png") for name in PICTURES}
     return PackingView(

@@ -7,30 +7,24 @@ from typing import Any
 
 from pydantic import Field
 
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import CadScene
+from schemas.contact_graph import ContactGraph
 from schemas.errors import UsageError
-from schemas.kinds import (
-    CadLibrary,
-    CadScene,
-    ContactGraph,
-    Evaluation,
-    GroundTruth,
-    InteractiveScene,
-    Packing,
-    PanopticMap,
-    Plan,
-    Report,
-    Segments,
-    Sequence,
-    SutureEvaluation,
-    SutureNeedle,
-    SutureThread,
-    SutureTrial,
-    TablewareDetections,
-    TablewareEvaluation,
-    TablewarePlan,
-    TablewareTrial,
-    Trajectory,
-)
+from schemas.evaluation import Evaluation, Report
+from schemas.ground_truth import GroundTruth
+from schemas.interactive_scene import InteractiveScene
+from schemas.packing import Packing
+from schemas.panoptic_map import PanopticMap
+from schemas.plan import Plan
+from schemas.segments import Segments
+from schemas.sequence import Sequence
+from schemas.suture_needle import SutureNeedle, SutureThread
+from schemas.suture_trial import SutureEvaluation, SutureTrial
+from schemas.tableware_detections import TablewareDetections
+from schemas.tableware_plan import TablewarePlan
+from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
+from schemas.trajectory import Trajectory
 from stages.kit.stage import Optionally, Parameters, Stage
 
 

@@ -121,7 +121,7 @@ def run(
     artifacts = {role: artifact for role, artifact in given.items() if artifact is not None}
     values: dict[str, Any] = _empty_page()
     values["label"] = _label(evaluation, segments, panoptic_map)
-    values["baseline_label"] = baseline_evaluation.metrics.label if baseline_evaluation is not None else ""
+    values["baseline_label"] = baseline_evaluation.info.label if baseline_evaluation is not None else ""
     if sequence is not None:
         with context.progress.step("frames"):
             _add_frames(values, sequence, segments, parameters)
@@ -140,7 +140,7 @@ def run(
     if plan is not None:
         with context.progress.step("plan"):
             values["plan"] = plan_view(plan, parameters.keyframes, 640)
-            values["plan_ok"] = all(check.holds for check in plan.plan.checks)
+            values["plan_ok"] = all(check.holds for check in plan.info.checks)
     if packing is not None:
         with context.progress.step("packing"):
             values["packing"] = packing_view(packing, 1100)
@@ -181,8 +181,8 @@ def _empty_page() -> dict[str, Any]:
 
 
 def _label(evaluation: Evaluation | None, segments: Segments | None, panoptic_map: PanopticMap | None) -> str:
-    if evaluation is not None and evaluation.metrics.label:
-        return evaluation.metrics.label
+    if evaluation is not None and evaluation.info.label:
+        return evaluation.info.label
     if segments is not None:
         return segments.info.label
     return panoptic_map.info.segmentation if panoptic_map is not None else ""
@@ -195,7 +195,7 @@ def _title(ground_truth: GroundTruth | None, sequence: Sequence | None, artifact
         return "A table to clear"
     if artifacts and all(role.startswith("suture_") for role in artifacts):
         return "Suture throws"
-    if ground_truth is not None and ground_truth.truth.source == "generated":
+    if ground_truth is not None and ground_truth.info.source == "generated":
         return "A generated room, reconstructed"
     return "A scanned room, reconstructed" if sequence is not None else "A reconstructed room"
 
@@ -216,7 +216,7 @@ def _lead(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts
         "suture_trial": "sutures thrown in a simulator", "suture_evaluation": "their figures",
     }  # fmt: skip
     if isinstance(plan := artifacts.get("plan"), Plan):
-        status = plan.plan.status
+        status = plan.info.status
         executed = {"executed": "a plan that a robot executed", "execution_failed": "a plan whose execution failed"}
         names["plan"] = executed.get(
             status, "a plan" if status == "planned" else "an attempt to plan that found no way"
@@ -227,7 +227,7 @@ def _lead(ground_truth: GroundTruth | None, sequence: Sequence | None, artifacts
     text = " became ".join(parts) if len(parts) == 2 else "".join(parts)
     truth = ""
     if ground_truth is not None:
-        file = ground_truth.truth
+        file = ground_truth.info
         truth = f" The room was generated (recipe {file.recipe}, seed {file.seed}), so the truth is known."
         if file.source == "scan":
             truth = f" What is true of the room was annotated by people ({file.recipe})."
@@ -286,7 +286,7 @@ def _add_views(
     if values["map_views"] is not None:
         pictures.append(replace(values["map_views"]["color"], caption="The map from the same place."))
     if ground_truth is not None:
-        upright = sequence is None or ground_truth.truth.source == "scan"
+        upright = sequence is None or ground_truth.info.source == "scan"
         moved = np.eye(4) if upright or sequence is None else np.array(sequence.info.gravity.world_from_log)
         truth = true_model(ground_truth, moved)
         if truth is not None:
@@ -294,7 +294,7 @@ def _add_views(
     pictures.append(
         _draw(model, top_view(scanned or model, round(0.75 * width)), "CAD scene from above", 15.5 * width / 960)
     )
-    scene = cad_scene.scene
+    scene = cad_scene.info
     decisions = [r.decision for r in scene.replacements]
     values.update(
         cad_views=pictures,
@@ -356,7 +356,7 @@ def _add_candidates(
 
 
 def _add_trees(values: dict[str, Any], interactive_scene: InteractiveScene) -> None:
-    path = interactive_scene.path(interactive_scene.scene.combined_file)
+    path = interactive_scene.path(interactive_scene.info.combined_file)
     if not path.is_file():
         return
     try:
@@ -366,7 +366,7 @@ def _add_trees(values: dict[str, Any], interactive_scene: InteractiveScene) -> N
 
 
 def _add_graph(values: dict[str, Any], contact_graph: ContactGraph, evaluation: Evaluation | None) -> None:
-    graph = contact_graph.graph
+    graph = contact_graph.info
     marks, missing = marks_from_evaluation(evaluation.root) if evaluation is not None else ({}, ())
     try:
         values["graph"] = draw_graph(graph, marks, missing)
@@ -388,7 +388,7 @@ def _add_graph(values: dict[str, Any], contact_graph: ContactGraph, evaluation: 
 
 
 def _add_scene(values: dict[str, Any], interactive_scene: InteractiveScene) -> None:
-    scene = interactive_scene.scene
+    scene = interactive_scene.info
     movable = sum(body.movable for body in scene.bodies)
     joints = sum(len(body.joints) for body in scene.bodies)
     rows = body_rows(interactive_scene)
@@ -402,14 +402,14 @@ def _add_scene(values: dict[str, Any], interactive_scene: InteractiveScene) -> N
 
 def _add_figures(values: dict[str, Any], evaluation: Evaluation, baseline: Evaluation | None) -> None:
     groups = metric_groups(evaluation, baseline)
-    metrics = evaluation.metrics.metrics
+    metrics = evaluation.info.metrics
     against_truth = any(not name.startswith("counts/") for name in metrics)
     measures = {measure.key: measure for _, rows in GROUPS for measure in rows}
     values.update(
         groups=groups,
         baseline=baseline is not None,
         has_intervals=any(row.interval for _, rows in groups for row in rows),
-        notes=evaluation.metrics.notes,
+        notes=evaluation.info.notes,
         plots=read_plots(evaluation),
         tables=read_tables(evaluation),
         metrics=all_metrics(evaluation),
@@ -433,7 +433,7 @@ def _add_figures(values: dict[str, Any], evaluation: Evaluation, baseline: Evalu
 
 def baseline_is_nameless(baseline: Evaluation) -> bool:
     """Whether the baseline's masks have no classes (its class-wise figures are undefined)."""
-    theirs = baseline.metrics.metrics
+    theirs = baseline.info.metrics
     return theirs.get("map/pq") is None and theirs.get("map/pq_class_agnostic") is not None
 
 

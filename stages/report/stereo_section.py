@@ -42,7 +42,7 @@ class StereoView:
 
 def stereo_view(disparity: Disparity, wanted: int, width: int) -> StereoView:
     """Read a disparity; at most MOST_FRAMES frames are shown, pictures at most `width` wide [px]."""
-    file, frames = disparity.disparity, []
+    file, frames = disparity.matching, []
     with (
         FrameReader(disparity.path("frames.mcap")) as reader,
         DisparityReader(disparity.path("disparity.mcap")) as maps,

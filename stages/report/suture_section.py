@@ -74,10 +74,10 @@ def suture_view(
     width: int,
 ) -> SutureView:
     """Read what there is; pictures are at most `width` wide [px]. Raises BadInput for a picture that cannot be read."""
-    poses = needle.needle if needle is not None else None
-    curves = thread.thread if thread is not None else None
-    file = trial.trial if trial is not None else None
-    metrics = evaluation.metrics if evaluation is not None else None
+    poses = needle.info if needle is not None else None
+    curves = thread.info if thread is not None else None
+    file = trial.info if trial is not None else None
+    metrics = evaluation.info if evaluation is not None else None
     rows = () if poses is None else tuple(_needle_row(one) for one in poses.frames)
     if poses is not None and poses.filtered is not None:
         text = poses.filtered.abstained or "one pose from all frames"

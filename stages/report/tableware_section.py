@@ -80,9 +80,9 @@ def tableware_view(
     }
     if trial is not None and (path := trial.path("clearing.gif")).is_file():
         pictures["clearing"] = (animation(path, CAPTIONS["clearing"]), CAPTIONS["clearing"])
-    file = plan.plan if plan is not None else None
-    done = trial.trial if trial is not None else None
-    results = evaluation.results if evaluation is not None else None
+    file = plan.info if plan is not None else None
+    done = trial.info if trial is not None else None
+    results = evaluation.info if evaluation is not None else None
     said = compared = ""
     if done is not None:
         said = f"{done.policy.replace('_', ' ')} in the {done.simulator} simulator: {done.statement}."
@@ -92,7 +92,7 @@ def tableware_view(
             f"{results.sight}; 95 % bootstrap intervals over tables, ratios against Random."
         )
     return TablewareView(
-        seen="" if detections is None else detections.detections.statement,
+        seen="" if detections is None else detections.info.statement,
         plan=_plan_text(plan),
         refused=tuple(one.message for one in file.refused) if file is not None else (),
         impossible=tuple(
@@ -113,7 +113,7 @@ def tableware_view(
 def _plan_text(plan: TablewarePlan | None) -> str:
     if plan is None:
         return ""
-    file = plan.plan
+    file = plan.info
     return (
         f"{file.statement[:1].upper()}{file.statement[1:]}. {file.policy.replace('_', ' ')} takes {file.trips} trips "
         f"and {file.seconds:.0f} s when nothing slips; {file.expected_seconds:.0f} s and "
@@ -125,7 +125,7 @@ def _rows(trial: TablewareTrial | None) -> tuple[TablewareRow, ...]:
     if trial is None:
         return ()
     rows = []
-    for number, step in enumerate(trial.trial.steps, start=1):
+    for number, step in enumerate(trial.info.steps, start=1):
         came = f"to the bin: {', '.join(step.binned)}" if step.binned else ""
         wrong = "; ".join(step.troubles)
         text = "; ".join(part for part in (came, wrong) if part)

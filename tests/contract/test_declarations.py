@@ -89,7 +89,7 @@ def test_a_new_folder_is_a_new_command(tmp_path: Path) -> None:
     folder.mkdir()
     (folder / "__init__.py").write_text("")
     (folder / "parameters.py").write_text(
-        "from schemas.kinds import Trajectory\nfrom stages.kit.stage import Parameters, Stage\n"
+        "from schemas.trajectory import Trajectory\nfrom stages.kit.stage import Parameters, Stage\n"
         "class P(Parameters):\n    pass\nSTAGE = Stage('brandnew', 1, 'Something new', P, {}, Trajectory)\n"
     )
     assert "Something new" in python(code)

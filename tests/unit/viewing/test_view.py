@@ -259,7 +259,7 @@ def test_segment_images_look_up_class_and_instance() -> None:
 
 
 def test_models_stand_side_by_side(run: Path) -> None:
-    models = CadLibrary(root=run / "cad_library").library.models
+    models = CadLibrary(root=run / "cad_library").info.models
     places = row_places(models)
     footprints = [
         (
