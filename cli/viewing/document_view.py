@@ -26,7 +26,7 @@ def draw_report(report: Report, canvas: Canvas) -> None:
     canvas.document("report", f"Open `{report.path('report.html')}` in a browser.")
 
 
-def draw_export(export: ExportedSequence, canvas: Canvas) -> None:
+def draw_exported_sequence(export: ExportedSequence, canvas: Canvas) -> None:
     """Say what was written: it is made for other tools."""
     info = export.info
     rows = [f"{info.frame_count} frames as {info.layout}: open `{export.path(info.log)}`", ""]

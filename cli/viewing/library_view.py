@@ -16,7 +16,7 @@ GAP = 0.4
 SWING_STEPS = 12
 
 
-def draw_library(library: CadLibrary, canvas: Canvas) -> None:
+def draw_cad_library(library: CadLibrary, canvas: Canvas) -> None:
     """Draw a row of models for each class; scrub `opening` (0..1) to move the joints."""
     models = library.info.models
     places = row_places(models)
