@@ -17,7 +17,8 @@ Content = TypeVar("Content", bound=Model)
 class Document(Generic[Content]):
     """A JSON payload file of a kind, declared once: `info = Document(SegmentsFile, "segments.json")`.
 
-    On a handle it is the parsed file, read and validated when it is first asked for. Raises BadInput then.
+    On a handle it is the parsed file, read and validated when it is first asked for (each time, as long as a step is
+    still writing). Raises BadInput then.
     """
 
     def __init__(self, model: type[Content], name: str) -> None:
@@ -33,8 +34,9 @@ class Document(Generic[Content]):
     def __get__(self, artifact: Artifact | None, owner: type) -> Self | Content:
         if artifact is None:
             return self
-        # Kept on the handle, where Python finds it before it asks here again.
-        content = artifact.__dict__[self.attribute] = self.model.read(artifact.path(self.name))
+        content = self.model.read(artifact.path(self.name))
+        if artifact.manifest is not None:  # whole: what it holds is settled
+            artifact.__dict__[self.attribute] = content  # where Python finds it before it asks here again
         return content
 
 

@@ -7,25 +7,10 @@ from typing import Any
 
 from pydantic import Field
 
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph
 from schemas.errors import UsageError
-from schemas.evaluation import Evaluation, Report
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveScene
-from schemas.packing import Packing
-from schemas.panoptic_map import PanopticMap
-from schemas.plan import Plan
-from schemas.segments import Segments
-from schemas.sequence import Sequence
-from schemas.suture_needle import SutureNeedle, SutureThread
-from schemas.suture_trial import SutureEvaluation, SutureTrial
-from schemas.tableware_detections import TablewareDetections
-from schemas.tableware_plan import TablewarePlan
-from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
-from schemas.trajectory import Trajectory
+from schemas.evaluation import Report
 from stages.kit.stage import Optionally, Parameters, Stage
+from stages.report.section import all_roles
 
 
 class ReportParameters(Parameters):
@@ -53,29 +38,7 @@ STAGE = Stage(
     version=7,
     summary="Write one self-contained HTML page about a run: pictures, graph, figures, times, how it was made",
     parameters=ReportParameters,
-    reads={
-        "ground_truth": Optionally(GroundTruth),
-        "sequence": Optionally(Sequence),
-        "trajectory": Optionally(Trajectory),
-        "segments": Optionally(Segments),
-        "panoptic_map": Optionally(PanopticMap),
-        "contact_graph": Optionally(ContactGraph),
-        "cad_scene": Optionally(CadScene),
-        "cad_library": Optionally(CadLibrary),
-        "interactive_scene": Optionally(InteractiveScene),
-        "plan": Optionally(Plan),
-        "packing": Optionally(Packing),
-        "tableware_detections": Optionally(TablewareDetections),
-        "tableware_plan": Optionally(TablewarePlan),
-        "tableware_trial": Optionally(TablewareTrial),
-        "tableware_evaluation": Optionally(TablewareEvaluation),
-        "suture_needle": Optionally(SutureNeedle),
-        "suture_thread": Optionally(SutureThread),
-        "suture_trial": Optionally(SutureTrial),
-        "suture_evaluation": Optionally(SutureEvaluation),
-        "evaluation": Optionally(Evaluation),
-        "baseline_evaluation": Optionally(Evaluation),
-    },
+    reads={role: Optionally(kind) for role, kind in all_roles().items()},
     writes=Report,
     libraries=("numpy", "scipy", "jinja2", "matplotlib", "pillow", "open3d"),
     check=check_inputs,

@@ -17,7 +17,7 @@ from stages.disparity.parameters import DisparityParameters, check_inputs
 from stages.ingest.preflight.steps import step_reports
 from stages.kit.formats.disparity_file import DisparityReader
 from stages.kit.formats.frames import FrameReader, FrameWriter, require_depth
-from stages.report.stereo_section import stereo_view
+from stages.report.sections.stereo.view import stereo_view
 from tests.unit.disparity.pairs import BASELINE, CAMERA, pair, write_folder
 from tests.unit.disparity.running import matched
 from tests.unit.disparity.test_rectification import turned

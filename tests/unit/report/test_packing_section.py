@@ -13,7 +13,7 @@ from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.pack.parameters import PackParameters
 from stages.pack.stage import run as pack
-from stages.report.packing_section import MOST_ROWS, attempt_row, packing_view
+from stages.report.sections.packing.view import MOST_ROWS, attempt_row, packing_view
 from tests.unit.report.test_report import parse, report
 
 

@@ -17,7 +17,7 @@ from schemas.suture_scene import SutureScene, SutureSceneFile
 from schemas.suture_trial import SutureTrialFile
 from stages.engine.loading import load, payload
 from stages.kit.formats.frames import FrameWriter
-from stages.report.suture_section import tables_of
+from stages.report.sections.suture.view import tables_of
 from stages.suture.evaluation.thread_figures import thread_error
 from stages.suture.motion_reports import motions_to_last
 from stages.suture.pairs import StereoPairs

@@ -6,6 +6,7 @@ import base64
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from PIL import Image
 
@@ -14,7 +15,10 @@ from schemas.tableware_detections import TablewareDetections
 from schemas.tableware_plan import TablewareAction, TablewarePlan
 from schemas.tableware_trial import EvaluatedPolicy, TablewareEvaluation, TablewareTrial
 from stages.report.images import Picture, from_file
+from stages.report.page import Page
 
+WIDTH = 1100
+"""Of pictures, at most [px]."""
 LARGEST_ANIMATION = 6_000_000
 CAPTIONS = {
     "overlay": "What was seen, and how sure that is",
@@ -155,3 +159,15 @@ def animation(path: Path, alt: str) -> Picture:
     if len(data) > LARGEST_ANIMATION:
         raise BadInput(f"{path}: {len(data)} bytes are too large an animation", hint="make the artifact again")
     return Picture(f"data:image/gif;base64,{base64.b64encode(data).decode('ascii')}", width, height, alt)
+
+
+def view(page: Page) -> dict[str, Any]:
+    """Return what there is of a table: what was seen, planned, tried, compared."""
+    found = tableware_view(
+        page.given("tableware_detections", TablewareDetections),
+        page.given("tableware_plan", TablewarePlan),
+        page.given("tableware_trial", TablewareTrial),
+        page.given("tableware_evaluation", TablewareEvaluation),
+        WIDTH,
+    )
+    return {"tableware": found}

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from schemas.packing import Packing, PackingAttempt
 from stages.report.images import Picture, from_file
+from stages.report.page import Page
 
+WIDTH = 1100
+"""Of pictures, at most [px]."""
 MOST_ROWS = 60
 PICTURES = {
     "layout": "The basket from above after the last plan; red: placements that were refused",
@@ -85,3 +89,9 @@ def attempt_row(number: int, attempt: PackingAttempt) -> AttemptRow:
     if attempt.task is not None:
         return AttemptRow(number, placed, "", attempt.task.message, attempt.task.kind)
     return AttemptRow(number, placed, "", "goal reached", "")
+
+
+def view(page: Page) -> dict[str, Any] | None:
+    """Return the packing with its pictures."""
+    packing = page.given("packing", Packing)
+    return {"packing": packing_view(packing, WIDTH)} if packing is not None else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,10 @@ from schemas.artifact import Artifact
 from schemas.suture_needle import NeedleFrame, SutureNeedle, SutureThread
 from schemas.suture_trial import SutureEvaluation, SutureRun, SutureTrial
 from stages.report.images import Picture, from_file
+from stages.report.page import Page
 
+WIDTH = 1100
+"""Of pictures, at most [px]."""
 MOST_PICTURES = 6
 MOST_RUNS = 60
 CLASSES = {"I": "insertion", "E": "extraction", "H": "handover", "T": "thread"}
@@ -158,3 +162,15 @@ def tables_of(markdown: str) -> tuple[tuple[str, tuple[tuple[str, ...], ...]], .
         if line.startswith("#"):
             title = line.lstrip("# ").strip()
     return tuple(found)
+
+
+def view(page: Page) -> dict[str, Any]:
+    """Return what there is of suturing: needle, thread, trial, figures."""
+    found = suture_view(
+        page.given("suture_needle", SutureNeedle),
+        page.given("suture_thread", SutureThread),
+        page.given("suture_trial", SutureTrial),
+        page.given("suture_evaluation", SutureEvaluation),
+        WIDTH,
+    )
+    return {"suture": found}

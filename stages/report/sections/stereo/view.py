@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from stages.kit.formats.frames import FrameReader
 from stages.kit.stereo.pictures import confidence_colors, disparity_colors
 from stages.report.frames import choose_frames
 from stages.report.images import Picture, jpeg
+from stages.report.page import Page
 
 MOST_FRAMES = 3
 
@@ -58,3 +60,11 @@ def stereo_view(disparity: Disparity, wanted: int, width: int) -> StereoView:
     shares = np.array([[frame.known, frame.trusted] for frame in file.frames]).reshape(-1, 2)
     known, trusted = 100 * shares.mean(axis=0) if len(shares) else (0.0, 0.0)
     return StereoView(file.detail, file.rows, tuple(frames), float(known), float(trusted), file.minimum_confidence)
+
+
+def view(page: Page) -> dict[str, Any] | None:
+    """Return the matching of a sequence from stereo pairs; None for any other."""
+    disparity = page.given("sequence", Disparity)
+    if disparity is None:
+        return None
+    return {"stereo": stereo_view(disparity, page.parameters.frames, page.parameters.frame_width)}
