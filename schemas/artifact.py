@@ -93,6 +93,10 @@ class Artifact:
         """Return the path of a payload file."""
         return self.root / name
 
+    def pictures(self) -> tuple[int, float] | None:
+        """Return the number of frames, and the megapixels of all of them; None for a kind without frames."""
+        return None
+
     @property
     def files(self) -> tuple[str, ...]:
         """Payload files by path within the folder, as the manifest lists them; none before it is written."""

@@ -61,3 +61,8 @@ class GroundTruth(Artifact):
     )
     info = Document(GroundTruthFile, "ground_truth.json")
     graph = Document(ContactGraphFile, "graph.json")
+
+    def pictures(self) -> tuple[int, float]:
+        """Return the number of frames, and the megapixels of all of them."""
+        camera = self.info.camera
+        return self.info.frame_count, self.info.frame_count * camera.width * camera.height / 1e6

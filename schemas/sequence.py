@@ -74,3 +74,9 @@ class Sequence(Artifact):
     schema_version: ClassVar[int] = 2
     description: ClassVar[str] = "RGB-D frames with calibration and poses, gravity aligned"
     info = Document(SequenceFile, "sequence.json")
+
+    def pictures(self) -> tuple[int, float]:
+        """Return the number of frames, and the megapixels of all of them."""
+        sizes = [camera.camera.width * camera.camera.height / 1e6 for camera in self.info.cameras]
+        known = sum(size * camera.frame_count for size, camera in zip(sizes, self.info.cameras, strict=True))
+        return self.info.frame_count, known or self.info.frame_count * sizes[0]

@@ -19,6 +19,7 @@ from schemas.plan import Plan
 from schemas.segments import Segments
 from schemas.sequence import Sequence
 from schemas.trajectory import Trajectory
+from stages.kit.estimates import grows_with
 from stages.kit.stage import Optionally, Parameters, Stage
 
 
@@ -75,4 +76,5 @@ STAGE = Stage(
     check=check_inputs,
     example="scenewright evaluate --ground-truth outputs/demo/ground_truth "
     "--panoptic-map outputs/demo/panoptic_map --out outputs/demo/evaluation",
+    estimate=grows_with("panoptic_map", 0.4, 0.0, 390, 3.5),
 )

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from schemas.errors import UsageError
 from schemas.evaluation import Report
+from stages.kit.estimates import grows_with
 from stages.kit.stage import Optionally, Parameters, Stage
 from stages.report.section import all_roles
 
@@ -44,4 +45,5 @@ STAGE = Stage(
     check=check_inputs,
     example="scenewright report --sequence outputs/demo/sequence --panoptic-map outputs/demo/panoptic_map "
     "--evaluation outputs/demo/evaluation --out outputs/demo/report",
+    estimate=grows_with("panoptic_map", 1.0, 0.02, 840, 9.5),
 )
