@@ -22,9 +22,9 @@ def viewer_of(kind: type[Artifact]) -> Callable[[Any, Canvas], None] | None:
     """
     files = [entry.name for entry in pkgutil.iter_modules(cli.viewing.__path__) if entry.name.endswith("_view")]
     modules = [importlib.import_module(f"cli.viewing.{name}") for name in files]
-    for base in kind.__mro__[:-2]:  # up to Artifact, of which nothing is known
+    for name in [base.kind for base in kind.__mro__ if issubclass(base, Artifact)]:
         for module in modules:
-            draw = getattr(module, f"draw_{base.kind}", None)
+            draw = getattr(module, f"draw_{name}", None)
             if draw is not None:
                 return draw
     return None

@@ -43,7 +43,7 @@ def load_run(path: Path | str) -> dict[str, Artifact]:
 
     Raises BadInput when there are none, or for the first that cannot be opened.
     """
-    found = {name: load(folder) for name, folder in artifacts_of(Path(path)).items()}
+    found: dict[str, Artifact] = {name: load(folder) for name, folder in artifacts_of(Path(path)).items()}
     started = {name: artifact.manifest.provenance.started for name, artifact in found.items() if artifact.manifest}
     return dict(sorted(found.items(), key=lambda item: (started[item[0]], item[0])))
 

@@ -28,8 +28,8 @@ class Section:
     order: int
     """Its place on the page: small numbers first."""
     reads: Mapping[str, type[Artifact]] = field(default_factory=dict)
-    """Role -> kind: inputs of the step `report`, each may be left out. The section is asked when one of them is given;
-    one that reads nothing is always asked."""
+    """Role -> kind: inputs of the step `report`, each may be left out. The section is asked when one of them is given,
+    and is of that kind; a section that reads nothing is always asked."""
     became: Mapping[str, str | Callable[[Any], str]] = field(default_factory=dict)
     """Role -> what the first lines call it (`a labelled map`), or a function of the artifact that says it."""
     alone: str = ""
@@ -48,12 +48,15 @@ def all_sections() -> tuple[Section, ...]:
 
 
 def all_roles() -> dict[str, type[Artifact]]:
-    """Return role -> kind of everything that some section reads. Raises RuntimeError when two disagree."""
+    """Return role -> kind of everything that some section reads, the more general one where two differ.
+
+    Raises RuntimeError when neither can be read as the other.
+    """
     roles: dict[str, type[Artifact]] = {}
     for section in all_sections():
         for role, kind in section.reads.items():
-            if roles.setdefault(role, kind) is not kind:
-                raise RuntimeError(
-                    f"section {section.name!r} reads {role!r} as {kind.kind!r}, another as something else"
-                )
+            other = roles.get(role, kind)
+            if not issubclass(kind, other) and not issubclass(other, kind):
+                raise RuntimeError(f"{role!r} is {kind.kind!r} to section {section.name!r}, {other.kind!r} to another")
+            roles[role] = other if issubclass(kind, other) else kind
     return roles

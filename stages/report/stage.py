@@ -30,7 +30,7 @@ def run(*, parameters: ReportParameters, context: Context, **inputs: Artifact | 
     shown: list[dict[str, Any]] = []
     tiles: list[Any] = []
     for section in all_sections():
-        if section.reads and not set(section.reads) & set(artifacts):
+        if section.reads and not any(page.given(role, kind) for role, kind in section.reads.items()):
             continue
         with context.progress.step(section.name):
             values = importlib.import_module(f"stages.report.sections.{section.name}.view").view(page)
@@ -39,10 +39,10 @@ def run(*, parameters: ReportParameters, context: Context, **inputs: Artifact | 
             shown.append({"id": section.name, "name": section.title, "html": html})
             tiles += values.get("tiles", ())
     title = parameters.title or _title(page)
-    html = render_page(
+    page_text = render_page(
         {**head, "title": title, "lead": _lead(page), "tiles": tiles, "sections": shown, "version": _version()}
     )
-    return _write(html, title, tuple(section["id"] for section in shown), artifacts, context)
+    return _write(page_text, title, tuple(section["id"] for section in shown), artifacts, context)
 
 
 def _version() -> str:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from schemas.sequence import Sequence
+from schemas.disparity import Disparity
 from stages.report.section import Section
 
 SECTION = Section(
     "stereo",
     "Stereo",
     order=20,
-    reads={"sequence": Sequence},
+    reads={"sequence": Disparity},
 )
