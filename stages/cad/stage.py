@@ -53,8 +53,8 @@ def run(
     method = METHODS[parameters.method](parameters)
     surfaces: dict[str, ModelSurface] = {}
     with context.progress.step("candidates"):
-        shortlists = find_candidates(contact_graph.graph, panoptic_map, library, surfaces, method, context)
-    return choose_and_write(contact_graph.graph, panoptic_map, library, shortlists, surfaces, method, context)
+        shortlists = find_candidates(contact_graph.info, panoptic_map, library, surfaces, method, context)
+    return choose_and_write(contact_graph.info, panoptic_map, library, shortlists, surfaces, method, context)
 
 
 def choose_and_write(
@@ -116,7 +116,7 @@ def find_candidates(
     context: Context,
 ) -> dict[str, Shortlist]:
     """Return the shortlist of every object; surfaces of the models that were needed are added to `surfaces`."""
-    models = library.library.models
+    models = library.info.models
     objects = [node for node in graph.nodes if node.node_type in ("rigid", "articulated")]
     free_space = method.free_space(panoptic_map)
     shortlists: dict[str, Shortlist] = {}
