@@ -42,7 +42,7 @@ INLINE = re.compile(r"(?P<open><!--f (?P<spec>[^>]*?)-->)(?P<body>.*?)(?P<close>
 GIVEN_MARKER = re.compile(r"<!--given (?P<reason>\w+)-->.*?<!--/given-->", re.DOTALL)
 IN_TEXT = re.compile(r"\{(?P<spec>[^{}]+)\}")
 MEASURED = re.compile(
-    r"(?<![\w.:/-])\d+\.\d+(?![\w.])"  # a decimal
+    r"(?<![\w.:/])\d+\.\d+(?!\.?\d)"  # a decimal
     r"|(?<![\w.])\d[\d,]*(?:\.\d+)? ?(?:%|per cent|percent)"  # a share
     r"|(?<![\w.])\d+ of \d+\b"  # a count of cases
     r"|(?<![\w.])\d[\d,]*(?:\.\d+)? ?(?:°|(?:ms|s|min|minutes|seconds|mm|cm|m|px|MB|GB|kB|Hz|degrees|times|points)\b)"
