@@ -124,11 +124,15 @@ def load_experiment(file: Path) -> Experiment:
 
 
 def digits_of(values: Sequence[float | int | None]) -> int:
-    """Decimals for figures that stand together: as many as they carry, but no more than the largest one deserves."""
-    known = [value for value in values if value is not None]
-    carried = max((len(repr(float(value)).partition(".")[2]) for value in known if value != int(value)), default=0)
-    largest = max((abs(value) for value in known), default=0)
-    return min(carried, 3 if largest <= 1 else 2 if largest < 10 else 1)
+    """Decimals for figures that stand together: what they carry, but no more than three figures of the largest one, or
+    two of the smallest."""
+    sizes = sorted(abs(value) for value in values if value)
+    if not sizes:
+        return 0 if all(isinstance(value, int) for value in values if value is not None) else 1
+    carried = max(len(repr(float(size)).partition(".")[2]) if size % 1 else 0 for size in sizes)
+    for_largest = 3 if sizes[-1] <= 1 else 2 if sizes[-1] < 10 else 1
+    for_smallest = 0 if sizes[0] >= 10 else 1 if sizes[0] >= 1 else 2 if sizes[0] >= 0.1 else 3
+    return min(carried, max(for_largest, for_smallest))
 
 
 def number(value: float | int | None, digits: int) -> str:
@@ -256,11 +260,13 @@ def table(experiment: Experiment, spec: Mapping[str, Any], own_page: bool) -> st
     for place, name in enumerate(columns):
         figures = [row.figures[place] for row in rows]
         known = [figure for figure in figures if figure]
-        digits = spec.get("digits", {}).get(name, digits_for(known))
-        units = {figure.unit for figure in known} - {"", "count"}
-        header.append(f"{name} [{units.pop()}]" if len(units) == 1 and "[" not in name else name)
+        units = {figure.unit for figure in known} - {"count"}
+        same_unit = len(units) < 2
+        header.append(f"{name} [{''.join(units)}]" if same_unit and any(units) and "[" not in name else name)
         for line, figure in zip(cells, figures, strict=True):
-            line.append(with_interval(figure, digits) if figure else "–")
+            digits = spec.get("digits", {}).get(name, digits_for(known if same_unit else [figure] if figure else []))
+            unit = "" if same_unit or figure is None or not figure.unit else f" {figure.unit}"
+            line.append(with_interval(figure, digits) + unit if figure else "–")
     caption = caption_of(experiment, [figure for row in rows for figure in row.known], varied)
     if not own_page:
         caption += f" {origin(experiment)}"
