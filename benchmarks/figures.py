@@ -49,6 +49,15 @@ MEASURED = re.compile(
 )
 """What looks measured: a decimal, a share, `N of M`, a number with a unit. Bare whole numbers are left alone, because
 seeds, counts of cases and settings look the same."""
+CLEARLY_MEASURED = re.compile(
+    r"\d+\.\d+ ?%"
+    r"|\b(?:F1|PQ|AP|IoU|recall|precision|success|accuracy)(?: of| is|:)? \d[\d.]*"
+    r"|(?<![\w.])\d[\d.]* ?(?:ms|s|minutes|min|h)\b(?= of| a frame| on one)"
+    r"|\d[\d.]* ?(?:CPU|frames/s|Hz)\b"
+    r"|(?<![\w.])\d+ of \d+\b"
+    r"|\d[\d.]* times (?:faster|slower|as)"
+)
+"""The same for other pages of docs/, full of settings, limits and formats: only what can hardly be one of them."""
 NUMBERED = re.compile(
     r"\b(?:[Tt]able|[Ss]ection|[Cc]hapter|[Ff]igure|[Ee]quation|Python)s? [\d.]*\d(?:(?:,| and| to) \d+\.\d+)*"
 )
@@ -395,8 +404,8 @@ def render(text: str, experiments: Mapping[str, Experiment], addresses: Mapping[
     return INLINE.sub(lambda match: match["open"] + inline(experiments, match["spec"]) + match["close"], text)
 
 
-def unmarked(text: str) -> Iterator[tuple[int, str]]:
-    """Yield line and text of what looks measured and stands outside of every marker.
+def unmarked(text: str, pattern: re.Pattern[str] = MEASURED) -> Iterator[tuple[int, str]]:
+    """Yield line and text of what looks measured (by `pattern`) and stands outside of every marker.
 
     Left out: code, link targets and numbers of tables and sections.
     """
@@ -405,7 +414,7 @@ def unmarked(text: str) -> Iterator[tuple[int, str]]:
     def hidden(match: re.Match[str]) -> str:
         return blank(match[0])
 
-    for pattern in (
+    for marked in (
         BLOCK,
         INLINE,
         GIVEN_MARKER,
@@ -415,9 +424,9 @@ def unmarked(text: str) -> Iterator[tuple[int, str]]:
         re.compile(r"<!--.*?-->", re.DOTALL),
         NUMBERED,
     ):
-        text = pattern.sub(hidden, text)
+        text = marked.sub(hidden, text)
     for line, content in enumerate(text.splitlines(), start=1):
-        for match in MEASURED.finditer(content):
+        for match in pattern.finditer(content):
             yield line, match[0]
 
 
