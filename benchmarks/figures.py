@@ -269,17 +269,24 @@ def table(experiment: Experiment, spec: Mapping[str, Any], own_page: bool) -> st
     for place, name in enumerate(columns):
         figures = [row.figures[place] for row in rows]
         known = [figure for figure in figures if figure]
-        units = {figure.unit for figure in known} - {"count"}
+        units = {figure.unit for figure in known}
         same_unit = len(units) < 2
-        header.append(f"{name} [{''.join(units)}]" if same_unit and any(units) and "[" not in name else name)
+        unit = "".join(units - {"count"}) if same_unit else ""
+        header.append(f"{name} [{unit}]" if unit and "[" not in name else name)
         for line, figure in zip(cells, figures, strict=True):
             digits = spec.get("digits", {}).get(name, digits_for(known if same_unit else [figure] if figure else []))
-            unit = "" if same_unit or figure is None or not figure.unit else f" {figure.unit}"
-            line.append(with_interval(figure, digits) + unit if figure else "–")
+            line.append("–" if not figure else with_interval(figure, digits) + ("" if same_unit else of_unit(figure)))
     caption = caption_of(experiment, [figure for row in rows for figure in row.known], varied)
     if not own_page:
         caption += f" {origin(experiment)}"
     return f"{markdown_table(header, cells, shown_labels)}\n*{caption}*\n"
+
+
+def of_unit(figure: Figure) -> str:
+    """What follows a figure in a column of several units."""
+    if figure.unit == "count":
+        return f" of {figure.cases}" if figure.cases else ""
+    return f" {figure.unit}" if figure.unit else ""
 
 
 def caption_of(experiment: Experiment, figures: Sequence[Figure], varied: bool) -> str:

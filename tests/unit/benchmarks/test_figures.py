@@ -122,6 +122,15 @@ def test_a_table_says_intervals_cases_and_where_none_was_measured(tmp_path: Path
     assert "old" not in text
 
 
+def test_in_a_column_of_several_units_every_figure_has_its_own(tmp_path: Path) -> None:
+    figures = CONTENT["figures"] | {
+        "theirs/wall/time": {"value": 2, "low": None, "high": None, "cases": 3, "unit": "count"}
+    }
+    text = render(f"{TABLE}<!-- /table -->", brushes(tmp_path, figures=figures), {})
+    assert "| ours | wall | 4 | 3.25 [3.0, 3.5] s |" in text
+    assert "| theirs | wall | 3 | 2 of 3 |" in text
+
+
 def test_on_the_page_of_the_experiment_the_origin_is_said_once(tmp_path: Path) -> None:
     text = render(f"<!-- about brushes -->\n<!-- /about -->\n{TABLE}<!-- /table -->", brushes(tmp_path), {})
     assert text.startswith("<!-- about brushes -->\n**What this does not show.** More than 3.25 says.\n")
