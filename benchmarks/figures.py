@@ -103,7 +103,12 @@ class Experiment:
 
     def text(self, name: str) -> str:
         """A text of the JSON with the figures it names in braces: "over {ours/clean/PQ}"."""
-        return IN_TEXT.sub(lambda match: inline({self.name: self}, match["spec"], self.name), str(self.about[name]))
+        text = str(self.about[name])
+        return IN_TEXT.sub(lambda match: inline({self.name: self}, match["spec"], self.name), text)
+
+    def clause(self, name: str) -> str:
+        """The same as a part of a sentence."""
+        return self.text(name).rstrip(".")
 
 
 REQUIRED = ("experiment", "title", "date", "commit", "machine", "command", "simulated", "knows", "does_not_show")
@@ -111,10 +116,12 @@ REQUIRED = ("experiment", "title", "date", "commit", "machine", "command", "simu
 
 def load_experiments(folder: Path) -> dict[str, Experiment]:
     """Return the experiments of a folder by name; raises FiguresError where a file is not of the form."""
-    return {file.stem: load_experiment(file) for file in sorted(folder.glob("*.json"))}
+    words = tomllib.loads((folder / "words.toml").read_text())
+    return {file.stem: load_experiment(file, words.get(file.stem, {})) for file in sorted(folder.glob("*.json"))}
 
 
-def load_experiment(file: Path) -> Experiment:
+def load_experiment(file: Path, words: Mapping[str, Any]) -> Experiment:
+    """Return one experiment; `words` are its section of words.toml: `a_case`, `interval`, `names`."""
     content = json.loads(file.read_text())
     missing = [name for name in (*REQUIRED, "figures") if not content.get(name)]
     if missing or content["experiment"] != file.stem:
@@ -126,7 +133,7 @@ def load_experiment(file: Path) -> Experiment:
         if (entry["low"] is None) != (entry["high"] is None):
             raise FiguresError(f"{file.name}: {key!r} has half an interval")
         figures[key] = Figure(**entry)
-    return Experiment(file.stem, content, figures, content.get("rows", {}))
+    return Experiment(file.stem, {**content, **words}, figures, content.get("rows", {}))
 
 
 # ---- numbers --------------------------------------------------------------------------------------------------------
@@ -308,7 +315,7 @@ def caption_of(experiment: Experiment, figures: Sequence[Figure], varied: bool) 
 
 def origin(experiment: Experiment) -> str:
     return (
-        f"Simulated: {experiment.text('simulated')}. The method may know: {experiment.text('knows')}. "
+        f"Simulated: {experiment.clause('simulated')}. The method may know: {experiment.clause('knows')}. "
         f"{experiment.about['date']}, commit {experiment.about['commit']}."
     )
 
@@ -327,8 +334,8 @@ def about(experiment: Experiment) -> str:
     lines = [
         f"**What this does not show.** {experiment.text('does_not_show')}",
         "",
-        f"- **Simulated:** {experiment.text('simulated')}.",
-        f"- **The method may know:** {experiment.text('knows')}.",
+        f"- **Simulated:** {experiment.clause('simulated')}.",
+        f"- **The method may know:** {experiment.clause('knows')}.",
         f"- **Measured:** {', '.join(str(experiment.about[name]) for name in ('date', 'commit', 'machine'))}.",
         f"- **Command:** `{experiment.about['command']}`",
     ]
@@ -355,7 +362,7 @@ def headlines(experiments: Mapping[str, Experiment], spec: Mapping[str, Any], pa
         ]
         linked = f"[{label}]({pages[name]})" if name in pages else label
         cases = f"{figure.cases} {experiment.about.get('a_case', 'cases')}" if figure.cases else "–"
-        about_it = "″" if name == above else f"{experiment.text('simulated')}; {experiment.text('knows')}"
+        about_it = "″" if name == above else f"{experiment.clause('simulated')}; {experiment.clause('knows')}"
         above = name
         date = str(experiment.about["date"])
         rows.append([linked + unit, cell(figure, digits), "; ".join(rivals) or "–", cases, about_it, date])

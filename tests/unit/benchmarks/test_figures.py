@@ -108,7 +108,7 @@ TABLE = '<!-- table brushes\nlabels = ["arm", "where"]\nrows = ["*/wall", "ours/
 def brushes(folder: Path, **changes: object) -> dict[str, Experiment]:
     file = folder / "brushes.json"
     file.write_text(json.dumps(CONTENT | changes))
-    return {"brushes": load_experiment(file)}
+    return {"brushes": load_experiment(file, {})}
 
 
 def test_a_table_says_intervals_cases_and_where_none_was_measured(tmp_path: Path) -> None:
@@ -120,6 +120,14 @@ def test_a_table_says_intervals_cases_and_where_none_was_measured(tmp_path: Path
     assert "where none stands, none was measured" in text
     assert "Simulated: the paint. The method may know: the wall. 2026-01-02, commit abc1234." in text
     assert "old" not in text
+
+
+def test_words_name_arms_cases_and_what_a_case_is(tmp_path: Path) -> None:
+    brushes(tmp_path)
+    (tmp_path / "words.toml").write_text('[brushes]\na_case = "walls"\n[brushes.names]\nfence = "garden fence"\n')
+    text = render(f"{TABLE}<!-- /table -->", load_experiments(tmp_path), {})
+    assert "| ours | garden fence | 2 | 12.0 |" in text
+    assert "*n: walls; " in text
 
 
 def test_in_a_column_of_several_units_every_figure_has_its_own(tmp_path: Path) -> None:
