@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -70,6 +71,10 @@ def test_a_page_of_results_begins_with_what_it_does_not_show(page: Path) -> None
 def test_every_experiment_has_one_page(experiments: dict[str, Experiment]) -> None:
     about = Counter(name for page in RESULTS.glob("*.md") for name in re.findall(r"<!-- about (\w+)", page.read_text()))
     assert about == Counter(list(experiments))
+
+
+def test_words_are_of_experiments_that_are_there(experiments: dict[str, Experiment]) -> None:
+    assert set(tomllib.loads((RESULTS / "words.toml").read_text())) <= set(experiments)
 
 
 def test_every_page_of_results_is_linked_from_the_index() -> None:
