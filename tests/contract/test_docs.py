@@ -98,3 +98,14 @@ def test_commands_that_are_named_exist_and_have_these_options(page: Path) -> Non
         elif flags - options()[name] - {"--help"}:
             wrong.append(f"{name}: no {', '.join(sorted(flags - options()[name]))}")
     assert wrong == []
+
+
+def test_pages_that_code_names_exist() -> None:
+    files = [ROOT / "Makefile", ROOT / "CHANGELOG.md", *ROOT.glob("data/**/*.toml")]
+    files += [
+        file
+        for folder in ("benchmarks", "cli", "schemas", "stages", "tests")
+        for file in ROOT.glob(f"{folder}/**/*.py")
+    ]
+    named = {page for file in files for page in re.findall(r"\bdocs/[\w/]+\.(?:md|py|ipynb)\b", file.read_text())}
+    assert {page for page in named if not (ROOT / page).exists()} == set()
