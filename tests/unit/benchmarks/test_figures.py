@@ -11,22 +11,10 @@ from typing import Any
 
 import pytest
 
-from benchmarks.figures import (
-    CLEARLY_MEASURED,
-    GIVEN,
-    GIVEN_MARKER,
-    IN_TEXT,
-    MEASURED,
-    ROOT,
-    Experiment,
-    FiguresError,
-    homes,
-    load_experiment,
-    load_experiments,
-    pages,
-    render,
-    unmarked,
-)
+from benchmarks.figures.content import Experiment, FiguresError, load_experiment, load_experiments
+from benchmarks.figures.lines import IN_TEXT
+from benchmarks.figures.pages import ROOT, homes, pages, render
+from benchmarks.figures.unmarked import CLEARLY_MEASURED, GIVEN, GIVEN_MARKER, MEASURED, unmarked
 
 RESULTS = ROOT / "docs" / "results"
 WORDS = 900
