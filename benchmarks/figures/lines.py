@@ -58,8 +58,8 @@ def inline(experiments: Mapping[str, Experiment], spec: str, default: str = "") 
     unit = f" {figure.unit}" if figure.unit and figure.unit != "count" else ""
     text = value + unit + bracket + interval
     if "cases" in options:
-        text += f" of {figure.cases} {experiment.about.get('a_case', 'cases')}" if figure.cases else ""
-        text += "" if figure.has_interval else " (interval not measured)"
+        said = [f"{figure.cases} {experiment.about.get('a_case', 'cases')}"] if figure.cases else []
+        text += f" ({'; '.join([*said, *([] if figure.has_interval else ['interval not measured'])])})"
     return text
 
 

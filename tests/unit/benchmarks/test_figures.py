@@ -144,7 +144,7 @@ def test_on_the_page_of_the_experiment_the_origin_is_said_once(tmp_path: Path) -
         ("brushes:ours/wall/time", "3.25 s [3.0, 3.5]"),
         ("brushes:ours/wall/time bare", "3.25"),
         ("brushes:ours/wall/time .1", "3.2 s [3.0, 3.5]"),
-        ("brushes:ours/fence/time cases", "12 s of 2 cases (interval not measured)"),
+        ("brushes:ours/fence/time cases", "12 s (2 cases; interval not measured)"),
     ],
 )
 def test_a_figure_in_a_line(tmp_path: Path, spec: str, shown: str) -> None:
