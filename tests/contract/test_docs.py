@@ -59,7 +59,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_files_that_are_named_exist(page: Path) -> None:
-    paths = re.findall(rf"(?<![\w./-])((?:{'|'.join(FOLDERS)})/[\w./*{{}}-]*[\w*/])", page.read_text())
+    paths = re.findall(rf"(?<![\w./-])((?:{'|'.join(FOLDERS)})/[\w./*{{}}-]*[\w*/])(?![\w<])", page.read_text())
     missing = [
         path for path in paths if "{" not in path and not path.startswith(MADE) and not any(ROOT.glob(path.rstrip("/")))
     ]
