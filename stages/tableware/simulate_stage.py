@@ -17,14 +17,14 @@ from schemas.tableware_trial import TablewareTrial, TablewareTrialFile, TrialCou
 from stages.kit.stage import Context
 from stages.tableware.parameters import SimulateParameters
 from stages.tableware.plan_stage import panels
-from stages.tableware.planning.actions import Action, Grasp, Pull, PullGrasp, Stack, StackGrasp
+from stages.tableware.planning.action import Action
 from stages.tableware.planning.choice import as_times, chances_of, make_policy, time_model
 from stages.tableware.planning.records import as_action, as_record
 from stages.tableware.planning.time_model import Chances, TimeModel
 from stages.tableware.sight import Eyes, named_as
 from stages.tableware.simulation.arm_times import arm_times
 from stages.tableware.simulation.fast import Done, FastWorld, Trial, World, do_in, run_in, truth
-from stages.tableware.table_pictures import draw_strip, words_of, write_animation
+from stages.tableware.table_pictures import draw_strip, write_animation
 from stages.tableware.world.items import Table
 from stages.tableware.world.records import as_records, as_table
 from stages.tableware.world.shape_files import write_shapes
@@ -80,7 +80,7 @@ def run(
         if recording is not None:
             _draw_physics(recording.arrays(), done, context.output, parameters.image_width, width)
         else:
-            moving = [(one.action, one.before, one.after, f"{one.start:.0f} s: {words_of(one.action)}") for one in done]
+            moving = [(one.action, one.before, one.after, f"{one.start:.0f} s: {one.action.words}") for one in done]
             write_animation(context.output / "clearing.gif", moving, width)
     summary: dict[str, object] = {
         "policy": "plan" if planned is not None else parameters.policy,
@@ -109,7 +109,7 @@ def _draw_physics(
     """Write physics.png and clearing.gif from what was recorded."""
     pictures = physics_part("physics_pictures")
     words = [
-        next((words_of(one.action) for one in done if one.start <= seconds <= one.end + 1e-6), "")
+        next((one.action.words for one in done if one.start <= seconds <= one.end + 1e-6), "")
         for seconds in frames["seconds"]
     ]
     pictures.draw_physics_strip(frames, words, strip_width).save(folder / "physics.png")
@@ -152,38 +152,8 @@ def planned_actions(plan: TablewarePlan, table: Table) -> list[tuple[Action, Tab
         before = as_table(one.model_copy(update={"name": names.get(one.name, one.name),
                                                  "on": None if one.on is None else names.get(one.on, one.on)})
                           for one in step.before)  # fmt: skip
-        actions.append((renamed_action(as_action(step.action), names), before))
+        actions.append((as_action(step.action).renamed(names), before))
     return actions
-
-
-def renamed_action(action: Action, names: dict[str, str]) -> Action:
-    """Return an action with its things called by other names; those that have none keep theirs."""
-
-    def name(old: str) -> str:
-        return names.get(old, old)
-
-    if isinstance(action, PullGrasp):
-        return PullGrasp(_renamed_pull(action.u_P, names), _renamed_grasp(action.u_G, names))
-    if isinstance(action, StackGrasp):
-        put = action.u_S
-        return StackGrasp(
-            Stack(_renamed_grasp(put.u_G, names), name(put.onto), put.p_L, put.theta_L),
-            _renamed_grasp(action.u_G, names),
-        )
-    if isinstance(action, Pull):
-        return _renamed_pull(action, names)
-    if isinstance(action, Stack):
-        return Stack(_renamed_grasp(action.u_G, names), name(action.onto), action.p_L, action.theta_L)
-    return _renamed_grasp(action, names)
-
-
-def _renamed_grasp(action: Grasp, names: dict[str, str]) -> Grasp:
-    return Grasp(tuple(names.get(item, item) for item in action.items), action.p_G, action.theta_G)
-
-
-def _renamed_pull(action: Pull, names: dict[str, str]) -> Pull:
-    item, target = names.get(action.item, action.item), names.get(action.target, action.target)
-    return Pull(item, target, action.p_S, action.theta_S, action.p_E, action.theta_E)
 
 
 def carry_out(world: World, planned: Iterable[tuple[Action, Table]], done: list[Done]) -> Trial:
@@ -226,7 +196,7 @@ def _statement(trial: Trial, items: int) -> str:
 def _text(done: list[Done], statement: str) -> str:
     lines = [statement, ""]
     for one in done:
-        lines.append(f"{one.start:7.1f} s  {words_of(one.action)}")
+        lines.append(f"{one.start:7.1f} s  {one.action.words}")
         gone = [name for name in one.before.by_name if name not in one.after.by_name and name not in one.dropped]
         lines += [f"           binned: {', '.join(gone)}"] if gone else []
         lines += [f"           dropped: {', '.join(one.dropped)}"] if one.dropped else []

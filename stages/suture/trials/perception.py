@@ -9,6 +9,7 @@ from __future__ import annotations
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -85,6 +86,20 @@ class Seen:
     def pose(self) -> np.ndarray:
         """The needle's pose (4, 4) that the estimate amounts to."""
         return from_ends(self.normal, self.tip, self.swage)
+
+
+class Looking(Protocol):
+    """Who looks at the needle of a trial; `model` says how long an estimate takes and how well thread is seen, the
+    others count estimates."""
+
+    model: PerceptionModel
+    looks: int
+    right: int
+    abstained: int
+
+    def look(self, needle: np.ndarray, place: str) -> Seen | None:
+        """Return one estimate of a needle at its true pose (4, 4); None when it is abstained from."""
+        ...
 
 
 class Eyes:
