@@ -14,12 +14,13 @@ from benchmarks.tidy.tables import metrics, no_slower
 from benchmarks.tidy.thesis_fit import FAILED_TRIALS, TABLE_7_2, trips_of
 from schemas.errors import BadInput, MissingDependency
 from schemas.tableware_plan import TablewareAction
-from stages.tableware import simulate_stage
+from stages.tableware import simulators
 from stages.tableware.actions.grasp import Grasp, grasp, grasp_two
 from stages.tableware.actions.pull import pull
 from stages.tableware.actions.pull_grasp import pull_grasp
 from stages.tableware.actions.stack import stack
 from stages.tableware.actions.stack_grasp import stack_grasp
+from stages.tableware.parameters import SimulateParameters
 from stages.tableware.planning.choice import make_policy
 from stages.tableware.planning.joint import JointPolicy, _alone, plan, rules_in
 from stages.tableware.planning.optimum import Optimum, seconds
@@ -284,9 +285,9 @@ def test_a_pile_that_is_more_than_seen_is_dropped() -> None:
 
 
 def test_physics_that_is_not_there_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulate_stage, "SIMULATION", "stages.tableware.no_such_package")
+    monkeypatch.setattr(simulators, "SIMULATION", "stages.tableware.no_such_package")
     with pytest.raises(MissingDependency, match="no physics"):
-        simulate_stage.open_world("physics", Table(()), MODEL, EXACT, 0)
+        simulators.SIMULATORS["physics"](SimulateParameters(simulator="physics"))
 
 
 def test_no_slower_goes_by_the_means_of_the_draws() -> None:
