@@ -56,11 +56,12 @@ class Simulator(Protocol):
 class FastSimulator:
     """The fitted time model."""
 
-    again = None
+    again: Again | None = None
 
     def __init__(self, parameters: SimulateParameters) -> None:
         self.times, self.told = time_model(parameters), chances_of(parameters.chances)
-        self.recorded_times, self.recorded_chances = as_times(self.times), parameters.chances
+        self.recorded_times: TimesOfActions | None = as_times(self.times)
+        self.recorded_chances: str = parameters.chances
 
     def open(self, table: Table, seed: int) -> World:
         """Return the fast world."""
@@ -79,14 +80,15 @@ class PhysicsSimulator:
     """Contact physics; the arm's own times, but for those that are given explicitly. Raises MissingDependency where
     there is no physics."""
 
-    recorded_times, recorded_chances = None, "contact"
+    recorded_times: TimesOfActions | None = None
+    recorded_chances: str = "contact"
 
     def __init__(self, parameters: SimulateParameters) -> None:
         given = {"trip": parameters.trip_seconds, "stack": parameters.stack_seconds, "pull": parameters.pull_seconds}
         arm = arm_times(parameters.delay)
         self.times = replace(arm, **{name: value for name, value in given.items() if value is not None})
         self.told = replace(chances_of(parameters.chances), spills=True)
-        self.again: Again = physics_part("physics_trial").alone
+        self.again: Again | None = physics_part("physics_trial").alone
         self._recording = physics_part("recording").Recording()
         self._world: Any = None
 

@@ -227,6 +227,17 @@ def _compare(
     return cost
 
 
+@numba.njit(cache=True, fastmath=True)
+def _compare_both(
+    arc: Arc, sheets: tuple[Sheet, Sheet], tau: float, scale: float, matrix: np.ndarray, gradient: np.ndarray
+) -> tuple[float, float]:
+    """Return both eyes' misfits less what they are without a needle; add to the normal equations."""
+    misfits = np.zeros(2)
+    for eye, sheet in enumerate(sheets):
+        misfits[eye] = _compare(arc, sheet, eye, tau, scale, matrix, gradient)
+    return misfits[0], misfits[1]
+
+
 def camera_of(rig: StereoRig) -> np.ndarray:
     """Return the rig as the compiled functions take it: focal length, principal point, baseline."""
     return np.array([rig.focal, rig.centre[0], rig.centre[1], rig.baseline])
@@ -245,8 +256,9 @@ def _misfit(
     precision = PIXEL_VARIANCE / CALIBRATION_SIGMA**2
     cost = precision * float(shift @ shift)
     arc = arc_at(rig, pose, shift)
-    for eye, sheet in enumerate(sheets):
-        cost += sheet.total + _compare(arc, sheet, eye, tau, scale, matrix, gradient)
+    left, right = _compare_both(arc, sheets, tau, scale, matrix, gradient)
+    cost += sheets[0].total + left
+    cost += sheets[1].total + right
     upper = np.triu(matrix)
     matrix = upper + np.triu(upper, 1).T
     matrix[6, 6] += precision

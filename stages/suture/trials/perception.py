@@ -103,7 +103,7 @@ class Looking(Protocol):
 
 
 class Eyes:
-    """Sees needles with the errors of a model; `looks` and `right` count estimates, also for the 42 % of the thesis."""
+    """Sees needles with the errors of a model; `looks` and `right` count estimates."""
 
     def __init__(self, model: PerceptionModel, random: np.random.Generator) -> None:
         self.model = model

@@ -1,4 +1,4 @@
-"""The baseline as its tier-2 figure implies: 1.4 objects a trip (Srinivas 2024, table 7.1)."""
+"""The baseline as its tier-2 figure implies: more than one object a trip (Srinivas 2024, table 7.1)."""
 
 from __future__ import annotations
 
