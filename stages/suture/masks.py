@@ -111,7 +111,7 @@ def _true_eyes(sequence: Sequence, size: tuple[int, int]) -> Callable[[Pair], tu
             f"{sequence.root}: no masks: a {sequence.kind!r} has no truth to take them from",
             hint="give --masks FOLDER or --segmenter CHECKPOINT",
         )
-    views, folder = sequence.scene.views, sequence.path("truth")
+    views, folder = sequence.truth.views, sequence.path("truth")
 
     def eyes(pair: Pair) -> tuple[Eye, Eye, int]:
         if pair.index >= len(views):

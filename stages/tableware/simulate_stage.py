@@ -28,7 +28,7 @@ def run(
     scene: TablewareScene, plan: TablewarePlan | None, *, parameters: SimulateParameters, context: Context
 ) -> TablewareTrial:
     """Let a policy clear the table of a scene, or carry out a plan as it stands."""
-    file = scene.scene
+    file = scene.info
     table = as_table(file.items)
     simulator = SIMULATORS[parameters.simulator](parameters)
     eyes = Eyes(context.seed, file.light, file.colors, parameters.least_confidence)
@@ -77,7 +77,7 @@ def run(
 def planned_actions(plan: TablewarePlan, table: Table) -> list[tuple[Action, Table]]:
     """Return the actions of a plan with the tables on which they were decided, named as the things that stand there in
     truth. Raises BadInput when the plan is about another table."""
-    file = plan.plan
+    file = plan.info
     seen = as_table(file.items)
     renamed = named_as(seen, table)
     names = {one.name: other.name for one, other in zip(seen.items, renamed.items, strict=True)}
