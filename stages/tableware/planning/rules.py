@@ -33,7 +33,7 @@ class Rules:
     similar: float = 0.005
     """Greatest difference of two grasp heights in a multi-object grasp: the thesis's adjustable threshold, without a
     number there. At 0.005 (like with like) Pull comes nearer to the thesis's times of tiers 1 and 2 than at 0.02
-    (tuning seeds 0 to 39; docs/TIDY.md)."""
+    (tuning seeds 0 to 39)."""
     parallel: float = pi / 6
     """Greatest angle between two utensils that are grasped together (ours)."""
     pull_gap: float = 0.01

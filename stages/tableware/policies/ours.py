@@ -13,7 +13,7 @@ _PAIRS = frozenset(
     | {(one, other) for one in _BOWLS for other in _BOWLS if one <= other}
 )
 RULES = Rules(most_utensils=2, plates_alone=True, beside=_PAIRS)
-"""What physics bears (docs/TIDY_PHYSICS.md): two utensils a pile, plates alone, and side by side the pairs of piles
+"""What physics bears (docs/TIDY.md): two utensils a pile, plates alone, and side by side the pairs of piles
 that came whole in every grasp measured there. Dishes that carry utensils are lifted side by side as they stand only
 where the world's chances say that nothing spills."""
 POLICY = DeclaredPolicy(lambda model, chances, seed: JointPolicy(RULES, model, chances), RULES, rivals=RIVALS)
