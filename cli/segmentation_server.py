@@ -19,10 +19,10 @@ from stages.kit.formats.frames import Frame
 from stages.kit.library_versions import library_version
 from stages.kit.stage import External, Optionally
 from stages.segment.backend_names import is_service
+from stages.segment.backends.service.protocol import SegmentRequest
+from stages.segment.backends.service.server import SegmentationServer, revision_of, segment_request
 from stages.segment.choice import NEEDS_COLOR, BackendRequest, choose_backend
 from stages.segment.parameters import STAGE, SegmentParameters
-from stages.segment.service.protocol import SegmentRequest
-from stages.segment.service.server import SegmentationServer, revision_of, segment_request
 from stages.segment.settings import geometric_settings
 
 _BLANK = SegmentRequest(

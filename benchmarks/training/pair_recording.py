@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.tables.mosd import CAMERA, LabelledFrame
-from stages.segment.objects.grouping import Agglomeration, PairScorer
-from stages.segment.objects.segmentation import ObjectSettings, Pieces, cut_pieces
+from stages.segment.backends.objects.grouping import Agglomeration, PairScorer
+from stages.segment.backends.objects.segmentation import ObjectSettings, Pieces, cut_pieces
 
 
 @dataclass(frozen=True)

@@ -27,11 +27,11 @@ from benchmarks.training.pair_recording import pairs_of_frame
 from benchmarks.training.tabletops import make_tabletop
 from benchmarks.training.tree_growing import grow_trees
 from schemas.errors import BadInput
-from stages.segment.objects.backend import BUNDLED
-from stages.segment.objects.boosting import Trees, write_trees
-from stages.segment.objects.grouping import PairScorer, by_trees
-from stages.segment.objects.pairs import FEATURES
-from stages.segment.objects.segmentation import BY_SET_RULES, segment_objects
+from stages.segment.backends.objects.backend import BUNDLED
+from stages.segment.backends.objects.boosting import Trees, write_trees
+from stages.segment.backends.objects.grouping import PairScorer, by_trees
+from stages.segment.backends.objects.pairs import FEATURES
+from stages.segment.backends.objects.segmentation import BY_SET_RULES, segment_objects
 
 GENERATED, GENERATED_QUICK = 160, 10
 FIRST_TREES, LAST_TREES = 120, 240

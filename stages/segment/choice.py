@@ -13,9 +13,9 @@ from schemas.errors import BadInput, MissingDependency, UsageError
 from schemas.sequence import Sequence
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.frames import Frame, FrameReader
-from stages.segment.backend_geometric import GeometricBackend
-from stages.segment.backend_ground_truth import GroundTruthBackend
 from stages.segment.backend_names import is_service
+from stages.segment.backends.geometric.backend import GeometricBackend
+from stages.segment.backends.ground_truth.backend import GroundTruthBackend
 from stages.segment.geometric import GeometricFrame
 from stages.segment.labels import read_label_file
 from stages.segment.panoptic import PanopticFrame
@@ -90,8 +90,8 @@ def _geometric(request: BackendRequest) -> Backend:
 
 def _detector(request: BackendRequest) -> Backend:
     # Imported here: the other backends do not need OpenCV's dnn module.
-    from stages.segment.backend_detector import DetectorBackend
-    from stages.segment.yolox import Detector
+    from stages.segment.backends.detector.backend import DetectorBackend
+    from stages.segment.backends.detector.yolox import Detector
 
     parameters = request.parameters
     sequence, reader = request.log()
@@ -119,7 +119,7 @@ def _detector(request: BackendRequest) -> Backend:
 
 def _huggingface(request: BackendRequest) -> Backend:
     # Imported here: transformers is an extra.
-    from stages.segment.huggingface.backend import make_backend
+    from stages.segment.backends.huggingface.backend import make_backend
 
     parameters = request.parameters
     return make_backend(
@@ -137,7 +137,7 @@ def _huggingface(request: BackendRequest) -> Backend:
 
 def _onnx(request: BackendRequest) -> Backend:
     # Imported here: ONNX Runtime is an extra.
-    from stages.segment.onnx.backend import OnnxBackend
+    from stages.segment.backends.onnx.backend import OnnxBackend
 
     parameters = request.parameters
     return OnnxBackend(
@@ -155,7 +155,7 @@ def _onnx(request: BackendRequest) -> Backend:
 def _service(request: BackendRequest) -> Backend:
     # Imported here: the other backends do not need HTTP.
     from stages.kit.services.connection import Connection
-    from stages.segment.service.backend import REFUSED_HINT, ServiceBackend
+    from stages.segment.backends.service.backend import REFUSED_HINT, ServiceBackend
 
     parameters = request.parameters
     sequence, reader = request.log()
@@ -181,7 +181,7 @@ def _service(request: BackendRequest) -> Backend:
 
 def _network(request: BackendRequest) -> Backend:
     # Imported here: loading torch takes seconds, which the other backends need not wait for.
-    from stages.segment.network.backend import NetworkBackend
+    from stages.segment.backends.network.backend import NetworkBackend
 
     if request.weights is not None and request.weights.suffix != ".safetensors":
         raise UsageError(
@@ -194,7 +194,7 @@ def _network(request: BackendRequest) -> Backend:
 
 def _objects(request: BackendRequest) -> Backend:
     # Imported here: its loops are compiled when they are first used.
-    from stages.segment.objects.backend import SCORERS, ObjectsBackend
+    from stages.segment.backends.objects.backend import SCORERS, ObjectsBackend
 
     _, reader = request.log()
     parameters = request.parameters

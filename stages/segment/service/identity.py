@@ -7,7 +7,7 @@ def service_identity(address: str, *, timeout: float, retries: int, retry_wait: 
     """Return the identity of the service at `address` now. Raises MissingDependency when none answers."""
     # Imported here: the declaration of the step, which asks for it, has to stay cheap.
     from stages.kit.services.connection import Connection
-    from stages.segment.service.backend import REFUSED_HINT, read_info
+    from stages.segment.backends.service.backend import REFUSED_HINT, read_info
 
     connection = Connection(address, timeout=timeout, retries=retries, retry_wait=retry_wait, refused_hint=REFUSED_HINT)
     try:

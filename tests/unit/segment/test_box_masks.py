@@ -8,11 +8,11 @@ import pytest
 from schemas.scene_parts import Camera
 from schemas.vocabulary import load_vocabulary
 from stages.kit.geometry.transforms import look_at
-from stages.segment.backend_detector import Found, merge_duplicates, paint
-from stages.segment.box_masks import FrameGeometry, box_mask, frame_geometry
+from stages.segment.backends.detector.backend import Found, merge_duplicates, paint
+from stages.segment.backends.detector.box_masks import FrameGeometry, box_mask, frame_geometry
+from stages.segment.backends.detector.plausibility import extent_of, is_plausible
+from stages.segment.backends.detector.room import find_floor, find_room, find_walls, room_masks, sample_surface
 from stages.segment.geometric import segment_depth
-from stages.segment.plausibility import extent_of, is_plausible
-from stages.segment.room import find_floor, find_room, find_walls, room_masks, sample_surface
 from tests.unit.segment.scenes import combine
 
 VOCABULARY = load_vocabulary()

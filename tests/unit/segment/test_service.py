@@ -31,10 +31,8 @@ from stages.kit.progress import SilentProgress
 from stages.kit.services.connection import Connection
 from stages.kit.stage import Context
 from stages.segment.backend_names import BACKENDS, check_backend
-from stages.segment.choice import BUILDERS, BackendRequest, choose_backend
-from stages.segment.parameters import STAGE, SegmentParameters
-from stages.segment.service import reply_cache
-from stages.segment.service.protocol import (
+from stages.segment.backends.service import reply_cache
+from stages.segment.backends.service.protocol import (
     PROTOCOL,
     Category,
     SegmentRequest,
@@ -44,7 +42,9 @@ from stages.segment.service.protocol import (
     parse_request,
     split_multipart,
 )
-from stages.segment.service.server import SegmentationServer
+from stages.segment.backends.service.server import SegmentationServer
+from stages.segment.choice import BUILDERS, BackendRequest, choose_backend
+from stages.segment.parameters import STAGE, SegmentParameters
 from stages.segment.settings import geometric_settings
 from stages.segment.stage import run
 from tests.unit.segment.test_stage import Written, payload, write_sequence

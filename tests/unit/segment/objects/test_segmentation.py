@@ -12,12 +12,12 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.frames import Frame
-from stages.segment.objects.backend import BUNDLED, ObjectsBackend
-from stages.segment.objects.boosting import read_trees, score_rows, write_trees
-from stages.segment.objects.grouping import by_trees
-from stages.segment.objects.pairs import FEATURES
-from stages.segment.objects.plain import segment_plain
-from stages.segment.objects.segmentation import (
+from stages.segment.backends.objects.backend import BUNDLED, ObjectsBackend
+from stages.segment.backends.objects.boosting import read_trees, score_rows, write_trees
+from stages.segment.backends.objects.grouping import by_trees
+from stages.segment.backends.objects.pairs import FEATURES
+from stages.segment.backends.objects.plain import segment_plain
+from stages.segment.backends.objects.segmentation import (
     BY_SET_RULES,
     ObjectFrame,
     ObjectSettings,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from stages.segment.onnx.network import Fitted
-from stages.segment.yolox import suppress
+from stages.segment.backends.detector.yolox import suppress
+from stages.segment.backends.onnx.network import Fitted
 
 MOST_CANDIDATES = 300
 """Instances of one image that are looked at, the best scored."""

@@ -14,12 +14,12 @@ import numpy as np
 from schemas.scene_parts import Camera
 from schemas.vocabulary import Vocabulary
 from stages.kit.formats.frames import Frame
+from stages.segment.backends.objects.boosting import read_trees
+from stages.segment.backends.objects.cuts import pixels_by_label
+from stages.segment.backends.objects.grouping import PairScorer, by_trees
+from stages.segment.backends.objects.pairs import FEATURES
+from stages.segment.backends.objects.segmentation import BY_SET_RULES, segment_objects
 from stages.segment.geometric import GeometricFrame
-from stages.segment.objects.boosting import read_trees
-from stages.segment.objects.cuts import pixels_by_label
-from stages.segment.objects.grouping import PairScorer, by_trees
-from stages.segment.objects.pairs import FEATURES
-from stages.segment.objects.segmentation import BY_SET_RULES, segment_objects
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
 BUNDLED = Path(__file__).resolve().parents[3] / "data" / "networks" / "tabletop_pairs.safetensors"

@@ -12,13 +12,13 @@ from schemas.errors import BadInput
 from schemas.sequence import SequenceFile
 from schemas.vocabulary import SemanticClass, Vocabulary
 from stages.kit.formats.frames import Frame, FrameReader
-from stages.segment.box_masks import box_mask, frame_geometry
+from stages.segment.backends.detector.box_masks import box_mask, frame_geometry
+from stages.segment.backends.detector.plausibility import extent_of, is_plausible
+from stages.segment.backends.detector.room import Room, SurfaceSample, find_room, room_masks, sample_surface
+from stages.segment.backends.detector.yolox import Detections, Detector
 from stages.segment.coco import COCO_NAMES
 from stages.segment.geometric import GeometricFrame, GeometricSettings, pixels_at, segment_depth
 from stages.segment.panoptic import PanopticFrame, PanopticMask
-from stages.segment.plausibility import extent_of, is_plausible
-from stages.segment.room import Room, SurfaceSample, find_room, room_masks, sample_surface
-from stages.segment.yolox import Detections, Detector
 
 LARGE_FACED = frozenset({"table", "desk", "bed", "sofa", "bench", "monitor", "fridge"})
 """A box around a part of these is still a detection of the whole: one face fills most of the box."""

@@ -10,10 +10,16 @@ from typing import Any
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.segment.huggingface.loading import load_model, load_processor, load_tokenizer, processor_class, short_name
+from stages.segment.backends.detector.yolox import suppress
+from stages.segment.backends.huggingface.loading import (
+    load_model,
+    load_processor,
+    load_tokenizer,
+    processor_class,
+    short_name,
+)
 from stages.segment.labels import Label
 from stages.segment.naming import InstanceMask
-from stages.segment.yolox import suppress
 
 MOST_TOKENS = 200
 """Tokens of one prompt; published models read 256. Longer lists of words are asked in several goes."""

@@ -8,7 +8,7 @@ from schemas.errors import BadInput
 from schemas.sequence import SequenceFile
 from schemas.vocabulary import Vocabulary
 from stages.kit.formats.frames import Frame
-from stages.segment.corruption import corrupt, rates_of_level
+from stages.segment.backends.ground_truth.corruption import corrupt, rates_of_level
 from stages.segment.geometric import GeometricFrame
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from schemas.errors import BadInput, MissingDependency
-from stages.segment.onnx.sidecar import Sidecar, find_layout
+from stages.segment.backends.onnx.sidecar import Sidecar, find_layout
 
 DEFAULT_SIZE = (640, 640)
 """Width and height [pixels] of the trial image when a network takes any size."""

@@ -11,11 +11,7 @@ from schemas.sequence import SequenceFile
 from schemas.vocabulary import Vocabulary
 from stages.kit.formats.frames import Frame, FrameReader
 from stages.kit.services.connection import Connection
-from stages.segment.geometric import GeometricFrame
-from stages.segment.labels import Label, LabelSet, match_labels
-from stages.segment.naming import NamedSegment, name_segments
-from stages.segment.panoptic import PanopticFrame, PanopticMask
-from stages.segment.service.protocol import (
+from stages.segment.backends.service.protocol import (
     INFO_PATH,
     SEGMENT_PATH,
     Category,
@@ -26,7 +22,11 @@ from stages.segment.service.protocol import (
     parse_info,
     parse_reply,
 )
-from stages.segment.service.reply_cache import ReplyCache, prune
+from stages.segment.backends.service.reply_cache import ReplyCache, prune
+from stages.segment.geometric import GeometricFrame
+from stages.segment.labels import Label, LabelSet, match_labels
+from stages.segment.naming import NamedSegment, name_segments
+from stages.segment.panoptic import PanopticFrame, PanopticMask
 
 REFUSED_HINT = "is this a segmentation service? see docs/SEGMENTATION.md"
 

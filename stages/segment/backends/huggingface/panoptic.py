@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.segment.huggingface.loading import (
+from stages.segment.backends.huggingface.loading import (
     load_model,
     load_processor,
     load_tokenizer,

@@ -13,8 +13,8 @@ import torch
 from schemas.errors import BadInput
 from schemas.vocabulary import Vocabulary
 from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
-from stages.segment.network.features import CHANNELS, INPUT_WIDTH
-from stages.segment.network.model import PanopticNetwork, Widths
+from stages.segment.backends.network.features import CHANNELS, INPUT_WIDTH
+from stages.segment.backends.network.model import PanopticNetwork, Widths
 
 FORMAT = "scenewright panoptic network"
 VERSION = 1

@@ -16,9 +16,7 @@ from schemas.base import canonical_json
 from schemas.errors import MachineFailure, ScenewrightError
 from schemas.vocabulary import load_vocabulary
 from stages.kit.digests import sha256_of_text
-from stages.segment.choice import Backend
-from stages.segment.geometric import GeometricSettings, segment_depth
-from stages.segment.service.protocol import (
+from stages.segment.backends.service.protocol import (
     HEALTH_PATH,
     INFO_PATH,
     LARGEST_BODY,
@@ -33,6 +31,8 @@ from stages.segment.service.protocol import (
     encode_reply,
     parse_request,
 )
+from stages.segment.choice import Backend
+from stages.segment.geometric import GeometricSettings, segment_depth
 
 IDLE_SECONDS = 60.0
 """A connection on which nothing comes for so long is closed."""

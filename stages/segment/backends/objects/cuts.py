@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numba import njit
 
-from stages.segment.objects.regions import color_difference
+from stages.segment.backends.objects.regions import color_difference
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from schemas.scene_parts import Camera
 from schemas.sequence import SequenceFile
 from schemas.vocabulary import Vocabulary
 from stages.kit.formats.frames import Frame, FrameReader
+from stages.segment.backends.network.features import STRIDE, Mount, features, input_camera, mount_of_pose, resized
+from stages.segment.backends.network.grouping import GroupingSettings, Named, group, raise_to_depth
+from stages.segment.backends.network.weights import BUNDLED, Checkpoint, load_checkpoint
 from stages.segment.geometric import GeometricFrame
-from stages.segment.network.features import STRIDE, Mount, features, input_camera, mount_of_pose, resized
-from stages.segment.network.grouping import GroupingSettings, Named, group, raise_to_depth
-from stages.segment.network.weights import BUNDLED, Checkpoint, load_checkpoint
 from stages.segment.panoptic import PanopticFrame
 
 UNNAMED = "object"

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numba import njit
 
-from stages.segment.network.features import STRIDE
+from stages.segment.backends.network.features import STRIDE
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from schemas.errors import BadInput, MissingDependency
 from schemas.vocabulary import Vocabulary
 from stages.kit.formats.frames import Frame
+from stages.segment.backends.onnx import decoding
+from stages.segment.backends.onnx.network import HINT, Network, fit
+from stages.segment.backends.onnx.sidecar import read_sidecar
 from stages.segment.geometric import GeometricFrame, pixels_at
 from stages.segment.labels import LabelMap, LabelSet, load_label_set, match_labels
 from stages.segment.naming import InstanceMask, NamedSegment, name_instances, name_segments
-from stages.segment.onnx import decoding
-from stages.segment.onnx.network import HINT, Network, fit
-from stages.segment.onnx.sidecar import read_sidecar
 from stages.segment.panoptic import PanopticFrame
 
 SETS_BY_SIZE = {80: "coco-80", 133: "coco-panoptic", 150: "ade20k"}

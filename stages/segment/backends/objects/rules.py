@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from stages.segment.objects.pairs import FEATURES
+from stages.segment.backends.objects.pairs import FEATURES
 
 _AT = {name: k for k, name in enumerate(FEATURES)}
 CONNECTED, CONVEX, SHARE, BORDER_COLOR = _AT["connected"], _AT["convex"], _AT["border_share"], _AT["border_color"]
