@@ -26,6 +26,7 @@ LABEL_FILES = {
     "words": "labels/words.toml",
 }
 """Label set -> file of data/."""
+LABEL_TABLES = tuple(LABEL_FILES.values())
 OWN = "scenewright"
 """The label set that is the vocabulary itself."""
 MATCHED = (OWN, "coco-panoptic", "ade20k", "words")
