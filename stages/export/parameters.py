@@ -13,9 +13,11 @@ from stages.export.registry import STREAMS, all_formats, dialects, layouts
 from stages.kit.stage import Parameters, Stage
 
 if TYPE_CHECKING:
-    Layout = Dialect = str
+    Layout = str
+    Dialect = str
 else:
-    Layout, Dialect = Literal[layouts()], Literal[dialects()]
+    Layout = Literal[layouts()]
+    Dialect = Literal[dialects()]
 
 
 class ExportParameters(Parameters):

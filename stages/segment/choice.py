@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -76,7 +75,8 @@ def choose_backend(request: BackendRequest) -> Backend:
     _refuse_options_of_others(request.parameters, chosen)
     if request.sequence is not None:
         _require_streams(request.sequence, chosen)
-    return importlib.import_module(chosen.module).open_backend(request)
+    backend: Backend = chosen.load("backend").open_backend(request)
+    return backend
 
 
 def _refuse_options_of_others(parameters: SegmentParameters, chosen: BackendDeclaration) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import importlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
@@ -49,15 +50,15 @@ class BackendDeclaration:
     """Those of them that do not come with the project."""
     data_files: Callable[[Any], tuple[str, ...]] = _nothing
     """Parameters -> files of data/ that it reads."""
-    versions: Callable[[Any], Mapping[str, str]] | None = None
-    """Parameters -> what else decides its masks, by name; it may raise MissingDependency."""
+    versions: str = ""
+    """Module of its folder whose function `versions(parameters)` returns what else decides its masks, by name, as that
+    of a step does (Stage.versions)."""
     address: str = ""
     """How an http address reads that is given in place of the name; empty: it goes by its name."""
 
-    @property
-    def module(self) -> str:
-        """The module with `open_backend`."""
-        return f"stages.segment.backends.{self.name.replace('-', '_')}.backend"
+    def load(self, module: str) -> Any:
+        """Return a module of its folder, loaded now: `backend` has `open_backend`."""
+        return importlib.import_module(f"stages.segment.backends.{self.name.replace('-', '_')}.{module}")
 
 
 @cache
@@ -115,5 +116,5 @@ def versions(parameters: Any) -> dict[str, str]:
     Raises MissingDependency or BadInput when a backend has to ask for that and is not answered.
     """
     declared = backend_for(parameters.backend)
-    further = declared.versions(parameters) if declared.versions is not None else {}
-    return {name: library_version(name) for name in declared.libraries} | dict(further)
+    further: dict[str, str] = declared.load(declared.versions).versions(parameters) if declared.versions else {}
+    return {name: library_version(name) for name in declared.libraries} | further

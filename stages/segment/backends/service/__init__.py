@@ -22,24 +22,12 @@ class ServiceParameters(Parameters):
     )
 
 
-def _identity(parameters: ServiceParameters) -> dict[str, str]:
-    """Return what the service says of itself now, or what --service-model says it has to be.
-
-    Raises MissingDependency when it does not answer, BadInput when it is no segmentation service.
-    """
-    # Imported here: a declaration has to stay cheap.
-    from stages.segment.backends.service.identity import service_identity
-
-    address: str = parameters.backend  # type: ignore[attr-defined]  # the option of the step that all backends share
-    return {f"service {address}": parameters.service_model or service_identity(address, parameters)}
-
-
 BACKEND = BackendDeclaration(
     name="service",
     summary="the masks of another program",
     order=80,
     parameters=ServiceParameters,
     data_files=lambda parameters: LABEL_TABLES,
-    versions=_identity,
+    versions="identity",
     address="http://HOST:PORT of a segmentation service",
 )

@@ -4,11 +4,21 @@ from __future__ import annotations
 
 from stages.segment.backends.service import ServiceParameters
 from stages.segment.backends.service.backend import connect, read_info
+from stages.segment.parameters import SegmentParameters
 
 
-def service_identity(address: str, parameters: ServiceParameters) -> str:
-    """Return the identity of the service at `address` now. Raises MissingDependency when none answers."""
-    connection = connect(address, parameters)
+def versions(parameters: SegmentParameters) -> dict[str, str]:
+    """Return what the service says of itself now, or what --service-model says it has to be.
+
+    Raises MissingDependency when it does not answer, BadInput when it is no segmentation service.
+    """
+    assert isinstance(parameters, ServiceParameters)
+    address = parameters.backend
+    return {f"service {address}": parameters.service_model or _asked(address, parameters)}
+
+
+def _asked(address: str, own: ServiceParameters) -> str:
+    connection = connect(address, own)
     try:
         return read_info(connection).identity
     finally:

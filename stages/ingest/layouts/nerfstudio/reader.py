@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.ingest.layouts import replica
-from stages.ingest.layouts.camera_groups import grouped
-from stages.ingest.layouts.files import (
+from stages.ingest.folders.camera_groups import grouped
+from stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     all_intrinsics_given,
     chosen_cameras,
@@ -33,8 +32,9 @@ from stages.ingest.layouts.files import (
     stream,
     text_stream,
 )
-from stages.ingest.layouts.frame_loading import FrameFiles, FrameFormat, frame_loader
-from stages.ingest.layouts.undistortion import PINHOLE, Lens, RecordedCamera, lens_of, overridden_recording
+from stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
+from stages.ingest.folders.undistortion import PINHOLE, Lens, RecordedCamera, lens_of, overridden_recording
+from stages.ingest.layouts.nerfstudio import replica
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import Entry, LogSource, SourceCamera
 from stages.kit.geometry.transforms import inverse, is_rigid

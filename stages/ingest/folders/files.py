@@ -12,8 +12,8 @@ import numpy as np
 
 from schemas.errors import BadInput, UsageError
 from schemas.scene_parts import Camera
+from stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
 from stages.ingest.images import decode_image, usable_color, usable_depth
-from stages.ingest.layouts.depth_arrays import ARRAY_SUFFIXES, depth_array
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import LoadedFrame, Role, StreamInfo, Unusable
 from stages.kit.formats.foxglove import decode_color

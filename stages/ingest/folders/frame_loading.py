@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from schemas.scene_parts import Camera
+from stages.ingest.folders.files import file_bytes, raw_depth
+from stages.ingest.folders.undistortion import RecordedCamera, undistorted
 from stages.ingest.images import depth_millimetres, fitted_color, usable_color
-from stages.ingest.layouts.files import file_bytes, raw_depth
-from stages.ingest.layouts.undistortion import RecordedCamera, undistorted
 from stages.ingest.source import LoadedFrame, Unusable
 from stages.kit.formats.foxglove import decode_color
 

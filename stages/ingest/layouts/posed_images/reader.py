@@ -1,7 +1,7 @@
 """Folders of posed images: color|rgb|image/, depth/, pose.txt with a line `tx ty tz qx qy qz qw` an image.
 
 The poses are world_from_camera (as in slambook2's diningroom); intrinsics come from options. Folders with a
-calibration file, or with other pose lines, are the plain images of image_folder.py.
+calibration file, or with other pose lines, are the plain images of layouts/images.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.ingest.layouts.calibration_files import calibration_file
-from stages.ingest.layouts.files import (
+from stages.ingest.folders.calibration_files import calibration_file
+from stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     camera_from_options,
@@ -25,7 +25,7 @@ from stages.ingest.layouts.files import (
     stream,
     text_stream,
 )
-from stages.ingest.layouts.pose_files import columns_of
+from stages.ingest.folders.pose_files import columns_of
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import Entry, LogSource, SourceCamera
 from stages.kit.formats.trajectories import number_rows, transform_from_numbers

@@ -12,7 +12,7 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
-from stages.ingest.layouts.files import resized_camera
+from stages.ingest.folders.files import resized_camera
 from stages.ingest.parameters import IngestParameters
 from stages.kit.geometry.cameras import intrinsic_matrix
 

@@ -16,8 +16,7 @@ import numpy as np
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from stages.ingest.color_registration import registered_loader
-from stages.ingest.images import usable_color, usable_depth
-from stages.ingest.layouts.files import (
+from stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     color_image_size,
@@ -31,6 +30,7 @@ from stages.ingest.layouts.files import (
     stream,
     text_stream,
 )
+from stages.ingest.images import usable_color, usable_depth
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
 from stages.kit.formats.trajectories import read_matrix, read_text

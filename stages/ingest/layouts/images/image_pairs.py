@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.ingest.layouts.depth_arrays import ARRAY_SUFFIXES
-from stages.ingest.layouts.files import COLOR_SUFFIXES, DEPTH_SUFFIXES, files_of, images_by_stem, natural_key
-from stages.ingest.layouts.video_frames import SUFFIXES as VIDEO_SUFFIXES
+from stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES
+from stages.ingest.folders.files import COLOR_SUFFIXES, DEPTH_SUFFIXES, files_of, images_by_stem, natural_key
+from stages.ingest.layouts.images.video_frames import SUFFIXES as VIDEO_SUFFIXES
 
 STEREO_FOLDERS = (
     ("left", "right"), ("image_0", "image_1"), ("image_2", "image_3"), ("cam0/data", "cam1/data"),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
-from stages.ingest.layouts.files import (
+from stages.ingest.folders.files import (
     camera_from_options,
     depth_image_size,
     depth_units,

@@ -15,9 +15,8 @@ import numpy as np
 
 from schemas.errors import BadInput, UsageError
 from schemas.scene_parts import Camera
-from stages.ingest.images import depth_millimetres, usable_color
-from stages.ingest.layouts.calibration_files import FolderCalibration, calibration_file, find_calibration
-from stages.ingest.layouts.files import (
+from stages.ingest.folders.calibration_files import FolderCalibration, calibration_file, find_calibration
+from stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
     color_image_size,
@@ -29,10 +28,11 @@ from stages.ingest.layouts.files import (
     stream,
     text_stream,
 )
-from stages.ingest.layouts.image_pairs import FolderImages, find_images, has_images, stamps_of
-from stages.ingest.layouts.pose_files import Pose, pose_file, read_pose_list
-from stages.ingest.layouts.stamped_poses import LATEST_STAMP, StampedPoses
-from stages.ingest.layouts.video_frames import VideoFrames
+from stages.ingest.folders.pose_files import Pose, pose_file, read_pose_list
+from stages.ingest.folders.stamped_poses import LATEST_STAMP, StampedPoses
+from stages.ingest.images import depth_millimetres, usable_color
+from stages.ingest.layouts.images.image_pairs import FolderImages, find_images, has_images, stamps_of
+from stages.ingest.layouts.images.video_frames import VideoFrames
 from stages.ingest.lenses import Lens, lens_of
 from stages.ingest.messages.records import CalibrationRecord
 from stages.ingest.parameters import IngestParameters

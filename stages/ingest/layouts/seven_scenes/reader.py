@@ -10,7 +10,7 @@ import numpy as np
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from stages.ingest.color_registration import registered_loader
-from stages.ingest.layouts.files import depth_image_size, depth_units, image_loader, overridden, stream
+from stages.ingest.folders.files import depth_image_size, depth_units, image_loader, overridden, stream
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import Entry, LogSource, SourceCamera
 from stages.kit.formats.trajectories import read_matrix

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.ingest.layouts.files import files_of, images_by_number
-from stages.ingest.layouts.stamped_poses import StampedPoses, read_stamped_poses
+from stages.ingest.folders.files import files_of, images_by_number
+from stages.ingest.folders.stamped_poses import StampedPoses, read_stamped_poses
 from stages.kit.formats.trajectories import number_rows, read_matrix, read_open3d_log, read_text, transform_from_numbers
 
 FILES = ("pose.txt", "poses.txt", "groundtruth.txt", "trajectory.txt", "trajectory.tum", "traj.txt", "trajectory.log")

@@ -19,7 +19,7 @@ import numpy as np
 from ruamel.yaml import YAML, YAMLError
 
 from schemas.errors import BadInput
-from stages.ingest.layouts.files import read_json
+from stages.ingest.folders.files import read_json
 from stages.ingest.messages.records import CalibrationRecord
 from stages.kit.formats.trajectories import read_text
 from stages.kit.geometry.transforms import inverse, is_rigid, transform_from

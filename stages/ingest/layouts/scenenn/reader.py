@@ -14,7 +14,7 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
-from stages.ingest.layouts.files import (
+from stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     all_intrinsics_given,

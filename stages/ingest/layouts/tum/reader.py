@@ -16,7 +16,7 @@ import numpy as np
 
 from schemas.errors import BadInput
 from stages.ingest.association import mutual_nearest
-from stages.ingest.layouts.files import (
+from stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
     color_image_size,
@@ -28,9 +28,9 @@ from stages.ingest.layouts.files import (
     stream,
     text_stream,
 )
-from stages.ingest.layouts.frame_loading import FrameFiles, FrameFormat, frame_loader
-from stages.ingest.layouts.stamped_poses import StampedPoses, exact_stamp, read_stamped_poses
-from stages.ingest.layouts.undistortion import RecordedCamera, lens_of, overridden_recording
+from stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
+from stages.ingest.folders.stamped_poses import StampedPoses, exact_stamp, read_stamped_poses
+from stages.ingest.folders.undistortion import RecordedCamera, lens_of, overridden_recording
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import Entry, LogSource, SourceCamera
 from stages.kit.formats.trajectories import read_text

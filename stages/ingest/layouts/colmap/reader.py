@@ -9,9 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from schemas.errors import BadInput
-from stages.ingest.layouts.camera_groups import CameraGroup, grouped
-from stages.ingest.layouts.colmap_model import ModelCamera, ModelImage, SparseModel, has_model, read_model
-from stages.ingest.layouts.files import (
+from stages.ingest.folders.camera_groups import CameraGroup, grouped
+from stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     chosen_cameras,
@@ -26,8 +25,9 @@ from stages.ingest.layouts.files import (
     stream,
     text_stream,
 )
-from stages.ingest.layouts.frame_loading import FrameFiles, FrameFormat, frame_loader
-from stages.ingest.layouts.undistortion import PINHOLE, RecordedCamera, lens_of, overridden_recording
+from stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
+from stages.ingest.folders.undistortion import PINHOLE, RecordedCamera, lens_of, overridden_recording
+from stages.ingest.layouts.colmap.model import ModelCamera, ModelImage, SparseModel, has_model, read_model
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
 
