@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -304,3 +304,14 @@ def _arc(
         tally.collided(collision)
         return None
     return arms
+
+
+def check_joint(joint: Joint, value: float, action: str, planned: str, reached: Callable[[Joint, float], bool]) -> None:
+    """Raises MotionFailed `condition_not_met` when a joint of the room, `planned` in the plan, is not `reached`."""
+    if not reached(joint, value):
+        raise MotionFailed(
+            "condition_not_met",
+            f"after {action} the joint {joint.name} stands at {value:.3f} of {joint.upper:.3f}",
+            (planned,),
+            {"value": value, "upper": joint.upper},
+        )

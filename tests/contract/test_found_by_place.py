@@ -1,4 +1,4 @@
-"""What lies in its folder is found: backends, log layouts, export formats, scene exporters. Nothing else is edited."""
+"""What lies in its folder is found: backends, layouts, formats, exporters, actions. Nothing else is edited."""
 
 from __future__ import annotations
 
@@ -190,6 +190,60 @@ print([exporter.name for exporter in scene_exporters()], (root / "names.txt").re
 """,
     )
     assert "['srdf', 'glb', 'mcap', 'names'] world" in printed
+
+
+def test_an_action_of_the_planner(tmp_path: Path) -> None:
+    """Its symbols are in the domain, its motion in the refinement, its look at the room in the execution."""
+    write(
+        tmp_path / "actions",
+        wipe="""
+import numpy as np
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.tasks.strips import Schema
+from stages.plan.action import PlanAction
+from stages.plan.motions import Manipulation, Segment
+class Wipe(PlanAction):
+    name, order, predicates = "wipe", 90, {"wiped": ("support",)}
+    schemas = (Schema("wipe", (("?on", "support"),), (("near", "?on"), ("hand_empty",)), (("wiped", "?on"),), ()),)
+    def manipulate(self, model, state, request):
+        return (Manipulation(np.zeros(3), (Segment(np.zeros((1, 10)), 0.0, label=request.arguments[0]),)),)
+    def check_effect(self, conduct, arguments):
+        raise MotionFailed("condition_not_met", f"{arguments[0]} is dirty")
+ACTION = Wipe()
+""",
+    )
+    printed = with_plugin(
+        "stages.plan.actions",
+        tmp_path / "actions",
+        """
+from types import SimpleNamespace
+import numpy as np
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.tasks.strips import Problem, ground
+from stages.kit.tasks.task_planner import plan_task
+from stages.plan import refinement
+from stages.plan.conduct import Conduct
+from stages.plan.domain import DOMAIN
+from stages.plan.pick_place import Budgets
+from stages.plan.world_model import RobotState
+at_start = frozenset({("near", "start"), ("hand_empty",), ("reachable", "table")})
+problem = Problem("scene", {"start": "spot", "table": "surface"}, at_start, frozenset({("wiped", "table")}))
+actions = plan_task(problem, ground(DOMAIN, problem), heuristic="max", limit=99).actions
+print([action.text for action in actions])
+refinement.plan_drive = lambda *_, **__: np.zeros((1, 3))
+checker = SimpleNamespace(allow=lambda touch: None, put_down=lambda: None)
+model = SimpleNamespace(snapshot=lambda: None, restore=lambda before: None, checker=checker, room=None)
+state, random = RobotState(np.zeros(3), np.zeros(7)), np.random.default_rng(0)
+for step in refinement.refine_plan(model, state, actions, Budgets(1, 1, 1, 1), random):
+    print(step.text, step.segments[0].label)
+    try:
+        Conduct._check_effect(None, step.name, step.arguments)
+    except MotionFailed as failed:
+        print(failed.failure.message)
+""",
+    )
+    assert "['drive(start, table)', 'wipe(table)']" in printed
+    assert "wipe(table) table" in printed and "table is dirty" in printed
 
 
 def test_what_declares_nothing_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
