@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from schemas.plan import Check
 from stages.kit.declared import declared_in
 from stages.kit.tasks.strips import Schema
+from stages.plan.checks import GoalInRoom
 from stages.plan.motions import Manipulation
 from stages.plan.pick_place import Budgets, GraspStyle
 from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
@@ -45,6 +47,8 @@ class PlanAction:
     """Symbolic variants: all of them have the one motion."""
     predicates: Mapping[str, tuple[str, ...]] = {}
     """Predicates that no other action needs -> types of their arguments."""
+    goals: Mapping[str, Callable[[GoalInRoom], Check]] = {}
+    """Predicates that a goal may name because of it -> whether one of them holds in the room."""
     has_motion: bool = True
     """Whether it has a motion of its own. A drive has none: its base pose belongs to the manipulation that follows."""
     hand: Literal["takes", "puts", "free"] = "free"
@@ -125,6 +129,12 @@ def _by_name() -> Mapping[str, PlanAction]:
 def action_named(name: str) -> PlanAction:
     """Return the action of a schema or a motion. Raises KeyError."""
     return _by_name()[name]
+
+
+@cache
+def goal_checks() -> Mapping[str, Callable[[GoalInRoom], Check]]:
+    """Return the predicates that a goal may name, and what tells whether one of them holds."""
+    return {predicate: check for action in all_actions() for predicate, check in action.goals.items()}
 
 
 def schemas_of_hand(hand: Literal["takes", "puts"]) -> frozenset[str]:

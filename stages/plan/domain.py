@@ -12,7 +12,6 @@ from stages.kit.tasks.strips import Domain
 from stages.plan.action import all_actions
 
 START = "start"
-GOAL_PREDICATES = ("on", "in", "holding", "carried_along", "open", "closed")
 
 DOMAIN = Domain(
     name="mobile_manipulation",

@@ -198,12 +198,14 @@ def test_an_action_of_the_planner(tmp_path: Path) -> None:
         tmp_path / "actions",
         wipe="""
 import numpy as np
+from schemas.plan import Check
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.tasks.strips import Schema
 from stages.plan.action import PlanAction
 from stages.plan.motions import Manipulation, Segment
 class Wipe(PlanAction):
     name, order, predicates = "wipe", 90, {"wiped": ("support",)}
+    goals = {"wiped": lambda goal: Check(condition=goal.literal, holds=True, detail="shines")}
     schemas = (Schema("wipe", (("?on", "support"),), (("near", "?on"), ("hand_empty",)), (("wiped", "?on"),), ()),)
     def manipulate(self, model, state, request):
         return (Manipulation(np.zeros(3), (Segment(np.zeros((1, 10)), 0.0, label=request.arguments[0]),)),)
@@ -218,22 +220,28 @@ ACTION = Wipe()
         """
 from types import SimpleNamespace
 import numpy as np
+from schemas.plan import BodyMatch
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.tasks.strips import Problem, ground
 from stages.kit.tasks.task_planner import plan_task
 from stages.plan import refinement
 from stages.plan.conduct import Conduct
 from stages.plan.domain import DOMAIN
+from stages.plan.goal_checks import check_goal
 from stages.plan.pick_place import Budgets
+from stages.plan.symbols import parse_goal
 from stages.plan.world_model import RobotState
+OBJECTS = {"start": "spot", "table": "surface"}
 at_start = frozenset({("near", "start"), ("hand_empty",), ("reachable", "table")})
-problem = Problem("scene", {"start": "spot", "table": "surface"}, at_start, frozenset({("wiped", "table")}))
+problem = Problem("scene", OBJECTS, at_start, parse_goal(("wiped(table)",), OBJECTS)[0])
 actions = plan_task(problem, ground(DOMAIN, problem), heuristic="max", limit=99).actions
 print([action.text for action in actions])
 refinement.plan_drive = lambda *_, **__: np.zeros((1, 3))
 checker = SimpleNamespace(allow=lambda touch: None, put_down=lambda: None)
 model = SimpleNamespace(snapshot=lambda: None, restore=lambda before: None, checker=checker, room=None)
 state, random = RobotState(np.zeros(3), np.zeros(7)), np.random.default_rng(0)
+world, match = SimpleNamespace(bodies={"desk": SimpleNamespace(joints=())}), BodyMatch(body="table", matched="desk")
+print(check_goal(world, ("wiped(table)",), {"table": match}, {}, None)[0].detail)
 for step in refinement.refine_plan(model, state, actions, Budgets(1, 1, 1, 1), random):
     print(step.text, step.segments[0].label)
     try:
@@ -243,7 +251,7 @@ for step in refinement.refine_plan(model, state, actions, Budgets(1, 1, 1, 1), r
 """,
     )
     assert "['drive(start, table)', 'wipe(table)']" in printed
-    assert "wipe(table) table" in printed and "table is dirty" in printed
+    assert "wipe(table) table" in printed and "table is dirty" in printed and "shines" in printed
 
 
 def test_what_declares_nothing_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from stages.kit.tasks.strips import Schema
 from stages.plan.action import MotionRequest, PlanAction
+from stages.plan.checks import check_joints
 from stages.plan.door_motion import check_joint, is_closed, plan_close
 from stages.plan.motions import Manipulation
 from stages.plan.world_model import RobotState, WorldModel
@@ -19,6 +20,9 @@ class Close(PlanAction):
 
     name = "close"
     order = 50
+    goals = {
+        "closed": lambda goal: check_joints(goal.world, goal.literal, goal.bodies[0], goal.joints, shut=True),
+    }
     schemas = (
         Schema(
             "close",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from stages.kit.tasks.strips import Schema
 from stages.plan.action import MotionRequest, PlanAction
+from stages.plan.checks import check_joints
 from stages.plan.door_motion import check_joint, is_open, plan_open
 from stages.plan.motions import Manipulation
 from stages.plan.world_model import RobotState, WorldModel
@@ -19,6 +20,9 @@ class Open(PlanAction):
 
     name = "open"
     order = 40
+    goals = {
+        "open": lambda goal: check_joints(goal.world, goal.literal, goal.bodies[0], goal.joints, shut=False),
+    }
     schemas = (
         Schema(
             "open",

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from schemas.plan import Check
 from stages.kit.tasks.strips import Schema
 from stages.plan.action import MotionRequest, PlanAction
 from stages.plan.carriers import HAND
+from stages.plan.checks import GoalInRoom
 from stages.plan.motions import Manipulation
 from stages.plan.pick_place import plan_pick
 from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
@@ -17,6 +19,12 @@ from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
 if TYPE_CHECKING:
     from stages.plan.conduct import Conduct
     from stages.plan.tree_state import TreeState
+
+
+def check_held(goal: GoalInRoom) -> Check:
+    """Whether the hand holds a thing."""
+    detail = f"the hand holds {goal.held or 'nothing'}"
+    return Check(condition=goal.literal, holds=goal.held == goal.bodies[0], detail=detail)
 
 
 class Pick(PlanAction):
@@ -27,6 +35,7 @@ class Pick(PlanAction):
     hand = "takes"
     tied_to = 0
     when_unmet = "back"
+    goals = {"holding": check_held}
     schemas = (
         Schema(
             "pick",

@@ -11,6 +11,7 @@ from stages.kit.motion.failures import MotionFailed
 from stages.kit.tasks.strips import Schema
 from stages.plan.action import MotionRequest, PlanAction
 from stages.plan.carriers import carried_by, carrier
+from stages.plan.checks import check_in, check_on
 from stages.plan.motions import Manipulation
 from stages.plan.pick_place import GraspStyle, plan_place
 from stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level, placement_style
@@ -32,6 +33,11 @@ class Place(PlanAction):
     hand = "puts"
     tied_to = 1
     when_unmet = "stay"
+    goals = {
+        "on": lambda goal: check_on(goal.world, goal.literal, *goal.bodies[:2]),
+        "carried_along": lambda goal: check_on(goal.world, goal.literal, *goal.bodies[:2]),
+        "in": lambda goal: check_in(goal.world, goal.literal, *goal.bodies[:2]),
+    }
     schemas = (
         Schema(
             "place",
