@@ -185,19 +185,19 @@ def plan_and_refine(
     for _ in range(task_attempts):
         allowed = lessons.apply(actions)
         if planner == "builtin":
-            found = plan_task(problem, allowed, heuristic=heuristic, limit=TASK_STATES[heuristic == "max"])
+            plan = plan_task(problem, allowed, heuristic=heuristic, limit=TASK_STATES[heuristic == "max"])
         else:
-            found = plan_with_fast_downward(domain, problem, allowed)
-        if found.actions is None:
-            failures.append(_no_task_plan(problem, found, lessons))
+            plan = plan_with_fast_downward(domain, problem, allowed)
+        if plan.actions is None:
+            failures.append(_no_task_plan(problem, plan, lessons))
             return Attempt(None, None, failures, tuple(tried), tuple(lessons.words))
-        texts = tuple(action.text for action in found.actions)
+        texts = tuple(action.text for action in plan.actions)
         worst: RefinementFailed | None = None
         for _ in range(refinement_attempts):
             try:
-                steps = refine_plan(model, state, found.actions, budgets, random)
+                steps = refine_plan(model, state, plan.actions, budgets, random)
                 tried.append(TriedPlan(actions=texts))
-                return Attempt(found.actions, steps, failures, tuple(tried), tuple(lessons.words))
+                return Attempt(plan.actions, steps, failures, tuple(tried), tuple(lessons.words))
             except RefinementFailed as failed:
                 failures.append(failed.failure)
                 tried.append(TriedPlan(actions=texts, failed_action=failed.place, failure=failed.failure))
@@ -206,28 +206,28 @@ def plan_and_refine(
                     break
         assert worst is not None
         before = problem.initial
-        for action in found.actions[: worst.place]:
+        for action in plan.actions[: worst.place]:
             before = apply_action(before, action)
         lessons.learn(worst.action, worst.failure, actions, before)
     return Attempt(None, None, failures, tuple(tried), tuple(lessons.words))
 
 
-def _no_task_plan(problem: Problem, found: TaskPlan, lessons: Lessons) -> Failure:
+def _no_task_plan(problem: Problem, plan: TaskPlan, lessons: Lessons) -> Failure:
     without = f" ({'; '.join(lessons.words)})" if lessons.words else ""
-    if found.unreachable:
-        names = ", ".join(atom_text(atom) for atom in found.unreachable)
-        message = f"no sequence of actions makes {names} true{without}{_lacking(problem, found.unreachable)}"
-    elif found.exhausted:
+    if plan.unreachable:
+        names = ", ".join(atom_text(atom) for atom in plan.unreachable)
+        message = f"no sequence of actions makes {names} true{without}{_lacking(problem, plan.unreachable)}"
+    elif plan.exhausted:
         names = ", ".join(sorted(atom_text(atom) for atom in problem.goal))
         message = f"each of {names} can be reached, but not all together{without}"
     else:
-        message = f"no task plan within {found.expanded} expanded states{without}"
-    objects = sorted({name for atom in found.unreachable or problem.goal for name in atom[1:]})
+        message = f"no task plan within {plan.expanded} expanded states{without}"
+    objects = sorted({name for atom in plan.unreachable or problem.goal for name in atom[1:]})
     return Failure(
-        kind="goal_unsatisfiable" if found.exhausted else "search_limit",
+        kind="goal_unsatisfiable" if plan.exhausted else "search_limit",
         message=message,
         objects=tuple(objects),
-        numbers={"expanded": float(found.expanded), "lessons": float(len(lessons.words))},
+        numbers={"expanded": float(plan.expanded), "lessons": float(len(lessons.words))},
     )
 
 

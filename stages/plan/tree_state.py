@@ -77,10 +77,12 @@ def tree_differences(
     action: int, expected: TreeState, observed: TreeState, model: WorldModel
 ) -> tuple[TreeDifference, ...]:  # fmt: skip
     """Return where an observed state is not as expected: carriers of things, doors that are open or shut."""
-    found = []
+    differences = []
     for name, parent in sorted(observed.parents.items()):
         if expected.parents.get(name, parent) != parent:
-            found.append(TreeDifference(action=action, node=name, expected=expected.parents[name], observed=parent))
+            differences.append(
+                TreeDifference(action=action, node=name, expected=expected.parents[name], observed=parent)
+            )
     for record in model.records.values():
         for joint in record.joints:
             if joint.name not in observed.joints:
@@ -91,8 +93,8 @@ def tree_differences(
                 for state in (expected, observed)
             ]  # fmt: skip
             if words[0] != words[1]:
-                found.append(TreeDifference(action=action, node=joint.name, expected=words[0], observed=words[1]))
-    return tuple(found)
+                differences.append(TreeDifference(action=action, node=joint.name, expected=words[0], observed=words[1]))
+    return tuple(differences)
 
 
 def graph_of_state(

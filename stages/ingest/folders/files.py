@@ -33,8 +33,10 @@ def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
 
 def files_of(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
     """Return the files with these suffixes in a folder, in natural order; hidden ones (editors, archives) are none."""
-    found = (path for path in folder.iterdir() if path.suffix.lower() in suffixes and not path.name.startswith("."))
-    return sorted((path for path in found if not path.is_dir()), key=lambda path: natural_key(path.name))
+    candidates = (
+        path for path in folder.iterdir() if path.suffix.lower() in suffixes and not path.name.startswith(".")
+    )
+    return sorted((path for path in candidates if not path.is_dir()), key=lambda path: natural_key(path.name))
 
 
 def images_by_stem(folder: Path, suffixes: tuple[str, ...]) -> dict[str, Path]:
@@ -42,15 +44,15 @@ def images_by_stem(folder: Path, suffixes: tuple[str, ...]) -> dict[str, Path]:
 
     Raises BadInput when two share a stem, or have stems that differ only in case.
     """
-    found: dict[str, Path] = {}
+    images: dict[str, Path] = {}
     folded: dict[str, Path] = {}
     for path in files_of(folder, suffixes):
         other = folded.setdefault(path.stem.casefold(), path)
         if other is not path:
             same = "has the same name" if other.stem == path.stem else "differs only in case"
             raise BadInput(f"{path}: {other.name} {same}", hint="keep one of the two")
-        found[path.stem] = path
-    return found
+        images[path.stem] = path
+    return images
 
 
 def images_by_number(folder: Path, suffixes: tuple[str, ...], prefix: str = "") -> dict[int, Path]:
@@ -58,16 +60,16 @@ def images_by_number(folder: Path, suffixes: tuple[str, ...], prefix: str = "") 
 
     Only names that begin with `prefix` count. Raises BadInput when a name has none, or two have the same.
     """
-    found: dict[int, Path] = {}
+    images: dict[int, Path] = {}
     for path in (path for path in files_of(folder, suffixes) if path.name.startswith(prefix)):
         numbers = re.findall(r"\d+", path.stem)
         if not numbers:
             raise BadInput(f"{path}: has no frame number in its name")
         number = int(numbers[-1])
-        if number in found:
-            raise BadInput(f"{path}: {found[number].name} has the same frame number", hint="keep one of the two")
-        found[number] = path
-    return dict(sorted(found.items()))
+        if number in images:
+            raise BadInput(f"{path}: {images[number].name} has the same frame number", hint="keep one of the two")
+        images[number] = path
+    return dict(sorted(images.items()))
 
 
 def first_subfolder(root: Path, names: tuple[str, ...]) -> Path | None:
@@ -177,10 +179,10 @@ def color_image_size(paths: Iterable[Path]) -> tuple[int, int] | None:
 
 def refuse_exr(names: Iterable[str], where: str) -> None:
     """Raises BadInput when depth is in OpenEXR files, for which there is no reader here."""
-    found = next((name for name in names if name.lower().endswith(".exr")), None)
-    if found is not None:
+    exr = next((name for name in names if name.lower().endswith(".exr")), None)
+    if exr is not None:
         raise BadInput(
-            f"{where}: depth {found} is OpenEXR, which is not read",
+            f"{where}: depth {exr} is OpenEXR, which is not read",
             hint="convert it to 16-bit PNG in millimetres, or to .npy",
         )
 

@@ -163,11 +163,11 @@ def _depths(root: Path, images: list[ModelImage]) -> tuple[list[Path | None], st
     if (root / "depth").is_dir():
         paths = [_named_like(root / "depth", image.name, root) for image in images]
         return paths, "depth" if any(paths) else None
-    found: list[Path | None] = []
+    dense_maps: list[Path | None] = []
     for image in images:
         candidates = (named_file(root / DENSE_MAPS, image.name + ending, str(root)) for ending in DENSE_ENDINGS)
-        found.append(next((path for path in candidates if path.is_file()), None))
-    return found, DENSE_MAPS if any(found) else None
+        dense_maps.append(next((path for path in candidates if path.is_file()), None))
+    return dense_maps, DENSE_MAPS if any(dense_maps) else None
 
 
 def _named_like(folder: Path, name: str, root: Path) -> Path | None:
@@ -185,7 +185,7 @@ def _recorded(
     parameters: IngestParameters,
 ) -> tuple[list[RecordedCamera], tuple[str, ...]]:
     """Return the camera of each image at the size of its depth, or of its colour where there is none."""
-    known: dict[int, RecordedCamera] = {}
+    cameras: dict[int, RecordedCamera] = {}
     notes: tuple[str, ...] = ()
     for number in dict.fromkeys(image.camera for image in images):
         own = [index for index, image in enumerate(images) if image.camera == number]
@@ -193,8 +193,8 @@ def _recorded(
         size = depth_image_size(path for index in own if (path := depths[index]) is not None)
         size = size or color_image_size(colors[index] for index in own)
         camera = _camera(model.cameras[number], where).at(size, where)
-        known[number], notes = overridden_recording(camera, parameters)
-    return [known[image.camera] for image in images], notes
+        cameras[number], notes = overridden_recording(camera, parameters)
+    return [cameras[image.camera] for image in images], notes
 
 
 def _camera(camera: ModelCamera, where: str) -> RecordedCamera:
@@ -217,9 +217,9 @@ def _camera(camera: ModelCamera, where: str) -> RecordedCamera:
 
 
 def _unregistered(folder: Path, registered: list[Path]) -> list[Path]:
-    known = set(registered)
-    found = (path for path in folder.rglob("*") if path.suffix.lower() in COLOR_SUFFIXES and path.is_file())
-    return [path for path in found if path not in known] if folder.name in IMAGE_FOLDERS else []
+    in_model = set(registered)
+    images = (path for path in folder.rglob("*") if path.suffix.lower() in COLOR_SUFFIXES and path.is_file())
+    return [path for path in images if path not in in_model] if folder.name in IMAGE_FOLDERS else []
 
 
 def _scale_notes(depth_words: str | None, unit_note: str) -> tuple[str, ...]:

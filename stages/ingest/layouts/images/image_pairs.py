@@ -103,37 +103,37 @@ def _of_folders(root: Path, color: str, right: str | None) -> FolderImages:
     places = {"color": color} | ({"depth": depth} if depth else {}) | ({"right": right} if right else {})
     notes: list[str] = []
     keys = _keys(root, [colors, depths, rights], notes)
-    names = sorted({key for one in keys for key in one}, key=natural_key)
-    columns = [tuple(found.get(name) for name in names) for found in keys]
+    names = sorted({key for images in keys for key in images}, key=natural_key)
+    columns = [tuple(images.get(name) for name in names) for images in keys]
     number = 2 if color == "image_2" else 0
     return FolderImages(tuple(names), columns[0], columns[1], columns[2], number, places, notes=tuple(notes))
 
 
-def _keys(root: Path, found: list[dict[str, Path]], notes: list[str]) -> list[dict[str, Path]]:
+def _keys(root: Path, images: list[dict[str, Path]], notes: list[str]) -> list[dict[str, Path]]:
     """Return the images under names that their partners share: equal names, else equal numbers, else their order."""
-    first, others = found[0], [one for one in found[1:] if one]
-    if not others or all(first.keys() & one.keys() for one in others):
-        return found
-    numbered = [_by_number(one) for one in found]
-    if all(one is not None for one in numbered):
+    first, others = images[0], [eye for eye in images[1:] if eye]
+    if not others or all(first.keys() & eye.keys() for eye in others):
+        return images
+    numbered = [_by_number(eye) for eye in images]
+    if all(eye is not None for eye in numbered):
         notes.append("images paired by the last number in their names")
-        return [one for one in numbered if one is not None]
-    if any(len(one) != len(first) for one in others):
-        counts = " and ".join(str(len(one)) for one in [first, *others])
+        return [eye for eye in numbered if eye is not None]
+    if any(len(eye) != len(first) for eye in others):
+        counts = " and ".join(str(len(eye)) for eye in [first, *others])
         raise BadInput(f"{root}: {counts} images have no names or numbers in common", hint="give partners one name")
     notes.append("images paired by their order")
-    return [dict(zip(first, one.values(), strict=bool(one))) for one in found]
+    return [dict(zip(first, eye.values(), strict=bool(eye))) for eye in images]
 
 
-def _by_number(found: dict[str, Path]) -> dict[str, Path] | None:
+def _by_number(images: dict[str, Path]) -> dict[str, Path] | None:
     """Return the images by the last number in their names, None when a name has none or two have the same."""
     keyed: dict[str, Path] = {}
-    for stem, path in found.items():
+    for stem, path in images.items():
         numbers = re.findall(r"[0-9]+", stem)
         if not numbers:
             return None
         keyed[str(int(numbers[-1]))] = path
-    return keyed if len(keyed) == len(found) else None
+    return keyed if len(keyed) == len(images) else None
 
 
 def _marked(root: Path) -> FolderImages | None:
@@ -146,15 +146,15 @@ def _marked(root: Path) -> FolderImages | None:
             word, name = (match[1], match[2]) if match[1] else (match[4], match[3])
         if word is None:
             continue
-        found = roles[ROLES[word.lower()]]
-        if name in found:
-            raise BadInput(f"{path}: {found[name].name} is the same image", hint="keep one of the two")
-        found[name] = path
+        images = roles[ROLES[word.lower()]]
+        if name in images:
+            raise BadInput(f"{path}: {images[name].name} is the same image", hint="keep one of the two")
+        images[name] = path
     if not roles["color"] or not (roles["depth"] or roles["right"] or roles["disparity"]):
         return None
-    names = sorted({name for found in roles.values() for name in found}, key=natural_key)
+    names = sorted({name for images in roles.values() for name in images}, key=natural_key)
     depths = roles["depth"] or roles["disparity"]
-    columns = [tuple(found.get(name) for name in names) for found in (roles["color"], depths, roles["right"])]
+    columns = [tuple(images.get(name) for name in names) for images in (roles["color"], depths, roles["right"])]
     places = {role: f"*{role}*" for role in ("color", "depth", "right") if roles[role]}
     if depths:
         places["depth"] = "*depth*" if roles["depth"] else "disp0"

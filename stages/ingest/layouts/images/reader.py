@@ -126,20 +126,22 @@ def _calibration(root: Path, images: FolderImages, parameters: IngestParameters)
     if all_intrinsics_given(parameters) and not any(images.rights):
         camera = camera_from_options(None, parameters, str(root))
         return FolderCalibration(_pinhole_record(camera), notes=("intrinsics given by option",))
-    found = find_calibration(root, images.camera_number)
-    if found is None:
+    calibration = find_calibration(root, images.camera_number)
+    if calibration is None:
         camera_from_options(None, parameters, f"{root}: there is no calibration file")
         raise BadInput(f"{root}: there is no calibration file for left and right images", hint=PAIR_HINT)
-    if given and found.right is not None:
+    if given and calibration.right is not None:
         raise UsageError(f"--{given[0]} cannot describe a stereo pair", hint="change the calibration file instead")
     if given:
-        matrix = list(found.left.K)
+        matrix = list(calibration.left.K)
         for name, place in zip(OPTIONS, (0, 4, 2, 5), strict=True):
             matrix[place] = matrix[place] if getattr(parameters, name) is None else getattr(parameters, name)
         listed = ", ".join(f"{name} {getattr(parameters, name):g}" for name in given)
-        notes = (*found.notes, f"intrinsics given by option: {listed}")
-        found = replace(found, left=replace(found.left, K=tuple(matrix), P=()), rectified=False, notes=notes)
-    return found
+        notes = (*calibration.notes, f"intrinsics given by option: {listed}")
+        calibration = replace(
+            calibration, left=replace(calibration.left, K=tuple(matrix), P=()), rectified=False, notes=notes
+        )
+    return calibration
 
 
 def _pinhole_record(camera: Camera) -> CalibrationRecord:

@@ -55,9 +55,9 @@ def matches(path: Path) -> str | None:
     if path.is_file():
         return "file with the ending .sens: ScanNet container" if path.suffix.lower() == ".sens" else None
     if all((path / name).is_dir() for name in ("color", "depth", "pose")):
-        known = next((name for name in (*INTRINSIC_FILES, INFO) if (path / name).is_file()), None)
-        if known or (path / "intrinsic").is_dir():
-            return f"folder with color/, depth/, pose/ and {known or 'intrinsic/'}: ScanNet export"
+        intrinsics = next((name for name in (*INTRINSIC_FILES, INFO) if (path / name).is_file()), None)
+        if intrinsics or (path / "intrinsic").is_dir():
+            return f"folder with color/, depth/, pose/ and {intrinsics or 'intrinsic/'}: ScanNet export"
     if any(path.glob("*.sens")) and not (path / "depth").is_dir():
         return "folder with a .sens file: ScanNet container"
     return None
@@ -73,19 +73,19 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     colors = images_by_number(path / "color", COLOR_SUFFIXES)
     depths = images_by_number(path / "depth", DEPTH_SUFFIXES)
     poses = images_by_number(path / "pose", (".txt",))
-    known = _calibration(path, depth_image_size(depths.values()), color_image_size(colors.values()))
-    camera, given = overridden(known.depth, parameters)
-    units, unit_note = depth_units(parameters, known.units_per_metre)
+    calibration = _calibration(path, depth_image_size(depths.values()), color_image_size(colors.values()))
+    camera, given = overridden(calibration.depth, parameters)
+    units, unit_note = depth_units(parameters, calibration.units_per_metre)
     entries = []
     for number in sorted(colors.keys() | depths.keys()):
         pose, problem = _pose(poses.get(number))
-        load = _loader(colors.get(number), depths.get(number), known.color, camera, units)
-        if known.color != camera:
-            load = registered_loader(load, camera, known.color, np.eye(4))
+        load = _loader(colors.get(number), depths.get(number), calibration.color, camera, units)
+        if calibration.color != camera:
+            load = registered_loader(load, camera, calibration.color, np.eye(4))
         entries.append(Entry(f"frame {number}", number / parameters.frame_rate, pose, load, problem))
     stray = len(poses.keys() - colors.keys() - depths.keys())
     notes = (
-        *known.notes,
+        *calibration.notes,
         *given,
         unit_note,
         f"times assumed: frame number / {parameters.frame_rate:g} per second",
@@ -96,7 +96,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         stream("depth", "depth", depths.values()),
         text_stream("pose", "pose", len(poses)),
     )
-    cameras = (SourceCamera("camera", camera, registered=known.identity),)
+    cameras = (SourceCamera("camera", camera, registered=calibration.identity),)
     return LogSource("scannet", rule, cameras, tuple(entries), notes, streams=streams)
 
 
@@ -176,8 +176,8 @@ def _matrix_of(path: Path, default: np.ndarray) -> np.ndarray:
 
 
 def _info(path: Path) -> dict[str, str]:
-    found = (INFO_LINE.match(line) for line in read_text(path).splitlines())
-    return {match[1]: match[2] for match in found if match}
+    matches = (INFO_LINE.match(line) for line in read_text(path).splitlines())
+    return {match[1]: match[2] for match in matches if match}
 
 
 def _info_numbers(fields: dict[str, str], name: str, path: Path, count: int) -> np.ndarray:

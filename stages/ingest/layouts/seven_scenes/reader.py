@@ -41,16 +41,16 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         match = FILE.match(path.name)
         if match:
             files.setdefault(int(match[1]), {})[match[2]] = path
-    size = depth_image_size([found["depth"] for _, found in sorted(files.items()) if "depth" in found])
+    size = depth_image_size([images["depth"] for _, images in sorted(files.items()) if "depth" in images])
     camera, notes = _camera(root, size)
     camera, given = overridden(camera, parameters)
     units, unit_note = depth_units(parameters, 1000.0)
     register = parameters.register_color and _is_seven_scenes_kinect(camera)
     entries = []
     for number in sorted(files):
-        found = files[number]
-        pose, problem = _pose(found.get("pose"))
-        load = image_loader(found.get("color"), found.get("depth"), camera, units)
+        images = files[number]
+        pose, problem = _pose(images.get("pose"))
+        load = image_loader(images.get("color"), images.get("depth"), camera, units)
         if register:
             load = registered_loader(load, camera, COLOR_CAMERA, COLOR_FROM_DEPTH)
         entries.append(
@@ -71,9 +71,9 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     )
     cameras = (SourceCamera("camera", camera, registered=register),)
     streams = (
-        stream("*.color", "color", [found["color"] for found in files.values() if "color" in found]),
-        stream("*.depth", "depth", [found["depth"] for found in files.values() if "depth" in found]),
-        stream("*.pose.txt", "pose", [found["pose"] for found in files.values() if "pose" in found]),
+        stream("*.color", "color", [images["color"] for images in files.values() if "color" in images]),
+        stream("*.depth", "depth", [images["depth"] for images in files.values() if "depth" in images]),
+        stream("*.pose.txt", "pose", [images["pose"] for images in files.values() if "pose" in images]),
     )
     return LogSource("7scenes", rule, cameras, tuple(entries), notes, streams=streams)
 

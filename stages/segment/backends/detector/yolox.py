@@ -110,10 +110,10 @@ class Detector:
     def detect(self, color: np.ndarray) -> Detections:
         """Return what is found in an image (H, W, 3) uint8 RGB: in the whole, and in tiles when `tile_side` > 0."""
         height, width = color.shape[:2]
-        found = [self._detect_window(color, (0, 0, width, height))]
+        windows = [self._detect_window(color, (0, 0, width, height))]
         if self.tile_side:
-            found += [self._detect_window(color, window) for window in tile_windows(width, height, self.tile_side)]
-        boxes, scores, classes = (np.concatenate([part[k] for part in found]) for k in range(3))
+            windows += [self._detect_window(color, window) for window in tile_windows(width, height, self.tile_side)]
+        boxes, scores, classes = (np.concatenate([part[k] for part in windows]) for k in range(3))
         kept = suppress(boxes, scores, classes, self.suppression_overlap)
         return Detections(boxes[kept], scores[kept], classes[kept])
 

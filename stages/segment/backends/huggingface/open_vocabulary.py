@@ -114,11 +114,11 @@ class OpenVocabularySegmenter:
 
     def __call__(self, color: np.ndarray) -> list[InstanceMask]:
         """Return what is found in an image (H, W, 3) uint8 RGB; masks may overlap."""
-        found = self._boxes(color)
-        masks = self._masks(color, found.boxes)
+        boxes = self._boxes(color)
+        masks = self._masks(color, boxes.boxes)
         return [
             InstanceMask(mask, self._labels[word], float(score))
-            for mask, word, score in zip(masks, found.words, found.scores, strict=True)
+            for mask, word, score in zip(masks, boxes.words, boxes.scores, strict=True)
         ]
 
     def _boxes(self, color: np.ndarray) -> WordBoxes:

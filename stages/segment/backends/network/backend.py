@@ -130,9 +130,9 @@ def camera_of_points(points: np.ndarray) -> Camera | None:
     v, u = np.nonzero(points[..., 2] > 0)
     if len(u) < 16 or np.ptp(u) < 2 or np.ptp(v) < 2:
         return None
-    found = points[v, u].astype(np.float64)
-    fx, cx = np.polyfit(found[:, 0] / found[:, 2], u, 1)
-    fy, cy = np.polyfit(found[:, 1] / found[:, 2], v, 1)
+    visible = points[v, u].astype(np.float64)
+    fx, cx = np.polyfit(visible[:, 0] / visible[:, 2], u, 1)
+    fy, cy = np.polyfit(visible[:, 1] / visible[:, 2], v, 1)
     height, width = points.shape[:2]
     return Camera(width=width, height=height, fx=float(fx), fy=float(fy), cx=float(cx), cy=float(cy))
 

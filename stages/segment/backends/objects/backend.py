@@ -47,16 +47,16 @@ class ObjectsBackend:
         """Return a mask per object. The frame must have depth; without colour only geometry counts."""
         assert frame.depth is not None
         color = frame.color if frame.color is not None else np.full((*frame.depth.shape, 3), GREY, dtype=np.uint8)
-        found = segment_objects(color, frame.depth, self._camera, trees=self._trees)
-        count = int(found.labels.max(initial=0))
-        rows, columns, starts = pixels_by_label(found.labels[found.patches.window], count)
+        objects = segment_objects(color, frame.depth, self._camera, trees=self._trees)
+        count = int(objects.labels.max(initial=0))
+        rows, columns, starts = pixels_by_label(objects.labels[objects.patches.window], count)
         kept = np.arange(count + 1, dtype=np.int32)
         for k in range(1, count + 1):
             own = slice(starts[k], starts[k + 1])
-            low, high = np.quantile(found.patches.points[rows[own], columns[own]], (0.02, 0.98), axis=0)
+            low, high = np.quantile(objects.patches.points[rows[own], columns[own]], (0.02, 0.98), axis=0)
             if np.linalg.norm(high - low) > self._largest:
                 kept[k] = 0
-        ids = kept[found.labels]
+        ids = kept[objects.labels]
         return PanopticFrame(ids=ids, masks=dict.fromkeys(np.unique(ids[ids > 0]).tolist(), self._mask))
 
 
