@@ -160,6 +160,16 @@ class Attempt:
     """What the failures taught the task search, in words."""
 
 
+@dataclass(frozen=True)
+class SearchSettings:
+    """How the task search and its alternation with geometry go."""
+
+    heuristic: Heuristic
+    task_attempts: int
+    refinement_attempts: int
+    planner: Literal["builtin", "fast-downward"] = "builtin"
+
+
 def plan_and_refine(
     model: WorldModel,
     state: RobotState,
@@ -167,11 +177,7 @@ def plan_and_refine(
     problem: Problem,
     budgets: Budgets,
     random: np.random.Generator,
-    *,
-    heuristic: Heuristic,
-    task_attempts: int,
-    refinement_attempts: int,
-    planner: Literal["builtin", "fast-downward"] = "builtin",
+    settings: SearchSettings,
 ) -> Attempt:
     """Alternate between task search and geometry.
 
@@ -182,9 +188,10 @@ def plan_and_refine(
     failures: list[Failure] = []
     lessons = Lessons(held=next((atom[1] for atom in problem.initial if atom[0] == "holding"), None))
     tried: list[TriedPlan] = []
-    for _ in range(task_attempts):
+    heuristic = settings.heuristic
+    for _ in range(settings.task_attempts):
         allowed = lessons.apply(actions)
-        if planner == "builtin":
+        if settings.planner == "builtin":
             plan = plan_task(problem, allowed, heuristic=heuristic, limit=TASK_STATES[heuristic == "max"])
         else:
             plan = plan_with_fast_downward(domain, problem, allowed)
@@ -193,7 +200,7 @@ def plan_and_refine(
             return Attempt(None, None, failures, tuple(tried), tuple(lessons.words))
         texts = tuple(action.text for action in plan.actions)
         worst: RefinementFailed | None = None
-        for _ in range(refinement_attempts):
+        for _ in range(settings.refinement_attempts):
             try:
                 steps = refine_plan(model, state, plan.actions, budgets, random)
                 tried.append(TriedPlan(actions=texts))

@@ -18,7 +18,7 @@ from stages.plan.action import MotionRequest
 from stages.plan.door_motion import plan_close
 from stages.plan.goals import default_goals
 from stages.plan.pick_place import Budgets, plan_pick
-from stages.plan.refinement import plan_and_refine, refine_action
+from stages.plan.refinement import SearchSettings, plan_and_refine, refine_action
 from stages.plan.symbols import DOMAIN, parse_goal, symbolic_state, task_problem
 from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
 from tests.unit.simulation.handmade_scene import HandmadeBody, kitchen, write_scene
@@ -78,7 +78,7 @@ def test_every_motion_of_a_refined_plan_is_free_of_collision(
     goal, _ = parse_goal(("on(bottle_7, table_3)",), objects)
     attempt = plan_and_refine(
         model, START, DOMAIN, task_problem(objects, initial, goal), BUDGETS, np.random.default_rng(0),
-        heuristic="add", task_attempts=2, refinement_attempts=3,
+        SearchSettings("add", task_attempts=2, refinement_attempts=3),
     )  # fmt: skip
     assert attempt.steps is not None
     assert [step.name for step in attempt.steps] == ["drive", "pick", "drive", "place"]
@@ -198,7 +198,7 @@ def test_what_the_hand_cannot_take_is_known_before_any_geometry(tmp_path: Path) 
         goal, _ = parse_goal(("holding(box_9)",), objects)
         attempt = plan_and_refine(
             model, START, DOMAIN, task_problem(objects, initial, goal), BUDGETS, np.random.default_rng(0),
-            heuristic="add", task_attempts=3, refinement_attempts=2,
+            SearchSettings("add", task_attempts=3, refinement_attempts=2),
         )  # fmt: skip
     finally:
         model.close()
