@@ -9,6 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from schemas.segments import Segments
 from schemas.sequence import Sequence
+from stages.kit.estimates import USUAL_FRAME, Estimate, Inputs
 from stages.kit.stage import External, Optionally, Parameters, Stage
 from stages.segment.registry import all_backends, backend_help, check_backend, data_files, weights_help
 
@@ -93,6 +94,14 @@ else:
     """Options of `segment`: the common ones and those of every backend."""
 
 
+def _estimate(parameters: SegmentParameters, inputs: Inputs) -> Estimate:
+    sequence = inputs["sequence"]
+    megapixels = sequence.megapixels if sequence.megapixels is not None else sequence.megabytes
+    frames = sequence.frames or megapixels / USUAL_FRAME
+    expected = 0.015 * frames + 0.048 * megapixels
+    return Estimate(expected, 0.2 * expected, 215 + 300 * sequence.frame_megapixels, frames, megapixels)
+
+
 STAGE = Stage(
     name="segment",
     version=3,
@@ -118,4 +127,5 @@ STAGE = Stage(
     data_files=data_files,
     extras=tuple(extra for declared in all_backends() for extra in declared.extras),
     example="scenewright segment --sequence outputs/demo/sequence --out outputs/demo/segments",
+    estimate=_estimate,
 )
