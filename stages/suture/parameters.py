@@ -21,7 +21,7 @@ DATA = Path(__file__).resolve().parents[2] / "data"
 MASKS = Optionally(
     External("folder of masks <frame:06d>_left.png, _right.png: 1 or 255 needle, 2 thread, 3 and 4 what hides them")
 )
-SEGMENTER = Optionally(External("checkpoint of the segmenter (docs/STITCH_SEGMENTATION.md)", weights=True))
+SEGMENTER = Optionally(External("checkpoint of the segmenter (docs/STITCH.md)", weights=True))
 
 
 class SceneParameters(Parameters):
