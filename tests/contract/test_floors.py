@@ -117,7 +117,7 @@ CORES = (
     *("fuse.mapping", "fuse.ours", "fuse.closing"),
     *("graph.building", "graph.ours"),
     *("cad.candidates", "cad.choosing", "cad.ours"),
-    *("segment.fusion_ours", "segment.geometric", "segment.objects.segmentation", "segment.network.backend"),
+    *("segment.fusion_ours", "segment.geometric", "segment.backends.objects.segmentation", "segment.backends.network.grouping"),
     *("poses.tracking", "poses.estimation"),
     *("plan.world_model", "plan.pick_place", "plan.door_motion", "plan.conduct", "plan.execution", "plan.refinement"),
 )

@@ -8,17 +8,20 @@ from pathlib import Path
 
 import numpy as np
 
-from schemas.errors import BadInput
+from schemas.errors import MissingDependency
 from schemas.sequence import SequenceFile
-from schemas.vocabulary import SemanticClass, Vocabulary
+from schemas.vocabulary import SemanticClass, Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame, FrameReader
+from stages.segment.backends.detector import DetectorParameters
 from stages.segment.backends.detector.box_masks import box_mask, frame_geometry
 from stages.segment.backends.detector.plausibility import extent_of, is_plausible
 from stages.segment.backends.detector.room import Room, SurfaceSample, find_room, room_masks, sample_surface
 from stages.segment.backends.detector.yolox import Detections, Detector
+from stages.segment.choice import BackendRequest
 from stages.segment.coco import COCO_NAMES
 from stages.segment.geometric import GeometricFrame, GeometricSettings, pixels_at, segment_depth
 from stages.segment.panoptic import PanopticFrame, PanopticMask
+from stages.segment.settings import geometric_settings
 
 LARGE_FACED = frozenset({"table", "desk", "bed", "sofa", "bench", "monitor", "fridge"})
 """A box around a part of these is still a detection of the whole: one face fills most of the box."""
@@ -33,7 +36,7 @@ DUPLICATE_OVERLAP = 0.5
 
 
 @dataclass(frozen=True)
-class Found:
+class Thing:
     """One detected thing in a frame."""
 
     semantic: SemanticClass
@@ -45,8 +48,7 @@ class Found:
 class DetectorBackend:
     """Detector boxes combined with geometric segments.
 
-    Raises BadInput when the sequence has no colour. Looks at a few frames of the whole sequence first, to find floor,
-    walls and ceiling.
+    Looks at a few frames of the whole sequence first, to find floor, walls and ceiling.
     """
 
     name = "detector"
@@ -63,8 +65,6 @@ class DetectorBackend:
         geometric: GeometricSettings,
         minimum_pixels: int,
     ) -> None:
-        if "color" not in sequence.streams:
-            raise BadInput("this sequence has no colour for the detector", hint="use --backend geometric")
         self.label = f"detector {Path(weights).stem} + geometric segments"
         self.minimum_pixels = minimum_pixels
         self._detector = detector
@@ -84,7 +84,7 @@ class DetectorBackend:
         things = self._things(frame, geometric, layout) if frame.color is not None else []
         return paint(layout, things, self._layout, geometric.labels.shape)
 
-    def _things(self, frame: Frame, geometric: GeometricFrame, layout: dict[str, np.ndarray]) -> list[Found]:
+    def _things(self, frame: Frame, geometric: GeometricFrame, layout: dict[str, np.ndarray]) -> list[Thing]:
         assert frame.color is not None
         available = geometric.points[..., 2] > 0
         for mask in layout.values():
@@ -93,7 +93,7 @@ class DetectorBackend:
             geometric.labels, geometric.points, geometric.normals, available, frame.world_from_camera
         )
         detections: Detections = self._detector.detect(frame.color)
-        found = []
+        things = []
         for box, score, number in zip(detections.boxes, detections.scores, detections.classes, strict=True):
             semantic = self._classes[int(number)]
             if semantic is None:
@@ -113,8 +113,8 @@ class DetectorBackend:
                 if extent > LARGEST_UNNAMED:
                     continue
                 semantic = self._anything
-            found.append(Found(semantic, float(score), mask))
-        return merge_duplicates(found)
+            things.append(Thing(semantic, float(score), mask))
+        return merge_duplicates(things)
 
 
 def _surface_samples(reader: FrameReader, settings: GeometricSettings) -> Iterator[SurfaceSample]:
@@ -126,20 +126,20 @@ def _surface_samples(reader: FrameReader, settings: GeometricSettings) -> Iterat
             yield sample_surface(geometric.points, geometric.normals, frame.world_from_camera)
 
 
-def merge_duplicates(found: list[Found]) -> list[Found]:
+def merge_duplicates(things: list[Thing]) -> list[Thing]:
     """Return the things with those merged that are the same, best score first.
 
     Two masks that share half of the smaller one are one thing when they have the same class (a chair and its back,
     boxed twice): it gets the union. Of two classes for nearly the same mask the better scored stays, but any class
     goes before `object`, which is what is left of a detection of impossible size.
     """
-    kept: list[Found] = []
-    for item in sorted(found, key=lambda thing: (thing.semantic.name == UNNAMED, -thing.score)):
+    kept: list[Thing] = []
+    for item in sorted(things, key=lambda thing: (thing.semantic.name == UNNAMED, -thing.score)):
         for index, other in enumerate(kept):
             shared = int((item.mask & other.mask).sum())
             smaller, union = min(item.mask.sum(), other.mask.sum()), (item.mask | other.mask).sum()
             if item.semantic.id == other.semantic.id and shared > DUPLICATE_OVERLAP * smaller:
-                kept[index] = Found(other.semantic, other.score, other.mask | item.mask)
+                kept[index] = Thing(other.semantic, other.score, other.mask | item.mask)
                 break
             if shared > 0.6 * union:
                 break
@@ -149,7 +149,7 @@ def merge_duplicates(found: list[Found]) -> list[Found]:
 
 
 def paint(
-    layout: dict[str, np.ndarray], things: list[Found], classes: dict[str, SemanticClass], shape: tuple[int, ...]
+    layout: dict[str, np.ndarray], things: list[Thing], classes: dict[str, SemanticClass], shape: tuple[int, ...]
 ) -> PanopticFrame:
     """Return one frame of masks: layout below, large things over it, small things on top (they stand in front)."""
     ids = np.zeros(shape, dtype=np.int32)
@@ -163,3 +163,32 @@ def paint(
         ids[thing.mask] = len(masks)
     present = set(np.unique(ids).tolist())
     return PanopticFrame(ids, {key: mask for key, mask in masks.items() if key in present})
+
+
+def open_backend(request: BackendRequest) -> DetectorBackend:
+    """Return the backend that the request asks for.
+
+    Raises UsageError without a log, MissingDependency without weights, BadInput when they are no such detector.
+    """
+    parameters = request.parameters
+    sequence, reader = request.log()
+    if request.weights is None:
+        raise MissingDependency(
+            "--backend detector needs the weights of a detector",
+            hint="give an ONNX export of a YOLOX model (COCO-80) with --weights, or use --backend geometric",
+        )
+    detector = Detector(
+        request.weights,
+        score_threshold=parameters.score_threshold,
+        suppression_overlap=parameters.suppression_overlap,
+        tile_side=min(reader.camera.width, reader.camera.height) if request.own(DetectorParameters).tiles else 0,
+    )
+    return DetectorBackend(
+        sequence.info,
+        reader,
+        load_vocabulary(),
+        detector,
+        weights=request.weights,
+        geometric=geometric_settings(parameters),
+        minimum_pixels=parameters.small_object_pixels,
+    )

@@ -10,6 +10,7 @@ import numpy as np
 
 from schemas.errors import BadInput, MissingDependency
 from stages.segment.coco import COCO_NAMES
+from stages.segment.suppression import suppress
 
 STRIDES = (8, 16, 32)
 PAD_VALUE = 114
@@ -56,29 +57,6 @@ def decode(raw: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
     # A damaged network must not overflow: no box is wider than e^8 cells.
     half = np.exp(np.minimum(raw[:, 2:4], 8.0)) * step / 2
     return np.concatenate([center - half, center + half], axis=1), raw[:, 4:5] * raw[:, 5:]
-
-
-def overlap_of_boxes(box: np.ndarray, boxes: np.ndarray) -> np.ndarray:
-    """Return the intersection over union (N,) of one box (4,) with boxes (N, 4)."""
-    low, high = np.maximum(box[:2], boxes[:, :2]), np.minimum(box[2:], boxes[:, 2:])
-    shared = np.clip(high - low, 0, None).prod(axis=1)
-    area = np.clip(boxes[:, 2:] - boxes[:, :2], 0, None).prod(axis=1)
-    own = float(np.clip(box[2:] - box[:2], 0, None).prod())
-    return shared / np.maximum(own + area - shared, 1e-9)
-
-
-def suppress(boxes: np.ndarray, scores: np.ndarray, classes: np.ndarray, overlap: float) -> np.ndarray:
-    """Return the indices kept by greedy non-maximum suppression per class, best first (ties: smaller index first).
-
-    A box goes when its IoU with a better one of its class is over `overlap`.
-    """
-    order = np.lexsort((np.arange(len(scores)), -scores))
-    kept: list[int] = []
-    for index in order:
-        same = [other for other in kept if classes[other] == classes[index]]
-        if not same or overlap_of_boxes(boxes[index], boxes[same]).max() <= overlap:
-            kept.append(int(index))
-    return np.array(kept, dtype=int)
 
 
 def tile_windows(width: int, height: int, side: int) -> list[tuple[int, int, int, int]]:
@@ -132,10 +110,10 @@ class Detector:
     def detect(self, color: np.ndarray) -> Detections:
         """Return what is found in an image (H, W, 3) uint8 RGB: in the whole, and in tiles when `tile_side` > 0."""
         height, width = color.shape[:2]
-        found = [self._detect_window(color, (0, 0, width, height))]
+        windows = [self._detect_window(color, (0, 0, width, height))]
         if self.tile_side:
-            found += [self._detect_window(color, window) for window in tile_windows(width, height, self.tile_side)]
-        boxes, scores, classes = (np.concatenate([part[k] for part in found]) for k in range(3))
+            windows += [self._detect_window(color, window) for window in tile_windows(width, height, self.tile_side)]
+        boxes, scores, classes = (np.concatenate([part[k] for part in windows]) for k in range(3))
         kept = suppress(boxes, scores, classes, self.suppression_overlap)
         return Detections(boxes[kept], scores[kept], classes[kept])
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from schemas.vocabulary import Vocabulary
+from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame
+from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame, pixels_at
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
@@ -33,3 +34,8 @@ class GeometricBackend:
         large[0] = False
         ids = np.where(large[geometric.labels], geometric.labels, 0).astype(np.int32)
         return PanopticFrame(ids=ids, masks=dict.fromkeys(np.flatnonzero(large).tolist(), self._mask))
+
+
+def open_backend(request: BackendRequest) -> GeometricBackend:
+    """Return the backend that the request asks for."""
+    return GeometricBackend(load_vocabulary(), minimum_pixels=request.parameters.fusion_minimum)

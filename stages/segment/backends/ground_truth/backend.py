@@ -6,9 +6,11 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.sequence import SequenceFile
-from schemas.vocabulary import Vocabulary
+from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame
+from stages.segment.backends.ground_truth import GroundTruthParameters
 from stages.segment.backends.ground_truth.corruption import corrupt, rates_of_level
+from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
@@ -28,6 +30,7 @@ class GroundTruthBackend:
                 "this sequence has no ground-truth labels",
                 hint="use --backend detector with --weights, or --backend geometric (class-agnostic)",
             )
+        self.corruption = level
         self.label = f"ground-truth masks, corruption {level:g}"
         self._rates = rates_of_level(level)
         self._corrupted = level > 0
@@ -59,3 +62,9 @@ class GroundTruthBackend:
         present = set(np.unique(ids).tolist()) - {0}
         true = PanopticFrame(ids=ids, masks={i: self._masks[i] for i in sorted(present)})
         return corrupt(true, self._rates, self._classes, random) if self._corrupted else true
+
+
+def open_backend(request: BackendRequest) -> GroundTruthBackend:
+    """Return the backend that the request asks for. Raises UsageError without a log, BadInput as the class does."""
+    sequence, _ = request.log()
+    return GroundTruthBackend(sequence.info, load_vocabulary(), request.own(GroundTruthParameters).corruption)

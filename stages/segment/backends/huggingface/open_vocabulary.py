@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.segment.backends.detector.yolox import suppress
 from stages.segment.backends.huggingface.loading import (
     load_model,
     load_processor,
@@ -20,6 +19,7 @@ from stages.segment.backends.huggingface.loading import (
 )
 from stages.segment.labels import Label
 from stages.segment.naming import InstanceMask
+from stages.segment.suppression import suppress
 
 MOST_TOKENS = 200
 """Tokens of one prompt; published models read 256. Longer lists of words are asked in several goes."""
@@ -114,11 +114,11 @@ class OpenVocabularySegmenter:
 
     def __call__(self, color: np.ndarray) -> list[InstanceMask]:
         """Return what is found in an image (H, W, 3) uint8 RGB; masks may overlap."""
-        found = self._boxes(color)
-        masks = self._masks(color, found.boxes)
+        boxes = self._boxes(color)
+        masks = self._masks(color, boxes.boxes)
         return [
             InstanceMask(mask, self._labels[word], float(score))
-            for mask, word, score in zip(masks, found.words, found.scores, strict=True)
+            for mask, word, score in zip(masks, boxes.words, boxes.scores, strict=True)
         ]
 
     def _boxes(self, color: np.ndarray) -> WordBoxes:

@@ -90,7 +90,7 @@ class PanopticSegmenter:
                     outputs.masks_queries_logits, size=size, mode="bilinear", align_corners=False
                 )
                 target = None
-            found = self._images.post_process_panoptic_segmentation(
+            segmented = self._images.post_process_panoptic_segmentation(
                 outputs,
                 threshold=self._threshold,
                 overlap_mask_area_threshold=OVERLAP_SHARE,
@@ -98,13 +98,13 @@ class PanopticSegmenter:
                 target_sizes=target,
             )[0]
         # Some processors number segments from 0, and write -1 where there is none.
-        ids = found["segmentation"].to("cpu").numpy().astype(np.int32) + 1
+        ids = segmented["segmentation"].to("cpu").numpy().astype(np.int32) + 1
         if ids.shape != size:
             raise BadInput(
                 f"the network gave masks of {ids.shape}, not of {size}", hint="check preprocessor_config.json"
             )
         segments = {}
-        for row in found["segments_info"]:
+        for row in segmented["segments_info"]:
             label = self._labels.labels.get(int(row["label_id"]))
             if label is not None:
                 segments[int(row["id"]) + 1] = NamedSegment(label, float(row["score"]))

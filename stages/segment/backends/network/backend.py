@@ -10,13 +10,15 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from schemas.errors import UsageError
 from schemas.scene_parts import Camera
 from schemas.sequence import SequenceFile
-from schemas.vocabulary import Vocabulary
+from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame, FrameReader
 from stages.segment.backends.network.features import STRIDE, Mount, features, input_camera, mount_of_pose, resized
 from stages.segment.backends.network.grouping import GroupingSettings, Named, group, raise_to_depth
 from stages.segment.backends.network.weights import BUNDLED, Checkpoint, load_checkpoint
+from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame
 from stages.segment.panoptic import PanopticFrame
 
@@ -128,8 +130,19 @@ def camera_of_points(points: np.ndarray) -> Camera | None:
     v, u = np.nonzero(points[..., 2] > 0)
     if len(u) < 16 or np.ptp(u) < 2 or np.ptp(v) < 2:
         return None
-    found = points[v, u].astype(np.float64)
-    fx, cx = np.polyfit(found[:, 0] / found[:, 2], u, 1)
-    fy, cy = np.polyfit(found[:, 1] / found[:, 2], v, 1)
+    visible = points[v, u].astype(np.float64)
+    fx, cx = np.polyfit(visible[:, 0] / visible[:, 2], u, 1)
+    fy, cy = np.polyfit(visible[:, 1] / visible[:, 2], v, 1)
     height, width = points.shape[:2]
     return Camera(width=width, height=height, fx=float(fx), fy=float(fy), cx=float(cx), cy=float(cy))
+
+
+def open_backend(request: BackendRequest) -> NetworkBackend:
+    """Return the backend that the request asks for. Raises UsageError for weights of another kind, BadInput."""
+    if request.weights is not None and request.weights.suffix != ".safetensors":
+        raise UsageError(
+            f"{request.weights.name} is no checkpoint of the network of our own (a .safetensors file)",
+            hint="say whose weights they are with --backend detector, onnx or huggingface",
+        )
+    sequence = request.sequence.info if request.sequence is not None else None
+    return NetworkBackend(load_vocabulary(), request.weights, sequence=sequence, reader=request.reader)

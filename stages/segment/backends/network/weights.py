@@ -18,7 +18,7 @@ from stages.segment.backends.network.model import PanopticNetwork, Widths
 
 FORMAT = "scenewright panoptic network"
 VERSION = 1
-BUNDLED = Path(__file__).resolve().parents[3] / "data" / "networks" / "panoptic.safetensors"
+BUNDLED = Path(__file__).resolve().parents[4] / "data" / "networks" / "panoptic.safetensors"
 _OTHER = "give a checkpoint that `make train-network` wrote, or leave --weights out"
 
 

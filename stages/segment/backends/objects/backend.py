@@ -12,17 +12,19 @@ from pathlib import Path
 import numpy as np
 
 from schemas.scene_parts import Camera
-from schemas.vocabulary import Vocabulary
+from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame
+from stages.segment.backends.objects import ObjectsParameters
 from stages.segment.backends.objects.boosting import read_trees
 from stages.segment.backends.objects.cuts import pixels_by_label
 from stages.segment.backends.objects.grouping import PairScorer, by_trees
 from stages.segment.backends.objects.pairs import FEATURES
 from stages.segment.backends.objects.segmentation import BY_SET_RULES, segment_objects
+from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
-BUNDLED = Path(__file__).resolve().parents[3] / "data" / "networks" / "tabletop_pairs.safetensors"
+BUNDLED = Path(__file__).resolve().parents[4] / "data" / "networks" / "tabletop_pairs.safetensors"
 GREY = 128
 """Colour of everything in a log without colour."""
 
@@ -63,3 +65,10 @@ class ObjectsBackend:
                 kept[k] = 0
         ids = kept[objects.labels]
         return PanopticFrame(ids=ids, masks=dict.fromkeys(np.unique(ids[ids > 0]).tolist(), self._mask))
+
+
+def open_backend(request: BackendRequest) -> ObjectsBackend:
+    """Return the backend that the request asks for. Raises UsageError without a log, BadInput as the class does."""
+    _, reader = request.log()
+    own = request.own(ObjectsParameters)
+    return ObjectsBackend(load_vocabulary(), reader.camera, scorer=SCORERS[own.grouping](), largest=own.largest_object)

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from schemas.errors import BadInput, MissingDependency
-from schemas.vocabulary import Vocabulary
+from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame
 from stages.segment.backends.onnx import decoding
 from stages.segment.backends.onnx.network import HINT, Network, fit
 from stages.segment.backends.onnx.sidecar import read_sidecar
+from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame, pixels_at
-from stages.segment.labels import LabelMap, LabelSet, load_label_set, match_labels
+from stages.segment.labels import LabelMap, LabelSet, load_label_set, match_labels, read_label_file
 from stages.segment.naming import InstanceMask, NamedSegment, name_instances, name_segments
 from stages.segment.panoptic import PanopticFrame
 
@@ -64,13 +65,13 @@ class OnnxBackend:
         fitted = fit(frame.color, self._network.sidecar, self._network.size)
         outputs = self._network(fitted)
         if self._network.sidecar.layout == "panoptic":
-            ids, found = decoding.panoptic(
+            ids, segments = decoding.panoptic(
                 outputs["classes"], outputs["masks"], fitted, shape,
                 score_threshold=self._threshold, stuff=self._labels.stuff(),
             )  # fmt: skip
             named = {
                 segment: NamedSegment(self._labels.labels[number], score)
-                for segment, (number, score) in found.items()
+                for segment, (number, score) in segments.items()
                 if number in self._labels.labels
             }
             return name_segments(ids, named, self._vocabulary, minimum_pixels=least)
@@ -131,3 +132,18 @@ def _warned(matched: LabelMap, name: str) -> LabelMap:
             name, len(matched.unknown), ", ".join(matched.unknown[:10]),
         )  # fmt: skip
     return matched
+
+
+def open_backend(request: BackendRequest) -> OnnxBackend:
+    """Return the backend that the request asks for. Raises as the class does, and BadInput for damaged labels."""
+    parameters = request.parameters
+    return OnnxBackend(
+        request.weights,
+        request.sidecar,
+        read_label_file(request.labels) if request.labels else None,
+        load_vocabulary(),
+        score_threshold=parameters.score_threshold,
+        suppression_overlap=parameters.suppression_overlap,
+        minimum_pixels=parameters.small_object_pixels,
+        device=request.device,
+    )

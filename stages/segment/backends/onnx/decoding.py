@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from stages.segment.backends.detector.yolox import suppress
 from stages.segment.backends.onnx.network import Fitted
+from stages.segment.suppression import suppress
 
 MOST_CANDIDATES = 300
 """Instances of one image that are looked at, the best scored."""
@@ -52,14 +52,14 @@ def yolo_seg(
     boxes = np.concatenate([rows[order, :2] - half, rows[order, :2] + half], axis=1)
     kept = suppress(boxes, best[order], numbers[order], suppression_overlap)
     input_height, input_width = fitted.tensor.shape[-2:]
-    found = []
+    things = []
     for k in kept:
         logits = np.tensordot(rows[order[k], -count:], prototypes[0].astype(np.float32), axes=1)
         whole = cv2.resize(logits, (input_width, input_height), interpolation=cv2.INTER_LINEAR)
         mask = _to_image(whole, fitted, shape) > 0
         x0, y0, x1, y1 = _scaled(boxes[k], fitted)
-        found.append(Found(mask & _inside(x0, y0, x1, y1, shape), int(numbers[order[k]]), _unit(best[order[k]])))
-    return found
+        things.append(Found(mask & _inside(x0, y0, x1, y1, shape), int(numbers[order[k]]), _unit(best[order[k]])))
+    return things
 
 
 def instances(
@@ -83,14 +83,14 @@ def instances(
         return []
     sound = np.isfinite(boxes).all(axis=1) & np.isfinite(masks).all(axis=(1, 2)) & (scores >= score_threshold)
     order = np.flatnonzero(sound)[np.argsort(-scores[sound], kind="stable")][:MOST_CANDIDATES]
-    found = []
+    things = []
     for k in order:
         if masks.shape[1:] == fitted.tensor.shape[-2:]:
             mask = _to_image(masks[k], fitted, shape) > MASK_THRESHOLD
         else:
             mask = _pasted(masks[k], _scaled(boxes[k], fitted), shape)
-        found.append(Found(mask, int(labels[k]), _unit(scores[k])))
-    return found
+        things.append(Found(mask, int(labels[k]), _unit(scores[k])))
+    return things
 
 
 def panoptic(

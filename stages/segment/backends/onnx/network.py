@@ -79,15 +79,15 @@ class Network:
             name: array.shape
             for name, array in self._raw(fit(np.zeros((*DEFAULT_SIZE[::-1], 3), np.uint8), trial, self.size)).items()
         }
-        found = sidecar or find_layout(shapes)
-        if found is None:
+        layout = sidecar or find_layout(shapes)
+        if layout is None:
             shown = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
             raise BadInput(f"{self.path.name}: its outputs ({shown:.200}) are of no known layout", hint=HINT)
-        missing = [name for name in found.outputs.values() if name not in shapes]
+        missing = [name for name in layout.outputs.values() if name not in shapes]
         if missing:
             raise BadInput(f"{self.path.name}: has no output {missing[0]!r:.60}", hint=f"it has: {', '.join(shapes)}")
-        self.sidecar = found.model_copy(update={"batch": batch})
-        self.shapes = {role: shapes[name] for role, name in found.outputs.items()}
+        self.sidecar = layout.model_copy(update={"batch": batch})
+        self.shapes = {role: shapes[name] for role, name in layout.outputs.items()}
 
     def __call__(self, fitted: Fitted) -> dict[str, np.ndarray]:
         """Return what the network makes of an image, by role. Raises BadInput when it fails."""
@@ -100,10 +100,10 @@ class Network:
         if not text or len(text) > LONGEST_METADATA:
             return {}
         try:
-            found = ast.literal_eval(text)
+            listed = ast.literal_eval(text)
         except (ValueError, SyntaxError, RecursionError, MemoryError):
             return {}
-        rows = dict(enumerate(found)) if isinstance(found, list | tuple) else found
+        rows = dict(enumerate(listed)) if isinstance(listed, list | tuple) else listed
         if not isinstance(rows, dict):
             return {}
         return {k: v for k, v in rows.items() if isinstance(k, int) and isinstance(v, str)}

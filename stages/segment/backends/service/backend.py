@@ -7,10 +7,10 @@ import logging
 import numpy as np
 
 from schemas.errors import BadInput, MachineFailure, MissingDependency
-from schemas.sequence import SequenceFile
-from schemas.vocabulary import Vocabulary
-from stages.kit.formats.frames import Frame, FrameReader
+from schemas.vocabulary import Vocabulary, load_vocabulary
+from stages.kit.formats.frames import Frame
 from stages.kit.services.connection import Connection
+from stages.segment.backends.service import ServiceParameters
 from stages.segment.backends.service.protocol import (
     INFO_PATH,
     SEGMENT_PATH,
@@ -23,8 +23,9 @@ from stages.segment.backends.service.protocol import (
     parse_reply,
 )
 from stages.segment.backends.service.reply_cache import ReplyCache, prune
+from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame
-from stages.segment.labels import Label, LabelSet, match_labels
+from stages.segment.labels import Label, LabelSet, match_labels, read_label_file
 from stages.segment.naming import NamedSegment, name_segments
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
@@ -36,34 +37,27 @@ logger = logging.getLogger("scenewright")
 class ServiceBackend:
     """Asks a service for the masks of every frame. Replies are kept, so that a run that broke off can go on.
 
-    Raises BadInput when the sequence lacks a stream that the service needs, or the service is another one than
-    `expected` (its identity; empty: any).
+    Raises UsageError without a log, MissingDependency when no service answers, BadInput when the sequence lacks a
+    stream that the service needs, or it is another service than the one that was expected.
     """
 
     name = "service"
 
-    def __init__(
-        self,
-        connection: Connection,
-        sequence: SequenceFile,
-        reader: FrameReader,
-        vocabulary: Vocabulary,
-        *,
-        seed: int,
-        expected: str = "",
-        labels: LabelSet | None = None,
-        minimum_pixels: int,
-        ask_again: bool = False,
-    ) -> None:
-        self._connection, self._reader, self._vocabulary = connection, reader, vocabulary
-        self._seed, self._minimum_pixels = seed, minimum_pixels
+    def __init__(self, request: BackendRequest) -> None:
+        sequence, self._reader = request.log()
+        own, vocabulary = request.own(ServiceParameters), load_vocabulary()
+        labels = read_label_file(request.labels) if request.labels else None
+        connection = connect(request.parameters.backend, own)
+        self._connection, self._vocabulary = connection, vocabulary
+        self._seed, self._minimum_pixels = request.seed, request.parameters.small_object_pixels
+        expected = own.service_model
         self.info = read_info(connection)
         if expected and self.info.identity != expected:
             raise BadInput(
                 f"{connection.address}: runs {self.info.identity!r}, not {expected!r}",
                 hint="start that service, or change --service-model",
             )
-        missing = [stream for stream in self.info.required if stream != "pose" and stream not in sequence.streams]
+        missing = [stream for stream in self.info.required if stream != "pose" and stream not in sequence.info.streams]
         if missing:
             raise BadInput(
                 f"this sequence has no {missing[0]}, which {connection.address} needs",
@@ -74,7 +68,7 @@ class ServiceBackend:
         self._categories = {category.id: category for category in self.info.categories}
         self._speaks_ours = _is_vocabulary(self._categories, vocabulary) and labels is None
         self._labels = {} if self._speaks_ours else _labels(self.info, labels, connection.address)
-        self._replies = ReplyCache(self.info.identity, read_only_new=ask_again)
+        self._replies = ReplyCache(self.info.identity, read_only_new=request.ask_again)
         prune()
 
     def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
@@ -90,10 +84,10 @@ class ServiceBackend:
         return self._named(self._ask(frame.index, body, content_type, (shape[0], shape[1])))
 
     def _ask(self, index: int, body: bytes, content_type: str, shape: tuple[int, int]) -> Reply:
-        kept = self._replies.find(body)
-        if kept is not None:
+        kept_reply = self._replies.find(body)
+        if kept_reply is not None:
             try:
-                return parse_reply(kept, "application/json", shape, self._categories)
+                return parse_reply(kept_reply, "application/json", shape, self._categories)
             except BadInput as error:
                 logger.warning("frame %d: a kept reply is damaged (%s): asked again", index, error.message)
         try:
@@ -114,15 +108,28 @@ class ServiceBackend:
         # Small numbers in the same order: tables over ids stay small, and ties are broken as the service had them.
         numbers = sorted(reply.segments)
         ids = np.searchsorted(np.array([0, *numbers]), reply.ids).astype(np.int32)
-        found = {k + 1: reply.segments[number] for k, number in enumerate(numbers)}
+        segments = {k + 1: reply.segments[number] for k, number in enumerate(numbers)}
         if self._speaks_ours:
-            return PanopticFrame(ids, {k: PanopticMask(s.category_id, s.is_thing, s.score) for k, s in found.items()})
+            return PanopticFrame(
+                ids, {k: PanopticMask(s.category_id, s.is_thing, s.score) for k, s in segments.items()}
+            )
         named = {
             k: NamedSegment(self._labels[s.category_id], s.score)
-            for k, s in found.items()
+            for k, s in segments.items()
             if s.category_id in self._labels
         }
         return name_segments(ids, named, self._vocabulary, minimum_pixels=self._minimum_pixels)
+
+
+def connect(address: str, own: ServiceParameters) -> Connection:
+    """Return a connection to the service at `address`; nothing is asked yet."""
+    return Connection(
+        address,
+        timeout=own.request_timeout,
+        retries=own.retries,
+        retry_wait=own.retry_wait,
+        refused_hint=REFUSED_HINT,
+    )
 
 
 def read_info(connection: Connection) -> ServiceInfo:
@@ -157,3 +164,8 @@ def _labels(info: ServiceInfo, given: LabelSet | None, address: str) -> dict[int
         )  # fmt: skip
     kinds = {category.id: "thing" if category.isthing else "stuff" for category in info.categories}
     return {number: label.model_copy(update={"kind": kinds[number]}) for number, label in matched.labels.items()}
+
+
+def open_backend(request: BackendRequest) -> ServiceBackend:
+    """Return the backend that the request asks for. Raises as the class does, and BadInput for damaged labels."""
+    return ServiceBackend(request)

@@ -117,8 +117,8 @@ def parse_info(body: bytes, content_type: str) -> ServiceInfo:
         _refuse("its description lists no categories")
     try:
         # Services may say more of a category than is read here (COCO's colour, supercategory).
-        known = Category.model_fields
-        categories = tuple(Category(**{k: v for k, v in row.items() if k in known}) for row in rows)
+        fields = Category.model_fields
+        categories = tuple(Category(**{k: v for k, v in row.items() if k in fields}) for row in rows)
     except (ValidationError, AttributeError, TypeError) as error:
         _refuse(f"a category of its description is malformed ({str(error).splitlines()[0]})")
     if len({category.id for category in categories}) < len(categories):
@@ -143,7 +143,7 @@ def encode_request(request: SegmentRequest, streams: tuple[str, ...], color: byt
     millimetres, which is what a sequence holds, so nothing is lost. The same request has the same bytes.
     """
     frame, camera = request.frame, request.camera
-    said: dict[str, Any] = {
+    description: dict[str, Any] = {
         "protocol": PROTOCOL,
         "frame": frame.index,
         "seed": request.seed,
@@ -152,8 +152,8 @@ def encode_request(request: SegmentRequest, streams: tuple[str, ...], color: byt
         "depth_unit_m": 0.001,
     }
     if "pose" in streams and frame.world_from_camera is not None:
-        said["world_from_camera"] = frame.world_from_camera.tolist()
-    parts = [("request", "application/json", canonical_json(said).encode())]
+        description["world_from_camera"] = frame.world_from_camera.tolist()
+    parts = [("request", "application/json", canonical_json(description).encode())]
     if "color" in streams and frame.color is not None:
         data = color or _png(np.ascontiguousarray(frame.color[..., ::-1]))
         parts.append(("color", "image/png" if data.startswith(PNG_START) else "image/jpeg", data))
@@ -167,12 +167,12 @@ def parse_request(body: bytes, content_type: str) -> SegmentRequest:
     parts = split_multipart(body, content_type)
     if "request" not in parts:
         _refuse("the part `request` is missing")
-    said = _json_object(parts["request"], "application/json")
-    _check_protocol(said)
+    description = _json_object(parts["request"], "application/json")
+    _check_protocol(description)
     try:
-        camera = Camera(**said["intrinsics"])
-        index, seed = _integer(said["frame"]), _integer(said.get("seed", 0))
-        pose = said.get("world_from_camera")
+        camera = Camera(**description["intrinsics"])
+        index, seed = _integer(description["frame"]), _integer(description.get("seed", 0))
+        pose = description.get("world_from_camera")
         world_from_camera = None if pose is None else np.array(pose, dtype=float).reshape(4, 4)
     except (KeyError, TypeError, ValueError) as error:
         _refuse(f"the part `request` is malformed ({str(error).splitlines()[0]})")
@@ -189,10 +189,10 @@ def parse_request(body: bytes, content_type: str) -> SegmentRequest:
         color = _decoded("color", parts["color"], camera, foxglove.decode_color)
     if "depth" in parts:
         depth = _decoded("depth", parts["depth"], camera, _millimetres)
-        if said.get("depth_unit_m") != 0.001:
+        if description.get("depth_unit_m") != 0.001:
             _refuse("depth_unit_m is not 0.001")
         depth = foxglove.millimetres_to_depth(depth)
-    name = said.get("camera") if isinstance(said.get("camera"), str) else "camera"
+    name = description.get("camera") if isinstance(description.get("camera"), str) else "camera"
     return SegmentRequest(Frame(index, 0.0, color, depth, None, world_from_camera, str(name)), camera, seed)
 
 
@@ -228,8 +228,8 @@ def parse_reply(body: bytes, content_type: str, shape: tuple[int, int], categori
 def split_multipart(body: bytes, content_type: str) -> dict[str, bytes]:
     """Return name -> content of the parts of multipart/form-data. Raises BadInput."""
     kind, _, rest = content_type.partition(";")
-    found = [item.strip()[len("boundary=") :] for item in rest.split(";") if item.strip().startswith("boundary=")]
-    boundary = found[0].strip('"').encode("ascii", "replace") if found else b""
+    boundaries = [item.strip()[len("boundary=") :] for item in rest.split(";") if item.strip().startswith("boundary=")]
+    boundary = boundaries[0].strip('"').encode("ascii", "replace") if boundaries else b""
     if kind.strip().lower() != "multipart/form-data" or not 0 < len(boundary) <= 70:
         _refuse(f"content type {content_type!r:.80} is no multipart/form-data with a boundary")
     pieces = (b"\r\n" + body).split(b"\r\n--" + boundary)

@@ -74,8 +74,8 @@ def prune(limit: int = LARGEST_CACHE) -> None:
     files = []
     for path in cache_folder().glob("*/*"):
         with contextlib.suppress(OSError):
-            found = path.stat()
-            files.append((found.st_mtime_ns, found.st_size, path))
+            status = path.stat()
+            files.append((status.st_mtime_ns, status.st_size, path))
     total = sum(size for _, size, _ in files)
     for _, size, path in sorted(files):
         if total <= limit:

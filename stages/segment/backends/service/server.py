@@ -106,12 +106,12 @@ def segment_request(request: SegmentRequest, backend: Backend, geometric: Geomet
     depth = frame.depth if frame.depth is not None else np.zeros((camera.height, camera.width), dtype=np.float32)
     # The numbers that `scenewright segment --seed` would draw for this frame.
     random = np.random.default_rng([request.seed, frame.index])
-    found = backend(frame, segment_depth(depth, camera, geometric), random)
+    panoptic = backend(frame, segment_depth(depth, camera, geometric), random)
     return Reply(
-        found.ids,
+        panoptic.ids,
         {
             number: ReplySegment(mask.category_id, mask.is_thing, float(mask.score))
-            for number, mask in found.masks.items()
+            for number, mask in panoptic.masks.items()
         },
     )
 
