@@ -8,8 +8,12 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from schemas.disparity import Disparity
 from schemas.errors import UsageError
-from schemas.kinds import Disparity, Sequence, SutureEvaluation, SutureNeedle, SutureScene, SutureThread, SutureTrial
+from schemas.sequence import Sequence
+from schemas.suture_needle import SutureNeedle, SutureThread
+from schemas.suture_scene import SutureScene
+from schemas.suture_trial import SutureEvaluation, SutureTrial
 from stages.kit.stage import External, Optionally, Parameters, Stage
 from stages.suture.options import ARM_NAMES, CHECKPOINT, HolderName, MaskOptions, PlaceName
 
@@ -17,7 +21,7 @@ DATA = Path(__file__).resolve().parents[2] / "data"
 MASKS = Optionally(
     External("folder of masks <frame:06d>_left.png, _right.png: 1 or 255 needle, 2 thread, 3 and 4 what hides them")
 )
-SEGMENTER = Optionally(External("checkpoint of the segmenter (docs/STITCH_SEGMENTATION.md)", weights=True))
+SEGMENTER = Optionally(External("checkpoint of the segmenter (docs/STITCH.md)", weights=True))
 
 
 class SceneParameters(Parameters):

@@ -57,7 +57,7 @@ RULES: dict[str, Rules] = {
     "ours_without_loaded_pulls": replace(_BORNE, loaded_pulls=False),
     "ours_bold": Rules(),
 }
-"""What our policies allow themselves. `ours`: what physics bears (docs/TIDY_PHYSICS.md): two utensils a pile, plates
+"""What our policies allow themselves. `ours`: what physics bears (docs/TIDY.md): two utensils a pile, plates
 alone, and side by side the pairs of piles that came whole in every grasp measured there. Dishes that carry utensils are
 lifted side by side as they stand only where the world's chances say that nothing spills. `ours_bold`: whatever the jaws
 allow."""
