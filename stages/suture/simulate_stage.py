@@ -15,9 +15,10 @@ from stages.suture.motion.constants import THROWS
 from stages.suture.parameters import SimulateParameters
 from stages.suture.trials.machine import run_trial
 from stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
+from stages.suture.trials.policies import POLICIES
 from stages.suture.trials.recording import Recorder
 from stages.suture.trials.records import run_of
-from stages.suture.trials.settings import POLICIES, World
+from stages.suture.trials.settings import World
 
 if TYPE_CHECKING:
     from stages.suture.trials.sight import LookingEyes
