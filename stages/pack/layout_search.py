@@ -94,13 +94,13 @@ class _Rectangle(NamedTuple):
 
 
 @njit(cache=True)
-def _apart(one, other, gap):  # type: ignore[no-untyped-def]
+def _apart(first, second, gap):  # type: ignore[no-untyped-def]
     """Whether rectangles are at least `gap` apart along an axis."""
     return (
-        one.high_x + gap <= other.low_x + 1e-9
-        or other.high_x + gap <= one.low_x + 1e-9
-        or one.high_y + gap <= other.low_y + 1e-9
-        or other.high_y + gap <= one.low_y + 1e-9
+        first.high_x + gap <= second.low_x + 1e-9
+        or second.high_x + gap <= first.low_x + 1e-9
+        or first.high_y + gap <= second.low_y + 1e-9
+        or second.high_y + gap <= first.low_y + 1e-9
     )
 
 

@@ -67,8 +67,8 @@ def placement_solver(
 
     Returns the pick/place plan, or a Failure (`no_placement`, `unknown_object`) that says why there is none.
     """
-    known = {box.name for box in observation.boxes}
-    unknown = tuple(name for name in order if name not in known)
+    names = {box.name for box in observation.boxes}
+    unknown = tuple(name for name in order if name not in names)
     if unknown:
         return Failure(kind="unknown_object", message=f"there is no {unknown[0]}", objects=unknown)
     limits = learn(observation, trace, True)
@@ -132,11 +132,11 @@ def solve_layout(
         for (gap, out), restarts in zip(SPACING, RESTARTS, strict=True):
             problem = _problem(observation, problem_boxes, limits, held, out - limits.inward)
             random = np.random.default_rng([seed, count])
-            found = find_layout(problem, gap + limits.wider, random, restarts=min(restarts, 3) if held else restarts)
-            if found is not None:
+            layout = find_layout(problem, gap + limits.wider, random, restarts=min(restarts, 3) if held else restarts)
+            if layout is not None:
                 spots = [
                     Spot(box.name, float(row[0]), float(row[1]), int(row[2]))
-                    for box, row in zip(problem_boxes, found, strict=True)
+                    for box, row in zip(problem_boxes, layout, strict=True)
                 ]
                 return (*held, *_far_first(spots[count:], boxes, limits, reorder))
     return None

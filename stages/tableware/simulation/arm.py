@@ -118,7 +118,7 @@ class Arm:
         half a turn will do as well, as the fingers are alike: the answer that moves the joints least is taken, of those
         that leave the last joint room for half a turn either way."""
         near = self.target
-        found = []
+        solutions = []
         for half_turn in (False,) if held else (False, True):
             wanted = pose.copy()
             if half_turn:
@@ -136,10 +136,12 @@ class Arm:
                     arm = solution.arm.copy()
                     arm[5] += turns
                     if abs(arm[5]) < 2 * pi:
-                        found.append(arm)
-        if not found:
+                        solutions.append(arm)
+        if not solutions:
             return None
-        return min(found, key=lambda arm: (not held and abs(arm[5]) > ROOM_TO_TURN, float(np.abs(arm - near).max())))
+        return min(
+            solutions, key=lambda arm: (not held and abs(arm[5]) > ROOM_TO_TURN, float(np.abs(arm - near).max()))
+        )
 
     # --- motion -----------------------------------------------------------------------------------------------
 

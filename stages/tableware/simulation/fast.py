@@ -255,10 +255,10 @@ def run_in(
     world: World,
     policy: Policy,
     see: Callable[[World], Table] = truth,
-    told: Callable[[Done], None] = lambda done: None,
+    hear: Callable[[Done], None] = lambda done: None,
     again: Callable[[Table, Done, int], Action] | None = None,
 ) -> Trial:
-    """Let a policy clear the table of any world, one action an image; `told` hears of each action. It ends when nothing
+    """Let a policy clear the table of any world, one action an image; `hear` is told of each action. It ends when nothing
     is seen, when eight actions in a row have changed nothing, and after 400. What is left counts as left.
 
     `again` decides instead of the policy after a number of actions in a row, the last of which it is told, that changed
@@ -273,7 +273,7 @@ def run_in(
         action = again(seen, last, idle) if again is not None and idle and last is not None else policy.decide(seen)
         last = do_in(world, action, seen)
         idle = idle + 1 if last.idle else 0
-        told(last)
+        hear(last)
     return world.trial
 
 

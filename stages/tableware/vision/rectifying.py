@@ -133,10 +133,10 @@ def rectify(
     notes: list[str] = []
     depth = np.where(depth < FARTHEST, depth, 0.0)
     points = back_projected(depth, camera)
-    known = depth > 0.0
+    measured = depth > 0.0
     if world_from_camera is None:
         frame = _table_frame(plane)
-        flat = points[known] @ frame[:3, :3].T + frame[:3, 3]
+        flat = points[measured] @ frame[:3, :3].T + frame[:3, 3]
         frame, sides, cut = _workspace_frame(frame, flat)
         if cut:
             notes.append(f"the table is larger than what can be looked at together: {sides[0]:.2f} x {sides[1]:.2f} m "

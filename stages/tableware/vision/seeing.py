@@ -120,15 +120,15 @@ def see(
     if rectified:
         heights = replace(heights, roughness=heights.measured_roughness())
     if sizes == "known":
-        found = items_in(heights)
+        detections = items_in(heights)
     else:
-        found = estimated_dishes(heights, seed)
+        detections = estimated_dishes(heights, seed)
         notes.append("sizes are estimated: utensils and what stacks hold were not looked for")
     if rectified and -normal[2] < np.cos(OBLIQUE):
-        found = tuple(_doubted(one) for one in found)
+        detections = tuple(_doubted(detection) for detection in detections)
     notes += _unhandled(heights)
     plane = ((float(normal[0]), float(normal[1]), float(normal[2])), float(offset))
-    return Sight(found, tuple(notes), intrinsics, world, plane, sides, rectified, heights)
+    return Sight(detections, tuple(notes), intrinsics, world, plane, sides, rectified, heights)
 
 
 def _check(color: np.ndarray, depth: np.ndarray | None, camera: Camera) -> None:
@@ -182,12 +182,14 @@ def _check_pose(pose: np.ndarray, normal: np.ndarray, offset: float) -> None:
                        f"{angle:.1f} degrees off it", hint="correct the pose, or leave it out")  # fmt: skip
 
 
-def _doubted(one: Detection) -> Detection:
+def _doubted(detection: Detection) -> Detection:
     """Return a detection of an oblique view: confidences are calibrated from above, and a tall cup seen from the side
     passes for two."""
-    if one.kind is None:
-        return one
-    return replace(one, confidence=OBLIQUE_TRUST * one.confidence, unsure=(*one.unsure, "oblique view"))
+    if detection.kind is None:
+        return detection
+    return replace(
+        detection, confidence=OBLIQUE_TRUST * detection.confidence, unsure=(*detection.unsure, "oblique view")
+    )
 
 
 def _unhandled(heights: HeightMap) -> list[str]:

@@ -87,18 +87,18 @@ def _scores(
         cos, sin = scale * np.cos(angle[k]), scale * np.sin(angle[k])
         for part in range(2):
             points = inside if part == 0 else border
-            total, known = 0, 0
+            total, measured = 0, 0
             for i in range(len(points)):
                 column = int(u[k] + points[i, 0] * cos + points[i, 1] * sin + 0.5)
                 row = int(v[k] + points[i, 0] * sin - points[i, 1] * cos + 0.5)
                 if 0 <= column < map_.shape[1] and 0 <= row < map_.shape[0]:
                     value = map_[row, column]
                     total += value
-                    known += value != 0
-            mean = total / max(known + UNKNOWN_WEIGHT * (len(points) - known), 1.0)
+                    measured += value != 0
+            mean = total / max(measured + UNKNOWN_WEIGHT * (len(points) - measured), 1.0)
             result[k] += 0.5 * mean if part == 0 else -0.5 * mean
             if part == 0:
-                visible[k] = known / len(points)
+                visible[k] = measured / len(points)
     return result, visible
 
 
@@ -123,7 +123,7 @@ def _grid(far: int) -> tuple[np.ndarray, ...]:
 
 def fit_utensil(map_: np.ndarray, scale: float, u: float, v: float, angle: float) -> Bar:
     """Return the best outline near a bar's centre [px] and direction [rad]; `scale` in pixels per metre."""
-    found: list[tuple[Pose, Kind]] = []
+    fitted: list[tuple[Pose, Kind]] = []
     part = _scores(map_, *outline("spoon"), scale, np.array([u]), np.array([v]), np.array([angle]))[1][0] < 0.9
     for kind in UTENSILS:
         pose = max(
@@ -132,10 +132,10 @@ def fit_utensil(map_: np.ndarray, scale: float, u: float, v: float, angle: float
         )
         for steps in ((2.0, 1.0, 0.02), (1.0, 0.5, 0.008)):
             pose = _best_pose(map_, kind, scale, pose[1:4], steps)
-        found.append((pose, kind))
-    found.sort(reverse=True)
-    (score, u, v, angle, visible), kind = found[0]
-    return Bar(kind, u, v, angle, score, visible, {kind: pose for pose, kind in found})
+        fitted.append((pose, kind))
+    fitted.sort(reverse=True)
+    (score, u, v, angle, visible), kind = fitted[0]
+    return Bar(kind, u, v, angle, score, visible, {kind: pose for pose, kind in fitted})
 
 
 def search_bars(map_: np.ndarray, scale: float, most: int) -> list[Bar]:
