@@ -187,9 +187,14 @@ class MotionPlanner:
         if path is not None:
             space = _narrowed(space, whole_range=np.concatenate([path, start.arm[None]]))
         planned = rrt_connect(
-            start.arm, end.arm, scene.check, space, np.random.default_rng([self._seed, 3]), samples=SAMPLES,
+            start.arm,
+            end.arm,
+            scene.check,
+            space,
+            np.random.default_rng([self._seed, 3]),
+            samples=SAMPLES,
             smoothing=20,
-        )  # fmt: skip
+        )
         return Motion(lambda: planned, end, True)
 
 

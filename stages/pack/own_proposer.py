@@ -111,9 +111,14 @@ def kept_spots(trace: Sequence[Attempt], limits: LearnedLimits) -> tuple[Spot, .
 
 
 def solve_layout(
-    observation: Observation, order: tuple[str, ...], limits: LearnedLimits, kept: tuple[Spot, ...], seed: int,
-    *, reorder: bool = True,
-) -> tuple[Spot, ...] | None:  # fmt: skip
+    observation: Observation,
+    order: tuple[str, ...],
+    limits: LearnedLimits,
+    kept: tuple[Spot, ...],
+    seed: int,
+    *,
+    reorder: bool = True,
+) -> tuple[Spot, ...] | None:
     """Return a spot for each box of `order`, in the order of execution, as many as can be from `kept` first.
 
     `reorder`: boxes of one height may change places, the farthest first. None when no layout was found.
@@ -180,7 +185,8 @@ def _problem(
 
 def _hand_footprints(boxes: list[BoxState]) -> tuple[np.ndarray, np.ndarray]:
     """Return (2, K, 4) footprints about the tool at both turns, and (B, K) the world z of their bottoms [m]."""
-    footprints = np.array([[part.bounds for part in hand_blocks(place_tool_pose(boxes[0], 0.0, 0.0, turn * QUARTER))]
-                           for turn in (0, 1)])  # fmt: skip
+    footprints = np.array(
+        [[part.bounds for part in hand_blocks(place_tool_pose(boxes[0], 0.0, 0.0, turn * QUARTER))] for turn in (0, 1)]
+    )
     bottoms = np.array([[part.bottom for part in hand_blocks(place_tool_pose(box, 0.0, 0.0, 0.0))] for box in boxes])
     return footprints, bottoms

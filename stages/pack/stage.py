@@ -87,9 +87,11 @@ def _instance(problem: Path | None, parameters: PackParameters) -> Instance:
 def _proposer(parameters: PackParameters, transcript: Path | None, context: Context) -> Proposer:
     def chat(variant: Variant) -> Chat:
         return open_chat(
-            parameters, scripted=scripted_backend(variant, context.seed), transcript=transcript,
+            parameters,
+            scripted=scripted_backend(variant, context.seed),
+            transcript=transcript,
             record=context.output / "transcript.jsonl",
-        )  # fmt: skip
+        )
 
     setting = Setting(context.seed, parameters.reasons, parameters.trace_length, chat)
     return PROPOSERS[parameters.proposer](setting)
@@ -101,10 +103,15 @@ def _attempt(attempt: Attempt) -> PackingAttempt:
         tried = number < len(attempt.feedback)
         steps.append(
             PackingStep(
-                name=action.name, box=action.box, x=action.x, y=action.y, yaw=action.yaw, tried=tried,
+                name=action.name,
+                box=action.box,
+                x=action.x,
+                y=action.y,
+                yaw=action.yaw,
+                tried=tried,
                 failure=attempt.feedback[number].failure if tried else None,
             )
-        )  # fmt: skip
+        )
     return PackingAttempt(steps=tuple(steps), task=attempt.task)
 
 

@@ -80,9 +80,13 @@ def run(
     np.savez_compressed(context.output / "threads.npz", allow_pickle=False, **curves)
     statement = _statement(frames)
     SutureThreadFile(
-        statement=statement, masks=source, masks_from=words, rig=record, started_at_needle=bool(starts),
+        statement=statement,
+        masks=source,
+        masks_from=words,
+        rig=record,
+        started_at_needle=bool(starts),
         frames=tuple(frames),
-    ).write(context.output / "thread.json")  # fmt: skip
+    ).write(context.output / "thread.json")
     traced = sum(frame.points > 0 for frame in frames)
     summary: dict[str, object] = {"frames": len(frames), "traced": traced, "masks": source}
     if not traced:

@@ -21,7 +21,8 @@ from stages.tableware.planning.rules import Rules
 from stages.tableware.planning.time_model import EXACT, Chances, TimeModel
 from stages.tableware.scene_files import read_image
 from stages.tableware.sight import look, understood
-from stages.tableware.simulation.fast import Done, FastWorld, Trial, run_in, run_trial
+from stages.tableware.simulation.fast import FastWorld, run_trial
+from stages.tableware.simulation.trial import Done, Trial, run_in
 from stages.tableware.table_pictures import Panel, draw_strip
 from stages.tableware.vision.detections_file import from_file
 from stages.tableware.vision.overlay import draw_sight

@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.tableware.planning.refusals import Accepted, Doubt, Unknown, accept
 from stages.tableware.planning.rules import Rules
-from stages.tableware.simulation.fast import World
+from stages.tableware.simulation.trial import World
 from stages.tableware.vision.detections import Detection, as_table
 from stages.tableware.vision.seeing import Sight, see
 from stages.tableware.world.items import Table

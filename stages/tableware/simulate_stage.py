@@ -16,7 +16,7 @@ from stages.tableware.planning.choice import chances_of, make_policy
 from stages.tableware.planning.records import as_action, as_record
 from stages.tableware.planning.time_model import Chances, TimeModel
 from stages.tableware.sight import Eyes, named_as
-from stages.tableware.simulation.fast import Done, Trial, World, do_in, run_in, truth
+from stages.tableware.simulation.trial import Done, Trial, World, do_in, run_in, truth
 from stages.tableware.simulators import SIMULATORS
 from stages.tableware.table_pictures import draw_strip
 from stages.tableware.world.items import Table
@@ -88,9 +88,15 @@ def planned_actions(plan: TablewarePlan, table: Table) -> list[tuple[Action, Tab
         )
     actions = []
     for step in file.steps:
-        before = as_table(item.model_copy(update={"name": names.get(item.name, item.name),
-                                                 "on": None if item.on is None else names.get(item.on, item.on)})
-                          for item in step.before)  # fmt: skip
+        before = as_table(
+            item.model_copy(
+                update={
+                    "name": names.get(item.name, item.name),
+                    "on": None if item.on is None else names.get(item.on, item.on),
+                }
+            )
+            for item in step.before
+        )
         actions.append((as_action(step.action).renamed(names), before))
     return actions
 
@@ -104,9 +110,16 @@ def carry_out(world: World, planned: Iterable[tuple[Action, Table]], done: list[
 
 def _counts(trial: Trial) -> TrialCounts:
     return TrialCounts(
-        seconds=trial.seconds, trips=trial.trips, moved=trial.moved, pulls=trial.pulls, stacks=trial.stacks,
-        dropped=trial.dropped, left=trial.left, objects_per_trip=trial.objects_per_trip, failure=trial.failure,
-    )  # fmt: skip
+        seconds=trial.seconds,
+        trips=trial.trips,
+        moved=trial.moved,
+        pulls=trial.pulls,
+        stacks=trial.stacks,
+        dropped=trial.dropped,
+        left=trial.left,
+        objects_per_trip=trial.objects_per_trip,
+        failure=trial.failure,
+    )
 
 
 def _steps(done: list[Done], model: TimeModel, chances: Chances) -> Iterable[TrialStep]:

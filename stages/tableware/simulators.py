@@ -17,7 +17,8 @@ from stages.tableware.planning.action import Action
 from stages.tableware.planning.choice import as_times, chances_of, time_model
 from stages.tableware.planning.time_model import Chances, TimeModel
 from stages.tableware.simulation.arm_times import arm_times
-from stages.tableware.simulation.fast import Done, FastWorld, World
+from stages.tableware.simulation.fast import FastWorld
+from stages.tableware.simulation.trial import Done, World
 from stages.tableware.table_pictures import write_animation
 from stages.tableware.world.items import Table
 
@@ -25,7 +26,7 @@ ANIMATION_WIDTH = 560
 SIMULATION = "stages.tableware.simulation"
 """Its modules of physics are loaded only when they are asked for."""
 Again = Callable[[Table, Done, int], Action]
-"""Decides in the policy's place after actions that changed nothing (fast.run_in)."""
+"""Decides in the policy's place after actions that changed nothing (trial.run_in)."""
 
 
 class Simulator(Protocol):

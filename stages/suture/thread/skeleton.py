@@ -49,9 +49,7 @@ def thinned(mask: np.ndarray) -> np.ndarray:
         changed = False
         for odd in (False, True):
             n, ne, e, se, s, sw, w, nw = (flat[pixels + step] for step in steps)
-            crossings = (
-                (~n & (ne | e)).astype(int) + (~e & (se | s)) + (~s & (sw | w)) + (~w & (nw | n))
-            )  # fmt: skip
+            crossings = (~n & (ne | e)).astype(int) + (~e & (se | s)) + (~s & (sw | w)) + (~w & (nw | n))
             first = (nw | n).astype(int) + (ne | e) + (se | s) + (sw | w)
             second = (n | ne).astype(int) + (e | se) + (s | sw) + (w | nw)
             neighbours = np.minimum(first, second)

@@ -159,9 +159,7 @@ def _paired(stretches: list[Stretch], ends: list[End]) -> Iterator[tuple[End, En
         return
     costs = sorted(_matchings(tuple(range(len(ends))), turns, alone), key=lambda matching: matching[0])
     best = costs[0][1]
-    doubtful = {
-        pair for pair in best for cost, other in costs[1:] if cost - costs[0][0] < CLOSE and pair not in other
-    }  # fmt: skip
+    doubtful = {pair for pair in best for cost, other in costs[1:] if cost - costs[0][0] < CLOSE and pair not in other}
     for i, j in best:
         yield ends[i], ends[j], (i, j) in doubtful
 

@@ -213,9 +213,15 @@ class Bench:
         first = swages if self.anchor is None else np.repeat(self.anchor[None], steps, axis=0)
         rest = np.full(steps, self.thread.working)
         drape(
-            self.rope, rest, np.ascontiguousarray(first), np.ascontiguousarray(swages), self.anchor is not None,
-            capsules, RIDGE_HALF_WIDTH, RIDGE_HEIGHT,
-        )  # fmt: skip
+            self.rope,
+            rest,
+            np.ascontiguousarray(first),
+            np.ascontiguousarray(swages),
+            self.anchor is not None,
+            capsules,
+            RIDGE_HALF_WIDTH,
+            RIDGE_HEIGHT,
+        )
 
 
 def travel_time(path: np.ndarray, speed: float) -> float:

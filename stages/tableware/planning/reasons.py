@@ -112,6 +112,10 @@ def _pair(
         return None
     objects = why[2] if len(why) == 3 else ()
     return ImpossiblePair(
-        primitive=primitive, first=first.name, second=second.name, kind=why[0], objects=objects,  # type: ignore[arg-type]
+        primitive=primitive,
+        first=first.name,
+        second=second.name,
+        kind=why[0],
+        objects=objects,  # type: ignore[arg-type]
         message=f"{first.name} and {second.name}: {why[1]}",
-    )  # fmt: skip
+    )

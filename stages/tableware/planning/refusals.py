@@ -56,11 +56,14 @@ def accept(
         )
     refused = [
         RefusedItem(
-            name=thing.name, position=(thing.x, thing.y, 0.0), radius=thing.radius, reason="unknown_object",
+            name=thing.name,
+            position=(thing.x, thing.y, 0.0),
+            radius=thing.radius,
+            reason="unknown_object",
             message=f"{thing.name}: no tableware of known size, {1e3 * thing.radius:.0f} mm around",
         )
         for thing in unknown
-    ]  # fmt: skip
+    ]
     kept: list[Item] = []
     for pile in table.stacks:
         wrong = [refusal for item in pile if (refusal := _wrong(item, doubts.get(item.name), least)) is not None]
@@ -98,8 +101,12 @@ def _wrong(item: Item, doubt: Doubt | None, least: float) -> RefusedItem | None:
 def _refusal(item: Item, reason: str, message: str) -> RefusedItem:
     size = item.measures.rim_radius if item.is_dish else item.measures.length / 2
     return RefusedItem(
-        name=item.name, position=item.position, radius=size, reason=reason, message=f"{item.name}: {message}"  # type: ignore[arg-type]
-    )  # fmt: skip
+        name=item.name,
+        position=item.position,
+        radius=size,
+        reason=reason,
+        message=f"{item.name}: {message}",  # type: ignore[arg-type]
+    )
 
 
 def statement(accepted: Accepted, notes: tuple[str, ...] = ()) -> str:

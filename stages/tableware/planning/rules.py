@@ -18,8 +18,11 @@ from stages.tableware.world.items import MEASURES, Item, Kind, Measures, Table, 
 
 LETTERS: dict[Kind, str] = {"plate": "p", "bowl": "b", "cup": "c", "fork": "u", "spoon": "u"}
 _MEASURES: dict[str, Measures] = {
-    "p": MEASURES["plate"], "b": MEASURES["bowl"], "c": MEASURES["cup"], "u": MEASURES["fork"],
-}  # fmt: skip
+    "p": MEASURES["plate"],
+    "b": MEASURES["bowl"],
+    "c": MEASURES["cup"],
+    "u": MEASURES["fork"],
+}
 
 
 @dataclass(frozen=True)

@@ -90,14 +90,22 @@ def trip_options(table: Table, rules: Rules, model: TimeModel, chances: Chances,
         for upper, lower in pairs:
             two[number, types[upper, True], types[lower, True]] = True
     costs = _Costs(
-        float(model.whole_trip), float(model.stack), float(chances.drop_stack), float(chances.drop_single),
-        float(chances.drop_two), float(chances.drop_loaded_pull), float(worth), rules.loaded_pulls,
-    )  # fmt: skip
+        float(model.whole_trip),
+        float(model.stack),
+        float(chances.drop_stack),
+        float(chances.drop_single),
+        float(chances.drop_two),
+        float(chances.drop_loaded_pull),
+        float(worth),
+        rules.loaded_pulls,
+    )
     columns = _Parts(
-        np.array([part.lowest for part in parts], np.int64), np.array([part.whole for part in parts], np.bool_),
-        np.array([len(part.items) for part in parts], np.int64), np.array([part.mask for part in parts], np.int64),
+        np.array([part.lowest for part in parts], np.int64),
+        np.array([part.whole for part in parts], np.bool_),
+        np.array([len(part.items) for part in parts], np.int64),
+        np.array([part.mask for part in parts], np.int64),
         type_of,
-    )  # fmt: skip
+    )
     choices = _Choices(rows, masks, signatures)
     ways = _ways_of(choices, _Signatures(bases, two), columns, _pairs(table, rules, model, chances, worth), costs)
     return TripOptions(parts, tuple(chosen), masks, *ways)
@@ -406,6 +414,13 @@ def _ways_of(choices, kinds, parts, pairs, costs):  # type: ignore[no-untyped-de
                 pulled.append(pair_pulled[pair])
         starts[choice + 1] = len(seconds) - 1
     return (
-        starts, np.array(seconds[1:]), np.array(lost[1:]), np.array(slips[1:]), np.array(stays[1:]),
-        np.array(blockers[1:]), np.array(first[1:]), np.array(second[1:]), np.array(pulled[1:]),
-    )  # fmt: skip
+        starts,
+        np.array(seconds[1:]),
+        np.array(lost[1:]),
+        np.array(slips[1:]),
+        np.array(stays[1:]),
+        np.array(blockers[1:]),
+        np.array(first[1:]),
+        np.array(second[1:]),
+        np.array(pulled[1:]),
+    )

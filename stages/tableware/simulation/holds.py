@@ -185,9 +185,14 @@ def pair_hold(table: Table, first: str, second: str, point: tuple[float, float, 
 
 
 def _dish_pair(
-    table: Table, names: tuple[str, str], point: tuple[float, float, float], closing: float, depth: float, room: float,
+    table: Table,
+    names: tuple[str, str],
+    point: tuple[float, float, float],
+    closing: float,
+    depth: float,
+    room: float,
     others: list[Item],
-) -> Hold:  # fmt: skip
+) -> Hold:
     """Return how two dishes are taken at most `depth` [m] below the lower lip, with `room` [m] between open pads and
     walls."""
     families = [walls(table, name) for name in names]

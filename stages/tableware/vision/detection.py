@@ -70,8 +70,11 @@ def items_in(heights: HeightMap) -> tuple[Detection, ...]:
     lying, strange = utensils_on_table(heights, unlike, hidden)
     for seen in lying:
         here = np.array(heights.world(np.float64(seen.bar.u), np.float64(seen.bar.v), 0.0))
-        below = [k for k, other in enumerate(detections) if other.on is None and other.kind in UTENSILS
-                 and np.hypot(*(here - other.position[:2])) < SAME_PLACE]  # fmt: skip
+        below = [
+            k
+            for k, other in enumerate(detections)
+            if other.on is None and other.kind in UTENSILS and np.hypot(*(here - other.position[:2])) < SAME_PLACE
+        ]
         z = MEASURES[seen.bar.kind].height if below else 0.0
         detections.append(as_detection(seen, heights, z, below[0] if below else None))
         _cover_bar(covered, heights, seen.bar, z)
@@ -109,10 +112,14 @@ def _unknown(heights: HeightMap, covered: np.ndarray, strange: np.ndarray) -> li
         x, y = heights.world(np.float64(left + 0.5 * width), np.float64(top + 0.5 * height), tall)
         result.append(
             Detection(
-                kind=None, position=(float(x), float(y), 0.0), lip=max(0.0, tall), confidence=0.0,
-                extent=0.5 * float(np.hypot(width, height)) / scale, unsure=(reason,),
+                kind=None,
+                position=(float(x), float(y), 0.0),
+                lip=max(0.0, tall),
+                confidence=0.0,
+                extent=0.5 * float(np.hypot(width, height)) / scale,
+                unsure=(reason,),
             )
-        )  # fmt: skip
+        )
     return result
 
 

@@ -43,12 +43,18 @@ def as_table(detections: tuple[Detection, ...]) -> Table:
     }
     return Table(
         tuple(
-            Item(names[index], detection.kind, detection.position, detection.yaw,
-                 None if detection.on is None else names[detection.on], detection.size or MEASURES[detection.kind])
+            Item(
+                names[index],
+                detection.kind,
+                detection.position,
+                detection.yaw,
+                None if detection.on is None else names[detection.on],
+                detection.size or MEASURES[detection.kind],
+            )
             for index, detection in enumerate(detections)
             if detection.kind is not None
         )
-    )  # fmt: skip
+    )
 
 
 def statement(detections: tuple[Detection, ...]) -> str:

@@ -28,27 +28,46 @@ def to_file(sight: Sight, sizes: Sizes) -> TablewareDetectionsFile:
 def from_file(file: TablewareDetectionsFile) -> tuple[Detection, ...]:
     """Return the detections of a payload. Raises BadInput where heights are not known: nothing can be planned then."""
     if not file.heights_known:
-        raise BadInput("the detections are of a photograph without depth: heights are unknown",
-                       hint="detect on an RGB-D image")  # fmt: skip
+        raise BadInput(
+            "the detections are of a photograph without depth: heights are unknown", hint="detect on an RGB-D image"
+        )
     return tuple(
         Detection(
-            kind=item.kind, position=item.position, yaw=item.yaw, lip=item.lip, on=item.on, hidden=item.hidden,
-            grasp=item.grasp, extent=item.extent, confidence=item.confidence, unsure=item.unsure,
-            size=None if item.size is None else Measures(
-                height=item.size.height, rim_radius=item.size.rim_radius, foot_radius=item.size.foot_radius,
-                wall=item.size.wall,
-            ),
+            kind=item.kind,
+            position=item.position,
+            yaw=item.yaw,
+            lip=item.lip,
+            on=item.on,
+            hidden=item.hidden,
+            grasp=item.grasp,
+            extent=item.extent,
+            confidence=item.confidence,
+            unsure=item.unsure,
+            size=None if item.size is None else Measures(**item.size.model_dump()),
         )
         for item in file.items
-    )  # fmt: skip
+    )
 
 
 def _item(detection: Detection) -> TablewareDetection:
     size = None
     if detection.size is not None:
-        size = DetectedSize(height=detection.size.height, rim_radius=detection.size.rim_radius, foot_radius=detection.size.foot_radius,
-                            wall=detection.size.wall)  # fmt: skip
+        size = DetectedSize(
+            height=detection.size.height,
+            rim_radius=detection.size.rim_radius,
+            foot_radius=detection.size.foot_radius,
+            wall=detection.size.wall,
+        )
     return TablewareDetection(
-        kind=detection.kind, position=detection.position, yaw=detection.yaw, lip=max(0.0, detection.lip), on=detection.on, hidden=detection.hidden,
-        grasp=detection.grasp, extent=detection.extent, size=size, confidence=min(1.0, max(0.0, detection.confidence)), unsure=detection.unsure,
-    )  # fmt: skip
+        kind=detection.kind,
+        position=detection.position,
+        yaw=detection.yaw,
+        lip=max(0.0, detection.lip),
+        on=detection.on,
+        hidden=detection.hidden,
+        grasp=detection.grasp,
+        extent=detection.extent,
+        size=size,
+        confidence=min(1.0, max(0.0, detection.confidence)),
+        unsure=detection.unsure,
+    )

@@ -120,7 +120,9 @@ def _depth(path: Path, scale: float | None) -> np.ndarray:
     else:
         array = _picture(path, cv2.IMREAD_UNCHANGED)
         if array.ndim != 2 or array.dtype != np.uint16:
-            raise BadInput(f"{path}: the depth image is {array.shape} {array.dtype}, not 16 bits in one channel",
-                           hint="8-bit pictures of depth hold no distances")  # fmt: skip
+            raise BadInput(
+                f"{path}: the depth image is {array.shape} {array.dtype}, not 16 bits in one channel",
+                hint="8-bit pictures of depth hold no distances",
+            )
         usual = MILLIMETRE
     return np.asarray(array, dtype=np.float32) * np.float32(usual if scale is None else scale)

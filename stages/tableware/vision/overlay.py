@@ -13,8 +13,14 @@ from stages.tableware.vision.photographs import Outline
 from stages.tableware.vision.seeing import Sight
 from stages.tableware.world.items import MEASURES
 
-COLORS = {"cup": (235, 70, 60), "bowl": (40, 180, 70), "plate": (60, 120, 240), "fork": (245, 160, 30),
-          "spoon": (20, 190, 200), None: (220, 60, 220)}  # fmt: skip
+COLORS = {
+    "cup": (235, 70, 60),
+    "bowl": (40, 180, 70),
+    "plate": (60, 120, 240),
+    "fork": (245, 160, 30),
+    "spoon": (20, 190, 200),
+    None: (220, 60, 220),
+}
 """sRGB by kind; None is unknown."""
 SURE = 0.9
 FONT, LINE = cv2.FONT_HERSHEY_SIMPLEX, 20
@@ -116,8 +122,9 @@ def _write(picture: np.ndarray, labels: list[tuple[tuple[int, int], str, tuple[i
 
 
 def _with_text(picture: np.ndarray, text: str) -> np.ndarray:
-    lines = textwrap.wrap(text + ". Full lines: sure; dashed: in doubt; thin: hidden in a stack.",
-                          max(20, picture.shape[1] // 8))  # fmt: skip
+    lines = textwrap.wrap(
+        text + ". Full lines: sure; dashed: in doubt; thin: hidden in a stack.", max(20, picture.shape[1] // 8)
+    )
     foot = np.full((LINE * len(lines) + 10, picture.shape[1], 3), 255, dtype=np.uint8)
     for number, line in enumerate(lines):
         cv2.putText(foot, line, (6, LINE * (number + 1) - 3), FONT, 0.45, (20, 20, 20), 1, cv2.LINE_AA)

@@ -40,14 +40,20 @@ def find_rims(heights: HeightMap) -> list[Rim]:
     """Return the rims of all kinds, surest first, none twice."""
     low, high = (np.array([LIPS[kind][end] for kind in DISHES]) for end in (0, 1))
     votes = cast_votes(
-        cv2.GaussianBlur(heights.smooth, (0, 0), 2.0), heights.smooth,
-        np.array([MEASURES[kind].rim_radius for kind in DISHES]), low, high,
-        heights.focal[0], heights.camera_height, LEAST_SLOPE,
-    )  # fmt: skip
+        cv2.GaussianBlur(heights.smooth, (0, 0), 2.0),
+        heights.smooth,
+        np.array([MEASURES[kind].rim_radius for kind in DISHES]),
+        low,
+        high,
+        heights.focal[0],
+        heights.camera_height,
+        LEAST_SLOPE,
+    )
     kept: list[Rim] = []
     for kind, own in zip(DISHES, votes, strict=True):
-        rims = [fitted for u0, v0 in _peaks(own, heights, kind)
-                if (fitted := fit_rim(heights, kind, u0, v0)) is not None]  # fmt: skip
+        rims = [
+            fitted for u0, v0 in _peaks(own, heights, kind) if (fitted := fit_rim(heights, kind, u0, v0)) is not None
+        ]
         for rim in sorted(rims, key=lambda rim: -rim.support):
             apart = 1.2 * MEASURES[kind].rim_radius
             if all(rim.kind != other.kind or np.hypot(rim.x - other.x, rim.y - other.y) > apart for other in kept):

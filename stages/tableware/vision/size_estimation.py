@@ -135,8 +135,14 @@ def _dish(
         reasons.append("partly hidden")
     confidence = 0.5 + 0.4 * min(1.0, (share - LEAST_ROUND) / (SURE_ROUND - LEAST_ROUND))
     size = Measures(height=greatest, rim_radius=rim, foot_radius=FOOT_SHARE * rim, wall=WALL)
-    return Detection(kind=kind, position=(float(x), float(y), 0.0), lip=greatest, confidence=confidence,
-                     unsure=tuple(reasons), size=size)  # fmt: skip
+    return Detection(
+        kind=kind,
+        position=(float(x), float(y), 0.0),
+        lip=greatest,
+        confidence=confidence,
+        unsure=tuple(reasons),
+        size=size,
+    )
 
 
 def _unknown(heights: HeightMap, window: tuple[slice, slice], own: np.ndarray, height: float, reason: str) -> Detection:

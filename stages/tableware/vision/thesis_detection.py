@@ -57,9 +57,15 @@ def detect_thesis(color: np.ndarray, depth: np.ndarray, camera: OverheadCamera) 
 def _circles(gray: np.ndarray, heights: HeightMap, kind: Kind) -> list[Rim]:
     expected = MEASURES[kind].rim_radius * float(heights.scale(0.0))
     circles = cv2.HoughCircles(
-        gray, cv2.HOUGH_GRADIENT, 1.5, 0.3 * expected, param1=CANNY[1], param2=VOTES,
-        minRadius=int(expected), maxRadius=int(np.ceil((1.0 + RADIUS_TOLERANCE) * expected)),
-    )  # fmt: skip
+        gray,
+        cv2.HOUGH_GRADIENT,
+        1.5,
+        0.3 * expected,
+        param1=CANNY[1],
+        param2=VOTES,
+        minRadius=int(expected),
+        maxRadius=int(np.ceil((1.0 + RADIUS_TOLERANCE) * expected)),
+    )
     rims: list[Rim] = []
     for u, v, radius in [] if circles is None else circles.reshape(-1, circles.shape[-1])[:, :3]:
         angles = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
@@ -96,7 +102,12 @@ def _bars(gray: np.ndarray, heights: HeightMap, covered: np.ndarray) -> list[Det
         x, y = heights.world(np.float64(u), np.float64(v), 0.003)
         gx, gy = heights.world(np.float64(columns[k]), np.float64(rows[k]), 0.003)
         bars.append(
-            Detection(kind="fork", position=(float(x), float(y), 0.0), yaw=float(-angle), lip=MEASURES["fork"].height,
-                      grasp=(float(gx), float(gy), float(line[k])))
-        )  # fmt: skip
+            Detection(
+                kind="fork",
+                position=(float(x), float(y), 0.0),
+                yaw=float(-angle),
+                lip=MEASURES["fork"].height,
+                grasp=(float(gx), float(gy), float(line[k])),
+            )
+        )
     return bars

@@ -74,9 +74,14 @@ def outline(kind: Kind) -> tuple[np.ndarray, np.ndarray]:
 
 @njit(cache=True)
 def _scores(
-    map_: np.ndarray, inside: np.ndarray, border: np.ndarray, scale: float, u: np.ndarray, v: np.ndarray,
+    map_: np.ndarray,
+    inside: np.ndarray,
+    border: np.ndarray,
+    scale: float,
+    u: np.ndarray,
+    v: np.ndarray,
     angle: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """Return (N,) scores of an outline at N poses, half the difference of the mean map in it and around it, and (N,)
     shares of the outline that are known.
 
@@ -103,9 +108,13 @@ def _scores(
 
 
 def _best_pose(
-    map_: np.ndarray, kind: Kind, scale: float, start: tuple[float, float, float], steps: tuple[float, float, float],
+    map_: np.ndarray,
+    kind: Kind,
+    scale: float,
+    start: tuple[float, float, float],
+    steps: tuple[float, float, float],
     far: int = 2,
-) -> Pose:  # fmt: skip
+) -> Pose:
     """Return the best of 9 (2 far + 1) poses around a start; steps along, across [px], turn [rad]."""
     along, across, turn = (step * grid for step, grid in zip(steps, _grid(far), strict=True))
     cos, sin = np.cos(start[2]), np.sin(start[2])

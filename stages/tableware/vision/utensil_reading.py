@@ -231,10 +231,15 @@ def as_detection(utensil: SeenUtensil, heights: HeightMap, z: float, on: int | N
     if bar.visible < MOSTLY_SEEN:
         reasons.append("partly hidden")
     return Detection(
-        kind=bar.kind, position=(float(x), float(y), z), yaw=float(np.arctan2(np.sin(-bar.angle), np.cos(-bar.angle))),
-        lip=z + thick, on=on, grasp=(float(grasp[0]), float(grasp[1]), float(along.max())),
-        confidence=1.0 - WEAK_LOOK * (1.0 - utensil.chance * _there(utensil)), unsure=tuple(reasons),
-    )  # fmt: skip
+        kind=bar.kind,
+        position=(float(x), float(y), z),
+        yaw=float(np.arctan2(np.sin(-bar.angle), np.cos(-bar.angle))),
+        lip=z + thick,
+        on=on,
+        grasp=(float(grasp[0]), float(grasp[1]), float(along.max())),
+        confidence=1.0 - WEAK_LOOK * (1.0 - utensil.chance * _there(utensil)),
+        unsure=tuple(reasons),
+    )
 
 
 def _there(utensil: SeenUtensil) -> float:

@@ -110,8 +110,11 @@ def utensil_parts(strip: Measures, fork: bool, stations: int = 48) -> list[tuple
     neck, root = 1.0 - HEAD_SHARE, 1.0 - 0.6 * HEAD_SHARE
     share = np.linspace(0.0, root, stations)
     opening = np.clip((share - neck) / (root - neck), 0.0, 1.0)
-    half = np.where(share < neck, spoon_half_width(strip, np.minimum(share, neck - 1e-9)),
-                    0.5 * strip.width * (NECK_SHARE + (1.0 - NECK_SHARE) * np.sin(0.5 * np.pi * opening)))  # fmt: skip
+    half = np.where(
+        share < neck,
+        spoon_half_width(strip, np.minimum(share, neck - 1e-9)),
+        0.5 * strip.width * (NECK_SHARE + (1.0 - NECK_SHARE) * np.sin(0.5 * np.pi * opening)),
+    )
     parts = [((share - 0.5) * strip.length, -half, half)]
     tine = strip.width * (1.0 - GAP_SHARE) / TINES
     pitch = (strip.width - tine) / (TINES - 1)

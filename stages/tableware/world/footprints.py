@@ -80,9 +80,11 @@ def _square_distance(first, second):  # type: ignore[no-untyped-def]
     if c_side * d_side < 0.0 and a_side * b_side < 0.0:
         return 0.0
     return min(
-        _square_to_segment(ax, ay, cx, cy, dx, dy), _square_to_segment(bx, by, cx, cy, dx, dy),
-        _square_to_segment(cx, cy, ax, ay, bx, by), _square_to_segment(dx, dy, ax, ay, bx, by),
-    )  # fmt: skip
+        _square_to_segment(ax, ay, cx, cy, dx, dy),
+        _square_to_segment(bx, by, cx, cy, dx, dy),
+        _square_to_segment(cx, cy, ax, ay, bx, by),
+        _square_to_segment(dx, dy, ax, ay, bx, by),
+    )
 
 
 @njit(cache=True)
