@@ -21,7 +21,6 @@ from stages.suture.robot.psm import (
     within_limits,
 )
 
-BRANCHES = 8
 SMALLEST = 1e-9
 
 

@@ -6,13 +6,12 @@ import numpy as np
 
 from stages.kit.geometry.transforms import transform_from
 from stages.suture.motion import primitives
-from stages.suture.motion.needle import TIP, point_at, turned, upright
-from stages.suture.rig import NEEDLE_RADIUS
-from stages.suture.trials.belief import START_ANGLE, Belief, as_planned
+from stages.suture.motion.needle import TIP, turned
+from stages.suture.trials.belief import Belief, as_planned
 from stages.suture.trials.bench import Bench, Failed, travel_time
 from stages.suture.trials.places import beside_wound
 from stages.suture.trials.policy import Coordination
-from stages.suture.trials.wound import CHORD, HOLE_HEIGHT, entry, exit_, passage
+from stages.suture.trials.wound import entry, exit_, passage
 
 STAND_OFF = np.array([-0.008, 0.0, 0.0])
 """From the place of insertion to where the push begins [m]."""
@@ -61,12 +60,3 @@ def insert(bench: Bench, belief: Belief, coordination: Coordination) -> None:
     away = bench.tools["right"].copy()
     away[:3, 3] += np.array([-0.02, 0.0, 0.03])
     coordination.withdraw(bench, "right", away)
-
-
-def nominal_needle(suture: int) -> np.ndarray:
-    """Return the pose (4, 4) of a needle that is ready for insertion as planned, its tip at the entry."""
-    centre = (entry(suture) + exit_(suture)) / 2.0
-    centre = np.array([centre[0] - CHORD, centre[1], HOLE_HEIGHT + NEEDLE_RADIUS * np.cos(START_ANGLE)])
-    needle = upright(centre, START_ANGLE)
-    assert np.allclose(point_at(needle, 0.0), entry(suture))
-    return needle

@@ -162,13 +162,6 @@ class Tabletop:
 
     # --- reading ----------------------------------------------------------------------------------------------
 
-    def tipped(self) -> tuple[str, ...]:
-        """Return the dishes that have fallen over on the table: they lean, and stand in no other dish."""
-        table = self.read(everything=True)
-        return tuple(
-            item.name for item in table.items if item.is_dish and item.on is None and self.lean(item.name) > TIPPED
-        )
-
     def lean(self, name: str) -> float:
         """Return the angle [rad] of an item's axis against the vertical."""
         return float(np.arccos(np.clip(self.pose(name)[2, 2], -1.0, 1.0)))

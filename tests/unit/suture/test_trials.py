@@ -17,11 +17,10 @@ from stages.suture.motion.constants import OpenConstants, cinch_length
 from stages.suture.motion.needle import SWAGE, TIP, from_ends, point_at, turned, upright
 from stages.suture.rig import NEEDLE_RADIUS
 from stages.suture.robot.arms import ARMS
-from stages.suture.trials.belief import as_planned, believed
+from stages.suture.trials.belief import START_ANGLE, as_planned, believed
 from stages.suture.trials.bench import CORNER, HOME, Bench, loaded
 from stages.suture.trials.drawing import draw_strip, whole_suture
 from stages.suture.trials.gripping import close
-from stages.suture.trials.insertion import nominal_needle
 from stages.suture.trials.machine import Outcome, run_trial
 from stages.suture.trials.ours.extraction import grasp_point, left_to_turn
 from stages.suture.trials.ours.handover import middle, turned_about
@@ -44,7 +43,7 @@ from stages.suture.trials.rope import PARTICLES, drape, line, winding
 from stages.suture.trials.settings import World
 from stages.suture.trials.thesis.handover import NormalUnchanged
 from stages.suture.trials.thread import Thread, draw, pull_on, pull_through
-from stages.suture.trials.wound import CHORD, entry, exit_, passage
+from stages.suture.trials.wound import CHORD, HOLE_HEIGHT, entry, exit_, passage
 
 STILL_WORLD = World(
     thread_shortest=0.30, thread_longest=0.30, loading_normal=0, loading_in_plane=0, hand_eye=0, closing_normal=0,
@@ -62,6 +61,14 @@ def perfect(name: str = "ours") -> PerceptionModel:
             "thread_length_error": 0.0,
         }
     )
+
+
+def nominal_needle(suture: int) -> np.ndarray:
+    """Return the pose (4, 4) of a needle that is ready for insertion as planned, its tip at the entry."""
+    centre = (entry(suture) + exit_(suture)) / 2.0
+    centre = np.array([centre[0] - CHORD, centre[1], HOLE_HEIGHT + NEEDLE_RADIUS * np.cos(START_ANGLE)])
+    needle = upright(centre, START_ANGLE)
+    return needle
 
 
 def insertion_of(needle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

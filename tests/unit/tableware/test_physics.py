@@ -30,8 +30,8 @@ from stages.tableware.simulation.recording import Recording
 from stages.tableware.simulation.tabletop import where_it_passed
 from stages.tableware.simulation.trial import Done, Trial, most_actions, run_in
 from stages.tableware.simulators import SIMULATORS
-from stages.tableware.world.dish_shapes import shell_volume
 from stages.tableware.world.items import MEASURES, Item, Kind, Table, make_item, stand_height
+from tests.unit.tableware.volumes import shell_volume
 
 DENAVIT_HARTENBERG = (
     (0.089159, 0.0, pi / 2), (0.0, -0.425, 0.0), (0.0, -0.39225, 0.0), (0.10915, 0.0, pi / 2),
@@ -295,7 +295,6 @@ def test_a_knocked_cup_is_counted_and_no_longer_on_the_table() -> None:
     world.top.wake_near([np.array([-0.2, 0.0])], 0.2)
     world.do(grasp(world.table, "up"))
     assert (world.trial.moved, world.trial.dropped, world.trial.left) == (1, 1, 0)
-    assert world.top.tipped() == ("over",)
     world.close()
 
 
