@@ -1,0 +1,207 @@
+"""Kept records become figures with intervals: metrics.json, figures.json, table.md."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+import shlex
+import subprocess
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.experiment import Bench, Experiment, Trial
+from benchmarks.tabulation import differences_table, figures_table
+from stages.kit.measurement.bootstrap import Interval, figure_interval, paired_interval
+
+RESAMPLES = 2000
+SEED_OF_INTERVALS = 0
+LEAST_CLUSTERS = 2
+"""With fewer there is nothing to resample."""
+RUNNING = "trials"
+"""`all/<case>/trials`: how many seeds a case ran on."""
+
+
+@dataclass
+class Results:
+    """The records of a run."""
+
+    experiment: Experiment
+    bench: Bench
+    records: Mapping[Trial, Any]
+    _clusters: dict[tuple[str, str], dict[str, list[Any]]] = field(default_factory=dict)
+    _values: dict[tuple[Any, ...], float | None] = field(default_factory=dict)
+
+    @property
+    def cases(self) -> list[str]:
+        """The cases that ran, in their order."""
+        return list(dict.fromkeys(trial.case for trial in self.records))
+
+    def arms(self, case: str | None = None) -> list[str]:
+        """The arms that ran (in a case), in the order of the declaration."""
+        there = {trial.arm for trial in self.records if case in (None, trial.case)}
+        return [arm for arm in self.experiment.arms if arm in there]
+
+    def seeds(self, case: str) -> list[str]:
+        """The seeds of a case that any arm ran on."""
+        return list(dict.fromkeys(trial.seed for trial in self.records if trial.case == case))
+
+    def of(self, arm: str, case: str) -> list[Any]:
+        """The records of an arm in a case, by seed."""
+        return [record for group in self._grouped(arm, case).values() for record in group]
+
+    def get(self, arm: str, case: str, seed: str) -> Any | None:
+        """The record of one trial."""
+        return self.records.get(Trial(arm, case, seed))
+
+    def value(self, arm: str, case: str, measure: str) -> float | None:
+        """A measure of an arm in a case."""
+        records = self.of(arm, case)
+        return self.experiment.measures[measure].of(records) if records else None
+
+    def interval(self, arm: str, case: str, measure: str) -> Interval | None:
+        """A measure with its 95 % percentile bootstrap interval over clusters of seeds; None where it is undefined, or
+        where there are fewer than two clusters."""
+        names = list(self._grouped(arm, case))
+        if len(names) < LEAST_CLUSTERS:
+            return None
+        random = np.random.default_rng(SEED_OF_INTERVALS)
+        return figure_interval(self._figure(arm, case, measure, names), range(len(names)), random, resamples=RESAMPLES)
+
+    def difference(self, first: str, second: str, case: str, measure: str) -> Interval | None:
+        """`first` minus `second` over the clusters that both ran on, drawn together, with its 95 % interval."""
+        other = self._grouped(second, case)
+        names = [name for name in self._grouped(first, case) if name in other]
+        if len(names) < LEAST_CLUSTERS:
+            return None
+        figures = [self._figure(arm, case, measure, names) for arm in (first, second)]
+        numbers = [(which, k) for which in (0, 1) for k in range(len(names))]
+
+        def of_either(samples: Sequence[tuple[int, int]]) -> float | None:
+            return figures[samples[0][0]]([k for _, k in samples])
+
+        half = len(names)
+        random = np.random.default_rng(SEED_OF_INTERVALS)
+        return paired_interval(of_either, numbers[:half], numbers[half:], random, resamples=RESAMPLES)
+
+    def _grouped(self, arm: str, case: str) -> dict[str, list[Any]]:
+        if (arm, case) not in self._clusters:
+            groups: dict[str, list[Any]] = {}
+            for trial, record in self.records.items():
+                if (trial.arm, trial.case) == (arm, case):
+                    groups.setdefault(self.experiment.cluster(trial.seed), []).append(record)
+            self._clusters[arm, case] = groups
+        return self._clusters[arm, case]
+
+    def _figure(
+        self, arm: str, case: str, measure: str, names: Sequence[str]
+    ) -> Callable[[Sequence[int]], float | None]:
+        """The measure over clusters given by their numbers; remembered by how often each is drawn."""
+        groups, of = self._grouped(arm, case), self.experiment.measures[measure].of
+
+        def figure(numbers: Sequence[int]) -> float | None:
+            drawn = tuple(sorted(numbers))
+            key = (arm, case, measure, len(names), drawn)
+            if key not in self._values:
+                self._values[key] = of([record for k in drawn for record in groups[names[k]]])
+            return self._values[key]
+
+        return figure
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One number of figures.json."""
+
+    value: float
+    low: float | None
+    high: float | None
+    cases: int | None
+    unit: str
+
+
+def figures_of(results: Results) -> dict[str, Figure]:
+    """Return `<arm>/<case>/<measure>` -> figure; what is undefined is left out."""
+    figures: dict[str, Figure] = {}
+    for case in results.cases:
+        figures[f"all/{case}/{RUNNING}"] = Figure(float(len(results.seeds(case))), None, None, None, "")
+        for arm in results.arms(case):
+            for name, measure in results.experiment.measures.items():
+                cases = len(results.of(arm, case))
+                value = results.value(arm, case, name)
+                if value is None or not math.isfinite(value):
+                    continue
+                low = high = None
+                if measure.interval and (found := results.interval(arm, case, name)) is not None:
+                    low, high = found.low, found.high
+                figures[f"{arm}/{case}/{name}"] = Figure(value, low, high, cases, measure.unit)
+    for key, value in (results.experiment.more_figures(results) if results.experiment.more_figures else {}).items():
+        if value is not None and math.isfinite(value):
+            figures[key] = Figure(float(value), None, None, None, "")
+    return figures
+
+
+def write_results(results: Results, command: Sequence[str], missing: Sequence[Trial]) -> str:
+    """Write metrics.json, figures.json, table.md and the pictures into the output folder; return the table."""
+    out, figures = results.bench.out, figures_of(results)
+    out.mkdir(parents=True, exist_ok=True)
+    _write(out / "metrics.json", {name: figure.value for name, figure in figures.items()})
+    _write(out / "figures.json", described(results.experiment, figures, command))
+    text = (results.experiment.table or default_table)(results)
+    if missing:
+        text += f"\nNot measured: {', '.join(map(str, missing))}.\n"
+    (out / "table.md").write_text(text, encoding="utf-8")
+    if results.experiment.pictures:
+        results.experiment.pictures(results)
+    return text
+
+
+def described(experiment: Experiment, figures: Mapping[str, Figure], command: Sequence[str]) -> dict[str, Any]:
+    """Return figures.json: the figures, and what has to stand beside them."""
+    return {
+        "experiment": experiment.name,
+        "title": experiment.title,
+        "date": datetime.now(UTC).date().isoformat(),
+        "commit": _commit(),
+        "machine": f"{os.cpu_count()} processors, {platform.machine()}, {platform.system()}",
+        "command": shlex.join(command),
+        "simulated": experiment.simulated,
+        "knows": experiment.knows,
+        "does_not_show": experiment.does_not_show,
+        "figures": {name: vars(figure) for name, figure in figures.items()},
+    }
+
+
+def default_table(results: Results) -> str:
+    """All measures of all arms and cases, then the differences."""
+    parts = [figures_table(results, case, list(results.experiment.measures)) for case in results.cases]
+    return "\n".join([seeds_line(results), *parts, differences_table(results)])
+
+
+def seeds_line(results: Results) -> str:
+    """Say which seeds ran."""
+    told = []
+    for names in dict.fromkeys(tuple(results.seeds(case)) for case in results.cases):
+        kind = next(
+            (kind for kind in ("tuning", "reporting") if set(names) <= set(getattr(results.experiment, kind))), ""
+        )
+        told.append(
+            f"{len(names)}{f' for {kind}' if kind else ''} ({', '.join(names[:20])}{', ...' * (len(names) > 20)})"
+        )
+    return f"Seeds: {'; '.join(told)}. Intervals: 95 %, bootstrap, {RESAMPLES} draws over clusters of seeds.\n"
+
+
+def _write(path: Path, values: Mapping[str, Any]) -> None:
+    path.write_text(json.dumps(values, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def _commit() -> str:
+    here = Path(__file__).resolve().parent
+    words = ["git", "-C", str(here), "describe", "--always", "--dirty", "--abbrev=10", "--exclude=*"]
+    return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip()
