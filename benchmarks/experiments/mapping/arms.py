@@ -7,6 +7,7 @@ on this sensor's noise, so that every arm gets ours, which helps the rivals (doc
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from stages.fuse.parameters import FuseParameters
@@ -18,7 +19,7 @@ LEVELS = {"clean": 0.0, "low": 0.15, "middle": 0.3, "high": 0.5}
 NETWORK = "network"
 DRIFTING = "middle/drifting"
 """Masks of the middle level, poses that drift (drift.py)."""
-
+CASES = (*LEVELS, DRIFTING, NETWORK)
 
 SHOWN = "middle"
 """The case that the tables by room and class show; all arms run in it."""
@@ -69,7 +70,7 @@ _VOXBLOX_DEFAULT = {**_VOXBLOX_SCENENN, "truncation_voxels": 3.0, "maximum_depth
 def all_arms(voxel_size: float) -> tuple[Arm, ...]:
     """Return the arms in the order of the tables; all at one voxel size [m]."""
 
-    def arm(name: str, title: str, segment: dict[str, object], fuse: dict[str, object], method: str) -> Arm:
+    def arm(name: str, title: str, segment: Mapping[str, object], fuse: Mapping[str, object], method: str) -> Arm:
         return Arm(
             name,
             title,

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.mapping.experiment import Outcome
+from benchmarks.experiment import Measure
+from benchmarks.experiments.mapping.measuring import Outcome, Ranked
 from stages.evaluate.truth import stuff_classes
 from stages.kit.measurement.average_precision import (
-    Candidates,
     PrecisionRecall,
     average_precision,
     average_precision_thesis_code,
-    match_greedily,
     mean_precision,
 )
-from stages.kit.measurement.bootstrap import Interval, figure_interval, paired_interval
 from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, average_quality_thesis_code
 
-Measure = Callable[[Sequence[Outcome]], float | None]
+Figure = Callable[[Sequence[Outcome]], float | None]
 ANY = "any"
-RESAMPLES = 200
 
 
 def summed_qualities(outcomes: Sequence[Outcome], field: str = "qualities") -> dict[str, ClassQuality]:
@@ -32,31 +28,6 @@ def summed_qualities(outcomes: Sequence[Outcome], field: str = "qualities") -> d
         for name, quality in getattr(outcome, field).items():
             sums[name] = sums.get(name, ClassQuality()) + quality
     return sums
-
-
-@dataclass(frozen=True)
-class Ranked:
-    """Predictions of one class in one room with whether each found something true. Matching never crosses rooms, so
-    that it is done once and pooling is a sort."""
-
-    confidence: np.ndarray
-    hits: np.ndarray
-    true_count: int
-
-
-def ranked(found: Candidates) -> Ranked:
-    """Match one room's predictions of a class (`average_precision.match_greedily`); remembered by the object."""
-    key = id(found)
-    if key not in _RANKED:
-        matches = match_greedily(found.iou, found.confidence)
-        order = [row for row, _ in matches]
-        hits = np.array([truth is not None for _, truth in matches], dtype=float)
-        # The object is kept beside, so that its id stays its own.
-        _RANKED[key] = (found, Ranked(found.confidence[order], hits, found.iou.shape[1]))
-    return _RANKED[key][1]
-
-
-_RANKED: dict[int, tuple[Candidates, Ranked]] = {}
 
 
 def pooled_curve(rooms: Sequence[Ranked]) -> PrecisionRecall:
@@ -76,11 +47,11 @@ def pooled_curves(outcomes: Sequence[Outcome], field: str) -> dict[str, Precisio
     for outcome in outcomes:
         for name, found in getattr(outcome, field).items():
             if name != ANY:
-                rooms.setdefault(name, []).append(ranked(found))
+                rooms.setdefault(name, []).append(found)
     return {name: pooled_curve(found) for name, found in sorted(rooms.items())}
 
 
-def quality_measure(which: str, kind: str = "all") -> Measure:
+def quality_measure(which: str, kind: str = "all") -> Figure:
     """Return the measure `pq`, `sq` or `rq`, the mean over the classes that are true or predicted; `kind` is all,
     stuff or thing."""
 
@@ -102,7 +73,7 @@ def quality_thesis_code(outcomes: Sequence[Outcome]) -> float | None:
     return average_quality_thesis_code(summed_qualities(outcomes, "qualities_thesis_code").values()).pq
 
 
-def precision_measure(field: str, form: Callable[[PrecisionRecall], float | None] = average_precision) -> Measure:
+def precision_measure(field: str, form: Callable[[PrecisionRecall], float | None] = average_precision) -> Figure:
     """Return the mean over classes of average precision of `instances`, `boxes` or `boxes_refined`."""
 
     def measure(outcomes: Sequence[Outcome]) -> float | None:
@@ -117,28 +88,16 @@ def frames_per_second(outcomes: Sequence[Outcome]) -> float | None:
     return sum(outcome.frames for outcome in outcomes) / seconds if seconds else None
 
 
-MEASURES: dict[str, Measure] = {
-    "pq": quality_measure("pq"),
-    "sq": quality_measure("sq"),
-    "rq": quality_measure("rq"),
-    "pq_stuff": quality_measure("pq", "stuff"),
-    "pq_thing": quality_measure("pq", "thing"),
-    "pq_thesis_code": quality_thesis_code,
-    "instance_ap": precision_measure("instances"),
-    "instance_ap_thesis_code": precision_measure("instances", average_precision_thesis_code),
-    "box_ap": precision_measure("boxes"),
-    "box_ap_refined": precision_measure("boxes_refined"),
-    "frames_per_second": frames_per_second,
+MEASURES = {
+    "pq": Measure(quality_measure("pq")),
+    "sq": Measure(quality_measure("sq"), interval=False),
+    "rq": Measure(quality_measure("rq"), interval=False),
+    "pq_stuff": Measure(quality_measure("pq", "stuff"), interval=False),
+    "pq_thing": Measure(quality_measure("pq", "thing"), interval=False),
+    "pq_thesis_code": Measure(quality_thesis_code, interval=False),
+    "instance_ap": Measure(precision_measure("instances")),
+    "instance_ap_thesis_code": Measure(precision_measure("instances", average_precision_thesis_code), interval=False),
+    "box_ap": Measure(precision_measure("boxes")),
+    "box_ap_refined": Measure(precision_measure("boxes_refined")),
+    "frames_per_second": Measure(frames_per_second, "frames/s", interval=False),
 }
-
-
-def interval(outcomes: Sequence[Outcome], measure: Measure, random: np.random.Generator) -> Interval | None:
-    """Return a measure with its 95 % percentile bootstrap interval over rooms; None where it is undefined."""
-    return figure_interval(measure, outcomes, random, resamples=RESAMPLES)
-
-
-def difference(
-    first: Sequence[Outcome], second: Sequence[Outcome], measure: Measure, random: np.random.Generator
-) -> Interval | None:
-    """Return first minus second with the interval over rooms, both on the same draws (paired)."""
-    return paired_interval(measure, first, second, random, resamples=RESAMPLES)

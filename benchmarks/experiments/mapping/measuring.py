@@ -1,4 +1,4 @@
-"""One room through all arms and cases: frames are read once, geometric segments and masks are shared."""
+"""One room through arms and cases: frames are read once, geometric segments and masks are shared."""
 
 from __future__ import annotations
 
@@ -8,16 +8,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 
-from benchmarks.mapping.arms import DRIFTING, EVERYWHERE, LEVELS, NETWORK, SHOWN, Arm
-from benchmarks.mapping.drift import drifting_poses
-from benchmarks.mapping.rooms import RoomFolder
+from benchmarks.experiment import Bench, Trial
+from benchmarks.experiments.mapping.arms import DRIFTING, LEVELS, NETWORK, Arm, all_arms
+from benchmarks.experiments.mapping.drift import drifting_poses
+from benchmarks.generated_rooms import make_room
+from benchmarks.steps import context_in, opened, unrecorded
+from schemas.contact_graph import ContactGraphFile
 from schemas.kinds import GroundTruth, PanopticMap
 from schemas.kinds import Sequence as SequenceArtifact
 from schemas.vocabulary import load_vocabulary
-from stages.engine.reading import open_artifact
 from stages.evaluate.graph_measures import box_candidates
 from stages.evaluate.map_measures import (
+    PredictedMap,
     instance_candidates,
     label_true_points,
     load_map,
@@ -29,12 +33,10 @@ from stages.evaluate.results import Part
 from stages.evaluate.truth import TrueRoom, load_truth
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.stage import write_map
-from stages.graph.stage import run as build_graph
 from stages.kit.formats.frames import Frame, FrameReader
-from stages.kit.measurement.average_precision import Candidates
+from stages.kit.measurement.average_precision import Candidates, match_greedily
 from stages.kit.measurement.panoptic_quality import ClassQuality
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
+from stages.kit.stage import Parameters
 from stages.segment.choice import BackendRequest, choose_backend
 from stages.segment.fusion import fuse
 from stages.segment.geometric import GeometricFrame, GeometricSettings, segment_depth
@@ -43,20 +45,36 @@ from stages.segment.settings import fusion_settings, geometric_settings
 from stages.segment.stage import describe
 
 DRIFT_STREAM = 11
+SEED = 0
+
+
+class MappingParameters(Parameters):
+    """Options of the experiment."""
+
+    voxel_size: float = Field(0.02, gt=0, description="Voxel edge of all arms [m] (the publications: 0.01)")
+    frames: int = Field(60, ge=1, description="Frames of every room")
+    untrained: bool = Field(False, description="With --tuning: rooms that our own network never saw")
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """Predictions of one class in one room with whether each found something true. Matching never crosses rooms, so
+    that it is done once and pooling is a sort."""
+
+    confidence: tuple[float, ...]
+    hits: tuple[bool, ...]
+    true_count: int
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one arm made of one room in one case."""
+    """What one arm made of one room in one case, by class."""
 
-    room: str
-    arm: str
-    case: str
     qualities: dict[str, ClassQuality]
     qualities_thesis_code: dict[str, ClassQuality]
-    instances: dict[str, Candidates]
-    boxes: dict[str, Candidates]
-    boxes_refined: dict[str, Candidates]
+    instances: dict[str, Ranked]
+    boxes: dict[str, Ranked]
+    boxes_refined: dict[str, Ranked]
     frames: int = 0
     seconds: float = 0.0
     """Wall clock of this arm's own work on the frames: geometric segments, fusion with the masks, integration."""
@@ -71,29 +89,25 @@ class SharedFrame:
     """Geometric segments by settings, and the seconds they took."""
 
 
-def run_room(
-    room: RoomFolder, arms: Sequence[Arm], cases: Sequence[str], scratch: Path, seed: int
-) -> Iterator[tuple[str, list[Outcome]]]:
-    """Yield case after case with the outcome of every arm. Maps are written under `scratch` and stay there."""
-    sequence = open_artifact(room.sequence, SequenceArtifact)
-    truth_artifact = open_artifact(room.ground_truth, GroundTruth)
-    assert isinstance(sequence, SequenceArtifact) and isinstance(truth_artifact, GroundTruth)
-    options = EvaluateParameters()
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outcome]]:
+    """Yield the outcomes of the trials of one room, case after case; the maps are left in the folders of the trials."""
+    parameters: MappingParameters = bench.parameters
+    room = make_room(bench.out / "rooms", trials[0].seed, parameters.frames)
+    sequence, truth_artifact = opened(SequenceArtifact, room.sequence), opened(GroundTruth, room.ground_truth)
+    options = EvaluateParameters.model_validate({})
     truth = load_truth(truth_artifact, np.array(sequence.info.gravity.world_from_log), options.minimum_visible_points)
+    arms = {arm.name: arm for arm in all_arms(parameters.voxel_size)}
     with FrameReader(sequence.path("frames.mcap")) as reader:
-        shared = read_frames(reader, arms) if cases else []
-        for case in cases:
-            outcomes = []
-            present = [arm for arm in arms if case == SHOWN or arm.name in EVERYWHERE]
-            seconds = dict.fromkeys([arm.name for arm in present], 0.0)
-            mappers = build_maps(sequence, reader, shared, present, case, seed, seconds)
-            for arm in present:
-                output = scratch / room.name / case / arm.name
-                panoptic_map = finish_map(mappers.pop(arm.name), output, seed)
-                scene = (room.name, arm, case)
-                found = measure(scene, truth, panoptic_map, options, output, seed)
-                outcomes.append(replace(found, frames=len(shared), seconds=seconds[arm.name]))
-            yield case, outcomes
+        shared = read_frames(reader, [arms[name] for name in dict.fromkeys(trial.arm for trial in trials)])
+        for case in dict.fromkeys(trial.case for trial in trials):
+            present = {trial.arm: trial for trial in trials if trial.case == case}
+            seconds = dict.fromkeys(present, 0.0)
+            mappers = build_maps(sequence, reader, shared, [arms[name] for name in present], case, SEED, seconds)
+            for name, trial in present.items():
+                output = bench.folder(trial)
+                panoptic_map = finish_map(mappers.pop(name), output, SEED)
+                found = outcome_of(arms[name], truth, panoptic_map, options, output)
+                yield trial, replace(found, frames=len(shared), seconds=seconds[name])
 
 
 def read_frames(reader: FrameReader, arms: Sequence[Arm]) -> list[SharedFrame]:
@@ -152,37 +166,38 @@ def _level(case: str) -> float:
 
 def finish_map(mapper: PanopticMapper, output: Path, seed: int) -> PanopticMap:
     """Close the map and write it as a panoptic_map without a manifest under `output`."""
-    folder = output / "panoptic_map"
-    folder.mkdir(parents=True, exist_ok=True)
     mapper.regularize()
-    context = Context(folder, seed=seed, device="cpu", progress=SilentProgress())
-    return write_map(mapper, load_vocabulary(), "benchmark", {}, context)
+    return write_map(mapper, load_vocabulary(), "benchmark", {}, context_in(output / "panoptic_map", seed))
 
 
-def measure(
-    scene: tuple[str, Arm, str],
-    truth: TrueRoom,
-    panoptic_map: PanopticMap,
-    options: EvaluateParameters,
-    output: Path,
-    seed: int,
+def outcome_of(
+    arm: Arm, truth: TrueRoom, panoptic_map: PanopticMap, options: EvaluateParameters, output: Path
 ) -> Outcome:
-    """Measure a finished map: PQ, instance candidates, and the boxes of the contact graph built from it."""
-    room, arm, case = scene
-    predicted = load_map(panoptic_map)
+    """Measure a finished map: PQ, instances, and the boxes of the contact graph built from it."""
+    graph = unrecorded("graph", output / "contact_graph", arm.graph, seed=SEED, panoptic_map=panoptic_map).graph
+    return outcome_of_map(truth, load_map(panoptic_map), graph, options)
+
+
+def outcome_of_map(
+    truth: TrueRoom, predicted: PredictedMap, graph: ContactGraphFile, options: EvaluateParameters
+) -> Outcome:
+    """Measure a map and the boxes of its contact graph against the truth, by class."""
     labels = label_true_points(truth, predicted, options.label_distance)
-    folder = output / "contact_graph"
-    folder.mkdir(parents=True, exist_ok=True)
-    context = Context(folder, seed=seed, device="cpu", progress=SilentProgress())
-    graph = build_graph(panoptic_map, parameters=arm.graph, context=context).graph
     points: Mapping[int, int] = {entity.instance: entity.vertices for entity in predicted.info.entities}
     return Outcome(
-        room=room,
-        arm=arm.name,
-        case=case,
         qualities=measure_quality(Part("map"), truth, predicted, labels, options),
         qualities_thesis_code=quality_thesis_code(truth, predicted, options),
-        instances=instance_candidates(truth, predicted, labels),
-        boxes=box_candidates(truth, graph, points, "box_observed", options.match_iou),
-        boxes_refined=box_candidates(truth, graph, points, "box", options.match_iou),
+        instances=ranked(instance_candidates(truth, predicted, labels)),
+        boxes=ranked(box_candidates(truth, graph, points, "box_observed", options.match_iou)),
+        boxes_refined=ranked(box_candidates(truth, graph, points, "box", options.match_iou)),
     )
+
+
+def ranked(candidates: Mapping[str, Candidates]) -> dict[str, Ranked]:
+    """Match the predictions of each class in falling confidence (`average_precision.match_greedily`)."""
+    result = {}
+    for name, found in candidates.items():
+        matches = match_greedily(found.iou, found.confidence)
+        confidence = tuple(float(found.confidence[row]) for row, _ in matches)
+        result[name] = Ranked(confidence, tuple(truth is not None for _, truth in matches), found.iou.shape[1])
+    return result
