@@ -32,10 +32,10 @@ ARMS = (
         "best_single",
         "ours without the global check",
         "ours",
-        GraphParameters(),
+        GraphParameters.model_validate({}),
         CadParameters.model_validate({"conflict_iterations": 0, "maximum_shift": 0.0}),
     ),
-    Arm("ours", "ours", "ours", GraphParameters(), CadParameters()),
+    Arm("ours", "ours", "ours", GraphParameters.model_validate({}), CadParameters.model_validate({})),
 )
 """`best_single` takes what fits each object best by itself and puts it on its support."""
 

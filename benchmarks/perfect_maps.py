@@ -77,16 +77,18 @@ def perfect_map(truth: GroundTruth, root: Path) -> PanopticMap:
     """
     with np.load(truth.path("visible.npz"), allow_pickle=False) as archive:
         points, instance = archive["points"].astype(float), archive["instance"]
-    mesh = trimesh.load(truth.path("mesh.ply"), force="mesh", process=False)
+    mesh = trimesh.load_mesh(truth.path("mesh.ply"), process=False)
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(
-        o3d.core.Tensor(np.asarray(mesh.vertices, dtype=np.float32)),
-        o3d.core.Tensor(np.asarray(mesh.faces, dtype=np.uint32)),
+        o3d.core.Tensor(np.asarray(mesh.vertices, dtype=np.float32)),  # type: ignore[call-overload]
+        o3d.core.Tensor(np.asarray(mesh.faces, dtype=np.uint32)),  # type: ignore[call-overload]
     )
-    closest = scene.compute_closest_points(o3d.core.Tensor(points.astype(np.float32)))
+    tensor = o3d.core.Tensor(points.astype(np.float32))  # type: ignore[call-overload]
+    closest = scene.compute_closest_points(tensor)
     normals = closest["primitive_normals"].numpy().astype(float)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-    paint = np.asarray(mesh.visual.vertex_colors)[mesh.faces[closest["primitive_ids"].numpy(), 0], :3]
+    colors = np.asarray(mesh.visual.vertex_colors)  # type: ignore[union-attr]
+    paint = colors[mesh.faces[closest["primitive_ids"].numpy(), 0], :3]
     classes = {entry.instance: entry.class_name for entry in truth.truth.objects}
     meshes = {
         int(k): tiles(points[own], normals[own], colors=paint[own])

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from pydantic import Field
 
-from benchmarks.graph.rooms import distance_figures, judge
-from benchmarks.mapping.rooms import RoomFolder
-from benchmarks.scene.arms import HELD_OUT, MASK_LEVEL, PERFECT, Arm
-from benchmarks.scene.perfect_maps import perfect_map
+from benchmarks.experiment import Bench, Trial
+from benchmarks.experiments.mapping.experiment import EXPERIMENT as MAPPING
+from benchmarks.experiments.scene.arms import ARMS, HELD_OUT, MASK_LEVEL, PERFECT, REAL, Arm
+from benchmarks.generated_rooms import make_library, make_room, room_at
+from benchmarks.graph_scores import OPTIONS, distance_figures, judge
+from benchmarks.keeping import measure_missing
+from benchmarks.perfect_maps import perfect_map
+from benchmarks.steps import StepFailed, context_in, made, opened, unrecorded
 from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene
 from schemas.contact_graph import ContactGraphFile
@@ -23,27 +29,33 @@ from schemas.panoptic_map import PanopticMap
 from stages.cad.candidates import Shortlist
 from stages.cad.model_surfaces import ModelSurface
 from stages.cad.stage import choose_and_write, find_candidates
-from stages.engine.reading import open_artifact
 from stages.evaluate.correspondence import point_overlaps
 from stages.evaluate.map_measures import label_true_points, load_map
-from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.replacement_measures import ObjectResult, replacements_of
 from stages.evaluate.truth import TrueRoom, load_truth
-from stages.graph.stage import run as build_graph
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.urdf.parameters import UrdfParameters
+from stages.kit.stage import Parameters
 from stages.urdf.settle_report import SettleReport, settle_report
-from stages.urdf.stage import run as write_urdf
+
+SEED = 0
+HELD_OUT_SEED = 501
+"""Of the library whose shapes no room has."""
+ANNOTATIONS = Path(__file__).resolve().parents[3] / "data" / "annotations" / "real"
+
+
+class SceneParameters(Parameters):
+    """Options of the experiment."""
+
+    maps: Path = Field(Path("outputs/experiments/bench-mapping"), description="What `mapping` writes: its rooms, maps")
+    real: Path | None = Field(None, description="What `make real` wrote; the case `real` needs its maps")
+    frames: int = Field(60, ge=1, description="Frames of every room")
+    as_is: bool = Field(False, description="Take rooms and maps as they stand, even of older code")
+    keep: bool = Field(False, description="Keep the artifacts (100 MB an arm and case)")
 
 
 @dataclass(frozen=True)
 class Outcome:
     """What one arm made of one room in one case: plain numbers, so that rooms run in processes of their own."""
 
-    room: str
-    arm: str
-    case: str
     graph: dict[str, float]
     """Edit distance and its parts."""
     edges: dict[str, tuple[int, int, int]]
@@ -65,20 +77,61 @@ class Room:
     truth_artifact: GroundTruth
     truth: TrueRoom
     world_from_log: np.ndarray
-    maps: Path
-    """Folder of `make bench-mapping` with this room's maps: <level>/<arm>/panoptic_map."""
+    maps: Mapping[str, Path]
+    """Arm of `mapping` -> its map of this room."""
     libraries: Mapping[bool, CadLibrary]
     """Held out? -> library."""
 
 
-def load_room(folder: RoomFolder, maps: Path, libraries: Mapping[bool, CadLibrary]) -> Room:
-    """Read a room. Raises BadInput when its artifacts are missing or broken."""
-    sequence = open_artifact(folder.sequence, SequenceArtifact)
-    artifact = open_artifact(folder.ground_truth, GroundTruth)
-    assert isinstance(sequence, SequenceArtifact) and isinstance(artifact, GroundTruth)
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outcome]]:
+    """Yield the outcomes of the trials of one room, or of one real log."""
+    wanted = {(trial.case, trial.arm): trial for trial in trials}
+    shared = Shared()
+    if trials[0].case == REAL:
+        folder, scratch = bench.parameters.real / trials[0].seed, bench.out / "scenes" / trials[0].seed
+        for name, outcome in run_real(folder, scratch, [arm for arm in ARMS if (REAL, arm.name) in wanted]):
+            yield wanted[REAL, name], outcome
+        return
+    room = load_room(bench, trials[0].seed, with_maps=any(trial.case != PERFECT for trial in trials))
+    for case in dict.fromkeys(trial.case for trial in trials):
+        arms = [arm for arm in ARMS if (case, arm.name) in wanted]
+        outcomes = run_case(room, arms, case, bench.out / "scenes", shared, keep=bench.parameters.keep)
+        for arm, made_of_it in zip(arms, outcomes, strict=True):
+            yield wanted[case, arm.name], made_of_it
+
+
+def held_out_library(bench: Bench) -> Path:
+    """Where the library stands that shares no shape with the rooms."""
+    return bench.out / "held_out_library"
+
+
+def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
+    """Make both libraries before rooms run beside each other."""
+    if not bench.parameters.as_is:
+        make_library(bench.parameters.maps / "rooms")
+    made("library build", held_out_library(bench), "--seed", HELD_OUT_SEED)
+
+
+def load_room(bench: Bench, name: str, *, with_maps: bool) -> Room:
+    """Read a room, and make what is missing of it and of its maps. Raises BadInput or StepFailed."""
+    parameters: SceneParameters = bench.parameters
+    rooms = parameters.maps / "rooms"
+    folder = room_at(rooms, name, parameters.frames)
+    if not (parameters.as_is and folder.ground_truth.is_dir() and folder.sequence.is_dir()):
+        folder = make_room(rooms, name, parameters.frames)
+    mapping = Bench(parameters.maps, MAPPING.parameters.model_validate({"frames": parameters.frames}), bench.quick)
+    trials = [Trial(arm, MASK_LEVEL, name) for arm in sorted({arm.map_arm for arm in ARMS})]
+    if with_maps and (code := measure_missing(MAPPING, mapping, trials, any_code=parameters.as_is)):
+        raise StepFailed(f"mapping of {name}", code)
+    sequence, artifact = opened(SequenceArtifact, folder.sequence), opened(GroundTruth, folder.ground_truth)
     world_from_log = np.array(sequence.info.gravity.world_from_log)
-    truth = load_truth(artifact, world_from_log, EvaluateParameters().minimum_visible_points)
-    return Room(folder.name, artifact, truth, world_from_log, maps, libraries)
+    truth = load_truth(artifact, world_from_log, OPTIONS.minimum_visible_points)
+    libraries = {
+        False: CadLibrary(rooms / "cad_library"),
+        True: CadLibrary(held_out_library(bench)),
+    }
+    maps = {trial.arm: mapping.folder(trial) / "panoptic_map" for trial in trials}
+    return Room(name, artifact, truth, world_from_log, maps, libraries)
 
 
 @dataclass(frozen=True)
@@ -99,9 +152,7 @@ class Shared:
         self.found: dict[tuple[str, Path, str], Found] = {}
 
 
-def run_case(
-    room: Room, arms: Sequence[Arm], case: str, scratch: Path, seed: int, shared: Shared, *, keep: bool
-) -> list[Outcome]:
+def run_case(room: Room, arms: Sequence[Arm], case: str, scratch: Path, shared: Shared, *, keep: bool) -> list[Outcome]:
     """Return the outcome of every arm. Artifacts are written under `scratch` and deleted again unless `keep`."""
     folder = scratch / room.name / case
     shutil.rmtree(folder, ignore_errors=True)
@@ -109,24 +160,22 @@ def run_case(
         perfect_map(room.truth_artifact, folder / "map")
     outcomes = []
     for arm in arms:
-        map_folder = folder / "map" if case == PERFECT else room.maps / MASK_LEVEL / arm.map_arm / "panoptic_map"
-        outcomes.append(_run_arm(room, arm, case, PanopticMap(map_folder), folder / arm.name, seed, shared))
+        map_folder = folder / "map" if case == PERFECT else room.maps[arm.map_arm]
+        outcomes.append(_run_arm(room, arm, case, PanopticMap(map_folder), folder / arm.name, shared))
     if not keep:
         shutil.rmtree(folder)
     return outcomes
 
 
-def _run_arm(
-    room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder: Path, seed: int, shared: Shared
-) -> Outcome:
+def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder: Path, shared: Shared) -> Outcome:
     library, method = room.libraries[case == HELD_OUT], arm.graph.method
     of_graph = (panoptic_map.root, method)
     if of_graph not in shared.graphs:
-        context = context_in(folder / "contact_graph", seed)
-        shared.graphs[of_graph] = build_graph(panoptic_map, parameters=arm.graph, context=context).graph
+        built = unrecorded("graph", folder / "contact_graph", arm.graph, seed=SEED, panoptic_map=panoptic_map)
+        shared.graphs[of_graph] = built.graph
     graph = shared.graphs[of_graph]
     key = (case, panoptic_map.root, arm.cad.method)
-    context = context_in(folder / "cad_scene", seed)
+    context = context_in(folder / "cad_scene", SEED)
     if key not in shared.found:
         surfaces: dict[str, ModelSurface] = {}
         start = time.process_time()
@@ -138,7 +187,7 @@ def _run_arm(
         graph, panoptic_map, library, found.shortlists, found.surfaces, parameters=arm.cad, context=context
     )
     seconds = found.seconds + time.process_time() - start
-    settled = settle(scene, folder / "interactive_scene", seed)
+    settled = settle(scene, folder / "interactive_scene")
     if panoptic_map.root not in shared.overlaps:
         shared.overlaps[panoptic_map.root] = overlaps_of(room.truth, panoptic_map)
     overlaps = shared.overlaps[panoptic_map.root]
@@ -148,7 +197,7 @@ def _run_arm(
         scene,
         world_from_log=room.world_from_log,
         overlaps=overlaps,
-        minimum_iou=EvaluateParameters().node_match_iou,
+        minimum_iou=OPTIONS.node_match_iou,
         library_models=library.path("models"),
     )
     assert measured is not None
@@ -161,9 +210,6 @@ def _run_arm(
         "conflicts_after": float(summary.conflicts_after),
     }
     return Outcome(
-        room=room.name,
-        arm=arm.name,
-        case=case,
         graph=distance,
         edges=edges,
         cad={**measured.summary, **extra},
@@ -173,22 +219,47 @@ def _run_arm(
     )
 
 
-def context_in(folder: Path, seed: int) -> Context:
-    """Return a context that writes into `folder`, which is made where it is missing, without a word."""
-    folder.mkdir(parents=True, exist_ok=True)
-    return Context(folder, seed=seed, device="cpu", progress=SilentProgress())
-
-
-def settle(scene: CadScene, folder: Path, seed: int) -> SettleReport:
+def settle(scene: CadScene, folder: Path) -> SettleReport:
     """Write the URDF scene and let it go."""
-    write_urdf(scene, parameters=UrdfParameters(), context=context_in(folder, seed))
+    unrecorded("urdf", folder, seed=SEED, cad_scene=scene)
     return settle_report(folder)
+
+
+def annotated_runs(real: Path | None) -> list[str]:
+    """Return the annotated logs whose map stands under `real` (`make real`), by name."""
+    names = sorted(file.stem for file in ANNOTATIONS.glob("*.json"))
+    return [name for name in names if real and (real / name / "panoptic_map" / "manifest.json").is_file()]
+
+
+def run_real(folder: Path, scratch: Path, arms: Sequence[Arm]) -> Iterator[tuple[str, Outcome]]:
+    """Yield arm and outcome for a log of `annotated_runs`.
+
+    All arms start from the one map that is there. No CAD model is true, so that only graph and physics are measured.
+    Raises BadInput when sequence, map or library of a run are broken.
+    """
+    annotation, map_folder = ANNOTATIONS / f"{folder.name}.json", folder / "panoptic_map"
+    told = ("--annotation", annotation, "--sequence", folder / "sequence", "--panoptic-map", map_folder)
+    truth_artifact = opened(GroundTruth, made("truth supports", scratch / "ground_truth", *told))
+    given: dict[str, Any] = {"panoptic_map": opened(PanopticMap, map_folder)}
+    truth = load_truth(truth_artifact, np.eye(4), OPTIONS.minimum_visible_points)
+    overlaps = overlaps_of(truth, given["panoptic_map"])
+    library = opened(CadLibrary, folder / "cad_library")
+    for arm in arms:
+        # `cad` takes every mesh that it finds in its folder for a thing of the scene, those of an earlier run too.
+        shutil.rmtree(scratch / arm.name, ignore_errors=True)
+        graph = unrecorded("graph", scratch / arm.name / "graph", arm.graph, seed=SEED, **given)
+        scene = unrecorded(
+            "cad", scratch / arm.name / "cad_scene", arm.cad, seed=SEED, contact_graph=graph, library=library, **given
+        )
+        settled = settle(scene, scratch / arm.name / "interactive_scene")
+        distance, edges = measure_graph(truth, graph.graph, overlaps)
+        yield arm.name, Outcome(distance, edges, physics=physics_of(settled), unsettled=what_moved(settled))
 
 
 def overlaps_of(truth: TrueRoom, panoptic_map: PanopticMap) -> dict[tuple[int, int], float]:
     """IoU of true and predicted instances over the true points that were seen (`point_overlaps`)."""
     predicted = load_map(panoptic_map)
-    labels = label_true_points(truth, predicted, EvaluateParameters().label_distance)
+    labels = label_true_points(truth, predicted, OPTIONS.label_distance)
     return point_overlaps(truth, labels, {entry.instance: entry.class_name for entry in predicted.info.entities})
 
 

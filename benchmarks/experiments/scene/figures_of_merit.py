@@ -6,12 +6,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from benchmarks.scene.experiment import Outcome
-from stages.kit.measurement.bootstrap import Interval, figure_interval, paired_interval
+from benchmarks.experiment import Measure
+from benchmarks.experiments.scene.measuring import Outcome
 
 Figure = Callable[[Sequence[Outcome]], float | None]
-RESAMPLES = 2000
-SEED_OF_INTERVALS = 0
 
 
 def edge_f1(relation: str) -> Figure:
@@ -43,6 +41,11 @@ def over_objects(name: str, weight: str = "true_objects") -> Figure:
         return sum((value or 0.0) * (count or 0.0) for value, count in pairs) / total if total else None
 
     return figure
+
+
+def _ratio(outcomes: Sequence[Outcome], part: str, whole: str) -> float | None:
+    total = sum(o.cad.get(whole) or 0.0 for o in outcomes)
+    return sum(o.cad.get(part) or 0.0 for o in outcomes) / total if total else None
 
 
 FIGURES: dict[str, Figure] = {
@@ -94,19 +97,4 @@ FIGURES: dict[str, Figure] = {
     "seconds_per_object": per_room("cad", "seconds_per_object", np.median),
 }
 """Name in metrics.json -> figure."""
-
-
-def _ratio(outcomes: Sequence[Outcome], part: str, whole: str) -> float | None:
-    total = sum(o.cad.get(whole) or 0.0 for o in outcomes)
-    return sum(o.cad.get(part) or 0.0 for o in outcomes) / total if total else None
-
-
-def interval(figure: Figure, outcomes: Sequence[Outcome]) -> Interval | None:
-    """Percentile bootstrap over rooms, 95 %; None where the figure is."""
-    return figure_interval(figure, outcomes, np.random.default_rng(SEED_OF_INTERVALS), resamples=RESAMPLES)
-
-
-def paired_difference(figure: Figure, first: Sequence[Outcome], second: Sequence[Outcome]) -> Interval | None:
-    """`first` minus `second` over the same rooms in the same order, with its 95 % interval; None where either is."""
-    random = np.random.default_rng(SEED_OF_INTERVALS)
-    return paired_interval(figure, first, second, random, resamples=RESAMPLES)
+MEASURES = {name: Measure(figure, interval=not name.startswith("seconds")) for name, figure in FIGURES.items()}
