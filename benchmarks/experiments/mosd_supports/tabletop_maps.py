@@ -13,23 +13,16 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from benchmarks.steps import opened, step
 from schemas.panoptic_map import PanopticMap
 from schemas.scene_parts import Camera
-from schemas.sequence import LabelEntry, Sequence
-from stages.fuse.parameters import FuseParameters
-from stages.fuse.stage import run as fuse
-from stages.ingest.parameters import IngestParameters
-from stages.ingest.stage import run as ingest
+from schemas.sequence import LabelEntry
 from stages.kit.formats.frames import FrameWriter
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.geometry.cameras import back_project, project
 from stages.kit.geometry.planes import ransac_plane
 from stages.kit.geometry.transforms import apply, inverse
-from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
-from stages.segment.parameters import SegmentParameters
-from stages.segment.stage import run as segment
 
 VOXEL_SIZE = 0.004
 """Metres; what rests on these tables is 2 to 30 cm high."""
@@ -73,29 +66,18 @@ def upright_pose(depth: np.ndarray, table: np.ndarray, camera: Camera, seed: int
     return pose
 
 
-def build_map(view: LabelledView, camera: Camera, backend: str, folder: Path) -> tuple[Sequence, PanopticMap]:
+def build_map(view: LabelledView, camera: Camera, backend: str, folder: Path) -> PanopticMap:
     """Write the frame as a log into `folder` and run the steps up to the map. `backend`: ground-truth or objects."""
     table = [LabelEntry(instance=k, class_name=name) for k, name in enumerate(view.classes, 1)]
     with FrameWriter(folder / "log.mcap", camera, labels=True, label_table=table) as writer:
         for k in range(REPEATS):
             writer.write(0.1 * k, view.color, view.depth, view.world_from_camera, view.nodes.astype(np.uint16))
-    sequence = ingest(folder / "log.mcap", parameters=IngestParameters(), context=context_in(folder / "sequence"))
-    segments = segment(
-        sequence,
-        parameters=SegmentParameters(backend=backend),
-        context=context_in(folder / "segments"),
-    )
-    made = fuse(
-        sequence, segments, parameters=FuseParameters(voxel_size=VOXEL_SIZE),
-        context=context_in(folder / "panoptic_map"),
+    sequence = step("ingest", folder / "sequence", log=folder / "log.mcap")
+    segments = step("segment", folder / "segments", {"backend": backend}, sequence=sequence)
+    fused = step(
+        "fuse", folder / "panoptic_map", {"voxel_size": VOXEL_SIZE}, sequence=sequence, segments=segments
     )  # fmt: skip
-    return sequence, made
-
-
-def context_in(folder: Path) -> Context:
-    """Return a context that writes into a new folder, with seed 0 and without a word."""
-    folder.mkdir(parents=True)
-    return Context(output=folder, seed=0, device="cpu", progress=SilentProgress())
+    return opened(PanopticMap, fused)
 
 
 def nodes_of_entities(panoptic_map: PanopticMap, view: LabelledView, camera: Camera) -> dict[int, int]:
