@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from stages.kit.measurement.average_precision import Candidates, ClassPrecision, class_precision, mean_precision, pool
+from benchmarks.experiments.mapping.figures_of_merit import pooled_curves
+from benchmarks.experiments.mapping.measuring import Outcome
+from stages.kit.measurement.average_precision import (
+    PrecisionRecall,
+    average_precision,
+    average_precision_thesis_code,
+    mean_precision,
+)
 from stages.kit.measurement.panoptic_quality import (
     ClassQuality,
     QualityAverage,
@@ -17,21 +24,8 @@ from stages.kit.measurement.panoptic_quality import (
 )
 from stages.kit.measurement.tables import Cell, Table
 
-PUBLISHED = Path(__file__).resolve().parent.parent / "expectations" / "thesis_mapping.toml"
+PUBLISHED = Path(__file__).resolve().parents[2] / "expectations" / "thesis_mapping.toml"
 ALL = "all"
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What one arm made of one scene, by class."""
-
-    scene: str
-    arm: str
-    qualities: Mapping[str, ClassQuality]
-    qualities_thesis_code: Mapping[str, ClassQuality]
-    instances: Mapping[str, Candidates]
-    boxes: Mapping[str, Candidates]
-    boxes_refined: Mapping[str, Candidates]
 
 
 @dataclass(frozen=True)
@@ -40,9 +34,9 @@ class Summary:
 
     qualities: Mapping[str, ClassQuality]
     qualities_thesis_code: Mapping[str, ClassQuality]
-    instances: Mapping[str, ClassPrecision]
-    boxes: Mapping[str, ClassPrecision]
-    boxes_refined: Mapping[str, ClassPrecision]
+    instances: Mapping[str, PrecisionRecall]
+    boxes: Mapping[str, PrecisionRecall]
+    boxes_refined: Mapping[str, PrecisionRecall]
 
 
 def read_published() -> dict[str, Any]:
@@ -59,9 +53,9 @@ def summarise(outcomes: Sequence[Outcome], classes: Sequence[str], things: Seque
             for name in classes
         }
 
-    def pooled(of: str) -> dict[str, ClassPrecision]:
-        found = {name: [g[name] for o in outcomes if name in (g := getattr(o, of))] for name in things}
-        return {name: class_precision(pool(scenes)) for name, scenes in found.items() if scenes}
+    def pooled(of: str) -> dict[str, PrecisionRecall]:
+        curves = pooled_curves(outcomes, of)
+        return {name: curves[name] for name in things if name in curves}
 
     return Summary(
         added("qualities"), added("qualities_thesis_code"),
@@ -94,20 +88,20 @@ def figures(summary: Summary, stuff: Sequence[str]) -> dict[str, float]:
     for measure, classes in (
         ("instance_ap", summary.instances), ("box_ap", summary.boxes), ("box_ap_refined", summary.boxes_refined)
     ):  # fmt: skip
-        for suffix, form in (("", "all_point"), ("_thesis_code", "thesis_code")):
-            by_class = {name: getattr(precision, form) for name, precision in classes.items()}
+        for suffix, form in (("", average_precision), ("_thesis_code", average_precision_thesis_code)):
+            by_class = {name: form(curve) for name, curve in classes.items()}
             values[f"{measure}{suffix}"] = mean_precision(list(by_class.values()))
             values |= {f"{measure}{suffix}_{name}": value for name, value in by_class.items()}
     return {name: value for name, value in values.items() if value is not None}
 
 
-def all_figures(outcomes: Sequence[Outcome], published: Mapping[str, Any]) -> dict[str, float]:
-    """Return `<arm>/<scene or all>/<measure>` -> share."""
+def all_figures(outcomes: Mapping[tuple[str, str], Outcome], published: Mapping[str, Any]) -> dict[str, float]:
+    """Return `<arm>/<scene or all>/<measure>` -> share, of outcomes by arm and scene."""
     stuff, things = published["stuff"], published["things"]
     metrics: dict[str, float] = {}
-    for arm in dict.fromkeys(outcome.arm for outcome in outcomes):
-        own = [outcome for outcome in outcomes if outcome.arm == arm]
-        for case, chosen in {ALL: own, **{outcome.scene: [outcome] for outcome in own}}.items():
+    for arm in dict.fromkeys(arm for arm, _ in outcomes):
+        own = {scene: outcome for (name, scene), outcome in outcomes.items() if name == arm}
+        for case, chosen in {ALL: list(own.values()), **{scene: [o] for scene, o in own.items()}}.items():
             summary = summarise(chosen, [*stuff, *things], things)
             metrics |= {f"{arm}/{case}/{name}": value for name, value in figures(summary, stuff).items()}
     return metrics
