@@ -70,6 +70,7 @@ def plates_world(plates: dict[str, list[Plate]]) -> PhysicsWorld:
     for name, entries in plates.items():
         record = SceneBody(
             name=name, class_name="furniture", movable=False, world_from_body=as_transform(np.eye(4)), mass=1.0,
+            world_from_reconstructed=None,
             box=Box(center=entries[0][0], size=entries[0][1]),
         )  # fmt: skip
         shapes = "".join(

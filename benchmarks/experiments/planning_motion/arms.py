@@ -10,7 +10,7 @@ from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
-from benchmarks.planning.motion_queries import CHAIN, MotionQuery
+from benchmarks.experiments.planning_motion.queries import CHAIN, MotionQuery
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.optimal import optimal_path

@@ -1,50 +1,47 @@
 """Tasks by name in generated rooms: in the exact scene, and in scenes reconstructed from images, executed in physics.
 
-`run` gives flat figures: `ours/<case>/<measure>` over all tasks and `<task>/<case>/<measure>`; `table` prints them.
-One of them is `task_result`. Seconds are of CPU, one process; rooms of a case are the same for every task.
+Figures are `ours/<case>/<measure>` over all tasks and `<task>/<case>/<measure>`. Seconds are of CPU, one process; rooms
+of a case are the same for every task.
 """
 
 from __future__ import annotations
 
-import json
-import multiprocessing
-import shutil
-import subprocess
-import sys
-import tempfile
+import os
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import get_args
 
 import numpy as np
 
-from benchmarks.planning.tamp_rooms import exact_room
+from benchmarks.experiment import Bench, Experiment, Trial
+from benchmarks.experiments.planning_tamp.rooms import exact_room
+from benchmarks.results import Results, seeds_line
+from benchmarks.steps import made, opened, unrecorded
+from benchmarks.tabulation import markdown, number
 from schemas.cad_library import CadLibrary
 from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
 from stages.kit.measurement.proportions import wilson_interval
 from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context
 from stages.kit.tasks.pddl import parse_domain, parse_problem
 from stages.kit.tasks.strips import positive_task
 from stages.kit.tasks.task_planner import plan_task
-from stages.plan.parameters import PlanParameters
-from stages.plan.stage import run as run_plan
 from stages.plan.tasks import TaskName
 
 TASKS: tuple[TaskName, ...] = get_args(TaskName)
 EXACT, RECONSTRUCTED = "tamp_exact", "tamp_reconstructed"
 CASES = (EXACT, RECONSTRUCTED)
 RECIPE = "household"
-TUNING, REPORTING = range(0, 500), range(1050, 2000)
+ROOMS, QUICK_ROOMS = 50, 2
+TUNING, REPORTING = range(0, ROOMS), range(1050, 1050 + ROOMS)
 """Counts of successes in rooms 1000 to 1018 were seen before the last changes to `plan`: they do not report."""
 FRAMES = 120
+LIBRARY_SEED = 1
 CHAIN: tuple[tuple[str, str, dict[str, str], tuple[str, ...]], ...] = (
     ("ingest", "sequence", {"log": "ground_truth/log.mcap"}, ()),
     ("segment", "segments", {"sequence": "sequence"}, ("--backend", "ground-truth", "--corruption", "0.2")),
@@ -87,26 +84,22 @@ class _CpuProgress(SilentProgress):
 
 
 def plan_room(
-    scene: InteractiveScene, truth: GroundTruth | None, task: TaskName, case: str, seed: int, folder: Path,
-    **options: object,
-) -> RoomResult:  # fmt: skip
+    scene: InteractiveScene, truth: GroundTruth | None, trial: Trial, folder: Path, **options: object
+) -> RoomResult:
     """Plan a task in a scene and execute it, in the true room where that is given; the artifact goes to `folder`."""
-    folder.mkdir(parents=True)
     progress = _CpuProgress()
-    parameters = PlanParameters.model_validate({"task": task, "video_rate": 0.0, "image_width": 64} | options)
-    plan = run_plan(
-        scene, truth, parameters=parameters, context=Context(output=folder, seed=seed, device="cpu", progress=progress)
-    )
-    found = plan.plan
+    parameters = {"task": trial.arm, "video_rate": 0.0, "image_width": 64} | options
+    inputs = {"scene": scene} | ({} if truth is None else {"ground_truth": truth})
+    found = unrecorded("plan", folder, parameters, seed=int(trial.seed), progress=progress, **inputs).plan
     success = found.status == "executed"
     reason = "" if success else found.failures[-1].kind if found.failures else found.status
     seconds = {name: value for name, value in progress.seconds.items() if name in ("load the scene", "plan", "execute")}
     if found.goal:
         seconds["task search"] = _search_seconds(folder)
+    rounded = {name: round(value, 3) for name, value in seconds.items()}
     return RoomResult(
-        task, case, seed, success, found.status, reason, len(found.actions),
-        {name: round(value, 3) for name, value in seconds.items()},
-    )  # fmt: skip
+        trial.arm, trial.case, int(trial.seed), success, found.status, reason, len(found.actions), rounded
+    )
 
 
 def _search_seconds(folder: Path) -> float:
@@ -119,66 +112,42 @@ def _search_seconds(folder: Path) -> float:
 
 
 def reconstructed_room(library: Path, seed: int, folder: Path) -> tuple[InteractiveScene, GroundTruth]:
-    """Record the room of a seed and reconstruct it, each step as its own process; what is there already stays.
-
-    Raises BadInput with the last line of what a step said when it fails.
-    """
-    made = InteractiveScene(folder / "interactive_scene"), GroundTruth(folder / "ground_truth")
-    if (folder / "interactive_scene" / "scene.json").is_file():
-        return made
+    """Record the room of a seed and reconstruct it, each step as its own process. Raises StepFailed."""
     wishes = ("--recipe", RECIPE, "--frames", str(FRAMES), "--seed", str(seed), "library")
     for command, name, inputs, options in (("synthesize", "ground_truth", {}, wishes), *CHAIN):
-        words = [sys.executable, "-m", "cli", command, "--out", str(folder / name)]
+        words: list[object] = []
         for option, source in inputs.items():
-            words += [f"--{option}", str(folder / source)]
+            words += [f"--{option}", folder / source]
         for option in options:
-            words += ["--library", str(library)] if option == "library" else [option]
-        done = subprocess.run(words, capture_output=True, text=True, check=False)
-        if done.returncode not in (0, 4):
-            said = done.stderr.strip().splitlines()[-1:] or ["nothing"]
-            raise BadInput(f"{command} of room {seed}: {said[0]}")
-    return made
+            words += ["--library", library] if option == "library" else [option]
+        made(command, folder / name, *words)
+    return opened(InteractiveScene, folder / "interactive_scene"), opened(GroundTruth, folder / "ground_truth")
 
 
-def task_result(case: str, seed: int, task: TaskName, library: Path, folder: Path) -> RoomResult:
-    """Return the result of a task in the room of one seed; a second call reads `<task>.json` of the first."""
-    done = folder / f"{task}.json"
-    if done.is_file():
-        return RoomResult(**json.loads(done.read_text(encoding="utf-8")))
+def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
+    """Make the library."""
+    made("library build", bench.out / "cad_library", "--seed", LIBRARY_SEED)
+
+
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, RoomResult]]:
+    """Yield the results of the tasks in the room of one seed; a room that cannot be made is a result too."""
+    case, seed = trials[0].case, int(trials[0].seed)
+    library, folder = bench.out / "cad_library", bench.out / "rooms" / case / str(seed)
     try:
         scene, truth = _room(case, seed, library, folder)
     except BadInput as error:
-        print(f"room {seed}: {error}", file=sys.stderr)
-        return RoomResult(task, case, seed, False, "infeasible", "no_room", 0, {})
-    with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        plan = Path(scratch) / "plan"
-        result = plan_room(scene, truth, task, case, seed, plan)
-        shutil.copy(plan / "plan.json", folder / f"{task}.plan.json")
-    print(f"{case} {seed} {task}: {result.status} {result.reason}", file=sys.stderr, flush=True)
-    done.write_text(json.dumps(asdict(result), indent=1) + "\n", encoding="utf-8")
-    return result
+        print(f"room {seed}: {error}")
+        for trial in trials:
+            yield trial, RoomResult(trial.arm, case, seed, False, "infeasible", "no_room", 0, {})
+        return
+    for trial in trials:
+        yield trial, plan_room(scene, truth, trial, bench.folder(trial) / "plan")
 
 
 def _room(case: str, seed: int, library: Path, folder: Path) -> tuple[InteractiveScene, GroundTruth | None]:
     if case == RECONSTRUCTED:
         return reconstructed_room(library, seed, folder / "chain")
-    if not (folder / "room" / "scene.json").is_file():
-        exact_room(CadLibrary(library), RECIPE, seed, folder / "room", shut=True)
-    return InteractiveScene(folder / "room"), None
-
-
-def run(
-    library: Path, folder: Path, *, seeds: Sequence[int], cases: Sequence[str] = CASES,
-    tasks: Sequence[TaskName] = TASKS, jobs: int = 1,
-) -> dict[str, float]:  # fmt: skip
-    """Return the figures over the rooms of some seeds, `jobs` of them at a time; rooms and results go to `folder` and
-    are used again."""
-    units = [(case, seed, task) for case in cases for seed in seeds for task in tasks]
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-        found = [
-            pool.submit(task_result, case, seed, task, library, folder / case / str(seed)) for case, seed, task in units
-        ]
-        return figures([unit.result() for unit in found])
+    return exact_room(CadLibrary(library), RECIPE, seed, folder / "room", shut=True), None
 
 
 def figures(results: Sequence[RoomResult]) -> dict[str, float]:
@@ -215,30 +184,55 @@ def figures(results: Sequence[RoomResult]) -> dict[str, float]:
     return metrics
 
 
-def table(metrics: dict[str, float]) -> str:
+def table(results: Results) -> str:
+    """Return table.md."""
+    return seeds_line(results) + "\n" + table_of(figures(list(results.records.values())))
+
+
+def table_of(metrics: Mapping[str, float]) -> str:
     """Return the figures as a Markdown table, a row per task and case."""
-    lines = [
-        "| task | case | rooms | with a goal | success | actions | task search [s] | planning [s] | execution [s] "
-        "| failed by |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-    ]
+    rows = []
     for key in sorted({"/".join(name.split("/")[:2]) for name in metrics}):
-        task, case = key.split("/")
-
-        def cell(measure: str, key: str = key) -> str:
-            value = metrics.get(f"{key}/{measure}")
-            return "" if value is None else f"{value:g}"
-
         failed = f"{key}/failed_"
         reasons = {name.removeprefix(failed): count for name, count in metrics.items() if name.startswith(failed)}
         words = ", ".join(f"{name} {count:g}" for name, count in sorted(reasons.items(), key=lambda entry: -entry[1]))
-        success = metrics.get(f"{key}/success")
         share = ""
-        if success is not None:
+        if (success := metrics.get(f"{key}/success")) is not None:
             low, high = (100 * metrics[f"{key}/success_{end}"] for end in ("low", "high"))
             share = f"{100 * success:.0f} % ({low:.0f} to {high:.0f})"
-        lines.append(
-            f"| {task} | {case} | {cell('rooms')} | {cell('goals')} | {share} | {cell('actions')} | "
-            f"{cell('seconds_task_search')} | {cell('seconds_plan')} | {cell('seconds_execute')} | {words} |"
-        )
-    return "\n".join([*lines, ""])
+        seconds = (number(metrics.get(f"{key}/seconds_{part}"), 3) for part in ("task_search", "plan", "execute"))
+        counts = (number(metrics.get(f"{key}/{name}"), 0) for name in ("rooms", "goals"))
+        actions = number(metrics.get(f"{key}/actions"))
+        rows.append((*key.split("/"), *counts, share, actions, *seconds, words))
+    head = ("task", "case", "rooms", "with a goal", "success", "actions", "task search [s]", "planning [s]",
+            "execution [s]", "failed by")  # fmt: skip
+    return markdown("", head, rows)
+
+
+def more_figures(results: Results) -> dict[str, float | None]:
+    """All figures: what counts as a try depends on all cases of a room."""
+    return dict(figures(list(results.records.values())))
+
+
+EXPERIMENT = Experiment(
+    name="planning_tamp",
+    title="Tasks by name, planned and executed",
+    simulated="Rooms, robot, execution in physics; in the reconstructed case the log too, with masks that are the true "
+    "ones with errors of level 0.2.",
+    knows="The scene: exact, or as it was reconstructed.",
+    does_not_show="Execution on a robot, or perception while it acts.",
+    arms={task: task for task in TASKS},
+    cases=CASES,
+    tuning=tuple(map(str, TUNING)),
+    reporting=tuple(map(str, REPORTING)),
+    together=lambda trial: (trial.case, trial.seed),
+    measure=measure,
+    record=RoomResult,
+    measures={},
+    more_figures=more_figures,
+    quick_seeds=QUICK_ROOMS,
+    jobs=min(2, os.cpu_count() or 1),
+    prepare=prepare,
+    steps=("library build", "synthesize", "plan", *(command for command, *_ in CHAIN)),
+    table=table,
+)
