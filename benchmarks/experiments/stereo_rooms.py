@@ -1,31 +1,43 @@
-"""`make bench-reconstruct-stereo`: rooms reconstructed from two eyes, beside the same rooms seen by a depth camera.
-
-    python -m benchmarks.disparity.reconstruction --out FOLDER [--seeds N ...] [--quick]
+"""Rooms reconstructed from two eyes, beside the same rooms seen by a depth camera.
 
 Both arms run the pipeline `reconstruct-stereo` to its evaluation: same room, walk, masks and voxels. `depth_camera`
 gets the log of a simulated structured-light camera instead of the right eye. Depth is compared with the exact depth of
-the same frames. Writes metrics.json (`<arm>/room_<seed>/<measure>`) and table.md; a stopped run goes on.
+the same frames.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
+import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 
-from benchmarks.disparity.rendered_pairs import made
+from benchmarks.experiment import Bench, Experiment, Trial, only
+from benchmarks.results import Results
+from benchmarks.steps import StepFailed, made
+from benchmarks.tabulation import markdown
 from stages.engine.chain import run_pipeline
 from stages.engine.pipelines import Pipeline, pipeline_path, read_pipeline
 from stages.kit.formats.frames import FrameReader
+from stages.kit.stage import Parameters
 
-ARMS = ("two_eyes", "depth_camera")
-SEEDS, QUICK_SEEDS = (1100,), (100,)
-"""A reporting seed, and a tuning seed that proves that the comparison runs."""
-GIVEN = {"frames": "60"}
-"""Variables of the pipeline that are not its defaults."""
-QUICK = {"frames": "12", "width": "320", "height": "240", "clutter": "low"}
+TUNING, REPORTING = ("100",), ("1100",)
+"""A tuning seed that proves that the comparison runs, and a reporting seed."""
+CASE = "room_"
+
+
+class StereoRoomsParameters(Parameters):
+    """Options of the experiment: variables of the pipeline."""
+
+    frames: int = Field(60, ge=2, description="Frames of a room")
+    width: int = Field(0, ge=0, description="Image width [px]; 0: that of the pipeline")
+    height: int = Field(0, ge=0, description="Image height [px]; 0: that of the pipeline")
+    clutter: str = Field("", description="How much lies about; empty: as in the pipeline")
+
+
 FARTHEST = 4.0
 """Depth is compared up to here [m], where the pipeline ends; its error grows with its square."""
 MEASURES = {
@@ -65,14 +77,12 @@ def pipeline_of(arm: str) -> Pipeline:
     return pipeline.model_copy(update={"step": tuple(steps)})
 
 
-def exact_depth(folder: Path, run: Path, seed: int, given: dict[str, str]) -> Path:
-    """Return a sequence of the room of a run whose depth is exact."""
+def exact_depth(folder: Path, library: Path, seed: str, given: dict[str, str]) -> Path:
+    """Return a sequence of a room whose depth is exact."""
     values = {name: variable.default for name, variable in pipeline_of("two_eyes").variables.items()} | given
     options = [f"--{name}={values[name]}" for name in ("recipe", "clutter", "frames", "width", "height")]
-    made(["synthesize", "--library", str(run / "cad_library"), *options, "--seed", str(seed), "--no-depth-noise",
-          "--out", str(folder / "truth")])  # fmt: skip
-    made(["ingest", "--log", str(folder / "truth" / "log.mcap"), "--out", str(folder / "sequence")])
-    return folder / "sequence"
+    truth = made("synthesize", folder / "truth", "--library", library, *options, "--seed", seed, "--no-depth-noise")
+    return made("ingest", folder / "sequence", "--log", truth / "log.mcap")
 
 
 def depth_figures(sequence: Path, exact: Path, every: int = 5) -> dict[str, float]:
@@ -97,51 +107,56 @@ def depth_figures(sequence: Path, exact: Path, every: int = 5) -> dict[str, floa
     }
 
 
-def measured(folder: Path, seed: int, given: dict[str, str]) -> dict[str, dict[str, float]]:
-    """Run both arms on a room and return arm -> measure -> value. Raises RuntimeError when a step fails."""
-    found = {}
-    for arm in ARMS:
-        run = folder / arm
-        reports = run_pipeline(pipeline_of(arm), run, given | {"seed": str(seed)}, announce=print)
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, dict[str, float]]]:
+    """Run the arms on a room and yield their figures. Raises StepFailed."""
+    given = {name: str(value) for name, value in bench.parameters.model_dump().items() if value}
+    for trial in trials:
+        run = bench.out / trial.case / trial.arm
+        reports = run_pipeline(pipeline_of(trial.arm), run, given | {"seed": trial.seed}, announce=_say)
         if reports[-1].exit_code != 0:
-            raise RuntimeError(f"{arm}, seed {seed}: {reports[-1].name} ended with {reports[-1].exit_code}")
+            raise StepFailed(f"{trial}: {reports[-1].name}", reports[-1].exit_code)
         metrics = json.loads((run / "evaluation" / "metrics.json").read_text())["metrics"]
-        figures = depth_figures(run / "sequence", exact_depth(folder, run, seed, given))
-        for measure in MEASURES:
-            if measure in metrics and metrics[measure] is not None:
-                figures[measure] = (100 if measure in SHARES else 1) * metrics[measure]
-        found[arm] = {measure: round(value, 4) for measure, value in figures.items()}
-    return found
+        exact = exact_depth(bench.out / trial.case, run / "cad_library", trial.seed, given)
+        figures = depth_figures(run / "sequence", exact)
+        for name in MEASURES:
+            if metrics.get(name) is not None:
+                figures[name] = (100 if name in SHARES else 1) * metrics[name]
+        yield trial, {name: round(value, 4) for name, value in figures.items()}
 
 
-def table(metrics: dict[str, float]) -> str:
-    """Return the table of all rooms, in Markdown."""
-    rooms = sorted({key.split("/")[1] for key in metrics}, key=lambda name: int(name.removeprefix("room_")))
-    heads = [f"{room.replace('_', ' ')}, {arm.replace('_', ' ')}" for room in rooms for arm in ARMS]
-    lines = ["| | " + " | ".join(heads) + " |", "|---|" + "---|" * len(heads)]
-    for measure, words in MEASURES.items():
-        values = [metrics.get(f"{arm}/{room}/{measure}") for room in rooms for arm in ARMS]
-        lines.append(f"| {words} | " + " | ".join("-" if v is None else f"{v:.3g}" for v in values) + " |")
-    return "\n".join(lines) + "\n"
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
 
 
-def main() -> None:
-    """Run both arms on every room."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--seeds", type=int, nargs="+")
-    parser.add_argument("--quick", action="store_true", help="one room, few small frames")
-    options = parser.parse_args()
-    given = QUICK if options.quick else GIVEN
-    kept = options.out / "metrics.json"
-    metrics: dict[str, float] = json.loads(kept.read_text()) if kept.exists() else {}
-    for seed in options.seeds or (QUICK_SEEDS if options.quick else SEEDS):
-        for arm, figures in measured(options.out / f"room_{seed}", seed, given).items():
-            metrics |= {f"{arm}/room_{seed}/{measure}": value for measure, value in figures.items()}
-        kept.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
-        (options.out / "table.md").write_text(table(metrics))
-    print(table(metrics))
+def table(results: Results) -> str:
+    """Return table.md: a column a room and arm."""
+    columns = list(results.records)
+    rows = []
+    for name, words in MEASURES.items():
+        values = [results.value(trial.arm, trial.case, name) for trial in columns]
+        rows.append((words, *("-" if value is None else f"{value:.3g}" for value in values)))
+    heads = [f"{trial.case.replace('_', ' ')}, {trial.arm.replace('_', ' ')}" for trial in columns]
+    return markdown("", ("", *heads), rows)
 
 
-if __name__ == "__main__":
-    main()
+EXPERIMENT = Experiment(
+    name="stereo_rooms",
+    title="Rooms from two eyes and from a depth camera",
+    simulated="Rooms, walks, pictures, the depth camera's noise; masks are those of the pipeline.",
+    knows="Two rectified pictures, or colour and depth; true poses.",
+    does_not_show="Calibration errors of a real rig; one room has no interval.",
+    arms={"two_eyes": "two eyes", "depth_camera": "depth camera"},
+    cases=tuple(f"{CASE}{seed}" for seed in (*TUNING, *REPORTING)),
+    default_cases=lambda bench: [f"{CASE}{seed}" for seed in (TUNING if bench.tuning or bench.quick else REPORTING)],
+    tuning=TUNING,
+    reporting=REPORTING,
+    seeds_of=lambda bench, case: [case.removeprefix(CASE)],
+    together=lambda trial: trial.case,
+    measure=measure,
+    record=dict[str, float],
+    measures={name: only(name) for name in MEASURES},
+    parameters=StereoRoomsParameters,
+    quick={"frames": 12, "width": 320, "height": 240, "clutter": "low"},
+    keeps=False,
+    table=table,
+)
