@@ -131,8 +131,8 @@ class Experiment:
     """Measures of the differences."""
     more_figures: Callable[[Results], Mapping[str, float | None]] | None = None
     """Further `<arm>/<case>/<measure>` -> value, without intervals."""
-    table: Callable[[Results], str] | None = None
-    """table.md; by default all measures, then the differences."""
+    notes: Callable[[Results], str] | None = None
+    """What table.md says after the figures, the differences and the single seeds."""
     pictures: Callable[[Results], None] | None = None
     """Draws and writes into the output folder what table.md does not hold."""
     problems: Callable[[Results], Sequence[str]] | None = None

@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 
 from benchmarks.experiment import Bench, Experiment, Trial
-from benchmarks.tabulation import differences_table, figures_table
+from benchmarks.tabulation import grid
 from stages.kit.measurement.bootstrap import Interval, figure_interval, paired_interval
 
 RESAMPLES = 2000
 SEED_OF_INTERVALS = 0
 LEAST_CLUSTERS = 2
 """With fewer there is nothing to resample."""
+MOST_COLUMNS, MOST_SEEDS = 8, 200
 RUNNING = "trials"
 """`all/<case>/trials`: how many seeds a case ran on."""
 
@@ -153,7 +154,7 @@ def write_results(results: Results, command: Sequence[str], missing: Sequence[Tr
     out.mkdir(parents=True, exist_ok=True)
     _write(out / "metrics.json", {name: figure.value for name, figure in figures.items()})
     _write(out / "figures.json", described(results.experiment, figures, command))
-    text = (results.experiment.table or default_table)(results)
+    text = table(results, figures)
     if missing:
         text += f"\nNot measured: {', '.join(map(str, missing))}.\n"
     (out / "table.md").write_text(text, encoding="utf-8")
@@ -178,10 +179,53 @@ def described(experiment: Experiment, figures: Mapping[str, Figure], command: Se
     }
 
 
-def default_table(results: Results) -> str:
-    """All measures of all arms and cases, then the differences."""
-    parts = [figures_table(results, case, list(results.experiment.measures)) for case in results.cases]
-    return "\n".join([seeds_line(results), *parts, differences_table(results)])
+def table(results: Results, figures: Mapping[str, Figure]) -> str:
+    """Return table.md: every figure of every arm and case, differences, single seeds, and what the experiment adds."""
+    parts, shown = [seeds_line(results)], set()
+    one_arm = len(results.arms()) == 1
+    together: dict[tuple[str, str], Figure] = {}
+    for case in results.cases:
+        by_arm: dict[tuple[str, str], Figure] = {}
+        for arm in results.arms(case):
+            for name in (name for name in figures if name.startswith(f"{arm}/{case}/")):
+                measure = name.removeprefix(f"{arm}/{case}/")
+                if any(f"{measure.split('/')[0]}" == other.removeprefix(f"{case}/") for other in results.cases):
+                    continue  # of a case that is named for a part of this one
+                shown.add(name)
+                by_arm[measure, results.experiment.arms[arm]] = together[measure, case] = figures[name]
+        if not one_arm:
+            parts.append(grid(case, "measure", by_arm))
+    if one_arm:
+        wide = len(results.cases) > MOST_COLUMNS
+        parts.append(grid("", "", {(k[::-1] if wide else k): figure for k, figure in together.items()}))
+    rest = {tuple(name.rsplit("/", 1)): figure for name, figure in figures.items() if name not in shown}
+    further = {(key[0], key[1]): figure for key, figure in rest.items() if key[1] != RUNNING}
+    parts += [grid("Further figures", "", further)] if further else []
+    parts += [differences_table(results), seeds_table(results)]
+    parts += [results.experiment.notes(results)] if results.experiment.notes else []
+    return "\n".join(part for part in parts if part)
+
+
+def differences_table(results: Results) -> str:
+    """Return the differences that the experiment declares, case by case."""
+    found: dict[tuple[str, str], Figure] = {}
+    for case in results.cases:
+        for first, second in results.experiment.pairs:
+            for name in results.experiment.compared:
+                if (d := results.difference(first, second, case, name)) is not None:
+                    found[f"{case}: {first} – {second}", name] = Figure(d.value, d.low, d.high, None, "")
+    return grid("Differences on the same seeds (95 %)", "case, arms", found) if found else ""
+
+
+def seeds_table(results: Results) -> str:
+    """Return the compared measures of every seed by itself."""
+    found: dict[tuple[str, str], Figure] = {}
+    for trial, record in results.records.items():
+        for name in results.experiment.compared:
+            if (value := results.experiment.measures[name].of([record])) is not None:
+                row = f"{trial.case}, {trial.seed}"
+                found[row, f"{trial.arm}: {name}"] = Figure(value, None, None, 1, "")
+    return grid("Seed by seed", "case, seed", found) if len({row for row, _ in found}) in range(2, MOST_SEEDS) else ""
 
 
 def seeds_line(results: Results) -> str:

@@ -14,9 +14,8 @@ from benchmarks.experiment import Bench, Experiment, Measure, Trial, statistic
 from benchmarks.generated_rooms import STEPS, make_room
 from benchmarks.graph_scores import RELATIONS, distance_figures, judge, read_room
 from benchmarks.perfect_maps import perfect_map
-from benchmarks.results import Results, seeds_line
+from benchmarks.results import Results
 from benchmarks.steps import opened, unrecorded
-from benchmarks.tabulation import figures_table, markdown, number
 from schemas.contact_graph import ContactGraphFile
 from schemas.kinds import GroundTruth
 from schemas.scene_parts import Relation
@@ -168,23 +167,6 @@ def differences(room: TrueRoom, comparison: GraphComparison) -> list[str]:
     ]
 
 
-def table(results: Results) -> str:
-    """Return table.md: edges by relation, then the edit distance room by room."""
-    parts = [seeds_line(results)]
-    for case in results.cases:
-        parts.append(figures_table(results, case, [f"{name}_f1" for name in COUNTED]))
-        own = {arm: results.of(arm, case) for arm in results.arms(case)}
-        rows = [(name, *(" / ".join(map(str, pooled(records, name))) for records in own.values())) for name in COUNTED]
-        parts.append(markdown(f"{case}: true / predicted / agreed edges", ("relation", *own), rows))
-    rows = []
-    for trial, record in results.records.items():
-        f = record.figures
-        exact = "exact" if f["edit_distance_exact"] else "bound"
-        rows.append((trial.seed, trial.arm, exact, number(f["edit_distance"], 0), number(f["support_f1"], 3)))
-    parts.append(markdown("Studio by studio", ("studio", "arm", "search", "edit distance", "support F1"), rows))
-    return "\n".join(parts)
-
-
 def write_wrong(results: Results) -> None:
     """Write wrong.md."""
     lines = ["| method | room | relation | source | target | |", "|:--|:--|:--|:--|:--|:--|"]
@@ -213,6 +195,5 @@ EXPERIMENT = Experiment(
     steps=("graph", *STEPS),
     pairs=(("ours", "thesis"),),
     compared=("all_f1", "edit_distance"),
-    table=table,
     pictures=write_wrong,
 )

@@ -21,7 +21,6 @@ from benchmarks.generated_rooms import STEPS, RoomFolder, make_room
 from benchmarks.graph_scores import OPTIONS, Figures, distance_figures, judge, read_room
 from benchmarks.results import Results
 from benchmarks.steps import made, opened, unrecorded
-from benchmarks.tabulation import markdown, number
 from schemas.contact_graph import ContactGraphFile
 from schemas.kinds import PanopticMap, Segments
 from schemas.kinds import Sequence as SequenceArtifact
@@ -128,32 +127,6 @@ def more_figures(results: Results) -> Figures:
     return flat
 
 
-def table(results: Results) -> str:
-    """Return table.md."""
-    columns = ("nodes", "edit_distance", "wrong_support", "missing_detection", "wrong_detection")
-    rows = [
-        (trial.case, str(frames), *(number(f[name], 0) for name in columns), number(f["support_f1"], 3),
-         number(f["changes"], 0))
-        for trial, growth in results.records.items()
-        for frames, f in growth.figures.items()
-    ]  # fmt: skip
-    head = (
-        "room",
-        "frames",
-        "nodes",
-        "edit distance",
-        "wrong supports",
-        "missing",
-        "wrong",
-        "any-parent F1",
-        "changes",
-    )
-    costs = ("fuse_seconds_without", "graph_seconds_without", "fuse_seconds_a_snapshot", "graph_seconds_a_snapshot")
-    spent = [(t.case, *(number(g.costs[name], 2) for name in costs)) for t, g in results.records.items()]
-    cost_head = ("room", "fuse [s]", "graph [s]", "snapshot in fuse [s]", "its graph [s]")
-    return markdown("While the map grows", head, rows) + "\n" + markdown("Processor time", cost_head, spent)
-
-
 def plot(results: Results) -> None:
     """Draw the edit distance (lines) and the nodes (dashed) over the frames."""
     with plt.rc_context(STYLE):
@@ -187,6 +160,5 @@ EXPERIMENT = Experiment(
     parameters=TimelineParameters,
     places=frozenset({"rooms"}),
     steps=("segment", "fuse", "graph", *STEPS),
-    table=table,
     pictures=plot,
 )

@@ -18,10 +18,9 @@ import numpy as np
 from pydantic import Field
 
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, count, mean, median
-from benchmarks.mosd_frames import CAMERA, FOLDER, KINDS, LabelledFrame, frame_files, frame_names, kind_of, read_frame
+from benchmarks.mosd_frames import CAMERA, FOLDER, LabelledFrame, frame_files, frame_names, kind_of, read_frame
 from benchmarks.object_masks import score_object_masks
-from benchmarks.results import Results, default_table
-from benchmarks.tabulation import markdown, number
+from benchmarks.results import Results
 from stages.kit.drawing.palette import instance_color
 from stages.kit.stage import Parameters
 from stages.segment.objects.backend import BUNDLED
@@ -133,23 +132,19 @@ MEASURES = {name: mean(name) for name in SHARES} | {
 }
 
 
-def table(results: Results) -> str:
-    """Return table.md: all measures, then kinds of scene."""
-    parts = [default_table(results)]
+def more_figures(results: Results) -> dict[str, float | None]:
+    """Figures by kind of scene."""
+    flat: dict[str, float | None] = {}
     for case in results.cases:
-        kinds = [kind for kind in KINDS[case] if any(kind_of(case, name) == kind for name in results.seeds(case))]
-        rows = []
         for arm in results.arms(case):
-            cells = []
-            for kind in kinds:
-                own = [r for name in results.seeds(case) if kind_of(case, name) == kind
-                       and (r := results.get(arm, case, name))]  # fmt: skip
-                values = [MEASURES[name].of(own) for name in ("overlap_f", "boundary_f", "right_count")]
-                cells.append(f"{' / '.join(number(value, 3) for value in values)} ({len(own)})")
-            rows.append((arm, *cells))
-        parts.append(markdown(f"{case}: overlap F / boundary F / right number (frames)", ("arm", *kinds), rows))
-    parts.append("`learn` helped to fit `geometric` and to train `ours`, `test` did neither.\n")
-    return "\n".join(parts)
+            kinds: dict[str, list[FrameScore]] = {}
+            for name in results.seeds(case):
+                if (score := results.get(arm, case, name)) is not None:
+                    kinds.setdefault(kind_of(case, name), []).append(score)
+            for kind, scores in kinds.items():
+                own = {name: MEASURES[name].of(scores) for name in ("overlap_f", "boundary_f", "right_count", "frames")}
+                flat |= {f"{arm}/{case}_{kind.replace(' ', '_')}/{name}": value for name, value in own.items()}
+    return flat
 
 
 def _painted(frame: LabelledFrame, labels: np.ndarray | None, text: str) -> np.ndarray:
@@ -216,6 +211,6 @@ EXPERIMENT = Experiment(
     inputs=inputs,
     pairs=(("ours", "geometric"), ("ours", "plain")),
     compared=("overlap_f", "boundary_f", "right_count"),
-    table=table,
+    more_figures=more_figures,
     pictures=write_sheet,
 )

@@ -25,9 +25,8 @@ from benchmarks.experiment import Bench, Experiment, Measure, Trial
 from benchmarks.generated_rooms import REPORTING, STEPS, make_room
 from benchmarks.mosd_frames import CAMERA, FOLDER, frame_files, frame_names, read_frame
 from benchmarks.object_masks import score_object_masks
-from benchmarks.results import Results, seeds_line
+from benchmarks.results import Results
 from benchmarks.steps import made, opened
-from benchmarks.tabulation import figures_table, markdown, number, percent
 from schemas.kinds import Sequence as SequenceArtifact
 from schemas.scene_parts import Camera
 from schemas.vocabulary import load_vocabulary
@@ -342,33 +341,6 @@ def more_figures(results: Results) -> dict[str, float | None]:
     return flat
 
 
-def table(results: Results) -> str:
-    """Return table.md."""
-    parts = [seeds_line(results)]
-    if ROOMS in results.cases:
-        arms = results.arms(ROOMS)
-        parts.append(figures_table(results, ROOMS, ("pq", "sq", "rq"), digits=1, scale=100.0))
-        sums = {arm: summed(results.of(arm, ROOMS)) for arm in arms}
-        names = sorted({name for by_class in sums.values() for name in by_class})
-        rows = []
-        for name in names:
-            own = sums[arms[0]].get(name, ClassQuality())
-            cells = [percent(by_class.get(name, ClassQuality()).pq) for by_class in sums.values()]
-            rows.append((f"{name} ({own.true_positives + own.false_negatives})", *cells))
-        parts.append(markdown("PQ per class (true segments over all frames in brackets)", ("class", *arms), rows))
-        speed = (number(results.value(arms[0], ROOMS, name), 2) for name in ("frames_per_second",))
-        parts.append(f"{' '.join(speed)} frames/s for the network and its grouping ({arms[0]}).\n")
-    if CLOUDS in results.cases:
-        parts.append(figures_table(results, CLOUDS, SCORES, digits=1, scale=100.0))
-    for case in results.cases:
-        if case in LOGS:
-            masks = {arm: results.of(arm, case)[0].masks for arm in results.arms(case)}
-            classes = sorted({name for counts in masks.values() for name in counts})
-            rows = [(arm, *(f"{counts.get(name, 0):.2f}" for name in classes)) for arm, counts in masks.items()]
-            parts.append(markdown(f"{case}: masks a frame", ("masks", *classes), rows))
-    return "\n".join(parts)
-
-
 EXPERIMENT = Experiment(
     name="network",
     title="Our own segmentation network",
@@ -390,5 +362,4 @@ EXPERIMENT = Experiment(
     quick={"frames": 6, "thinned": 4},
     inputs=inputs,
     steps=STEPS,
-    table=table,
 )

@@ -25,7 +25,6 @@ from benchmarks.experiments.mapping.drift import drifting_poses
 from benchmarks.generated_rooms import STEPS
 from benchmarks.results import Results
 from benchmarks.steps import made, opened, unrecorded
-from benchmarks.tabulation import markdown, number
 from schemas.kinds import GroundTruth, Segments, Trajectory
 from schemas.kinds import Sequence as SequenceArtifact
 from stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
@@ -357,46 +356,16 @@ def map_figures(log: Log, segments: Segments, path: Path | None, output: Path) -
     }
 
 
-COLUMNS = {
-    "ate_m": ("ATE [cm]", 100.0, 2), "rpe_second_m": ("RPE [cm/s]", 100.0, 2),
-    "rpe_second_rad": ("RPE [deg/s]", float(np.degrees(1.0)), 2), "rpe_metre_m": ("RPE [cm/m]", 100.0, 2),
-    "fit_m": ("fit [mm]", 1000.0, 2), "epipolar_rad": ("epipolar [deg]", float(np.degrees(1.0)), 2),
-    "posed_share": ("posed [%]", 100.0, 0), "loops": ("loops", 1.0, 0),
-    "frames_per_cpu_second": ("frames/CPU s", 1.0, 1), "frames_per_second": ("frames/s", 1.0, 1),
-}  # fmt: skip
-MAP_COLUMNS = {
-    "ate_m": ("ATE [cm]", 100.0, 2),
-    "pq": ("PQ", 100.0, 1),
-    "accuracy_mm": ("surface error [mm]", 1.0, 1),
-}
-
-
-def table(results: Results) -> str:
-    """Return table.md."""
-    lines: list[tuple[str, ...]] = []
-    maps: list[tuple[str, ...]] = []
-    for trial, row in results.records.items():
-        of_map = trial.case.startswith(MAPS)
-        columns = MAP_COLUMNS if of_map else COLUMNS
-        cells = [number(row.get(name), digits, scale) for name, (_, scale, digits) in columns.items()]
-        (maps if of_map else lines).append((trial.case, trial.arm, *cells))
-    medians = []
+def more_figures(results: Results) -> dict[str, float | None]:
+    """Median and worst error over the generated rooms."""
+    flat: dict[str, float | None] = {}
     for arm in results.arms():
         rows = [row for trial, row in results.records.items() if trial.arm == arm and trial.case in ROOMS]
         values = [value for row in rows if (value := row.get("ate_m")) is not None]
         if len(values) > 1:
-            figures = (number(float(np.median(values)), 2, 100.0), number(max(values), 2, 100.0))
-            medians.append((arm, str(len(values)), *figures))
-    heads = ("log", "arm", *(head for head, _, _ in COLUMNS.values()))
-    map_heads = ("map", "poses", *(head for head, _, _ in MAP_COLUMNS.values()))
-    title = f"Maps, true masks with corruption {CORRUPTION}, 2 cm voxels"
-    return "\n".join(
-        [
-            markdown("", heads, lines),
-            markdown("Generated rooms, ATE [cm]", ("arm", "rooms", "median", "worst"), medians),
-            markdown(title, map_heads, maps),
-        ]
-    )
+            flat[f"{arm}/generated_rooms/ate_m_median"] = float(np.median(values))
+            flat[f"{arm}/generated_rooms/ate_m_worst"] = max(values)
+    return flat
 
 
 UNITS = {"_m": "m", "_rad": "rad", "_mm": "mm", "_second": "frames/s"}
@@ -425,6 +394,6 @@ EXPERIMENT = Experiment(
     quick={"frames": 240},
     steps=("poses", "segment", "fuse", "evaluate", *STEPS),
     code={OPEN3D: ("stages.kit.measurement.pose_error", "stages.kit.formats.trajectories")},
-    table=table,
+    more_figures=more_figures,
     pictures=draw_paths,
 )

@@ -20,7 +20,6 @@ from pydantic import Field
 from benchmarks.experiment import Bench, Experiment, Trial
 from benchmarks.results import Results
 from benchmarks.steps import StepFailed, opened
-from benchmarks.tabulation import markdown
 from schemas.kinds import ContactGraph, PanopticMap
 from schemas.kinds import Sequence as SequenceArtifact
 from schemas.scene_parts import TREE_RELATIONS
@@ -137,34 +136,6 @@ def problems(results: Results) -> list[str]:
     ]
 
 
-def counted(counts: dict[str, int], form: str) -> str:
-    """Write counts by name."""
-    return ", ".join(form.format(name=name, count=count) for name, count in counts.items())
-
-
-def table(results: Results) -> str:
-    """Return table.md."""
-    facts = {trial.case: record for trial, record in results.records.items()}
-    rows = []
-    for name, f in facts.items():
-        rms = "no floor"
-        if "floor_height_rms" in f:
-            rms = f"{1000 * f['floor_height_rms']:.1f} ({f['floor_share_within_3cm']:.0%})"
-        drops, frames = counted(f["drops"], "{name} {count}") or "0", f"{f['frames_used']} / {f['frames_in_log']}"
-        entities, supports = counted(f["entities"], "{count} {name}"), counted(f["supports"], "{name} {count}")
-        rows.append((name, frames, drops, f"{f['frames_per_second']:.2f}", entities, supports, rms))
-    head = ("log", "frames used / in log", "dropped", "frames/s", "entities", "support edges", "floor rms [mm]")
-    steps = list(dict.fromkeys(step for f in facts.values() for step in f["steps"]))
-    costs = []
-    for name, f in facts.items():
-        cells = [f["steps"].get(step) for step in steps]
-        costs.append((name, *(f"{c['seconds']:.1f} ({c['peak_mib']:.0f})" if c else "" for c in cells)))
-    note = "Floor rms: height over z = 0 of its upward vertices; in brackets the share of all its vertices within 3 cm."
-    return "\n".join(
-        [markdown("", head, rows), markdown("Seconds (peak MiB) per step", ("log", *steps), costs), note, ""]
-    )
-
-
 def more_figures(results: Results) -> dict[str, float | None]:
     """Every number of every log."""
     metrics: dict[str, float | None] = {}
@@ -193,6 +164,5 @@ EXPERIMENT = Experiment(
     more_figures=more_figures,
     parameters=RealParameters,
     keeps=False,
-    table=table,
     problems=problems,
 )

@@ -22,7 +22,7 @@ from benchmarks.experiment import Bench, Experiment, Measure, Trial, statistic
 from benchmarks.perfect_maps import write_map
 from benchmarks.results import Results
 from benchmarks.steps import opened, step, unrecorded
-from benchmarks.tabulation import markdown, number
+from benchmarks.tabulation import markdown
 from schemas.ground_truth import GroundTruth
 from schemas.kinds import PanopticMap
 from stages.kit.formats.mesh_files import read_mesh
@@ -126,21 +126,6 @@ def of_measures(name: str) -> Measure:
     return Measure(lambda records: figure([record.measures for record in records]), interval=False)
 
 
-def table(results: Results) -> str:
-    """Return table.md."""
-    rows = []
-    for trial, record in results.records.items():
-        m = record.measures
-        bound = "" if m.get("exact") else " (at most)"
-        counts = (m.get(name) for name in ("wrong_support", "missing_detection", "wrong_detection", "true_nodes"))
-        shares = (number(m.get(f"support_{name}"), 3) for name in ("precision", "recall", "f1"))
-        distance = f"{m['edit_distance']:.0f}{bound}"
-        rows.append((trial.case, trial.arm, distance, *(number(count, 0) for count in counts), *shares))
-    head = ("case", "method", "edit distance", "wrong supports", "missing", "wrong detections", "true nodes",
-            "support P", "R", "F1")  # fmt: skip
-    return markdown("", head, rows)
-
-
 def write_errors(results: Results) -> None:
     """Write errors.md."""
     rows = [(trial.case, trial.arm, *error) for trial, record in results.records.items() for error in record.errors]
@@ -164,6 +149,5 @@ EXPERIMENT = Experiment(
     places=frozenset({"runs"}),
     inputs=inputs,
     steps=("graph", "evaluate", "truth supports"),
-    table=table,
     pictures=write_errors,
 )

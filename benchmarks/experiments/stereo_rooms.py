@@ -16,9 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from benchmarks.experiment import Bench, Experiment, Trial, only
-from benchmarks.results import Results
 from benchmarks.steps import StepFailed, made
-from benchmarks.tabulation import markdown
 from stages.engine.chain import run_pipeline
 from stages.engine.pipelines import Pipeline, pipeline_path, read_pipeline
 from stages.kit.formats.frames import FrameReader
@@ -128,17 +126,6 @@ def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def table(results: Results) -> str:
-    """Return table.md: a column a room and arm."""
-    columns = list(results.records)
-    rows = []
-    for name, words in MEASURES.items():
-        values = [results.value(trial.arm, trial.case, name) for trial in columns]
-        rows.append((words, *("-" if value is None else f"{value:.3g}" for value in values)))
-    heads = [f"{trial.case.replace('_', ' ')}, {trial.arm.replace('_', ' ')}" for trial in columns]
-    return markdown("", ("", *heads), rows)
-
-
 EXPERIMENT = Experiment(
     name="stereo_rooms",
     title="Rooms from two eyes and from a depth camera",
@@ -158,5 +145,4 @@ EXPERIMENT = Experiment(
     parameters=StereoRoomsParameters,
     quick={"frames": 12, "width": 320, "height": 240, "clutter": "low"},
     keeps=False,
-    table=table,
 )

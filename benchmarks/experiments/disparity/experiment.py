@@ -16,8 +16,7 @@ from pydantic import Field
 from benchmarks.experiment import Bench, Experiment, Measure, Trial
 from benchmarks.experiments.disparity.arms import DERIVED, NETWORK, WORDS, Arm, arms_of
 from benchmarks.experiments.disparity.cases import CASES, NEEDLE_SEEDS, TUNING_NEEDLES, Pair
-from benchmarks.results import Results, seeds_line
-from benchmarks.tabulation import differences_table, figures_table, markdown, number
+from benchmarks.results import Results
 from stages.disparity.raft.matching import SMALL_UPDATES
 from stages.disparity.search_range import search_range
 from stages.disparity.semi_global import gray_of
@@ -165,20 +164,6 @@ def more_figures(results: Results) -> dict[str, float | None]:
     return flat
 
 
-def table(results: Results) -> str:
-    """Return table.md: a table a case or part of a case."""
-    parts = [seeds_line(results)]
-    for case in results.cases:
-        parts.append(figures_table(results, case, list(UNITS), digits=2))
-        for part in parts_of(results, case):
-            rows = [
-                (WORDS[arm], *(number(of_part(name, part)(results.of(arm, case)), 2) for name in UNITS))
-                for arm in results.arms(case)
-            ]
-            parts.append(markdown(f"{case}, {part}", ("matcher", *UNITS.values()), rows))
-    return "\n".join([*parts, differences_table(results, digits=2)])
-
-
 def copy_pictures(results: Results) -> None:
     """Put the picture of the first pair of every case into the output folder."""
     for case in results.cases:
@@ -210,6 +195,5 @@ EXPERIMENT = Experiment(
     steps=("ingest", "synthesize", "library build"),
     pairs=(("ours", "opencv_usual"), ("ours", "opencv_default")),
     compared=("bad2", "bad2_all", "epe", "coverage"),
-    table=table,
     pictures=copy_pictures,
 )

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from benchmarks.experiment import Bench, Experiment, Trial
 from benchmarks.experiments.mapping.arms import CASES, EVERYWHERE, NETWORK, SHOWN, all_arms
-from benchmarks.experiments.mapping.figures_of_merit import MEASURES
+from benchmarks.experiments.mapping.figures_of_merit import MEASURES, more_figures
 from benchmarks.experiments.mapping.measuring import MappingParameters, Outcome, measure
-from benchmarks.experiments.mapping.tables import table
+from benchmarks.experiments.mapping.printed import printed_by_the_thesis
 from benchmarks.generated_rooms import REPORTING, STEPS, TUNING, TUNING_UNTRAINED, make_library
 from stages.segment.choice import BUILDERS
 
@@ -48,6 +48,7 @@ EXPERIMENT = Experiment(
     measure=measure,
     record=Outcome,
     measures=MEASURES,
+    more_figures=more_figures,
     parameters=MappingParameters,
     places=frozenset({"untrained"}),
     quick_seeds=3,
@@ -62,5 +63,5 @@ EXPERIMENT = Experiment(
         ("ours", "thesis"),
     ),
     compared=("pq", "instance_ap", "box_ap", "box_ap_refined"),
-    table=table,
+    notes=printed_by_the_thesis,
 )

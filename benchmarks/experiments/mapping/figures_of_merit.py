@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from benchmarks.experiment import Measure
+from benchmarks.experiments.mapping.arms import SHOWN
 from benchmarks.experiments.mapping.measuring import Outcome, Ranked
+from benchmarks.results import Results
 from stages.evaluate.truth import stuff_classes
 from stages.kit.measurement.average_precision import (
     PrecisionRecall,
@@ -101,3 +103,25 @@ MEASURES = {
     "box_ap_refined": Measure(precision_measure("boxes_refined")),
     "frames_per_second": Measure(frames_per_second, "frames/s", interval=False),
 }
+
+
+def class_figures(outcomes: Sequence[Outcome]) -> dict[str, float | None]:
+    """Return PQ, SQ, RQ and average precision of every class that is true, as `pq_chair`, `instance_ap_chair`."""
+    values: dict[str, float | None] = {}
+    for name, quality in sorted(summed_qualities(outcomes).items()):
+        if quality.true_positives + quality.false_negatives:
+            values |= {f"{which}_{name}": getattr(quality, which) for which in ("pq", "sq", "rq")}
+    for measure, field in (("instance_ap", "instances"), ("box_ap", "boxes"), ("box_ap_refined", "boxes_refined")):
+        for name, curve in pooled_curves(outcomes, field).items():
+            values[f"{measure}_{name}"] = average_precision(curve)
+            values[f"{measure}_thesis_code_{name}"] = average_precision_thesis_code(curve)
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def more_figures(results: Results) -> dict[str, float | None]:
+    """Figures by class in the case in which all arms run."""
+    return {
+        f"{arm}/{SHOWN}/{name}": value
+        for arm in results.arms(SHOWN)
+        for name, value in class_figures(results.of(arm, SHOWN)).items()
+    }

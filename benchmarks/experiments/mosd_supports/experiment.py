@@ -22,9 +22,9 @@ from benchmarks.experiment import Bench, Experiment, Measure, Trial, median
 from benchmarks.experiments.mosd_supports.support_score import SupportScore, f1, score_graph
 from benchmarks.experiments.mosd_supports.tabletop_maps import LabelledView, build_map, nodes_of_entities, upright_pose
 from benchmarks.mosd_frames import CAMERA, DEPTH_UNIT, FOLDER, frame_files, kind_of
-from benchmarks.results import Results, seeds_line
+from benchmarks.results import Results
 from benchmarks.steps import unrecorded
-from benchmarks.tabulation import differences_table, figures_table, markdown
+from benchmarks.tabulation import markdown
 from schemas.errors import BadInput
 from stages.kit.stage import Parameters
 from stages.truth.support_annotation import SupportAnnotation, read_support_annotation
@@ -157,6 +157,15 @@ MEASURES |= {name: Measure(of_counts(name), interval=False) for name in COUNTS}
 MEASURES["graph_processor_ms"] = median("processor_ms", "ms", interval=False)
 
 
+def kinds_of(results: Results) -> dict[str, list[FrameSupports]]:
+    """Return the frames of `test` by the kind of scene, ours from the data set's masks."""
+    kinds: dict[str, list[FrameSupports]] = {}
+    for trial, record in results.records.items():
+        if (trial.arm, trial.case) == ("ours", "test"):
+            kinds.setdefault(kind_of("test", trial.seed), []).append(record)
+    return kinds
+
+
 def more_figures(results: Results) -> dict[str, float | None]:
     """The levels, and the time of our graphs over all cases."""
     flat: dict[str, float | None] = {}
@@ -164,43 +173,22 @@ def more_figures(results: Results) -> dict[str, float | None]:
         for arm in results.arms(case):
             found = measures_of(pooled(results.of(arm, case)))
             flat |= {f"{arm}/{case}/{name}": value for name, value in found.items() if name.startswith("level_")}
+    for kind, records in kinds_of(results).items():
+        score = pooled(records)
+        flat[f"ours/test_{kind.replace(' ', '_')}/edges"] = float(score.true)
+        flat[f"ours/test_{kind.replace(' ', '_')}/support_f1"] = f1(score.true, score.predicted, score.agreed)
     ours = [record.processor_ms for trial, record in results.records.items() if trial.arm == "ours"]
     flat["ours/all/graph_processor_ms"] = float(np.median(ours)) if ours else None
     return flat
 
 
-def table(results: Results) -> str:
-    """Return table.md: figures by case, the levels, kinds of scene."""
-    parts = [seeds_line(results), *(figures_table(results, case, SHARES) for case in results.cases)]
-    parts.append(differences_table(results))
-    rows, levels_rows = [], []
-    scores = {(c, a): pooled(results.of(a, c)) for c in results.cases for a in results.arms(c)}
-    levels = sorted({level for score in scores.values() for level in score.levels})
-    for (case, arm), score in scores.items():
-        second = " / ".join(map(str, score.second["second"]))
-        rows.append((case, arm, str(score.true), str(score.true_to_things), second, str(score.doubtful)))
-        cells = ["{1} of {0}".format(*score.levels[level]) if level in score.levels else "" for level in levels]
-        levels_rows.append((case, arm, *cells))
-    head = ("case", "method", "objects", "on things", "second: true / found / right", "doubtful")
-    parts.append(markdown("Counts", head, rows))
-    title = "Objects whose carrier is right, by level (1 stands on the table)"
-    parts.append(markdown(title, ("case", "method", *map(str, levels)), levels_rows))
-    kinds: dict[str, list[FrameSupports]] = {}
-    for trial, record in results.records.items():
-        if (trial.arm, trial.case) == ("ours", "test"):
-            kinds.setdefault(kind_of("test", trial.seed), []).append(record)
-    by_kind = {kind: pooled(records) for kind, records in kinds.items()}
-    kind_rows = [
-        (k, str(s.true), str(s.agreed), f"{f1(s.true, s.predicted, s.agreed):.3f}") for k, s in by_kind.items()
-    ]
-    title = "By kind of scene, `test`, ours, from the data set's masks"
-    parts.append(markdown(title, ("kind", "objects", "right", "F1"), kind_rows))
-    parts.append(
+def notes(results: Results) -> str:
+    """Return what the figures mean."""
+    return (
         "An object that two things carry counts as right with either; `on things` leaves out the edges to the table; "
         "`second` are further carriers and what things lean on. Objects whose predicted carrier the annotator could "
         "not rule out are left out (`doubtful`).\n"
     )
-    return "\n".join(parts)
 
 
 def write_wrong(results: Results) -> None:
@@ -235,6 +223,6 @@ EXPERIMENT = Experiment(
     steps=("ingest", "segment", "fuse", "graph"),
     pairs=(("ours", "thesis"),),
     compared=("support_f1", "on_things_f1"),
-    table=table,
+    notes=notes,
     pictures=write_wrong,
 )

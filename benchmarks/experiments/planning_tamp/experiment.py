@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,9 +19,8 @@ import numpy as np
 
 from benchmarks.experiment import Bench, Experiment, Trial
 from benchmarks.experiments.planning_tamp.rooms import exact_room
-from benchmarks.results import Results, seeds_line
+from benchmarks.results import Results
 from benchmarks.steps import made, opened, unrecorded
-from benchmarks.tabulation import markdown, number
 from schemas.cad_library import CadLibrary
 from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth
@@ -184,31 +183,6 @@ def figures(results: Sequence[RoomResult]) -> dict[str, float]:
     return metrics
 
 
-def table(results: Results) -> str:
-    """Return table.md."""
-    return seeds_line(results) + "\n" + table_of(figures(list(results.records.values())))
-
-
-def table_of(metrics: Mapping[str, float]) -> str:
-    """Return the figures as a Markdown table, a row per task and case."""
-    rows = []
-    for key in sorted({"/".join(name.split("/")[:2]) for name in metrics}):
-        failed = f"{key}/failed_"
-        reasons = {name.removeprefix(failed): count for name, count in metrics.items() if name.startswith(failed)}
-        words = ", ".join(f"{name} {count:g}" for name, count in sorted(reasons.items(), key=lambda entry: -entry[1]))
-        share = ""
-        if (success := metrics.get(f"{key}/success")) is not None:
-            low, high = (100 * metrics[f"{key}/success_{end}"] for end in ("low", "high"))
-            share = f"{100 * success:.0f} % ({low:.0f} to {high:.0f})"
-        seconds = (number(metrics.get(f"{key}/seconds_{part}"), 3) for part in ("task_search", "plan", "execute"))
-        counts = (number(metrics.get(f"{key}/{name}"), 0) for name in ("rooms", "goals"))
-        actions = number(metrics.get(f"{key}/actions"))
-        rows.append((*key.split("/"), *counts, share, actions, *seconds, words))
-    head = ("task", "case", "rooms", "with a goal", "success", "actions", "task search [s]", "planning [s]",
-            "execution [s]", "failed by")  # fmt: skip
-    return markdown("", head, rows)
-
-
 def more_figures(results: Results) -> dict[str, float | None]:
     """All figures: what counts as a try depends on all cases of a room."""
     return dict(figures(list(results.records.values())))
@@ -234,5 +208,4 @@ EXPERIMENT = Experiment(
     jobs=min(2, os.cpu_count() or 1),
     prepare=prepare,
     steps=("library build", "synthesize", "plan", *(command for command, *_ in CHAIN)),
-    table=table,
 )

@@ -17,9 +17,8 @@ from pydantic import Field
 from benchmarks.experiment import Bench, Experiment, Trial, mean, median
 from benchmarks.experiments.preflight.faults import FAULTS, NOTHING, Fault, Named
 from benchmarks.experiments.real import EXPECTED
-from benchmarks.results import Results, seeds_line
+from benchmarks.results import Results
 from benchmarks.steps import made
-from benchmarks.tabulation import markdown
 from stages.ingest.detection import open_log
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.preflight.inspection import inspect_source
@@ -132,27 +131,6 @@ def more_figures(results: Results) -> dict[str, float | None]:
     }
 
 
-def table(results: Results) -> str:
-    """Return table.md: a line a fault, generated rooms together, real logs one by one."""
-    rows = []
-    for fault in (NOTHING, *FAULTS):
-        rooms = results.of("ours", f"{GENERATED}/{fault}")
-        real = [results.get("ours", f"{REAL}/{fault}", log) for log in LOGS]
-        detected, named = (sum(getattr(row, key) for row in rooms) for key in ("detected", "named"))
-        if fault == NOTHING:
-            rows.append((fault, f"{detected} false alarms", *(row.verdict if row else "" for row in real)))
-        else:
-            rows.append((fault, f"{detected} detected, {named} named", *map(_cell, real)))
-    head = ("planted", "generated rooms", *LOGS)
-    return seeds_line(results) + "\n" + markdown("", head, rows)
-
-
-def _cell(row: Inspection | None) -> str:
-    if row is None:
-        return ""
-    return "named" if row.named else "detected" if row.detected else "**missed**"
-
-
 def write_reasons(results: Results) -> None:
     """Write reasons.json."""
     rows = {str(trial): asdict(row) for trial, row in results.records.items()}
@@ -178,6 +156,5 @@ EXPERIMENT = Experiment(
     places=frozenset({"rooms", "data"}),
     prepare=prepare,
     steps=("library build", "synthesize"),
-    table=table,
     pictures=write_reasons,
 )

@@ -21,9 +21,8 @@ from benchmarks.experiments.mapping.arms import Arm, all_arms
 from benchmarks.experiments.mapping.measuring import Outcome, outcome_of_map
 from benchmarks.experiments.scenenn.scenes import Scene, find_scene
 from benchmarks.experiments.scenenn.tables import ALL, all_figures, figures, make_tables, read_published, summarise
-from benchmarks.results import Results, seeds_line
+from benchmarks.results import Results
 from benchmarks.steps import opened, step
-from benchmarks.tabulation import differences_table
 from schemas.contact_graph import ContactGraphFile
 from schemas.errors import BadInput, UsageError
 from schemas.kinds import ContactGraph, GroundTruth, PanopticMap
@@ -168,12 +167,11 @@ def more_figures(results: Results) -> dict[str, float | None]:
     return {**all_figures(outcomes, published()), **counted}
 
 
-def table(results: Results) -> str:
-    """Return table.md."""
+def notes(results: Results) -> str:
+    """Return the thesis's tables with its printed rows, and what was not there."""
     backend = results.bench.parameters.backend
     metrics = {name: value for name, value in more_figures(results).items() if value is not None}
-    parts = [seeds_line(results), *map(as_markdown, make_tables(metrics, results.arms(), published()))]
-    parts.append(differences_table(results, digits=1, scale=100.0))
+    parts = [as_markdown(table) for table in make_tables(metrics, results.arms(), published())]
     seeds = results.seeds(ALL)
     parts.append(f"Masks: {backend}. {len(seeds)} of the thesis's {len(published()['sequences'])} sequences.")
     if backend in NAMELESS:
@@ -204,5 +202,5 @@ EXPERIMENT = Experiment(
     steps=("ingest", "truth scenenn", "segment", "fuse", "graph", "evaluate"),
     pairs=(("thesis", "thesis_separate"), ("thesis", "voxblox++"), ("ours", "thesis")),
     compared=("pq", "instance_ap", "box_ap"),
-    table=table,
+    notes=notes,
 )

@@ -12,7 +12,6 @@ from benchmarks.experiment import Bench, Trial
 from benchmarks.experiments.disparity.arms import CLASSICAL, DERIVED, WORDS, arms_of
 from benchmarks.experiments.disparity.cases import Pair
 from benchmarks.experiments.disparity.experiment import EXPERIMENT, DisparityParameters, measured, scores
-from benchmarks.experiments.stereo_rooms import EXPERIMENT as ROOMS
 from benchmarks.experiments.stereo_rooms import depth_figures, pipeline_of
 from benchmarks.results import Results, write_results
 from schemas.scene_parts import Camera
@@ -35,7 +34,7 @@ def test_parts_of_cases_have_figures_and_a_table(tmp_path: Path) -> None:
     records = {Trial("ours", "needles", "3100"): {"": values, "needle": {"coverage": 50.0}}}
     results = Results(EXPERIMENT, Bench(tmp_path, DisparityParameters.model_validate({})), records)
     text = write_results(results, ["python"], [])
-    assert "### needles\n" in text and "### needles, needle" in text and "rooms" not in text
+    assert "| ours/needles_needle |" in text and "rooms" not in text
     metrics = json.loads((tmp_path / "metrics.json").read_text())
     assert metrics["ours/needles/epe"] == 3.0 and metrics["pairs/needles/count"] == 1.0
     assert metrics["ours/needles_needle/coverage"] == 50.0 and "ours/needles_needle/epe" not in metrics
@@ -100,11 +99,3 @@ def test_depth_is_compared_frame_by_frame(tmp_path: Path) -> None:
     found = depth_figures(tmp_path / "found", tmp_path / "exact")
     assert found["depth_share"] == pytest.approx(80)
     assert found["depth_median_mm"] == pytest.approx(10, abs=1e-3)
-
-
-def test_the_table_has_a_column_a_room_and_arm(tmp_path: Path) -> None:
-    pq = {"two_eyes": 0.5, "depth_camera": 0.75}
-    records = {Trial(arm, "room_1100", "1100"): {"map/pq": value} for arm, value in pq.items()}
-    assert ROOMS.table is not None
-    text = ROOMS.table(Results(ROOMS, Bench(tmp_path, ROOMS.parameters.model_validate({})), records))
-    assert "room 1100, two eyes" in text and "| 0.5 | 0.75 |" in text

@@ -93,7 +93,7 @@ def test_what_is_measured_is_kept_and_the_figures_are_written(tmp_path: Path, ca
     assert about["experiment"] == "small" and about["command"].endswith("--scale 2")
     assert set(figures_in(tmp_path)["ours/one/value"]) == {"value", "low", "high", "cases", "unit"}
     assert figures_in(tmp_path)["ours/one/count"]["low"] is None
-    assert "| one | ours – thesis | 2.000 [2.000, 2.000] |" in capsys.readouterr().out, "paired: rooms cancel"
+    assert "| one: ours – thesis | 2 [2, 2] |" in capsys.readouterr().out, "paired: rooms cancel"
     before = (tmp_path / "metrics.json").read_bytes()
     assert run(SMALL, words) == 0 and len(MEASURED) == 16, "nothing is measured twice"
     assert (tmp_path / "metrics.json").read_bytes() == before

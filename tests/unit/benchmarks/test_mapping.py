@@ -14,9 +14,8 @@ from benchmarks.experiments.mapping.drift import TRANSLATION_PER_METRE, drifting
 from benchmarks.experiments.mapping.experiment import EXPERIMENT
 from benchmarks.experiments.mapping.figures_of_merit import MEASURES, pooled_curve
 from benchmarks.experiments.mapping.measuring import MappingParameters, Outcome, ranked
-from benchmarks.experiments.mapping.tables import by_room, printed_by_the_thesis, quality_by_class, table
 from benchmarks.generated_rooms import REPORTING, TUNING
-from benchmarks.results import Results
+from benchmarks.results import Results, figures_of, table
 from stages.kit.measurement.average_precision import Candidates, average_precision
 from stages.kit.measurement.panoptic_quality import ClassQuality
 from stages.synthesize.recipes import load_recipe
@@ -90,12 +89,13 @@ def test_pooled_rooms_share_the_ranking_but_not_the_truth() -> None:
     assert average_precision(pooled_curve([])) is None
 
 
-def test_tables_show_every_arm_and_the_thesis_beside() -> None:
+def test_figures_are_there_for_every_arm_and_class_and_the_thesis_beside() -> None:
     found = {("ours", "a"): (3, 1), ("ours", "b"): (4, 0), ("thesis", "a"): (1, 3), ("thesis", "b"): (2, 2)}
     results = results_of({key: outcome(*counts) for key, counts in found.items()})
-    text = table(results)
-    assert "| middle | ours – thesis |" in text and "| thesis | 2 |" in text
-    assert by_room(results, SHOWN).splitlines()[-1].startswith("| b |")
+    figures = figures_of(results)
     # Chairs of both rooms: 7 of 8 found, PQ 0.8 * 7 / 7.5.
-    assert "| ours | PQ | 82.3 | 90.0 | 74.7 | 90.0 | 74.7 |" in quality_by_class(results, SHOWN)
-    assert "| Han 2024: ours | 35.4 | 80.5 | 43.1 | 58.1 | 45.3 |" in printed_by_the_thesis()
+    assert figures["ours/middle/pq_chair"].value == pytest.approx(0.8 * 7 / 7.5)
+    assert figures["ours/middle/pq"].low is not None and figures["ours/middle/sq"].low is None
+    text = table(results, figures)
+    assert "| middle: ours – thesis |" in text and "| middle, b |" in text
+    assert "| Han 2024: ours | 35.4 | 80.5 | 43.1 | 58.1 | 45.3 |" in text

@@ -8,13 +8,12 @@ import pytest
 
 from benchmarks.experiment import Bench, Trial
 from benchmarks.experiments.scene import measuring
-from benchmarks.experiments.scene.arms import ARMS, MASK_LEVEL, PERFECT, REAL, RECONSTRUCTED
+from benchmarks.experiments.scene.arms import ARMS, MASK_LEVEL, PERFECT, REAL
 from benchmarks.experiments.scene.experiment import EXPERIMENT
 from benchmarks.experiments.scene.figures_of_merit import FIGURES
 from benchmarks.experiments.scene.measuring import Outcome, SceneParameters
-from benchmarks.experiments.scene.tables import GRAPHS, REPLACEMENT, columns_table, differences
 from benchmarks.generated_rooms import RoomFolder
-from benchmarks.results import Results
+from benchmarks.results import Results, figures_of, table
 
 GRAPH = {"edit_distance": 4.0, "wrong_support": 1.0, "missing_detection": 2.0, "wrong_detection": 0.0}
 
@@ -46,15 +45,13 @@ def test_tables_show_what_was_run(tmp_path: Path) -> None:
         Trial("best_single", PERFECT, "b"): outcome(5, 10, 1.0),
     }
     results = Results(EXPERIMENT, bench_in(tmp_path), records)
-    graphs = columns_table(results, "graphs", GRAPHS, [PERFECT, RECONSTRUCTED]).splitlines()[4:]
-    assert len(graphs) == 1 and graphs[0].startswith("| perfect | ours | 2 | 75.0 [50.0, 100.0] |")
-    replaced = columns_table(results, "models", REPLACEMENT, [PERFECT]).splitlines()[4:]
-    assert [row.split(" | ")[1] for row in replaced] == [EXPERIMENT.arms["best_single"], "ours"]
-    assert "| 20.0 | 5.7 |" in replaced[1]  # 0.02 m, 0.1 rad
-    assert differences(results, [PERFECT]).splitlines()[4:] == [
-        "| perfect | best_single | 0.0 [0.0, 0.0] | -20.0 [-80.0, 0.0] | – | 0.0 [0.0, 0.0] | 0.0 [0.0, 0.0] "
-        "| 0.0 [0.0, 0.0] |"
-    ]
+    found = figures_of(results)["ours/perfect/support_f1"]
+    assert (found.value, found.low, found.high, found.cases) == (0.75, 0.5, 1.0, 2)
+    text = table(results, figures_of(results))
+    assert f"| measure | {EXPERIMENT.arms['best_single']} | ours |" in text
+    difference = results.difference("ours", "best_single", PERFECT, "scan2cad_success")
+    assert difference is not None
+    assert (difference.value, difference.low, difference.high) == pytest.approx((-0.2, -0.8, 0.0))
 
 
 def test_real_logs_are_a_case_only_where_they_have_run(tmp_path: Path) -> None:
