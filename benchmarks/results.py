@@ -37,7 +37,7 @@ class Results:
     bench: Bench
     records: Mapping[Trial, Any]
     _clusters: dict[tuple[str, str], dict[str, list[Any]]] = field(default_factory=dict)
-    _values: dict[tuple[Any, ...], float | None] = field(default_factory=dict)
+    _values: dict[tuple[str, ...], dict[tuple[int, ...], float | None]] = field(default_factory=dict)
 
     @property
     def cases(self) -> list[str]:
@@ -105,13 +105,13 @@ class Results:
     ) -> Callable[[Sequence[int]], float | None]:
         """The measure over clusters given by their numbers; remembered by how often each is drawn."""
         groups, of = self._grouped(arm, case), self.experiment.measures[measure].of
+        values = self._values.setdefault((arm, case, measure, *names), {})
 
         def figure(numbers: Sequence[int]) -> float | None:
             drawn = tuple(sorted(numbers))
-            key = (arm, case, measure, len(names), drawn)
-            if key not in self._values:
-                self._values[key] = of([record for k in drawn for record in groups[names[k]]])
-            return self._values[key]
+            if drawn not in values:
+                values[drawn] = of([record for k in drawn for record in groups[names[k]]])
+            return values[drawn]
 
         return figure
 
@@ -189,8 +189,10 @@ def table(results: Results, figures: Mapping[str, Figure]) -> str:
         for arm in results.arms(case):
             for name in (name for name in figures if name.startswith(f"{arm}/{case}/")):
                 measure = name.removeprefix(f"{arm}/{case}/")
-                if any(f"{measure.split('/')[0]}" == other.removeprefix(f"{case}/") for other in results.cases):
-                    continue  # of a case that is named for a part of this one
+                if any(
+                    name.startswith(f"{arm}/{longer}/") for longer in results.cases if longer.startswith(f"{case}/")
+                ):
+                    continue  # of a case like middle/drifting
                 shown.add(name)
                 by_arm[measure, results.experiment.arms[arm]] = together[measure, case] = figures[name]
         if not one_arm:
