@@ -152,19 +152,19 @@ class Shared:
         self.found: dict[tuple[str, Path, str], Found] = {}
 
 
-def run_case(room: Room, arms: Sequence[Arm], case: str, scratch: Path, shared: Shared, *, keep: bool) -> list[Outcome]:
-    """Return the outcome of every arm. Artifacts are written under `scratch` and deleted again unless `keep`."""
+def run_case(
+    room: Room, arms: Sequence[Arm], case: str, scratch: Path, shared: Shared, *, keep: bool
+) -> Iterator[Outcome]:
+    """Yield the outcome of every arm. Artifacts are written under `scratch` and deleted again unless `keep`."""
     folder = scratch / room.name / case
     shutil.rmtree(folder, ignore_errors=True)
     if case == PERFECT:
         perfect_map(room.truth_artifact, folder / "map")
-    outcomes = []
     for arm in arms:
         map_folder = folder / "map" if case == PERFECT else room.maps[arm.map_arm]
-        outcomes.append(_run_arm(room, arm, case, PanopticMap(map_folder), folder / arm.name, shared))
+        yield _run_arm(room, arm, case, PanopticMap(map_folder), folder / arm.name, shared)
     if not keep:
         shutil.rmtree(folder)
-    return outcomes
 
 
 def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder: Path, shared: Shared) -> Outcome:

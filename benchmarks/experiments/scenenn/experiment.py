@@ -173,7 +173,9 @@ def notes(results: Results) -> str:
     metrics = {name: value for name, value in more_figures(results).items() if value is not None}
     parts = [as_markdown(table) for table in make_tables(metrics, results.arms(), published())]
     seeds = results.seeds(ALL)
-    parts.append(f"Masks: {backend}. {len(seeds)} of the thesis's {len(published()['sequences'])} sequences.")
+    parts.append(
+        f"Masks: {backend}. {len(seeds)} of the thesis's {len(published()['sequences'])} sequences: {', '.join(seeds)}."
+    )
     if backend in NAMELESS:
         parts.append("These masks name no classes: the figures by class are not about them.")
     absent = {name: why for name, why in scenes_of(results.bench).items() if isinstance(why, str)}
