@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.steps import opened
 from schemas.contact_graph import ContactGraphFile
-from schemas.kinds import GroundTruth
+from schemas.ground_truth import GroundTruth
 from stages.evaluate.graph_measures import GraphComparison, compare_graphs, optional_nodes
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.truth import TrueRoom, load_truth

@@ -17,7 +17,7 @@ from benchmarks.perfect_maps import perfect_map
 from benchmarks.results import Results
 from benchmarks.steps import opened, unrecorded
 from schemas.contact_graph import ContactGraphFile
-from schemas.kinds import GroundTruth
+from schemas.ground_truth import GroundTruth
 from schemas.scene_parts import Relation
 from stages.evaluate.graph_measures import GraphComparison, optional_nodes
 from stages.evaluate.truth import TrueRoom
@@ -55,7 +55,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Stud
     for trial in trials:
         folder = bench.folder(trial) / "contact_graph"
         started = time.process_time()
-        graph = unrecorded("graph", folder, {"method": trial.arm}, panoptic_map=panoptic_map).graph
+        graph = unrecorded("graph", folder, {"method": trial.arm}, panoptic_map=panoptic_map).info
         seconds = time.process_time() - started
         yield trial, judged(room, graph, same, seconds)
 

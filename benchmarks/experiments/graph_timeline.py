@@ -22,8 +22,9 @@ from benchmarks.graph_scores import OPTIONS, Figures, distance_figures, judge, r
 from benchmarks.results import Results
 from benchmarks.steps import made, opened, unrecorded
 from schemas.contact_graph import ContactGraphFile
-from schemas.kinds import PanopticMap, Segments
-from schemas.kinds import Sequence as SequenceArtifact
+from schemas.panoptic_map import PanopticMap
+from schemas.segments import Segments
+from schemas.sequence import Sequence as SequenceArtifact
 from stages.evaluate.correspondence import point_overlaps
 from stages.evaluate.truth import TrueRoom
 from stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
@@ -97,7 +98,7 @@ def grow(folder: RoomFolder, work: Path, every: int) -> Growth:
         graphs[step] = unrecorded("graph", work / f"graph_{step}", panoptic_map=maps[step])
         seconds["graph", step] = time.process_time() - started
     timeline = graphs[every].timeline
-    assert timeline is not None and timeline.snapshots[-1].links == graphs[0].graph.links
+    assert timeline is not None and timeline.snapshots[-1].links == graphs[0].info.links
     room = read_room(folder.ground_truth, np.array(sequence.info.gravity.world_from_log))
     partial = {snapshot.info.frames_integrated: snapshot for snapshot in (*maps[every].snapshots(), maps[every])}
     found: dict[int, Figures] = {}

@@ -27,8 +27,8 @@ from benchmarks.mosd_frames import CAMERA, FOLDER, frame_files, frame_names, rea
 from benchmarks.object_masks import score_object_masks
 from benchmarks.results import Results
 from benchmarks.steps import made, opened
-from schemas.kinds import Sequence as SequenceArtifact
 from schemas.scene_parts import Camera
+from schemas.sequence import Sequence as SequenceArtifact
 from schemas.vocabulary import load_vocabulary
 from stages.kit.drawing.palette import entity_color
 from stages.kit.formats.frames import Frame, FrameReader

@@ -25,8 +25,10 @@ from benchmarks.experiments.mapping.drift import drifting_poses
 from benchmarks.generated_rooms import STEPS
 from benchmarks.results import Results
 from benchmarks.steps import made, opened, unrecorded
-from schemas.kinds import GroundTruth, Segments, Trajectory
-from schemas.kinds import Sequence as SequenceArtifact
+from schemas.ground_truth import GroundTruth
+from schemas.segments import Segments
+from schemas.sequence import Sequence as SequenceArtifact
+from schemas.trajectory import Trajectory
 from stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
 from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.trajectories import read_tum, write_tum

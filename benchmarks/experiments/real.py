@@ -20,9 +20,10 @@ from pydantic import Field
 from benchmarks.experiment import Bench, Experiment, Trial
 from benchmarks.results import Results
 from benchmarks.steps import StepFailed, opened
-from schemas.kinds import ContactGraph, PanopticMap
-from schemas.kinds import Sequence as SequenceArtifact
+from schemas.contact_graph import ContactGraph
+from schemas.panoptic_map import PanopticMap
 from schemas.scene_parts import TREE_RELATIONS
+from schemas.sequence import Sequence as SequenceArtifact
 from stages.engine.chain import run_pipeline
 from stages.engine.pipelines import pipeline_path, read_pipeline
 from stages.engine.reading import read_manifest
@@ -83,10 +84,10 @@ def facts_of_run(run: Path) -> dict[str, Any]:
     """Collect what the table shows from the artifacts of one run."""
     sequence = opened(SequenceArtifact, run / "sequence")
     panoptic_map, graph = opened(PanopticMap, run / "panoptic_map"), opened(ContactGraph, run / "contact_graph")
-    classes = {node.id: node.class_name for node in graph.graph.nodes}
+    classes = {node.id: node.class_name for node in graph.info.nodes}
     supports = Counter(
         f"{classes[link.source]} > {classes[link.target]}"
-        for link in graph.graph.links
+        for link in graph.info.links
         if link.relation in TREE_RELATIONS and link.source != "scene"
     )
     steps = {}

@@ -24,7 +24,7 @@ from benchmarks.results import Results
 from benchmarks.steps import opened, step, unrecorded
 from benchmarks.tabulation import markdown
 from schemas.ground_truth import GroundTruth
-from schemas.kinds import PanopticMap
+from schemas.panoptic_map import PanopticMap
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.stage import Parameters
 from stages.truth.annotated_points import instances_of

@@ -16,8 +16,9 @@ from benchmarks.experiments.mapping.drift import drifting_poses
 from benchmarks.generated_rooms import make_room
 from benchmarks.steps import context_in, opened, unrecorded
 from schemas.contact_graph import ContactGraphFile
-from schemas.kinds import GroundTruth, PanopticMap
-from schemas.kinds import Sequence as SequenceArtifact
+from schemas.ground_truth import GroundTruth
+from schemas.panoptic_map import PanopticMap
+from schemas.sequence import Sequence as SequenceArtifact
 from schemas.vocabulary import load_vocabulary
 from stages.evaluate.graph_measures import box_candidates
 from stages.evaluate.map_measures import (
@@ -174,7 +175,7 @@ def outcome_of(
     arm: Arm, truth: TrueRoom, panoptic_map: PanopticMap, options: EvaluateParameters, output: Path
 ) -> Outcome:
     """Measure a finished map: PQ, instances, and the boxes of the contact graph built from it."""
-    graph = unrecorded("graph", output / "contact_graph", arm.graph, seed=SEED, panoptic_map=panoptic_map).graph
+    graph = unrecorded("graph", output / "contact_graph", arm.graph, seed=SEED, panoptic_map=panoptic_map).info
     return outcome_of_map(truth, load_map(panoptic_map), graph, options)
 
 

@@ -102,7 +102,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Fram
         for trial in trials:
             started = time.process_time()
             parameters = {"method": trial.arm}
-            graph = unrecorded("graph", Path(folder) / trial.arm, parameters, panoptic_map=panoptic_map).graph
+            graph = unrecorded("graph", Path(folder) / trial.arm, parameters, panoptic_map=panoptic_map).info
             spent = 1000 * (time.process_time() - started)
             yield trial, FrameSupports(score_graph(told, graph, node_of, BASE), spent)
 

@@ -89,7 +89,7 @@ def plan_room(
     progress = _CpuProgress()
     parameters = {"task": trial.arm, "video_rate": 0.0, "image_width": 64} | options
     inputs = {"scene": scene} | ({} if truth is None else {"ground_truth": truth})
-    found = unrecorded("plan", folder, parameters, seed=int(trial.seed), progress=progress, **inputs).plan
+    found = unrecorded("plan", folder, parameters, seed=int(trial.seed), progress=progress, **inputs).info
     success = found.status == "executed"
     reason = "" if success else found.failures[-1].kind if found.failures else found.status
     seconds = {name: value for name, value in progress.seconds.items() if name in ("load the scene", "plan", "execute")}

@@ -24,8 +24,8 @@ from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene
 from schemas.contact_graph import ContactGraphFile
 from schemas.ground_truth import GroundTruth
-from schemas.kinds import Sequence as SequenceArtifact
 from schemas.panoptic_map import PanopticMap
+from schemas.sequence import Sequence as SequenceArtifact
 from stages.cad.candidates import Shortlist
 from stages.cad.model_surfaces import ModelSurface
 from stages.cad.stage import choose_and_write, find_candidates
@@ -172,7 +172,7 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
     of_graph = (panoptic_map.root, method)
     if of_graph not in shared.graphs:
         built = unrecorded("graph", folder / "contact_graph", arm.graph, seed=SEED, panoptic_map=panoptic_map)
-        shared.graphs[of_graph] = built.graph
+        shared.graphs[of_graph] = built.info
     graph = shared.graphs[of_graph]
     key = (case, panoptic_map.root, arm.cad.method)
     context = context_in(folder / "cad_scene", SEED)
@@ -203,7 +203,7 @@ def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder:
     assert measured is not None
     objects = sum(node.node_type in ("rigid", "articulated") for node in graph.nodes)
     distance, edges = measure_graph(room.truth, graph, overlaps)
-    summary = scene.scene
+    summary = scene.info
     extra = {
         "seconds_per_object": seconds / max(1, objects),
         "conflicts_before": float(summary.conflicts_before),
@@ -252,7 +252,7 @@ def run_real(folder: Path, scratch: Path, arms: Sequence[Arm]) -> Iterator[tuple
             "cad", scratch / arm.name / "cad_scene", arm.cad, seed=SEED, contact_graph=graph, library=library, **given
         )
         settled = settle(scene, scratch / arm.name / "interactive_scene")
-        distance, edges = measure_graph(truth, graph.graph, overlaps)
+        distance, edges = measure_graph(truth, graph.info, overlaps)
         yield arm.name, Outcome(distance, edges, physics=physics_of(settled), unsettled=what_moved(settled))
 
 

@@ -23,9 +23,10 @@ from benchmarks.experiments.scenenn.scenes import Scene, find_scene
 from benchmarks.experiments.scenenn.tables import ALL, all_figures, figures, make_tables, read_published, summarise
 from benchmarks.results import Results
 from benchmarks.steps import opened, step
-from schemas.contact_graph import ContactGraphFile
+from schemas.contact_graph import ContactGraph, ContactGraphFile
 from schemas.errors import BadInput, UsageError
-from schemas.kinds import ContactGraph, GroundTruth, PanopticMap
+from schemas.ground_truth import GroundTruth
+from schemas.panoptic_map import PanopticMap
 from stages.evaluate.map_measures import PredictedMap, load_map
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.truth import load_truth
@@ -123,7 +124,7 @@ def outcome_of(truth_folder: Path, map_folder: Path, graph_folder: Path) -> Outc
     options = EvaluateParameters.model_validate({})
     truth = load_truth(opened(GroundTruth, truth_folder), np.eye(4), options.minimum_visible_points)
     predicted = renamed_map(load_map(opened(PanopticMap, map_folder)))
-    return outcome_of_map(truth, predicted, renamed_graph(opened(ContactGraph, graph_folder).graph), options)
+    return outcome_of_map(truth, predicted, renamed_graph(opened(ContactGraph, graph_folder).info), options)
 
 
 def renamed_map(predicted: PredictedMap) -> PredictedMap:
