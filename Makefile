@@ -235,6 +235,10 @@ bench-reconstruct-stereo: setup ## Rooms reconstructed from two eyes beside a de
 train-stereo: setup ## Train the small RAFT-Stereo on our own renderings (QUICK=1: 10 steps)
 	$(PYTHON) -m benchmarks.disparity.train $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/train-stereo$(if $(QUICK),-quick)
 
+.PHONY: figures
+figures: setup ## Write every figure of README and docs anew from docs/results/*.json
+	$(PYTHON) -m benchmarks.figures
+
 .PHONY: pictures
 pictures: setup ## Take the README's pictures out of the demo run
 	$(PYTHON) docs/pictures.py $(OUTPUTS)/demo
