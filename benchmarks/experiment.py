@@ -122,7 +122,7 @@ class Experiment:
     inputs: Callable[[Bench, Trial], Sequence[Path]] | None = None
     """Files and folders whose content a trial depends on; artifacts count by their manifest's digest."""
     steps: Sequence[str] = ()
-    """Commands that `measure` runs; their code counts."""
+    """Commands whose code counts: those that `measure` runs, and those whose parts are found by their place."""
     code: Mapping[str, Sequence[str]] = field(default_factory=dict)
     """Arm -> modules that it runs, where it is not all that `measure` reaches."""
     pairs: Sequence[tuple[str, str]] = ()

@@ -23,11 +23,11 @@ from benchmarks.object_masks import score_object_masks
 from benchmarks.results import Results
 from stages.kit.drawing.palette import instance_color
 from stages.kit.stage import Parameters
-from stages.segment.objects.backend import BUNDLED
-from stages.segment.objects.boosting import read_trees
-from stages.segment.objects.pairs import FEATURES
-from stages.segment.objects.plain import segment_plain
-from stages.segment.objects.segmentation import segment_objects
+from stages.segment.backends.objects.backend import BUNDLED
+from stages.segment.backends.objects.boosting import read_trees
+from stages.segment.backends.objects.pairs import FEATURES
+from stages.segment.backends.objects.plain import segment_plain
+from stages.segment.backends.objects.segmentation import segment_objects
 
 QUICK_STEP = 5
 """Every how many-th frame with --quick."""

@@ -6,12 +6,11 @@ import os
 from collections.abc import Sequence
 
 from benchmarks.experiment import Bench, Experiment, Trial
-from benchmarks.experiments.mapping.arms import CASES, EVERYWHERE, NETWORK, SHOWN, all_arms
+from benchmarks.experiments.mapping.arms import CASES, EVERYWHERE, SHOWN, all_arms
 from benchmarks.experiments.mapping.figures_of_merit import MEASURES, more_figures
 from benchmarks.experiments.mapping.measuring import MappingParameters, Outcome, measure
 from benchmarks.experiments.mapping.printed import printed_by_the_thesis
 from benchmarks.generated_rooms import REPORTING, STEPS, TUNING, TUNING_UNTRAINED, make_library
-from stages.segment.choice import BUILDERS
 
 
 def runs(arm: str, case: str) -> bool:
@@ -39,7 +38,6 @@ EXPERIMENT = Experiment(
     "that people live in.",
     arms={arm.name: arm.title for arm in all_arms(0.02)},
     cases=CASES,
-    default_cases=lambda bench: [case for case in CASES if case != NETWORK or NETWORK in BUILDERS],
     runs=runs,
     tuning=TUNING,
     reporting=REPORTING,
@@ -55,7 +53,7 @@ EXPERIMENT = Experiment(
     quick={"frames": 40},
     jobs=min(2, os.cpu_count() or 1),
     prepare=prepare,
-    steps=("graph", *STEPS),
+    steps=("segment", "graph", *STEPS),
     pairs=(
         ("thesis_separate", "voxblox++"),
         ("thesis", "thesis_separate"),

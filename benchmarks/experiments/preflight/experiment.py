@@ -155,6 +155,6 @@ EXPERIMENT = Experiment(
     parameters=PreflightParameters,
     places=frozenset({"rooms", "data"}),
     prepare=prepare,
-    steps=("library build", "synthesize"),
+    steps=("library build", "synthesize", "ingest"),
     pictures=write_reasons,
 )
