@@ -31,6 +31,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     try:
         return run(load_experiment(words[0]), words)
+    except KeyboardInterrupt:
+        print("stopped; what is measured is kept", file=sys.stderr)
+        return 130
     except ScenewrightError as error:
         print(f"error: {error}", file=sys.stderr)
         return error.exit_code

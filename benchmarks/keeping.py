@@ -25,7 +25,7 @@ from benchmarks.code_digest import code_digest
 from benchmarks.discovery import load_experiment
 from benchmarks.experiment import Bench, Experiment, Trial
 from schemas.base import canonical_json
-from schemas.errors import BadInput, ScenewrightError
+from schemas.errors import ScenewrightError, UsageError
 from stages.engine.discovery import stage_by_name
 from stages.engine.reading import read_manifest
 from stages.kit.digests import external_digest, sha256_of_text
@@ -153,14 +153,17 @@ def wanted_trials(
     seeds: Sequence[str] = (),
     most: int | None = None,
 ) -> list[Trial]:
-    """Return arms x cases x seeds, cut down to what is asked for. Raises BadInput for a name that is none of them."""
+    """Return arms x cases x seeds, cut down to what is asked for. Raises UsageError for a name that is none of them."""
     chosen_cases = cases or (experiment.default_cases(bench) if experiment.default_cases else experiment.cases)
     chosen_arms = arms or (experiment.default_arms(bench) if experiment.default_arms else list(experiment.arms))
     for given, known, what in ((arms, list(experiment.arms), "arm"), (cases, experiment.cases, "case")):
         for name in given:
             if name not in known:
-                raise BadInput(f"no {what} {name!r} in {experiment.name}", hint=f"there are {', '.join(known)}")
-    return list(_crossed(experiment, bench, chosen_arms, chosen_cases, seeds, most))
+                raise UsageError(f"no {what} {name!r} in {experiment.name}", hint=f"there are {', '.join(known)}")
+    trials = list(_crossed(experiment, bench, chosen_arms, chosen_cases, seeds, most))
+    for name in set(seeds) - {trial.seed for trial in trials}:
+        raise UsageError(f"no seed {name!r} in {experiment.name}, {', '.join(chosen_cases)}", hint="see --tuning")
+    return trials
 
 
 def _crossed(

@@ -18,6 +18,7 @@ from benchmarks.command import run
 from benchmarks.discovery import experiment_files, load_experiment
 from benchmarks.experiment import Bench, Experiment, Measure, Trial, mean
 from benchmarks.results import Results
+from schemas.errors import UsageError
 from stages.kit.stage import Parameters
 
 
@@ -122,6 +123,9 @@ def test_quick_tuning_and_counts_choose_the_trials(tmp_path: Path) -> None:
     assert run(SMALL, ["small", "--out", str(tmp_path), "--tuning", "--count", "1"]) == 0
     assert {trial.seed for trial in MEASURED} == {"7a"}
     assert run(SMALL, ["small", "--out", str(tmp_path / "other"), "--kept"]) == 0 and len(MEASURED) == 4
+    for wrong in (["--arms", "nobody"], ["--seeds", "9z"], ["--cases", "three"]):
+        with pytest.raises(UsageError):
+            run(SMALL, ["small", "--out", str(tmp_path), *wrong])
     with pytest.raises(SystemExit) as left:
         run(SMALL, ["small", "--out", str(tmp_path), "--scale", "nan"])
     assert left.value.code == 2
