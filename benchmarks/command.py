@@ -12,9 +12,9 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from benchmarks.discovery import experiment_files, load_experiment, summary_of
-from benchmarks.experiment import Bench, Experiment
+from benchmarks.experiment import Bench, Experiment, Results
 from benchmarks.keeping import measure_missing, read_record, wanted_trials
-from benchmarks.results import Results, write_results
+from benchmarks.results import write_results
 from schemas.errors import ScenewrightError
 
 UNMET = 4

@@ -10,15 +10,18 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 
+from stages.kit.measurement.bootstrap import Interval, figure_interval, paired_interval
 from stages.kit.stage import Parameters
 
-if TYPE_CHECKING:
-    from benchmarks.results import Results
+RESAMPLES = 2000
+SEED_OF_INTERVALS = 0
+LEAST_CLUSTERS = 2
+"""With fewer there is nothing to resample."""
 
 
 @dataclass(frozen=True, order=True)
@@ -137,6 +140,93 @@ class Experiment:
     """Draws and writes into the output folder what table.md does not hold."""
     problems: Callable[[Results], Sequence[str]] | None = None
     """What was expected and does not hold, in words; any makes the command exit with 4."""
+
+
+@dataclass
+class Results:
+    """The records of a run."""
+
+    experiment: Experiment
+    bench: Bench
+    records: Mapping[Trial, Any]
+    _clusters: dict[tuple[str, str], dict[str, list[Any]]] = field(default_factory=dict)
+    _values: dict[tuple[str, ...], dict[tuple[int, ...], float | None]] = field(default_factory=dict)
+
+    @property
+    def cases(self) -> list[str]:
+        """The cases that ran, in their order."""
+        return list(dict.fromkeys(trial.case for trial in self.records))
+
+    def arms(self, case: str | None = None) -> list[str]:
+        """The arms that ran (in a case), in the order of the declaration."""
+        there = {trial.arm for trial in self.records if case in (None, trial.case)}
+        return [arm for arm in self.experiment.arms if arm in there]
+
+    def seeds(self, case: str) -> list[str]:
+        """The seeds of a case that any arm ran on."""
+        return list(dict.fromkeys(trial.seed for trial in self.records if trial.case == case))
+
+    def of(self, arm: str, case: str) -> list[Any]:
+        """The records of an arm in a case, by seed."""
+        return [record for group in self._grouped(arm, case).values() for record in group]
+
+    def get(self, arm: str, case: str, seed: str) -> Any | None:
+        """The record of one trial."""
+        return self.records.get(Trial(arm, case, seed))
+
+    def value(self, arm: str, case: str, measure: str) -> float | None:
+        """A measure of an arm in a case."""
+        records = self.of(arm, case)
+        return self.experiment.measures[measure].of(records) if records else None
+
+    def interval(self, arm: str, case: str, measure: str) -> Interval | None:
+        """A measure with its 95 % percentile bootstrap interval over clusters of seeds; None where it is undefined, or
+        where there are fewer than two clusters."""
+        names = list(self._grouped(arm, case))
+        if len(names) < LEAST_CLUSTERS:
+            return None
+        random = np.random.default_rng(SEED_OF_INTERVALS)
+        return figure_interval(self._figure(arm, case, measure, names), range(len(names)), random, resamples=RESAMPLES)
+
+    def difference(self, first: str, second: str, case: str, measure: str) -> Interval | None:
+        """`first` minus `second` over the clusters that both ran on, drawn together, with its 95 % interval."""
+        other = self._grouped(second, case)
+        names = [name for name in self._grouped(first, case) if name in other]
+        if len(names) < LEAST_CLUSTERS:
+            return None
+        figures = [self._figure(arm, case, measure, names) for arm in (first, second)]
+        numbers = [(which, k) for which in (0, 1) for k in range(len(names))]
+
+        def of_either(samples: Sequence[tuple[int, int]]) -> float | None:
+            return figures[samples[0][0]]([k for _, k in samples])
+
+        half = len(names)
+        random = np.random.default_rng(SEED_OF_INTERVALS)
+        return paired_interval(of_either, numbers[:half], numbers[half:], random, resamples=RESAMPLES)
+
+    def _grouped(self, arm: str, case: str) -> dict[str, list[Any]]:
+        if (arm, case) not in self._clusters:
+            groups: dict[str, list[Any]] = {}
+            for trial, record in self.records.items():
+                if (trial.arm, trial.case) == (arm, case):
+                    groups.setdefault(self.experiment.cluster(trial.seed), []).append(record)
+            self._clusters[arm, case] = groups
+        return self._clusters[arm, case]
+
+    def _figure(
+        self, arm: str, case: str, measure: str, names: Sequence[str]
+    ) -> Callable[[Sequence[int]], float | None]:
+        """The measure over clusters given by their numbers; remembered by how often each is drawn."""
+        groups, of = self._grouped(arm, case), self.experiment.measures[measure].of
+        values = self._values.setdefault((arm, case, measure, *names), {})
+
+        def figure(numbers: Sequence[int]) -> float | None:
+            drawn = tuple(sorted(numbers))
+            if drawn not in values:
+                values[drawn] = of([record for k in drawn for record in groups[names[k]]])
+            return values[drawn]
+
+        return figure
 
 
 def mean(name: str, unit: str = "", *, interval: bool = True) -> Measure:

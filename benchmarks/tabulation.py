@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from benchmarks.results import Figure
+from dataclasses import dataclass
 
 MISSING = "–"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One number of figures.json."""
+
+    value: float
+    low: float | None
+    high: float | None
+    cases: int | None
+    unit: str
 
 
 def number(value: float | None, digits: int = 1, scale: float = 1.0) -> str:

@@ -10,11 +10,10 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from benchmarks.experiment import Bench, Experiment, Measure, Trial, statistic
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, statistic
 from benchmarks.generated_rooms import STEPS, make_room
 from benchmarks.graph_scores import RELATIONS, distance_figures, judge, read_room
 from benchmarks.perfect_maps import perfect_map
-from benchmarks.results import Results
 from benchmarks.steps import opened, unrecorded
 from schemas.contact_graph import ContactGraphFile
 from schemas.ground_truth import GroundTruth

@@ -16,10 +16,9 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial import cKDTree
 
-from benchmarks.experiment import Bench, Experiment, Trial
+from benchmarks.experiment import Bench, Experiment, Results, Trial
 from benchmarks.generated_rooms import STEPS, RoomFolder, make_room
 from benchmarks.graph_scores import OPTIONS, Figures, distance_figures, judge, read_room
-from benchmarks.results import Results
 from benchmarks.steps import made, opened, unrecorded
 from schemas.contact_graph import ContactGraphFile
 from schemas.panoptic_map import PanopticMap

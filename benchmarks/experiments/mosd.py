@@ -17,14 +17,14 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Measure, Trial, count, mean, median
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, median
 from benchmarks.mosd_frames import CAMERA, FOLDER, LabelledFrame, frame_files, frame_names, kind_of, read_frame
 from benchmarks.object_masks import score_object_masks
-from benchmarks.results import Results
 from stages.kit.drawing.palette import instance_color
 from stages.kit.stage import Parameters
 from stages.segment.backends.objects.backend import BUNDLED
 from stages.segment.backends.objects.boosting import read_trees
+from stages.segment.backends.objects.grouping import by_trees
 from stages.segment.backends.objects.pairs import FEATURES
 from stages.segment.backends.objects.plain import segment_plain
 from stages.segment.backends.objects.segmentation import segment_objects
@@ -86,7 +86,7 @@ def segmenter_of(arm: str) -> Segmenter:
     if arm == "geometric":
         return lambda color, depth: segment_objects(color, depth, CAMERA).labels
     trees = read_trees(BUNDLED, FEATURES)
-    return lambda color, depth: segment_objects(color, depth, CAMERA, trees=trees).labels
+    return lambda color, depth: segment_objects(color, depth, CAMERA, by_trees(trees)).labels
 
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, FrameScore]]:

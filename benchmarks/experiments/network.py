@@ -21,11 +21,10 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Measure, Trial
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.generated_rooms import REPORTING, STEPS, make_room
 from benchmarks.mosd_frames import CAMERA, FOLDER, frame_files, frame_names, read_frame
 from benchmarks.object_masks import score_object_masks
-from benchmarks.results import Results
 from benchmarks.steps import made, opened
 from schemas.scene_parts import Camera
 from schemas.sequence import Sequence as SequenceArtifact
@@ -37,7 +36,7 @@ from stages.kit.stage import Parameters
 from stages.segment.backends.network.backend import Predictor, load_predictor
 from stages.segment.backends.network.features import mount_of_pose
 from stages.segment.backends.network.weights import BUNDLED
-from stages.segment.fusion import fuse
+from stages.segment.fusion_ours import fuse
 from stages.segment.geometric import segment_depth
 from stages.segment.panoptic import PanopticFrame
 from stages.segment.parameters import SegmentParameters

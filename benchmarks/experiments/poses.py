@@ -20,10 +20,9 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Trial, only
+from benchmarks.experiment import Bench, Experiment, Results, Trial, only
 from benchmarks.experiments.mapping.drift import drifting_poses
 from benchmarks.generated_rooms import STEPS
-from benchmarks.results import Results
 from benchmarks.steps import made, opened, unrecorded
 from schemas.ground_truth import GroundTruth
 from schemas.segments import Segments

@@ -17,8 +17,7 @@ import numpy as np
 import trimesh
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Trial
-from benchmarks.results import Results
+from benchmarks.experiment import Bench, Experiment, Results, Trial
 from benchmarks.steps import StepFailed, opened
 from schemas.contact_graph import ContactGraph
 from schemas.panoptic_map import PanopticMap

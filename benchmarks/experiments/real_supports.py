@@ -18,9 +18,8 @@ import numpy as np
 import trimesh
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Measure, Trial, statistic
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, statistic
 from benchmarks.perfect_maps import write_map
-from benchmarks.results import Results
 from benchmarks.steps import opened, step, unrecorded
 from benchmarks.tabulation import markdown
 from schemas.ground_truth import GroundTruth

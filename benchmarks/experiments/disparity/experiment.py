@@ -13,10 +13,9 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Measure, Trial
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.disparity.arms import DERIVED, NETWORK, WORDS, Arm, arms_of
 from benchmarks.experiments.disparity.cases import CASES, NEEDLE_SEEDS, TUNING_NEEDLES, Pair
-from benchmarks.results import Results
 from stages.disparity.raft.matching import SMALL_UPDATES
 from stages.disparity.search_range import search_range
 from stages.disparity.semi_global import gray_of

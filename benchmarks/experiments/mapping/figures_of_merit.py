@@ -6,10 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from benchmarks.experiment import Measure
+from benchmarks.experiment import Measure, Results
 from benchmarks.experiments.mapping.arms import SHOWN
 from benchmarks.experiments.mapping.measuring import Outcome, Ranked
-from benchmarks.results import Results
 from stages.evaluate.truth import stuff_classes
 from stages.kit.measurement.average_precision import (
     PrecisionRecall,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.results import Results
+from benchmarks.experiment import Results
 from benchmarks.tabulation import markdown
 
 PRINTED = Path(__file__).resolve().parents[2] / "expectations" / "thesis_mapping.toml"

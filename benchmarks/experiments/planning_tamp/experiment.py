@@ -17,9 +17,8 @@ from typing import get_args
 
 import numpy as np
 
-from benchmarks.experiment import Bench, Experiment, Trial
+from benchmarks.experiment import Bench, Experiment, Results, Trial
 from benchmarks.experiments.planning_tamp.rooms import exact_room
-from benchmarks.results import Results
 from benchmarks.steps import made, opened, unrecorded
 from schemas.cad_library import CadLibrary
 from schemas.errors import BadInput

@@ -14,10 +14,9 @@ from pathlib import Path
 
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Trial, mean, median
+from benchmarks.experiment import Bench, Experiment, Results, Trial, mean, median
 from benchmarks.experiments.preflight.faults import FAULTS, NOTHING, Fault, Named
 from benchmarks.experiments.real import EXPECTED
-from benchmarks.results import Results
 from benchmarks.steps import made
 from stages.ingest.detection import open_log
 from stages.ingest.parameters import IngestParameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from benchmarks.results import Results
+from benchmarks.experiment import Results
 from benchmarks.tabulation import markdown
 
 PRINTED = (

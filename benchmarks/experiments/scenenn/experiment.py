@@ -16,12 +16,11 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Measure, Trial
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.mapping.arms import Arm, all_arms
 from benchmarks.experiments.mapping.measuring import Outcome, outcome_of_map
 from benchmarks.experiments.scenenn.scenes import Scene, find_scene
 from benchmarks.experiments.scenenn.tables import ALL, all_figures, figures, make_tables, read_published, summarise
-from benchmarks.results import Results
 from benchmarks.steps import opened, step
 from schemas.contact_graph import ContactGraph, ContactGraphFile
 from schemas.errors import BadInput, UsageError

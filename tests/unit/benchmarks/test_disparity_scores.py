@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.experiment import Bench, Trial
+from benchmarks.experiment import Bench, Results, Trial
 from benchmarks.experiments.disparity.arms import CLASSICAL, DERIVED, WORDS, arms_of
 from benchmarks.experiments.disparity.cases import Pair
 from benchmarks.experiments.disparity.experiment import EXPERIMENT, DisparityParameters, measured, scores
 from benchmarks.experiments.stereo_rooms import depth_figures, pipeline_of
-from benchmarks.results import Results, write_results
+from benchmarks.results import write_results
 from schemas.scene_parts import Camera
 from stages.engine.pipelines import resolve_variables, step_arguments
 from stages.kit.formats.frames import FrameWriter

@@ -16,8 +16,7 @@ from benchmarks import discovery, keeping
 from benchmarks.code_digest import code_digest
 from benchmarks.command import run
 from benchmarks.discovery import experiment_files, load_experiment
-from benchmarks.experiment import Bench, Experiment, Measure, Trial, mean
-from benchmarks.results import Results
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean
 from schemas.errors import UsageError
 from stages.kit.stage import Parameters
 

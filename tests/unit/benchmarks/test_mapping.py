@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from benchmarks.experiment import Bench, Trial
+from benchmarks.experiment import Bench, Results, Trial
 from benchmarks.experiments.mapping.arms import EVERYWHERE, SHOWN, all_arms
 from benchmarks.experiments.mapping.drift import TRANSLATION_PER_METRE, drifting_poses
 from benchmarks.experiments.mapping.experiment import EXPERIMENT
 from benchmarks.experiments.mapping.figures_of_merit import MEASURES, pooled_curve
 from benchmarks.experiments.mapping.measuring import MappingParameters, Outcome, ranked
 from benchmarks.generated_rooms import REPORTING, TUNING
-from benchmarks.results import Results, figures_of, table
+from benchmarks.results import figures_of, table
 from stages.kit.measurement.average_precision import Candidates, average_precision
 from stages.kit.measurement.panoptic_quality import ClassQuality
 from stages.synthesize.recipes import load_recipe

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.experiment import Bench, Trial
+from benchmarks.experiment import Bench, Results, Trial
 from benchmarks.experiments.scene import measuring
 from benchmarks.experiments.scene.arms import ARMS, MASK_LEVEL, PERFECT, REAL
 from benchmarks.experiments.scene.experiment import EXPERIMENT
 from benchmarks.experiments.scene.figures_of_merit import FIGURES
 from benchmarks.experiments.scene.measuring import Outcome, SceneParameters
 from benchmarks.generated_rooms import RoomFolder
-from benchmarks.results import Results, figures_of, table
+from benchmarks.results import figures_of, table
 
 GRAPH = {"edit_distance": 4.0, "wrong_support": 1.0, "missing_detection": 2.0, "wrong_detection": 0.0}
 
