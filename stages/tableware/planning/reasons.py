@@ -112,10 +112,10 @@ def _pair(
         return None
     objects = why[2] if len(why) == 3 else ()
     return ImpossiblePair(
-        primitive=primitive,
+        primitive=primitive,  # type: ignore[arg-type]
         first=first.name,
         second=second.name,
         kind=why[0],
-        objects=objects,  # type: ignore[arg-type]
+        objects=objects,
         message=f"{first.name} and {second.name}: {why[1]}",
     )

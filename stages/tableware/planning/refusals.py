@@ -104,8 +104,8 @@ def _refusal(item: Item, reason: str, message: str) -> RefusedItem:
         name=item.name,
         position=item.position,
         radius=size,
-        reason=reason,
-        message=f"{item.name}: {message}",  # type: ignore[arg-type]
+        reason=reason,  # type: ignore[arg-type]
+        message=f"{item.name}: {message}",
     )
 
 
