@@ -62,7 +62,7 @@ RUNS = (
     Run("table_plan", "tableware plan", "--detections @seen --draws 5 --image-width 300"),
     Run("table_trial", "tableware simulate", "--scene @table --plan @table_plan --image-width 300"),
     Run("table_physics", "tableware simulate", "--scene @table --simulator physics --image-width 300"),
-    Run("table_evaluation", "tableware evaluate", "--scenes 2 --draws 2"),
+    Run("table_evaluation", "tableware evaluate", "--tier tier2 --scenes 3 --draws 3 --chances thesis_spills"),
     Run("needle_scene", "suture scene", "--frames 2 --seed 2000"),
     Run("needle_disparity", "disparity", SEEN),
     Run("needle", "suture needle", f"{SEEN} --disparity @needle_disparity"),
