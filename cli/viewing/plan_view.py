@@ -17,7 +17,7 @@ from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
 from schemas.plan import Plan
 from stages.kit.formats.foxglove import JPEG_START, stamp_nanoseconds, transform_matrix
-from stages.kit.formats.mcap_log import McapLog
+from stages.kit.formats.indexed_mcap import IndexedMcap
 
 
 def draw_plan(plan: Plan, canvas: Canvas) -> None:
@@ -30,7 +30,7 @@ def draw_plan(plan: Plan, canvas: Canvas) -> None:
     path = plan.path("execution.mcap")
     if not path.exists():
         return
-    with McapLog(path) as log:
+    with IndexedMcap(path) as log:
         draw_robot(canvas)
         _animate(log, canvas)
 
@@ -53,7 +53,7 @@ def _room(plan: Plan) -> Path | None:
     return scene.root if scene is not None else None
 
 
-def _topics(log: McapLog, schema_name: str) -> set[int]:
+def _topics(log: IndexedMcap, schema_name: str) -> set[int]:
     return {
         channel.id
         for channel in log.channels.values()
@@ -61,17 +61,19 @@ def _topics(log: McapLog, schema_name: str) -> set[int]:
     }
 
 
-def _animate(log: McapLog, canvas: Canvas) -> None:
+def _animate(log: IndexedMcap, canvas: Canvas) -> None:
     transforms, images = _topics(log, "foxglove.FrameTransforms"), _topics(log, "foxglove.CompressedImage")
     try:
-        for message in log.messages(transforms | images):
-            if message.channel.id in transforms:
-                for transform in FrameTransforms.FromString(message.data).transforms:
+        messages = [(*entry, channel) for channel in transforms | images for entry in log.indexed(channel)]
+        for _, place, channel in sorted(messages, key=lambda message: (message[1].chunk, message[1].offset)):
+            data = log.fetch(place)
+            if channel in transforms:
+                for transform in FrameTransforms.FromString(data).transforms:
                     canvas.time(stamp_nanoseconds(transform) * 1e-9)
                     pose = transform_matrix(transform.translation, transform.rotation)
                     canvas.transform(_entity(transform.child_frame_id), pose)
             else:
-                image = CompressedImage.FromString(message.data)
+                image = CompressedImage.FromString(data)
                 canvas.time(stamp_nanoseconds(image) * 1e-9)
                 if image.data.startswith(JPEG_START):
                     canvas.picture("execution", bytes(image.data))

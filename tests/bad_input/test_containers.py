@@ -23,11 +23,11 @@ from mcap.opcode import Opcode
 from schemas.errors import BadInput
 from stages.ingest.messages.container import MessageLog
 from stages.ingest.messages.mcap_container import open_mcap
+from stages.ingest.messages.mcap_log import McapLog
+from stages.ingest.messages.mcap_records import MAGIC
 from stages.ingest.messages.opening import open_message_log
 from stages.ingest.messages.rosbag1_container import open_rosbag1
 from stages.ingest.messages.rosbag2_container import open_rosbag2
-from stages.kit.formats.mcap_log import McapLog
-from stages.kit.formats.mcap_records import MAGIC
 from tests.unit.ingest.container_logs import (
     CompressionMode,
     CompressionType,
@@ -317,7 +317,7 @@ def test_mcap_records_that_claim_more_than_there_is(tmp_path: Path) -> None:
 
 
 def test_mcap_metadata_is_bounded_as_a_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stages.kit.formats.mcap_structure.MOST_DEFINITIONS", 10_000)
+    monkeypatch.setattr("stages.ingest.messages.mcap_structure.MOST_DEFINITIONS", 10_000)
     metadata = mcap_record(Opcode.METADATA, struct.pack("<I", 1) + b"n" + struct.pack("<I", 0))
     path = _write(tmp_path / "log.mcap", mcap_file(mcap_channel(1, "/x"), *[metadata] * 100, mcap_message(1, 5, b"m")))
     messages, damage = _salvaged(path)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from schemas.errors import BadInput
 from stages.ingest.messages.container import Channel, StoredMessage
-from stages.kit.formats.mcap_log import Location, LogMessage, McapLog
+from stages.ingest.messages.mcap_log import Location, LogMessage, McapLog
 
 
 class McapMessages:

@@ -14,6 +14,8 @@ from typing import NamedTuple
 
 from schemas.errors import BadInput
 from stages.ingest.messages.container import Channel, StoredMessage
+from stages.ingest.messages.damage_lines import HINT, DamageLines
+from stages.ingest.messages.log_file import Damaged, LogFile
 from stages.ingest.messages.rosbag1_records import (
     BAG_HEADER,
     CHUNK,
@@ -31,8 +33,6 @@ from stages.ingest.messages.rosbag1_records import (
 )
 from stages.kit.formats.bounded_unpacking import unpacked
 from stages.kit.formats.chunk_cache import ChunkCache
-from stages.kit.formats.damage_lines import HINT, DamageLines
-from stages.kit.formats.log_file import Damaged, LogFile
 
 LARGEST_CHUNK = 1 << 30
 """Unpacked bytes of one chunk that are accepted; what claims more is taken for a bomb."""

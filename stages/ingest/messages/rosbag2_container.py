@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 from schemas.errors import BadInput, MachineFailure
 from stages.ingest.messages.container import Channel, StoredMessage
+from stages.ingest.messages.damage_lines import HINT, DamageLines
+from stages.ingest.messages.log_file import Damaged, LogFile
 from stages.ingest.messages.mcap_container import McapMessages
+from stages.ingest.messages.mcap_records import MAGIC as MCAP_MAGIC
 from stages.ingest.messages.rosbag2_metadata import NAME, BagMetadata, listed_parts, read_bag_metadata
 from stages.ingest.messages.sqlite_container import LARGEST_MESSAGE, SqliteMessages
 from stages.ingest.messages.sqlite_container import MAGIC as SQLITE_MAGIC
 from stages.kit.formats.bounded_unpacking import stated_size, unpack_file, unpacked_within
-from stages.kit.formats.damage_lines import HINT, DamageLines
-from stages.kit.formats.log_file import Damaged, LogFile
-from stages.kit.formats.mcap_records import MAGIC as MCAP_MAGIC
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 GREATEST_RATIO = 100

@@ -18,8 +18,8 @@ from urllib.parse import quote
 
 from schemas.errors import BadInput, MachineFailure
 from stages.ingest.messages.container import Channel, StoredMessage
-from stages.kit.formats.damage_lines import HINT, DamageLines
-from stages.kit.formats.log_file import Damaged, LogFile
+from stages.ingest.messages.damage_lines import HINT, DamageLines
+from stages.ingest.messages.log_file import Damaged, LogFile
 
 MAGIC = b"SQLite format 3\x00"
 _HEAD_SIZE = 100

@@ -21,7 +21,7 @@ from mcap_protobuf.schema import build_file_descriptor_set
 from schemas.errors import BadInput
 from stages.kit.formats import foxglove
 from stages.kit.formats.frames import CAMERA_NAME
-from stages.kit.formats.mcap_log import Location, McapLog
+from stages.kit.formats.indexed_mcap import IndexedMcap, Location
 from stages.kit.stereo.disparity_map import DisparityMap
 
 ENCODINGS = {"disparity": "32FC1", "confidence": "mono8"}
@@ -72,7 +72,7 @@ class DisparityReader:
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
-        self._log = McapLog(self.path)
+        self._log = IndexedMcap(self.path)
         try:
             self._places = self._index()
         except BaseException:
@@ -117,7 +117,7 @@ class DisparityReader:
         if stream not in places:
             raise BadInput(f"{self.path}: a map without {stream}", hint=_AGAIN)
         try:
-            message: Any = RawImage.FromString(self._log.fetch(places[stream]).data)
+            message: Any = RawImage.FromString(self._log.fetch(places[stream]))
             if message.encoding != ENCODINGS[stream]:
                 raise ValueError(f"its encoding is {message.encoding!r:.40}")
             return foxglove.raw_array(message)

@@ -30,7 +30,7 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from schemas.sequence import LabelEntry, Sequence
 from stages.kit.formats import foxglove
-from stages.kit.formats.mcap_log import Location, McapLog
+from stages.kit.formats.indexed_mcap import IndexedMcap, Location
 from stages.kit.geometry.transforms import is_rigid
 
 TRANSFORMS = "/tf"
@@ -212,11 +212,11 @@ class FrameReader:
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
-        self._log = McapLog(self.path)
+        self._log = IndexedMcap(self.path)
         try:
             self._topics = self._find_topics()
             self._index = self._build_index()
-            metadata = dict(self._log.metadata)
+            metadata = self._log.metadata
             self.world_up: str = metadata.get(WORLD_METADATA, {}).get("world_up", "unknown")
             """`z`, or `unknown`."""
             self.label_table = _label_table(metadata.get(LABELS_METADATA, {}), self.path)
@@ -375,7 +375,7 @@ class FrameReader:
     def _decode(self, stream: str, location: Location) -> Any:
         try:
             kind = FrameTransforms if stream == "pose" else MESSAGE_TYPES[stream]
-            return kind.FromString(self._log.fetch(location).data)
+            return kind.FromString(self._log.fetch(location))
         except DecodeError:
             raise BadInput(f"{self.path}: a message of stream {stream} cannot be decoded") from None
 

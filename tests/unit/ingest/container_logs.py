@@ -14,7 +14,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Bag2Writer
 
 from stages.ingest.messages.container import MessageLog
-from stages.kit.formats.mcap_records import MAGIC
+from stages.ingest.messages.mcap_records import MAGIC
 
 Message = tuple[str, int, bytes]
 DEFINITION = "string data\n"

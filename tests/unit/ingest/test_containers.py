@@ -15,8 +15,8 @@ from rosbags.rosbag1 import Reader as Bag1Reader
 
 from schemas.errors import BadInput
 from stages.ingest.messages.container import MessageLog
+from stages.ingest.messages.mcap_log import McapLog
 from stages.ingest.messages.opening import container_of, open_message_log
-from stages.kit.formats.mcap_log import McapLog
 from tests.real_data import real_data
 from tests.unit.ingest.container_logs import (
     DEFINITION,

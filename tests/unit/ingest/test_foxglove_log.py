@@ -279,7 +279,7 @@ def test_topics_can_be_chosen(tmp_path: Path) -> None:
 
 def test_memory_stays_flat(tmp_path: Path) -> None:
     """The chunks kept unpacked do not grow with the log."""
-    from stages.kit.formats.mcap_log import McapLog
+    from stages.ingest.messages.mcap_log import McapLog
 
     with McapLog(write_simple_log(tmp_path / "log.mcap", frames(12), chunk_size=1000)) as log:
         places = [message.location for message in log.messages()]

@@ -12,7 +12,7 @@ from schemas.errors import UsageError
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
 from schemas.plan import Plan
-from stages.kit.formats.mcap_log import McapLog
+from stages.ingest.messages.mcap_log import McapLog
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.plan.parameters import PlanParameters

@@ -15,9 +15,9 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Footer, Schema
 
 from schemas.errors import BadInput
-from stages.kit.formats.damage_lines import HINT, DamageLines
-from stages.kit.formats.log_file import Damaged, LogFile
-from stages.kit.formats.mcap_records import (
+from stages.ingest.messages.damage_lines import HINT, DamageLines
+from stages.ingest.messages.log_file import Damaged, LogFile
+from stages.ingest.messages.mcap_records import (
     COMPRESSIONS,
     DATA_END_SIZE,
     HEAD,

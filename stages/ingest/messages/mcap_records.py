@@ -13,7 +13,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Footer, Schema
 
-from stages.kit.formats.log_file import Damaged, LogFile
+from stages.ingest.messages.log_file import Damaged, LogFile
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")
