@@ -31,3 +31,6 @@ def test_runs_are_of_steps_and_need_runs_before_them() -> None:
     for run in RUNS:
         assert run.step in all_stages() and set(run.needs()) <= before and run.name not in before, run
         before.add(run.name)
+        stage = all_stages()[run.step]
+        options = {"seed", *stage.reads, *stage.parameters.model_fields}
+        assert {word[2:].replace("-", "_") for word in run.options.split() if word[:2] == "--"} <= options, run
