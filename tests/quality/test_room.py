@@ -1,0 +1,35 @@
+"""A small seeded room through the chain: masks with errors, map, contact graph, CAD scene, and their figures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from cli.main import run
+from tests.quality.bands import outside
+
+SIZE = ("--frames", "30", "--width", "240", "--height", "180")
+
+
+def figures(folder: Path) -> dict[str, float]:
+    """Return all metrics of the room."""
+
+    def step(name: str, out: str, *options: str, **inputs: str) -> None:
+        given = [word for role, at in inputs.items() for word in (f"--{role.replace('_', '-')}", str(folder / at))]
+        assert run([*name.split(), *given, *options, "--out", str(folder / out), "--quiet"]) == 0, name
+
+    step("library build", "library", "--shapes-per-class", "2", "--small-shapes-per-class", "2", "--seed", "1")
+    step("synthesize", "truth", *SIZE, "--seed", "3", library="library")
+    step("ingest", "sequence", log="truth/log.mcap")
+    step("segment", "segments", "--backend", "ground-truth", "--corruption", "0.2", sequence="sequence")
+    step("fuse", "map", "--voxel-size", "0.03", sequence="sequence", segments="segments")
+    step("graph", "graph", panoptic_map="map")
+    step("cad", "cad", contact_graph="graph", panoptic_map="map", library="library")
+    shown = {"panoptic_map": "map", "contact_graph": "graph", "cad_scene": "cad", "cad_library": "library"}
+    step("evaluate", "evaluation", ground_truth="truth", sequence="sequence", segments="segments", **shown)
+    metrics: dict[str, float] = json.loads((folder / "evaluation" / "metrics.json").read_text())["metrics"]
+    return metrics
+
+
+def test_a_room_is_mapped_understood_and_replaced(tmp_path: Path) -> None:
+    assert not outside(figures(tmp_path), {})
