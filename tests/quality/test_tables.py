@@ -17,6 +17,16 @@ SEEN_SEEDS = (7000, 7001, 7002)
 NEAR = 0.02
 """A detection counts for an item of its kind no further away than this in the plane [m]."""
 
+PLANNED: dict[str, Band] = {
+    "seconds_ours": (76.8, 77.8),
+    "seconds_stack": (83.7, 84.6),
+    "objects_per_trip_ours": (3.55, 3.67),
+    "failure_rate_ours": (0.0, 0.0),
+}
+"""Today 77.32 and 84.15 s, 3.611 objects a trip. Another action on one of six tables moves a mean by half a second."""
+SEEN: dict[str, Band] = {"items": (42, 42), "found": (42, 42), "in_vain": (0, 0), "mean_error_mm": (0.86, 0.97)}
+"""Today 42 of 42, none in vain, 0.916 mm."""
+
 
 def planned(folder: Path) -> dict[str, float]:
     """Return what clearing seeded tables of tier 2 takes by our policy and by the thesis's best."""
@@ -56,8 +66,8 @@ def seen(folder: Path) -> dict[str, float]:
 
 
 def test_tables_are_cleared_in_few_seconds(tmp_path: Path) -> None:
-    assert not outside(planned(tmp_path), {})
+    assert not outside(planned(tmp_path), PLANNED)
 
 
 def test_items_are_seen(tmp_path: Path) -> None:
-    assert not outside(seen(tmp_path), {})
+    assert not outside(seen(tmp_path), SEEN)
