@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from cli.main import run
-from tests.quality.bands import outside
+from tests.quality.bands import Band, outside
 
 SIZE = ("--frames", "30", "--width", "240", "--height", "180")
 

@@ -10,7 +10,7 @@ from cli.main import run
 from schemas.tableware_detections import TablewareDetectionsFile
 from schemas.tableware_scene import TablewareSceneFile
 from schemas.tableware_trial import TablewareEvaluationFile
-from tests.quality.bands import outside
+from tests.quality.bands import Band, outside
 
 TABLES = 6
 SEEN_SEEDS = (7000, 7001, 7002)
