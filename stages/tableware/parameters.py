@@ -125,6 +125,7 @@ SIMULATE = Stage(
     writes=TablewareTrial,
     libraries=("numpy", "numba", "pybullet", "trimesh", "embreex", "opencv-python-headless", "pillow"),
     module="simulate_stage",
+    data_files=lambda parameters: ("tableware/physics_times.json",) if parameters.simulator == "physics" else (),
     check=check_simulate,
     example="scenewright tableware simulate --scene outputs/tidy/scene --policy ours --out outputs/tidy/trial",
 )

@@ -68,6 +68,8 @@ class Written:
     """None: modules that cannot be known, so all of the step's folder."""
     shown: str
     """Digest with the names of our definitions, by which a change is found again."""
+    texts: frozenset[str]
+    """Its short texts that look like the name of a file."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,8 @@ class Code:
 
     digest: str
     modules: dict[str, str]
+    texts: frozenset[str]
+    """Texts in it that look like the name of a file."""
 
 
 class Program:
@@ -171,16 +175,19 @@ class Program:
             reach.number(root)
         whole = hashlib.sha256()
         per_module: dict[str, list[str]] = defaultdict(list)
+        texts: set[str] = set()
         for module, statement in reach.statements():
             written = self.written(module, statement)
             whole.update(" ".join(reach.text(part) for part in written.parts).encode())
             per_module[module].append(written.shown)
+            texts |= written.texts
         return Code(
             whole.hexdigest(),
             {
                 name: hashlib.sha256("".join(sorted(parts)).encode()).hexdigest()[:12]
                 for name, parts in sorted(per_module.items())
             },
+            frozenset(texts),
         )
 
 
@@ -260,6 +267,7 @@ class _Writer:
         self._in_function = False
         self._parts: list[str | Definition | Whole | None] = []
         self._shown: list[str] = []
+        self._texts: set[str] = set()
 
     def written(self) -> Written:
         """Write all of it."""
@@ -270,7 +278,9 @@ class _Writer:
                 joined[-1] += f" {part}"
             else:
                 joined.append(part)
-        return Written(tuple(joined), hashlib.sha256(" ".join(self._shown).encode()).hexdigest())
+        return Written(
+            tuple(joined), hashlib.sha256(" ".join(self._shown).encode()).hexdigest(), frozenset(self._texts)
+        )
 
     def _put(self, part: str | Definition | Whole | None, shown: str | None = None) -> None:
         self._parts.append(part)
@@ -392,6 +402,8 @@ class _Writer:
             self._put(Whole(value))
         else:
             self._put(f"{type(value).__name__}={value!r}")
+            if isinstance(value, str) and Path(value[:200]).suffix and "\n" not in value:
+                self._texts.add(value)
 
     def _imported_by_name(self, node: ast.Call | ast.JoinedStr) -> None:
         """Modules whose names are put together: all below what the text begins with; else all of the step's folder, and
