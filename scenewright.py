@@ -1,6 +1,7 @@
-"""Scenewright from Python: `from scenewright import load, load_run` (docs/PYTHON.md)."""
+"""Scenewright from Python: `from scenewright import load, load_run, payload` (docs/PYTHON.md)."""
 
+from schemas.artifact import Artifact
 from schemas.errors import BadInput, ScenewrightError
-from stages.engine.loading import LoadedArtifact, load, load_run
+from stages.engine.loading import as_networkx, load, load_run, payload
 
-__all__ = ["BadInput", "LoadedArtifact", "ScenewrightError", "load", "load_run"]
+__all__ = ["Artifact", "BadInput", "ScenewrightError", "as_networkx", "load", "load_run", "payload"]

@@ -78,8 +78,8 @@ def run(
 ) -> int:
     """Run a pipeline: the same commands that the Makefile chains."""
     from stages.engine.chain import run_pipeline
+    from stages.engine.estimation import estimate_pipeline, warn_or_refuse
     from stages.engine.memory_limit import parse_limit
-    from stages.engine.pipeline_estimation import warn_or_refuse
     from stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables
 
     flags = {"--force": force, "--dry-run": dry_run, "--quiet": quiet, "--debug": debug}
@@ -89,7 +89,8 @@ def run(
         extra += ("--max-memory", max_memory)
     chain = read_pipeline(pipeline_path(pipeline))
     values = _settings(settings)
-    expected = warn_or_refuse(chain, out, resolve_variables(chain, values), tuple(only or ()))
+    expected = estimate_pipeline(chain, out, resolve_variables(chain, values), tuple(only or ()))
+    warn_or_refuse(f"pipeline {chain.name}", expected.total, out)
     if dry_run:
         for line in expected.lines():
             _say(line)

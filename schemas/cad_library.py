@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document, OptionalDocument
 from schemas.base import Model, Name, Vector3
 from schemas.scene_parts import Joint, SurfacePlane
 
@@ -171,10 +171,5 @@ class CadLibrary(Artifact):
 
     kind: ClassVar[str] = "cad_library"
     description: ClassVar[str] = "CAD models: URDF, visual and convex collision meshes, planes, joints, affordances"
-    json_files: ClassVar[dict[str, type[Model]]] = {"library.json": LibraryFile}
-    optional_json_files: ClassVar[dict[str, type[Model]]] = {"imports.json": ImportFile}
-
-    @property
-    def library(self) -> LibraryFile:
-        """The parsed library.json."""
-        return LibraryFile.read(self.path("library.json"))
+    info = Document(LibraryFile, "library.json")
+    imports = OptionalDocument(ImportFile, "imports.json")

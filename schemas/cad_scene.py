@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model, Name, Transform
 from schemas.contact_graph import ContactGraphFile
 
@@ -65,14 +65,5 @@ class CadScene(Artifact):
 
     kind: ClassVar[str] = "cad_scene"
     description: ClassVar[str] = "CAD replacement: model, pose, scale, errors and alternatives per node"
-    json_files: ClassVar[dict[str, type[Model]]] = {"scene.json": CadSceneFile, "graph.json": ContactGraphFile}
-
-    @property
-    def scene(self) -> CadSceneFile:
-        """The parsed scene.json."""
-        return CadSceneFile.read(self.path("scene.json"))
-
-    @property
-    def graph(self) -> ContactGraphFile:
-        """The parsed graph.json of cg'."""
-        return ContactGraphFile.read(self.path("graph.json"))
+    info = Document(CadSceneFile, "scene.json")
+    graph = Document(ContactGraphFile, "graph.json")

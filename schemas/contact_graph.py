@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document, OptionalDocument
 from schemas.base import Model, Name, RelativePath, Transform
 from schemas.scene_parts import TREE_RELATIONS, Box, Relation, SurfacePlane
 
@@ -123,16 +123,5 @@ class ContactGraph(Artifact):
 
     kind: ClassVar[str] = "contact_graph"
     description: ClassVar[str] = "contact graph: support tree and proximal relations, node-link JSON"
-    json_files: ClassVar[dict[str, type[Model]]] = {"graph.json": ContactGraphFile}
-    optional_json_files: ClassVar[dict[str, type[Model]]] = {"timeline.json": TimelineFile}
-
-    @property
-    def graph(self) -> ContactGraphFile:
-        """The parsed graph.json."""
-        return ContactGraphFile.read(self.path("graph.json"))
-
-    @property
-    def timeline(self) -> TimelineFile | None:
-        """The parsed timeline.json, or None where the map kept no snapshots."""
-        path = self.path("timeline.json")
-        return TimelineFile.read(path) if path.is_file() else None
+    info = Document(ContactGraphFile, "graph.json")
+    timeline = OptionalDocument(TimelineFile, "timeline.json")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
+from schemas.artifact import Document
 from schemas.base import Model
-from schemas.sequence import Sequence, SequenceFile
+from schemas.sequence import Sequence
 
 
 class RowReport(Model):
@@ -74,9 +75,4 @@ class Disparity(Sequence):
     kind: ClassVar[str] = "disparity"
     schema_version: ClassVar[int] = 1
     description: ClassVar[str] = "sequence with disparity, confidence and depth from stereo pairs"
-    json_files: ClassVar[dict[str, type[Model]]] = {"sequence.json": SequenceFile, "disparity.json": DisparityFile}
-
-    @property
-    def disparity(self) -> DisparityFile:
-        """The parsed disparity.json."""
-        return DisparityFile.read(self.path("disparity.json"))
+    matching = Document(DisparityFile, "disparity.json")

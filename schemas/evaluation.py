@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model
 
 
@@ -23,12 +23,7 @@ class Evaluation(Artifact):
 
     kind: ClassVar[str] = "evaluation"
     description: ClassVar[str] = "figures against ground truth, with tables and plots"
-    json_files: ClassVar[dict[str, type[Model]]] = {"metrics.json": MetricsFile}
-
-    @property
-    def metrics(self) -> MetricsFile:
-        """The parsed metrics.json."""
-        return MetricsFile.read(self.path("metrics.json"))
+    info = Document(MetricsFile, "metrics.json")
 
 
 class ReportFile(Model):
@@ -44,5 +39,5 @@ class Report(Artifact):
 
     kind: ClassVar[str] = "report"
     description: ClassVar[str] = "one self-contained HTML page about a run"
-    json_files: ClassVar[dict[str, type[Model]]] = {"report.json": ReportFile}
     undigested: ClassVar[tuple[str, ...]] = ("timings.json", "report.html")
+    info = Document(ReportFile, "report.json")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model
 
 
@@ -37,9 +37,4 @@ class ExportedSequence(Artifact):
 
     kind: ClassVar[str] = "exported_sequence"
     description: ClassVar[str] = "a sequence written back as TUM, nerfstudio or MCAP"
-    json_files: ClassVar[dict[str, type[Model]]] = {"export.json": ExportFile}
-
-    @property
-    def info(self) -> ExportFile:
-        """The parsed export.json."""
-        return ExportFile.read(self.path("export.json"))
+    info = Document(ExportFile, "export.json")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model, Name, Transform, Vector3
 from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import Box, Camera
@@ -59,17 +59,10 @@ class GroundTruth(Artifact):
     description: ClassVar[str] = (
         "generated log with true poses, boxes, contact graph, CAD poses, joints; or annotated scan"
     )
-    json_files: ClassVar[dict[str, type[Model]]] = {
-        "ground_truth.json": GroundTruthFile,
-        "graph.json": ContactGraphFile,
-    }
+    info = Document(GroundTruthFile, "ground_truth.json")
+    graph = Document(ContactGraphFile, "graph.json")
 
-    @property
-    def truth(self) -> GroundTruthFile:
-        """The parsed ground_truth.json."""
-        return GroundTruthFile.read(self.path("ground_truth.json"))
-
-    @property
-    def graph(self) -> ContactGraphFile:
-        """The parsed true contact graph."""
-        return ContactGraphFile.read(self.path("graph.json"))
+    def pictures(self) -> tuple[int, float]:
+        """Return the number of frames, and the megapixels of all of them."""
+        camera = self.info.camera
+        return self.info.frame_count, self.info.frame_count * camera.width * camera.height / 1e6

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model, Name, RelativePath, Transform
 from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import Box, Joint
@@ -54,17 +54,5 @@ class InteractiveScene(Artifact):
 
     kind: ClassVar[str] = "interactive_scene"
     description: ClassVar[str] = "URDF scene: whole kinematic tree, static tree, one file per movable body"
-    json_files: ClassVar[dict[str, type[Model]]] = {
-        "scene.json": InteractiveSceneFile,
-        "graph.json": ContactGraphFile,
-    }
-
-    @property
-    def scene(self) -> InteractiveSceneFile:
-        """The parsed scene.json."""
-        return InteractiveSceneFile.read(self.path("scene.json"))
-
-    @property
-    def graph(self) -> ContactGraphFile:
-        """The parsed graph.json."""
-        return ContactGraphFile.read(self.path("graph.json"))
+    info = Document(InteractiveSceneFile, "scene.json")
+    graph = Document(ContactGraphFile, "graph.json")

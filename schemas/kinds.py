@@ -1,54 +1,13 @@
-"""The table of artifact kinds. Importing this registers every kind in `schemas.artifact.KINDS`."""
+"""The artifact kinds, found by place: importing this imports every file of schemas/, which registers its kinds."""
 
-from schemas.artifact import KINDS, Artifact
-from schemas.cad_library import CadLibrary
-from schemas.cad_scene import CadScene
-from schemas.contact_graph import ContactGraph
-from schemas.disparity import Disparity
-from schemas.evaluation import Evaluation, Report
-from schemas.exported_sequence import ExportedSequence
-from schemas.ground_truth import GroundTruth
-from schemas.interactive_scene import InteractiveScene
-from schemas.packing import Packing
-from schemas.panoptic_map import PanopticMap
-from schemas.plan import Plan
-from schemas.segments import Segments
-from schemas.sequence import Sequence
-from schemas.suture_needle import SutureNeedle, SutureThread
-from schemas.suture_scene import SutureScene
-from schemas.suture_trial import SutureEvaluation, SutureTrial
-from schemas.tableware_detections import TablewareDetections
-from schemas.tableware_plan import TablewarePlan
-from schemas.tableware_scene import TablewareScene
-from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
-from schemas.trajectory import Trajectory
+import importlib
+import pkgutil
 
-__all__ = [
-    "KINDS",
-    "Artifact",
-    "CadLibrary",
-    "CadScene",
-    "ContactGraph",
-    "Disparity",
-    "Evaluation",
-    "ExportedSequence",
-    "GroundTruth",
-    "InteractiveScene",
-    "Packing",
-    "PanopticMap",
-    "Plan",
-    "Report",
-    "Segments",
-    "Sequence",
-    "SutureEvaluation",
-    "SutureNeedle",
-    "SutureScene",
-    "SutureThread",
-    "SutureTrial",
-    "TablewareDetections",
-    "TablewareEvaluation",
-    "TablewarePlan",
-    "TablewareScene",
-    "TablewareTrial",
-    "Trajectory",
-]
+import schemas
+from schemas.artifact import KINDS
+
+for _module in pkgutil.iter_modules(schemas.__path__):
+    if _module.name != "kinds":
+        importlib.import_module(f"schemas.{_module.name}")
+
+__all__ = ["KINDS"]

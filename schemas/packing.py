@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model, Name
 from schemas.plan import Failure
 
@@ -115,14 +115,5 @@ class Packing(Artifact):
 
     kind: ClassVar[str] = "packing"
     description: ClassVar[str] = "boxes packed by proposals and motion-planning feedback"
-    json_files: ClassVar[dict[str, type[Model]]] = {"packing.json": PackingFile, "instance.json": PackingInstanceFile}
-
-    @property
-    def packing(self) -> PackingFile:
-        """The parsed packing.json."""
-        return PackingFile.read(self.path("packing.json"))
-
-    @property
-    def instance(self) -> PackingInstanceFile:
-        """The parsed instance.json."""
-        return PackingInstanceFile.read(self.path("instance.json"))
+    info = Document(PackingFile, "packing.json")
+    instance = Document(PackingInstanceFile, "instance.json")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model, RelativePath, Vector3
 
 SNAPSHOTS = "snapshots"
@@ -53,12 +53,6 @@ class PanopticMap(Artifact):
 
     kind: ClassVar[str] = "panoptic_map"
     description: ClassVar[str] = "labelled TSDF map: whole mesh, a mesh per entity, counts"
-    json_files: ClassVar[dict[str, type[Model]]] = {"entities.json": EntitiesFile}
-
-    @property
-    def info(self) -> EntitiesFile:
-        """The parsed entities.json."""
-        return EntitiesFile.read(self.path("entities.json"))
 
     def snapshots(self) -> tuple[PanopticMap, ...]:
         """Return the partial maps kept while mapping went on, the earliest first; they have no volume and no counts."""
@@ -66,3 +60,5 @@ class PanopticMap(Artifact):
         if not folder.is_dir():
             return ()
         return tuple(PanopticMap(entry) for entry in sorted(folder.iterdir()) if entry.is_dir())
+
+    info = Document(EntitiesFile, "entities.json")

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model, Transform
 from schemas.contact_graph import ContactGraphFile
 
@@ -128,9 +128,5 @@ class Plan(Artifact):
 
     kind: ClassVar[str] = "plan"
     description: ClassVar[str] = "task and motion plan, its execution and the updated contact graph"
-    json_files: ClassVar[dict[str, type[Model]]] = {"plan.json": PlanFile, "graph.json": ContactGraphFile}
-
-    @property
-    def plan(self) -> PlanFile:
-        """The parsed plan.json."""
-        return PlanFile.read(self.path("plan.json"))
+    info = Document(PlanFile, "plan.json")
+    graph = Document(ContactGraphFile, "graph.json")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model
 
 
@@ -50,9 +50,4 @@ class Segments(Artifact):
 
     kind: ClassVar[str] = "segments"
     description: ClassVar[str] = "per-frame fused panoptic and geometric segments"
-    json_files: ClassVar[dict[str, type[Model]]] = {"segments.json": SegmentsFile}
-
-    @property
-    def info(self) -> SegmentsFile:
-        """The parsed segments.json."""
-        return SegmentsFile.read(self.path("segments.json"))
+    info = Document(SegmentsFile, "segments.json")

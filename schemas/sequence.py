@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model, Transform
 from schemas.scene_parts import Camera
 
@@ -73,9 +73,10 @@ class Sequence(Artifact):
     kind: ClassVar[str] = "sequence"
     schema_version: ClassVar[int] = 2
     description: ClassVar[str] = "RGB-D frames with calibration and poses, gravity aligned"
-    json_files: ClassVar[dict[str, type[Model]]] = {"sequence.json": SequenceFile}
+    info = Document(SequenceFile, "sequence.json")
 
-    @property
-    def info(self) -> SequenceFile:
-        """The parsed sequence.json."""
-        return SequenceFile.read(self.path("sequence.json"))
+    def pictures(self) -> tuple[int, float]:
+        """Return the number of frames, and the megapixels of all of them."""
+        sizes = [camera.camera.width * camera.camera.height / 1e6 for camera in self.info.cameras]
+        known = sum(size * camera.frame_count for size, camera in zip(sizes, self.info.cameras, strict=True))
+        return self.info.frame_count, known or self.info.frame_count * sizes[0]

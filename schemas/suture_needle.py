@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model, Transform
 from schemas.suture_scene import MOST_VIEWS, Share, StereoRigRecord
 
@@ -79,12 +79,7 @@ class SutureNeedle(Artifact):
 
     kind: ClassVar[str] = "suture_needle"
     description: ClassVar[str] = "pose of a suture needle with its covariance, or an abstention"
-    json_files: ClassVar[dict[str, type[Model]]] = {"needle.json": SutureNeedleFile}
-
-    @property
-    def needle(self) -> SutureNeedleFile:
-        """The parsed needle.json."""
-        return SutureNeedleFile.read(self.path("needle.json"))
+    info = Document(SutureNeedleFile, "needle.json")
 
 
 class ThreadFrame(Model):
@@ -119,9 +114,4 @@ class SutureThread(Artifact):
 
     kind: ClassVar[str] = "suture_thread"
     description: ClassVar[str] = "the thread's curve in space"
-    json_files: ClassVar[dict[str, type[Model]]] = {"thread.json": SutureThreadFile}
-
-    @property
-    def thread(self) -> SutureThreadFile:
-        """The parsed thread.json."""
-        return SutureThreadFile.read(self.path("thread.json"))
+    info = Document(SutureThreadFile, "thread.json")

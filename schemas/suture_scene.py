@@ -11,9 +11,10 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from schemas.artifact import Document
 from schemas.base import Model, Transform, Vector3
 from schemas.scene_parts import Camera
-from schemas.sequence import Sequence, SequenceFile
+from schemas.sequence import Sequence
 
 MOST_VIEWS = 2000
 Holder = Literal["air", "left", "right", "both", "tissue"]
@@ -81,9 +82,4 @@ class SutureScene(Sequence):
     kind: ClassVar[str] = "suture_scene"
     schema_version: ClassVar[int] = 1
     description: ClassVar[str] = "rendered stereo pairs of a suture needle, with the truth"
-    json_files: ClassVar[dict[str, type[Model]]] = {"sequence.json": SequenceFile, "scene.json": SutureSceneFile}
-
-    @property
-    def scene(self) -> SutureSceneFile:
-        """The parsed scene.json."""
-        return SutureSceneFile.read(self.path("scene.json"))
+    truth = Document(SutureSceneFile, "scene.json")

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from pydantic import Field, model_validator
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model
 from schemas.evaluation import MetricsFile
 
@@ -84,12 +84,7 @@ class SutureTrial(Artifact):
 
     kind: ClassVar[str] = "suture_trial"
     description: ClassVar[str] = "running sutures thrown in a simulator"
-    json_files: ClassVar[dict[str, type[Model]]] = {"trial.json": SutureTrialFile}
-
-    @property
-    def trial(self) -> SutureTrialFile:
-        """The parsed trial.json."""
-        return SutureTrialFile.read(self.path("trial.json"))
+    info = Document(SutureTrialFile, "trial.json")
 
 
 class SutureEvaluation(Artifact):
@@ -98,9 +93,4 @@ class SutureEvaluation(Artifact):
 
     kind: ClassVar[str] = "suture_evaluation"
     description: ClassVar[str] = "figures of suture trials and needle poses"
-    json_files: ClassVar[dict[str, type[Model]]] = {"metrics.json": MetricsFile}
-
-    @property
-    def metrics(self) -> MetricsFile:
-        """The parsed metrics.json."""
-        return MetricsFile.read(self.path("metrics.json"))
+    info = Document(MetricsFile, "metrics.json")

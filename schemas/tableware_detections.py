@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model, Transform, Vector3
 from schemas.scene_parts import Camera
 
@@ -108,9 +108,4 @@ class TablewareDetections(Artifact):
 
     kind: ClassVar[str] = "tableware_detections"
     description: ClassVar[str] = "tableware that was seen on a table, with confidences"
-    json_files: ClassVar[dict[str, type[Model]]] = {"detections.json": TablewareDetectionsFile}
-
-    @property
-    def detections(self) -> TablewareDetectionsFile:
-        """The parsed detections.json."""
-        return TablewareDetectionsFile.read(self.path("detections.json"))
+    info = Document(TablewareDetectionsFile, "detections.json")

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model, Name, Vector3
 from schemas.tableware_scene import MOST_ITEMS, TablewareItem, check_carriers
 
@@ -173,9 +173,4 @@ class TablewarePlan(Artifact):
 
     kind: ClassVar[str] = "tableware_plan"
     description: ClassVar[str] = "actions that clear a table"
-    json_files: ClassVar[dict[str, type[Model]]] = {"plan.json": TablewarePlanFile}
-
-    @property
-    def plan(self) -> TablewarePlanFile:
-        """The parsed plan.json."""
-        return TablewarePlanFile.read(self.path("plan.json"))
+    info = Document(TablewarePlanFile, "plan.json")

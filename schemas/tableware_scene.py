@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model, Name, Transform, Vector3
 from schemas.scene_parts import Camera
 
@@ -71,9 +71,4 @@ class TablewareScene(Artifact):
 
     kind: ClassVar[str] = "tableware_scene"
     description: ClassVar[str] = "a table with tableware, its overhead RGB-D image and the truth"
-    json_files: ClassVar[dict[str, type[Model]]] = {"scene.json": TablewareSceneFile}
-
-    @property
-    def scene(self) -> TablewareSceneFile:
-        """The parsed scene.json."""
-        return TablewareSceneFile.read(self.path("scene.json"))
+    info = Document(TablewareSceneFile, "scene.json")

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model, Name
 from schemas.tableware_plan import TablewareAction, TimesOfActions
 from schemas.tableware_scene import TablewareItem
@@ -68,12 +68,7 @@ class TablewareTrial(Artifact):
 
     kind: ClassVar[str] = "tableware_trial"
     description: ClassVar[str] = "a table being cleared in a simulator"
-    json_files: ClassVar[dict[str, type[Model]]] = {"trial.json": TablewareTrialFile}
-
-    @property
-    def trial(self) -> TablewareTrialFile:
-        """The parsed trial.json."""
-        return TablewareTrialFile.read(self.path("trial.json"))
+    info = Document(TablewareTrialFile, "trial.json")
 
 
 class EvaluatedPolicy(Model):
@@ -112,9 +107,4 @@ class TablewareEvaluation(Artifact):
 
     kind: ClassVar[str] = "tableware_evaluation"
     description: ClassVar[str] = "policies compared over many tables"
-    json_files: ClassVar[dict[str, type[Model]]] = {"results.json": TablewareEvaluationFile}
-
-    @property
-    def results(self) -> TablewareEvaluationFile:
-        """The parsed results.json."""
-        return TablewareEvaluationFile.read(self.path("results.json"))
+    info = Document(TablewareEvaluationFile, "results.json")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, OptionalDocument
 from schemas.base import Model
 from schemas.sequence import Gravity
 
@@ -72,9 +72,4 @@ class Trajectory(Artifact):
 
     kind: ClassVar[str] = "trajectory"
     description: ClassVar[str] = "camera trajectory (TUM format, world_from_camera)"
-    optional_json_files: ClassVar[dict[str, type[Model]]] = {"poses.json": PosesFile}
-
-    @property
-    def info(self) -> PosesFile:
-        """The parsed poses.json. Raises BadInput where there is none."""
-        return PosesFile.read(self.path("poses.json"))
+    info = OptionalDocument(PosesFile, "poses.json")

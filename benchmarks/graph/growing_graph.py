@@ -28,7 +28,9 @@ from benchmarks.graph.rooms import (
     write_figures,
 )
 from schemas.contact_graph import ContactGraphFile
-from schemas.kinds import PanopticMap, Segments, Sequence
+from schemas.panoptic_map import PanopticMap
+from schemas.segments import Segments
+from schemas.sequence import Sequence
 from stages.engine.reading import open_artifact
 from stages.evaluate.correspondence import point_overlaps
 from stages.evaluate.truth import TrueRoom
@@ -83,7 +85,7 @@ def grow(folder: Path, work: Path, every: int) -> tuple[dict[int, Figures], Figu
         graphs[step] = build_graph(maps[step], parameters=plain, context=context_in(work / f"graph_{step}"))
         seconds["graph", step] = time.process_time() - started
     timeline = graphs[every].timeline
-    assert timeline is not None and timeline.snapshots[-1].links == graphs[0].graph.links
+    assert timeline is not None and timeline.snapshots[-1].links == graphs[0].info.links
     room = read_room(folder / "ground_truth", np.array(sequence.info.gravity.world_from_log))
     partial = {snapshot.info.frames_integrated: snapshot for snapshot in (*maps[every].snapshots(), maps[every])}
     found: dict[int, Figures] = {}

@@ -26,7 +26,7 @@ from benchmarks.graph.rooms import (
 )
 from benchmarks.scene.perfect_maps import perfect_map
 from schemas.contact_graph import ContactGraphFile
-from schemas.kinds import GroundTruth
+from schemas.ground_truth import GroundTruth
 from schemas.scene_parts import Relation
 from stages.engine.reading import open_artifact
 from stages.evaluate.graph_measures import GraphComparison, optional_nodes
@@ -60,7 +60,7 @@ def judge_room(path: Path, work: Path, counts: dict[str, Counts]) -> tuple[dict[
             panoptic_map,
             parameters=GraphParameters.model_validate({"method": method}),
             context=context_in(work / method),
-        ).graph
+        ).info
         seconds = time.process_time() - started
         comparison, edges = judge(room, graph, same)
         own = distance_figures(comparison) | {"cpu_seconds": seconds}

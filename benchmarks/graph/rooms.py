@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from schemas.contact_graph import ContactGraphFile
-from schemas.kinds import GroundTruth
+from schemas.ground_truth import GroundTruth
 from stages.engine.chain import run_command
 from stages.engine.reading import open_artifact
 from stages.evaluate.graph_measures import GraphComparison, compare_graphs, optional_nodes

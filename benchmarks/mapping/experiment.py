@@ -12,8 +12,9 @@ import numpy as np
 from benchmarks.mapping.arms import DRIFTING, EVERYWHERE, LEVELS, NETWORK, SHOWN, Arm
 from benchmarks.mapping.drift import drifting_poses
 from benchmarks.mapping.rooms import RoomFolder
-from schemas.kinds import GroundTruth, PanopticMap
-from schemas.kinds import Sequence as SequenceArtifact
+from schemas.ground_truth import GroundTruth
+from schemas.panoptic_map import PanopticMap
+from schemas.sequence import Sequence as SequenceArtifact
 from schemas.vocabulary import load_vocabulary
 from stages.engine.reading import open_artifact
 from stages.evaluate.graph_measures import box_candidates
@@ -174,7 +175,7 @@ def measure(
     folder = output / "contact_graph"
     folder.mkdir(parents=True, exist_ok=True)
     context = Context(folder, seed=seed, device="cpu", progress=SilentProgress())
-    graph = build_graph(panoptic_map, parameters=arm.graph, context=context).graph
+    graph = build_graph(panoptic_map, parameters=arm.graph, context=context).info
     points: Mapping[int, int] = {entity.instance: entity.vertices for entity in predicted.info.entities}
     return Outcome(
         room=room,

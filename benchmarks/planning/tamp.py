@@ -97,7 +97,7 @@ def plan_room(
     plan = run_plan(
         scene, truth, parameters=parameters, context=Context(output=folder, seed=seed, device="cpu", progress=progress)
     )
-    found = plan.plan
+    found = plan.info
     success = found.status == "executed"
     reason = "" if success else found.failures[-1].kind if found.failures else found.status
     seconds = {name: value for name, value in progress.seconds.items() if name in ("load the scene", "plan", "execute")}

@@ -18,8 +18,8 @@ from schemas.cad_library import CadLibrary
 from schemas.cad_scene import CadScene
 from schemas.contact_graph import ContactGraphFile
 from schemas.ground_truth import GroundTruth
-from schemas.kinds import Sequence as SequenceArtifact
 from schemas.panoptic_map import PanopticMap
+from schemas.sequence import Sequence as SequenceArtifact
 from stages.cad.candidates import Shortlist
 from stages.cad.model_surfaces import ModelSurface
 from stages.cad.stage import choose_and_write, find_candidates
@@ -123,7 +123,7 @@ def _run_arm(
     of_graph = (panoptic_map.root, method)
     if of_graph not in shared.graphs:
         context = context_in(folder / "contact_graph", seed)
-        shared.graphs[of_graph] = build_graph(panoptic_map, parameters=arm.graph, context=context).graph
+        shared.graphs[of_graph] = build_graph(panoptic_map, parameters=arm.graph, context=context).info
     graph = shared.graphs[of_graph]
     key = (case, panoptic_map.root, arm.cad.method)
     context = context_in(folder / "cad_scene", seed)
@@ -154,7 +154,7 @@ def _run_arm(
     assert measured is not None
     objects = sum(node.node_type in ("rigid", "articulated") for node in graph.nodes)
     distance, edges = measure_graph(room.truth, graph, overlaps)
-    summary = scene.scene
+    summary = scene.info
     extra = {
         "seconds_per_object": seconds / max(1, objects),
         "conflicts_before": float(summary.conflicts_before),

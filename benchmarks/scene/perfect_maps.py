@@ -87,7 +87,7 @@ def perfect_map(truth: GroundTruth, root: Path) -> PanopticMap:
     normals = closest["primitive_normals"].numpy().astype(float)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     paint = np.asarray(mesh.visual.vertex_colors)[mesh.faces[closest["primitive_ids"].numpy(), 0], :3]
-    classes = {entry.instance: entry.class_name for entry in truth.truth.objects}
+    classes = {entry.instance: entry.class_name for entry in truth.info.objects}
     meshes = {
         int(k): tiles(points[own], normals[own], colors=paint[own])
         for k in np.unique(instance)

@@ -66,7 +66,7 @@ def run_real(real: Path, scratch: Path, arms: Sequence[Arm], seed: int) -> list[
             context = context_in(where / arm.name / "cad_scene", seed)
             scene = replace_objects(graph, panoptic_map, library, parameters=arm.cad, context=context)
             settled = settle(scene, where / arm.name / "interactive_scene", seed)
-            distance, edges = measure_graph(truth, graph.graph, overlaps)
+            distance, edges = measure_graph(truth, graph.info, overlaps)
             outcomes.append(
                 Outcome(
                     room=annotation.stem,

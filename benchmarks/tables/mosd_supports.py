@@ -64,7 +64,7 @@ def read_view(folder: Path, frame: str, told: SupportAnnotation) -> LabelledView
 def build_graph(made: PanopticMap, method: str, folder: Path) -> ContactGraphFile:
     """The contact graph of a map by one of METHODS."""
     parameters = GraphParameters(method=method)  # type: ignore[arg-type]
-    return graph_of(made, parameters=parameters, context=context_in(folder)).graph
+    return graph_of(made, parameters=parameters, context=context_in(folder)).info
 
 
 def judge_frame(folder: Path, annotation: Path, backend: str, work: Path) -> tuple[dict[str, SupportScore], float]:

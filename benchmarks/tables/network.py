@@ -28,8 +28,8 @@ import numpy as np
 
 from benchmarks.mapping.rooms import REPORTING, make_room
 from benchmarks.tables.object_masks import score_object_masks
-from schemas.kinds import Sequence
 from schemas.scene_parts import Camera
+from schemas.sequence import Sequence
 from schemas.vocabulary import load_vocabulary
 from stages.engine.chain import run_command
 from stages.engine.reading import open_artifact

@@ -25,7 +25,10 @@ import cv2
 import numpy as np
 
 from benchmarks.mapping.drift import drifting_poses
-from schemas.kinds import GroundTruth, Segments, Sequence, Trajectory
+from schemas.ground_truth import GroundTruth
+from schemas.segments import Segments
+from schemas.sequence import Sequence
+from schemas.trajectory import Trajectory
 from stages.engine.chain import run_command
 from stages.engine.reading import open_artifact
 from stages.evaluate.parameters import EvaluateParameters

@@ -17,8 +17,10 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from schemas.kinds import ContactGraph, PanopticMap, Sequence
+from schemas.contact_graph import ContactGraph
+from schemas.panoptic_map import PanopticMap
 from schemas.scene_parts import TREE_RELATIONS
+from schemas.sequence import Sequence
 from stages.engine.chain import run_pipeline
 from stages.engine.pipelines import pipeline_path, read_pipeline
 from stages.engine.reading import open_artifact
@@ -54,10 +56,10 @@ def facts_of_run(run: Path) -> dict[str, Any]:
     panoptic_map = open_artifact(run / "panoptic_map", PanopticMap)
     graph = open_artifact(run / "contact_graph", ContactGraph)
     assert isinstance(sequence, Sequence) and isinstance(panoptic_map, PanopticMap) and isinstance(graph, ContactGraph)
-    classes = {node.id: node.class_name for node in graph.graph.nodes}
+    classes = {node.id: node.class_name for node in graph.info.nodes}
     supports = Counter(
         f"{classes[link.source]} > {classes[link.target]}"
-        for link in graph.graph.links
+        for link in graph.info.links
         if link.relation in TREE_RELATIONS and link.source != "scene"
     )
     steps = {}

@@ -23,7 +23,8 @@ from benchmarks.scene.perfect_maps import write_map
 from benchmarks.tables.tabletop_maps import context_in
 from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth
-from schemas.kinds import PanopticMap, Sequence
+from schemas.panoptic_map import PanopticMap
+from schemas.sequence import Sequence
 from stages.engine.reading import open_artifact
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.stage import run as evaluate

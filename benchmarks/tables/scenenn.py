@@ -19,8 +19,9 @@ import numpy as np
 from benchmarks.mapping.arms import Arm, all_arms
 from benchmarks.tables.scenenn_scenes import Scene, find_scene
 from benchmarks.tables.scenenn_tables import ALL, Outcome, all_figures, make_tables, read_published
-from schemas.contact_graph import ContactGraphFile
-from schemas.kinds import ContactGraph, GroundTruth, PanopticMap
+from schemas.contact_graph import ContactGraph, ContactGraphFile
+from schemas.ground_truth import GroundTruth
+from schemas.panoptic_map import PanopticMap
 from stages.engine.chain import run_command
 from stages.engine.reading import open_artifact
 from stages.evaluate.graph_measures import box_candidates
@@ -129,7 +130,7 @@ def measure(scene: str, arm: str, truth_folder: Path, map_folder: Path, graph_fo
     options = EvaluateParameters()
     truth = load_truth(truth_artifact, np.eye(4), options.minimum_visible_points)
     predicted = renamed_map(load_map(map_artifact))
-    graph = renamed_graph(graph_artifact.graph)
+    graph = renamed_graph(graph_artifact.info)
     labels = label_true_points(truth, predicted, options.label_distance)
     vertices = {entity.instance: entity.vertices for entity in predicted.info.entities}
     return Outcome(

@@ -23,8 +23,8 @@ import numpy as np
 import trimesh
 
 from benchmarks.training.clutter import Thing, height_map, primitives, put_down
+from schemas.cad_library import CadLibrary
 from schemas.errors import BadInput
-from schemas.kinds import CadLibrary
 from schemas.scene_parts import Camera
 from stages.engine.reading import open_artifact
 from stages.kit.geometry.transforms import look_at, transform_from_yaw

@@ -35,7 +35,7 @@ def draw_affordances(entity: str, model: CadModel, uses: Affordances, canvas: Ca
 
 def affordance_table(library: CadLibrary) -> str:
     """Return the affordances of all models as a Markdown table; empty when the library has none."""
-    rows = [_row(uses) for uses in library.library.affordances]
+    rows = [_row(uses) for uses in library.info.affordances]
     return "\n".join([HEADER, "|" + "---|" * (HEADER.count("|") - 1), *rows]) if rows else ""
 
 

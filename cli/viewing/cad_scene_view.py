@@ -32,7 +32,7 @@ def draw_cad_scene(cad_scene: CadScene, canvas: Canvas) -> None:
     library = input_artifact(cad_scene, CadLibrary)
     roots = [cad_scene.path("models")] + ([library.path("models")] if library is not None else [])
     rows = ["| node | decision | model | matching error | alignment error [m] |", "|---|---|---|---|---|"]
-    for replacement in cad_scene.scene.replacements:
+    for replacement in cad_scene.info.replacements:
         chosen = replacement.chosen
         _draw_candidates(replacement, roots, canvas)
         if replacement.decision == "cad" and chosen is not None:
@@ -77,7 +77,7 @@ def _draw_model(
 def candidate_table(cad_scene: CadScene) -> str:
     """Return the candidates of every object in Markdown: errors, scale, joints, what was rejected and why."""
     lines: list[str] = []
-    for replacement in cad_scene.scene.replacements:
+    for replacement in cad_scene.info.replacements:
         if replacement.decision == "layout":
             continue
         candidates = candidates_of(replacement)

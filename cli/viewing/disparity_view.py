@@ -26,7 +26,7 @@ def draw_disparity(disparity: Disparity, canvas: Canvas) -> None:
             canvas.picture(f"{frame.camera_name}/disparity", encode_jpeg(disparity_colors(found.disparity)))
             canvas.picture(f"{frame.camera_name}/confidence", encode_jpeg(confidence_colors(found.confidence)))
     canvas.always()
-    canvas.document("rows", rows_text(disparity.disparity))
+    canvas.document("rows", rows_text(disparity.matching))
 
 
 def rows_text(file: DisparityFile) -> str:

@@ -9,7 +9,7 @@ from schemas.exported_sequence import ExportedSequence
 
 def draw_evaluation(evaluation: Evaluation, canvas: Canvas) -> None:
     """Show all figures and plots."""
-    metrics = evaluation.metrics
+    metrics = evaluation.info
     rows = [f"**{metrics.label}**", "", "| measure | value |", "|---|---|"]
     for name, value in sorted(metrics.metrics.items()):
         rows.append(f"| {name} | {'-' if value is None else f'{value:.4g}'} |")
@@ -26,7 +26,7 @@ def draw_report(report: Report, canvas: Canvas) -> None:
     canvas.document("report", f"Open `{report.path('report.html')}` in a browser.")
 
 
-def draw_export(export: ExportedSequence, canvas: Canvas) -> None:
+def draw_exported_sequence(export: ExportedSequence, canvas: Canvas) -> None:
     """Say what was written: it is made for other tools."""
     info = export.info
     rows = [f"{info.frame_count} frames as {info.layout}: open `{export.path(info.log)}`", ""]

@@ -20,10 +20,10 @@ HIDDEN = ("boxes_before_refinement", "boxes_of_layout", SHELL)
 
 def draw_contact_graph(graph: ContactGraph, canvas: Canvas) -> None:
     """Draw the graph over the meshes of the map it was made from, where that map is still there."""
-    draw_graph(graph.graph, canvas)
+    draw_graph(graph.info, canvas)
     panoptic_map = input_artifact(graph, PanopticMap)
     if panoptic_map is not None:
-        for node in graph.graph.nodes:
+        for node in graph.info.nodes:
             if node.mesh is not None and panoptic_map.path(node.mesh).exists():
                 canvas.mesh(f"meshes/{node.id}", load_mesh(panoptic_map.path(node.mesh)), front_only=True)
 

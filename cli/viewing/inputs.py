@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from schemas.artifact import KINDS, Artifact
+from schemas.artifact import Artifact
 from schemas.errors import BadInput
+from schemas.kinds import KINDS
 from stages.engine.reading import open_artifact
 
 Kind = TypeVar("Kind", bound=Artifact)

@@ -16,11 +16,11 @@ GAP = 0.4
 SWING_STEPS = 12
 
 
-def draw_library(library: CadLibrary, canvas: Canvas) -> None:
+def draw_cad_library(library: CadLibrary, canvas: Canvas) -> None:
     """Draw a row of models for each class; scrub `opening` (0..1) to move the joints."""
-    models = library.library.models
+    models = library.info.models
     places = row_places(models)
-    uses = {entry.model: entry for entry in library.library.affordances}
+    uses = {entry.model: entry for entry in library.info.affordances}
     for model in models:
         entity = f"library/{model.class_name}/{model.id}"
         canvas.transform(entity, transform_from(np.eye(3), places[model.id]))

@@ -13,7 +13,7 @@ from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.geometry.boxes import box_from_bounds
 
 
-def draw_map(panoptic_map: PanopticMap, canvas: Canvas) -> None:
+def draw_panoptic_map(panoptic_map: PanopticMap, canvas: Canvas) -> None:
     """Draw the whole mesh twice (colour, instance) and a labelled box for every entity."""
     info = panoptic_map.info
     path = panoptic_map.path("mesh.ply")

@@ -21,7 +21,7 @@ START_COLOR, PACKED_COLOR = (0.6, 0.7, 0.85), (0.2, 0.55, 0.35)
 
 def draw_packing(packing: Packing, canvas: Canvas) -> None:
     """Draw the problem, the places of the last plan, the pictures of the step, and every plan as text."""
-    instance, found = packing.instance, packing.packing
+    instance, found = packing.instance, packing.info
     canvas.document("plans", packing_text(packing))
     for name in PICTURES:
         path = packing.path(f"{name}.png")
@@ -54,7 +54,7 @@ def placed(step: PackingStep, boxes: dict[str, PackingBox]) -> bool:
 
 def packing_text(packing: Packing) -> str:
     """Return every proposed plan with the reason at the action that ended it, in Markdown."""
-    found = packing.packing
+    found = packing.info
     outcome = "packed" if found.success else "not packed"
     rows = [f"**{outcome}**: {found.name} by {found.proposer}; {found.proposer_calls} proposals, "]
     rows[0] += f"{found.motion_planner_calls} motion-planner calls"

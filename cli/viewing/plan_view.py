@@ -37,7 +37,7 @@ def draw_plan(plan: Plan, canvas: Canvas) -> None:
 
 def plan_text(plan: Plan) -> str:
     """Return the plan, its checks and failures in Markdown."""
-    content = plan.plan
+    content = plan.info
     rows = [f"**{content.status}**, goal: {', '.join(content.goal) or '-'}", ""]
     rows += [f"{k}. {action.name}({', '.join(action.arguments)})" for k, action in enumerate(content.actions, 1)]
     rows += ["", *(f"- {'holds' if c.holds else 'FAILS'}: {c.condition} ({c.detail})" for c in content.checks)]
@@ -46,7 +46,7 @@ def plan_text(plan: Plan) -> str:
 
 
 def _room(plan: Plan) -> Path | None:
-    if plan.plan.executed_in == "ground_truth":
+    if plan.info.executed_in == "ground_truth":
         truth = input_artifact(plan, GroundTruth)
         return truth.path("room") if truth is not None else None
     scene = input_artifact(plan, InteractiveScene)

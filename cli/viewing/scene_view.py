@@ -18,7 +18,7 @@ from stages.kit.formats.urdf_file import parse_urdf
 SHELL_CLASSES = ("wall", "ceiling")
 
 
-def draw_scene(scene: InteractiveScene, canvas: Canvas) -> None:
+def draw_interactive_scene(scene: InteractiveScene, canvas: Canvas) -> None:
     """Draw the links, the boxes and the contact graph."""
     draw_scene_folder(scene.root, canvas)
     draw_graph(scene.graph, canvas)

@@ -38,7 +38,7 @@ def arc_points(pose: np.ndarray, radius: float) -> np.ndarray:
 def draw_suture_scene(scene: SutureScene, canvas: Canvas) -> None:
     """Draw the pictures over time and the true needle and thread in the world of the pad."""
     draw_sequence(scene, canvas)
-    file = scene.scene
+    file = scene.truth
     for view in file.views:
         canvas.time(1.0 + view.frame / 10.0)
         world = np.linalg.inv(np.array(view.camera_from_world))
@@ -51,7 +51,7 @@ def draw_suture_scene(scene: SutureScene, canvas: Canvas) -> None:
 
 def draw_suture_needle(needle: SutureNeedle, canvas: Canvas) -> None:
     """Draw poses in the left camera's frame over time, with the pictures."""
-    file = needle.needle
+    file = needle.info
     rows = [f"{file.statement}", f"masks: {file.masks_from}; estimator {file.estimator}; filter {file.filter}"]
     rows += [f"- frame {one.frame}: {one.estimate.abstained or 'known'}" for one in file.frames]
     canvas.document("needle", "\n\n".join(rows))
@@ -68,7 +68,7 @@ def draw_suture_needle(needle: SutureNeedle, canvas: Canvas) -> None:
 
 def draw_suture_thread(thread: SutureThread, canvas: Canvas) -> None:
     """Draw the curves in the left camera's frame over time, with the pictures."""
-    file = thread.thread
+    file = thread.info
     rows = [f"- frame {one.frame}: {one.status}" for one in file.frames]
     canvas.document("thread", "\n\n".join([file.statement, f"masks: {file.masks_from}", *rows]))
     _eyes(file.rig, canvas)

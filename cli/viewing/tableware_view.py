@@ -22,7 +22,7 @@ BIN_AT, BIN_PITCH, BIN_COLUMNS = (0.62, -0.4), 0.2, 5
 
 def draw_tableware_scene(scene: TablewareScene, canvas: Canvas) -> None:
     """Draw the table as it truly stands and the image of it."""
-    file = scene.scene
+    file = scene.info
     _table(canvas)
     _shapes(scene, file.items, canvas)
     for item in file.items:
@@ -34,7 +34,7 @@ def draw_tableware_scene(scene: TablewareScene, canvas: Canvas) -> None:
 
 def draw_tableware_detections(found: TablewareDetections, canvas: Canvas) -> None:
     """Show what was seen: the statement, the picture, and every item as a point at its lip, green by confidence."""
-    told = found.detections
+    told = found.info
     canvas.document("seen", "\n\n".join([told.statement, *told.notes]))
     canvas.picture("overlay", found.path("overlay.png").read_bytes())
     _table(canvas)
@@ -52,7 +52,7 @@ def draw_tableware_plan(plan: TablewarePlan, canvas: Canvas) -> None:
     for name in ("strip", "detections"):
         if plan.path(f"{name}.png").is_file():
             canvas.picture(name, plan.path(f"{name}.png").read_bytes())
-    for number, step in enumerate(plan.plan.steps, start=1):
+    for number, step in enumerate(plan.info.steps, start=1):
         action = step.action
         pull = action.u_P or (action.u_PG.u_P if action.u_PG else None)
         put = action.u_S or (action.u_SG.u_S if action.u_SG else None)
@@ -65,7 +65,7 @@ def draw_tableware_plan(plan: TablewarePlan, canvas: Canvas) -> None:
 def draw_tableware_trial(trial: TablewareTrial, canvas: Canvas) -> None:
     """Draw the table being cleared: each thing where it is after each action; what was binned stands beside the
     table."""
-    file = trial.trial
+    file = trial.info
     canvas.document("trial", trial.path("trial.txt").read_text(encoding="utf-8"))
     _table(canvas)
     canvas.picture("keyframes", trial.path("keyframes.png").read_bytes())

@@ -17,7 +17,7 @@ from stages.kit.formats.numpy_files import read_arrays
 
 def draw_ground_truth(truth: GroundTruth, canvas: Canvas) -> None:
     """Draw the true room with its graph, visible points by instance, the camera's walk and its frames."""
-    description = truth.truth
+    description = truth.info
     if (truth.path("room") / "scene.json").exists():
         draw_scene_folder(truth.path("room"), canvas, prefix="room")
     objects = description.objects

@@ -61,9 +61,9 @@ def run(
         raise UsageError("minimum_scale is larger than maximum_scale")
     surfaces: dict[str, ModelSurface] = {}
     with context.progress.step("candidates"):
-        shortlists = find_candidates(contact_graph.graph, panoptic_map, library, surfaces, parameters, context)
+        shortlists = find_candidates(contact_graph.info, panoptic_map, library, surfaces, parameters, context)
     return choose_and_write(
-        contact_graph.graph, panoptic_map, library, shortlists, surfaces, parameters=parameters, context=context
+        contact_graph.info, panoptic_map, library, shortlists, surfaces, parameters=parameters, context=context
     )
 
 
@@ -127,7 +127,7 @@ def find_candidates(
     context: Context,
 ) -> dict[str, Shortlist]:
     """Return the shortlist of every object; surfaces of the models that were needed are added to `surfaces`."""
-    models = library.library.models
+    models = library.info.models
     objects = [node for node in graph.nodes if node.node_type in ("rigid", "articulated")]
     free_space = load_free_space(panoptic_map) if parameters.method == "ours" else NOTHING_KNOWN
     found: dict[str, Shortlist] = {}

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from schemas.artifact import Artifact
 from schemas.errors import BadInput
-from schemas.kinds import KINDS, Artifact
+from schemas.kinds import KINDS
 from schemas.manifest import FORMAT_VERSION, LARGEST_MANIFEST, MANIFEST_NAME, Manifest
 from stages.engine.digests import content_digest
 from stages.engine.store import complete_interrupted

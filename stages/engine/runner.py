@@ -25,6 +25,7 @@ from stages.engine.model_cache import resolve_weights
 from stages.engine.provenance import provenance_now
 from stages.engine.reading import check_hashes, check_sizes, open_artifact, read_manifest
 from stages.kit.digests import external_digest, external_files
+from stages.kit.estimates import Estimate
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context, External, Optionally, Parameters, Stage
 
@@ -43,7 +44,7 @@ class RunResult:
     manifest: Manifest | None
     nondeterministic: bool = False
     """The same key gave another content digest than before."""
-    estimate: estimation.Estimate | None = None
+    estimate: Estimate | None = None
     """What it would write and use, for a dry run."""
 
     @property
@@ -287,7 +288,7 @@ def run_stage(
         previous = _previous_manifest(out)
         reason = _reason_to_run(out, key, previous, force, _what_changed(previous, facts) if previous else [])
         status: Literal["up to date", "would run"] = "up to date" if reason is None else "would run"
-        expected = estimation.estimate_step(stage.name, parameters, inputs) if reason is not None else None
+        expected = estimation.estimate_step(stage, parameters, inputs) if reason is not None else None
         return RunResult(status, reason or "", out, key, previous if reason is None else None, estimate=expected)
 
     with _machine_errors(out), store.locked(out):
@@ -296,7 +297,7 @@ def run_stage(
         if reason is None:
             return RunResult("up to date", "", out, key, previous)
         logger.info("%s: %s", stage.name, reason)
-        estimation.warn_or_refuse(stage.name, parameters, inputs, out)
+        estimation.warn_or_refuse(stage.name, estimation.estimate_step(stage, parameters, inputs), out)
         started = datetime.now(UTC)
         progress = progress or SilentProgress()
         with store.partial_folder(out) as partial:

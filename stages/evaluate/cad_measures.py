@@ -81,7 +81,7 @@ def model_periods(cad_scene: CadScene, samples: int = 2000) -> dict[str, float]:
     import trimesh
 
     periods: dict[str, float] = {}
-    for model_id in sorted({r.chosen.model_id for r in cad_scene.scene.replacements if r.chosen is not None}):
+    for model_id in sorted({r.chosen.model_id for r in cad_scene.info.replacements if r.chosen is not None}):
         folder = cad_scene.path("models") / model_id
         if folder.is_dir():
             mesh = posed_mesh(folder, read_model(folder), {})

@@ -92,7 +92,7 @@ def count_graph(part: Part, graph: ContactGraphFile) -> None:
 
 def count_cad(part: Part, cad_scene: CadScene) -> None:
     """Decisions and collisions of CAD replacement."""
-    scene = cad_scene.scene
+    scene = cad_scene.info
     for decision in ("cad", "mesh", "layout"):
         part.set(f"replaced_{decision}", sum(r.decision == decision for r in scene.replacements))
     part.set("conflicts_before", scene.conflicts_before)
@@ -101,7 +101,7 @@ def count_cad(part: Part, cad_scene: CadScene) -> None:
 
 def count_bodies(part: Part, interactive_scene: InteractiveScene) -> None:
     """Bodies and joints of the interactive scene."""
-    bodies = interactive_scene.scene.bodies
+    bodies = interactive_scene.info.bodies
     part.set("bodies", len(bodies))
     part.set("bodies_movable", sum(body.movable for body in bodies))
     part.set("joints", sum(len(body.joints) for body in bodies))

@@ -7,20 +7,19 @@ from typing import Any
 
 from pydantic import Field
 
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import CadScene
+from schemas.contact_graph import ContactGraph
 from schemas.errors import UsageError
-from schemas.kinds import (
-    CadLibrary,
-    CadScene,
-    ContactGraph,
-    Evaluation,
-    GroundTruth,
-    InteractiveScene,
-    PanopticMap,
-    Plan,
-    Segments,
-    Sequence,
-    Trajectory,
-)
+from schemas.evaluation import Evaluation
+from schemas.ground_truth import GroundTruth
+from schemas.interactive_scene import InteractiveScene
+from schemas.panoptic_map import PanopticMap
+from schemas.plan import Plan
+from schemas.segments import Segments
+from schemas.sequence import Sequence
+from schemas.trajectory import Trajectory
+from stages.kit.estimates import grows_with
 from stages.kit.stage import Optionally, Parameters, Stage
 
 
@@ -77,4 +76,5 @@ STAGE = Stage(
     check=check_inputs,
     example="scenewright evaluate --ground-truth outputs/demo/ground_truth "
     "--panoptic-map outputs/demo/panoptic_map --out outputs/demo/evaluation",
+    estimate=grows_with("panoptic_map", 0.4, 0.0, 390, 3.5),
 )

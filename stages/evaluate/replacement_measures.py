@@ -312,7 +312,7 @@ def replacements_of(
     true_models = true_shapes(ground_truth, world_from_log)
     if not true_models:
         return None
-    scene = with_best_single(cad_scene.scene) if best_single else cad_scene.scene
+    scene = with_best_single(cad_scene.info) if best_single else cad_scene.info
     chosen = {r.node: r.chosen for r in scene.replacements if r.decision == "cad" and r.chosen is not None}
     roots = [cad_scene.path("models"), *([library_models] if library_models is not None else [])]
     models = model_shapes([candidate.model_id for candidate in chosen.values()], roots)

@@ -43,7 +43,7 @@ def true_shapes(truth: GroundTruth, world_from_log: np.ndarray) -> dict[str, Pla
         text = with_absolute_meshes(read_urdf(root / file), (root / file).parent)
         visual |= link_shapes(text, "visual")
         collision |= link_shapes(text, "collision")
-    models = {entry.name: entry.model_id for entry in truth.truth.objects}
+    models = {entry.name: entry.model_id for entry in truth.info.objects}
     shapes: dict[str, PlacedShape] = {}
     for body in scene.bodies:
         model_id = models.get(body.name)

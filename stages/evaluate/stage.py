@@ -124,11 +124,11 @@ def run(
         with context.progress.step("cad"):
             _evaluate_cad(inputs, parameters, context)
     elif parameters.plots and contact_graph is not None:
-        figures.draw_graph(context.output / "plots" / "contact_graph.png", contact_graph.graph, inputs.label)
+        figures.draw_graph(context.output / "plots" / "contact_graph.png", contact_graph.info, inputs.label)
     with context.progress.step("trajectory"):
         _evaluate_trajectory(inputs, parameters, context)
     if plan is not None:
-        measure_plan(inputs.part("plan"), plan.plan)
+        measure_plan(inputs.part("plan"), plan.info)
     return _write(inputs, context)
 
 
@@ -159,7 +159,7 @@ def _count(inputs: Inputs) -> None:
         counts.count_entities(part, inputs.predicted_map)
         counts.measure_floor(part, inputs.panoptic_map, inputs.predicted_map)
     if inputs.contact_graph is not None:
-        counts.count_graph(part, inputs.contact_graph.graph)
+        counts.count_graph(part, inputs.contact_graph.info)
     if inputs.cad_scene is not None:
         counts.count_cad(part, inputs.cad_scene)
     if inputs.interactive_scene is not None:
@@ -190,7 +190,7 @@ def _evaluate_graph(inputs: Inputs, parameters: EvaluateParameters, context: Con
     if truth is None or artifact is None:
         return
     part = inputs.part("graph")
-    graph = artifact.graph
+    graph = artifact.info
     measure_boxes(part, truth, graph, _vertices(inputs.predicted_map), parameters)
     if truth.graph.graph.get("annotated") == "no":
         part.notes.append("Nobody annotated what carries what: there is no graph to compare with.")
@@ -213,7 +213,7 @@ def _vertices(predicted: PredictedMap | None) -> Mapping[int, int]:
 def _evaluate_cad(inputs: Inputs, parameters: EvaluateParameters, context: Context) -> None:
     if inputs.truth is None or inputs.ground_truth is None or inputs.cad_scene is None:
         return
-    scene, graph = inputs.cad_scene.scene, inputs.cad_scene.graph
+    scene, graph = inputs.cad_scene.info, inputs.cad_scene.graph
     periods = model_periods(inputs.cad_scene)
     pairs = pair_replacements(inputs.truth, scene, graph, inputs.overlaps, parameters.node_match_iou, periods)
     joints = true_joints(inputs.ground_truth)
@@ -232,7 +232,7 @@ def _evaluate_replacement(
     if measured is None:
         return
     record_replacements(inputs.part("replacement"), measured)
-    if inputs.cad_library is None or all(r.best_single is None for r in cad_scene.scene.replacements):
+    if inputs.cad_library is None or all(r.best_single is None for r in cad_scene.info.replacements):
         return
     before = replacements_of(
         ground_truth, truth, cad_scene, world_from_log=world_from_log(inputs.sequence), overlaps=inputs.overlaps,
@@ -247,7 +247,7 @@ def _evaluate_trajectory(inputs: Inputs, parameters: EvaluateParameters, context
     paths: dict[str, np.ndarray] = {}
     if estimated is not None:
         paths["camera"] = estimated[1][:, :3, 3]
-    if inputs.trajectory is not None and inputs.trajectory.path("poses.json").is_file():
+    if inputs.trajectory is not None and inputs.trajectory.info is not None:
         count_poses(inputs.part("trajectory"), inputs.trajectory.info)
     truth = _true_trajectory(inputs)
     if truth is not None and estimated is not None:
@@ -260,7 +260,7 @@ def _evaluate_trajectory(inputs: Inputs, parameters: EvaluateParameters, context
         return
     graph: ContactGraphFile | None = None
     if inputs.contact_graph is not None:
-        graph = inputs.contact_graph.graph
+        graph = inputs.contact_graph.info
     elif inputs.truth is not None:
         graph = inputs.truth.graph
     boxes = [
@@ -273,7 +273,7 @@ def _evaluate_trajectory(inputs: Inputs, parameters: EvaluateParameters, context
 
 def _true_trajectory(inputs: Inputs) -> tuple[np.ndarray, np.ndarray] | None:
     """Times and poses to compare with: those of the ground truth, else, for a trajectory, those that the log gave."""
-    if inputs.ground_truth is not None and inputs.ground_truth.truth.source == "generated":
+    if inputs.ground_truth is not None and inputs.ground_truth.info.source == "generated":
         times, poses = read_tum(inputs.ground_truth.path("trajectory.tum"))
         return times, world_from_log(inputs.sequence) @ poses
     if inputs.trajectory is None:

@@ -73,7 +73,7 @@ def load_truth(truth: GroundTruth, world_from_log: np.ndarray, minimum_visible_p
     Boxes keep their size and stay upright: exact when ingest only turned about z, close when it corrected a small
     tilt. That of an annotated scan is not moved. Raises BadInput when visible.npz is unreadable or its arrays disagree.
     """
-    file = truth.truth
+    file = truth.info
     if file.source == "scan":  # it is in the sequence's world already
         world_from_log = np.eye(4)
     points, instances = read_arrays(truth.path("visible.npz"), "points", "instance")

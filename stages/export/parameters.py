@@ -9,6 +9,7 @@ from pydantic import Field
 from schemas.errors import UsageError
 from schemas.exported_sequence import ExportedSequence
 from schemas.sequence import Sequence
+from stages.kit.estimates import Estimate, Inputs
 from stages.kit.stage import Parameters, Stage
 
 STREAMS = ("color", "depth", "right", "labels", "pose")
@@ -42,6 +43,13 @@ def check(parameters: ExportParameters, inputs: Any) -> None:
         )
 
 
+def _estimate(parameters: ExportParameters, inputs: Inputs) -> Estimate:
+    sequence = inputs["sequence"]
+    expected = sequence.megabytes / parameters.every * {"tum": 1.16, "nerfstudio": 1.08, "mcap": 1.0}[parameters.layout]
+    cut = bool(parameters.streams) or parameters.camera is not None
+    return Estimate(expected, 0.0 if cut else 0.5 * expected, 120)
+
+
 STAGE = Stage(
     name="export",
     version=1,
@@ -52,4 +60,5 @@ STAGE = Stage(
     libraries=("numpy", "scipy", "opencv-python-headless", "mcap", "protobuf", "zstandard", "rosbags"),
     example="scenewright export --sequence outputs/demo/sequence --layout tum --out outputs/demo/tum",
     check=check,
+    estimate=_estimate,
 )

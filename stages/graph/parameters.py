@@ -8,6 +8,7 @@ from pydantic import Field
 
 from schemas.contact_graph import ContactGraph
 from schemas.panoptic_map import PanopticMap
+from stages.kit.estimates import grows_with
 from stages.kit.stage import Parameters, Stage
 
 
@@ -93,4 +94,5 @@ STAGE = Stage(
     writes=ContactGraph,
     libraries=("numpy", "scipy", "trimesh"),
     example="scenewright graph --panoptic-map outputs/demo/panoptic_map --out outputs/demo/contact_graph",
+    estimate=grows_with("panoptic_map", 0.1, 0.0, 280, 3.0),
 )

@@ -9,6 +9,7 @@ from pydantic import Field
 from schemas.errors import UsageError
 from schemas.sequence import Sequence
 from stages.ingest.pose_convention_names import PoseConvention
+from stages.kit.estimates import LOG_MEGABYTES_PER_MEGAPIXEL, Estimate, Inputs
 from stages.kit.stage import External, Parameters, Stage
 
 
@@ -80,6 +81,25 @@ def check(parameters: IngestParameters, inputs: Any) -> None:
         raise UsageError(f"stop {parameters.stop} is not after start {parameters.start}")
 
 
+REPACKED = 1.2
+"""Size of a sequence beside its log: 1.0 for MCAP that is packed already, 1.4 for a folder of JPEG and depth PNG."""
+
+
+def _estimate(parameters: IngestParameters, inputs: Inputs) -> Estimate:
+    log = inputs["log"]
+    share = 1 / parameters.every
+    if log.megapixels is not None and log.frames is not None:
+        frames = min(log.frames * share, parameters.max_frames or log.frames)
+        megapixels = frames * log.frame_megapixels
+        expected = LOG_MEGABYTES_PER_MEGAPIXEL * megapixels
+        return Estimate(expected, 0.3 * expected, 120, frames, megapixels)
+    expected = REPACKED * log.megabytes * share
+    cut = parameters.max_frames is not None or parameters.stop is not None or parameters.start > 0
+    # Raw images shrink to a sixth. A part of the log may be any part of it.
+    least = 0.0 if cut else 0.1 * expected
+    return Estimate(expected, least, 150, None, expected / LOG_MEGABYTES_PER_MEGAPIXEL)
+
+
 STAGE = Stage(
     name="ingest",
     version=2,
@@ -102,4 +122,5 @@ STAGE = Stage(
     ),
     example="scenewright ingest --log recording.mcap --out outputs/kitchen/sequence",
     check=check,
+    estimate=_estimate,
 )

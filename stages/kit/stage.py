@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from schemas.artifact import Artifact
+from stages.kit.estimates import Formula
 
 Item = TypeVar("Item")
 
@@ -113,6 +114,9 @@ class Stage:
     and the manifest beside `libraries`; it may raise MissingDependency."""
     check: Callable[[Any, Mapping[str, Any]], None] | None = None
     """Optional check of parameters against the inputs given (role -> path), raising UsageError before work starts."""
+
+    estimate: Formula | None = None
+    """Optional: what the step is going to write and to use (`--dry-run`, and before it starts)."""
 
     @property
     def folder(self) -> str:

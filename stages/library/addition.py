@@ -73,7 +73,7 @@ def run(
     decompose = uses_coacd(parameters)
     said = read_mapping(mapping) if mapping is not None else Mapping()
     taken, records, seed = _kept_models(library, context)
-    uses = {} if library is None else {entry.model: entry for entry in library.library.affordances}
+    uses = {} if library is None else {entry.model: entry for entry in library.info.affordances}
     names = {model.id.lower() for model in taken}
     folder = SourceFolder(models)
     imported = 0
@@ -124,12 +124,12 @@ def _kept_models(library: CadLibrary | None, context: Context) -> tuple[list[Cad
     """Copy the models of an existing library; return them, what was said when they were imported, and its seed."""
     if library is None:
         return [], [], context.seed
-    for model in library.library.models:
+    for model in library.info.models:
         shutil.copytree(model_folder(library, model.id), context.output / "models" / model.id)
     records: list[ImportedModel] = []
     if (path := library.path(IMPORTS_FILE)).is_file():
         records = list(ImportFile.read(path).models)
-    return list(library.library.models), records, library.library.seed
+    return list(library.info.models), records, library.info.seed
 
 
 def _import(

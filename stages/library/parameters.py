@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from schemas.cad_library import CadLibrary
+from stages.kit.estimates import Estimate, Inputs
 from stages.kit.stage import External, Optionally, Parameters, Stage
 
 
@@ -43,6 +44,12 @@ class AdditionParameters(Parameters):
     )
 
 
+def _estimate(parameters: LibraryParameters, inputs: Inputs) -> Estimate:
+    classes = len(parameters.classes) or 51
+    models = classes * (parameters.shapes_per_class + parameters.small_shapes_per_class) / 2
+    return Estimate(0.08 * models, 0.01 * models, 190)
+
+
 BUILD = Stage(
     name="library build",
     version=2,
@@ -52,6 +59,7 @@ BUILD = Stage(
     writes=CadLibrary,
     libraries=("numpy", "scipy", "shapely", "trimesh"),
     example="scenewright library build --out outputs/demo/cad_library --seed 0",
+    estimate=_estimate,
 )
 
 ADD = Stage(

@@ -10,6 +10,7 @@ from pydantic import Field
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
 from schemas.plan import Plan
+from stages.kit.estimates import grows_with
 from stages.kit.stage import Optionally, Parameters, Stage
 
 DATA = Path(__file__).resolve().parents[2] / "data"
@@ -84,4 +85,5 @@ STAGE = Stage(
     data_files=robot_files,
     example="scenewright plan --scene outputs/demo/interactive_scene --ground-truth outputs/demo/ground_truth "
     "--out outputs/demo/plan",
+    estimate=grows_with("scene", 2.2, 0.0, 640, 0.0),
 )

@@ -60,7 +60,7 @@ class PlanView:
 def body_rows(scene: InteractiveScene) -> list[BodyRow]:
     """Bodies with joints first, then the movable ones, then the rest."""
     rows = []
-    for body in scene.scene.bodies:
+    for body in scene.info.bodies:
         joints = []
         for joint in body.joints:
             value = body.joint_values.get(joint.name, 0.0)
@@ -89,7 +89,7 @@ def _place(relation: str, parent: str | None) -> str:
 
 def plan_view(plan: Plan, most: int, width: int) -> PlanView:
     """Read a plan with its key frames, evenly thinned to at most `most`."""
-    file = plan.plan
+    file = plan.info
     times = _times(plan)
     actions = []
     for k, action in enumerate(file.actions):

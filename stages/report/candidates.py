@@ -61,7 +61,7 @@ def object_views(
     nodes = {node.id: node for node in cad_scene.graph.nodes}
     return [
         _object_view(r, nodes.get(r.node), cad_scene, shelf, panoptic_map, count, width)
-        for r in cad_scene.scene.replacements
+        for r in cad_scene.info.replacements
         if r.decision != "layout"
     ]
 

@@ -198,8 +198,8 @@ class DataTable:
 
 def metric_groups(evaluation: Evaluation, baseline: Evaluation | None) -> list[tuple[str, list[Row]]]:
     """Return the groups of rows of which at least one value is defined."""
-    ours = evaluation.metrics.metrics
-    theirs = baseline.metrics.metrics if baseline is not None else {}
+    ours = evaluation.info.metrics
+    theirs = baseline.info.metrics if baseline is not None else {}
     groups = []
     for title, measures in GROUPS:
         rows = [
@@ -256,6 +256,5 @@ def read_plots(evaluation: Evaluation) -> list[Picture]:
 def all_metrics(evaluation: Evaluation) -> list[tuple[str, str]]:
     """Every metric by name, as text."""
     return [
-        (name, MISSING if value is None else f"{value:.4g}")
-        for name, value in sorted(evaluation.metrics.metrics.items())
+        (name, MISSING if value is None else f"{value:.4g}") for name, value in sorted(evaluation.info.metrics.items())
     ]

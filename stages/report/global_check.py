@@ -36,7 +36,7 @@ def checked_scenes(cad_scene: CadScene, shelf: ModelShelf) -> list[CheckedScene]
     Conflicts are pairs of replaced objects, and of objects with floor, walls or ceiling, more than 5 mm deep. A model
     that is not at hand is left out of the picture.
     """
-    scene = cad_scene.scene
+    scene = cad_scene.info
     steps: list[tuple[str, Callable[[Replacement], CadCandidate | None]]] = [("After the global check", after_check)]
     if any(r.best_single is not None for r in scene.replacements):
         steps.insert(0, ("Before the global check, every object by itself", before_check))

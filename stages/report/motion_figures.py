@@ -49,7 +49,7 @@ def motion_figure(plan: Plan) -> Figure:
         scale, name = (100.0, f"finger {number - ARM_JOINTS + 1} [cm]") if finger else (1.0, f"joint {number + 1}")
         below.plot(time, scale * joints[:, number], linewidth=0.8 if finger else 1.0, label=name)
     for axes, unit in ((above, "base"), (below, "arm [rad]")):
-        for number, action in enumerate(plan.plan.actions):
+        for number, action in enumerate(plan.info.actions):
             if not 0 <= action.start < action.end <= len(time):
                 continue
             if number % 2 == 0:

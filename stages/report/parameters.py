@@ -8,30 +8,10 @@ from typing import Any
 from pydantic import Field
 
 from schemas.errors import UsageError
-from schemas.kinds import (
-    CadLibrary,
-    CadScene,
-    ContactGraph,
-    Evaluation,
-    GroundTruth,
-    InteractiveScene,
-    Packing,
-    PanopticMap,
-    Plan,
-    Report,
-    Segments,
-    Sequence,
-    SutureEvaluation,
-    SutureNeedle,
-    SutureThread,
-    SutureTrial,
-    TablewareDetections,
-    TablewareEvaluation,
-    TablewarePlan,
-    TablewareTrial,
-    Trajectory,
-)
+from schemas.evaluation import Report
+from stages.kit.estimates import grows_with
 from stages.kit.stage import Optionally, Parameters, Stage
+from stages.report.section import all_roles
 
 
 class ReportParameters(Parameters):
@@ -59,32 +39,11 @@ STAGE = Stage(
     version=7,
     summary="Write one self-contained HTML page about a run: pictures, graph, figures, times, how it was made",
     parameters=ReportParameters,
-    reads={
-        "ground_truth": Optionally(GroundTruth),
-        "sequence": Optionally(Sequence),
-        "trajectory": Optionally(Trajectory),
-        "segments": Optionally(Segments),
-        "panoptic_map": Optionally(PanopticMap),
-        "contact_graph": Optionally(ContactGraph),
-        "cad_scene": Optionally(CadScene),
-        "cad_library": Optionally(CadLibrary),
-        "interactive_scene": Optionally(InteractiveScene),
-        "plan": Optionally(Plan),
-        "packing": Optionally(Packing),
-        "tableware_detections": Optionally(TablewareDetections),
-        "tableware_plan": Optionally(TablewarePlan),
-        "tableware_trial": Optionally(TablewareTrial),
-        "tableware_evaluation": Optionally(TablewareEvaluation),
-        "suture_needle": Optionally(SutureNeedle),
-        "suture_thread": Optionally(SutureThread),
-        "suture_trial": Optionally(SutureTrial),
-        "suture_evaluation": Optionally(SutureEvaluation),
-        "evaluation": Optionally(Evaluation),
-        "baseline_evaluation": Optionally(Evaluation),
-    },
+    reads={role: Optionally(kind) for role, kind in all_roles().items()},
     writes=Report,
     libraries=("numpy", "scipy", "jinja2", "matplotlib", "pillow", "open3d"),
     check=check_inputs,
     example="scenewright report --sequence outputs/demo/sequence --panoptic-map outputs/demo/panoptic_map "
     "--evaluation outputs/demo/evaluation --out outputs/demo/report",
+    estimate=grows_with("panoptic_map", 1.0, 0.02, 840, 9.5),
 )

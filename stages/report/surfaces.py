@@ -138,7 +138,7 @@ def cad_model(
     classes: dict[int, str] = {}
     names: dict[int, str] = {}
     node_ids: dict[int, str] = {}
-    for row, replacement in enumerate(cad_scene.scene.replacements, start=1):
+    for row, replacement in enumerate(cad_scene.info.replacements, start=1):
         node = nodes.get(replacement.node)
         class_name = node.class_name if node is not None else "object"
         number = node.instance if node is not None and node.instance > 0 else 100_000 + row

@@ -9,6 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from schemas.segments import Segments
 from schemas.sequence import Sequence
+from stages.kit.estimates import USUAL_FRAME, Estimate, Inputs
 from stages.kit.stage import External, Optionally, Parameters, Stage
 from stages.segment.backend_names import BACKENDS, LABEL_FILES, SERVICE, check_backend, is_service
 
@@ -130,6 +131,14 @@ def _data_files(parameters: SegmentParameters) -> tuple[str, ...]:
     return LABEL_FILES if parameters.backend in LABELLED or is_service(parameters.backend) else ()
 
 
+def _estimate(parameters: SegmentParameters, inputs: Inputs) -> Estimate:
+    sequence = inputs["sequence"]
+    megapixels = sequence.megapixels if sequence.megapixels is not None else sequence.megabytes
+    frames = sequence.frames or megapixels / USUAL_FRAME
+    expected = 0.015 * frames + 0.048 * megapixels
+    return Estimate(expected, 0.2 * expected, 215 + 300 * sequence.frame_megapixels, frames, megapixels)
+
+
 STAGE = Stage(
     name="segment",
     version=3,
@@ -160,4 +169,5 @@ STAGE = Stage(
     versions="versions",
     data_files=_data_files,
     example="scenewright segment --sequence outputs/demo/sequence --out outputs/demo/segments",
+    estimate=_estimate,
 )

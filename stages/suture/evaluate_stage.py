@@ -40,27 +40,27 @@ def run(
     notes: list[str] = []
     (context.output / "plots").mkdir()
     if trials is not None:
-        file = trials.trial
+        file = trials.info
         figures.update(trial_figures.metrics(file.runs))
         parts.append(trial_figures.table(file.runs).rstrip())
         notes += [f"{one.arm} sees by {one.model}: ASSUMED figures" for one in file.perception if not one.measured]
         with context.progress.step("histogram"):
             plots.histogram(context.output / "plots" / "sutures.png", file.runs)
     if scene is not None:
-        truth = scene.scene
+        truth = scene.truth
         poses = [one for one in (needle_thesis, needle) if one is not None]
         groups = _groups([record for one in poses for record in judge(one, truth)])
         if groups:
             figures.update(needle_figures.metrics(groups))
             parts.append("\n".join(["# The needle's pose", "", *needle_figures.rows("case", groups)]))
-            notes += [f"needle: masks are {one.needle.masks_from}" for one in poses[:1]]
+            notes += [f"needle: masks are {one.info.masks_from}" for one in poses[:1]]
             with context.progress.step("errors"):
                 plots.pose_errors(context.output / "plots" / "needle.png", groups)
         if thread is not None:
             errors = thread_errors(thread, scene)
             figures.update(thread_metrics(errors))
             parts.append("\n".join(["# The thread", "", *thread_rows(errors)]))
-            notes.append(f"thread: masks are {thread.thread.masks_from}")
+            notes.append(f"thread: masks are {thread.info.masks_from}")
     label = parameters.label or "simulated and rendered; nothing here is about real tissue"
     MetricsFile(label=label, metrics=dict(sorted(figures.items())), notes=tuple(notes)).write(
         context.output / "metrics.json"
@@ -77,7 +77,7 @@ def same_rig(rig: StereoRigRecord, other: StereoRigRecord) -> bool:
 
 def judge(needle: SutureNeedle, truth: SutureSceneFile) -> list[Estimate]:
     """Return every frame's estimate, and the filtered one, beside the truth. Raises BadInput for another scene's."""
-    file = needle.needle
+    file = needle.info
     if not same_rig(file.rig, truth.rig):
         raise BadInput(f"{needle.root}: its rig is not the scene's", hint="give the scene that the needle was seen in")
     records = []
@@ -119,10 +119,10 @@ def _groups(records: list[Estimate]) -> dict[str, list[Estimate]]:
 
 def thread_errors(thread: SutureThread, scene: SutureScene) -> list[ThreadError]:
     """Return every frame's error of the thread. Raises BadInput for another scene's, or arrays that are not there."""
-    file = thread.thread
+    file = thread.info
     errors = []
     for one in file.frames:
-        if one.frame >= len(scene.scene.views):
+        if one.frame >= len(scene.truth.views):
             raise BadInput(f"{thread.root}: frame {one.frame} is not in the scene", hint="give the thread's own scene")
         (true,) = read_arrays(scene.path("threads.npz"), f"thread_{one.frame:06d}")
         points = np.zeros((0, 3))

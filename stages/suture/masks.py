@@ -114,7 +114,7 @@ def _from_files(folder: Path, size: tuple[int, int]) -> MaskMaker:
 
 
 def _from_truth(scene: SutureScene, spoiled: bool, size: tuple[int, int]) -> MaskMaker:
-    views, folder = scene.scene.views, scene.path("truth")
+    views, folder = scene.truth.views, scene.path("truth")
 
     def make(pair: Pair) -> EyeMasks:
         if pair.index >= len(views):

@@ -38,7 +38,7 @@ def run(
     context: Context,
 ) -> SutureNeedle:
     """Estimate the needle in every pair. The outcome is `abstained` when no pose can be given."""
-    views = sequence.scene.views if isinstance(sequence, SutureScene) else ()
+    views = sequence.truth.views if isinstance(sequence, SutureScene) else ()
     with StereoPairs(sequence) as pairs:
         size = (pairs.camera.height, pairs.camera.width)
         make, source, told = open_masks(sequence, masks, segmenter, parameters, size)
@@ -59,7 +59,7 @@ def run(
         estimator=parameters.estimator,
         masks=source,
         masks_from=told,
-        disparity="" if disparity is None else disparity.disparity.detail,
+        disparity="" if disparity is None else disparity.matching.detail,
         rig=record,
         needle_radius=NEEDLE_RADIUS,
         frames=tuple(frames),
@@ -108,7 +108,7 @@ def _disparity_maps(disparity: Disparity | None) -> _Maps | None:
 def _motion(sequence: Sequence, parameters: NeedleParameters, frames: int) -> str:
     """Return how the needle is carried from frame to frame. Raises BadInput where kinematics are asked for and are not
     there."""
-    scene = sequence.scene if isinstance(sequence, SutureScene) else None
+    scene = sequence.truth if isinstance(sequence, SutureScene) else None
     reported = scene is not None and scene.arrangement == "motion" and frames > 1
     if parameters.filter == "auto":
         return "kinematics" if reported else "none"

@@ -8,8 +8,12 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from schemas.disparity import Disparity
 from schemas.errors import UsageError
-from schemas.kinds import Disparity, Sequence, SutureEvaluation, SutureNeedle, SutureScene, SutureThread, SutureTrial
+from schemas.sequence import Sequence
+from schemas.suture_needle import SutureNeedle, SutureThread
+from schemas.suture_scene import SutureScene
+from schemas.suture_trial import SutureEvaluation, SutureTrial
 from stages.kit.stage import External, Optionally, Parameters, Stage
 from stages.suture.options import ARM_NAMES, CHECKPOINT, HolderName, MaskOptions, PlaceName
 

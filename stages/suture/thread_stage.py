@@ -103,7 +103,7 @@ def _starts(needle: SutureNeedle | None) -> dict[int, np.ndarray]:
     if needle is None:
         return {}
     starts = {}
-    for frame in needle.needle.frames:
+    for frame in needle.info.frames:
         answer = as_estimate(frame.estimate)
         if answer.pose is not None and not answer.abstained:
             starts[frame.frame] = answer.pose.swage

@@ -177,7 +177,7 @@ class Catalogue:
     def __init__(self, library: CadLibrary) -> None:
         self.library = library
         self.by_class: dict[str, list[CadModel]] = {}
-        for model in sorted(library.library.models, key=lambda m: m.id):
+        for model in sorted(library.info.models, key=lambda m: m.id):
             self.by_class.setdefault(model.class_name, []).append(model)
         self._made: dict[tuple[str, tuple[tuple[str, float], ...], float], Furnishing] = {}
 

@@ -10,6 +10,7 @@ from pydantic import Field
 from schemas.cad_library import CadLibrary
 from schemas.errors import UsageError
 from schemas.ground_truth import GroundTruth
+from stages.kit.estimates import LOG_MEGABYTES_PER_MEGAPIXEL, Estimate, Inputs
 from stages.kit.stage import Parameters, Stage
 
 
@@ -40,6 +41,12 @@ def check(parameters: SynthesizeParameters, inputs: Mapping[str, Any]) -> None:
         raise UsageError("--no-depth leaves a log without distances", hint="give --stereo-baseline 0.12, for example")
 
 
+def _estimate(parameters: SynthesizeParameters, inputs: Inputs) -> Estimate:
+    megapixels = parameters.frames * parameters.width * parameters.height / 1e6
+    log = LOG_MEGABYTES_PER_MEGAPIXEL * megapixels
+    return Estimate(15 + log, 5 + 0.5 * log, 850, parameters.frames, megapixels)
+
+
 STAGE = Stage(
     name="synthesize",
     version=3,
@@ -51,4 +58,5 @@ STAGE = Stage(
     data_files=lambda parameters: (f"recipes/{parameters.recipe}.toml",),
     check=check,
     example="scenewright synthesize --library outputs/demo/cad_library --out outputs/demo/ground_truth --frames 300",
+    estimate=_estimate,
 )

@@ -8,7 +8,10 @@ from typing import Any, Literal
 from pydantic import Field
 
 from schemas.errors import UsageError
-from schemas.kinds import TablewareDetections, TablewareEvaluation, TablewarePlan, TablewareScene, TablewareTrial
+from schemas.tableware_detections import TablewareDetections
+from schemas.tableware_plan import TablewarePlan
+from schemas.tableware_scene import TablewareScene
+from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
 from stages.kit.stage import Optionally, Parameters, Stage
 from stages.tableware.detect_parameters import DETECT
 from stages.tableware.options import ActionTimes, PolicyName, TierName

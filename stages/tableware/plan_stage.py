@@ -95,12 +95,12 @@ def _accepted(
     """Return what is planned for, and what vision did not handle. Raises BadInput for what cannot be planned from."""
     least, rules = parameters.least_confidence, Rules()
     if detections is not None:
-        told = detections.detections
+        told = detections.info
         return understood(from_file(told), least, rules), told.notes
     if scene is None:
         raise BadInput("tableware plan: nothing to plan from", hint="give --detections, or --scene")
     if parameters.source == "truth":
-        return accept(as_table(scene.scene.items), {}, (), least, rules), ()
+        return accept(as_table(scene.info.items), {}, (), least, rules), ()
     color, depth, view = read_image(scene)
     seen = look(color, depth, view, least, rules)
     picture = Image.fromarray(draw_sight(color, seen.sight))

@@ -14,7 +14,7 @@ from stages.tableware.world.overhead import OverheadCamera
 def read_image(scene: TablewareScene) -> tuple[np.ndarray, np.ndarray, OverheadCamera]:
     """Return color (H, W, 3) uint8, depth (H, W) float32 [m] and the camera. Raises BadInput for files that cannot be
     read; whether images and camera fit is for vision to say."""
-    file = scene.scene
+    file = scene.info
     path = scene.path("color.png")
     try:
         with Image.open(path) as opened:

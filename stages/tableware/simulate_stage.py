@@ -38,7 +38,7 @@ def run(
     scene: TablewareScene, plan: TablewarePlan | None, *, parameters: SimulateParameters, context: Context
 ) -> TablewareTrial:
     """Let a policy clear the table of a scene, or carry out a plan as it stands."""
-    file = scene.scene
+    file = scene.info
     table = as_table(file.items)
     model, chances = times_of(parameters), chances_of(parameters.chances)
     eyes = Eyes(context.seed, file.light, file.colors, parameters.least_confidence)
@@ -138,7 +138,7 @@ def open_world(
 def planned_actions(plan: TablewarePlan, table: Table) -> list[tuple[Action, Table]]:
     """Return the actions of a plan with the tables on which they were decided, named as the things that stand there in
     truth. Raises BadInput when the plan is about another table."""
-    file = plan.plan
+    file = plan.info
     seen = as_table(file.items)
     renamed = named_as(seen, table)
     names = {one.name: other.name for one, other in zip(seen.items, renamed.items, strict=True)}

@@ -27,7 +27,7 @@ def scene_bodies(cad_scene: CadScene, graph: ContactGraphFile, movable: Collecti
 
     `movable`: names of the classes that hang on floating joints. Raises BadInput for a missing model or mesh.
     """
-    colors = {entry.node: entry.part_colors for entry in cad_scene.scene.replacements if entry.decision == "cad"}
+    colors = {entry.node: entry.part_colors for entry in cad_scene.info.replacements if entry.decision == "cad"}
     bodies = [
         _body(cad_scene, graph, node, movable, colors.get(node.id, {})) for node in graph.nodes if node.id != SCENE_NODE
     ]

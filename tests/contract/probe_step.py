@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from schemas.kinds import Trajectory
+from schemas.trajectory import Trajectory
 from stages.kit.stage import Context, External, Optionally, Parameters, Stage
 
 

@@ -78,23 +78,6 @@ def test_help_loads_no_heavy_library() -> None:
     assert loaded == []
 
 
-def test_a_new_folder_is_a_new_command(tmp_path: Path) -> None:
-    """The whole registration of a step is its folder."""
-    code = (
-        "import stages.engine.discovery as d, sys, pathlib, stages;"
-        f"root = pathlib.Path({str(tmp_path)!r}); d.STAGES_FOLDER = root; stages.__path__.insert(0, str(root));"
-        "from cli.main import run; sys.exit(run(['brandnew', '--help']))"
-    )
-    folder = tmp_path / "brandnew"
-    folder.mkdir()
-    (folder / "__init__.py").write_text("")
-    (folder / "parameters.py").write_text(
-        "from schemas.kinds import Trajectory\nfrom stages.kit.stage import Parameters, Stage\n"
-        "class P(Parameters):\n    pass\nSTAGE = Stage('brandnew', 1, 'Something new', P, {}, Trajectory)\n"
-    )
-    assert "Something new" in python(code)
-
-
 def test_json_schemas_are_current() -> None:
     folder = REPOSITORY / "schemas" / "json"
     expected = json_schemas()

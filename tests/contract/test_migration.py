@@ -9,7 +9,7 @@ from typing import ClassVar
 import pytest
 
 import schemas.artifact as artifact_module
-from schemas.artifact import Artifact
+from schemas.artifact import Artifact, Document
 from schemas.base import Model
 from schemas.errors import BadInput, UsageError
 from schemas.manifest import MANIFEST_NAME, Manifest
@@ -32,7 +32,7 @@ def kind() -> Iterator[type[Artifact]]:
     class Sample(Artifact):
         kind: ClassVar[str] = "test_sample"
         schema_version: ClassVar[int] = 3
-        json_files: ClassVar[dict[str, type[Model]]] = {"payload.json": Third}
+        info = Document(Third, "payload.json")
 
     @migration("test_sample", 1)
     def to_second(old: Path, new: Path) -> None:

@@ -30,6 +30,13 @@ def read_arrays(path: Path, *names: str, hint: str = "make the artifact again") 
         return tuple(_read_entry(archive, f"{name}.npy") for name in names)
 
 
+def read_all_arrays(path: Path, hint: str = "make the artifact again") -> dict[str, np.ndarray]:
+    """Return every array of an NPZ file by name. Raises BadInput as `read_arrays` does."""
+    path = Path(path)
+    with zip_errors(path, hint), zipfile.ZipFile(path) as archive:
+        return {name.removesuffix(".npy"): _read_entry(archive, name) for name in archive.namelist()}
+
+
 def read_array(path: Path, hint: str = "make the artifact again") -> np.ndarray:
     """Return the array of an NPY file. Raises BadInput as `read_arrays` does."""
     path = Path(path)

@@ -83,7 +83,7 @@ def match_of(shape, scale, yaw, position, start_yaw, center_error=(0.0, 0.0, 0.0
 @given(st.floats(0.7, 1.5), st.floats(-3, 3), st.floats(-0.2, 0.2), st.floats(-0.05, 0.05))
 @settings(max_examples=25, deadline=None)
 def test_alignment_recovers_scale_yaw_and_shift(library, scale, yaw, twist, push):
-    model = next(m for m in library.library.models if m.id == "chair_low")
+    model = next(m for m in library.info.models if m.id == "chair_low")
     shape = shape_of_state(model, model.states[0])
     match = match_of(shape, scale, yaw, (1.0, -2.0, 0.3 + scale * 0.45), yaw + twist, (push, -push, 0.0))
     # The footprint term pulls towards the wrong frame; without it the planes decide alone.
@@ -95,14 +95,14 @@ def test_alignment_recovers_scale_yaw_and_shift(library, scale, yaw, twist, push
 
 
 def test_height_follows_from_the_supporting_plane(library):
-    model = next(m for m in library.library.models if m.id == "table_square")
+    model = next(m for m in library.info.models if m.id == "table_square")
     shape = shape_of_state(model, model.states[0])
     found = align(match_of(shape, 1.2, 0.4, (0, 0, 0.2 + 0.6 * 0.74), 0.5), WEIGHTS, 1000)
     assert found.position[2] == pytest.approx(0.2 + found.scale * shape.size[2] / 2, abs=1e-12)
 
 
 def test_solver_agrees_with_scipy(library):
-    model = next(m for m in library.library.models if m.id == "chair_low")
+    model = next(m for m in library.info.models if m.id == "chair_low")
     shape = shape_of_state(model, model.states[0])
     match = match_of(shape, 1.1, 0.3, (0.5, 0.5, 0.5), 0.45, (0.05, 0.02, 0.0))
     residuals = residual_function(match, WEIGHTS)

@@ -25,7 +25,7 @@ EYES = [(-1.4, -1.8, 1.5), (1.4, -1.8, 1.6), (0.1, 1.7, 1.7)]
 
 
 def model_named(library, model_id):
-    return next(model for model in library.library.models if model.id == model_id)
+    return next(model for model in library.info.models if model.id == model_id)
 
 
 def mesh_of(library, model_id, position, yaw=0.0, scale=1.0, joints=None):
@@ -34,7 +34,7 @@ def mesh_of(library, model_id, position, yaw=0.0, scale=1.0, joints=None):
 
 
 def decisions(scene):
-    return {replacement.node: replacement for replacement in scene.scene.replacements}
+    return {replacement.node: replacement for replacement in scene.info.replacements}
 
 
 def yaw_of(candidate):
@@ -99,7 +99,7 @@ def test_furnished_room(scene):
     assert turn_between(yaw_of(found["table_2"].chosen), 0.2, math.pi) < 0.03
     assert turn_between(yaw_of(found["fridge_4"].chosen), 0.0) < 0.03
     assert all(entry.chosen.alignment_error < 0.01 for entry in found.values() if entry.chosen)
-    assert scene.scene.conflicts_after == 0
+    assert scene.info.conflicts_after == 0
 
 
 def test_open_door_is_found_and_measured(scene):
@@ -195,7 +195,7 @@ def test_scale_limits_must_make_sense(replace_objects):
 
 def test_empty_map_is_an_empty_scene(replace_objects):
     scene = replace_objects({}, {})
-    assert scene.outcome == "empty" and scene.scene.replacements == ()
+    assert scene.outcome == "empty" and scene.info.replacements == ()
 
 
 def surface_points(mesh, spacing=0.015):
@@ -333,10 +333,10 @@ def test_neighbours_that_overlap_are_moved_apart(replace_objects):
     }
     classes = {1: "floor", 2: "box", 3: "box"}
     stuck = replace_objects(meshes, classes, name="stuck", maximum_shift=0.0)
-    assert stuck.scene.conflicts_before == 1 and stuck.scene.conflicts_after == 1
+    assert stuck.info.conflicts_before == 1 and stuck.info.conflicts_after == 1
     apart = replace_objects(meshes, classes, name="apart", maximum_shift=0.05)
-    assert apart.scene.conflicts_after == 0
-    for a, b in zip(stuck.scene.replacements, apart.scene.replacements, strict=True):
+    assert apart.info.conflicts_after == 0
+    for a, b in zip(stuck.info.replacements, apart.info.replacements, strict=True):
         if a.chosen and b.chosen:
             shift = np.array(a.chosen.world_from_model)[:3, 3] - np.array(b.chosen.world_from_model)[:3, 3]
             assert np.linalg.norm(shift) <= 0.05 + 1e-9 and shift[2] == 0

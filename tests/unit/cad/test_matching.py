@@ -97,7 +97,7 @@ def test_no_planes_cost_nothing_and_supports_are_preserved():
 
 def test_a_model_matches_itself_only_as_it_stands(library):
     """D = 0 (2.7) for the model's own planes and size, in any frame and at any scale; larger in all other turns."""
-    model = next(m for m in library.library.models if m.id == "chair_low")
+    model = next(m for m in library.info.models if m.id == "chair_low")
     shape = shape_of_state(model, model.states[0])
     for yaw, scale in ((0.0, 1.0), (0.7, 1.3)):
         turn = Rotation.from_euler("z", yaw).as_matrix()
@@ -129,7 +129,7 @@ def test_weights_of_2_7():
 
 
 def test_ranking_rejects_absurd_scales(library):
-    models = [m for m in library.library.models if m.class_name == "box"]
+    models = [m for m in library.info.models if m.class_name == "box"]
     shapes = [shape_of_state(m, m.states[0]) for m in models]
     keep = dict(weights=(1.0, 1.0, 0.2), unmatched=1.0, scale_range=(0.6, 1.6), keep=5)
     found, rejected = rank_matches([observed((0.3, 0.2, 0.1))], shapes, **keep)

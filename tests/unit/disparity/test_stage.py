@@ -17,7 +17,7 @@ from stages.disparity.parameters import DisparityParameters, check_inputs
 from stages.ingest.preflight.steps import step_reports
 from stages.kit.formats.disparity_file import DisparityReader
 from stages.kit.formats.frames import FrameReader, FrameWriter, require_depth
-from stages.report.stereo_section import stereo_view
+from stages.report.sections.stereo.view import stereo_view
 from tests.unit.disparity.pairs import BASELINE, CAMERA, pair, write_folder
 from tests.unit.disparity.running import matched
 from tests.unit.disparity.test_rectification import turned
@@ -45,12 +45,12 @@ def test_the_artifact_is_a_sequence_with_the_depth_of_its_disparities(made: Disp
     assert known.mean() > 0.5
     error = frame.depth - CAMERA.fx * BASELINE / TRUTH
     assert np.median(np.abs(error[known])) < 0.04
-    sure = found.confidence >= made.disparity.minimum_confidence
+    sure = found.confidence >= made.matching.minimum_confidence
     np.testing.assert_array_equal(frame.depth > 0, found.known & sure)
 
 
 def test_its_record_says_what_was_searched_and_found(made: Disparity) -> None:
-    file = made.disparity
+    file = made.matching
     assert [row.verdict for row in file.rows] == ["rectified"] and file.rows[0].matches > 100
     first = file.frames[0]
     assert first.lowest <= TRUTH.min() and first.lowest + first.levels > TRUTH.max()
@@ -73,10 +73,10 @@ def test_a_turned_eye_is_reported_corrected_or_refused(tmp_path: Path) -> None:
     log = write_folder(tmp_path / "log", [(LEFT, turned(RIGHT, 0.012, -0.02))])
     sequence = ingest(log, tmp_path / "sequence")
     corrected = matched(sequence, tmp_path / "corrected")
-    assert corrected.outcome == "ok" and corrected.disparity.rows[0].verdict == "corrected"
+    assert corrected.outcome == "ok" and corrected.matching.rows[0].verdict == "corrected"
     reported = matched(sequence, tmp_path / "reported", rectification="report")
-    assert reported.outcome == "not_rectified" and reported.disparity.rows[0].row_error > 1.5  # type: ignore[operator]
-    assert corrected.disparity.frames[0].trusted > reported.disparity.frames[0].trusted + 0.1
+    assert reported.outcome == "not_rectified" and reported.matching.rows[0].row_error > 1.5  # type: ignore[operator]
+    assert corrected.matching.frames[0].trusted > reported.matching.frames[0].trusted + 0.1
     with pytest.raises(BadInput, match="not rectified"):
         matched(sequence, tmp_path / "refused", rectification="refuse")
 
@@ -134,7 +134,7 @@ def test_blank_walls_give_an_empty_artifact_with_the_reason(tmp_path: Path) -> N
     blank = np.full((CAMERA.height, CAMERA.width, 3), 120, np.uint8)
     made = matched(ingest(write_folder(tmp_path / "log", [(blank, blank)]), tmp_path / "sequence"), tmp_path / "out")
     assert made.outcome == "empty" and "nothing_matches" in made.summary["reason"]
-    assert made.disparity.rows[0].verdict == "not_checked" and made.disparity.left_out == {"nothing_matches": 1}
+    assert made.matching.rows[0].verdict == "not_checked" and made.matching.left_out == {"nothing_matches": 1}
 
 
 def covered(picture: np.ndarray) -> np.ndarray:
@@ -150,7 +150,7 @@ def test_a_covered_eye_leaves_its_frames_out(tmp_path: Path, which: int, spoil: 
     bad[which] = spoil(bad[which])
     log = write_folder(tmp_path / "log", [(LEFT, RIGHT), (bad[0], bad[1])])
     made = matched(ingest(log, tmp_path / "sequence"), tmp_path / "disparity")
-    assert made.outcome == "ok" and made.summary["frames"] == 1 and made.disparity.left_out == {"blank_eye": 1}
+    assert made.outcome == "ok" and made.summary["frames"] == 1 and made.matching.left_out == {"blank_eye": 1}
 
 
 def test_eyes_that_are_all_covered_give_an_empty_artifact(tmp_path: Path) -> None:
@@ -172,7 +172,7 @@ def test_eyes_far_from_rectified_are_said_to_be(tmp_path: Path, wrong: str) -> N
     sequence = ingest(write_folder(tmp_path / "log", [(LEFT, np.ascontiguousarray(right))]), tmp_path / "sequence")
     made = matched(sequence, tmp_path / "disparity")
     assert made.outcome in ("not_rectified", "empty")
-    assert made.disparity.rows[0].verdict == "not_rectified" and made.disparity.rows[0].row_error > 10  # type: ignore[operator]
+    assert made.matching.rows[0].verdict == "not_rectified" and made.matching.rows[0].row_error > 10  # type: ignore[operator]
 
 
 @pytest.mark.parametrize(

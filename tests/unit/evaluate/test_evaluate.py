@@ -57,8 +57,8 @@ def test_a_perfect_reconstruction(tmp_path, truth):
         contact_graph=make_graph(tmp_path / "graph", graph_of(ROOM)), cad_scene=make_cad_scene(tmp_path / "cad"),
         interactive_scene=make_interactive_scene(tmp_path / "scene"), plan=make_plan(tmp_path / "plan"),
     )  # fmt: skip
-    metrics = result.metrics.metrics
-    assert result.metrics.label == f"{LABEL}, handmade, seed 3"
+    metrics = result.info.metrics
+    assert result.info.label == f"{LABEL}, handmade, seed 3"
     exact = {
         "map/rq": 1.0, "map/rq_thesis_code": 1.0, "map/instance_ap50": 1.0, "map/mesh_recall": 1.0,
         "map/mesh_precision": 1.0, "graph/edit_distance": 0.0, "graph/edit_distance_exact": 1.0,
@@ -89,7 +89,7 @@ def test_known_mistakes_give_known_figures(tmp_path, truth):
     metrics = evaluate(
         tmp_path / "evaluation", ground_truth=truth, panoptic_map=make_map(tmp_path / "map", seen),
         contact_graph=make_graph(tmp_path / "graph", graph_of(seen)),
-    ).metrics.metrics  # fmt: skip
+    ).info.metrics  # fmt: skip
     # 2 wrong support (cup) + 1 wrong class (table) + 1 missing (chair) + 1 extra (sofa)
     assert metrics["graph/edit_distance"] == 5
     assert metrics["graph/wrong_supports"] == 1
@@ -113,7 +113,7 @@ def test_an_empty_map_is_zero_and_not_a_crash(tmp_path, truth):
     metrics = evaluate(
         tmp_path / "evaluation", plots=True, ground_truth=truth, panoptic_map=make_map(tmp_path / "map", ()),
         contact_graph=make_graph(tmp_path / "graph", graph_of(())),
-    ).metrics.metrics  # fmt: skip
+    ).info.metrics  # fmt: skip
     assert metrics["map/pq"] == metrics["map/rq"] == metrics["map/instance_ap50"] == metrics["map/mesh_recall"] == 0.0
     assert metrics["map/pq_thesis_code"] is None
     assert metrics["graph/edit_distance"] == len(ROOM)
@@ -128,7 +128,7 @@ def test_class_agnostic_masks_have_no_figures_by_class(tmp_path, truth):
     nameless = tuple(replace(t, class_name="object") for t in (low, high, *ROOM[1:]))
     metrics = evaluate(
         tmp_path / "evaluation", ground_truth=truth, panoptic_map=make_map(tmp_path / "map", nameless)
-    ).metrics.metrics
+    ).info.metrics
     assert metrics["map/pq"] is None
     assert metrics["map/instance_ap50"] is None
     assert metrics["map/rq_class_agnostic"] == 1.0
@@ -144,7 +144,7 @@ def test_refinement_is_measured(tmp_path, truth):
         for node in graph.nodes
     )
     changed = make_graph(tmp_path / "graph", graph.model_copy(update={"nodes": nodes}))
-    metrics = evaluate(tmp_path / "evaluation", ground_truth=truth, contact_graph=changed).metrics.metrics
+    metrics = evaluate(tmp_path / "evaluation", ground_truth=truth, contact_graph=changed).info.metrics
     assert metrics["graph/obb_ap50_observed"] == pytest.approx(4 / 5)
     assert metrics["graph/obb_ap50_refined"] == 1.0
     assert metrics["graph/edit_distance"] == 0  # paired by boxes, as no map is given
@@ -155,17 +155,17 @@ def test_entities_that_the_camera_never_saw_count_neither_way(tmp_path):
     without = tuple(t for t in ROOM if t.instance != 7)
     inputs = {"panoptic_map": make_map(tmp_path / "map", without)}
     graph = make_graph(tmp_path / "graph", graph_of(without))
-    metrics = evaluate(tmp_path / "a", ground_truth=hidden, contact_graph=graph, **inputs).metrics.metrics
+    metrics = evaluate(tmp_path / "a", ground_truth=hidden, contact_graph=graph, **inputs).info.metrics
     assert (metrics["graph/edit_distance"], metrics["graph/true_nodes"]) == (0, 6)
     assert metrics["map/instance_ap50"] == 1.0
     assert metrics["graph/any_support_recall"] == 1.0
     seen = evaluate(tmp_path / "b", ground_truth=make_ground_truth(tmp_path / "all"), contact_graph=graph, **inputs)
-    assert seen.metrics.metrics["graph/edit_distance"] == 1
+    assert seen.info.metrics["graph/edit_distance"] == 1
 
 
 def test_cad_errors(tmp_path, truth):
     scene = make_cad_scene(tmp_path / "cad", shift=0.03, turn=np.radians(100))
-    metrics = evaluate(tmp_path / "evaluation", ground_truth=truth, cad_scene=scene).metrics.metrics
+    metrics = evaluate(tmp_path / "evaluation", ground_truth=truth, cad_scene=scene).info.metrics
     assert metrics["cad/position_error_m_mean"] == pytest.approx(0.03)
     assert metrics["cad/position_error_m_mean_low"] <= 0.03 + 1e-9 <= metrics["cad/position_error_m_mean_high"] + 2e-9
     assert metrics["cad/yaw_error_rad_mean"] == pytest.approx(np.radians(100))
@@ -192,11 +192,11 @@ def test_truth_follows_what_ingest_did_to_the_world(tmp_path, truth):
     nodes = tuple(n.model_copy(update={"box_observed": n.box}) for n in nodes)
     turned = make_graph(tmp_path / "graph", graph.model_copy(update={"nodes": nodes}))
     inputs = {"ground_truth": truth, "contact_graph": turned}
-    metrics = evaluate(tmp_path / "with", sequence=sequence, **inputs).metrics.metrics
+    metrics = evaluate(tmp_path / "with", sequence=sequence, **inputs).info.metrics
     assert metrics["graph/obb_ap50_refined"] == 1.0
     assert metrics["trajectory/ate_rmse_m"] > 0.1  # the trajectory file itself was not moved
     assert metrics["trajectory/ate_rmse_aligned_m"] < 1e-6
-    assert evaluate(tmp_path / "without", **inputs).metrics.metrics["graph/obb_ap50_refined"] < 1.0
+    assert evaluate(tmp_path / "without", **inputs).info.metrics["graph/obb_ap50_refined"] < 1.0
 
 
 def test_without_ground_truth_there_are_counts_only(tmp_path):
@@ -204,10 +204,10 @@ def test_without_ground_truth_there_are_counts_only(tmp_path):
         tmp_path / "evaluation", plots=True, panoptic_map=make_map(tmp_path / "map"),
         contact_graph=make_graph(tmp_path / "graph", graph_of(ROOM)),
     )  # fmt: skip
-    assert {name.split("/")[0] for name in result.metrics.metrics} == {"counts"}
-    assert result.metrics.metrics["counts/floor_height_rms_m"] == pytest.approx(0.014, abs=0.001)
-    assert result.metrics.metrics["counts/floor_tilt_rad"] == pytest.approx(0.0, abs=1e-6)
-    assert "no ground truth" in result.metrics.notes[-1]
+    assert {name.split("/")[0] for name in result.info.metrics} == {"counts"}
+    assert result.info.metrics["counts/floor_height_rms_m"] == pytest.approx(0.014, abs=0.001)
+    assert result.info.metrics["counts/floor_tilt_rad"] == pytest.approx(0.0, abs=1e-6)
+    assert "no ground truth" in result.info.notes[-1]
     assert (result.root / "plots" / "contact_graph.png").is_file()
 
 

@@ -64,7 +64,7 @@ def results_of(truth, scene, graph, models=SHAPES):
 
 def test_a_perfect_room(tmp_path, truth):
     cad = make_cad_scene(tmp_path / "cad")
-    results = results_of(truth, cad.scene, cad.graph)
+    results = results_of(truth, cad.info, cad.graph)
     assert sorted(results) == sorted(TRUE)
     for result in results.values():
         assert result.success and result.functional and result.rank == 1, result.name
@@ -80,7 +80,7 @@ def test_a_perfect_room(tmp_path, truth):
 def test_missed_objects_are_failures_and_named_apart(tmp_path, truth):
     found = tuple(thing for thing in ROOM if thing not in (CHAIR,))
     cad = make_cad_scene(tmp_path / "cad", found)
-    summary = room_summary(list(results_of(truth, cad.scene, cad.graph).values()))
+    summary = room_summary(list(results_of(truth, cad.info, cad.graph).values()))
     assert summary["scan2cad_success"] == pytest.approx(4 / 5) and summary["scan2cad_success_detected"] == 1.0
     assert summary["functional"] == pytest.approx(4 / 5) and summary["detected"] == 4.0
 
@@ -97,9 +97,9 @@ def test_a_held_out_shape_can_succeed_by_its_extents(tmp_path, truth):
     for model_id, right in (("table_b", True), ("desk_b", False)):
         replacements = tuple(
             r.model_copy(update={"chosen": candidate(model_id, model_pose(TABLE))}) if r.node == TABLE.name else r
-            for r in cad.scene.replacements
+            for r in cad.info.replacements
         )
-        scene = cad.scene.model_copy(update={"replacements": replacements})
+        scene = cad.info.model_copy(update={"replacements": replacements})
         result = results_of(truth, scene, cad.graph, models)[TABLE.name]
         assert result.rank is None and result.success is right and result.class_right is right
         assert result.equivalence is not None and result.equivalence.same_class is right
@@ -109,11 +109,11 @@ def test_what_each_criterion_of_equivalence_asks(tmp_path, truth):
     cad = make_cad_scene(tmp_path / "cad")
     red = [
         r.model_copy(update={"part_colors": {"body": (20, 20, 200)}}) if r.node == CUP.name else r
-        for r in cad.scene.replacements
+        for r in cad.info.replacements
     ]
     moved = graph_of(tuple(replace(t, parent=1) if t is BOTTLE else t for t in ROOM))
     locked = replace(SHAPES["chair_a"], joints=SHAPES["cabinet_a"].joints, parts=SHAPES["cabinet_a"].parts)
-    scene = cad.scene.model_copy(update={"replacements": tuple(red)})
+    scene = cad.info.model_copy(update={"replacements": tuple(red)})
     results = results_of(truth, scene, moved, {**SHAPES, "chair_a": locked})
     cup, bottle, chair = (results[t.name].equivalence for t in (CUP, BOTTLE, CHAIR))
     assert not cup.appearance and cup.affordance and cup.size_and_shape and cup.class_and_relations
@@ -132,9 +132,9 @@ def test_the_scene_before_the_global_check(tmp_path, truth):
     pose[0, 3] += 0.5
     before = tuple(
         r.model_copy(update={"best_single": candidate("cup_a", pose)}) if r.node == CUP.name else r
-        for r in cad.scene.replacements
+        for r in cad.info.replacements
     )
-    scene = with_best_single(cad.scene.model_copy(update={"replacements": before}))
+    scene = with_best_single(cad.info.model_copy(update={"replacements": before}))
     results = results_of(truth, scene, cad.graph)
     assert results[CUP.name].alignment.translation == pytest.approx(0.5) and not results[CUP.name].success
     assert results[TABLE.name].success  # no best_single recorded: it keeps its choice

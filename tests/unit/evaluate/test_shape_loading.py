@@ -35,7 +35,7 @@ def bodies_of(library: CadLibrary) -> list[BundleBody]:
     """The small room and a shrunk cabinet with a drawer that stands open."""
     slides = [
         (model, joint.name)
-        for model in library.library.models
+        for model in library.info.models
         if model.class_name == "cabinet"
         for joint in model.joints
         if joint.type == "prismatic"
@@ -155,7 +155,7 @@ def test_true_shapes_stand_where_the_room_has_them(truth, bodies):
 
 def test_before_the_global_check_needs_the_library(tmp_path, library, truth, bodies):
     """Best by itself: the table a metre away, as another model that only the library has."""
-    other = next(m.id for m in library.library.models if m.class_name == "table" and m.id != "table_00")
+    other = next(m.id for m in library.info.models if m.class_name == "table" and m.id != "table_00")
     pose = np.array(TURNED)
     pose[0, 3] += 1.0
     single = CadCandidate(

@@ -25,6 +25,6 @@ def build_graph(tmp_path: Path):
         context = Context(output=output, seed=0, device="cpu", progress=SilentProgress())
         artifact = run(panoptic_map, parameters=GraphParameters(**options), context=context)
         build.summary, build.outcome = artifact.summary, artifact.outcome
-        return artifact.graph
+        return artifact.info
 
     return build

@@ -61,7 +61,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> ContactGraphFile:
     panoptic_map = write_map(folder / "map", meshes, {k: name for k, (name, _) in things.items()})
     (folder / "graph").mkdir()
     context = Context(output=folder / "graph", seed=0, device="cpu", progress=SilentProgress())
-    return run(panoptic_map, parameters=GraphParameters(), context=context).graph
+    return run(panoptic_map, parameters=GraphParameters(), context=context).info
 
 
 def link(graph: ContactGraphFile, relation: str, source: str, target: str) -> Relation:

@@ -207,8 +207,8 @@ def test_missing_floor_is_supposed_only_where_the_map_shows_one(build_graph, tmp
     context = Context(output=output, seed=0, device="cpu", progress=SilentProgress())
     artifact = run(panoptic_map, parameters=GraphParameters(), context=context)
     assert artifact.summary["floor"] == "supposed at z = 0"
-    assert parents(artifact.graph) == {"chair_2": ("floor_3", "supports"), "floor_3": ("scene", "supports")}
-    assert artifact.graph.node("floor_3").mesh is None
+    assert parents(artifact.info) == {"chair_2": ("floor_3", "supports"), "floor_3": ("scene", "supports")}
+    assert artifact.info.node("floor_3").mesh is None
 
 
 def test_small_entities_and_persons_are_dropped(build_graph):

@@ -27,7 +27,7 @@ def graph_of(folder: Path, things: dict[int, tuple[str, trimesh.Trimesh]], metho
     output = folder / method
     output.mkdir()
     context = Context(output=output, seed=0, device="cpu", progress=SilentProgress())
-    return run(panoptic_map, parameters=GraphParameters(method=method), context=context).graph
+    return run(panoptic_map, parameters=GraphParameters(method=method), context=context).info
 
 
 def edges(graph: ContactGraphFile, target: str) -> set[tuple[str, str]]:

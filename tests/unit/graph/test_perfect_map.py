@@ -105,7 +105,7 @@ def graph_of(truth: GroundTruth, folder: Path, method: str) -> ContactGraphFile:
     output.mkdir()
     context = Context(output=output, seed=0, device="cpu", progress=SilentProgress())
     panoptic_map = perfect_map(truth, folder / f"map_{method}")
-    return run(panoptic_map, parameters=GraphParameters(method=method), context=context).graph
+    return run(panoptic_map, parameters=GraphParameters(method=method), context=context).info
 
 
 def test_support_edges_of_a_perfect_map(truth, tmp_path):
@@ -114,7 +114,7 @@ def test_support_edges_of_a_perfect_map(truth, tmp_path):
     agreement = edge_agreement(truth.graph, graph, names)["any_support"]
     assert agreement.true_count == len(ROOM)
     assert agreement.precision == 1.0 and agreement.recall == 1.0
-    for entry in truth.truth.objects:
+    for entry in truth.info.objects:
         # Back sides were not seen; the boxes are those of what was.
         if entry.class_name in ("table", "chair", "desk"):
             assert box_iou(graph.node(entry.name).box, entry.box) > 0.85, entry.name

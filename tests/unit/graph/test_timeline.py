@@ -58,8 +58,8 @@ def grown(tmp_path_factory: pytest.TempPathFactory) -> tuple[ContactGraph, Timel
 def test_the_last_snapshot_is_the_graph_of_the_finished_map(grown, tmp_path):
     artifact, timeline = grown
     last = timeline.snapshots[-1]
-    assert last.frames == 30 and last.links == artifact.graph.links
-    bare = [node.model_copy(update={"planes": (), "mesh": None}) for node in artifact.graph.nodes]
+    assert last.frames == 30 and last.links == artifact.info.links
+    bare = [node.model_copy(update={"planes": (), "mesh": None}) for node in artifact.info.nodes]
     assert list(last.nodes) == bare
     # ... which is the same graph as without snapshots.
     context = Context(output=tmp_path, seed=0, device="cpu", progress=SilentProgress())
@@ -67,7 +67,7 @@ def test_the_last_snapshot_is_the_graph_of_the_finished_map(grown, tmp_path):
     (finished / SNAPSHOTS).rename(tmp_path / "elsewhere")
     alone = run(PanopticMap(finished), parameters=GraphParameters(), context=context)
     (tmp_path / "elsewhere").rename(finished / SNAPSHOTS)
-    assert alone.timeline is None and alone.graph == artifact.graph
+    assert alone.timeline is None and alone.info == artifact.info
 
 
 def test_ids_last_whatever_a_thing_was_called(grown):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import json
 import os
 import shutil
@@ -15,12 +16,12 @@ import networkx
 import numpy as np
 import pytest
 
-from scenewright import LoadedArtifact, load, load_run
+from scenewright import as_networkx, load, load_run, payload
 from schemas.errors import BadInput
 from schemas.kinds import KINDS
 from schemas.manifest import MANIFEST_NAME
-from stages.engine.loading import LoadedContactGraph, LoadedMap, LoadedSequence
-from stages.engine.loading.opening import CLASSES
+from schemas.panoptic_map import PanopticMap
+from schemas.sequence import Sequence
 from stages.kit.formats.frames import FrameReader
 from tests.unit.housekeeping.artifacts import snapshot
 from tests.unit.housekeeping.tiny_run import make_tiny_run
@@ -39,24 +40,34 @@ def run(run_folder: Path) -> dict:
     return load_run(run_folder)
 
 
-def test_every_kind_has_a_class_and_opens_as_it(run: dict) -> None:
-    made = set(KINDS) - {"trajectory"} - {kind for kind in KINDS if kind.startswith("test_")}
-    assert set(CLASSES) == made
-    assert {type(artifact) for artifact in run.values()} == {*CLASSES.values(), LoadedArtifact}
+GOLDEN = [path for path in sorted((REPOSITORY / "tests" / "golden").glob("v*/*"))
+          if path.parent.name == f"v{KINDS[path.name].schema_version}"]  # fmt: skip
+
+
+@pytest.mark.parametrize("root", GOLDEN, ids=lambda path: path.name)
+def test_every_kind_opens_as_the_handle_that_steps_get(root: Path) -> None:
+    artifact = load(root)
+    assert type(artifact) is KINDS[root.name] and repr(artifact).startswith(f"<{root.name} ")
+    name, model = next(iter((artifact.json_files | artifact.optional_json_files).items()))
+    assert type(artifact.info) is (model if (root / name).exists() else type(None)), "the main document"
+    assert artifact.info is artifact.info, "parsed once"
+
+
+def test_a_run_is_opened_by_step(run: dict) -> None:
     for name, artifact in run.items():
-        assert artifact.path.name == name and artifact.kind in repr(artifact)
-        assert artifact.kind == json.loads((artifact.path / MANIFEST_NAME).read_text())["kind"]
+        assert artifact.root.name == name
+        assert artifact.kind == json.loads((artifact.root / MANIFEST_NAME).read_text())["kind"]
 
 
 def test_opening_reads_no_payload(run_folder: Path, tmp_path: Path) -> None:
     """What is wrong inside shows when it is asked for, as bad input."""
     shutil.copytree(run_folder / "evaluation", tmp_path / "evaluation")
-    payload = tmp_path / "evaluation" / "metrics.json"
-    payload.write_text("?" * payload.stat().st_size)
+    document = tmp_path / "evaluation" / "metrics.json"
+    document.write_text("?" * document.stat().st_size)
     loaded = load(tmp_path / "evaluation")
     with pytest.raises(BadInput, match="metrics.json"):
-        loaded.metrics  # noqa: B018
-    payload.write_text("?")
+        loaded.info  # noqa: B018
+    document.write_text("?")
     with pytest.raises(BadInput, match="the manifest says"):
         load(tmp_path / "evaluation")
 
@@ -67,87 +78,86 @@ def test_using_writes_nothing(run_folder: Path) -> None:
         for name in dir(artifact):
             if not name.startswith("_"):
                 getattr(artifact, name)
+        for name in artifact.files:
+            with contextlib.suppress(BadInput):
+                payload(artifact, name)
     assert snapshot(run_folder) == before
 
 
 def test_sequence(run: dict, run_folder: Path) -> None:
     sequence = run["sequence"]
-    assert len(sequence) == 5 and sequence.camera == CAMERA and list(sequence.cameras) == ["camera"]
-    with FrameReader(run_folder / "sequence" / "frames.mcap") as reader:
-        np.testing.assert_array_equal(sequence.times, reader.times)
-        indices, poses = reader.poses()
-        np.testing.assert_allclose(sequence.poses, poses, atol=1e-8)
-        assert len(indices) == len(sequence.poses) == 5
-    assert [frame.index for frame in sequence.frames(("depth",), every=2)] == [0, 2, 4]
-    frame = sequence.frame(3)
-    assert frame.color.shape == (CAMERA.height, CAMERA.width, 3) and frame.depth.dtype == np.float32
+    assert sequence.info.frame_count == 5 and sequence.info.camera == CAMERA
+    with payload(sequence, "frames.mcap") as frames, FrameReader(run_folder / "sequence" / "frames.mcap") as reader:
+        np.testing.assert_array_equal(frames.times, reader.times)
+        assert [frame.index for frame in frames.frames(("depth",), every=2)] == [0, 2, 4]
+        frame = frames.read(3)
+        assert frame.color.shape == (CAMERA.height, CAMERA.width, 3) and frame.depth.dtype == np.float32
+        _, poses = reader.poses()
+        np.testing.assert_allclose(payload(sequence, "trajectory.tum")[1], poses, atol=1e-8)
     world_from_log = np.array(sequence.info.gravity.world_from_log)
     np.testing.assert_allclose(frame.world_from_camera, world_from_log @ camera_poses(5)[3], atol=1e-8)
 
 
+def test_disparity_is_a_sequence_too(run: dict) -> None:
+    artifact = run["disparity"]
+    with payload(artifact, "frames.mcap") as frames, payload(artifact, "disparity.mcap") as maps:
+        found = maps.read(int(frames.stamps[0]))
+        assert found.disparity.shape == (frames.camera.height, frames.camera.width)
+    assert artifact.info.frame_count == len(artifact.matching.frames)
+
+
 def test_segments_and_map(run: dict) -> None:
     segments, found = run["segments"], run["panoptic_map"]
-    mask = segments.mask(2)
-    assert {segment.id for segment in segments.segments(2)} == set(np.unique(mask)) - {0}
-    assert segments.frame_indices == (0, 1, 2, 3, 4) and segments.label == "test masks"
-    with pytest.raises(KeyError):
-        segments.segments(9)
-    entity = found.entities[0]
+    with payload(segments, "panoptic.zip") as masks:
+        assert {segment.id for segment in segments.info.frames[2].segments} == set(np.unique(masks.read(2))) - {0}
+    assert segments.info.label == "test masks"
+    entity = found.info.entities[0]
     assert (entity.instance, entity.class_name) == (4, "table")
-    np.testing.assert_allclose(entity.box, entity.mesh.bounds)
-    assert found.mesh.volume == pytest.approx(1) and entity.mesh.visual.vertex_colors[0].tolist() == [10, 20, 30, 255]
-    assert {len(labels) for labels in found.vertex_labels.values()} == {len(found.mesh.vertices)}
+    mesh = payload(found, entity.mesh)
+    np.testing.assert_allclose((entity.box_minimum, entity.box_maximum), mesh.bounds)
+    whole, labels = payload(found, "mesh.ply"), payload(found, "mesh_labels.npz")
+    assert whole.volume == pytest.approx(1) and mesh.visual.vertex_colors[0].tolist() == [10, 20, 30, 255]
+    assert set(labels) == {"instance", "segment", "class_id"}
+    assert {len(values) for values in labels.values()} == {len(whole.vertices)}
 
 
 def test_graphs(run: dict) -> None:
     for name in ("contact_graph", "cad_scene", "interactive_scene", "ground_truth"):
         artifact = run[name]
-        document = json.loads((artifact.path / "graph.json").read_text())
-        expected = networkx.node_link_graph(document, edges="links")
-        graph = artifact.graph
+        file = artifact.info if name == "contact_graph" else artifact.graph
+        expected = networkx.node_link_graph(json.loads((artifact.root / "graph.json").read_text()), edges="links")
+        graph = as_networkx(file)
         assert set(graph.nodes) == set(expected.nodes) and graph.number_of_edges() == expected.number_of_edges()
         assert sorted(graph.edges(data="relation")) == sorted(expected.edges(data="relation"))
         support = [(u, v) for u, v, relation in graph.edges(data="relation") if relation != "proximal"]
         assert networkx.is_arborescence(networkx.DiGraph(support))
         assert graph.nodes["table_3"]["class_name"] == "table"
-    contact = run["contact_graph"]
-    assert contact.parent("scene") is None
-    assert all(contact.parent(child) == "table_3" for child in contact.children("table_3"))
 
 
-def test_scenes(run: dict) -> None:
+def test_files_are_those_of_the_manifest(run: dict) -> None:
     scene, library = run["interactive_scene"], run["cad_library"]
-    for path in (scene.urdf_path, scene.static_urdf_path, library.urdf_path("table_00")):
+    paths = [scene.file(scene.info.combined_file), scene.file(scene.info.static_file)]
+    for path in (*paths, library.file("models/table_00/model.urdf")):
         assert ElementTree.parse(path).getroot().tag == "robot"
-    assert scene.mjcf_path.exists() and {body.name for body in scene.bodies} >= {"table_3", "cup_5"}
-    assert scene.world_from_body("table_3").shape == (4, 4)
-    with pytest.raises(KeyError):
-        scene.world_from_body("nonsense")
     with pytest.raises(BadInput, match="no file"):
-        library.urdf_path("../../secret")
-    assert run["cad_scene"].replacements["table_3"].chosen.model_id in library.models
-    assert {item.name for item in run["ground_truth"].objects} >= {"table_3"}
+        library.file("../../secret")
+    with pytest.raises(BadInput, match="no file"):
+        payload(library, "../../secret.ply")
+    with pytest.raises(BadInput, match="no reader"):
+        payload(scene, scene.info.combined_file)
 
 
-def test_results(run: dict) -> None:
-    packing = run["packing"]
-    assert packing.success and len(packing.attempts) == 2 and packing.problem.boxes[0].name == "red"
-    assert {name: len(rows) for name, rows in packing.trajectory.items()} == {"joints": 3, "action": 3}
-    plan = run["plan"]
-    assert plan.status == "executed" and [action.name for action in plan.actions] == ["pick"] and plan.failures == ()
-    assert {name: len(rows) for name, rows in plan.trajectory.items()} == dict.fromkeys(
-        ("time", "joints", "world_from_base", "action"), 4
-    )
-    assert run["evaluation"].metrics == {"map/pq": 0.5, "map/ap": None} and run["evaluation"].label == "test"
-    assert run["report"].html_path.read_text() == "<html></html>"
-    assert run["exported_sequence"].info.layout == "tum" and (run["exported_sequence"].log / "rgb.txt").exists()
+def test_arrays(run: dict) -> None:
+    rows = {name: len(values) for name, values in payload(run["plan"], "trajectory.npz").items()}
+    assert rows == dict.fromkeys(("time", "joints", "world_from_base", "action"), 4)
+    assert set(payload(run["packing"], "trajectory.npz")) == {"joints", "action"}
 
 
 def test_what_cannot_be_opened_says_what_to_do(run_folder: Path, tmp_path: Path) -> None:
-    assert load(run_folder / "panoptic_map", LoadedMap).entities
+    assert load(run_folder / "panoptic_map", PanopticMap).info.entities
+    assert isinstance(load(run_folder / "disparity", Sequence), Sequence)
     with pytest.raises(BadInput, match="'sequence' is needed"):
-        load(run_folder / "panoptic_map", LoadedSequence)
-    assert isinstance(load(str(run_folder / "contact_graph")), LoadedContactGraph)
+        load(run_folder / "panoptic_map", Sequence)
     for path in (tmp_path, tmp_path / "nowhere"):
         with pytest.raises(BadInput):
             load(path)
@@ -155,8 +165,6 @@ def test_what_cannot_be_opened_says_what_to_do(run_folder: Path, tmp_path: Path)
             load_run(path)
     with pytest.raises(BadInput, match="scenewright migrate"):
         load(REPOSITORY / "tests" / "golden" / "v1" / "sequence")
-    with pytest.raises(BadInput, match="has no file"):
-        load(run_folder / "sequence").file("../../etc/passwd")
 
 
 def test_the_module_stands_on_kit_and_engine_only() -> None:

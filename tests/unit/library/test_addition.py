@@ -50,7 +50,7 @@ def add(
 
 
 def only(library: CadLibrary) -> tuple[CadModel, ImportedModel]:
-    (model,) = library.library.models
+    (model,) = library.info.models
     (record,) = ImportFile.read(library.path("imports.json")).models
     folder = model_folder(library, model.id)
     assert read_model(folder) == model
@@ -123,7 +123,7 @@ def test_urdf_keeps_its_joints(tmp_path) -> None:
     np.testing.assert_allclose(hinge.origin, [-0.25, -0.30, 0.2], atol=1e-6)
     assert record.can_be_opened and record.can_contain and record.can_support and record.has_handle
     assert not record.can_be_carried
-    (uses,) = library.library.affordances
+    (uses,) = library.info.affordances
     assert [(use.joint, use.kind) for use in uses.joints] == [("slide", "drawer"), ("hinge", "door")]
     assert uses.openable == ("slide", "hinge") and not uses.movable and not uses.contains  # its drawer is solid
     assert uses.carries[0].part == "body" and [grasp.joint for grasp in uses.grasps] == ["slide"]
@@ -298,7 +298,7 @@ def test_glb_gltf_stl_and_obj(tmp_path) -> None:
         (0.001, "guessed", "+z"),
         (0.01, "guessed", "+y"),
     ]
-    for model in library.library.models:
+    for model in library.info.models:
         np.testing.assert_allclose(sorted(size_of(model).tolist()), [0.45, 0.5, 0.9], atol=1e-6)
         assert size_of(model)[2] == pytest.approx(0.9, abs=1e-6)
 
@@ -321,7 +321,7 @@ def test_shapenetsem_columns(tmp_path) -> None:
     rows += 'wss.abc1,"Chair,_Attributes",1,"0.0\\,1.0\\,0.0","1.0\\,0.0\\,0.0",0.0254,,a\nwss.gone,Table,2,,,0.01,,b\n'
     write(folder / "metadata.csv", rows)
     library = add(folder, tmp_path / "out", mapping='[models]\n"unlisted" = "skip"\n')
-    (model,) = library.library.models
+    (model,) = library.info.models
     record = ImportFile.read(library.path("imports.json")).models[0]
     assert (record.format, record.class_name, record.unit) == ("ShapeNetSem", "chair", 0.0254)
     assert (record.up, record.front, record.front_from) == ("+y", "+x", "file")
@@ -372,9 +372,9 @@ def test_same_bytes_again_and_merging(tmp_path) -> None:
     add(tmp_path / "in", tmp_path / "b")
     assert digest(tmp_path / "a") == digest(tmp_path / "b")
     both = add(tmp_path / "in", tmp_path / "c", library=first)
-    assert [model.id for model in both.library.models] == ["old_cabinet", "old_cabinet_2"]
+    assert [model.id for model in both.info.models] == ["old_cabinet", "old_cabinet_2"]
     assert len(ImportFile.read(both.path("imports.json")).models) == 2
-    before, after = (posed_mesh(model_folder(both, model.id), model, {}) for model in both.library.models)
+    before, after = (posed_mesh(model_folder(both, model.id), model, {}) for model in both.info.models)
     np.testing.assert_array_equal(before.vertices, after.vertices)
 
 
@@ -382,13 +382,13 @@ def test_unknown_class_is_left_out_or_an_object(tmp_path) -> None:
     obj_box(tmp_path / "in" / "gizmo.obj", (0.2, 0.2, 0.2))
     obj_box(tmp_path / "in" / "mug.obj", (0.08, 0.1, 0.08))
     library = add(tmp_path / "in", tmp_path / "a")
-    assert [model.class_name for model in library.library.models] == ["cup"]
+    assert [model.class_name for model in library.info.models] == ["cup"]
     left_out = ImportFile.read(library.path("imports.json")).models[0]
     assert left_out.id == "" and "nothing tells its class" in left_out.findings[0]
-    kinds = {m.id: m.class_name for m in add(tmp_path / "in", tmp_path / "b", unknown="object").library.models}
+    kinds = {m.id: m.class_name for m in add(tmp_path / "in", tmp_path / "b", unknown="object").info.models}
     assert kinds == {"gizmo": "object", "mug": "cup"}
     mapping = '[models]\n"gi*" = { class_name = "box", unit = "dm", up = "+z" }\n'
-    mapped = add(tmp_path / "in", tmp_path / "c", mapping=mapping).library.models
+    mapped = add(tmp_path / "in", tmp_path / "c", mapping=mapping).info.models
     assert mapped[0].class_name == "box" and size_of(mapped[0])[0] == pytest.approx(0.02)
     with pytest.raises(BadInput, match="'spoon_rest' is not in the vocabulary"):
         add(tmp_path / "in", tmp_path / "d", mapping='[models]\n"a" = "spoon_rest"\n')
@@ -525,12 +525,12 @@ def test_real_mjcf_furniture_keeps_its_joints(tmp_path) -> None:
     mapping = '[models]\n"kitchen*" = "skip"\n"kettle*" = "skip"\n"light*" = "skip"\n"misc/*" = "skip"\n'
     mapping += '"dishwasher" = "skip"\n"*hood*" = "skip"\n"bin*" = "skip"\n"oven*" = "skip"\n'
     library = add(data, tmp_path / "out", mapping=mapping)
-    joints = {model.id: [(j.name, j.type, j.upper) for j in model.joints] for model in library.library.models}
+    joints = {model.id: [(j.name, j.type, j.upper) for j in model.joints] for model in library.info.models}
     assert joints["microwave"] == [("micro0joint", "revolute", pytest.approx(2.094))]
     assert joints["slidecabinet"] == [("slidedoor_joint", "prismatic", pytest.approx(0.44))]
     assert [entry[2] for entry in joints["hingecabinet"]] == [pytest.approx(1.57)] * 2
     assert [entry[1:] for entry in joints["studyTable"]] == [("prismatic", 0.48), ("prismatic", 0.6)]
-    by_id = {model.id: model for model in library.library.models}
+    by_id = {model.id: model for model in library.info.models}
     left, right = by_id["hingecabinet"].joints
     np.testing.assert_allclose([left.axis, right.axis], [[0, 0, -1], [0, 0, 1]], atol=1e-9)
     np.testing.assert_allclose(np.subtract(right.origin, left.origin), [0.76, 0, 0], atol=1e-6)

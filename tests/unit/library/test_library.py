@@ -53,7 +53,7 @@ def library(tmp_path_factory) -> CadLibrary:
 
 @pytest.fixture(scope="module")
 def models(library) -> list[CadModel]:
-    return list(library.library.models)
+    return list(library.info.models)
 
 
 def digest(root: Path) -> str:
@@ -87,13 +87,13 @@ def test_same_seed_same_bytes_other_seed_other_shapes(tmp_path):
     again = build(tmp_path / "b", 5, classes=classes)
     other = build(tmp_path / "c", 6, classes=classes)
     assert digest(first.root) == digest(again.root)
-    assert first.library.models[0].states != other.library.models[0].states
+    assert first.info.models[0].states != other.info.models[0].states
 
 
 def test_leaving_classes_out_changes_no_model(library, tmp_path):
     some = build(tmp_path / "some", 3, classes=("bowl",))
-    whole = {model.id: model for model in library.library.models}
-    assert all(whole[model.id] == model for model in some.library.models)
+    whole = {model.id: model for model in library.info.models}
+    assert all(whole[model.id] == model for model in some.info.models)
 
 
 def test_an_unknown_class_is_a_usage_error(tmp_path):
@@ -315,7 +315,7 @@ def test_interior_surfaces_are_supports(models):
 def test_affordances_of_the_first_classes(library):
     """All shapes of a class can do the same: what opens, what contains, what carries."""
     found: dict[str, list] = {}
-    for uses in library.library.affordances:
+    for uses in library.info.affordances:
         found.setdefault(uses.model.rsplit("_", 1)[0], []).append(uses)
     assert {name for name, every in found.items() if all(uses.contains for uses in every)} == {
         *("cabinet", "wall_cabinet", "fridge", "microwave", "cup", "bowl", "bin")

@@ -56,7 +56,7 @@ def library(tmp_path_factory) -> CadLibrary:
 
 @pytest.fixture(scope="module")
 def models(library) -> list[CadModel]:
-    return list(library.library.models)
+    return list(library.info.models)
 
 
 def test_classes_are_of_the_vocabulary_and_many():
@@ -118,7 +118,7 @@ KINDS = {
 
 
 def test_affordances_tell_what_joints_are_for(library):
-    for uses in library.library.affordances:
+    for uses in library.info.affordances:
         kinds = Counter(use.kind for use in uses.joints)
         class_name = uses.model.removesuffix("_00")
         if class_name == "oven":
@@ -131,7 +131,7 @@ def test_affordances_tell_what_joints_are_for(library):
 
 def test_what_stands_in_the_way_of_a_rack_is_what_was_drawn_there(library):
     """Found by rays in the finished shape; the designs say the same."""
-    found = {uses.model: {use.joint: use.behind for use in uses.joints} for uses in library.library.affordances}
+    found = {uses.model: {use.joint: use.behind for use in uses.joints} for uses in library.info.affordances}
     for class_name in LATER:
         design = designs(class_name, 1, seed=3)[0]
         drawn = {link.joint.name: () if link.behind is None else (link.behind,) for link in design.moving}
@@ -140,7 +140,7 @@ def test_what_stands_in_the_way_of_a_rack_is_what_was_drawn_there(library):
 
 
 def test_affordances_of_things_that_contain_carry_and_are_held(library):
-    by_class = {uses.model.removesuffix("_00"): uses for uses in library.library.affordances}
+    by_class = {uses.model.removesuffix("_00"): uses for uses in library.info.affordances}
     rooms = {name: uses.contains for name, uses in by_class.items()}
     assert {name for name, found in rooms.items() if found} == {
         *("drawer_unit", "pan", "cooking_pot", "jug", "kettle", "oven", "dishwasher", "washing_machine", "printer"),
@@ -164,7 +164,7 @@ def test_affordances_of_things_that_contain_carry_and_are_held(library):
 
 def test_rooms_are_empty_and_surfaces_are_solid(library, models):
     """Against the collision meshes: a grid in every inner volume is free, and under every surface is something."""
-    by_id = {uses.model: uses for uses in library.library.affordances}
+    by_id = {uses.model: uses for uses in library.info.affordances}
     shares = np.stack(np.meshgrid(*[np.linspace(0.06, 0.94, 5)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     for model in models:
         pieces = posed_collision(model_folder(library, model.id), model, {})
@@ -182,8 +182,8 @@ def test_rooms_are_empty_and_surfaces_are_solid(library, models):
 def test_nothing_is_wrong_with_four_shapes_of_each_class(tmp_path):
     """`urdf check` finds nothing, and joints are clear, in a library of all classes."""
     whole = build(tmp_path / "whole", 1)
-    assert len(whole.library.models) == 4 * len(GENERATORS)
-    for model in whole.library.models:
+    assert len(whole.info.models) == 4 * len(GENERATORS)
+    for model in whole.info.models:
         folder = model_folder(whole, model.id)
         assert check_urdf(folder / "model.urdf") == []
         collision = load_collision_parts(folder)

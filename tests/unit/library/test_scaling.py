@@ -23,7 +23,7 @@ def library(tmp_path_factory) -> CadLibrary:
 @pytest.mark.parametrize("scale", [0.7, 1.6])
 @pytest.mark.parametrize("model_id", ["printer_00", "cooking_pot_00"])
 def test_a_scaled_model_opens_as_its_scaled_mesh(library, tmp_path, model_id, scale):
-    model = next(entry for entry in library.library.models if entry.id == model_id)
+    model = next(entry for entry in library.info.models if entry.id == model_id)
     folder = model_folder(library, model_id)
     slides = {joint.name for joint in model.joints if joint.type == "prismatic"}
     opened = {joint.name: 0.8 * joint.upper for joint in model.joints}

@@ -42,13 +42,13 @@ def pack(folder: Path, problem: Path | None = None, **options: Any) -> Packing:
 
 def test_the_step_writes_the_same_bytes_twice(tmp_path: Path) -> None:
     results = [pack(tmp_path / name, suite="hard/unreachable", instance=1) for name in ("a", "b")]
-    assert results[0].outcome == "ok" and results[0].packing.success
+    assert results[0].outcome == "ok" and results[0].info.success
     names = sorted(path.name for path in (tmp_path / "a").iterdir())
     assert {"packing.json", "instance.json", "plan.txt", "trajectory.npz", "layout.png", "scene.png"} <= set(names)
     for name in names:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
     with np.load(tmp_path / "a" / "trajectory.npz", allow_pickle=False) as arrays:
-        actions = sum(len(attempt.steps) for attempt in results[0].packing.attempts[-1:])
+        actions = sum(len(attempt.steps) for attempt in results[0].info.attempts[-1:])
         assert arrays["joints"].shape == (len(arrays["action"]), 7)
         assert set(arrays["action"].tolist()) == set(range(actions))
 
@@ -57,16 +57,16 @@ def test_a_problem_of_ones_own_and_one_without_a_solution(tmp_path: Path) -> Non
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(PROBLEM))
     solved = pack(tmp_path / "a", path)
-    assert solved.outcome == "ok" and solved.packing.name == "mine"
+    assert solved.outcome == "ok" and solved.info.name == "mine"
     path.write_text(json.dumps(PROBLEM | {"basket": {"low": [0.55, -0.03], "high": [0.63, 0.03]}}))
     unsolved = pack(tmp_path / "b", path, iterations=2)
-    assert unsolved.outcome == "not_packed" and not unsolved.packing.success
+    assert unsolved.outcome == "not_packed" and not unsolved.info.success
     assert "not packed" in (tmp_path / "b" / "plan.txt").read_text()
 
 
 def test_the_scripted_stand_in_is_recorded(tmp_path: Path) -> None:
     result = pack(tmp_path / "a", proposer="backtrack")
-    assert result.packing.proposer_calls >= 1 and (tmp_path / "a" / "transcript.jsonl").stat().st_size > 0
+    assert result.info.proposer_calls >= 1 and (tmp_path / "a" / "transcript.jsonl").stat().st_size > 0
 
 
 def test_a_model_that_never_answered_ends_the_step_and_one_that_stopped_leaves_what_there_is(tmp_path: Path) -> None:
@@ -76,8 +76,8 @@ def test_a_model_that_never_answered_ends_the_step_and_one_that_stopped_leaves_w
     assert failed.value.exit_code == BadInput.exit_code and not (tmp_path / "a" / "packing.json").exists()
     with serving(replies({"reasoning": "", "plan": []}), status(401)) as server:
         result = pack(tmp_path / "b", base_url=server.base_url, **asked)
-    assert result.outcome == "not_packed" and len(result.packing.attempts) == 1
-    assert result.packing.stopped is not None and result.packing.stopped.kind == "refused"
+    assert result.outcome == "not_packed" and len(result.info.attempts) == 1
+    assert result.info.stopped is not None and result.info.stopped.kind == "refused"
     assert len((tmp_path / "b" / "transcript.jsonl").read_text().splitlines()) == 1
 
 

@@ -51,7 +51,7 @@ def executed(tmp_path_factory: pytest.TempPathFactory) -> Plan:
 
 
 def test_the_bottle_ends_on_the_table_and_the_door_is_shut(executed: Plan) -> None:
-    found = executed.plan
+    found = executed.info
     assert executed.outcome == "ok", found.failures
     assert found.status == "executed"
     assert (found.planned_in, found.executed_in) == ("reconstructed", "ground_truth")
@@ -92,7 +92,7 @@ def test_the_trajectory_is_continuous_and_covers_the_actions(executed: Plan) -> 
         assert arrays["world_from_base"].shape == (rows, 4, 4)
         assert np.abs(np.diff(arrays["joints"][:, :7], axis=0)).max() < 0.2
         assert np.abs(np.diff(arrays["world_from_base"][:, :2, 3], axis=0)).max() < 0.06
-        ranges = [(action.start, action.end) for action in executed.plan.actions]
+        ranges = [(action.start, action.end) for action in executed.info.actions]
         assert ranges[0][0] == 0 and ranges[-1][1] == rows
         assert all(end == start for (_, end), (start, _) in zip(ranges, ranges[1:], strict=False))
         executed_time = arrays["executed_time"]
@@ -124,8 +124,8 @@ def test_open_loop_replay_of_an_exact_scene_and_the_same_bytes_twice(tmp_path: P
     outputs = []
     for name in ("first", "second"):
         result = plan(tmp_path, tmp_path / "scene", name=name, relocalize=False, goal=("holding(cup_5)",))
-        assert result.outcome == "ok", result.plan.failures
-        assert result.plan.executed_in == "reconstructed"
+        assert result.outcome == "ok", result.info.failures
+        assert result.info.executed_in == "reconstructed"
         outputs.append(
             {p.relative_to(result.root): p.read_bytes() for p in sorted(result.root.rglob("*")) if p.is_file()}
         )
@@ -136,8 +136,8 @@ def test_an_impossible_goal_is_a_complete_artifact_with_a_named_reason(tmp_path:
     write_scene(tmp_path / "scene", kitchen())
     result = plan(tmp_path, tmp_path / "scene", goal=("on(bottle_7, table_3)", "in(bottle_7, fridge_2)"))
     assert result.outcome == "infeasible"
-    assert result.plan.status == "infeasible" and result.plan.actions == ()
-    last = result.plan.failures[-1]
+    assert result.info.status == "infeasible" and result.info.actions == ()
+    last = result.info.failures[-1]
     assert last.kind == "goal_unsatisfiable"
     assert {"bottle_7", "table_3", "fridge_2"} <= set(last.objects)
     assert "not all together" in last.message
@@ -149,8 +149,8 @@ def test_a_scene_without_anything_to_fetch_says_so(tmp_path: Path) -> None:
     write_scene(tmp_path / "scene", [body for body in kitchen() if body.name != "bottle_7"])
     result = plan(tmp_path, tmp_path / "scene")
     assert result.outcome == "infeasible"
-    assert result.plan.failures[-1].kind == "no_goal"
-    assert result.plan.failures[-1].numbers == {"items_inside": 0.0, "tables": 1.0}
+    assert result.info.failures[-1].kind == "no_goal"
+    assert result.info.failures[-1].numbers == {"items_inside": 0.0, "tables": 1.0}
 
 
 def test_an_item_that_is_not_there_fails_the_execution_by_name(tmp_path: Path) -> None:
@@ -160,11 +160,11 @@ def test_an_item_that_is_not_there_fails_the_execution_by_name(tmp_path: Path) -
     (tmp_path / "truth" / "graph.json").write_bytes((tmp_path / "truth" / "room" / "graph.json").read_bytes())
     result = plan(tmp_path, tmp_path / "scene", tmp_path / "truth", execution_attempts=1, video_rate=0)
     assert result.outcome == "execution_failed"
-    kinds = [failure.kind for failure in result.plan.failures]
+    kinds = [failure.kind for failure in result.info.failures]
     assert "not_found" in kinds and kinds[-1] == "condition_not_met"
-    missing = next(failure for failure in result.plan.failures if failure.kind == "not_found")
+    missing = next(failure for failure in result.info.failures if failure.kind == "not_found")
     assert missing.objects == ("bottle_7",)
-    assert not result.plan.checks[0].holds
+    assert not result.info.checks[0].holds
 
 
 def test_a_robot_that_would_start_inside_something_unseen_does_not_start(tmp_path: Path) -> None:
@@ -175,6 +175,6 @@ def test_a_robot_that_would_start_inside_something_unseen_does_not_start(tmp_pat
     (tmp_path / "truth" / "graph.json").write_bytes((tmp_path / "truth" / "room" / "graph.json").read_bytes())
     result = plan(tmp_path, tmp_path / "scene", tmp_path / "truth", video_rate=0)
     assert result.outcome == "execution_failed"
-    failure = next(entry for entry in result.plan.failures if entry.kind == "start_in_collision")
+    failure = next(entry for entry in result.info.failures if entry.kind == "start_in_collision")
     assert failure.objects == ("bin_9",)
     assert failure.numbers["depth"] > 0.005

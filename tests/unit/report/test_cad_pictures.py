@@ -33,7 +33,7 @@ def make_scene(root: Path, best: dict[str, tuple[float, float, float]] | None = 
     """The hand-made room out of box models; `best`: node -> how far its best single candidate is from its choice."""
     made = make_cad_scene(root)
     replacements = []
-    for r in made.scene.replacements:
+    for r in made.info.replacements:
         if r.chosen is not None:
             chosen = r.chosen.model_copy(update={"joints": {}})
             shift = (best or {}).get(r.node)
@@ -46,7 +46,7 @@ def make_scene(root: Path, best: dict[str, tuple[float, float, float]] | None = 
                 }
             )
         replacements.append(r)
-    made.scene.model_copy(update={"replacements": tuple(replacements)}).write(root / "scene.json")
+    made.info.model_copy(update={"replacements": tuple(replacements)}).write(root / "scene.json")
     for thing in ROOM:
         if thing.model_id and thing is not BOTTLE:  # which stands in a cabinet that is a solid box here
             write_box_model(root / "models", thing.model_id, thing.class_name, np.subtract(thing.high, thing.low))
@@ -54,7 +54,7 @@ def make_scene(root: Path, best: dict[str, tuple[float, float, float]] | None = 
 
 
 def test_candidates_are_listed_once_each(tmp_path):
-    scene = make_scene(tmp_path / "cad", {CUP.name: (0.05, 0.0, 0.0)}).scene
+    scene = make_scene(tmp_path / "cad", {CUP.name: (0.05, 0.0, 0.0)}).info
     by_node = {r.node: r for r in scene.replacements}
     assert [role for role, _ in candidates_of(by_node[CUP.name])] == ["chosen", "best by itself", ""]
     assert [role for role, _ in candidates_of(by_node[TABLE.name])] == ["chosen, best by itself", ""]
@@ -169,7 +169,7 @@ def test_the_page_shows_all_of_it(tmp_path):
 
 def test_places_of_models_follow_the_pose(tmp_path):
     cad = make_scene(tmp_path / "cad")
-    chosen = next(r.chosen for r in cad.scene.replacements if r.node == TABLE.name)
+    chosen = next(r.chosen for r in cad.info.replacements if r.node == TABLE.name)
     (piece,) = ModelShelf(cad).pieces(chosen)
     assert piece.low == pytest.approx(np.array(TABLE.low)) and piece.high == pytest.approx(np.array(TABLE.high))
     assert np.allclose(ModelShelf(cad).mesh(chosen).bounds, [TABLE.low, TABLE.high], atol=1e-6)
@@ -178,7 +178,7 @@ def test_places_of_models_follow_the_pose(tmp_path):
 
 def test_chosen_models_wear_the_colours_of_the_map(tmp_path):
     cad = make_scene(tmp_path / "cad")
-    chosen = next(r.chosen for r in cad.scene.replacements if r.node == TABLE.name)
+    chosen = next(r.chosen for r in cad.info.replacements if r.node == TABLE.name)
     shelf = ModelShelf(cad)
     painted = shelf.mesh(chosen, {"body": (10, 200, 30), "door": (1, 2, 3)})
     assert np.unique(painted.visual.vertex_colors[:, :3], axis=0).tolist() == [[10, 200, 30]]

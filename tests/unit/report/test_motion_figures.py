@@ -44,7 +44,7 @@ def test_motion_is_drawn_by_joint_with_the_actions(tmp_path) -> None:
     pose = as_transform(np.eye(4))
     rows = ((0, 10), (10, 30))  # the second one is torn: it ends after the last row
     actions = tuple(PlannedAction(name="pick", arguments=(), start=a, end=b, base_pose=pose) for a, b in rows)
-    plan = SimpleNamespace(plan=file(actions=actions), path=lambda name: tmp_path / name)
+    plan = SimpleNamespace(info=file(actions=actions), path=lambda name: tmp_path / name)
     above, below = motion_figure(plan).axes
     assert [line.get_label() for line in below.lines][6:] == ["joint 7", "finger 1 [cm]", "finger 2 [cm]"]
     assert below.lines[0].get_ydata()[0] == pytest.approx(0.04)  # [rad]

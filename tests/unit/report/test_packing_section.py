@@ -13,7 +13,7 @@ from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.pack.parameters import PackParameters
 from stages.pack.stage import run as pack
-from stages.report.packing_section import MOST_ROWS, attempt_row, packing_view
+from stages.report.sections.packing.view import MOST_ROWS, attempt_row, packing_view
 from tests.unit.report.test_report import parse, report
 
 
@@ -34,7 +34,7 @@ def test_the_section_says_what_came_of_it_and_what_ended_every_plan(tmp_path: Pa
     page = parse((tmp_path / "report" / "report.html").read_text())
     sections = {attributes.get("id") for tag, attributes in page.seen if tag == "section"}
     assert sections == {"packing", "cost", "made"} and result.summary["pictures"] == 3
-    file = made.packing
+    file = made.info
     assert f"{file.proposer_calls} proposals and {file.motion_planner_calls} motion-planner calls" in page.text
     assert "not packed" not in page.text and "goal reached" in page.text and "Boxes and a basket" in page.text
     cut = [step.failure for attempt in file.attempts for step in attempt.steps if step.failure is not None]
@@ -51,7 +51,7 @@ def test_a_torn_picture_is_bad_input_and_a_missing_one_is_left_out(tmp_path: Pat
 
 
 def test_of_many_plans_the_last_are_shown(tmp_path: Path, made: Packing) -> None:
-    many = made.packing.model_copy(update={"attempts": made.packing.attempts[:1] * (MOST_ROWS + 5)})
+    many = made.info.model_copy(update={"attempts": made.info.attempts[:1] * (MOST_ROWS + 5)})
     many.write(tmp_path / "packing.json")
     (tmp_path / "instance.json").write_bytes(made.path("instance.json").read_bytes())
     view = packing_view(Packing(tmp_path), 300)

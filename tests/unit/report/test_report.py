@@ -123,9 +123,9 @@ def cad_without_models(root: Path):
     scene = make_cad_scene(root)
     kept = tuple(
         r.model_copy(update={"decision": "mesh", "chosen": None, "reason": "nothing fits"}) if r.chosen else r
-        for r in scene.scene.replacements
+        for r in scene.info.replacements
     )
-    scene.scene.model_copy(update={"replacements": kept}).write(root / "scene.json")
+    scene.info.model_copy(update={"replacements": kept}).write(root / "scene.json")
     for thing in ROOM:
         if thing.node_type != "layout":
             thing.mesh().export(root / "meshes" / f"{thing.name}.ply")

@@ -15,9 +15,9 @@ from schemas.sequence import SequenceFile
 from schemas.suture_needle import SutureNeedleFile
 from schemas.suture_scene import SutureScene, SutureSceneFile
 from schemas.suture_trial import SutureTrialFile
-from stages.engine.loading import LoadedSutureTrial, load
+from stages.engine.loading import load, payload
 from stages.kit.formats.frames import FrameWriter
-from stages.report.suture_section import tables_of
+from stages.report.sections.suture.view import tables_of
 from stages.suture.evaluation.thread_figures import thread_error
 from stages.suture.motion_reports import motions_to_last
 from stages.suture.pairs import StereoPairs
@@ -151,7 +151,7 @@ def test_a_trial_is_recorded_and_evaluated(tmp_path: Path, capsys: pytest.Captur
     assert one.seed == 4 and one.sutures < 6 and file.events[-1].what == f"failed {one.errors[-1]}"
     assert len(one.errors) == len(one.error_seconds) == len(one.error_sutures)
     assert one.error_seconds[-1] == pytest.approx(one.seconds, abs=1e-3)
-    motions = load(out, LoadedSutureTrial).motions
+    motions = payload(load(out), "motions.npz")
     assert np.all(np.diff(motions["seconds"][motions["arm"] == 0]) >= -1e-9)
     assert len(motions["seconds"]) > 2 * KEPT_OF_A_MOTION and np.isfinite(motions["joints"]).mean() > 0.99
     assert run(["suture", "evaluate", "--trials", out, "--out", str(tmp_path / "figures"), QUIET]) == 0

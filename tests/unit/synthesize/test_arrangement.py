@@ -229,7 +229,7 @@ def test_recipes_split_their_seeds() -> None:
 def test_unknown_recipe_and_missing_class(library: CadLibrary, tmp_path) -> None:
     with pytest.raises(UsageError, match="no room recipe"):
         load_recipe("castle")
-    kept = tuple(model for model in library.library.models if model.class_name != "fridge")
+    kept = tuple(model for model in library.info.models if model.class_name != "fridge")
     LibraryFile(seed=0, models=kept).write(tmp_path / "library.json")
     with pytest.raises(BadInput, match="fridge"):
         arrange(load_recipe("room"), Catalogue(CadLibrary(tmp_path)), "medium", 0)

@@ -45,13 +45,13 @@ def test_log_and_trajectory_agree(truth: GroundTruth) -> None:
     times, poses = read_tum(truth.path("trajectory.tum"))
     with FrameReader(truth.path("log.mcap")) as log:
         frames = list(log.frames())
-        assert log.camera == truth.truth.camera and log.world_up == "z"
+        assert log.camera == truth.info.camera and log.world_up == "z"
         table = {entry.instance: entry.class_name for entry in log.label_table}
-    assert len(frames) == 6 == truth.truth.frame_count
+    assert len(frames) == 6 == truth.info.frame_count
     assert np.allclose([frame.time for frame in frames], times, atol=1e-6)
     for frame, pose in zip(frames, poses, strict=True):
         assert frame.world_from_camera is not None and np.allclose(frame.world_from_camera, pose, atol=1e-6)
-    assert table == {entry.instance: entry.class_name for entry in truth.truth.objects}
+    assert table == {entry.instance: entry.class_name for entry in truth.info.objects}
 
 
 def test_labelled_depth_lies_on_the_labelled_surface(truth: GroundTruth) -> None:
@@ -85,18 +85,18 @@ def test_boxes_hold_their_visible_points(truth: GroundTruth) -> None:
     assert points.dtype == np.float32 and instance.dtype == np.int32 and len(points) == len(instance) > 5000
     cells = np.floor(points.astype(np.float64) / 0.01).astype(int)
     assert len(np.unique(np.column_stack([cells, instance]), axis=0)) > 0.999 * len(points)
-    for entry in truth.truth.objects:
+    for entry in truth.info.objects:
         own = points[instance == entry.instance].astype(float)
         if len(own):
             assert points_in_box(entry.box, own, margin=2e-3).all(), entry.name
         assert (entry.visible_pixels > 0) or len(own) == 0
-    assert sum(entry.visible_pixels for entry in truth.truth.objects) == 6 * 160 * 120
+    assert sum(entry.visible_pixels for entry in truth.info.objects) == 6 * 160 * 120
 
 
 def test_graph_is_a_tree_of_true_contacts(truth: GroundTruth) -> None:
     graph = truth.graph
     names = {node.id for node in graph.nodes}
-    assert names == {entry.name for entry in truth.truth.objects} | {SCENE_NODE}
+    assert names == {entry.name for entry in truth.info.objects} | {SCENE_NODE}
     for node in graph.nodes:
         if node.id == SCENE_NODE:
             assert node.box is None and graph.parent_link(node.id) is None
@@ -132,9 +132,9 @@ def test_graph_is_a_tree_of_true_contacts(truth: GroundTruth) -> None:
 
 def test_room_is_an_interactive_scene(truth: GroundTruth) -> None:
     scene = InteractiveSceneFile.read(truth.path("room") / "scene.json")
-    assert {body.name for body in scene.bodies} == {entry.name for entry in truth.truth.objects}
+    assert {body.name for body in scene.bodies} == {entry.name for entry in truth.info.objects}
     assert (truth.path("room") / scene.combined_file).is_file() and (truth.path("room") / scene.static_file).is_file()
-    poses = {entry.name: entry.world_from_model for entry in truth.truth.objects}
+    poses = {entry.name: entry.world_from_model for entry in truth.info.objects}
     for body in scene.bodies:
         assert np.allclose(body.world_from_body, poses[body.name])
         assert (body.file is not None) == body.movable

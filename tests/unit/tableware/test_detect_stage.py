@@ -55,7 +55,7 @@ def test_a_scenes_folder_becomes_the_same_bytes_twice(scene: Path, tmp_path: Pat
     assert isinstance(first, TablewareDetections) and first.outcome == second.outcome == "ok"
     for name in ("detections.json", "overlay.png"):
         assert (first.root / name).read_bytes() == (second.root / name).read_bytes()
-    told = first.detections
+    told = first.info
     assert [item.kind for item in told.items] == ["bowl", "cup", "spoon", None]
     assert told.items[1].on == 0 and told.heights_known and not told.rectified
     found = from_file(told)
@@ -69,7 +69,7 @@ def test_a_16_bit_image_is_millimetres_and_a_wrong_scale_is_refused(scene: Path,
     millimetres = tmp_path / "depth.png"
     cv2.imwrite(str(millimetres), np.rint(1000.0 * images[1]).astype(np.uint16))
     made = detect(tmp_path / "a", scene / "color.png", millimetres, scene / "scene.json")
-    assert [item.kind for item in made.detections.items] == ["bowl", "cup", "spoon", None]
+    assert [item.kind for item in made.info.items] == ["bowl", "cup", "spoon", None]
     with pytest.raises(BadInput, match="in metres"):
         detect(tmp_path / "b", scene / "color.png", millimetres, scene / "scene.json", depth_scale=1.0)
 
@@ -79,7 +79,7 @@ def test_an_empty_table_is_an_outcome(tmp_path: Path) -> None:
     np.save(tmp_path / "depth.npy", np.full((720, 1280), 0.83, np.float32))
     (tmp_path / "camera.json").write_text(json.dumps({"camera": VIEW.camera.model_dump()}))
     made = detect(tmp_path / "a", tmp_path, overhead=True)
-    assert made.outcome == "nothing_found" and "empty" in made.detections.statement
+    assert made.outcome == "nothing_found" and "empty" in made.info.statement
 
 
 def test_a_photograph_has_outlines_without_heights(tmp_path: Path) -> None:
@@ -87,7 +87,7 @@ def test_a_photograph_has_outlines_without_heights(tmp_path: Path) -> None:
     cv2.ellipse(picture, (300, 240), (90, 60), 0, 0, 360, (230, 230, 230), -1)
     cv2.imwrite(str(tmp_path / "photo.png"), picture)
     made = detect(tmp_path / "a", tmp_path / "photo.png", photograph=True, picture_width=0.78)
-    told = made.detections
+    told = made.info
     assert made.outcome == "no_depth" and not told.heights_known and told.items == ()
     (outline,) = told.outlines
     assert outline.box == pytest.approx((210, 180, 390, 300), abs=4)

@@ -71,7 +71,7 @@ def make(scene: Path, sequence: Sequence, out: Path, **parameters) -> GroundTrut
 
 
 def test_classes_and_instances_come_back(truth):
-    file = truth.truth
+    file = truth.info
     assert file.source == "scan" and file.recipe == f"SceneNN {SCENE}"
     assert {o.instance: o.class_name for o in file.objects} == {
         thing.instance: thing.class_name for thing in ROOM if thing.instance not in VOID
@@ -88,7 +88,7 @@ def test_boxes_stand_upright_in_the_sequence_s_world(truth, sequence):
     for thing in ROOM:
         if thing.instance in VOID or thing.class_name in ("floor", "wall"):
             continue
-        box = next(o.box for o in truth.truth.objects if o.instance == thing.instance)
+        box = next(o.box for o in truth.info.objects if o.instance == thing.instance)
         size = np.subtract(thing.high, thing.low)
         np.testing.assert_allclose(sorted(box.size[:2]), sorted(size[:2]), atol=0.02)
         assert box.size[2] == pytest.approx(size[2], abs=0.02)
@@ -262,7 +262,7 @@ def test_labels_that_the_annotation_does_not_list(tmp_path, scene, sequence):
         make(tmp_path, sequence, tmp_path / "one")
     made = make(tmp_path, sequence, tmp_path / "two", maximum_unlisted=1.0)
     assert made.summary["unlisted_vertices"] > 0
-    assert {o.class_name for o in made.truth.objects} == {"floor", "table"}
+    assert {o.class_name for o in made.info.objects} == {"floor", "table"}
     (tmp_path / f"{SCENE}.xml").write_text(annotation({1000: "chair"}))
     with pytest.raises(BadInput, match="none of the 2 labels"):
         make(tmp_path, sequence, tmp_path / "three")

@@ -174,8 +174,8 @@ def test_optional_things_are_neither_missed_nor_extra(sequence, tmp_path):
     whole = predicted_graph(truth, tmp_path / "graph", "table")
     without = ContactGraph(tmp_path / "without")
     without.root.mkdir()
-    links = tuple(link for link in whole.graph.links if link.target != "tray")
-    nodes = tuple(node for node in whole.graph.nodes if node.id != "tray")
+    links = tuple(link for link in whole.info.links if link.target != "tray")
+    nodes = tuple(node for node in whole.info.nodes if node.id != "tray")
     ContactGraphFile(nodes=nodes, links=links).write(without.root / "graph.json")
     for number, graph in enumerate((whole, without)):
         made = evaluate(

@@ -34,7 +34,7 @@ def small_library(output: Path, *classes: str, shapes: int = 2) -> CadLibrary:
 
 def find(library: CadLibrary, model_id: str) -> CadModel:
     """Return the record of a model."""
-    return next(model for model in library.library.models if model.id == model_id)
+    return next(model for model in library.info.models if model.id == model_id)
 
 
 def placed(

@@ -101,8 +101,8 @@ def test_static_tree_holds_no_movable_and_each_movable_has_a_file(bundle):
 
 def test_uniform_scale_obeys_its_rules(library, tmp_path):
     scale = 1.3
-    drawers = next(m for m in library.library.models if any(j.type == "prismatic" for j in m.joints))
-    hinged = next(m for m in library.library.models if m.class_name == "fridge")
+    drawers = next(m for m in library.info.models if any(j.type == "prismatic" for j in m.joints))
+    hinged = next(m for m in library.info.models if m.class_name == "fridge")
     bodies = [
         placed(library, "cabinet_1", drawers.id, (0, 0, 0), scale=scale, joints={drawers.joints[0].name: 0.2}),
         placed(library, "fridge_2", hinged.id, (2, 0, 0), scale=scale, joints={hinged.joints[0].name: 0.5}),

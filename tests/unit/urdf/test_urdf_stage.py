@@ -56,7 +56,7 @@ def test_supports_become_joints_by_what_is_movable(cad_scene, tmp_path):
     assert joints["monitor_8"] == ("table_3", "fixed")
     assert joints["fridge_4__door"] == ("fridge_4", "revolute")
     assert made.graph == cad_scene.graph
-    monitor = next(body for body in made.scene.bodies if body.name == "monitor_8")
+    monitor = next(body for body in made.info.bodies if body.name == "monitor_8")
     pose = np.array(monitor.world_from_body)
     visual = trimesh.load(made.root / "meshes/monitor_8/visual.obj", force="mesh", process=False)
     assert (visual.bounds + pose[:3, 3])[0] == pytest.approx([-0.1, -0.3, 0.7], abs=0.01)
@@ -67,7 +67,7 @@ def test_what_has_no_name_is_a_static_body(cad_scene, tmp_path):
     counter.export(cad_scene.root / "meshes" / "surroundings.ply")
     quick = UrdfParameters(settle_seconds=0, rest=False)
     made = run(cad_scene, parameters=quick, context=context(tmp_path / "out"))
-    body = next(body for body in made.scene.bodies if body.name == "surroundings")
+    body = next(body for body in made.info.bodies if body.name == "surroundings")
     assert not body.movable and body.parent is None
     joint = next(joint for joint in parse_urdf(made.path("static.urdf")).joints if joint.child == "surroundings")
     assert (joint.parent, joint.type) == ("world", "fixed")
@@ -88,7 +88,7 @@ def test_movability_can_be_overruled(cad_scene, tmp_path):
     quick = {"settle_seconds": 0, "rest": False}
     parameters = UrdfParameters(movable_classes=("monitor",), fixed_classes=("bottle",), **quick)
     made = run(cad_scene, parameters=parameters, context=context(tmp_path / "out"))
-    movable = {body.name for body in made.scene.bodies if body.movable}
+    movable = {body.name for body in made.info.bodies if body.movable}
     assert movable == {"cup_5", "cup_7", "monitor_8"}
     with pytest.raises(UsageError, match="unicorn"):
         run(cad_scene, parameters=UrdfParameters(fixed_classes=("unicorn",)), context=context(tmp_path / "x"))

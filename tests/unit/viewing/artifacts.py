@@ -9,12 +9,12 @@ import numpy as np
 import trimesh
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 
-from schemas.artifact import KINDS
 from schemas.base import as_transform
 from schemas.cad_scene import CadCandidate, CadSceneFile, Replacement
 from schemas.contact_graph import ContactGraphFile
 from schemas.evaluation import MetricsFile, ReportFile
 from schemas.ground_truth import GroundTruthFile, TrueObject
+from schemas.kinds import KINDS
 from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
 from schemas.packing import (
     PackingArea,

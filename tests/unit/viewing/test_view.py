@@ -13,13 +13,16 @@ from cli.viewing.canvas import import_rerun
 from cli.viewing.graph_view import relation_table
 from cli.viewing.library_view import row_places
 from cli.viewing.segments_view import segment_images
-from cli.viewing.view import VIEWERS, view_artifact
-from schemas.artifact import KINDS
+from cli.viewing.sequence_view import draw_sequence
+from cli.viewing.view import view_artifact, viewer_of
+from schemas.artifact import Artifact
 from schemas.cad_library import CadLibrary
 from schemas.contact_graph import ContactGraphFile
 from schemas.errors import BadInput, MissingDependency, UsageError
 from schemas.interactive_scene import InteractiveSceneFile
+from schemas.kinds import KINDS
 from schemas.scene_parts import Relation
+from schemas.sequence import Sequence
 from stages.kit.formats.link_poses import joint_motion, link_poses
 from stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
 from stages.kit.measurement.relation_evidence import evidence
@@ -124,7 +127,7 @@ def recordings(run: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
     from rerun.chunk import RrdReader
 
     read = {}
-    for kind in VIEWERS:
+    for kind in EXPECTED:
         path = tmp_path_factory.mktemp("rrd") / f"{kind}.rrd"
         view_artifact(run / kind, path)
         entities: dict[str, list] = {}
@@ -150,9 +153,21 @@ def test_every_kind_is_drawn(recordings: dict, kind: str) -> None:
 
 
 def test_every_kind_that_steps_write_has_a_view() -> None:
-    import schemas.kinds  # noqa: F401
+    for name, kind in KINDS.items():
+        assert viewer_of(kind) is not None, name
 
-    assert set(VIEWERS) == set(EXPECTED) == set(KINDS)
+
+def test_a_kind_is_drawn_as_what_it_can_be_read_as() -> None:
+    class OtherSequence(Sequence):
+        kind = "test_other_sequence"
+
+    class Unseen(Artifact):
+        kind = "test_unseen"
+
+    try:
+        assert viewer_of(OtherSequence) is draw_sequence and viewer_of(Unseen) is None
+    finally:
+        del KINDS["test_other_sequence"], KINDS["test_unseen"]
 
 
 def test_relations_show_their_confidence_and_evidence(recordings: dict) -> None:
@@ -259,7 +274,7 @@ def test_segment_images_look_up_class_and_instance() -> None:
 
 
 def test_models_stand_side_by_side(run: Path) -> None:
-    models = CadLibrary(root=run / "cad_library").library.models
+    models = CadLibrary(root=run / "cad_library").info.models
     places = row_places(models)
     footprints = [
         (

@@ -1,0 +1,62 @@
+"""Sections of the page, found by place: every folder `sections/<name>/` with a `section.py` is one.
+
+`section.py` declares it as SECTION and is cheap to import; `view.py` has `view(page)`, which returns the values of
+`section.html.j2`, or None when there is nothing to show. `tiles` among them (name and value) stand on top of the page.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+import stages.report.sections
+from schemas.artifact import Artifact
+
+
+@dataclass(frozen=True)
+class Section:
+    """What a section says about itself."""
+
+    name: str
+    """Its folder, and its anchor on the page."""
+    title: str
+    """In the bar of sections."""
+    order: int
+    """Its place on the page: small numbers first."""
+    reads: Mapping[str, type[Artifact]] = field(default_factory=dict)
+    """Role -> kind: inputs of the step `report`, each may be left out. The section is asked when one of them is given,
+    and is of that kind; a section that reads nothing is always asked."""
+    became: Mapping[str, str | Callable[[Any], str]] = field(default_factory=dict)
+    """Role -> what the first lines call it (`a labelled map`), or a function of the artifact that says it."""
+    alone: str = ""
+    """Title of a page that shows nothing but what this section reads; empty: a room."""
+
+
+@cache
+def all_sections() -> tuple[Section, ...]:
+    """Return every section by its place on the page. Imports declarations only."""
+    names = [entry.name for entry in pkgutil.iter_modules(stages.report.sections.__path__)]
+    found = [importlib.import_module(f"stages.report.sections.{name}.section").SECTION for name in names]
+    for name, section in zip(names, found, strict=True):
+        if section.name != name:
+            raise RuntimeError(f"section {section.name!r} is declared in the folder {name!r}")
+    return tuple(sorted(found, key=lambda section: (section.order, section.name)))
+
+
+def all_roles() -> dict[str, type[Artifact]]:
+    """Return role -> kind of everything that some section reads, the more general one where two differ.
+
+    Raises RuntimeError when neither can be read as the other.
+    """
+    roles: dict[str, type[Artifact]] = {}
+    for section in all_sections():
+        for role, kind in section.reads.items():
+            other = roles.get(role, kind)
+            if not issubclass(kind, other) and not issubclass(other, kind):
+                raise RuntimeError(f"{role!r} is {kind.kind!r} to section {section.name!r}, {other.kind!r} to another")
+            roles[role] = other if issubclass(kind, other) else kind
+    return roles

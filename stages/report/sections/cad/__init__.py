@@ -1,0 +1,1 @@
+"""Section `cad`: what stands for which object."""

@@ -1,0 +1,1 @@
+"""Section `cost`: time and memory of every step."""

@@ -1,0 +1,1 @@
+"""Section `figures`: what was measured."""

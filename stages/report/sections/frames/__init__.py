@@ -1,0 +1,1 @@
+"""Section `frames`: what was recorded, with its masks."""

@@ -1,0 +1,1 @@
+"""Section `graph`: who carries whom."""

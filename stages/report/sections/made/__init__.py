@@ -1,0 +1,1 @@
+"""Section `made`: the record of every artifact."""

@@ -1,0 +1,1 @@
+"""Section `map`: the map from two sides."""

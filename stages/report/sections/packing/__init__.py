@@ -1,0 +1,1 @@
+"""Section `packing`: boxes and a basket."""

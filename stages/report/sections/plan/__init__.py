@@ -1,0 +1,1 @@
+"""Section `plan`: a robot acts."""

@@ -1,0 +1,1 @@
+"""Section `scene`: bodies and the kinematic tree."""

@@ -1,0 +1,14 @@
+"""Declaration of the section `scene`."""
+
+from __future__ import annotations
+
+from schemas.interactive_scene import InteractiveScene
+from stages.report.section import Section
+
+SECTION = Section(
+    "scene",
+    "Interactive scene",
+    order=60,
+    reads={"interactive_scene": InteractiveScene},
+    became={"interactive_scene": "a scene that simulators load"},
+)

@@ -1,0 +1,1 @@
+"""Section `stereo`: depth from two eyes."""

@@ -1,0 +1,70 @@
+"""Stereo for the page: left picture, disparity and confidence of some frames, and whether the eyes were rectified."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from schemas.disparity import Disparity, RowReport
+from stages.kit.formats.disparity_file import DisparityReader
+from stages.kit.formats.frames import FrameReader
+from stages.kit.stereo.pictures import confidence_colors, disparity_colors
+from stages.report.frames import choose_frames
+from stages.report.images import Picture, jpeg
+from stages.report.page import Page
+
+MOST_FRAMES = 3
+
+
+@dataclass(frozen=True)
+class StereoFrame:
+    """Pictures of one frame."""
+
+    index: int
+    pictures: tuple[Picture, ...]
+    """Left eye, disparity, confidence; the first may be missing."""
+    known: float
+    """Per cent of the pixels."""
+    trusted: float
+
+
+@dataclass(frozen=True)
+class StereoView:
+    """Everything the page says about the matching."""
+
+    detail: str
+    rows: tuple[RowReport, ...]
+    frames: tuple[StereoFrame, ...]
+    known: float
+    trusted: float
+    minimum_confidence: float
+
+
+def stereo_view(disparity: Disparity, wanted: int, width: int) -> StereoView:
+    """Read a disparity; at most MOST_FRAMES frames are shown, pictures at most `width` wide [px]."""
+    file, frames = disparity.matching, []
+    with (
+        FrameReader(disparity.path("frames.mcap")) as reader,
+        DisparityReader(disparity.path("disparity.mcap")) as maps,
+    ):
+        stamps = reader.stamps
+        for index in choose_frames(len(reader), min(wanted, MOST_FRAMES)):
+            frame, found = reader.read(index, ("color",)), maps.read(int(stamps[index]))
+            drawn = [] if frame.color is None else [jpeg(frame.color, f"left eye of frame {index}", width)]
+            drawn.append(jpeg(disparity_colors(found.disparity), f"disparity of frame {index}", width))
+            drawn.append(jpeg(confidence_colors(found.confidence), f"confidence of frame {index}", width))
+            told = file.frames[index]
+            frames.append(StereoFrame(index, tuple(drawn), 100 * told.known, 100 * told.trusted))
+    shares = np.array([[frame.known, frame.trusted] for frame in file.frames]).reshape(-1, 2)
+    known, trusted = 100 * shares.mean(axis=0) if len(shares) else (0.0, 0.0)
+    return StereoView(file.detail, file.rows, tuple(frames), float(known), float(trusted), file.minimum_confidence)
+
+
+def view(page: Page) -> dict[str, Any] | None:
+    """Return the matching of a sequence from stereo pairs; None for any other."""
+    disparity = page.given("sequence", Disparity)
+    if disparity is None:
+        return None
+    return {"stereo": stereo_view(disparity, page.parameters.frames, page.parameters.frame_width)}

@@ -1,0 +1,1 @@
+"""Section `suture`: needle, thread and throws."""

@@ -1,0 +1,1 @@
+"""Section `tableware`: a table being cleared."""

@@ -1,0 +1,173 @@
+"""Clearing a table, for the page: what was seen, the plan, the trial as pictures and in motion, policies compared."""
+
+from __future__ import annotations
+
+import base64
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+
+from schemas.errors import BadInput
+from schemas.tableware_detections import TablewareDetections
+from schemas.tableware_plan import TablewareAction, TablewarePlan
+from schemas.tableware_trial import EvaluatedPolicy, TablewareEvaluation, TablewareTrial
+from stages.report.images import Picture, from_file
+from stages.report.page import Page
+
+WIDTH = 1100
+"""Of pictures, at most [px]."""
+LARGEST_ANIMATION = 6_000_000
+CAPTIONS = {
+    "overlay": "What was seen, and how sure that is",
+    "detections": "What was seen, and how sure that is",
+    "strip": "The plan from above, before each action: green pulls, violet stackings, red jaws, in rings how many are "
+    "stacked",
+    "keyframes": "The trial from above, the true table before each action",
+    "physics": "The trial in physics, after each action",
+    "clearing": "The table being cleared",
+}
+
+
+@dataclass(frozen=True)
+class TablewareRow:
+    """An action of a trial."""
+
+    number: int
+    text: str
+    time: str
+    came: str
+    """What came to the bin, what fell, what did not go as planned."""
+    wrong: bool
+
+
+@dataclass(frozen=True)
+class TablewareView:
+    """Everything the page says about clearing a table."""
+
+    seen: str
+    plan: str
+    refused: tuple[str, ...]
+    impossible: tuple[tuple[str, int], ...]
+    """Kinds of reasons with their numbers."""
+    reasons: tuple[str, ...]
+    trial: str
+    cleared: bool
+    rows: tuple[TablewareRow, ...]
+    compared: str
+    policies: tuple[EvaluatedPolicy, ...]
+    pictures: dict[str, tuple[Picture, str]]
+    """By name, with the caption; what the artifacts have of them."""
+
+
+def tableware_view(
+    detections: TablewareDetections | None,
+    plan: TablewarePlan | None,
+    trial: TablewareTrial | None,
+    evaluation: TablewareEvaluation | None,
+    width: int,
+) -> TablewareView:
+    """Read what there is; pictures are at most `width` wide [px]. Raises BadInput for a picture that cannot be read."""
+    folders = {
+        "overlay": detections,
+        "detections": plan if detections is None else None,
+        "strip": plan,
+        "keyframes": trial,
+        "physics": trial,
+    }
+    pictures = {
+        name: (from_file(path, CAPTIONS[name], width), CAPTIONS[name])
+        for name, artifact in folders.items()
+        if artifact is not None and (path := artifact.path(f"{name}.png")).is_file()
+    }
+    if trial is not None and (path := trial.path("clearing.gif")).is_file():
+        pictures["clearing"] = (animation(path, CAPTIONS["clearing"]), CAPTIONS["clearing"])
+    file = plan.info if plan is not None else None
+    done = trial.info if trial is not None else None
+    results = evaluation.info if evaluation is not None else None
+    said = compared = ""
+    if done is not None:
+        said = f"{done.policy.replace('_', ' ')} in the {done.simulator} simulator: {done.statement}."
+    if results is not None:
+        compared = (
+            f"{results.draws} draws a table, chances: {results.chances.replace('_', ' ')}, the policies see the "
+            f"{results.sight}; 95 % bootstrap intervals over tables, ratios against Random."
+        )
+    return TablewareView(
+        seen="" if detections is None else detections.info.statement,
+        plan=_plan_text(plan),
+        refused=tuple(one.message for one in file.refused) if file is not None else (),
+        impossible=tuple(
+            Counter(f"{one.primitive}: {one.kind}".replace("_", " ") for one in file.impossible).most_common()
+        )
+        if file is not None
+        else (),
+        reasons=tuple(f"{one.primitive.replace('_', ' ')}: {one.message}" for one in file.impossible) if file else (),
+        trial=said,
+        cleared=done is not None and not done.counts.failure,
+        rows=_rows(trial),
+        compared=compared,
+        policies=results.rows if results is not None else (),
+        pictures=pictures,
+    )
+
+
+def _plan_text(plan: TablewarePlan | None) -> str:
+    if plan is None:
+        return ""
+    file = plan.info
+    return (
+        f"{file.statement[:1].upper()}{file.statement[1:]}. {file.policy.replace('_', ' ')} takes {file.trips} trips "
+        f"and {file.seconds:.0f} s when nothing slips; {file.expected_seconds:.0f} s and "
+        f"{file.expected_objects_per_trip:.2f} objects a trip are expected over {file.draws} draws."
+    )
+
+
+def _rows(trial: TablewareTrial | None) -> tuple[TablewareRow, ...]:
+    if trial is None:
+        return ()
+    rows = []
+    for number, step in enumerate(trial.info.steps, start=1):
+        came = f"to the bin: {', '.join(step.binned)}" if step.binned else ""
+        wrong = "; ".join(step.troubles)
+        text = "; ".join(part for part in (came, wrong) if part)
+        rows.append(TablewareRow(number, words(step.action), f"{step.start:.1f}", text, bool(wrong)))
+    return tuple(rows)
+
+
+def words(action: TablewareAction) -> str:
+    """Return an action in words."""
+    pull = action.u_P or (action.u_PG.u_P if action.u_PG else None)
+    put = action.u_S or (action.u_SG.u_S if action.u_SG else None)
+    if pull is not None:
+        return f"pull {pull.item} to {pull.target}" + (", take both" if action.u_PG else "")
+    if put is not None:
+        return f"stack {put.u_G.items[0]} on {put.onto}" + (", take the pile" if action.u_SG else "")
+    return f"take {' and '.join(action.u_G.items)}" if action.u_G is not None else action.name
+
+
+def animation(path: Path, alt: str) -> Picture:
+    """Embed a GIF as it is. Raises BadInput when it cannot be read or is too large for a page."""
+    try:
+        with Image.open(path) as opened:
+            width, height = opened.size
+        data = path.read_bytes()
+    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
+        raise BadInput(f"{path}: {error}", hint="make the artifact again") from None
+    if len(data) > LARGEST_ANIMATION:
+        raise BadInput(f"{path}: {len(data)} bytes are too large an animation", hint="make the artifact again")
+    return Picture(f"data:image/gif;base64,{base64.b64encode(data).decode('ascii')}", width, height, alt)
+
+
+def view(page: Page) -> dict[str, Any]:
+    """Return what there is of a table: what was seen, planned, tried, compared."""
+    found = tableware_view(
+        page.given("tableware_detections", TablewareDetections),
+        page.given("tableware_plan", TablewarePlan),
+        page.given("tableware_trial", TablewareTrial),
+        page.given("tableware_evaluation", TablewareEvaluation),
+        WIDTH,
+    )
+    return {"tableware": found}
