@@ -127,7 +127,7 @@ mosd-supports: setup ## Which object rests on which on real tabletop frames (QUI
 train-pairs: setup ## Train the trees of `segment --backend objects` anew (QUICK=1: few generated frames)
 	$(PYTHON) -m benchmarks.training.tabletop_pairs $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/train-pairs$(if $(QUICK),-quick)
 
-# About a quarter of an hour on one core; prints what stands in stages/segment/objects/rules.py.
+# About a quarter of an hour on one core; prints what stands in stages/segment/backends/objects/rules.py.
 pair-rules: setup ## Fit the rules of `segment --backend objects` anew (QUICK=1: few generated frames)
 	$(PYTHON) -m benchmarks.training.pair_rules $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/pair-rules$(if $(QUICK),-quick)
 
@@ -227,6 +227,10 @@ bench-reconstruct-stereo: setup ## Rooms reconstructed from two eyes beside a de
 # Half an hour of one core with rendering; stop it and start it again at will.
 train-stereo: setup ## Train the small RAFT-Stereo on our own renderings (QUICK=1: 10 steps)
 	$(PYTHON) -m benchmarks.disparity.train $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/train-stereo$(if $(QUICK),-quick)
+
+.PHONY: figures
+figures: setup ## Write every figure of README and docs anew from docs/results/*.json
+	$(PYTHON) -m benchmarks.figures
 
 .PHONY: pictures
 pictures: setup ## Take the README's pictures out of the demo run

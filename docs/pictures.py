@@ -1,4 +1,4 @@
-"""Takes the README's pictures out of a finished demo run: python docs/pictures.py outputs/demo (make pictures)."""
+"""Makes the README's picture out of a finished demo run: python docs/pictures.py outputs/demo (make pictures)."""
 
 from __future__ import annotations
 
@@ -10,42 +10,45 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-WANTED = {
-    "frame 30": "frame.jpg",
-    "segments of frame 30": "segments.jpg",
-    "The map, every instance in its colour": "map.jpg",
-    "CAD scene": "cad_scene.jpg",
-    "contact graphs": "graphs.png",
-}
-"""Alternative text of a picture in report.html -> file in docs/images."""
+TOP = ("frame 30", "The map, every instance in its colour", "CAD scene")
+"""Alternative texts in report.html of the upper row: what the camera saw, the map, the scene."""
+GRAPHS = "contact graphs"
+WIDTH, GAP, KEY_FRAMES = 1600, 6, 5
 
 
-def pictures_of(html: str) -> dict[str, bytes]:
-    """Return alternative text -> image bytes; the first of several with the same text."""
-    found: dict[str, bytes] = {}
+def pictures_of(html: str) -> dict[str, np.ndarray]:
+    """Return alternative text -> image, (H, W, 3) BGR; the first of several with the same text."""
+    found: dict[str, np.ndarray] = {}
     for tag in re.findall(r"<img[^>]*>", html):
         text, data = re.search(r'alt="([^"]*)"', tag), re.search(r'src="data:image/\w+;base64,([^"]+)"', tag)
-        if text and data:
-            found.setdefault(text[1], base64.b64decode(data[1]))
+        if text and data and text[1] not in found:
+            found[text[1]] = cv2.imdecode(np.frombuffer(base64.b64decode(data[1]), np.uint8), cv2.IMREAD_COLOR)
     return found
 
 
-def film_strip(key_frames: list[Path], columns: int = 4) -> np.ndarray:
-    """Return key frames side by side in rows, (H, W, 3) BGR, small enough for a README."""
-    images = [cv2.resize(cv2.imread(str(path)), (320, 240), interpolation=cv2.INTER_AREA) for path in key_frames]
-    images += [np.full_like(images[0], 255)] * (-len(images) % columns)
-    return np.vstack([np.hstack(images[i : i + columns]) for i in range(0, len(images), columns)])
+def in_a_row(images: list[np.ndarray]) -> np.ndarray:
+    """Return images side by side, as high as each other and WIDTH pixels wide, (H, WIDTH, 3)."""
+    shapes = [image.shape[1] / image.shape[0] for image in images]
+    height = round((WIDTH - GAP * (len(images) - 1)) / sum(shapes))
+    gap = np.full((height, GAP, 3), 255, np.uint8)
+    scaled = [
+        cv2.resize(image, (round(height * shape), height), interpolation=cv2.INTER_AREA)
+        for image, shape in zip(images, shapes, strict=True)
+    ]
+    row = np.hstack([part for image in scaled for part in (gap, image)][1:])
+    return cv2.resize(row, (WIDTH, height), interpolation=cv2.INTER_AREA)
 
 
 def main(run: Path) -> None:
-    """Write docs/images from a run folder."""
+    """Write docs/images/demo.jpg and graphs.png from a run folder."""
     folder = Path(__file__).resolve().parent / "images"
     pictures = pictures_of((run / "report" / "report.html").read_text())
-    for text, name in WANTED.items():
-        (folder / name).write_bytes(pictures[text])
+    cv2.imwrite(str(folder / "graphs.png"), pictures[GRAPHS])
     key_frames = sorted((run / "plan" / "keyframes").glob("*.png"))
-    chosen = [key_frames[i] for i in np.linspace(0, len(key_frames) - 1, 8).round().astype(int)]
-    cv2.imwrite(str(folder / "robot.jpg"), film_strip(chosen), [cv2.IMWRITE_JPEG_QUALITY, 88])
+    chosen = [key_frames[i] for i in np.linspace(0, len(key_frames) - 1, KEY_FRAMES).round().astype(int)]
+    rows = [in_a_row([pictures[text] for text in TOP]), in_a_row([cv2.imread(str(path)) for path in chosen])]
+    between = np.full((GAP, WIDTH, 3), 255, np.uint8)
+    cv2.imwrite(str(folder / "demo.jpg"), np.vstack([rows[0], between, rows[1]]), [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 
 if __name__ == "__main__":

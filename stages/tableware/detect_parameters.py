@@ -61,7 +61,7 @@ DETECT = Stage(
     reads={
         "image": External("colour image, or a folder with color.png, depth.png/.npy/.npz and camera.json/scene.json"),
         "depth": Optionally(External("depth image: 16-bit PNG, or .npy/.npz array")),
-        "camera": Optionally(External("camera.json: intrinsics, and the pose where it is known (docs/TIDY_VISION.md)")),
+        "camera": Optionally(External("camera.json: intrinsics, and the pose where it is known (docs/TIDY.md)")),
     },
     writes=TablewareDetections,
     libraries=("numpy", "scipy", "numba", "opencv-python-headless", "trimesh"),

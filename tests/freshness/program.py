@@ -116,20 +116,24 @@ class Program:
         module = Module(name)
         tree = ast.parse(file.read_text(encoding="utf-8"))
         package = name if file.name == "__init__.py" else name.rpartition(".")[0]
-        for statement in tree.body:
+        self._enter(module, tree.body, package)
+        return module
+
+    def _enter(self, module: Module, statements: list[ast.stmt], package: str) -> None:
+        for statement in statements:
             if isinstance(statement, (ast.Import, ast.ImportFrom)):
                 self.add_imports(module, statement, package)
-            elif _for_types_only(statement):
-                for inner in ast.walk(statement):
+            elif isinstance(statement, ast.If) and _for_types_only(statement):
+                for inner in statement.body:
                     self.add_imports(module, inner, package)
+                self._enter(module, statement.orelse, package)
             elif not _is_docstring(statement):
                 bound = _bound_at_top(statement)
                 again = not bound or bool(bound.keys() & module.definitions.keys())
-                for name_bound in bound:
-                    module.definitions.setdefault(name_bound, statement)
+                for name in bound:
+                    module.definitions.setdefault(name, statement)
                 if again or not isinstance(statement, DEFINING) or self._decorated_by_us(module, statement):
                     module.loose.append(statement)
-        return module
 
     def _decorated_by_us(self, module: Module, statement: ast.stmt) -> bool:
         """A decorator of ours may enter the definition somewhere, so that nobody has to name it."""
@@ -258,11 +262,12 @@ class _Writer:
         self._program, self._module, self._statement = program, module, statement
         file = program.file(module.name)
         assert file is not None
-        package = module.name if file.name == "__init__.py" else module.name.rpartition(".")[0]
+        package = self._package = module.name if file.name == "__init__.py" else module.name.rpartition(".")[0]
         self._inside = Module(module.name)
         for node in ast.walk(statement):
             program.add_imports(self._inside, node, package)
         self._top = list(_bound_at_top(statement))
+        self._parameters = {node.arg for node in ast.walk(statement) if isinstance(node, ast.arg)}
         self._locals: dict[str, str] = {}
         self._in_function = False
         self._parts: list[str | Definition | Whole | None] = []
@@ -350,6 +355,8 @@ class _Writer:
     def _name(self, name: str) -> None:
         if name in self._locals:
             self._put(self._locals[name])
+        elif name == "__package__":
+            self._put(Whole(self._package))
         elif name in self._top and not self._in_function and not isinstance(self._statement, (ast.ClassDef,)):
             self._put(f"@{self._top.index(name)}", name)
         else:
@@ -389,7 +396,7 @@ class _Writer:
             rest = list(chain)
             while rest and self._program.is_ours(f"{module}.{rest[0]}"):
                 module = f"{module}.{rest.pop(0)}"
-            if rest:
+            if rest and not rest[0].startswith("__"):
                 self._put(Definition(module, rest[0]), rest[0])
                 for name in rest[1:]:
                     self._put(f".{name}")
@@ -420,15 +427,22 @@ class _Writer:
             self._put(None)
 
     def _is_followed(self, call: ast.Call) -> bool:
-        """Whether the argument says by itself where it points: a text, or one that begins with text or a constant."""
-        argument = call.args[0] if call.args else None
+        """Whether the argument says by itself where it points: a text, or one that begins with a text, a constant, or
+        a parameter (then who calls the function names the module, and is followed)."""
+        argument: ast.expr | None = call.args[0] if call.args else None
         if isinstance(argument, ast.JoinedStr) and argument.values:
             argument = argument.values[0]
         if isinstance(argument, ast.FormattedValue):
             argument = argument.value
+        if isinstance(argument, ast.Attribute) and argument.attr in ("__name__", "__path__"):
+            argument = argument.value
+        if isinstance(argument, ast.Call):
+            return _called(argument) == "import_module"  # looked at by itself
         if isinstance(argument, ast.Constant):
             return _called(call) == "import_module"
-        return isinstance(argument, ast.Name) and argument.id not in self._locals and bool(self._targets(argument.id))
+        if not isinstance(argument, ast.Name):
+            return False
+        return argument.id in self._parameters or (argument.id not in self._locals and bool(self._targets(argument.id)))
 
     def _locals_of(self, function: ast.AST) -> dict[str, str]:
         """Number the local variables of a function with all inside it. A name that is also a definition, import or
@@ -479,7 +493,7 @@ def _says_nothing(statement: ast.stmt) -> bool:
     """Docstrings, imports, log lines, what only a type checker reads."""
     if isinstance(statement, (ast.Import, ast.ImportFrom, ast.Pass)):
         return True
-    if _is_docstring(statement) or _for_types_only(statement):
+    if _is_docstring(statement) or (_for_types_only(statement) and not getattr(statement, "orelse", None)):
         return True
     call = statement.value if isinstance(statement, ast.Expr) else None
     if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute):

@@ -147,3 +147,16 @@ def test_the_complaint_names_the_step_the_module_and_both_commands(tmp_path: Pat
         assert words in said
     raised = Record("bake", 1, original.digest, "", original.modules)
     assert "not recorded yet" in str(complaint(stage, raised, original))
+
+
+def test_who_hands_a_package_to_a_finder_reaches_all_of_it(tmp_path: Path) -> None:
+    finder = "def every(package):\n    return importlib.import_module(package)\n"
+    found = ('return importlib.import_module(f"{PART}.{parameters.part}").finish(made)', "return every(PART)")
+    codes = []
+    for name, sugar in (("a", "50"), ("b", "60")):
+        code(tmp_path / name, stage=found, icing=("50", sugar))
+        stage = tmp_path / name / "stages/bake/stage.py"
+        stage.write_text(stage.read_text().replace("def run", "from stages.kit.finding import every\n\ndef run"))
+        (tmp_path / name / "stages/kit/finding.py").write_text(f"import importlib\n\n{finder}")
+        codes.append(Program(tmp_path / name).code_of([Definition("stages.bake.stage", "run")]))
+    assert codes[0].digest != codes[1].digest and "stages.bake.unused" not in codes[0].modules

@@ -71,7 +71,7 @@ def read_image(
 
 def read_camera(path: Path) -> CameraFile:
     """Return the camera of a camera.json, or of a scene.json that says more. Raises BadInput."""
-    hint = 'it needs {"camera": {"width", "height", "fx", "fy", "cx", "cy"}}; docs/TIDY_VISION.md has an example'
+    hint = 'it needs {"camera": {"width", "height", "fx", "fy", "cx", "cy"}}; docs/TIDY.md has an example'
     try:
         if path.stat().st_size > LARGEST_JSON:
             raise BadInput(f"{path}: larger than {LARGEST_JSON} bytes", hint=hint)

@@ -1,0 +1,111 @@
+"""What README.md and docs/ name exists: links, files, modules, make targets, commands and their options."""
+
+from __future__ import annotations
+
+import importlib.util
+import inspect
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from cli.application import build_application
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
+FOLDERS = ("benchmarks", "cli", "data", "docs", "schemas", "stages", "tests")
+MADE = ("data/disparity/raft_stereo", "data/networks/")
+"""Weights that a user fetches or trains: they may be missing."""
+
+
+def in_code(text: str) -> str:
+    """Return the code blocks and spans of a page, a line each."""
+    blocks = re.findall(r"^```[^\n]*\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    rest = re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE)
+    return "\n".join([*blocks, *re.findall(r"`([^`]+)`", rest)]).replace("\\\n", " ")
+
+
+def targets() -> set[str]:
+    named = set(re.findall(r"^([a-z][\w-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    return named | {file.stem for file in (ROOT / "data" / "pipelines").glob("*.toml")}
+
+
+@cache
+def options() -> dict[str, set[str]]:
+    """Return every command's options, under its words: {"library build": {"--seed", ...}}."""
+
+    def walk(command: object, words: tuple[str, ...]) -> dict[str, set[str]]:
+        below = getattr(command, "commands", {})
+        own = {
+            " ".join(words): {
+                option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)
+            }
+        }
+        return own | {
+            name: flags for word, inner in below.items() for name, flags in walk(inner, (*words, word)).items()
+        }
+
+    found = walk(inspect.getclosurevars(build_application()).nonlocals["table"], ())
+    return found | {f"urdf {word}": found[f"urdf-{word}"] for word in ("check", "settle")}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page: Path) -> None:
+    found = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text())
+    broken = [link for link in found if "://" not in link and not (page.parent / link).exists()]
+    assert broken == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_files_that_are_named_exist(page: Path) -> None:
+    paths = re.findall(rf"(?<![\w./-])((?:{'|'.join(FOLDERS)})/[\w./*{{}}-]*[\w*/])(?![\w<])", page.read_text())
+    missing = [
+        path for path in paths if "{" not in path and not path.startswith(MADE) and not any(ROOT.glob(path.rstrip("/")))
+    ]
+    assert missing == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_modules_that_are_run_or_imported_exist(page: Path) -> None:
+    code = in_code(page.read_text())
+    tops = "|".join((*FOLDERS, "scenewright"))
+    modules = re.findall(rf"python -m ((?:{tops})[\w.]*)", code) + re.findall(
+        rf"^from ((?:{tops})[\w.]*) import", code, re.MULTILINE
+    )
+    assert [module for module in modules if importlib.util.find_spec(module) is None] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_make_targets_that_are_named_exist(page: Path) -> None:
+    named = re.findall(r"(?:^|[;&(] ?)make ([a-z][\w-]*)", in_code(page.read_text()), re.MULTILINE)
+    assert set(named) - targets() == set()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_that_are_named_exist_and_have_these_options(page: Path) -> None:
+    wrong = []
+    code = re.sub(r"(?:^|\s)#.*", "", in_code(page.read_text()), flags=re.MULTILINE)
+    call = r"(?:(?:^|[;&|$] ?|\.venv/bin/)scenewright|python -m cli) ((?:[a-z][\w-]*|--)[^\n|;&]*)"
+    for line in re.findall(call, code, re.MULTILINE):
+        words = line.split()
+        name = " ".join(words[:2]) if " ".join(words[:2]) in options() else words[0]
+        flags = set(re.findall(r"(?<!\S)(--[a-z][\w-]*)", line))
+        if name.startswith("--"):
+            name = ""
+        if name not in options():
+            wrong.append(f"no command: {line}")
+        elif flags - options()[name] - {"--help"}:
+            wrong.append(f"{name}: no {', '.join(sorted(flags - options()[name]))}")
+    assert wrong == []
+
+
+def test_pages_that_code_names_exist() -> None:
+    files = [ROOT / "Makefile", ROOT / "CHANGELOG.md", *ROOT.glob("data/**/*.toml")]
+    files += [
+        file
+        for folder in ("benchmarks", "cli", "schemas", "stages", "tests")
+        for file in ROOT.glob(f"{folder}/**/*.py")
+    ]
+    named = {page for file in files for page in re.findall(r"\bdocs/[\w/]+\.(?:md|py|ipynb)\b", file.read_text())}
+    assert {page for page in named if not (ROOT / page).exists()} == set()
