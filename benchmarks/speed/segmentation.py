@@ -26,7 +26,8 @@ from schemas.scene_parts import Camera
 from stages.kit.geometry.cameras import back_project, intrinsic_matrix
 from stages.kit.geometry.transforms import look_at
 from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.segment.fusion import FusionSettings, fuse
+from stages.segment.fusion import FusionSettings
+from stages.segment.fusion_ours import fuse
 from stages.segment.geometric import (
     GeometricSettings,
     depth_discontinuity,

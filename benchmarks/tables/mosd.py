@@ -30,6 +30,7 @@ from stages.kit.drawing.palette import instance_color
 from stages.kit.measurement.bootstrap import bootstrap_interval
 from stages.segment.backends.objects.backend import BUNDLED
 from stages.segment.backends.objects.boosting import read_trees
+from stages.segment.backends.objects.grouping import by_trees
 from stages.segment.backends.objects.pairs import FEATURES
 from stages.segment.backends.objects.plain import segment_plain
 from stages.segment.backends.objects.segmentation import segment_objects
@@ -122,7 +123,7 @@ def arms() -> dict[str, Segmenter]:
     return {
         "plain": lambda color, depth: segment_plain(depth, CAMERA),
         "geometric": lambda color, depth: segment_objects(color, depth, CAMERA).labels,
-        "ours": lambda color, depth: segment_objects(color, depth, CAMERA, trees=trees).labels,
+        "ours": lambda color, depth: segment_objects(color, depth, CAMERA, by_trees(trees)).labels,
     }
 
 

@@ -39,7 +39,7 @@ from stages.kit.measurement.panoptic_quality import ClassQuality, average_qualit
 from stages.segment.backends.network.backend import Predictor, load_predictor
 from stages.segment.backends.network.features import mount_of_pose
 from stages.segment.backends.network.weights import BUNDLED
-from stages.segment.fusion import fuse
+from stages.segment.fusion_ours import fuse
 from stages.segment.geometric import segment_depth
 from stages.segment.panoptic import PanopticFrame
 from stages.segment.parameters import SegmentParameters
