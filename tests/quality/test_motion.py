@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from benchmarks.planning.motion_queries import CHAIN, QuerySet, drawer_set, free_set, shelf_set
+from benchmarks.experiments.planning_motion.queries import CHAIN, QuerySet, drawer_set, free_set, shelf_set
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.path_query import Effort, Query
 from stages.kit.motion.path_search import find_path
