@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from stages.kit.motion.compiled_arrays import RESTING, SKIP, RobotArrays, SceneArrays
-from stages.kit.motion.convex_distance import convex_distance
+from stages.kit.motion.convex_distance import Hull, convex_distance
 
 FREE, UNCERTAIN, HIT = 0, 1, 2
 UNSURE = 0.004
@@ -64,6 +64,11 @@ def _square_to_box(point: np.ndarray, box: np.ndarray, half: np.ndarray) -> floa
     return total
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _hull(robot: RobotArrays, frames: np.ndarray, piece: int) -> Hull:
+    return Hull(robot.vertices, robot.vertex_begin[piece], robot.vertex_begin[piece + 1], frames[robot.frame[piece]])
+
+
 @njit(cache=True, error_model="numpy")
 def _piece_meets(
     robot: RobotArrays, scene: SceneArrays, frames: np.ndarray, piece: int, other: int, centers: np.ndarray
@@ -77,11 +82,8 @@ def _piece_meets(
             break
     if not near:
         return FREE
-    lower, upper = convex_distance(
-        robot.vertices, robot.vertex_begin[piece], robot.vertex_begin[piece + 1], frames[robot.frame[piece]],
-        scene.vertices, scene.vertex_begin[other], scene.vertex_begin[other + 1], scene.pose[other],
-        scene.distance, scene.distance - UNSURE,
-    )  # fmt: skip
+    standing = Hull(scene.vertices, scene.vertex_begin[other], scene.vertex_begin[other + 1], scene.pose[other])
+    lower, upper = convex_distance(_hull(robot, frames, piece), standing, scene.distance, scene.distance - UNSURE)
     if lower > scene.distance:
         return FREE
     return UNCERTAIN if upper >= scene.distance - UNSURE else HIT
@@ -104,11 +106,7 @@ def _pieces_meet(robot: RobotArrays, frames: np.ndarray, pair: int, centers: np.
             break
     if not near:
         return FREE
-    lower, upper = convex_distance(
-        robot.vertices, robot.vertex_begin[first], robot.vertex_begin[first + 1], frames[robot.frame[first]],
-        robot.vertices, robot.vertex_begin[second], robot.vertex_begin[second + 1], frames[robot.frame[second]],
-        apart, apart - UNSURE,
-    )  # fmt: skip
+    lower, upper = convex_distance(_hull(robot, frames, first), _hull(robot, frames, second), apart, apart - UNSURE)
     if lower > apart:
         return FREE
     return UNCERTAIN if upper >= apart - UNSURE else HIT
