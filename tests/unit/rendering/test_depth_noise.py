@@ -29,16 +29,7 @@ def wall(depth: float, angle: float = 0.0, reflectance: float = 0.6, gloss: floa
 
 
 def losses(depth: float, angle: float, reflectance: float, gloss: float) -> float:
-    return loss_probability(
-        depth,
-        angle,
-        reflectance,
-        gloss,
-        SENSOR.grazing_start,
-        SENSOR.grazing_end,
-        SENSOR.dark_signal,
-        SENSOR.shine_loss,
-    )
+    return loss_probability(depth, angle, reflectance, gloss, SENSOR)
 
 
 def test_published_values() -> None:
