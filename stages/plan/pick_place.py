@@ -170,10 +170,10 @@ def plan_pick(
     checker.allow(touch=model.links(item))
     try:
         for base, grasp in queue:
-            found = _try_pick(model, state, item, source, base, grasp, arm_planner, tally)
-            if isinstance(found, Manipulation):
-                return found
-            if found is not None:
+            attempt = _try_pick(model, state, item, source, base, grasp, arm_planner, tally)
+            if isinstance(attempt, Manipulation):
+                return attempt
+            if attempt is not None:
                 paths -= 1
                 if paths == 0:
                     break
@@ -327,10 +327,10 @@ def plan_place(
         queue += [(base, place) for base in bases]
     try:
         for base, place in queue[: budgets.pairs]:
-            found = _try_place(model, state, item, target, base, place, arm_planner, tally)
-            if isinstance(found, Manipulation):
-                return found
-            if found is not None:
+            attempt = _try_place(model, state, item, target, base, place, arm_planner, tally)
+            if isinstance(attempt, Manipulation):
+                return attempt
+            if attempt is not None:
                 paths -= 1
                 if paths == 0:
                     break

@@ -157,15 +157,15 @@ class WorldModel:
 
     def load(self, item: str) -> tuple[str, ...]:
         """Return the movable bodies that stand on a body, and on those, in turn: what goes along when it is carried."""
-        found: list[str] = []
+        loaded: list[str] = []
         waiting = [item]
         while waiting:
             carrier = waiting.pop()
             above = [name for name, record in self.records.items() if record.movable and record.parent == carrier]
-            fresh = [name for name in above if name not in found and name != item]
-            found += fresh
+            fresh = [name for name in above if name not in loaded and name != item]
+            loaded += fresh
             waiting += fresh
-        return tuple(found)
+        return tuple(loaded)
 
     def take_aboard(self, carrier: str) -> None:
         """Make one rigid body of a carrier and what stands on it, so that its load counts in collision checks."""
