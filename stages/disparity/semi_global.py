@@ -103,9 +103,9 @@ def directed(left: np.ndarray, right: np.ndarray, settings: SemiGlobalSettings, 
 
 def without_speckles(disparity: np.ndarray, settings: SemiGlobalSettings) -> np.ndarray:
     """Return disparities (H, W) float32 without islands smaller than the settings allow."""
-    known = np.isfinite(disparity)
+    matched = np.isfinite(disparity)
     if settings.speckle_size == 0:
         return disparity
-    fixed = np.where(known, np.rint(16 * np.where(known, disparity, 0.0)), -16).astype(np.int16)
+    fixed = np.where(matched, np.rint(16 * np.where(matched, disparity, 0.0)), -16).astype(np.int16)
     cv2.filterSpeckles(fixed, -16, settings.speckle_size, 16 * settings.speckle_range)
     return np.where(fixed >= 0, disparity, np.nan).astype(np.float32)
