@@ -104,9 +104,9 @@ def pair_objects(
     true_graph, _ = merge_stuff_nodes(truth.graph)
     found_graph, _ = merge_stuff_nodes(graph)
     true = [n for n in true_graph.nodes if n.node_type != "scene" and n.instance in seen]
-    found = [n for n in found_graph.nodes if n.node_type != "scene"]
-    pairs = assign(node_affinity(true, found, overlaps, minimum_iou))
-    return {true[i].id: found[j].id for i, j in pairs}
+    predicted = [n for n in found_graph.nodes if n.node_type != "scene"]
+    pairs = assign(node_affinity(true, predicted, overlaps, minimum_iou))
+    return {true[i].id: predicted[j].id for i, j in pairs}
 
 
 def measure_replacements(
