@@ -63,7 +63,8 @@ def run(
     low, high = points[owner > 0].min(axis=0), points[owner > 0].max(axis=0)
     GroundTruthFile(
         source="scan", seed=context.seed, recipe=annotation_file.scene, camera=info.camera,
-        frame_count=info.frame_count, room_size=(float(high[0] - low[0]), float(high[1] - low[1]), float(high[2] - low[2])),
+        frame_count=info.frame_count,
+        room_size=(float(high[0] - low[0]), float(high[1] - low[1]), float(high[2] - low[2])),
         depth_noise=True, objects=objects,
     ).write(context.output / "ground_truth.json")  # fmt: skip
     graph = annotated_graph(annotation_file, objects)
