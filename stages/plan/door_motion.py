@@ -30,8 +30,6 @@ ARC_STEP = 0.05
 SLOW = 0.3
 TILTS = (0.0, 0.5, -0.5, 0.9, -0.9, 1.2, -1.2)
 GRIP_SLACK = 0.012
-SHUT = 0.06
-"""Share of a joint's range below which it counts as shut."""
 OPEN = 0.5
 """Share of a joint's range above which it counts as open."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -295,15 +295,6 @@ class WorldModel:
             for joint, value in before.items():
                 self.world.set_joint(name, joint, value)
 
-    def extent_up(self, name: str, world_from_body: np.ndarray) -> tuple[float, float]:
-        """Return the lowest and highest z [m] of a rigid body put at a pose (4, 4)."""
-        heights = apply(world_from_body, self.points(name))[:, 2]
-        return float(heights.min()), float(heights.max())
-
-    def opening_for(self, grip: float) -> float:
-        """Return a finger distance [m] a little wider than `grip`, within what the gripper can."""
-        return float(min(self.description.opening, grip))
-
 
 def body_planes(record: SceneBody, text: str) -> tuple[SurfacePlane, ...]:
     """Return the horizontal planes on top of a body's base link at its pose, world frame, from its shapes."""
@@ -323,11 +314,6 @@ def moved_record(record: SceneBody, world_from_body: np.ndarray, joint_values: d
     return record.model_copy(
         update={"world_from_body": as_transform(world_from_body), "joint_values": joint_values, "box": box}
     )
-
-
-def with_state(state: RobotState, **changes: object) -> RobotState:
-    """Return the state with some fields changed."""
-    return replace(state, **changes)  # type: ignore[arg-type]
 
 
 def hold_for_checks(model: WorldModel, state: RobotState) -> None:

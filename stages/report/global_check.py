@@ -46,7 +46,7 @@ def checked_scenes(cad_scene: CadScene, shelf: ModelShelf) -> list[CheckedScene]
         model = cad_model(cad_scene, shelf, candidates)
         if model is not None:
             conflicts = conflicts_of(cad_scene, shelf, candidates)
-            scenes.append(CheckedScene(_painted(model, cad_scene, conflicts), conflicts, _caption(title, conflicts)))
+            scenes.append(CheckedScene(_painted(model, conflicts), conflicts, _caption(title, conflicts)))
     return scenes
 
 
@@ -59,7 +59,7 @@ def conflicts_of(
     return [pair for pair in room_penetrations(pieces, layout) if pair.collides]
 
 
-def _painted(model: Model, cad_scene: CadScene, conflicts: list[Penetration]) -> Model:
+def _painted(model: Model, conflicts: list[Penetration]) -> Model:
     """The model with objects in conflict in red and everything else pale."""
     guilty = {pair.first for pair in conflicts} | {pair.second for pair in conflicts if not pair.layout}
     numbers = [

@@ -60,12 +60,6 @@ def lateral_sigma(incidence: float) -> float:
 
 
 @njit(cache=True)
-def quantisation_step(z: float, focal_length: float, baseline: float, levels: float) -> float:
-    """Return the distance of neighbouring depth values at z [m]: z^2 / (f b levels)."""
-    return z * z / (focal_length * baseline * levels)
-
-
-@njit(cache=True)
 def quantise(z: float, focal_length: float, baseline: float, levels: float) -> float:
     """Round z [m] to the nearest disparity level."""
     disparity = np.floor(focal_length * baseline / z * levels + 0.5) / levels
