@@ -87,9 +87,7 @@ def mirrored(picture: np.ndarray) -> np.ndarray:
 def directed(left: np.ndarray, right: np.ndarray, settings: SemiGlobalSettings, low: int, levels: int) -> np.ndarray:
     """Return disparities (H, W) float32 [px] of the left picture, NaN where the matcher has none."""
     area = settings.block_size**2
-    modes = {
-        "low": cv2.StereoSGBM_MODE_SGBM_3WAY, "medium": cv2.StereoSGBM_MODE_HH4, "high": cv2.StereoSGBM_MODE_HH
-    }  # fmt: skip
+    modes = {"low": cv2.StereoSGBM_MODE_SGBM_3WAY, "medium": cv2.StereoSGBM_MODE_HH4, "high": cv2.StereoSGBM_MODE_HH}
     matcher = cv2.StereoSGBM.create(
         minDisparity=low, numDisparities=levels, blockSize=settings.block_size, P1=settings.small_penalty * area,
         P2=settings.large_penalty * area, disp12MaxDiff=-1, preFilterCap=settings.filter_cap,

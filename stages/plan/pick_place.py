@@ -137,9 +137,7 @@ def plan_pick(
         else []
     )
     if not grasps:
-        grasps = sample_grasps(
-            points, normals, world_from_item, opening=widest, random=random, pitches=PITCHES[style]
-        )  # fmt: skip
+        grasps = sample_grasps(points, normals, world_from_item, opening=widest, random=random, pitches=PITCHES[style])
     if not grasps:
         grasps = rim_grasps(points, world_from_item, random, uncertainty=budgets.size_uncertainty)
     if not grasps:
@@ -160,8 +158,10 @@ def plan_pick(
         moments = load_moments(model, item, np.array([world_from_item @ grasp.body_from_tool for _, grasp in queue]))
         queue = [queue[index] for index in np.argsort(moments.round(1), kind="stable")]
     lowest = float(apply(world_from_item, points)[:, 2].min())
-    over = {id(grasp): palm_bottom(world_from_item @ grasp.body_from_tool, model.description.palm) > lowest
-            for grasp in grasps}  # fmt: skip
+    over = {
+        id(grasp): palm_bottom(world_from_item @ grasp.body_from_tool, model.description.palm) > lowest
+        for grasp in grasps
+    }
     sideways = style == "rather_level"
     # A hand that reaches below the item's foot, over an edge, cannot put it down but over an edge.
     queue.sort(key=lambda entry: (not over[id(entry[1])], sideways and entry[1].pitch > max(PITCHES["level"])))
@@ -316,7 +316,7 @@ def plan_place(
     if on_tray and places:
         left = lifts_left(
             model, target, item, np.array([place.world_from_item for place in places]), budgets.size_uncertainty
-        )  # fmt: skip
+        )
         order = sorted(range(len(places)), key=lambda index: (not places[index].roomy, -left[index]))
         places = [places[index] for index in order if left[index] or not left.any()]
     tally = Tally()

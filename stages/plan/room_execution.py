@@ -105,9 +105,7 @@ def execute(
     root = order.scene.root if order.ground_truth is None else order.ground_truth.path("room")
     room = _read_room(root, order)
     planned = dict(model.records)
-    matches = match_beliefs(
-        order.beliefs, match_bodies(planned, room.records, parameters.match_radius), room.records
-    )  # fmt: skip
+    matches = match_beliefs(order.beliefs, match_bodies(planned, room.records, parameters.match_radius), room.records)
     joint_names = joint_pairs(planned, room.records, matches)
     believed = start_state(model)
     replanning = Replanning(model, order.graph, believed, order.literals, search)
@@ -153,8 +151,9 @@ def execute(
             draw(RoomPictures(world, room.records, room.texts, model.description), physical, parameters, context)
     graphs = {
         number: graph_of_state(order.graph, observed[START], state, believed, model)
-        for number, state in observed.items() if number >= 0
-    }  # fmt: skip
+        for number, state in observed.items()
+        if number >= 0
+    }
     used = (LOOK, PROPRIOCEPTION, GRIP) if parameters.relocalize else ("the planned motion was replayed", GRIP)
     return Outcome(
         conduct.steps,

@@ -62,7 +62,7 @@ def observed_state(
 
 def tree_differences(
     action: int, expected: TreeState, observed: TreeState, model: WorldModel
-) -> tuple[TreeDifference, ...]:  # fmt: skip
+) -> tuple[TreeDifference, ...]:
     """Return where an observed state is not as expected: carriers of things, doors that are open or shut."""
     differences = []
     for name, parent in sorted(observed.parents.items()):

@@ -89,9 +89,7 @@ def relax(problem: Problem, actions: list[GroundAction]) -> Relaxed:
     initial = np.zeros(len(atoms), dtype=np.uint8)
     initial[[number[atom] for atom in problem.initial if atom in number] + [always]] = 1
     goal = np.array(sorted(number[atom] for atom in problem.goal), dtype=np.int32)
-    return Relaxed(
-        tuple(atoms), tuple(usable), initial, goal, *_rows(pre), *_rows(add), *_rows(delete), *_rows(users)
-    )  # fmt: skip
+    return Relaxed(tuple(atoms), tuple(usable), initial, goal, *_rows(pre), *_rows(add), *_rows(delete), *_rows(users))
 
 
 def successor(task: Relaxed, state: np.ndarray, action: int) -> np.ndarray:
