@@ -120,10 +120,9 @@ def pattern_factor(row: np.ndarray, x: float, y: float, z: float, footprint: flo
     shifts it from blue towards red.
     """
     kind, strength, period, seed = int(row[PATTERN]), row[STRENGTH], row[PERIOD], int(row[SEED])
-    turn = row[TRANSFORM:SKIRTING]
-    px = turn[0] * x + turn[1] * y + turn[2] * z + turn[3]
-    py = turn[4] * x + turn[5] * y + turn[6] * z + turn[7]
-    pz = turn[8] * x + turn[9] * y + turn[10] * z + turn[11]
+    px = row[TRANSFORM] * x + row[TRANSFORM + 1] * y + row[TRANSFORM + 2] * z + row[TRANSFORM + 3]
+    py = row[TRANSFORM + 4] * x + row[TRANSFORM + 5] * y + row[TRANSFORM + 6] * z + row[TRANSFORM + 7]
+    pz = row[TRANSFORM + 8] * x + row[TRANSFORM + 9] * y + row[TRANSFORM + 10] * z + row[TRANSFORM + 11]
     factor, warmth = 0.0, 0.0
     if kind == _PLANKS:  # along x, `period` wide, staggered joints, each with its own tone
         lane = int(np.floor(py / period))
