@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import zipfile
 from pathlib import Path
 from typing import IO
@@ -10,6 +11,7 @@ from typing import IO
 import numpy as np
 
 from schemas.errors import BadInput
+from schemas.outside import opened
 from stages.kit.formats.zip_files import find_entry, zip_errors
 
 LARGEST_ARRAY = 8 * 2**30
@@ -26,28 +28,28 @@ def read_arrays(path: Path, *names: str, hint: str = "make the artifact again") 
     damaged, holds objects, or declares another size than it has (numpy would reserve memory for it first).
     """
     path = Path(path)
-    with zip_errors(path, hint), zipfile.ZipFile(path) as archive:
+    with opened(path, hint=hint) as file, zip_errors(path, hint), zipfile.ZipFile(file) as archive:
         return tuple(_read_entry(archive, f"{name}.npy") for name in names)
 
 
 def read_all_arrays(path: Path, hint: str = "make the artifact again") -> dict[str, np.ndarray]:
     """Return every array of an NPZ file by name. Raises BadInput as `read_arrays` does."""
     path = Path(path)
-    with zip_errors(path, hint), zipfile.ZipFile(path) as archive:
+    with opened(path, hint=hint) as file, zip_errors(path, hint), zipfile.ZipFile(file) as archive:
         return {name.removesuffix(".npy"): _read_entry(archive, name) for name in archive.namelist()}
 
 
 def read_array(path: Path, hint: str = "make the artifact again") -> np.ndarray:
     """Return the array of an NPY file. Raises BadInput as `read_arrays` does."""
     path = Path(path)
-    try:
-        size = path.stat().st_size
-        with path.open("rb") as file:
+    with opened(path, hint=hint) as file:
+        size = os.fstat(file.fileno()).st_size
+        try:
             return _read_stream(file, path.name, min(size, LARGEST_ARRAY))
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror or error}", hint=hint) from None
-    except BadInput as error:
-        raise BadInput(f"{path}: {error}", hint=hint) from None
+        except OSError as error:
+            raise BadInput(f"{path}: {error.strerror or error}", hint=hint) from None
+        except BadInput as error:
+            raise BadInput(f"{path}: {error}", hint=hint) from None
 
 
 def _read_entry(archive: zipfile.ZipFile, name: str) -> np.ndarray:
