@@ -210,7 +210,7 @@ def measure(repeats: int, weights: Path | None) -> dict[str, Timing]:
         "open3d/normals": median_seconds(lambda k: open3d_normals(pick(smooth, k)), slow),
     }
     if weights is not None:
-        from stages.segment.yolox import Detector
+        from stages.segment.backends.detector.yolox import Detector
 
         color = np.random.default_rng(1).integers(0, 255, (480, 640, 3), dtype=np.uint8)
         for name, side in (("detector-whole-image", 0), ("detector-tiles", 480)):

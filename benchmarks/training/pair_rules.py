@@ -6,7 +6,7 @@ Pairs come from where those of the trees come from (tabletop_pairs.py): generate
 `learn` frames; never `test`. They are recorded with grouping by the truth, by rules set by hand, and twice by the rules
 fitted before. For each kind of pair rules are chosen one by one, that with the largest score statistic first, and all
 weights are fitted anew after each (logistic regression); the sign of every weight is given (JOINS). Prints the table
-for stages/segment/objects/rules.py, and five-fold cross-validation over `learn`; writes both to `rules.json`.
+for stages/segment/backends/objects/rules.py, and five-fold cross-validation over `learn`; writes both to `rules.json`.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from benchmarks.tables.mosd import CAMERA, LabelledFrame, read_frames
 from benchmarks.tables.object_masks import score_object_masks
 from benchmarks.training.tabletop_pairs import FOLDS, GENERATED, GENERATED_QUICK, generated_frames
 from schemas.errors import BadInput
-from stages.segment.objects.grouping import Recording
-from stages.segment.objects.rules import (
+from stages.segment.backends.objects.grouping import Recording
+from stages.segment.backends.objects.rules import (
     APART,
     CUT,
     OVER,
@@ -36,7 +36,7 @@ from stages.segment.objects.rules import (
     rule_table,
     term_values,
 )
-from stages.segment.objects.segmentation import ObjectSettings, segment_objects
+from stages.segment.backends.objects.segmentation import ObjectSettings, segment_objects
 
 JOINS = {
     "histogram": 1,

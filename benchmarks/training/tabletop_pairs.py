@@ -26,11 +26,11 @@ from benchmarks.tables.object_masks import score_object_masks
 from benchmarks.training.tabletops import make_tabletop
 from benchmarks.training.tree_growing import grow_trees
 from schemas.errors import BadInput
-from stages.segment.objects.backend import BUNDLED
-from stages.segment.objects.boosting import NO_TREES, Trees, write_trees
-from stages.segment.objects.grouping import Recording
-from stages.segment.objects.pairs import FEATURES
-from stages.segment.objects.segmentation import segment_objects
+from stages.segment.backends.objects.backend import BUNDLED
+from stages.segment.backends.objects.boosting import NO_TREES, Trees, write_trees
+from stages.segment.backends.objects.grouping import Recording
+from stages.segment.backends.objects.pairs import FEATURES
+from stages.segment.backends.objects.segmentation import segment_objects
 
 GENERATED, GENERATED_QUICK = 160, 10
 FIRST_TREES, LAST_TREES = 120, 240

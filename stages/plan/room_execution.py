@@ -16,11 +16,11 @@ from stages.kit.simulation.robot import Configuration
 from stages.kit.simulation.world import load_scene, read_scene_bodies
 from stages.kit.stage import Context
 from stages.plan.assumptions import Belief, match_beliefs
-from stages.plan.checks import check_goal
 from stages.plan.conduct import Conduct, Room, joint_pairs
 from stages.plan.correspondence import match_bodies
 from stages.plan.execution import PhysicalRobot
 from stages.plan.execution_log import write_execution
+from stages.plan.goal_checks import check_goal
 from stages.plan.parameters import PlanParameters
 from stages.plan.pick_place import Budgets
 from stages.plan.pictures import RoomPictures, picture_camera

@@ -12,8 +12,9 @@ from schemas.errors import UsageError
 from schemas.scene_parts import Joint
 from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.tasks.strips import Atom, Problem, atom_text
+from stages.plan.action import goal_checks
 from stages.plan.affordances import LAYOUT, affordance_atoms
-from stages.plan.domain import DOMAIN, GOAL_PREDICATES, START
+from stages.plan.domain import DOMAIN, START
 from stages.plan.door_motion import is_closed, is_open
 from stages.plan.regions import region_under
 from stages.plan.world_model import WorldModel
@@ -129,7 +130,7 @@ def parse_goal(literals: tuple[str, ...], objects: dict[str, str]) -> tuple[froz
     """
     atoms: set[Atom] = set()
     normal = []
-    allowed = {name: kinds for name, kinds in DOMAIN.predicates.items() if name in GOAL_PREDICATES}
+    allowed = {name: kinds for name, kinds in DOMAIN.predicates.items() if name in goal_checks()}
     for literal in literals:
         match = _LITERAL.match(literal)
         if match is None:

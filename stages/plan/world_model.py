@@ -312,3 +312,12 @@ def moved_record(record: SceneBody, world_from_body: np.ndarray, joint_values: d
 def with_state(state: RobotState, **changes: object) -> RobotState:
     """Return the state with some fields changed."""
     return replace(state, **changes)  # type: ignore[arg-type]
+
+
+def hold_for_checks(model: WorldModel, state: RobotState) -> None:
+    """Make the checker carry what the robot holds (or nothing)."""
+    model.checker.allow(touch=model.links(state.holding) if state.holding else ())
+    if state.holding is not None and state.tool_from_item is not None:
+        model.checker.carry(state.holding, state.tool_from_item)
+    else:
+        model.checker.put_down()

@@ -65,7 +65,7 @@ def run(
     SegmentsFile(
         backend=backend.name,
         label=backend.label,
-        corruption=parameters.corruption if backend.name == "ground-truth" else 0.0,
+        corruption=getattr(backend, "corruption", 0.0),
         width=info.camera.width,
         height=info.camera.height,
         frames=tuple(annotations),

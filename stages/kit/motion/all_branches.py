@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from stages.kit.geometry.transforms import wrapped
 from stages.kit.motion.kinematics import (
     POSITION_TOLERANCE,
     ROTATION_TOLERANCE,
@@ -91,10 +92,6 @@ def _turn(value: float) -> np.ndarray:
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _wrapped(values: list[float]) -> np.ndarray:
-    return (np.array(values) + np.pi) % (2 * np.pi) - np.pi
-
-
 def _two_angles(cosine: float, sine: float, value: float) -> list[float]:
     """Return the solutions x of cosine * cos(x) + sine * sin(x) = value: none, or two."""
     length = np.hypot(cosine, sine)
@@ -134,7 +131,7 @@ def _branches(fixed: np.ndarray, lengths: np.ndarray, flange: np.ndarray, last: 
             for sign, half in ((1, 0.0), (-1, np.pi)):
                 angles = [first + half, sign * second, third + half, fourth, fifth, sixth]
                 # Joint 6 goes beyond half a turn.
-                wrapped = _wrapped(angles)
-                wrapped[5] = wrapped[5] + 2 * np.pi if wrapped[5] < -0.5 * np.pi else wrapped[5]
-                found.append(np.array([*wrapped, last]))
+                joints = wrapped(angles)
+                joints[5] = joints[5] + 2 * np.pi if joints[5] < -0.5 * np.pi else joints[5]
+                found.append(np.array([*joints, last]))
     return found

@@ -11,12 +11,12 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.frames import Frame
-from stages.segment.objects.backend import BUNDLED, ObjectsBackend
-from stages.segment.objects.boosting import read_trees, score_rows, write_trees
-from stages.segment.objects.grouping import Recording
-from stages.segment.objects.pairs import FEATURES
-from stages.segment.objects.plain import segment_plain
-from stages.segment.objects.segmentation import ObjectFrame, segment_objects
+from stages.segment.backends.objects.backend import BUNDLED, ObjectsBackend
+from stages.segment.backends.objects.boosting import read_trees, score_rows, write_trees
+from stages.segment.backends.objects.grouping import Recording
+from stages.segment.backends.objects.pairs import FEATURES
+from stages.segment.backends.objects.plain import segment_plain
+from stages.segment.backends.objects.segmentation import ObjectFrame, segment_objects
 from tests.unit.segment.scenes import best_overlap, box_depth, combine, plane_depth, rays
 
 CAMERA = Camera(width=320, height=240, fx=262.5, fy=262.5, cx=159.5, cy=119.5)
