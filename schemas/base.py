@@ -78,11 +78,18 @@ class Model(BaseModel):
         data = file_content(path, largest, hint=hint)
         check_integers(data, str(path), hint=hint)
         try:
-            return cls.model_validate_json(data)
+            model = cls.model_validate_json(data)
+            model.check()
+            return model
         except ValidationError as error:
             first = error.errors()[0]
             where = ".".join(str(part) for part in first["loc"]) or "document"
             raise BadInput(f"{path}: {where:.200}: {first['msg']}", hint=hint) from None
+        except ValueError as error:
+            raise BadInput(f"{path}: {error}", hint=hint) from None
+
+    def check(self) -> None:
+        """Raise ValueError when the parts of what was read do not fit each other; kinds say here what has to."""
 
     def write(self, path: Path) -> None:
         """Write the model as indented JSON with sorted keys and a final newline."""

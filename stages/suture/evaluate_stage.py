@@ -124,9 +124,9 @@ def thread_errors(thread: SutureThread, scene: SutureScene) -> list[ThreadError]
     for one in file.frames:
         if one.frame >= len(scene.truth.views):
             raise BadInput(f"{thread.root}: frame {one.frame} is not in the scene", hint="give the thread's own scene")
-        (true,) = read_arrays(scene.path("threads.npz"), f"thread_{one.frame:06d}")
+        (true,) = read_arrays(scene.path("threads.npz"), f"thread_{one.frame:06d}", shapes=("N 3",))
         points = np.zeros((0, 3))
         if one.points:
-            (points,) = read_arrays(thread.path("threads.npz"), f"points_{one.frame:06d}")
+            (points,) = read_arrays(thread.path("threads.npz"), f"points_{one.frame:06d}", shapes=("N 3",))
         errors.append(thread_error(points, one.length, true))
     return errors

@@ -16,7 +16,7 @@ LARGEST_LIST = 64 * 2**20
 
 
 def _absolute(text: str, base: Path) -> Path:
-    return Path(os.path.abspath(base / Path(text).expanduser()))
+    return Path(os.path.abspath(base / os.path.expanduser(text)))
 
 
 def _listed(file: Path, where: str) -> list[str]:
@@ -51,7 +51,7 @@ def find_scenes(data: DataSpec, base: Path, where: str) -> list[tuple[str, Path]
             named.append(path)
     found: dict[Path, str] = {}
     if data.glob is not None:
-        pattern = str(Path(data.glob).expanduser())
+        pattern = str(Path(os.path.expanduser(data.glob)))
         matches = sorted(glob.glob(pattern, root_dir=base, recursive=True))
         if not matches:
             raise UsageError(f"{where}: data: glob {data.glob}: no match in {base}", hint="check the pattern")

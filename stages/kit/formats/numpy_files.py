@@ -21,15 +21,20 @@ PIECE = 1 << 24
 PLAIN_KINDS = "biufUS"
 
 
-def read_arrays(path: Path, *names: str, hint: str = "make the artifact again") -> tuple[np.ndarray, ...]:
-    """Return the named arrays of an NPZ file.
+def read_arrays(
+    path: Path, *names: str, shapes: tuple[str, ...] = (), hint: str = "make the artifact again"
+) -> tuple[np.ndarray, ...]:
+    """Return the named arrays of an NPZ file. `shapes`, one for each, say what is expected of numbers: `B 3`, `B 512`
+    are arrays with the same, whatever, number of rows.
 
-    Raises BadInput when the file is missing, is no NPZ, lacks an array or has it twice, or when an entry is encrypted,
+    Raises BadInput when the file is missing, is no NPZ, lacks an array, has it twice or in another shape, or when an entry is encrypted,
     damaged, holds objects, or declares another size than it has (numpy would reserve memory for it first).
     """
     path = Path(path)
     with opened(path, hint=hint) as file, zip_errors(path, hint), zipfile.ZipFile(file) as archive:
-        return tuple(_read_entry(archive, f"{name}.npy") for name in names)
+        arrays = tuple(_read_entry(archive, f"{name}.npy") for name in names)
+        _check_shapes(names, arrays, shapes)
+    return arrays
 
 
 def read_all_arrays(path: Path, hint: str = "make the artifact again") -> dict[str, np.ndarray]:
@@ -50,6 +55,24 @@ def read_array(path: Path, hint: str = "make the artifact again") -> np.ndarray:
             raise BadInput(f"{path}: {error.strerror or error}", hint=hint) from None
         except BadInput as error:
             raise BadInput(f"{path}: {error}", hint=hint) from None
+
+
+def _check_shapes(names: tuple[str, ...], arrays: tuple[np.ndarray, ...], shapes: tuple[str, ...]) -> None:
+    """Raise BadInput for the first array that has another shape, or holds no numbers."""
+    sizes: dict[str, int] = {}
+    for name, array, shape in zip(names, arrays, shapes, strict=bool(shapes)):
+        axes = shape.split()
+        fits = (
+            array.ndim == len(axes)
+            and array.dtype.kind in "biuf"
+            and all(
+                length == (int(axis) if axis.isdigit() else sizes.setdefault(axis, length))
+                for axis, length in zip(axes, array.shape, strict=True)
+            )
+        )
+        if not fits:
+            wanted = ", ".join(f"{axis} = {sizes[axis]}" if axis in sizes else axis for axis in axes)
+            raise BadInput(f"{name}: shape {array.shape} of {array.dtype}, expected ({wanted}) numbers")
 
 
 def _read_entry(archive: zipfile.ZipFile, name: str) -> np.ndarray:
