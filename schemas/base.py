@@ -79,7 +79,7 @@ class Model(BaseModel):
         check_integers(data, str(path), hint=hint)
         try:
             model = cls.model_validate_json(data)
-            model.check()
+            model.check_read()
             return model
         except ValidationError as error:
             first = error.errors()[0]
@@ -88,7 +88,7 @@ class Model(BaseModel):
         except ValueError as error:
             raise BadInput(f"{path}: {error}", hint=hint) from None
 
-    def check(self) -> None:
+    def check_read(self) -> None:
         """Raise ValueError when the parts of what was read do not fit each other; kinds say here what has to."""
 
     def write(self, path: Path) -> None:

@@ -45,13 +45,11 @@ class ContactGraphFile(Model):
     nodes: tuple[GraphNode, ...]
     links: tuple[Relation, ...]
 
-    def check(self) -> None:
-        """Raise ValueError unless it has the scene's root, each node once, and relations of nodes and planes it has."""
+    def check_read(self) -> None:
+        """Raise ValueError unless it has each node once, and relations of nodes and planes it has."""
         nodes = {node.id: node for node in self.nodes}
         if len(nodes) < len(self.nodes):
             raise ValueError("a node is there twice")
-        if SCENE_NODE not in nodes:
-            raise ValueError(f"no node {SCENE_NODE!r}")
         for link in self.links:
             if link.source not in nodes or link.target not in nodes:
                 raise ValueError(f"{link.source!r:.60} {link.relation} {link.target!r:.60}: no such node")

@@ -66,7 +66,7 @@ class SequenceFile(Model):
     start_time: float = 0.0
     end_time: float = 0.0
 
-    def check(self) -> None:
+    def check_read(self) -> None:
         """Raise ValueError without a camera, or with counts that cannot be."""
         if not self.cameras:
             raise ValueError("names no camera")

@@ -27,8 +27,9 @@ def read_arrays(
     """Return the named arrays of an NPZ file. `shapes`, one for each, say what is expected of numbers: `B 3`, `B 512`
     are arrays with the same, whatever, number of rows.
 
-    Raises BadInput when the file is missing, is no NPZ, lacks an array, has it twice or in another shape, or when an entry is encrypted,
-    damaged, holds objects, or declares another size than it has (numpy would reserve memory for it first).
+    Raises BadInput when the file is missing, is no NPZ, lacks an array, has it twice or in another shape, or when an
+    entry is encrypted, damaged, holds objects, or declares another size than it has (numpy would reserve memory for it
+    first).
     """
     path = Path(path)
     with opened(path, hint=hint) as file, zip_errors(path, hint), zipfile.ZipFile(file) as archive:
