@@ -21,6 +21,8 @@ from schemas.errors import BadInput, MachineFailure, ScenewrightError
 
 LARGEST_DOCUMENT = 256 * 2**20
 """Bytes of a JSON document of an artifact, where nothing else is said."""
+LARGEST_SHOWN = 64 * 2**20
+"""Bytes of a picture or a text of an artifact that is shown as it is."""
 LARGEST_SETTINGS = 4 * 2**20
 """Bytes of a file that people write by hand."""
 DEEPEST = 64

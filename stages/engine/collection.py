@@ -192,7 +192,7 @@ def folder_bytes(path: Path) -> int:
 def is_locked(target: Path) -> bool:
     """Whether a run holds the lock of a target now."""
     try:
-        descriptor = os.open(target.with_name(f".{target.name}.lock"), os.O_RDONLY)
+        descriptor = os.open(target.with_name(f".{target.name}.lock"), os.O_RDONLY | os.O_NONBLOCK)
     except OSError:
         return False
     try:
