@@ -42,6 +42,12 @@ def inspect(
     from stages.ingest.preflight.settings import ingest_parameters
     from stages.kit.progress import progress_for
 
+    try:
+        os.stat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        pass  # whoever looks for a log says what it expects
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror}", hint="give an artifact folder or a log") from None
     progress = progress_for(sys.stderr.isatty(), quiet=quiet or json_output)
     if not os.path.exists(path / MANIFEST_NAME):
         if frames < 2:

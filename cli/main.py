@@ -54,6 +54,7 @@ def run(arguments: list[str]) -> int:
     from cli.streams import INTERRUPTED, ReaderLeft
     from schemas.errors import MachineFailure, ScenewrightError
     from stages.engine import interruption
+    from stages.engine.runner import NO_CODE_CACHE, NO_CODE_CACHE_HINT, NO_CODE_CACHE_TEXT
 
     debug = "--debug" in arguments
     _set_up_logging(logging.WARNING if "--quiet" in arguments else logging.DEBUG if debug else logging.INFO)
@@ -95,6 +96,9 @@ def run(arguments: list[str]) -> int:
     except Exception as error:
         if debug:
             raise
+        if NO_CODE_CACHE in str(error):
+            say_error(f"{NO_CODE_CACHE_TEXT} ({NO_CODE_CACHE_HINT})")
+            return MachineFailure.exit_code
         say_error(f"internal error: {type(error).__name__}: {error} (a bug of ours; --debug shows where)")
         return 1
 

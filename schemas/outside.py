@@ -7,6 +7,7 @@ counts or writes out in digits is bounded. tests/bad_input/test_one_door.py list
 from __future__ import annotations
 
 import errno
+import io
 import json
 import os
 import re
@@ -15,7 +16,7 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from schemas.errors import BadInput, MachineFailure, ScenewrightError
 
@@ -54,7 +55,7 @@ def _told(path: Path | str, error: type[ScenewrightError], hint: str) -> Iterato
         raise error(f"{path}: {failed}", hint=hint) from None
 
 
-def opened(path: Path | str, *, error: type[ScenewrightError] = BadInput, hint: str = "") -> BinaryIO:
+def opened(path: Path | str, *, error: type[ScenewrightError] = BadInput, hint: str = "") -> io.BufferedReader:
     """Open a regular file for reading, the caller closes it. Raises `error` for anything else, and never waits.
 
     Raises MachineFailure when the machine is at fault.

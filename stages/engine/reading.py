@@ -36,8 +36,8 @@ def input_place(root: Path, path: str) -> Path:
     """Return where an input stood that the manifest at `root` names. Raises BadInput for what can be no place."""
     try:
         place = (root / path).resolve()
-        os.stat(place.parent)
-    except FileNotFoundError:
+        os.stat(place)
+    except (FileNotFoundError, NotADirectoryError):
         pass  # no longer there, which is no fault
     except (OSError, ValueError, RuntimeError) as error:  # too long, a zero byte, a loop of links
         reason = getattr(error, "strerror", None) or "a loop of links"

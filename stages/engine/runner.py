@@ -65,7 +65,9 @@ OUT_OF_MEMORY = re.compile(
 )
 
 NO_CODE_CACHE = "cannot cache function"
-"""How numba begins what it says of that."""
+"""How numba begins what it says when every folder for it is read-only."""
+NO_CODE_CACHE_TEXT = "compiled code can be kept nowhere, neither beside the program nor in a home folder"
+NO_CODE_CACHE_HINT = "set NUMBA_CACHE_DIR to a folder that can be written"
 
 Stamp = tuple[tuple[str, int, int, int], ...]
 """Path, inode, time of change [ns] and size of files: what differs once one is replaced or written to."""
@@ -242,10 +244,7 @@ def _machine_errors(out: Path) -> Iterator[None]:
         raise
     except Exception as error:  # native libraries say it in words of their own
         if NO_CODE_CACHE in str(error):
-            raise MachineFailure(
-                "compiled code can be kept nowhere: neither beside the program nor in a home folder",
-                hint="set NUMBA_CACHE_DIR to a folder that can be written",
-            ) from error
+            raise MachineFailure(NO_CODE_CACHE_TEXT, hint=NO_CODE_CACHE_HINT) from error
         if isinstance(error, MemoryError) or OUT_OF_MEMORY.search(str(error)):
             raise MachineFailure(f"{out}: out of memory", hint="use fewer frames or larger voxels") from error
         raise
