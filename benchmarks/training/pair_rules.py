@@ -19,11 +19,12 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
-from benchmarks.tables.mosd import CAMERA, LabelledFrame, read_frames
-from benchmarks.tables.object_masks import score_object_masks
+from benchmarks.mosd_frames import CAMERA, LabelledFrame, read_frames
+from benchmarks.object_masks import score_object_masks
+from benchmarks.training.pair_recording import pairs_of_frame
 from benchmarks.training.tabletop_pairs import FOLDS, GENERATED, GENERATED_QUICK, generated_frames
 from schemas.errors import BadInput
-from stages.segment.backends.objects.grouping import Recording
+from stages.segment.backends.objects.grouping import by_rules
 from stages.segment.backends.objects.rules import (
     APART,
     CUT,
@@ -36,7 +37,7 @@ from stages.segment.backends.objects.rules import (
     rule_table,
     term_values,
 )
-from stages.segment.backends.objects.segmentation import ObjectSettings, segment_objects
+from stages.segment.backends.objects.segmentation import segment_objects
 
 JOINS = {
     "histogram": 1,
@@ -114,8 +115,7 @@ def recorded(frames: Iterable[LabelledFrame], table: np.ndarray, by_truth: float
     """Return the pairs that grouping by a table of rules meets, the share `by_truth` of the joints by the truth."""
     features, answers, weights = [], [], []
     for k, frame in enumerate(frames):
-        recording = Recording(frame.objects, np.random.default_rng([seed, k]), by_truth)
-        segment_objects(frame.color, frame.depth, CAMERA, ObjectSettings(rules=table), recording=recording)
+        recording = pairs_of_frame(frame, by_rules(table), by_truth, np.random.default_rng([seed, k]))
         known = recording.answers >= 0
         count = int(known.sum())
         features.append(recording.features[known])
@@ -230,9 +230,9 @@ def main() -> None:
     scores = []
     for fold in np.array_split(np.arange(len(frames)), FOLDS):
         seen = [rows for recording in real for k, rows in enumerate(recording) if k not in fold]
-        settings = ObjectSettings(rules=rule_table(*fit(joined([*generated, *seen]))))
+        scorer = by_rules(rule_table(*fit(joined([*generated, *seen]))))
         for k in fold:
-            found = segment_objects(frames[k].color, frames[k].depth, CAMERA, settings).labels
+            found = segment_objects(frames[k].color, frames[k].depth, CAMERA, scorer).labels
             scores.append(score_object_masks(frames[k].objects, found))
     result = {
         "start": start,

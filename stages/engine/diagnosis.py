@@ -17,7 +17,7 @@ CORE = {
     "typer": "typer", "open3d": "open3d", "trimesh": "trimesh", "pycolmap": "pycolmap",
     "opencv-python-headless": "cv2", "numpy": "numpy", "scipy": "scipy", "torch": "torch", "mcap": "mcap",
     "pybullet": "pybullet", "pydantic": "pydantic", "numba": "numba", "python-fcl": "fcl", "embreex": "embreex",
-    "shapely": "shapely", "networkx": "networkx", "yourdfpy": "yourdfpy", "matplotlib": "matplotlib",
+    "shapely": "shapely", "networkx": "networkx", "ompl": "ompl", "matplotlib": "matplotlib",
     "rosbags": "rosbags", "psutil": "psutil",
 }  # fmt: skip
 EXTRAS = {

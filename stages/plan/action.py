@@ -5,21 +5,39 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
 from schemas.plan import Check
+from schemas.scene_parts import Joint
 from stages.kit.declared import declared_in
 from stages.kit.tasks.strips import Schema
+from stages.plan.believed_tree import TreeState
 from stages.plan.checks import GoalInRoom
+from stages.plan.execution import PhysicalRobot
 from stages.plan.motions import Manipulation
 from stages.plan.pick_place import Budgets, GraspStyle
 from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
 
-if TYPE_CHECKING:
-    from stages.plan.conduct import Conduct
-    from stages.plan.tree_state import TreeState
+
+class Execution(Protocol):
+    """What an action sees of its own execution in the room (conduct.Conduct)."""
+
+    model: WorldModel
+    physical: PhysicalRobot
+
+    def matched(self, body: str) -> str:
+        """Return what a body of the plan is called in the room. Raises MotionFailed where it is not there."""
+        ...
+
+    def joint_in_room(self, joint: str) -> tuple[Joint, float]:
+        """Return a joint of the plan as the room has it, and its value there [rad or m]."""
+        ...
+
+    def level(self, state: RobotState) -> RobotState:
+        """Bring what the hand holds level; return the robot's state. Raises MotionFailed."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -106,11 +124,11 @@ class PlanAction:
         """Return base and grasp or place of a planned motion whose body stands `shift` (3,) [m] away from there."""
         raise NotImplementedError(self.name)
 
-    def after_motion(self, conduct: Conduct, state: RobotState, arguments: tuple[str, ...]) -> RobotState:
+    def after_motion(self, conduct: Execution, state: RobotState, arguments: tuple[str, ...]) -> RobotState:
         """Return the state after what is done once the motion was carried out. Raises MotionFailed."""
         return state
 
-    def check_effect(self, conduct: Conduct, arguments: tuple[str, ...]) -> None:
+    def check_effect(self, conduct: Execution, arguments: tuple[str, ...]) -> None:
         """Raises MotionFailed `condition_not_met` when the room is not as the action should leave it."""
 
 

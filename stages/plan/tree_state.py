@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile
 from schemas.plan import BodyMatch, TreeDifference
 from stages.kit.simulation.world import PhysicsWorld
 from stages.plan.action import action_named
+from stages.plan.believed_tree import TreeState
 from stages.plan.carriers import HAND, NOTHING, carrier
 from stages.plan.door_motion import is_closed, is_open
 from stages.plan.refinement import Step
@@ -18,18 +17,6 @@ from stages.plan.world_model import WorldModel
 
 MOVED = 0.05
 """Things that moved less than this keep their place in the graph [m]."""
-
-
-@dataclass(frozen=True)
-class TreeState:
-    """Names are those of the plan."""
-
-    parents: dict[str, str]
-    """Movable body -> what carries it."""
-    poses: dict[str, np.ndarray]
-    """Movable body -> world_from_body (4, 4)."""
-    joints: dict[str, float]
-    held: str | None = None
 
 
 def start_state(model: WorldModel) -> TreeState:

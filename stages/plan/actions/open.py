@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from stages.kit.tasks.strips import Schema
-from stages.plan.action import MotionRequest, PlanAction
+from stages.plan.action import Execution, MotionRequest, PlanAction
 from stages.plan.checks import check_joints
 from stages.plan.door_motion import check_joint, is_open, plan_open
 from stages.plan.motions import Manipulation
 from stages.plan.world_model import RobotState, WorldModel
-
-if TYPE_CHECKING:
-    from stages.plan.conduct import Conduct
 
 
 class Open(PlanAction):
@@ -38,7 +33,7 @@ class Open(PlanAction):
         joint = request.arguments[0]
         return plan_open(model, state, model.owner(joint), joint, request.budgets, request.random)
 
-    def check_effect(self, conduct: Conduct, arguments: tuple[str, ...]) -> None:
+    def check_effect(self, conduct: Execution, arguments: tuple[str, ...]) -> None:
         """The joint stands open."""
         check_joint(*conduct.joint_in_room(arguments[0]), self.name, arguments[0], is_open)
 

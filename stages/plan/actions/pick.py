@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from schemas.plan import Check
 from stages.kit.tasks.strips import Schema
-from stages.plan.action import MotionRequest, PlanAction
+from stages.plan.action import Execution, MotionRequest, PlanAction
+from stages.plan.believed_tree import TreeState
 from stages.plan.carriers import HAND
 from stages.plan.checks import GoalInRoom
 from stages.plan.motions import Manipulation
 from stages.plan.pick_place import plan_pick
 from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
-
-if TYPE_CHECKING:
-    from stages.plan.conduct import Conduct
-    from stages.plan.tree_state import TreeState
 
 
 def check_held(goal: GoalInRoom) -> Check:
@@ -111,7 +107,7 @@ class Pick(PlanAction):
         assert manipulation.body_from_tool is not None
         return manipulation.base + np.array([shift[0], shift[1], 0.0]), manipulation.body_from_tool
 
-    def after_motion(self, conduct: Conduct, state: RobotState, arguments: tuple[str, ...]) -> RobotState:
+    def after_motion(self, conduct: Execution, state: RobotState, arguments: tuple[str, ...]) -> RobotState:
         """A laden tray that gave way in the fingers is levelled."""
         return conduct.level(state) if conduct.model.laden(arguments[0]) else state
 

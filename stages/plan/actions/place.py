@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.tasks.strips import Schema
-from stages.plan.action import MotionRequest, PlanAction
+from stages.plan.action import Execution, MotionRequest, PlanAction
+from stages.plan.believed_tree import TreeState
 from stages.plan.carriers import carried_by, carrier
 from stages.plan.checks import check_in, check_on
 from stages.plan.motions import Manipulation
 from stages.plan.pick_place import GraspStyle, plan_place
 from stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level, placement_style
 from stages.plan.world_model import RobotState, WorldModel
-
-if TYPE_CHECKING:
-    from stages.plan.conduct import Conduct
-    from stages.plan.tree_state import TreeState
 
 MOST_TILT = 0.35
 """What was put down stands when it is tilted by less [rad]."""
@@ -121,7 +117,7 @@ class Place(PlanAction):
         place[2, 3] += nearest_level(model, arguments[1], place[:2, 3], bottom) - bottom + PUT_DOWN_HEIGHT
         return manipulation.base + np.array([shift[0], shift[1], 0.0]), place
 
-    def check_effect(self, conduct: Conduct, arguments: tuple[str, ...]) -> None:
+    def check_effect(self, conduct: Execution, arguments: tuple[str, ...]) -> None:
         """It stands on its target as it was to stand."""
         item, target = arguments[:2]
         world, here, there = conduct.physical.world, conduct.matched(item), conduct.matched(target)

@@ -7,12 +7,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import torch
-
 from schemas.errors import BadInput
 from schemas.vocabulary import Vocabulary
-from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from stages.kit.formats.network_file import put_tensors, write_network
+from stages.kit.formats.safetensors_file import read_safetensors
 from stages.segment.backends.network.features import CHANNELS, INPUT_WIDTH
 from stages.segment.backends.network.model import PanopticNetwork, Widths
 
@@ -36,11 +34,6 @@ def save_checkpoint(
     path: Path, network: PanopticNetwork, classes: tuple[str, ...], widths: Widths, description: str
 ) -> None:
     """Write the network with its numbers as float16; counters of the batch normalisation are left out."""
-    tensors = {
-        name: tensor.detach().to(torch.float16).contiguous().numpy()
-        for name, tensor in network.state_dict().items()
-        if tensor.is_floating_point()
-    }
     metadata = {
         "format": FORMAT,
         "version": str(VERSION),
@@ -50,7 +43,7 @@ def save_checkpoint(
         "widths": json.dumps(asdict(widths)),
         "description": description,
     }
-    write_safetensors(path, tensors, metadata)
+    write_network(path, network, metadata)
 
 
 def load_checkpoint(path: Path, vocabulary: Vocabulary) -> Checkpoint:
@@ -74,18 +67,8 @@ def load_checkpoint(path: Path, vocabulary: Vocabulary) -> Checkpoint:
         )
         raise BadInput(f"{path}: {what}", hint=_OTHER)
     network = PanopticNetwork(len(CHANNELS), len(classes), _widths(path, metadata))
-    state = network.state_dict()
-    wanted = {name: tensor for name, tensor in state.items() if tensor.is_floating_point()}
-    for name in sorted(wanted.keys() | tensors.keys()):
-        there = tensors[name].shape if name in tensors else None
-        needed = tuple(wanted[name].shape) if name in wanted else None
-        if there != needed:
-            raise BadInput(f"{path}: tensor {name!r} has shape {there}, the network needs {needed}", hint=_OTHER)
-        if not np.isfinite(tensors[name]).all():
-            raise BadInput(f"{path}: tensor {name!r} holds numbers that are not finite", hint=_OTHER)
-        state[name] = torch.from_numpy(tensors[name].astype(np.float32))
-    network.load_state_dict(state)
-    return Checkpoint(network.eval(), classes, metadata.get("description", ""))
+    put_tensors(network, tensors, str(path), _OTHER)
+    return Checkpoint(network, classes, metadata.get("description", ""))
 
 
 def _listed(path: Path, metadata: dict[str, str], key: str) -> list[str]:

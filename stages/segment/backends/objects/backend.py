@@ -6,6 +6,7 @@ be handled: the fusion keeps those as segments of the depth, which nobody has na
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,11 @@ from schemas.scene_parts import Camera
 from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame
 from stages.segment.backends.objects import ObjectsParameters
-from stages.segment.backends.objects.boosting import NO_TREES, read_trees
+from stages.segment.backends.objects.boosting import read_trees
 from stages.segment.backends.objects.cuts import pixels_by_label
+from stages.segment.backends.objects.grouping import PairScorer, by_trees
 from stages.segment.backends.objects.pairs import FEATURES
-from stages.segment.backends.objects.segmentation import segment_objects
+from stages.segment.backends.objects.segmentation import BY_SET_RULES, segment_objects
 from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame
 from stages.segment.panoptic import PanopticFrame, PanopticMask
@@ -25,6 +27,12 @@ from stages.segment.panoptic import PanopticFrame, PanopticMask
 BUNDLED = Path(__file__).resolve().parents[4] / "data" / "networks" / "tabletop_pairs.safetensors"
 GREY = 128
 """Colour of everything in a log without colour."""
+
+SCORERS: dict[str, Callable[[], PairScorer]] = {
+    "learned": lambda: by_trees(read_trees(BUNDLED, FEATURES)),
+    "rules": lambda: BY_SET_RULES,
+}
+"""What `--grouping` chooses from. The trees raise BadInput when they cannot be read."""
 
 
 class ObjectsBackend:
@@ -34,11 +42,10 @@ class ObjectsBackend:
     label = "objects from geometry and colour, class-agnostic"
     streams: tuple[str, ...] = ("color", "depth")
 
-    def __init__(self, vocabulary: Vocabulary, camera: Camera, *, learned: bool, largest: float) -> None:
-        """`learned`: trees decide what is one object, else the table of rules; `largest` diameter of an object [m].
-        Raises BadInput when the trees cannot be read."""
+    def __init__(self, vocabulary: Vocabulary, camera: Camera, *, scorer: PairScorer, largest: float) -> None:
+        """`scorer` decides what is one object (`SCORERS`); `largest` diameter of an object [m]."""
         self._camera = camera
-        self._trees = read_trees(BUNDLED, FEATURES) if learned else NO_TREES
+        self._scorer = scorer
         self._largest = largest
         semantic = vocabulary.by_name("object")
         self._mask = PanopticMask(semantic.id, semantic.kind == "thing")
@@ -47,7 +54,7 @@ class ObjectsBackend:
         """Return a mask per object. The frame must have depth; without colour only geometry counts."""
         assert frame.depth is not None
         color = frame.color if frame.color is not None else np.full((*frame.depth.shape, 3), GREY, dtype=np.uint8)
-        objects = segment_objects(color, frame.depth, self._camera, trees=self._trees)
+        objects = segment_objects(color, frame.depth, self._camera, self._scorer)
         count = int(objects.labels.max(initial=0))
         rows, columns, starts = pixels_by_label(objects.labels[objects.patches.window], count)
         kept = np.arange(count + 1, dtype=np.int32)
@@ -64,6 +71,4 @@ def open_backend(request: BackendRequest) -> ObjectsBackend:
     """Return the backend that the request asks for. Raises UsageError without a log, BadInput as the class does."""
     _, reader = request.log()
     own = request.own(ObjectsParameters)
-    return ObjectsBackend(
-        load_vocabulary(), reader.camera, learned=own.grouping == "learned", largest=own.largest_object
-    )
+    return ObjectsBackend(load_vocabulary(), reader.camera, scorer=SCORERS[own.grouping](), largest=own.largest_object)

@@ -15,12 +15,6 @@ Trees = tuple[np.ndarray, np.ndarray, np.ndarray, float]
 leaf (T, 2^d) float32, and the score of no tree at all."""
 FORMAT = "scenewright boosted trees"
 _OTHER = "give a file that `python -m benchmarks.training.tabletop_pairs` wrote"
-NO_TREES: Trees = (
-    np.zeros((0, 1), dtype=np.int32),
-    np.zeros((0, 1), dtype=np.float32),
-    np.zeros((0, 2), dtype=np.float32),
-    0.0,
-)
 
 
 @njit(cache=True)

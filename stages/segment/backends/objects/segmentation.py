@@ -9,9 +9,9 @@ import numpy as np
 from numba import njit
 
 from schemas.scene_parts import Camera
-from stages.segment.backends.objects.boosting import NO_TREES, Trees
 from stages.segment.backends.objects.cuts import CutSettings, cut_patches
-from stages.segment.backends.objects.grouping import Recording, group_patches
+from stages.segment.backends.objects.grouping import PairScorer, by_rules, group_patches
+from stages.segment.backends.objects.groups import Groups
 from stages.segment.backends.objects.patches import PatchFrame, PatchSettings, find_patches
 from stages.segment.backends.objects.regions import lab_image, measure_regions
 from stages.segment.backends.objects.rules import RULES, START, rule_table
@@ -20,6 +20,8 @@ from stages.segment.geometric import pixels_at, relabel
 
 UP_WITHOUT_SURFACE = np.array([0.0, -1.0, 0.0])
 """Where no support surface is seen, the camera is taken to be upright."""
+BY_SET_RULES = by_rules(rule_table(RULES, START))
+"""The scorer that needs no training."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +31,6 @@ class ObjectSettings:
     patches: PatchSettings = field(default_factory=PatchSettings)
     support: SupportSettings = field(default_factory=SupportSettings)
     cuts: CutSettings = field(default_factory=CutSettings)
-    rules: np.ndarray = field(default_factory=lambda: rule_table(RULES, START))
-    """Decide which patches are one object where no trees do."""
     threshold: float = 0.0
     """Pairs with a higher score are joined."""
     minimum_pixels: int = 250
@@ -48,20 +48,19 @@ class ObjectFrame:
     patches: PatchFrame
 
 
-def segment_objects(
-    color: np.ndarray,
-    depth: np.ndarray,
-    camera: Camera,
-    settings: ObjectSettings | None = None,
-    trees: Trees = NO_TREES,
-    recording: Recording | None = None,
-) -> ObjectFrame:
-    """Return the objects of a frame: RGB (H, W, 3) uint8 and z-depth (H, W) [m], 0 invalid, in the same pixels.
+@dataclass(frozen=True)
+class Pieces:
+    """Patches of one frame, cut so that none lies on two objects."""
 
-    `trees` decide which patches are one object; without them the rules do. Raises ValueError when the shapes
-    do not match the camera.
-    """
-    settings = settings or ObjectSettings()
+    patches: PatchFrame
+    labels: np.ndarray
+    """(h, w) int32 pieces of the window, 0 none."""
+    groups: Groups
+    """Every piece a group of its own; to be used once."""
+
+
+def cut_pieces(color: np.ndarray, depth: np.ndarray, camera: Camera, settings: ObjectSettings) -> Pieces:
+    """Return the pieces of a frame that are to be joined. Arguments and errors: see `segment_objects`."""
     if depth.shape != (camera.height, camera.width) or color.shape != (*depth.shape, 3):
         raise ValueError(f"color {color.shape} and depth {depth.shape} do not match {camera.height} x {camera.width}")
     patches = find_patches(depth, camera, settings.patches, settings.support)
@@ -79,10 +78,24 @@ def segment_objects(
         up,
         jump=settings.patches.jump,
     )
-    group_of = group_patches(
-        regions, pieces, patches.inverse, trees, settings.rules, settings.threshold, patches.window, recording
-    )
-    labels = group_of.astype(np.int32)[pieces]
+    return Pieces(patches, pieces, Groups(regions, pieces, patches.inverse))
+
+
+def segment_objects(
+    color: np.ndarray,
+    depth: np.ndarray,
+    camera: Camera,
+    scorer: PairScorer = BY_SET_RULES,
+    settings: ObjectSettings | None = None,
+) -> ObjectFrame:
+    """Return the objects of a frame: RGB (H, W, 3) uint8 and z-depth (H, W) [m], 0 invalid, in the same pixels.
+
+    `scorer` says which patches are one object. Raises ValueError when the shapes do not match the camera.
+    """
+    settings = settings or ObjectSettings()
+    cut = cut_pieces(color, depth, camera, settings)
+    patches = cut.patches
+    labels = group_patches(cut.groups, scorer, settings.threshold).astype(np.int32)[cut.labels]
     labels = _holes_closed(labels, depth[patches.window] > 0, pixels_at(settings.largest_hole, depth.shape))
     large = np.bincount(labels.ravel()) >= pixels_at(settings.minimum_pixels, depth.shape)
     large[0] = False
