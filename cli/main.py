@@ -90,8 +90,8 @@ def run(arguments: list[str]) -> int:
     except (OSError, MemoryError) as error:  # inputs and outputs have their own words where they are opened
         if debug:
             raise
-        where = f"{error.filename}: " if getattr(error, "filename", None) else ""
-        say_error(f"{where}{getattr(error, 'strerror', None) or error or 'out of memory'} (the machine failed)")
+        where, what = getattr(error, "filename", None), getattr(error, "strerror", None)
+        say_error(f"{f'{where}: ' if where else ''}{what or str(error) or 'out of memory'} (the machine failed)")
         return MachineFailure.exit_code
     except Exception as error:
         if debug:

@@ -123,10 +123,10 @@ def marks_from_evaluation(evaluation: Path) -> tuple[dict[str, str], tuple[str, 
     except csv.Error as error:
         raise BadInput(f"{path}: no table: {error}", hint="evaluate again") from None
     for row in rows:
-        error, predicted, true = row.get("error") or "", row.get("predicted") or "", row.get("true") or ""
+        wrong, predicted, true = row.get("error") or "", row.get("predicted") or "", row.get("true") or ""
         if predicted:
             parent = row.get("true parent") or "nothing"
-            marks[predicted] = error + (f", truly on {parent}" if error == "wrong support" else "")
+            marks[predicted] = wrong + (f", truly on {parent}" if wrong == "wrong support" else "")
         elif true:
             missing.append(true)
     return marks, tuple(missing)
