@@ -90,8 +90,8 @@ def run(arguments: list[str]) -> int:
     except (OSError, MemoryError) as error:  # inputs and outputs have their own words where they are opened
         if debug:
             raise
-        where, what = getattr(error, "filename", None), getattr(error, "strerror", None)
-        say_error(f"{f'{where}: ' if where else ''}{what or str(error) or 'out of memory'} (the machine failed)")
+        place, what = getattr(error, "filename", None), getattr(error, "strerror", None)
+        say_error(f"{f'{place}: ' if place else ''}{what or str(error) or 'out of memory'} (the machine failed)")
         return MachineFailure.exit_code
     except Exception as error:
         if debug:

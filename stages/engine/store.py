@@ -24,7 +24,7 @@ from schemas.errors import BadInput, MachineFailure, UsageError
 from schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME
 from schemas.outside import file_content, json_of
 
-LARGEST_JOURNAL = 64 * 2**10
+LARGEST_JOURNAL = 2**20
 """Bytes."""
 AT_FDCWD = -100
 RENAME_EXCHANGE = 2
