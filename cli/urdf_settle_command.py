@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
+
+from cli.output import out
 
 BAD_INPUT = 3
 Engine = Literal["bullet", "mujoco"]
@@ -55,12 +56,10 @@ def urdf_settle(
     ]
     sound = report.settled and not report.collisions
     if json_output:
-        sys.stdout.write(json.dumps({"scene": str(scene), "sound": sound, **report.as_json()}) + "\n")
+        out(json.dumps({"scene": str(scene), "sound": sound, **report.as_json()}))
     else:
         for line in lines:
-            sys.stdout.write(f"{scene}: {line}\n")
+            out(f"{scene}: {line}")
         if sound:
-            sys.stdout.write(
-                f"{scene}: settles: {len(report.bodies)} movable bodies stay, {len(report.joints)} joints are free\n"
-            )
+            out(f"{scene}: settles: {len(report.bodies)} movable bodies stay, {len(report.joints)} joints are free")
     return 0 if sound else BAD_INPUT
