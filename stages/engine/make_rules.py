@@ -48,11 +48,11 @@ def makefile_for(pipeline: Pipeline) -> str:
             lines.append(f"{upper} ?= {variable.default}")
         elif not variable.optional:
             lines.append(f"$(if $({upper}),,$(error {pipeline.name} needs {upper}=... ({variable.description})))")
-    raw = {variable: what for variable, what in given_inputs(pipeline)}
-    for variable, what in raw.items():
+    raw = dict(given_inputs(pipeline))
+    for given, what in raw.items():
         if not what.weights:  # those may be the name of cached ones
-            reference = f"$({variable.upper()})"
-            missing = f"$(error {variable.upper()}={reference}: no such file or folder)"
+            reference = f"$({given.upper()})"
+            missing = f"$(error {given.upper()}={reference}: no such file or folder)"
             lines.append(f"$(if {reference},$(if $(wildcard {reference}),,{missing}))")
     lines += [".PHONY: all", "all: " + " ".join(f"$(FOLDER)/{step.name}/manifest.json" for step in pipeline.step), ""]
     for step in pipeline.step:
