@@ -124,8 +124,23 @@ def run(
         _out(json.dumps(facts, sort_keys=True))
     else:
         _out(str(out))
+    if not dry_run and not quiet:
+        _say_what_to_trust(reports)
     _say_what_was_not_ok(reports, accepted, tuple(chain.variables))
     return worst_exit_code(report.code(accepted) for report in reports)
+
+
+def _say_what_to_trust(reports: list[StepReport]) -> None:
+    from stages.report.outlook import Facts, outlook
+
+    facts = {
+        report.name: Facts(str(report.facts.get("outcome", "")), report.facts["summary"])
+        for report in reports
+        if report.facts.get("summary")
+    }
+    if "panoptic_map" in facts:
+        for line in outlook(facts).lines():
+            _say(line)
 
 
 def _say_what_was_not_ok(reports: list[StepReport], accepted: tuple[str, ...], variables: tuple[str, ...]) -> None:

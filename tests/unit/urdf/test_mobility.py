@@ -10,7 +10,7 @@ import trimesh
 
 from schemas.cad_scene import CadScene, CadSceneFile
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from schemas.scene_parts import Box, Plane, Relation
+from schemas.scene_parts import Box, Relation, SurfacePlane
 from stages.kit.formats.urdf_file import parse_urdf
 from stages.kit.geometry.convex_pieces import convex_pieces
 from stages.urdf.mobility import Mobility, mobility
@@ -18,7 +18,7 @@ from stages.urdf.parameters import UrdfParameters
 from stages.urdf.stage import run
 from tests.unit.urdf.small_room import context
 
-FLOOR = Plane(normal=(0.0, 0.0, 1.0), offset=0.0, center=(0.0, 0.0, 0.0), boundary=((-3, -3), (3, -3), (3, 3), (-3, 3)))
+FLOOR = SurfacePlane(normal=(0, 0, 1), offset=0.0, area=36.0, center=(0, 0, 0), horizontal=True)
 CARRIABLE = frozenset({"cup"})
 FREE = Mobility(True, furniture=True)
 
@@ -54,7 +54,7 @@ def graph_with(
         (graph_with("chair", gap=0.03), FREE),
         (graph_with("chair", gap=0.3), Mobility(False)),  # it stands on nothing that is known
         (graph_with("chair", on_top=True), Mobility(False)),
-        (graph_with("chair", relation="hangs_on"), Mobility(False)),
+        (graph_with("chair", relation="hangs_from"), Mobility(False)),
         (graph_with("cabinet"), Mobility(False)),
         (graph_with("sink"), Mobility(False)),
         (graph_with("cup", gap=0.3), Mobility(True)),
