@@ -23,8 +23,8 @@ $(FOLDER)/sequence/manifest.json: data/pipelines/reconstruct-without-poses.toml 
 $(FOLDER)/trajectory/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json
 	$(PYTHON) -m cli poses --sequence $(FOLDER)/sequence --method '$(POSES_METHOD)' --seed '$(SEED)' --accept tracking_lost --out $(FOLDER)/trajectory
 
-$(FOLDER)/segments/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(WEIGHTS)
-	$(PYTHON) -m cli segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments
+$(FOLDER)/segments/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(WEIGHTS) $(MASKS) $(LABELS)
+	$(PYTHON) -m cli segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') $(if $(MASKS),--masks '$(MASKS)') $(if $(LABELS),--labels '$(LABELS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments
 
 $(FOLDER)/panoptic_map/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/trajectory/manifest.json
 	$(PYTHON) -m cli fuse --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --trajectory $(FOLDER)/trajectory --voxel-size '$(VOXEL_SIZE)' --out $(FOLDER)/panoptic_map
