@@ -11,13 +11,13 @@ from schemas.errors import BadInput
 from schemas.vocabulary import load_vocabulary
 from stages.kit.declared import declared_in
 from stages.kit.formats.frames import Frame
+from stages.kit.labels import ANYTHING, Label, LabelSet, match_labels, read_label_file
 from stages.segment.backends.masks import MasksParameters
 from stages.segment.backends.masks.given import GivenFrame, MaskFormat, MaskSource, ReadSettings
 from stages.segment.backends.masks.listing import HINT, Listing
 from stages.segment.backends.masks.matching import WAYS, match_pictures
 from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame, pixels_at
-from stages.segment.labels import ANYTHING, Label, LabelSet, match_labels, read_label_file
 from stages.segment.naming import NamedSegment, name_segments
 from stages.segment.panoptic import PanopticFrame
 

@@ -9,6 +9,7 @@ import numpy as np
 from schemas.errors import BadInput, MachineFailure, MissingDependency
 from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame
+from stages.kit.labels import Label, LabelSet, match_labels, read_label_file
 from stages.kit.services.connection import Connection
 from stages.segment.backends.service import ServiceParameters
 from stages.segment.backends.service.protocol import (
@@ -25,7 +26,6 @@ from stages.segment.backends.service.protocol import (
 from stages.segment.backends.service.reply_cache import ReplyCache, prune
 from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame
-from stages.segment.labels import Label, LabelSet, match_labels, read_label_file
 from stages.segment.naming import NamedSegment, name_segments
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
