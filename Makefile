@@ -127,7 +127,7 @@ mosd-supports: setup ## Which object rests on which on real tabletop frames (QUI
 train-pairs: setup ## Train the trees of `segment --backend objects` anew (QUICK=1: few generated frames)
 	$(PYTHON) -m benchmarks.training.tabletop_pairs $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/train-pairs$(if $(QUICK),-quick)
 
-# About a quarter of an hour on one core; prints what stands in stages/segment/objects/rules.py.
+# About a quarter of an hour on one core; prints what stands in stages/segment/backends/objects/rules.py.
 pair-rules: setup ## Fit the rules of `segment --backend objects` anew (QUICK=1: few generated frames)
 	$(PYTHON) -m benchmarks.training.pair_rules $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/pair-rules$(if $(QUICK),-quick)
 

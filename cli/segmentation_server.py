@@ -18,11 +18,11 @@ from stages.kit.digests import external_digest
 from stages.kit.formats.frames import Frame
 from stages.kit.library_versions import library_version
 from stages.kit.stage import External, Optionally
-from stages.segment.backend_names import is_service
-from stages.segment.choice import NEEDS_COLOR, BackendRequest, choose_backend
+from stages.segment.backends.service.protocol import SegmentRequest
+from stages.segment.backends.service.server import SegmentationServer, revision_of, segment_request
+from stages.segment.choice import BackendRequest, choose_backend
 from stages.segment.parameters import STAGE, SegmentParameters
-from stages.segment.service.protocol import SegmentRequest
-from stages.segment.service.server import SegmentationServer, revision_of, segment_request
+from stages.segment.registry import backend_for
 from stages.segment.settings import geometric_settings
 
 _BLANK = SegmentRequest(
@@ -49,24 +49,25 @@ def open_server(
     """
     parameters = parameters_for(STAGE, given, read_config(config) if config else {}, str(config))
     assert isinstance(parameters, SegmentParameters)
-    if is_service(parameters.backend):
+    declared = backend_for(parameters.backend)
+    if declared.address:
         raise UsageError("a service cannot be served", hint="serve the backend behind it")
-    found = {role: _resolved(role, path) for role, path in files.items()}
+    resolved = {role: _resolved(role, path) for role, path in files.items()}
     device = choose_device(device)
     backend = choose_backend(
         BackendRequest(
             parameters,
-            found.get("weights"),
-            mask_weights=found.get("mask_weights"),
-            labels=found.get("labels"),
-            sidecar=found.get("sidecar"),
+            resolved.get("weights"),
+            mask_weights=resolved.get("mask_weights"),
+            labels=resolved.get("labels"),
+            sidecar=resolved.get("sidecar"),
             device=device,
         )
     )
     revision = revision_of(
         {
             "parameters": parameters_as_json(parameters),
-            "files": {role: external_digest(path) for role, path in found.items()},
+            "files": {role: external_digest(path) for role, path in resolved.items()},
             "libraries": library_versions(STAGE, parameters),
             "data_files": data_file_digests(STAGE, parameters),
             "stage_version": STAGE.version,
@@ -76,7 +77,7 @@ def open_server(
     )
     # Libraries load and kernels are compiled on first use: now, and not while a client waits.
     segment_request(_BLANK, backend, geometric_settings(parameters))
-    required = ("color",) if parameters.backend in NEEDS_COLOR else ("depth",)
+    required = ("color",) if "color" in declared.needs else ("depth",)
     return SegmentationServer(host, port, backend, geometric_settings(parameters), revision=revision, required=required)
 
 

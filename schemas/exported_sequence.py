@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from schemas.artifact import Artifact, Document
 from schemas.base import Model
@@ -11,9 +11,10 @@ from schemas.base import Model
 class ExportFile(Model):
     """export.json: what was written, and what the layout could not hold."""
 
-    layout: Literal["tum", "nerfstudio", "mcap"]
-    dialect: Literal["foxglove", "ros2"] | None = None
-    """Message types of the `mcap` layout."""
+    layout: str
+    """A layout of `export` (docs/FORMATS.md)."""
+    dialect: str | None = None
+    """Which of several formats of that layout: of `mcap`, the message types."""
     log: str
     """What to open, relative to this folder: `.` or a file."""
     cameras: tuple[str, ...]

@@ -25,6 +25,11 @@ class GraspFields(Model):
     p_G: Vector3
     theta_G: float
 
+    @property
+    def words(self) -> str:
+        """The action as people read it."""
+        return f"take {' and '.join(self.items)}"
+
 
 class PullFields(Model):
     """u_P: pull `item` over the table to `target`."""
@@ -36,12 +41,22 @@ class PullFields(Model):
     p_E: Vector3
     theta_E: float
 
+    @property
+    def words(self) -> str:
+        """The action as people read it."""
+        return f"pull {self.item} to {self.target}"
+
 
 class PullGraspFields(Model):
     """u_PG."""
 
     u_P: PullFields
     u_G: GraspFields
+
+    @property
+    def words(self) -> str:
+        """The action as people read it."""
+        return f"{self.u_P.words}, take both"
 
 
 class StackFields(Model):
@@ -52,6 +67,11 @@ class StackFields(Model):
     p_L: Vector3
     theta_L: float
 
+    @property
+    def words(self) -> str:
+        """The action as people read it."""
+        return f"stack {self.u_G.items[0]} on {self.onto}"
+
 
 class StackGraspFields(Model):
     """u_SG."""
@@ -59,7 +79,13 @@ class StackGraspFields(Model):
     u_S: StackFields
     u_G: GraspFields
 
+    @property
+    def words(self) -> str:
+        """The action as people read it."""
+        return f"{self.u_S.words}, take the pile"
 
+
+ActionFields = GraspFields | PullFields | PullGraspFields | StackFields | StackGraspFields
 ActionName = Literal["grasp", "pull", "pull_grasp", "stack", "stack_grasp"]
 FIELD_OF: dict[str, str] = {
     "grasp": "u_G", "pull": "u_P", "pull_grasp": "u_PG", "stack": "u_S", "stack_grasp": "u_SG",
@@ -86,6 +112,22 @@ class TablewareAction(Model):
         if given != [FIELD_OF[self.name]]:
             raise ValueError(f"a {self.name} has {FIELD_OF[self.name]} and nothing else, here: {given or 'nothing'}")
         return self
+
+    @classmethod
+    def of(cls, name: str, fields: ActionFields, *, seconds: float, risk: float) -> TablewareAction:
+        """Return the action of a name with its fields; pydantic's error where they do not go together."""
+        return cls.model_validate({"name": name, FIELD_OF[name]: fields, "seconds": seconds, "risk": risk})
+
+    @property
+    def fields(self) -> ActionFields:
+        """The one field that is set."""
+        fields: ActionFields = getattr(self, FIELD_OF[self.name])
+        return fields
+
+    @property
+    def words(self) -> str:
+        """The action as people read it."""
+        return self.fields.words
 
 
 class TablewareStep(Model):

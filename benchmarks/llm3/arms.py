@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from stages.pack.backtracking import Backtracking
+from stages.pack.backtracking import Backtracking, CornerBacktracking
 from stages.pack.hard_suites import HARD_CELLS, hard_instance
 from stages.pack.instances import PUBLISHED_CELLS, Instance, published_instance
 from stages.pack.language_proposer import LanguageProposer, SymbolicProposer
@@ -56,7 +56,7 @@ ARMS: dict[str, Arm] = {
     "random": Arm(RandomSampler, ("published/easy", "published/medium"), sampler=True),
     "random_restarts": Arm(RandomRestarts, sampler=True),
     "backtracking": Arm(Backtracking, sampler=True),
-    "backtracking_corners": Arm(lambda seed: Backtracking(seed, corners=True), sampler=True),
+    "backtracking_corners": Arm(CornerBacktracking, sampler=True),
 }
 
 

@@ -26,7 +26,6 @@ from benchmarks.mapping.tables import (
     printed_by_the_thesis,
     quality_by_class,
 )
-from stages.segment.choice import BUILDERS
 
 SEED = 0
 FRAMES, QUICK_FRAMES = 60, 40
@@ -67,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def default_cases() -> list[str]:
     """All cases that can be run here."""
-    return [*LEVELS, DRIFTING, *([NETWORK] if NETWORK in BUILDERS else [])]
+    return [*LEVELS, DRIFTING, NETWORK]
 
 
 def outcomes_file(options: argparse.Namespace, room: tuple[str, int], case: str) -> Path:

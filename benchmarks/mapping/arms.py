@@ -14,7 +14,7 @@ from stages.graph.parameters import GraphParameters
 from stages.segment.parameters import SegmentParameters
 
 LEVELS = {"clean": 0.0, "low": 0.15, "middle": 0.3, "high": 0.5}
-"""Corruption of the true masks by case (stages/segment/corruption.py)."""
+"""Corruption of the true masks by case (stages/segment/backends/ground_truth/corruption.py)."""
 NETWORK = "network"
 DRIFTING = "middle/drifting"
 """Masks of the middle level, poses that drift (drift.py)."""

@@ -29,7 +29,7 @@ from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.results import Part
 from stages.evaluate.truth import TrueRoom, load_truth
 from stages.fuse.mapping import PanopticMapper
-from stages.fuse.stage import write_map
+from stages.fuse.stage import new_mapper, write_map
 from stages.graph.stage import run as build_graph
 from stages.kit.formats.frames import Frame, FrameReader
 from stages.kit.measurement.average_precision import Candidates
@@ -37,11 +37,10 @@ from stages.kit.measurement.panoptic_quality import ClassQuality
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.fusion import fuse
 from stages.segment.geometric import GeometricFrame, GeometricSettings, segment_depth
 from stages.segment.parameters import SegmentParameters
 from stages.segment.settings import fusion_settings, geometric_settings
-from stages.segment.stage import describe
+from stages.segment.stage import FUSION, describe
 
 DRIFT_STREAM = 11
 
@@ -124,8 +123,7 @@ def build_maps(
 ) -> dict[str, PanopticMapper]:
     """Return the map of every arm after all frames of a case; adds the time of each to `seconds`."""
     vocabulary = load_vocabulary()
-    things = frozenset(entry.id for entry in vocabulary.classes if entry.kind == "thing")
-    mappers = {arm.name: PanopticMapper(arm.fuse, things) for arm in arms}
+    mappers = {arm.name: new_mapper(arm.fuse, vocabulary) for arm in arms}
     own = {"backend": NETWORK} if case == NETWORK else {"backend": "ground-truth", "corruption": _level(case)}
     backend = choose_backend(BackendRequest(SegmentParameters.model_validate(own), sequence=sequence, reader=reader))
     poses = np.array([entry.frame.world_from_camera for entry in shared])
@@ -139,6 +137,7 @@ def build_maps(
         for arm in arms:
             geometric, spent = entry.geometric[geometric_settings(arm.segment)]
             start = time.perf_counter()
+            fuse = FUSION[arm.segment.fusion]
             fused = fuse(geometric.labels, masks, geometric.points, fusion_settings(arm.segment), geometric.small)
             listing = describe(frame.index, fused).segments
             assert frame.depth is not None

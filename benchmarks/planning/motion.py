@@ -1,4 +1,4 @@
-"""Motion queries: four planners on the same seeded queries, one after the other in one process, CPU time each.
+"""Motion queries: three planners on the same seeded queries, one after the other in one process, CPU time each.
 
 A path counts as success when a mesh checker of its own finds it free at a third of the resolution; one that it does
 not is counted as rejected_by_mesh. No planner sees the check of another.

@@ -13,7 +13,6 @@ from ompl import util as ou
 from benchmarks.planning.motion_queries import CHAIN, MotionQuery
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.optimal import optimal_path
 from stages.kit.motion.path_query import Query
 from stages.kit.motion.path_search import find_path
 from stages.kit.motion.rrt_connect import SearchSpace, rrt_connect
@@ -26,9 +25,8 @@ SPACE = SearchSpace(CHAIN.lower, CHAIN.upper, np.full(7, RESOLUTION))
 SMOOTHING = 60
 """Attempts at a shortcut, for every planner."""
 SAMPLES = 20000
-"""Of ours; the old planner in Python gets the 2000 that it was used with."""
-PYTHON_SAMPLES = 2000
-BIT_ITERATIONS = 2000
+"""Of ours; the mesh fallback gets the 2000 that it is used with."""
+FALLBACK_SAMPLES = 2000
 OMPL_SECONDS = 20.0
 """Of CPU time, after which OMPL gives up."""
 Arm = Callable[[CollisionChecker, MotionQuery, int], np.ndarray | None]
@@ -49,22 +47,13 @@ def ours(checker: CollisionChecker, query: MotionQuery, seed: int) -> np.ndarray
         return None
 
 
-def ours_bit_star(checker: CollisionChecker, query: MotionQuery, seed: int) -> np.ndarray | None:
-    """OMPL's BIT* over the compiled check, shortcuts, confirmation by the meshes."""
-    try:
-        return optimal_path(
-            _query(query), checker, np.random.default_rng(seed), iterations=BIT_ITERATIONS, smoothing=SMOOTHING
-        )  # fmt: skip
-    except MotionFailed:
-        return None
-
-
-def python_pybullet(checker: CollisionChecker, query: MotionQuery, seed: int) -> np.ndarray | None:
-    """RRT-Connect in Python with pybullet's checks: what the compiled planner replaced."""
+def mesh_fallback(checker: CollisionChecker, query: MotionQuery, seed: int) -> np.ndarray | None:
+    """What searches where the compiled check refuses too much: OMPL's RRT-Connect with the meshes' checks, repeated
+    where the closer look at the path finds a hit."""
     try:
         return rrt_connect(
             query.start, query.goal, lambda arm: checker.check_meshes(np.concatenate([query.base, arm])), SPACE,
-            np.random.default_rng(seed), samples=PYTHON_SAMPLES, smoothing=SMOOTHING,
+            np.random.default_rng(seed), samples=FALLBACK_SAMPLES, smoothing=SMOOTHING,
         )  # fmt: skip
     except MotionFailed:
         return None
@@ -115,7 +104,6 @@ def ompl_pybullet(checker: CollisionChecker, query: MotionQuery, seed: int) -> n
 
 ARMS: dict[str, Arm] = {
     "ours": ours,
-    "ours_bit_star": ours_bit_star,
     "ompl_pybullet": ompl_pybullet,
-    "python_pybullet": python_pybullet,
+    "mesh_fallback": mesh_fallback,
 }

@@ -22,7 +22,7 @@ from schemas.panoptic_map import PanopticMap
 from schemas.sequence import Sequence as SequenceArtifact
 from stages.cad.candidates import Shortlist
 from stages.cad.model_surfaces import ModelSurface
-from stages.cad.stage import choose_and_write, find_candidates
+from stages.cad.stage import METHODS, choose_and_write, find_candidates
 from stages.engine.reading import open_artifact
 from stages.evaluate.correspondence import point_overlaps
 from stages.evaluate.map_measures import label_true_points, load_map
@@ -127,16 +127,15 @@ def _run_arm(
     graph = shared.graphs[of_graph]
     key = (case, panoptic_map.root, arm.cad.method)
     context = context_in(folder / "cad_scene", seed)
+    replacing = METHODS[arm.cad.method](arm.cad)
     if key not in shared.found:
         surfaces: dict[str, ModelSurface] = {}
         start = time.process_time()
-        shortlists = find_candidates(graph, panoptic_map, library, surfaces, arm.cad, context)
+        shortlists = find_candidates(graph, panoptic_map, library, surfaces, replacing, context)
         shared.found[key] = Found(shortlists, surfaces, time.process_time() - start)
     found = shared.found[key]
     start = time.process_time()
-    scene = choose_and_write(
-        graph, panoptic_map, library, found.shortlists, found.surfaces, parameters=arm.cad, context=context
-    )
+    scene = choose_and_write(graph, panoptic_map, library, found.shortlists, found.surfaces, replacing, context)
     seconds = found.seconds + time.process_time() - start
     settled = settle(scene, folder / "interactive_scene", seed)
     if panoptic_map.root not in shared.overlaps:

@@ -20,7 +20,7 @@ from schemas.segments import FrameSegment
 from schemas.vocabulary import load_vocabulary
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import look_at
-from stages.segment.fusion import fuse
+from stages.segment.fusion_ours import fuse
 from stages.segment.geometric import segment_depth
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 from stages.segment.parameters import SegmentParameters

@@ -112,15 +112,14 @@ Mesh = Callable[[], tuple[np.ndarray, np.ndarray]]
 def ours(frames: dict[str, np.ndarray], voxel_size: float, whole: bool) -> tuple[Step, Mesh]:
     """Return what integrates frame k, and what gives the mesh. `whole`: with association, counts and merges."""
     from stages.fuse.integration import integrate
-    from stages.fuse.mapping import PanopticMapper
     from stages.fuse.parameters import FuseParameters
     from stages.fuse.smoothing import smoothed_tsdf
+    from stages.fuse.stage import new_mapper
     from stages.fuse.surface import extract_surface
 
     options = FuseParameters(voxel_size=voxel_size, truncation_voxels=TRUNCATION_VOXELS, maximum_depth=RANGE)
     vocabulary = load_vocabulary()
-    things = frozenset(entry.id for entry in vocabulary.classes if entry.kind == "thing")
-    mapper = PanopticMapper(options, things)
+    mapper = new_mapper(options, vocabulary)
     classes = [vocabulary.by_name(name) for name, _, _ in room()]
     listings = []
     for image in frames["ids"]:

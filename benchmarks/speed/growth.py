@@ -98,8 +98,9 @@ def frame_at(frames: list[CorridorFrame], number: int, standing: bool) -> tuple[
 def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standing: bool) -> list[dict[str, float]]:
     """Fuse `count` frames; return one row of figures for each window of the walk, the last with the extraction."""
     from stages.fuse import mapping
+    from stages.fuse.ours import Ours
     from stages.fuse.parameters import FuseParameters
-    from stages.fuse.stage import write_map
+    from stages.fuse.stage import new_mapper, write_map
 
     timers = Timers()
     for name in ("index_segments", "measure_overlap"):
@@ -108,7 +109,6 @@ def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standi
     timers.wrap(mapping.PanopticMapper, "regularize", "regularisation")
     timers.wrap(mapping.PanopticMapper, "_associate", "labels")
     options = FuseParameters(voxel_size=voxel_size, maximum_depth=RANGE)
-    things = frozenset(entry.id for entry in load_vocabulary().classes if entry.kind == "thing")
 
     def extract(mapper: mapping.PanopticMapper) -> int:
         with tempfile.TemporaryDirectory() as folder:
@@ -119,7 +119,7 @@ def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standi
         frame, pose = frame_at(frames, number, standing)
         mapper.add_frame(CAMERA, frame.depth, frame.color, pose, frame.ids, frame.listing)
 
-    warm = mapping.PanopticMapper(options.model_copy(update={"voxel_size": 0.08}), things)
+    warm = new_mapper(options.model_copy(update={"voxel_size": 0.08}), load_vocabulary())
     for number in range(12):
         add(warm, number)
     extract(warm)
@@ -127,7 +127,8 @@ def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standi
     timers.taken()
     reset_peak()
     before = memory("VmRSS")
-    mapper = mapping.PanopticMapper(options, things)
+    merging = Ours(options, frozenset(entry.id for entry in load_vocabulary().classes if entry.kind == "thing"))
+    mapper = mapping.PanopticMapper(options, merging)
     rows = []
     edges = np.unique(np.linspace(0, count, WINDOWS + 1).astype(int))
     for start, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
@@ -153,8 +154,8 @@ def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standi
                 "memory_mb": memory("VmHWM") - before,
                 "blocks": float(mapper.blocks.count),
                 "segment_labels": float(len(mapper.labels.table()) - 1),
-                "segments_counted": float(len(mapper.counts.by_segment)),
-                "pairs": float(len(mapper.shared.together) + len(mapper.shared.apart)),
+                "segments_counted": float(len(merging.counts.by_segment)),
+                "pairs": float(len(merging.shared.together) + len(merging.shared.apart)),
             }
         )
     start_extraction = time.process_time()
@@ -166,7 +167,7 @@ def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standi
 
 def segment_parts(frames: list[CorridorFrame]) -> dict[str, float]:
     """Return processor ms a frame of `segment` without its network, by part, and the peak memory [MB]."""
-    from stages.segment.fusion import fuse
+    from stages.segment.fusion_ours import fuse
     from stages.segment.geometric import segment_depth
     from stages.segment.parameters import SegmentParameters
     from stages.segment.settings import fusion_settings, geometric_settings

@@ -26,7 +26,8 @@ from schemas.scene_parts import Camera
 from stages.kit.geometry.cameras import back_project, intrinsic_matrix
 from stages.kit.geometry.transforms import look_at
 from stages.kit.rendering.ray_casting import SceneRenderer
-from stages.segment.fusion import FusionSettings, fuse
+from stages.segment.fusion import FusionSettings
+from stages.segment.fusion_ours import fuse
 from stages.segment.geometric import (
     GeometricSettings,
     depth_discontinuity,
@@ -210,7 +211,7 @@ def measure(repeats: int, weights: Path | None) -> dict[str, Timing]:
         "open3d/normals": median_seconds(lambda k: open3d_normals(pick(smooth, k)), slow),
     }
     if weights is not None:
-        from stages.segment.yolox import Detector
+        from stages.segment.backends.detector.yolox import Detector
 
         color = np.random.default_rng(1).integers(0, 255, (480, 640, 3), dtype=np.uint8)
         for name, side in (("detector-whole-image", 0), ("detector-tiles", 480)):

@@ -19,6 +19,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+from benchmarks.stitch.trials_printed import PAIRS, printed_rows
 from benchmarks.stitch.trials_records import Run, read_runs
 from stages.suture.evaluation.trial_figures import metrics, table
 from stages.suture.trials.machine import run_trial
@@ -76,8 +77,8 @@ def main() -> None:
         with log.open("a", encoding="utf-8") as stream:
             stream.writelines(run.model_dump_json() + "\n" for run in rows)
     runs = [run for run in read_runs(log) if run.seed in seeds]
-    (options.out / "metrics.json").write_text(json.dumps(metrics(runs), indent=1, sort_keys=True) + "\n")
-    (options.out / "table.md").write_text(table(runs), encoding="utf-8")
+    (options.out / "metrics.json").write_text(json.dumps(metrics(runs, PAIRS), indent=1, sort_keys=True) + "\n")
+    (options.out / "table.md").write_text(table(runs, PAIRS, printed_rows()), encoding="utf-8")
     pictures(options.out, runs, first)
     print(options.out / "table.md")
 

@@ -15,10 +15,12 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from benchmarks.run_log import read_log
 from benchmarks.stitch.trials import REPORTING
 from benchmarks.stitch.trials_records import Run
-from stages.suture.evaluation.trial_figures import interval_of
+from stages.kit.measurement.bootstrap import bootstrap_interval
 from stages.suture.trials.machine import run_trial
 from stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
 from stages.suture.trials.records import run_of
@@ -60,17 +62,21 @@ def one(arm: str, seed: int, sight: str, model: PerceptionModel) -> Look:
 def table(rows: Sequence[Look], model: PerceptionModel) -> str:
     """Return table.md of trials of one arm and one sight."""
     kinds = " ".join(str(sum(row.errors.count(kind) for row in rows)) for kind in "IEHT")
-    low, high = interval_of([row.sutures for row in rows])
-    other = interval_of([row.model_sutures for row in rows])
+    seen, modelled = (
+        bootstrap_interval(np.array(sutures), np.random.default_rng(0))
+        for sutures in ([row.sutures for row in rows], [row.model_sutures for row in rows])
+    )
+    assert seen is not None and modelled is not None  # a table has a row
     lines = [
         f"# {rows[0].arm} that sees by {SIGHTS[rows[0].sight]}\n",
         f"{len(rows)} trials, seeds {min(r.seed for r in rows)} to {max(r.seed for r in rows)}.\n",
         "| seen by | sutures to failure | seconds a suture | I E H T | closed |",
         "|---|---|---|---|---|",
-        f"| {rows[0].sight} | {sum(row.sutures for row in rows) / len(rows):.2f} [{low:.2f}, {high:.2f}] "
+        f"| {rows[0].sight} | {sum(row.sutures for row in rows) / len(rows):.2f} [{seen.low:.2f}, {seen.high:.2f}] "
         f"| {sum(row.seconds for row in rows) / sum(row.attempts for row in rows):.0f} | {kinds} "
         f"| {sum(row.sutures >= 6 for row in rows)} |",
-        f"| error model | {sum(row.model_sutures for row in rows) / len(rows):.2f} [{other[0]:.2f}, {other[1]:.2f}] "
+        f"| error model | {sum(row.model_sutures for row in rows) / len(rows):.2f} "
+        f"[{modelled.low:.2f}, {modelled.high:.2f}] "
         f"| {sum(row.model_seconds for row in rows) / sum(row.model_attempts for row in rows):.0f} | "
         f"| {sum(row.model_sutures >= 6 for row in rows)} |",
         "",

@@ -28,11 +28,12 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from stages.kit.drawing.palette import instance_color
 from stages.kit.measurement.bootstrap import bootstrap_interval
-from stages.segment.objects.backend import BUNDLED
-from stages.segment.objects.boosting import read_trees
-from stages.segment.objects.pairs import FEATURES
-from stages.segment.objects.plain import segment_plain
-from stages.segment.objects.segmentation import segment_objects
+from stages.segment.backends.objects.backend import BUNDLED
+from stages.segment.backends.objects.boosting import read_trees
+from stages.segment.backends.objects.grouping import by_trees
+from stages.segment.backends.objects.pairs import FEATURES
+from stages.segment.backends.objects.plain import segment_plain
+from stages.segment.backends.objects.segmentation import segment_objects
 
 CAMERA = Camera(width=640, height=480, fx=525.0, fy=525.0, cx=319.5, cy=239.5)
 DEPTH_UNIT = 1e-4
@@ -122,7 +123,7 @@ def arms() -> dict[str, Segmenter]:
     return {
         "plain": lambda color, depth: segment_plain(depth, CAMERA),
         "geometric": lambda color, depth: segment_objects(color, depth, CAMERA).labels,
-        "ours": lambda color, depth: segment_objects(color, depth, CAMERA, trees=trees).labels,
+        "ours": lambda color, depth: segment_objects(color, depth, CAMERA, by_trees(trees)).labels,
     }
 
 

@@ -36,11 +36,11 @@ from stages.engine.reading import open_artifact
 from stages.kit.drawing.palette import entity_color
 from stages.kit.formats.frames import Frame, FrameReader
 from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
-from stages.segment.fusion import fuse
+from stages.segment.backends.network.backend import Predictor, load_predictor
+from stages.segment.backends.network.features import mount_of_pose
+from stages.segment.backends.network.weights import BUNDLED
+from stages.segment.fusion_ours import fuse
 from stages.segment.geometric import segment_depth
-from stages.segment.network.backend import Predictor, load_predictor
-from stages.segment.network.features import mount_of_pose
-from stages.segment.network.weights import BUNDLED
 from stages.segment.panoptic import PanopticFrame
 from stages.segment.parameters import SegmentParameters
 from stages.segment.settings import fusion_settings, geometric_settings

@@ -8,11 +8,11 @@ from time import process_time
 import numpy as np
 
 from benchmarks.tidy.records import Run
-from stages.tableware.planning.actions import Action
-from stages.tableware.planning.choice import RULES
+from stages.tableware.planning.action import Action
+from stages.tableware.planning.choice import declared_policy
 from stages.tableware.planning.joint import JointPolicy, plan, rules_in
 from stages.tableware.planning.optimum import Optimum
-from stages.tableware.planning.policies import Policy, PullPolicy, RandomOne, RandomPile, StackPolicy
+from stages.tableware.planning.policy import Policy
 from stages.tableware.planning.rules import Rules
 from stages.tableware.planning.time_model import (
     EXACT,
@@ -23,11 +23,15 @@ from stages.tableware.planning.time_model import (
     with_spills,
     with_thesis_failures,
 )
+from stages.tableware.policies.pull import PullPolicy
+from stages.tableware.policies.random import RandomOne
+from stages.tableware.policies.random_piles import RandomPile
+from stages.tableware.policies.stack import StackPolicy
 from stages.tableware.simulation.fast import Trial, run_trial
 from stages.tableware.world.items import Table
 from stages.tableware.world.scenes import make_table
 
-OURS = RULES
+OURS = {name: declared_policy(name).rules for name in ("ours", "ours_without_loaded_pulls", "ours_bold")}
 SIMPLE = ("random", "random_piles", "stack", "pull")
 ARMS = (*SIMPLE, *OURS, "optimum")
 WORLDS: dict[str, Chances] = {
@@ -87,7 +91,7 @@ def trials(tier: str, world: str, seed: int, arm: str, tag: str = "") -> list[Ru
                 model,
                 chances,
                 (tier, seed),
-                lambda _, m=model, f=found: JointPolicy(OURS[arm], m, chances, found=f),  # type: ignore[misc]
+                lambda _, m=model, f=found: JointPolicy(OURS[arm], m, chances, made=f),  # type: ignore[misc]
             )
         elif not done:
             done = _draws(table, model, chances, (tier, seed), _simple(arm, seed))

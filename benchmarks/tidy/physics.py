@@ -16,11 +16,11 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+from benchmarks.tidy.arms import OURS
 from benchmarks.tidy.physics_records import PhysicsRun, metrics, read_runs, table
-from stages.tableware.planning.choice import RULES as OURS
 from stages.tableware.planning.choice import make_policy
 from stages.tableware.planning.joint import JointPolicy
-from stages.tableware.planning.policies import Policy
+from stages.tableware.planning.policy import Policy
 from stages.tableware.planning.time_model import EXACT
 from stages.tableware.simulation.arm_times import arm_times
 from stages.tableware.simulation.physics_trial import run_physics_trial

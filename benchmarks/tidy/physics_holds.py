@@ -20,7 +20,7 @@ import numpy as np
 
 from benchmarks.run_log import whole_lines
 from stages.kit.measurement.proportions import wilson_interval
-from stages.tableware.planning.actions import grasp, grasp_two
+from stages.tableware.actions.grasp import grasp, grasp_two
 from stages.tableware.simulation.physics import PhysicsTable
 from stages.tableware.world.footprints import footprint
 from stages.tableware.world.items import Item, Kind, Table, make_item, stand_height

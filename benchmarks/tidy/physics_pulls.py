@@ -23,7 +23,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.run_log import whole_lines
-from stages.tableware.planning.actions import Pull, pull_grasp
+from stages.tableware.actions.pull import Pull
+from stages.tableware.actions.pull_grasp import pull_grasp
 from stages.tableware.planning.rules import Rules
 from stages.tableware.simulation.holds import PAD, PAD_WIDTH
 from stages.tableware.simulation.physics import PhysicsTable, Speeds

@@ -19,7 +19,7 @@ from benchmarks.training.validation import KNOWN, quality_of
 from schemas.vocabulary import load_vocabulary
 from stages.engine.chain import run_command
 from stages.kit.measurement.panoptic_quality import average_quality
-from stages.segment.network.backend import load_predictor
+from stages.segment.backends.network.backend import load_predictor
 
 LIBRARY_SEED, LIBRARY_SHAPES = 41, 12
 """Seed and shapes of every class of the training's own library; other experiments use seeds 0 and 1."""

@@ -6,7 +6,7 @@ Pairs come from where those of the trees come from (tabletop_pairs.py): generate
 `learn` frames; never `test`. They are recorded with grouping by the truth, by rules set by hand, and twice by the rules
 fitted before. For each kind of pair rules are chosen one by one, that with the largest score statistic first, and all
 weights are fitted anew after each (logistic regression); the sign of every weight is given (JOINS). Prints the table
-for stages/segment/objects/rules.py, and five-fold cross-validation over `learn`; writes both to `rules.json`.
+for stages/segment/backends/objects/rules.py, and five-fold cross-validation over `learn`; writes both to `rules.json`.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ from scipy.optimize import minimize
 
 from benchmarks.tables.mosd import CAMERA, LabelledFrame, read_frames
 from benchmarks.tables.object_masks import score_object_masks
+from benchmarks.training.pair_recording import pairs_of_frame
 from benchmarks.training.tabletop_pairs import FOLDS, GENERATED, GENERATED_QUICK, generated_frames
 from schemas.errors import BadInput
-from stages.segment.objects.grouping import Recording
-from stages.segment.objects.rules import (
+from stages.segment.backends.objects.grouping import by_rules
+from stages.segment.backends.objects.rules import (
     APART,
     CUT,
     OVER,
@@ -36,7 +37,7 @@ from stages.segment.objects.rules import (
     rule_table,
     term_values,
 )
-from stages.segment.objects.segmentation import ObjectSettings, segment_objects
+from stages.segment.backends.objects.segmentation import segment_objects
 
 JOINS = {
     "histogram": 1,
@@ -114,8 +115,7 @@ def recorded(frames: Iterable[LabelledFrame], table: np.ndarray, by_truth: float
     """Return the pairs that grouping by a table of rules meets, the share `by_truth` of the joints by the truth."""
     features, answers, weights = [], [], []
     for k, frame in enumerate(frames):
-        recording = Recording(frame.objects, np.random.default_rng([seed, k]), by_truth)
-        segment_objects(frame.color, frame.depth, CAMERA, ObjectSettings(rules=table), recording=recording)
+        recording = pairs_of_frame(frame, by_rules(table), by_truth, np.random.default_rng([seed, k]))
         known = recording.answers >= 0
         count = int(known.sum())
         features.append(recording.features[known])
@@ -230,9 +230,9 @@ def main() -> None:
     scores = []
     for fold in np.array_split(np.arange(len(frames)), FOLDS):
         seen = [rows for recording in real for k, rows in enumerate(recording) if k not in fold]
-        settings = ObjectSettings(rules=rule_table(*fit(joined([*generated, *seen]))))
+        scorer = by_rules(rule_table(*fit(joined([*generated, *seen]))))
         for k in fold:
-            found = segment_objects(frames[k].color, frames[k].depth, CAMERA, settings).labels
+            found = segment_objects(frames[k].color, frames[k].depth, CAMERA, scorer).labels
             scores.append(score_object_masks(frames[k].objects, found))
     result = {
         "start": start,

@@ -14,7 +14,7 @@ from benchmarks.training.targets import IGNORED, Targets, make_targets
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from schemas.vocabulary import load_vocabulary
-from stages.segment.network.features import STRIDE, Mount, features
+from stages.segment.backends.network.features import STRIDE, Mount, features
 
 CROP_WIDTH, CROP_HEIGHT = 256, 192
 COLOR_DROPOUT, GRAVITY_DROPOUT, FLOOR_DROPOUT = 0.35, 0.3, 0.35

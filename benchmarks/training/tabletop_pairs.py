@@ -23,14 +23,15 @@ import numpy as np
 
 from benchmarks.tables.mosd import CAMERA, LabelledFrame, read_frames
 from benchmarks.tables.object_masks import score_object_masks
+from benchmarks.training.pair_recording import pairs_of_frame
 from benchmarks.training.tabletops import make_tabletop
 from benchmarks.training.tree_growing import grow_trees
 from schemas.errors import BadInput
-from stages.segment.objects.backend import BUNDLED
-from stages.segment.objects.boosting import NO_TREES, Trees, write_trees
-from stages.segment.objects.grouping import Recording
-from stages.segment.objects.pairs import FEATURES
-from stages.segment.objects.segmentation import segment_objects
+from stages.segment.backends.objects.backend import BUNDLED
+from stages.segment.backends.objects.boosting import Trees, write_trees
+from stages.segment.backends.objects.grouping import PairScorer, by_trees
+from stages.segment.backends.objects.pairs import FEATURES
+from stages.segment.backends.objects.segmentation import BY_SET_RULES, segment_objects
 
 GENERATED, GENERATED_QUICK = 160, 10
 FIRST_TREES, LAST_TREES = 120, 240
@@ -62,12 +63,11 @@ def generated_frames(count: int, folder: Path) -> Iterable[LabelledFrame]:
             yield LabelledFrame(str(seed), kept["color"], kept["depth"], kept["labels"], kept["labels"])
 
 
-def record_pairs(frames: Iterable[LabelledFrame], trees: Trees, by_truth: float) -> list[Pairs]:
+def record_pairs(frames: Iterable[LabelledFrame], scorer: PairScorer, by_truth: float) -> list[Pairs]:
     """Return the pairs that grouping meets in every frame."""
     result = []
     for k, frame in enumerate(frames):
-        recording = Recording(frame.objects, np.random.default_rng([SEED, k]), by_truth)
-        segment_objects(frame.color, frame.depth, CAMERA, trees=trees, recording=recording)
+        recording = pairs_of_frame(frame, scorer, by_truth, np.random.default_rng([SEED, k]))
         known = recording.answers >= 0
         result.append(Pairs(recording.features[known], recording.answers[known].astype(float)))
     return result
@@ -93,7 +93,7 @@ def cross_validate(generated: list[Pairs], real: list[list[Pairs]], frames: list
         seen = [pairs for recording in real for k, pairs in enumerate(recording) if k not in fold]
         trees = train(generated, seen, LAST_TREES)
         for k in fold:
-            found = segment_objects(frames[k].color, frames[k].depth, CAMERA, trees=trees).labels
+            found = segment_objects(frames[k].color, frames[k].depth, CAMERA, by_trees(trees)).labels
             scores.append(score_object_masks(frames[k].objects, found))
     return {
         "overlap_f": float(np.mean([score.overlap.f for score in scores])),
@@ -116,11 +116,11 @@ def main() -> None:
         raise SystemExit(str(error)) from None
     arguments.out.mkdir(parents=True, exist_ok=True)
     folder, count = arguments.out / "tabletops", GENERATED_QUICK if arguments.quick else GENERATED
-    generated = record_pairs(generated_frames(count, folder), NO_TREES, 1.0)
-    real = [record_pairs(real_frames, NO_TREES, 1.0)]
+    generated = record_pairs(generated_frames(count, folder), BY_SET_RULES, 1.0)
+    real = [record_pairs(real_frames, BY_SET_RULES, 1.0)]
     first = train(generated, real[0], FIRST_TREES)
-    generated += record_pairs(generated_frames(count, folder), first, BY_TRUTH)
-    real.append(record_pairs(real_frames, first, BY_TRUTH))
+    generated += record_pairs(generated_frames(count, folder), by_trees(first), BY_TRUTH)
+    real.append(record_pairs(real_frames, by_trees(first), BY_TRUTH))
     trees = train(generated, [pairs for recording in real for pairs in recording], LAST_TREES)
     weights = arguments.out / BUNDLED.name
     write_trees(weights, trees, FEATURES, f"{count} generated tabletops and mOSD learn, seed {SEED}")

@@ -18,9 +18,9 @@ from benchmarks.training.samples import FrameSet
 from benchmarks.training.validation import KNOWN, STUFF
 from schemas.vocabulary import load_vocabulary
 from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
-from stages.segment.network.backend import load_predictor
-from stages.segment.network.features import STRIDE, Mount, features
-from stages.segment.network.grouping import GroupingSettings, group
+from stages.segment.backends.network.backend import load_predictor
+from stages.segment.backends.network.features import STRIDE, Mount, features
+from stages.segment.backends.network.grouping import GroupingSettings, group
 
 GRID = {
     "centre_threshold": (0.1, 0.15, 0.2),

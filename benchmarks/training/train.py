@@ -21,9 +21,9 @@ from torch.nn import functional
 from benchmarks.training.run import TrainingRun, rate_at, train
 from benchmarks.training.samples import FrameSet, varied
 from benchmarks.training.targets import IGNORED, Targets
-from stages.segment.network.features import CHANNELS
-from stages.segment.network.model import PanopticNetwork, Widths
-from stages.segment.network.weights import save_checkpoint
+from stages.segment.backends.network.features import CHANNELS
+from stages.segment.backends.network.model import PanopticNetwork, Widths
+from stages.segment.backends.network.weights import save_checkpoint
 
 PEAK_RATE, WEIGHT_DECAY = 4e-3, 0.02
 WARM_UP, WHOLE_FRAMES = 0.04, 0.12

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from stages.segment.objects.boosting import Trees
+from stages.segment.backends.objects.boosting import Trees
 
 BINS = 64
 

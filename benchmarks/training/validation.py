@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks.training.samples import FrameSet
 from schemas.vocabulary import load_vocabulary
 from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
-from stages.segment.network.backend import Predictor, load_predictor
-from stages.segment.network.features import Mount
+from stages.segment.backends.network.backend import Predictor, load_predictor
+from stages.segment.backends.network.features import Mount
 
 
 @dataclass(frozen=True)

@@ -1,28 +1,19 @@
-"""What makes one placed model a better stand-in than another, and what rules one out."""
+"""Ours: what makes one placed model a better stand-in than another."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from schemas.contact_graph import ContactGraphFile, GraphNode
 from stages.cad.free_space import FreeSpace
 from stages.cad.matching import Match
 from stages.cad.model_surfaces import ModelSurface, to_world
 from stages.cad.parameters import CadParameters
-from stages.cad.placing import (
-    facing_wall,
-    is_upright,
-    placed_planes,
-    size_misfit,
-    supporting_surface,
-    surface_share,
-    wall_depth,
-)
+from stages.cad.placing import facing_wall, is_upright, placed_planes, size_misfit, surface_share
 from stages.cad.shapes import Placement
+from stages.cad.target import Surroundings
 from stages.kit.geometry.boxes import bottom
 
 MOST_MOVE = 0.2
@@ -31,26 +22,6 @@ CONTACT = 0.003
 """Points of a model that are this near to its lowest one bear it [m]."""
 LEAST_MARGIN = 0.002
 """What tips over at a smaller push than this does not stay as it lies [m]."""
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """An object of the graph, and what its stand-in has to get along with."""
-
-    node: GraphNode
-    graph: ContactGraphFile
-    free_space: FreeSpace
-
-    @property
-    def walls(self) -> list[GraphNode]:
-        """Nodes of walls."""
-        return [entry for entry in self.graph.nodes if entry.class_name == "wall"]
-
-    @property
-    def hangs(self) -> bool:
-        """Whether it stands on nothing: on a wall, from the ceiling."""
-        link = self.graph.parent_link(self.node.id)
-        return link is not None and link.relation in ("carries_on_wall", "hangs_from")
 
 
 def score_of(
@@ -98,26 +69,13 @@ def carrying_misfit(placement: Placement, around: Surroundings) -> float:
     return float(np.mean(moves)) if moves else 0.0
 
 
-def why_invalid(
-    placement: Placement,
-    surface: ModelSurface,
-    around: Surroundings,
-    parameters: CadParameters,
-) -> str | None:
-    """Return why a placement is no candidate whatever it carries, or None: scale, error, balance, walls."""
-    if not parameters.minimum_scale <= placement.scale <= parameters.maximum_scale:
-        return "refined scale out of range"
-    if parameters.method == "ours" and placement.alignment_error > parameters.maximum_alignment_error:
-        return "alignment error too large"
+def would_tip(placement: Placement, surface: ModelSurface) -> bool:
+    """Whether a placed model that does not stand upright would not stay as it lies."""
+    if is_upright(placement):
+        return False
     points = to_world(placement, surface.hull_points(placement.shape.joints))
-    if parameters.method == "ours" and not is_upright(placement) and not around.hangs:
-        center = to_world(placement, surface.center_of_mass(placement.shape.joints)[None])[0]
-        if balance_margin(points, center) < LEAST_MARGIN:
-            return "does not stay as it lies"
-    box = around.node.box
-    if box is not None and wall_depth(points, np.asarray(box.center), around.walls) > parameters.wall_penetration:
-        return "stands in a wall"
-    return None
+    center = to_world(placement, surface.center_of_mass(placement.shape.joints)[None])[0]
+    return balance_margin(points, center) < LEAST_MARGIN
 
 
 def balance_margin(points: np.ndarray, center_of_mass: np.ndarray) -> float:
@@ -129,23 +87,3 @@ def balance_margin(points: np.ndarray, center_of_mass: np.ndarray) -> float:
     except (QhullError, ValueError):
         return -math.inf
     return float(-(polygon.equations[:, :2] @ center_of_mass[:2] + polygon.equations[:, 2]).max())
-
-
-def unsupported_children(placement: Placement, around: Surroundings, parameters: CadParameters) -> tuple[str, ...]:
-    """Return the children for which no surface of the placed model satisfies (2.2) near where they stand."""
-    planes = placed_planes(placement)
-    missing = []
-    for link in around.graph.links:
-        child = around.graph.node(link.target).box
-        if link.source != around.node.id or link.relation not in ("supports", "contains") or child is None:
-            continue
-        found = supporting_surface(
-            planes,
-            child,
-            bottom(child),
-            area_threshold=parameters.area_threshold,
-            tolerance=parameters.support_tolerance,
-        )
-        if found is None:
-            missing.append(link.target)
-    return tuple(missing)

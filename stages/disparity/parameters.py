@@ -12,6 +12,9 @@ from schemas.errors import UsageError
 from schemas.sequence import Sequence
 from stages.kit.stage import External, Optionally, Parameters, Stage
 
+NETWORKS = ("raft-stereo",)
+"""Methods that are networks: they need weights, and torch."""
+
 
 class DisparityParameters(Parameters):
     """Options of `disparity`."""
@@ -56,12 +59,14 @@ class DisparityParameters(Parameters):
 def check_inputs(parameters: DisparityParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for options and inputs that do not go together."""
     given = inputs.get("weights") is not None
-    if parameters.method == "raft-stereo" and not given:
+    network = parameters.method in NETWORKS
+    if network and not given:
         raise UsageError(
-            "--method raft-stereo needs --weights", hint="the authors' raftstereo-*.pth, or the .safetensors made of it"
+            f"--method {parameters.method} needs --weights",
+            hint="the authors' raftstereo-*.pth, or the .safetensors made of it",
         )
-    if parameters.method == "semi-global" and given:
-        raise UsageError("--method semi-global reads no --weights", hint="--method raft-stereo")
+    if given and not network:
+        raise UsageError(f"--method {parameters.method} reads no --weights", hint=f"--method {' or '.join(NETWORKS)}")
     if (parameters.lowest_disparity is None) != (parameters.levels is None):
         raise UsageError("--lowest-disparity and --levels go together", hint="give both, or neither")
     if parameters.levels is not None and parameters.levels % 16:

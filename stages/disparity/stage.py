@@ -59,11 +59,10 @@ def run(sequence: Sequence, weights: Path | None, *, parameters: DisparityParame
 
 def open_matcher(parameters: DisparityParameters, weights: Path | None, context: Context) -> tuple[Matcher, str]:
     """Return the matcher of the options and what it is, for people. Raises BadInput for weights that do not fit."""
-    if parameters.method == "raft-stereo":
-        assert weights is not None
-        from stages.disparity.raft.matching import open_raft
+    return MATCHERS[parameters.method](parameters, weights, context)
 
-        return open_raft(weights, parameters.iterations, parameters.agreement, context.device)
+
+def _semi_global(parameters: DisparityParameters, weights: Path | None, context: Context) -> tuple[Matcher, str]:
     settings = semi_global.SemiGlobalSettings(
         effort=parameters.effort, block_size=parameters.block_size, agreement=parameters.agreement,
         refine=parameters.refine,
@@ -72,6 +71,19 @@ def open_matcher(parameters: DisparityParameters, weights: Path | None, context:
         lambda left, right, limits: semi_global.match(left, right, settings, limits),
         f"semi-global matching, effort {settings.effort}, blocks of {settings.block_size} px, both directions",
     )
+
+
+def _raft_stereo(parameters: DisparityParameters, weights: Path | None, context: Context) -> tuple[Matcher, str]:
+    assert weights is not None  # the declaration asks for them
+    from stages.disparity.raft.matching import open_raft
+
+    return open_raft(weights, parameters.iterations, parameters.agreement, context.device)
+
+
+MATCHERS: dict[str, Callable[[DisparityParameters, Path | None, Context], tuple[Matcher, str]]] = {
+    "semi-global": _semi_global,
+    "raft-stereo": _raft_stereo,
+}
 
 
 def _match_all(
@@ -105,9 +117,9 @@ def _match_all(
             camera, baseline = cameras[frame.camera_name], baselines[frame.camera_name]
             left, right = frame.color, _put_right(frame, rows[frame.camera_name], reader)
             limits = _limits(left, right, parameters)
-            found = matcher(left, right, limits)
-            depth = depth_of(found.disparity, camera, baseline)
-            depth[(found.confidence < parameters.minimum_confidence) | (depth > parameters.maximum_depth)] = 0.0
+            matched = matcher(left, right, limits)
+            depth = depth_of(matched.disparity, camera, baseline)
+            depth[(matched.confidence < parameters.minimum_confidence) | (depth > parameters.maximum_depth)] = 0.0
             if not (depth > 0).any():
                 written.left_out[NOTHING_MATCHES] += 1
                 continue
@@ -116,8 +128,8 @@ def _match_all(
             frames.write(
                 frame.time, encoded, depth, frame.world_from_camera, frame.labels, camera_name=frame.camera_name
             )
-            maps.write(stamp, frame.camera_name, found)
-            _note(written, index, frame, found, depth, limits)
+            maps.write(stamp, frame.camera_name, matched)
+            _note(written, index, frame, matched, depth, limits)
     return written
 
 
@@ -139,13 +151,13 @@ def _limits(left: np.ndarray, right: np.ndarray, parameters: DisparityParameters
 
 
 def _note(
-    written: _Written, index: int, frame: Frame, found: DisparityMap, depth: np.ndarray, limits: tuple[int, int]
+    written: _Written, index: int, frame: Frame, matched: DisparityMap, depth: np.ndarray, limits: tuple[int, int]
 ) -> None:
     written.frames.append(
         FrameDisparity(
             frame=len(written.frames), input_frame=index, lowest=limits[0], levels=limits[1],
-            known=round(float(found.known.mean()), 4), trusted=round(float((depth > 0).mean()), 4),
-            median_disparity=round(float(np.nanmedian(found.disparity)), 3),
+            known=round(float(matched.known.mean()), 4), trusted=round(float((depth > 0).mean()), 4),
+            median_disparity=round(float(np.nanmedian(matched.disparity)), 3),
             median_depth=round(float(np.median(depth[depth > 0])), 4),
         )
     )  # fmt: skip
@@ -170,11 +182,11 @@ def _finish(
         info.model_dump()
         | {
             "notes": (*info.notes, f"depth from stereo: {detail}"),
-            "camera": next(known.camera for known in info.cameras if known.name in rows),
+            "camera": next(each.camera for each in info.cameras if each.name in rows),
             "cameras": tuple(
-                known.model_dump() | {"frame_count": written.cameras[known.name], "baseline": None}
-                for known in info.cameras
-                if known.name in rows
+                each.model_dump() | {"frame_count": written.cameras[each.name], "baseline": None}
+                for each in info.cameras
+                if each.name in rows
             ),
             "streams": tuple(s for s in ("color", "depth", "labels", "pose") if s == "depth" or s in streams),
             "frame_count": len(written.frames),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from stages.disparity.parameters import DisparityParameters
+from stages.disparity.parameters import NETWORKS, DisparityParameters
 from stages.kit.library_versions import library_version
 
 
 def versions(parameters: DisparityParameters) -> dict[str, str]:
     """Return name -> version of the libraries of the chosen method alone."""
-    return {"torch": library_version("torch")} if parameters.method == "raft-stereo" else {}
+    return {"torch": library_version("torch")} if parameters.method in NETWORKS else {}

@@ -9,6 +9,7 @@ import shutil
 import sys
 from dataclasses import dataclass
 
+from stages.engine.discovery import all_stages
 from stages.engine.model_cache import cache_folder, cached_models
 from stages.kit.library_versions import library_version
 
@@ -16,7 +17,7 @@ CORE = {
     "typer": "typer", "open3d": "open3d", "trimesh": "trimesh", "pycolmap": "pycolmap",
     "opencv-python-headless": "cv2", "numpy": "numpy", "scipy": "scipy", "torch": "torch", "mcap": "mcap",
     "pybullet": "pybullet", "pydantic": "pydantic", "numba": "numba", "python-fcl": "fcl", "embreex": "embreex",
-    "shapely": "shapely", "networkx": "networkx", "yourdfpy": "yourdfpy", "matplotlib": "matplotlib",
+    "shapely": "shapely", "networkx": "networkx", "ompl": "ompl", "matplotlib": "matplotlib",
     "rosbags": "rosbags", "psutil": "psutil",
 }  # fmt: skip
 EXTRAS = {
@@ -25,10 +26,8 @@ EXTRAS = {
     "mujoco": ("mujoco", "opening scene.mjcf.xml: pip install mujoco"),
     "coacd": ("coacd", "library add cuts up hollow collision shapes: pip install coacd"),
     "atheris": ("atheris", "make fuzz: pip install atheris"),
-    "transformers": ("transformers", "segment --backend huggingface: pip install transformers (without torchvision)"),
-    "onnxruntime": ("onnxruntime", "segment --backend onnx: pip install onnxruntime"),
 }
-"""Distribution -> module, and what it is for."""
+"""Distribution -> module, and what it is for; the steps declare further ones (`Stage.extras`)."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +69,8 @@ def diagnose() -> list[Check]:
     if torchvision != "absent":
         checks.append(Check("torchvision", torchvision, "pip uninstall torchvision (it breaks transformers)", False))
     checks += [_import_check(name, module, hint, False) for name, (module, hint) in EXTRAS.items()]
+    declared = {extra.distribution: extra for stage in all_stages().values() for extra in stage.extras}
+    checks += [_import_check(name, extra.module, extra.remedy, False) for name, extra in declared.items()]
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     checks.append(Check("memory", f"{memory:.0f} GiB", "" if memory >= 4 else "4 GiB are needed", False))
     cached = cached_models()

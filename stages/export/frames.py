@@ -1,13 +1,16 @@
-"""The frames of a sequence as every layout gets them: encoded pictures, millimetres, one at a time."""
+"""What every format gets: the frames, with encoded pictures and millimetres, one at a time, and what goes with them."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
+from schemas.scene_parts import Camera
+from schemas.sequence import SequenceFile
 from stages.kit.formats.foxglove import depth_to_millimetres
 from stages.kit.formats.frames import FrameReader
 
@@ -40,6 +43,23 @@ class Tally:
     left_out: Counter[str] = field(default_factory=Counter)
     """Reason -> frames."""
     depth_pixels_zeroed: int = 0
+
+
+@dataclass(frozen=True)
+class ExportJob:
+    """What a format writes."""
+
+    root: Path
+    """The folder to write into; it is there and empty."""
+    frames: Iterable[ExportFrame]
+    """Read once, in time order."""
+    cameras: Mapping[str, Camera]
+    """Name -> camera of those to write."""
+    info: SequenceFile
+    world_up: str
+    """`z`, or what the sequence says of its world."""
+    tally: Tally
+    """Grows as the frames are written."""
 
 
 def export_frames(

@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
 from schemas.errors import UsageError
 from schemas.exported_sequence import ExportedSequence
 from schemas.sequence import Sequence
+from stages.export.registry import STREAMS, all_formats, dialects, layouts
 from stages.kit.estimates import Estimate, Inputs
 from stages.kit.stage import Parameters, Stage
 
-STREAMS = ("color", "depth", "right", "labels", "pose")
+if TYPE_CHECKING:
+    Layout = str
+    Dialect = str
+else:
+    Layout = Literal[layouts()]
+    Dialect = Literal[dialects()]
 
 
 class ExportParameters(Parameters):
     """Options of `export`."""
 
-    layout: Literal["tum", "nerfstudio", "mcap"] = Field("tum", description="What to write the sequence as")
-    dialect: Literal["foxglove", "ros2"] = Field(
-        "foxglove", description="Message types of MCAP: Foxglove protobuf, or ROS 2 (CDR) for ros2 bag and RViz"
+    layout: Layout = Field(layouts()[0], description="What to write the sequence as")
+    dialect: Dialect = Field(
+        dialects()[0],
+        description="Message types, where a layout has several: "
+        + "; ".join(
+            f"`{declared.dialect}` for {declared.layout}: {declared.summary}"
+            for declared in all_formats()
+            if declared.dialect
+        ),
     )
     every: int = Field(1, ge=1, description="Write every n-th frame")
     streams: tuple[str, ...] = Field(
@@ -36,10 +48,12 @@ def check(parameters: ExportParameters, inputs: Any) -> None:
     unknown = sorted(set(parameters.streams) - set(STREAMS))
     if unknown:
         raise UsageError(f"export: --streams: no stream {unknown[0]!r}", hint=f"streams are {', '.join(STREAMS)}")
-    if parameters.dialect != "foxglove" and parameters.layout != "mcap":
+    own = dialects([parameters.layout])
+    if parameters.dialect not in (own or dialects()[:1]):
+        meant = next(declared.layout for declared in all_formats() if declared.dialect == parameters.dialect)
         raise UsageError(
-            f"export: --dialect {parameters.dialect} is about MCAP, not about {parameters.layout}",
-            hint="add --layout mcap",
+            f"export: --dialect {parameters.dialect} is about {meant.upper()}, not about {parameters.layout}",
+            hint=f"add --layout {meant}",
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,92 +10,69 @@ from schemas.errors import UsageError
 from schemas.exported_sequence import ExportedSequence, ExportFile
 from schemas.scene_parts import Camera
 from schemas.sequence import Sequence, SequenceFile
-from stages.export import foxglove_mcap, nerfstudio, ros2_mcap, tum
-from stages.export.frames import Tally, export_frames
+from stages.export.frames import ExportJob, Tally, export_frames
 from stages.export.parameters import ExportParameters
+from stages.export.registry import SequenceFormat, format_for
 from stages.kit.formats.frames import FrameReader
 from stages.kit.stage import Context
 
-LOG_NAME = "log.mcap"
 WORLD_NOTE = "poses are world_from_camera in the sequence's world: metres, z up, OpenCV cameras"
-ROOT_AS_LOG = "."
 
 
 def run(sequence: Sequence, *, parameters: ExportParameters, context: Context) -> ExportedSequence:
     """Write a sequence in another tool's layout. Raises UsageError for a camera that it does not have."""
     info = sequence.info
-    cameras = chosen_cameras(info, parameters)
-    held = held_streams(parameters)
-    streams = tuple(name for name in held if name in (parameters.streams or held))
+    target_format = format_for(parameters.layout, parameters.dialect)
+    cameras = chosen_cameras(info, parameters.camera, target_format)
+    streams = tuple(name for name in target_format.streams if name in (parameters.streams or target_format.streams))
     tally = Tally()
     with FrameReader(sequence.path("frames.mcap")) as reader, context.progress.step("write frames"):
         numbers = context.progress.track(range(len(reader)), total=len(reader), description="frames")
         frames = export_frames(reader, numbers, parameters.every, streams, cameras, tally)
-        _write(frames, cameras, info, reader.world_up, parameters, context, tally)
+        job = ExportJob(context.output, frames, cameras, info, reader.world_up, tally)
+        importlib.import_module(target_format.module).write(job)
         frames_in_sequence = len(reader)
-    notes = _notes(info, cameras, streams, parameters, tally)
+    notes = _notes(info, cameras, streams, target_format, tally)
     for note in notes:
         context.logger.info("%s", note)
-    limited = parameters.layout == "tum" and "depth" in tally.streams
     ExportFile(
-        layout=parameters.layout,
-        dialect=parameters.dialect if parameters.layout == "mcap" else None,
-        log=LOG_NAME if parameters.layout == "mcap" else ROOT_AS_LOG,
+        layout=target_format.layout,
+        dialect=target_format.dialect,
+        log=target_format.log,
         cameras=tuple(cameras),
-        streams=tuple(stream for stream in held if stream in tally.streams),
+        streams=tuple(stream for stream in target_format.streams if stream in tally.streams),
         frame_count=tally.frames,
         frames_in_sequence=frames_in_sequence,
         left_out=dict(sorted(tally.left_out.items())),
         depth_pixels_zeroed=tally.depth_pixels_zeroed,
-        depth_limit=tum.LARGEST_MILLIMETRES / 1000 if limited else None,
+        depth_limit=target_format.depth_limit if "depth" in tally.streams else None,
         notes=notes,
     ).write(context.output / "export.json")
-    return _result(tally, frames_in_sequence, parameters, context)
+    return _result(tally, frames_in_sequence, target_format, context)
 
 
-def held_streams(parameters: ExportParameters) -> tuple[str, ...]:
-    """Return the streams that the layout has a place for."""
-    mcap = foxglove_mcap.STREAMS if parameters.dialect == "foxglove" else ros2_mcap.STREAMS
-    return {"tum": tum.STREAMS, "nerfstudio": nerfstudio.STREAMS, "mcap": mcap}[parameters.layout]
+def chosen_cameras(info: SequenceFile, wanted: str | None, target_format: SequenceFormat) -> dict[str, Camera]:
+    """Return name -> camera of those to write: the wanted one; the main one for a format that holds one; else all.
 
-
-def chosen_cameras(info: SequenceFile, parameters: ExportParameters) -> dict[str, Camera]:
-    """Return name -> camera of those to write: the one asked for; for TUM the main one; else all."""
-    known = {camera.name: camera.camera for camera in info.cameras}
-    if parameters.camera is not None:
-        if parameters.camera not in known:
-            raise UsageError(f"export: --camera {parameters.camera!r} is not in it", hint=f"it has: {', '.join(known)}")
-        return {parameters.camera: known[parameters.camera]}
-    return dict(list(known.items())[:1]) if parameters.layout == "tum" else known
-
-
-def _write(
-    frames: Any,
-    cameras: Mapping[str, Camera],
-    info: SequenceFile,
-    world_up: str,
-    parameters: ExportParameters,
-    context: Context,
-    tally: Tally,
-) -> None:
-    if parameters.layout == "tum":
-        tum.write_tum_folder(context.output, frames, next(iter(cameras.values())), tally)
-    elif parameters.layout == "nerfstudio":
-        nerfstudio.write_nerfstudio_folder(context.output, frames, cameras, tally)
-    else:
-        write = foxglove_mcap.write_foxglove_log if parameters.dialect == "foxglove" else ros2_mcap.write_ros2_log
-        write(context.output / LOG_NAME, frames, cameras, info, world_up, tally)
+    Raises UsageError for a camera that the sequence does not have.
+    """
+    cameras = {camera.name: camera.camera for camera in info.cameras}
+    if wanted is not None:
+        if wanted not in cameras:
+            raise UsageError(f"export: --camera {wanted!r} is not in it", hint=f"it has: {', '.join(cameras)}")
+        return {wanted: cameras[wanted]}
+    return dict(list(cameras.items())[:1]) if target_format.one_camera else cameras
 
 
 def _notes(
     info: SequenceFile,
     cameras: Mapping[str, Camera],
     streams: tuple[str, ...],
-    parameters: ExportParameters,
+    target_format: SequenceFormat,
     tally: Tally,
 ) -> tuple[str, ...]:
     """What a reader of the export has to know."""
-    notes = [WORLD_NOTE if parameters.layout != "nerfstudio" else f"{WORLD_NOTE}, written as OpenGL camera-to-world"]
+    notes = [f"{WORLD_NOTE}, {target_format.pose_note}" if target_format.pose_note else WORLD_NOTE]
     if info.gravity.method == "none":
         notes[0] = notes[0].replace("z up", "as the log had it")
     lost = [stream for stream in info.streams if stream not in streams]
@@ -105,17 +83,19 @@ def _notes(
         notes.append(f"cameras not written: {', '.join(others)} (--camera NAME writes another one)")
     if tally.depth_pixels_zeroed:
         notes.append(
-            f"{tally.depth_pixels_zeroed} depth pixels beyond {tum.LARGEST_MILLIMETRES / 1000:g} m are 0 = invalid: "
-            "16 bits at 5000 units per metre reach no further"
+            f"{tally.depth_pixels_zeroed} depth pixels beyond {target_format.depth_limit:g} m are 0 = invalid: "
+            f"{target_format.depth_limit_reason}"
         )
     if not info.color_depth_registered:
         notes.append("colour and depth are not registered to each other")
     return tuple(notes)
 
 
-def _result(tally: Tally, frames_in_sequence: int, parameters: ExportParameters, context: Context) -> ExportedSequence:
+def _result(tally: Tally, frames_in_sequence: int, target_format: SequenceFormat, context: Context) -> ExportedSequence:
     summary: dict[str, Any] = {
-        "layout": parameters.layout if parameters.layout != "mcap" else f"mcap {parameters.dialect}",
+        "layout": target_format.layout
+        if target_format.dialect is None
+        else f"{target_format.layout} {target_format.dialect}",
         "frames": tally.frames,
         "frames_in_sequence": frames_in_sequence,
     }

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.fuse.counts import TripleCounts
+from stages.fuse.merging import Grouping
 from stages.fuse.parts import absorb_pieces, absorb_specks, drop_far_parts, spread_labels
 from stages.fuse.surface import Surface
 from stages.kit.formats.ply_files import ColoredMesh
@@ -38,23 +39,19 @@ class LabelledSurface:
 
 
 def label_of_segments(
-    counts: TripleCounts,
-    sightings: dict[int, int],
-    largest_segment: int,
-    minimum_share: float,
-    grouped: Mapping[int, tuple[int, int]] | None = None,
+    grouping: Grouping, sightings: Mapping[int, int], largest_segment: int, minimum_share: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return class id and instance (L + 1,) int32 of every segment label 0 .. L (eq. 2.6); 0 where none was counted.
 
     A label whose predictions are fewer than `minimum_share` of its sightings (frame segments that were matched to it,
     background included) stays unlabelled: a detector that takes a cupboard for a fridge in one frame out of thirty is
     outvoted by the frames in which it sees nothing there. Equation 2.6 itself never weighs the background; 0 is that.
-    `grouped` (segment label -> class, instance) goes before equation 2.6 where it has an entry (partition.py).
     """
+    counts = grouping.counts
     class_ids = np.zeros(largest_segment + 1, dtype=np.int32)
     instances = np.zeros(largest_segment + 1, dtype=np.int32)
     for segment, row in counts.by_segment.items():
-        best = (grouped or {}).get(segment) or counts.best(segment)
+        best = grouping.best.get(segment) or counts.best(segment)
         if best is not None and sum(row.values()) >= minimum_share * sightings.get(segment, 0):
             class_ids[segment], instances[segment] = best
     return class_ids, instances
@@ -98,43 +95,53 @@ def cut_mesh(surface: Surface, chosen: np.ndarray) -> ColoredMesh:
     return ColoredMesh(surface.vertices[used], places.astype(np.int32).reshape(-1, 3), surface.colors[used])
 
 
+@dataclass(frozen=True)
+class ExtractionSettings:
+    """What becomes an entity."""
+
+    minimum_share: float
+    """See `label_of_segments`."""
+    minimum_voxels: int
+    """A vertex stands for one surface voxel."""
+    minimum_observations: int
+    """Frames that voted for an entity, or votes on the segments it ended up with, whichever are fewer."""
+    speck_share: float
+    part_distance: float
+    """[m]"""
+    spread_steps: int = 0
+    piece_share: float = 0.0
+    unnamed: int | None = None
+    """Class of things that masks found and did not recognise."""
+
+
 def extract_entities(
     surface: Surface,
     segment: np.ndarray,
-    counts: TripleCounts,
-    seen_in: dict[int, int],
-    sightings: dict[int, int],
+    grouping: Grouping,
+    sightings: Mapping[int, int],
     things: frozenset[int],
-    *,
-    minimum_share: float,
-    minimum_voxels: int,
-    minimum_observations: int,
-    speck_share: float,
-    part_distance: float,
-    spread_steps: int = 0,
-    piece_share: float = 0.0,
-    unnamed: int | None = None,
-    grouped: Mapping[int, tuple[int, int]] | None = None,
+    settings: ExtractionSettings,
 ) -> tuple[list[ExtractedEntity], LabelledSurface]:
     """Return the entities, ascending by instance, and the labels of the whole surface.
 
-    segment (V,) int32: merged segment label of every vertex. `seen_in`: frames that voted for an instance, as bits.
-    A vertex stands for one surface voxel: entities under `minimum_voxels` vertices, or under `minimum_observations`
-    frames or votes on the segments they ended up with, are dropped, and their vertices are unlabelled. `grouped`: see
-    `label_of_segments`.
+    segment (V,) int32: merged segment label of every vertex. Entities that fall short of the `settings` are dropped,
+    and their vertices are unlabelled.
     """
+    counts, unnamed = grouping.counts, settings.unnamed
     largest = max([0, *counts.by_segment, int(segment.max(initial=0))])
-    class_of, instance_of = label_of_segments(counts, sightings, largest, minimum_share, grouped)
+    class_of, instance_of = label_of_segments(grouping, sightings, largest, settings.minimum_share)
     class_of_instance = class_of_instances(counts, class_of, instance_of)
     stuff = frozenset(p for p, c in class_of_instance.items() if c not in things)
     named = spread_labels(
-        instance_of[segment], surface.vertices, surface.faces, steps=spread_steps, minimum_cosine=SPREAD_COSINE
+        instance_of[segment], surface.vertices, surface.faces, steps=settings.spread_steps, minimum_cosine=SPREAD_COSINE
     )
-    instance = absorb_specks(named, surface.faces, whole=stuff, minimum_size=minimum_voxels, minimum_share=speck_share)
+    instance = absorb_specks(
+        named, surface.faces, whole=stuff, minimum_size=settings.minimum_voxels, minimum_share=settings.speck_share
+    )
     # Things without a name are not of one class: a cup is no piece of the table that nobody recognised either.
     countable = {p: c for p, c in class_of_instance.items() if c in things and c != unnamed}
-    instance = absorb_pieces(instance, surface.faces, countable, share=piece_share)
-    instance = drop_far_parts(instance, surface.vertices, surface.faces, whole=stuff, distance=part_distance)
+    instance = absorb_pieces(instance, surface.faces, countable, share=settings.piece_share)
+    instance = drop_far_parts(instance, surface.vertices, surface.faces, whole=stuff, distance=settings.part_distance)
     of_face = face_labels(instance, surface.faces)
     by_label = np.argsort(of_face, kind="stable")
     sorted_labels = of_face[by_label]
@@ -147,10 +154,14 @@ def extract_entities(
             count for segment in segments for (_, voted), count in counts.by_segment[segment].items() if voted == label
         )
         # A stuff class is one instance all over the room: frames that voted for it elsewhere say nothing here.
-        observations = min(seen_in.get(label, 0).bit_count(), votes)
+        observations = min(grouping.seen_in.get(label, 0).bit_count(), votes)
         start, end = np.searchsorted(sorted_labels, (label, label + 1))
         mesh = cut_mesh(surface, by_label[start:end])
-        if len(mesh.vertices) < minimum_voxels or observations < minimum_observations or len(mesh.faces) == 0:
+        if (
+            len(mesh.vertices) < settings.minimum_voxels
+            or observations < settings.minimum_observations
+            or not len(mesh.faces)
+        ):
             continue
         confidence = confidence_of(counts, segments, class_id, label)
         entities.append(ExtractedEntity(label, class_id, segments, mesh, confidence, observations))

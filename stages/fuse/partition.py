@@ -8,26 +8,14 @@ confirms it. What frames said of each pair of segments, one thing or two, does n
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import reduce
 from heapq import heapify, heappop, heappush
 from operator import or_
 
 from stages.fuse.counts import TripleCounts
+from stages.fuse.merging import Grouping
 from stages.fuse.regularization import PairEvidence
-
-
-@dataclass(frozen=True)
-class Grouping:
-    """Segments with the thing that they are part of."""
-
-    counts: TripleCounts
-    """The counts with one instance label for all segments of a thing."""
-    best: dict[int, tuple[int, int]]
-    """Segment label -> (class, instance) of its thing, NOTHING where predictions are too few to believe."""
-    seen_in: dict[int, int]
-    """Frames in which each instance was predicted, as bits."""
-
 
 SURE_VOTES = 3
 """From so many predictions on, the leading class of a segment is believed."""
@@ -211,9 +199,8 @@ def group_things(
         elif best is not None and sum(counts.instances(segment, best[0]).values()) < minimum_votes:
             doubtful.append(segment)
     groups = attach_unseen_pairs(group_segments(pair_weights(classes, evidence), classes), evidence, counts)
-    grouping = name_groups(groups, counts, things, seen_in, scores, unnamed)
-    grouping.best.update(dict.fromkeys(doubtful, NOTHING))
-    return grouping
+    named_groups = name_groups(groups, counts, things, seen_in, scores, unnamed)
+    return replace(named_groups, best={**named_groups.best, **dict.fromkeys(doubtful, NOTHING)})
 
 
 def _total(group: Iterable[int], counts: TripleCounts) -> int:

@@ -3,42 +3,16 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from schemas.base import as_vector
-from schemas.panoptic_map import EntitiesFile, Entity
-from schemas.vocabulary import Vocabulary
-from stages.fuse.counts import TripleCounts
-from stages.fuse.extraction import ExtractedEntity, LabelledSurface
-from stages.fuse.surface import Surface
+from stages.fuse.closing import ClosedMap, mesh_name
 from stages.fuse.voxel_blocks import FIXED_POINT, VoxelBlocks
 from stages.kit.formats.ply_files import ColoredMesh, write_ply
 
 FIXED_TIMESTAMP = (1980, 1, 1, 0, 0, 0)
-
-
-def mesh_name(instance: int) -> str:
-    """Return the name of an entity's mesh within the artifact."""
-    return f"entities/{instance}.ply"
-
-
-def describe(entity: ExtractedEntity, vocabulary: Vocabulary) -> Entity:
-    """Return an entity's row of entities.json."""
-    return Entity(
-        instance=entity.instance,
-        class_name=vocabulary.by_id(entity.class_id).name,
-        mesh=mesh_name(entity.instance),
-        vertices=len(entity.mesh.vertices),
-        triangles=len(entity.mesh.faces),
-        box_minimum=as_vector(entity.mesh.vertices.min(axis=0)),
-        box_maximum=as_vector(entity.mesh.vertices.max(axis=0)),
-        confidence=round(entity.confidence, 6),
-        observations=entity.observations,
-        segments=entity.segments,
-    )
 
 
 def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
@@ -66,28 +40,20 @@ def volume_arrays(blocks: VoxelBlocks, merged: np.ndarray) -> dict[str, np.ndarr
     }
 
 
-def write_meshes(root: Path, file: EntitiesFile, entities: Sequence[ExtractedEntity], surface: Surface) -> None:
+def write_meshes(root: Path, closed: ClosedMap) -> None:
     """Write what a contact graph is built from: entities.json, a mesh per entity and the whole mesh."""
     (root / "entities").mkdir(parents=True, exist_ok=True)
-    file.write(root / "entities.json")
-    write_ply(root / "mesh.ply", ColoredMesh(surface.vertices, surface.faces, surface.colors))
-    for entity in entities:
+    closed.file.write(root / "entities.json")
+    write_ply(root / "mesh.ply", ColoredMesh(closed.surface.vertices, closed.surface.faces, closed.surface.colors))
+    for entity in closed.entities:
         write_ply(root / mesh_name(entity.instance), entity.mesh)
 
 
-def write_payload(
-    root: Path,
-    file: EntitiesFile,
-    entities: Sequence[ExtractedEntity],
-    surface: Surface,
-    labelled: LabelledSurface,
-    counts: TripleCounts,
-    blocks: VoxelBlocks,
-    merged: np.ndarray,
-) -> None:
+def write_payload(root: Path, closed: ClosedMap, blocks: VoxelBlocks) -> None:
     """Write every file of schemas/panoptic_map.py under `root`."""
-    write_meshes(root, file, entities, surface)
+    write_meshes(root, closed)
+    labelled = closed.labelled
     labels = {"instance": labelled.instance, "segment": labelled.segment, "class_id": labelled.class_id}
     write_arrays(root / "mesh_labels.npz", labels)
-    write_arrays(root / "counts.npz", counts.as_arrays())
-    write_arrays(root / "volume.npz", volume_arrays(blocks, merged))
+    write_arrays(root / "counts.npz", closed.counts.as_arrays())
+    write_arrays(root / "volume.npz", volume_arrays(blocks, closed.merged))

@@ -112,19 +112,19 @@ class PairEvidence:
             self._open.add(pair)
 
 
-def label_pairs(labels: list[int], class_id: int, counts: TripleCounts, *, guarded: bool) -> list[tuple[int, int]]:
-    """Return the pairs of global labels whose merging a frame segment of class `class_id` (0: background) speaks for.
+def pairs_of_one_class(labels: Iterable[int], class_id: int, counts: TripleCounts) -> list[Pair]:
+    """Return the pairs of global labels whose merging a frame segment of class `class_id` (0: background) speaks for,
+    if it knows what it sees.
 
-    Without `guarded` these are all pairs, as in the thesis. `guarded` asks that the frame segment knows what it sees: a
-    label that was predicted before takes part only if its class is the frame segment's. A geometric segment that runs
-    from a cupboard onto the floor then joins nothing, however often it is seen.
+    Ours: a label that was predicted before takes part only if its class is the frame segment's. A geometric segment
+    that runs from a cupboard onto the floor then joins nothing, however often it is seen.
     """
-    if guarded:
-        best = {label: counts.best(label) for label in labels}
-        labels = [label for label, known in best.items() if (known[0] if known else 0) in (0, class_id)]
-        if class_id == 0:
-            labels = [label for label in labels if best[label] is None]
-    return list(combinations(sorted(labels), 2))
+    best = {label: counts.best(label) for label in labels}
+    if class_id == 0:
+        taking_part = [label for label, leading in best.items() if leading is None]
+    else:
+        taking_part = [label for label, leading in best.items() if leading is None or leading[0] in (0, class_id)]
+    return list(combinations(sorted(taking_part), 2))
 
 
 def merge_segments(

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from itertools import combinations
 
 from stages.fuse.association import Prediction
 from stages.fuse.counts import TripleCounts
+from stages.fuse.merging import FrameInstance, Grouping, SharedSegment
+from stages.fuse.parameters import FuseParameters
+from stages.fuse.regularization import MergedLabels, PairEvidence, merge_segments
 
 
 class SeparateCounts(TripleCounts):
@@ -20,6 +24,47 @@ class SeparateCounts(TripleCounts):
         return result
 
 
+class Separate:
+    """A `Merging`: segments merge as in the thesis, instances never do."""
+
+    def __init__(self, parameters: FuseParameters, things: frozenset[int]) -> None:
+        self.things = things
+        self.counts = SeparateCounts()
+        self.shared = PairEvidence()
+        self._parameters = parameters
+        self._next_instance = 1
+
+    def observe_segments(self, segments: Sequence[SharedSegment], matched: Sequence[int]) -> None:
+        """All labels that share a segment speak for their merging, and nothing against it."""
+        self.shared.observe((combinations(sorted(segment.labels), 2) for segment in segments), ())
+
+    def merge_segments(self, labels: MergedLabels) -> list[tuple[int, int]]:
+        """Merge what lay together often enough."""
+        least = self._parameters.merge_minimum_frames
+        return merge_segments(self.shared, labels, self.counts, minimum_frames=least, contested=False)
+
+    def predict(self, predictions: Sequence[Prediction], unpredicted: Sequence[int]) -> dict[FrameInstance, int]:
+        """Associate by the instances alone."""
+        instances, self._next_instance = associate_separately(
+            predictions, unpredicted, self.counts, self._next_instance
+        )
+        for p in predictions:
+            self.counts.add(p.segment, p.class_id, instances[p.frame_instance, p.class_id])
+        return instances
+
+    def merge_instances(self) -> list[tuple[int, int]]:
+        """Nothing is merged."""
+        return []
+
+    def forget_lost(self, sightings: Collection[int], held: Callable[[], set[int]]) -> list[int]:
+        """Everything is kept."""
+        return []
+
+    def grouping(self, seen_in: Mapping[int, int], minimum_votes: int, unnamed: int) -> Grouping:
+        """The counts say it all."""
+        return Grouping(self.counts, {}, seen_in)
+
+
 def associate_separately(
     predictions: Sequence[Prediction], unpredicted: Sequence[int], counts: SeparateCounts, next_instance: int
 ) -> tuple[dict[tuple[int, int], int], int]:
@@ -31,17 +76,17 @@ def associate_separately(
     """
     taken: set[int] = set()
     for label in unpredicted:
-        known = counts.instances(label, 0)
-        if known:
-            taken.add(min(known, key=lambda p: (-known[p], p)))
+        counted = counts.instances(label, 0)
+        if counted:
+            taken.add(min(counted, key=lambda p: (-counted[p], p)))
     result: dict[tuple[int, int], int] = {}
     for prediction in predictions:
         key = (prediction.frame_instance, prediction.class_id)
         if key in result:
             continue
-        known = {p: n for p, n in counts.instances(prediction.segment, 0).items() if p not in taken}
-        if known:
-            result[key] = min(known, key=lambda p: (-known[p], p))
+        free = {p: n for p, n in counts.instances(prediction.segment, 0).items() if p not in taken}
+        if free:
+            result[key] = min(free, key=lambda p: (-free[p], p))
             taken.add(result[key])
         else:
             result[key] = next_instance

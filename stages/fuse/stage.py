@@ -3,34 +3,34 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 
-import numpy as np
-
-from schemas.panoptic_map import SNAPSHOTS, EntitiesFile, PanopticMap
+from schemas.panoptic_map import SNAPSHOTS, PanopticMap
 from schemas.segments import Segments
 from schemas.sequence import Sequence
 from schemas.trajectory import Trajectory
 from schemas.vocabulary import Vocabulary, load_vocabulary
-from stages.fuse.counts import TripleCounts
-from stages.fuse.extraction import ExtractedEntity, LabelledSurface, extract_entities
+from stages.fuse.closing import close_map
 from stages.fuse.inputs import check_origin, check_segments, poses_at
 from stages.fuse.listings import Listings
 from stages.fuse.mapping import PanopticMapper
+from stages.fuse.merging import Merging
+from stages.fuse.ours import Ours
 from stages.fuse.parameters import FuseParameters
-from stages.fuse.partition import group_things
-from stages.fuse.payload import describe, write_meshes, write_payload
-from stages.fuse.smoothing import smoothed_tsdf
-from stages.fuse.surface import Surface, extract_surface
+from stages.fuse.payload import write_meshes, write_payload
+from stages.fuse.separate import Separate
+from stages.fuse.thesis import Thesis
 from stages.kit.formats.frames import FrameReader, require_depth
 from stages.kit.formats.masks import PanopticReader
 from stages.kit.formats.trajectories import read_tum
 from stages.kit.progress import SilentProgress
-from stages.kit.stage import Context, Progress
+from stages.kit.stage import Context
 
-UNNAMED = "object"
-"""The class of things that masks found and did not recognise."""
+MERGING: dict[str, Callable[[FuseParameters, frozenset[int]], Merging]] = {
+    "ours": Ours,
+    "thesis": Thesis,
+    "separate": Separate,
+}
 
 
 def run(
@@ -53,55 +53,10 @@ def run(
     return write_map(mapper, vocabulary, label, skipped, context)
 
 
-@dataclass(frozen=True)
-class ClosedMap:
-    """What a map comes to: its entities, surface and labels."""
-
-    file: EntitiesFile
-    entities: list[ExtractedEntity]
-    surface: Surface
-    labelled: LabelledSurface
-    counts: TripleCounts
-    merged: np.ndarray
-    """Merged segment label of every segment label."""
-
-
-def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, progress: Progress) -> ClosedMap:
-    """Merge what is one instance, draw the surface and cut it into entities. `label` says whose masks these are.
-
-    Labels of the mapper are merged by it.
-    """
-    parameters = mapper.parameters
-    with progress.step("merge instances"):
-        mapper.regularize()
-    with progress.step("extract surface"):
-        tsdf = smoothed_tsdf(mapper.blocks, parameters.smoothing)
-        surface = extract_surface(mapper.blocks, minimum_weight=parameters.minimum_weight, tsdf=tsdf)
-    with progress.step("extract entities"):
-        merged = mapper.labels.table()
-        unnamed = vocabulary.by_name(UNNAMED).id
-        counts, seen_in, grouped = mapper.counts, mapper.seen_in, None
-        fewest = min(parameters.minimum_observations, max(1, mapper.labelled_frames // 10))
-        if parameters.merging == "ours":
-            things = group_things(
-                mapper.counts, mapper.segment_evidence, mapper.things, mapper.seen_in, fewest,
-                scores=mapper.class_scores.by_segment, unnamed=unnamed,
-            )  # fmt: skip
-            counts, seen_in, grouped = things.counts, things.seen_in, things.best
-        entities, labelled = extract_entities(
-            surface, merged[surface.segment], counts, seen_in, mapper.sightings, mapper.things,
-            minimum_share=parameters.minimum_prediction_share, minimum_voxels=parameters.minimum_entity_voxels,
-            minimum_observations=fewest, speck_share=parameters.speck_share, part_distance=parameters.part_distance,
-            spread_steps=parameters.spread_steps, piece_share=parameters.piece_share, unnamed=unnamed, grouped=grouped,
-        )  # fmt: skip
-    file = EntitiesFile(
-        voxel_size=parameters.voxel_size,
-        truncation_distance=mapper.truncation_distance,
-        frames_integrated=mapper.frames_integrated,
-        segmentation=label,
-        entities=tuple(describe(entity, vocabulary) for entity in entities),
-    )
-    return ClosedMap(file, entities, surface, labelled, counts, merged)
+def new_mapper(parameters: FuseParameters, vocabulary: Vocabulary) -> PanopticMapper:
+    """Return an empty map of the method that the parameters ask for."""
+    things = frozenset(entry.id for entry in vocabulary.classes if entry.kind == "thing")
+    return PanopticMapper(parameters, MERGING[parameters.merging](parameters, things))
 
 
 def write_map(
@@ -111,10 +66,7 @@ def write_map(
     `skipped` how many frames were left out by reason."""
     closed = close_map(mapper, vocabulary, label, context.progress)
     with context.progress.step("write the map"):
-        write_payload(
-            context.output, closed.file, closed.entities, closed.surface, closed.labelled, closed.counts, mapper.blocks,
-            closed.merged,
-        )  # fmt: skip
+        write_payload(context.output, closed, mapper.blocks)
     summary = {
         "frames": mapper.frames_integrated,
         **{f"skipped_{reason}": count for reason, count in sorted(skipped.items())},
@@ -134,7 +86,7 @@ def write_snapshot(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, c
     with context.progress.step("snapshots"):
         closed = close_map(mapper.held(), vocabulary, label, SilentProgress())
         folder = context.output / SNAPSHOTS / f"{mapper.frames_integrated:06d}"
-        write_meshes(folder, closed.file, closed.entities, closed.surface)
+        write_meshes(folder, closed)
 
 
 def _integrate_frames(
@@ -146,7 +98,6 @@ def _integrate_frames(
     context: Context,
 ) -> tuple[PanopticMapper, Counter[str], str]:
     """Return the map of all frames, how many frames were skipped by reason, and whose masks these are."""
-    things = frozenset(entry.id for entry in vocabulary.classes if entry.kind == "thing")
     skipped: Counter[str] = Counter()
     require_depth(sequence)
     with FrameReader(sequence.path("frames.mcap")) as reader, PanopticReader(segments.path("panoptic.zip")) as masks:
@@ -157,7 +108,7 @@ def _integrate_frames(
         poses = None
         if trajectory is not None:
             poses = poses_at(reader.times, *read_tum(trajectory.path("trajectory.tum")), parameters.pose_tolerance)
-        mapper = PanopticMapper(parameters, things)
+        mapper = new_mapper(parameters, vocabulary)
         total = -(-len(reader) // parameters.every)
         frames = reader.frames(streams=("color", "depth"), every=parameters.every)
         kept = 0

@@ -19,17 +19,17 @@ def relations_beside(
     entities: list[Entity], chosen: dict[str, Candidate], parameters: GraphParameters
 ) -> list[Relation]:
     """Return `also_supports` and `leans_on` of all objects, in the order of the entities."""
-    found: list[Relation] = []
+    relations: list[Relation] = []
     by_name = {entity.name: entity for entity in entities}
     for child in entities:
         candidate = chosen.get(child.name)
         if candidate is None or candidate.relation != "supports":
             continue
-        found += further_carriers(child, candidate, entities, chosen, parameters)
+        relations += further_carriers(child, candidate, entities, chosen, parameters)
         leaning = leaning_relation(child, candidate.parent, entities)
         if leaning is not None and not descends_from(leaning.source, child.name, chosen):
-            found.append(with_leaning_contact(leaning, child, by_name[leaning.source]))
-    return found
+            relations.append(with_leaning_contact(leaning, child, by_name[leaning.source]))
+    return relations
 
 
 def further_carriers(

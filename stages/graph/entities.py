@@ -11,31 +11,28 @@ from schemas.errors import BadInput
 from schemas.panoptic_map import Entity as MapEntity
 from schemas.panoptic_map import PanopticMap
 from schemas.vocabulary import load_vocabulary
-from stages.graph.nodes import THINNEST_DISTANCE, Entity, patch_from_fit, surface_planes
-from stages.graph.observed_box import observed_box
+from stages.graph.method import GraphMethod
+from stages.graph.nodes import THINNEST_DISTANCE, Entity, PlaneSearch, patch_from_fit, surface_planes
 from stages.graph.parameters import GraphParameters
 from stages.kit.formats.entity_meshes import load_entity_mesh
-from stages.kit.geometry.boxes import box_volume, boxes_overlap_volume, convex_hull, minimum_box
+from stages.kit.geometry.boxes import convex_hull, minimum_box
 from stages.kit.geometry.planes import PlaneFit
 from stages.kit.geometry.point_clouds import sample_large_triangles, thin_to_grid, vertex_normals
 from stages.kit.stage import Context
 
 SAMPLES, PLANES = 1, 2
 """Random streams."""
-LEDGE_AREA = 0.05
-"""Least area of a supporting surface in a wall entity [m^2]."""
-LEDGE_GAP = 0.2
-"""Gap between supporting surfaces of one wall entity [m]."""
-PIECE_SHARE = 0.7
-"""Share of its box that a piece has within the whole."""
-
 
 Kept = dict[str, Entity | str]
 """What entities came to, by a digest of all that decides it."""
 
 
 def load_entities(
-    panoptic_map: PanopticMap, parameters: GraphParameters, context: Context, kept: Kept | None = None
+    panoptic_map: PanopticMap,
+    method: GraphMethod,
+    parameters: GraphParameters,
+    context: Context,
+    kept: Kept | None = None,
 ) -> tuple[list[Entity], dict[str, str]]:
     """Return the nodes in the order of their instance labels, and why entities were dropped (name -> reason).
 
@@ -49,56 +46,39 @@ def load_entities(
     entities: list[Entity] = []
     dropped: dict[str, str] = {}
     for entry in context.progress.track(entries, description="entities"):
-        entity = _load_once(panoptic_map, entry, parameters, context, kept)
+        entity = _load_once(panoptic_map, entry, method, parameters, context, kept)
         if isinstance(entity, str):
             dropped[f"{entry.class_name}_{entry.instance}"] = entity
         else:
             entities.append(entity)
-    if parameters.method == "ours":
-        for name, whole in fragments(entities).items():
-            dropped[name] = f"a piece of {whole}"
-        entities = [entity for entity in entities if entity.name not in dropped]
-    return entities, dropped
+    for name, whole in method.fragments(entities).items():
+        dropped[name] = f"a piece of {whole}"
+    return [entity for entity in entities if entity.name not in dropped], dropped
 
 
 def _load_once(
-    panoptic_map: PanopticMap, entry: MapEntity, parameters: GraphParameters, context: Context, kept: Kept | None
+    panoptic_map: PanopticMap,
+    entry: MapEntity,
+    method: GraphMethod,
+    parameters: GraphParameters,
+    context: Context,
+    kept: Kept | None,
 ) -> Entity | str:
     path = panoptic_map.path(entry.mesh)
     if kept is None or not path.is_file():
-        return load_entity(panoptic_map, entry, parameters, context)
+        return load_entity(panoptic_map, entry, method, parameters, context)
     key = f"{entry.class_name}_{entry.instance} {hashlib.sha256(path.read_bytes()).hexdigest()}"
     if key not in kept:
-        kept[key] = load_entity(panoptic_map, entry, parameters, context)
-    found = kept[key]
-    return found if isinstance(found, str) else replace(found, confidence=entry.confidence, mesh=entry.mesh)
-
-
-def fragments(entities: list[Entity]) -> dict[str, str]:
-    """Return entities that can only be pieces of another one: name -> name of the whole.
-
-    Furniture of one class does not interpenetrate, so a chair whose box lies within the box of a larger chair is a
-    part of it that the map failed to merge. Small things of one class do lie in each other (bowls, boxes).
-    """
-    found: dict[str, str] = {}
-    for piece in entities:
-        if piece.movable or piece.node_type == "layout":
-            continue
-        for whole in entities:
-            if whole.class_name != piece.class_name or len(whole.points) <= len(piece.points):
-                continue
-            shared = boxes_overlap_volume(piece.box, whole.box)
-            if shared >= PIECE_SHARE * box_volume(piece.box) and whole.name not in found:
-                found[piece.name] = whole.name
-                break
-    return found
+        kept[key] = load_entity(panoptic_map, entry, method, parameters, context)
+    entity = kept[key]
+    return entity if isinstance(entity, str) else replace(entity, confidence=entry.confidence, mesh=entry.mesh)
 
 
 def load_entity(
-    panoptic_map: PanopticMap, entry: MapEntity, parameters: GraphParameters, context: Context
+    panoptic_map: PanopticMap, entry: MapEntity, method: GraphMethod, parameters: GraphParameters, context: Context
 ) -> Entity | str:
     """Return one node <o, c, M, B, Pi>, or the reason why it is dropped."""
-    semantic = load_vocabulary().by_name(entry.class_name)
+    load_vocabulary().by_name(entry.class_name)  # of a class that is not in it nothing is dropped in silence
     if entry.class_name in parameters.dropped_classes:
         return f"class {entry.class_name} is dropped"
     if entry.triangles == 0:
@@ -106,45 +86,37 @@ def load_entity(
     points, normals = oriented_points(panoptic_map, entry.mesh, entry.instance, parameters, context)
     if len(points) < parameters.minimum_points:
         return f"{len(points)} points on the grid, fewer than {parameters.minimum_points}"
+    return entity_of(entry, points, normals, method, parameters, context.random(PLANES, entry.instance))
+
+
+def entity_of(
+    entry: MapEntity,
+    points: np.ndarray,
+    normals: np.ndarray,
+    method: GraphMethod,
+    parameters: GraphParameters,
+    random: np.random.Generator,
+) -> Entity | str:
+    """Return the node of an entity's points (N, 3) [m] and unit normals (N, 3) on the grid, or why it is dropped."""
+    semantic = load_vocabulary().by_name(entry.class_name)
+    distance = parameters.plane_distance
     if semantic.is_layout:
         # Walls and floors come in pieces by nature.
         box, kept = minimum_box(points), np.ones(len(points), dtype=bool)
     else:
-        ours = parameters.method == "ours"
-        box, kept = observed_box(
-            points,
-            normals,
-            stray_share=parameters.stray_share,
-            stray_distance=parameters.stray_distance,
-            trim=parameters.box_trim if ours else 0.0,
-            side_share=parameters.side_share if ours else None,
-            may_be_round=ours and entry.class_name in parameters.round_classes,
-        )
+        box, kept = method.box(points, normals, entry.class_name)
+        distance = max(min(distance, min(box.size) / 4), THINNEST_DISTANCE)
     diagonal = float(np.linalg.norm(box.size))
     if diagonal < parameters.minimum_diagonal:
         return f"diagonal {diagonal:.3f} m is below {parameters.minimum_diagonal} m"
-    points, normals = points[kept], normals[kept]
-    distance = parameters.plane_distance
-    if not semantic.is_layout:
-        distance = max(min(distance, min(box.size) / 4), THINNEST_DISTANCE)
-    least_area: float | None = parameters.minimum_support_area
-    if parameters.method == "thesis" or semantic.name in ("floor", "ceiling"):
-        least_area = None
-    elif semantic.is_layout:
-        # Window sills, and furniture that was taken for a piece of the wall behind it.
-        least_area = LEDGE_AREA
-    patches = surface_planes(
-        points,
-        normals,
+    search = PlaneSearch(
         distance=distance,
         iterations=parameters.plane_iterations,
         normal_weight=parameters.normal_weight,
         plane_share=parameters.plane_share,
         horizontal_threshold=parameters.horizontal_threshold,
-        minimum_support_area=least_area,
-        split_distance=LEDGE_GAP if semantic.is_layout else None,
         spacing=parameters.point_spacing,
-        random=context.random(PLANES, entry.instance),
+        small=method.small_supports(semantic),
     )
     return Entity(
         name=f"{entry.class_name}_{entry.instance}",
@@ -154,9 +126,9 @@ def load_entity(
         movable=semantic.movable,
         mesh=entry.mesh,
         confidence=entry.confidence,
-        points=points,
+        points=points[kept],
         box=box,
-        patches=patches,
+        patches=surface_planes(points[kept], normals[kept], search, random),
     )
 
 

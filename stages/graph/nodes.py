@@ -94,49 +94,76 @@ def plane_height(plane: SurfacePlane, at: np.ndarray) -> float:
     return -(plane.offset + nx * float(at[0]) + ny * float(at[1])) / nz
 
 
-def surface_planes(
-    points: np.ndarray,
-    normals: np.ndarray,
-    *,
-    distance: float,
-    iterations: int,
-    normal_weight: float,
-    plane_share: float,
-    horizontal_threshold: float,
-    minimum_support_area: float | None,
-    split_distance: float | None,
-    spacing: float,
-    random: np.random.Generator,
-) -> tuple[Patch, ...]:
-    """Return the surface planes Pi of points (N, 3) with outward unit normals (N, 3) (Han 2024, section 2.2.2).
+@dataclass(frozen=True)
+class SmallSupports:
+    """Supporting planes that the share rule leaves over, and that things stand on all the same."""
 
-    `minimum_support_area` [m^2]: see `small_support_planes`; None leaves the thesis's planes alone. `split_distance`
-    [m]: horizontal planes fall into their clusters (a wall entity goes around the room; ledges on opposite sides are
-    not one surface).
-    """
+    minimum_area: float
+    """[m^2]"""
+    split_distance: float | None = None
+    """Horizontal planes fall into clusters this far apart [m]: a wall entity goes around the room; ledges on opposite
+    sides are not one surface."""
+
+
+@dataclass(frozen=True)
+class PlaneSearch:
+    """Constants of the search for surface planes."""
+
+    distance: float
+    """RANSAC inlier distance [m]."""
+    iterations: int
+    normal_weight: float
+    plane_share: float
+    horizontal_threshold: float
+    """a_th."""
+    spacing: float
+    """Grid that the points lie on [m]."""
+    small: SmallSupports | None = None
+    """None leaves the thesis's planes alone."""
+
+
+def surface_planes(
+    points: np.ndarray, normals: np.ndarray, search: PlaneSearch, random: np.random.Generator
+) -> tuple[Patch, ...]:
+    """Return the surface planes Pi of points (N, 3) with outward unit normals (N, 3) (Han 2024, section 2.2.2)."""
     fits = ransac_planes(
         points,
         normals,
-        distance_threshold=distance,
-        iterations=iterations,
+        distance_threshold=search.distance,
+        iterations=search.iterations,
         random=random,
-        normal_weight=normal_weight,
-        minimum_share=plane_share,
+        normal_weight=search.normal_weight,
+        minimum_share=search.plane_share,
     )
-    if minimum_support_area is not None:
-        fits = [fit for fit in fits if not is_slanted(fit.normal, horizontal_threshold)]
-        free = np.ones(len(points), dtype=bool)
-        for fit in fits:
-            free[fit.inliers] = False
-        rest = np.flatnonzero(free)
-        least = max(5, math.ceil(minimum_support_area / spacing**2))
-        found = small_support_planes(points[rest], normals[rest], distance, horizontal_threshold, least, random)
-        fits += [PlaneFit(fit.normal, fit.offset, rest[fit.inliers]) for fit in found]
-        fits = level_planes(points, fits, horizontal_threshold, least)
-        fits = merge_levels(points, fits, horizontal_threshold)
-        if split_distance is not None:
-            fits = split_levels(points, fits, horizontal_threshold, split_distance, least)
-    return tuple(patch_from_fit(points, fit, horizontal_threshold) for fit in fits)
+    if search.small is not None:
+        fits = with_small_supports(points, normals, fits, search, search.small, random)
+    return tuple(patch_from_fit(points, fit, search.horizontal_threshold) for fit in fits)
+
+
+def with_small_supports(
+    points: np.ndarray,
+    normals: np.ndarray,
+    fits: list[PlaneFit],
+    search: PlaneSearch,
+    small: SmallSupports,
+    random: np.random.Generator,
+) -> list[PlaneFit]:
+    """Return the planes of points (N, 3) with small supporting ones beside them, horizontal ones level, at different
+    heights and (`split_distance`) in one piece each; slanted ones go."""
+    threshold = search.horizontal_threshold
+    fits = [fit for fit in fits if not is_slanted(fit.normal, threshold)]
+    free = np.ones(len(points), dtype=bool)
+    for fit in fits:
+        free[fit.inliers] = False
+    rest = np.flatnonzero(free)
+    least = max(5, math.ceil(small.minimum_area / search.spacing**2))
+    supports = small_support_planes(points[rest], normals[rest], search.distance, threshold, least, random)
+    fits += [PlaneFit(fit.normal, fit.offset, rest[fit.inliers]) for fit in supports]
+    fits = level_planes(points, fits, threshold, least)
+    fits = merge_levels(points, fits, threshold)
+    if small.split_distance is not None:
+        fits = split_levels(points, fits, threshold, small.split_distance, least)
+    return fits
 
 
 def is_slanted(normal: np.ndarray, horizontal_threshold: float) -> bool:
@@ -159,7 +186,7 @@ def small_support_planes(
     have fewer, and yet they are what things stand on. Only points whose own normal points up are searched.
     """
     upward = np.flatnonzero(normals @ GRAVITY <= horizontal_threshold)
-    found: list[PlaneFit] = []
+    planes: list[PlaneFit] = []
     while len(upward) >= minimum_count:
         fit = ransac_plane(
             points[upward],
@@ -173,9 +200,9 @@ def small_support_planes(
         )
         if fit is None or len(fit.inliers) < minimum_count:
             break
-        found.append(PlaneFit(fit.normal, fit.offset, upward[fit.inliers]))
+        planes.append(PlaneFit(fit.normal, fit.offset, upward[fit.inliers]))
         upward = np.delete(upward, fit.inliers)
-    return found
+    return planes
 
 
 def level_planes(

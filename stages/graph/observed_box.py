@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from schemas.scene_parts import Box
@@ -49,34 +51,39 @@ def trimmed_extent(values: np.ndarray, trim: float) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def observed_box(
-    points: np.ndarray,
-    normals: np.ndarray,
-    *,
-    stray_share: float,
-    stray_distance: float,
-    trim: float,
-    side_share: float | None,
-    may_be_round: bool = False,
-) -> tuple[Box, np.ndarray]:
+@dataclass(frozen=True)
+class BoxFit:
+    """What is left out of a box, and how its yaw is found."""
+
+    stray_share: float
+    stray_distance: float
+    """[m]"""
+    trim: float = 0.0
+    """Share of the points that is left out at both ends of every axis."""
+    side_share: float | None = None
+    """See `side_yaw`; None: the least rectangle says the yaw."""
+    may_be_round: bool = False
+
+
+def observed_box(points: np.ndarray, normals: np.ndarray, fit: BoxFit) -> tuple[Box, np.ndarray]:
     """Return the gravity-aligned box of points (N, 3) [m] with unit normals (N, 3), and which points it was put around.
 
     Labels leak at object borders, onto what stands behind them and beside them. Small clusters that are cut off from
     the rest are left out (point_clouds.without_strays), and so is the share `trim` at both ends of every axis: a side
     that was seen holds far more points than that. A thing that `may_be_round` gets the box of its disc where its sides
-    say that it is. Else the yaw is that of the sides (`side_yaw`; None: not asked for), or of the least rectangle, as
-    the thesis has it (section 2.2.2).
+    say that it is. Else the yaw is that of the sides (`side_yaw`), or of the least rectangle, as the thesis has it
+    (section 2.2.2).
     """
-    kept = without_strays(points, stray_share, stray_distance)
+    kept = without_strays(points, fit.stray_share, fit.stray_distance)
     inside = points[kept]
-    bottom, top = trimmed_extent(inside[:, 2], trim / 2)
-    if may_be_round and (disc := round_footprint(inside, normals[kept])) is not None:
-        return box_over_disc(disc, inside, (bottom, top), trim), kept
-    yaw = None if side_share is None else side_yaw(normals[kept], minimum_share=side_share)
+    bottom, top = trimmed_extent(inside[:, 2], fit.trim / 2)
+    if fit.may_be_round and (disc := round_footprint(inside, normals[kept])) is not None:
+        return box_over_disc(disc, inside, (bottom, top), fit.trim), kept
+    yaw = None if fit.side_share is None else side_yaw(normals[kept], minimum_share=fit.side_share)
     if yaw is None:
         _, _, yaw = minimum_rectangle(inside[:, :2])
     along, across = axes_of(yaw)
-    sides = trimmed_extent(inside[:, :2] @ along, trim), trimmed_extent(inside[:, :2] @ across, trim)
+    sides = trimmed_extent(inside[:, :2] @ along, fit.trim), trimmed_extent(inside[:, :2] @ across, fit.trim)
     return box_between(*sides, (bottom, top), yaw), kept
 
 

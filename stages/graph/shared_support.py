@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from stages.graph.corrected_support import hull_overlap
 from stages.graph.nodes import Entity, plane_height
 from stages.graph.parameters import GraphParameters
-from stages.graph.support import Candidate, height_gap, hull_overlap, inside_share, stands_inside, support_score
+from stages.graph.support import Candidate, height_gap, inside_share, stands_inside, support_score
 from stages.kit.geometry.boxes import clip_polygon, footprint
 
 SAME_LEVEL = 0.02
@@ -35,7 +36,7 @@ def partial_supports(child: Entity, entities: list[Entity], parameters: GraphPar
 
     Layout and what lies around the child (a shelf around a book) carry no part: the floor is under everything.
     """
-    found: dict[str, PartialSupport] = {}
+    best: dict[str, PartialSupport] = {}
     for parent in entities:
         if parent.name == child.name or parent.node_type == "layout":
             continue
@@ -51,9 +52,9 @@ def partial_supports(child: Entity, entities: list[Entity], parameters: GraphPar
                 share = max(share, inside_share(child.box, parent.box))
             if share < PART_SHARE or stands_inside(child, parent, height):
                 continue
-            if parent.name not in found or share > found[parent.name].share:
-                found[parent.name] = PartialSupport(parent.name, k, gap, share, height)
-    return list(found.values())
+            if parent.name not in best or share > best[parent.name].share:
+                best[parent.name] = PartialSupport(parent.name, k, gap, share, height)
+    return list(best.values())
 
 
 def together_with(main: PartialSupport, parts: list[PartialSupport]) -> list[PartialSupport]:

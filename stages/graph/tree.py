@@ -2,54 +2,29 @@
 
 from __future__ import annotations
 
-from scipy.spatial import cKDTree
-
 from schemas.contact_graph import SCENE_NODE
-from stages.graph.hanging import hanging_candidate
 from stages.graph.nodes import Entity
-from stages.graph.parameters import GraphParameters
-from stages.graph.shared_support import shared_candidates
-from stages.graph.support import HIDDEN_TOP_DISTANCE, Candidate, candidates_for
-from stages.graph.walls import wall_candidate
+from stages.graph.support import Candidate
 
 FLOOR_CONFIDENCE = 0.1
 """Of a relation to the floor that only says: it has to stand on something."""
 SCENE_CONFIDENCE = 0.05
-MOVABLE_REACH = 1 / 3
-"""Movable things have to be this much nearer to a wall to hang on it."""
 UPRIGHT_LAYOUT = ("wall", "door", "window", "curtain", "ceiling")
 
 
-def ranked_candidates(entities: list[Entity], parameters: GraphParameters) -> dict[str, list[Candidate]]:
-    """Return for every object its acceptable relations, best first: support, then wall or ceiling, then floor or scene.
+def objects_of(entities: list[Entity]) -> list[Entity]:
+    """Return the nodes that need a parent."""
+    return [entity for entity in entities if entity.node_type != "layout"]
 
-    The last entry always hangs on the scene, so a tree exists whatever the map shows.
-    """
-    objects = [entity for entity in entities if entity.node_type != "layout"]
-    ours = parameters.method == "ours"
-    ceilings = [entity for entity in entities if entity.class_name == "ceiling"] if ours else []
-    upright = [e for e in entities if e.class_name in UPRIGHT_LAYOUT and len(e.points)]
-    walls = [entity for entity in upright if entity not in ceilings]
-    floors = [entity for entity in entities if entity.class_name == "floor" and entity.supporting]
-    trees = {wall.name: cKDTree(wall.points) for wall in walls}
-    ranked: dict[str, list[Candidate]] = {}
-    for child in objects:
-        choices = candidates_for(child, entities, parameters)
-        close = [c for c in choices if abs(c.gap) <= HIDDEN_TOP_DISTANCE and c.overlap >= parameters.area_threshold]
-        if ours and not close:
-            # Two in contact come before one that is deeper, and before one of them alone.
-            choices = [*shared_candidates(child, entities, parameters), *choices]
-        reach = parameters.wall_distance
-        if ours and child.movable:
-            # A cup does not hang on the wall that the desk, which the map lacks, stands at.
-            reach *= MOVABLE_REACH
-        wall = wall_candidate(child, walls, reach, trees)
-        hanging = hanging_candidate(child, ceilings, reach)
-        held = [candidate for candidate in (wall, hanging) if candidate is not None]
-        choices += sorted(held, key=lambda candidate: -candidate.score)
-        choices += fallback_candidates(child, floors)
-        ranked[child.name] = choices
-    return ranked
+
+def upright_layout(entities: list[Entity]) -> list[Entity]:
+    """Return layout that was seen and on which things may hang."""
+    return [entity for entity in entities if entity.class_name in UPRIGHT_LAYOUT and len(entity.points)]
+
+
+def level_floors(entities: list[Entity]) -> list[Entity]:
+    """Return floors with a plane to stand on."""
+    return [entity for entity in entities if entity.class_name == "floor" and entity.supporting]
 
 
 def fallback_candidates(child: Entity, floors: list[Entity]) -> list[Candidate]:

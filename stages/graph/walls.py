@@ -45,6 +45,11 @@ def within_rectangle(point: np.ndarray, plane: SurfacePlane) -> bool:
     return bool(0.0 <= u <= 1.0 and 0.0 <= v <= 1.0)
 
 
+def search_trees(walls: list[Entity]) -> dict[str, cKDTree]:
+    """Return a search tree over the points of every wall, by name."""
+    return {wall.name: cKDTree(wall.points) for wall in walls}
+
+
 def wall_candidate(child: Entity, walls: list[Entity], limit: float, trees: dict[str, cKDTree]) -> Candidate | None:
     """Return the relation `carries_on_wall` of the nearest wall within `limit` [m], or None.
 

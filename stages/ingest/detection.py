@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from schemas.errors import BadInput
 from stages.ingest.parameters import IngestParameters
+from stages.ingest.registry import LogLayout, all_layouts
 from stages.ingest.source import LogSource
 
 
@@ -20,26 +21,9 @@ class LogFormat(NamedTuple):
     open_source: Callable[[Path, IngestParameters, str], LogSource]
 
 
-MODULES = {
-    "mcap": "messages.mcap_source",
-    "rosbag1": "messages.rosbag1_source",
-    "rosbag2": "messages.rosbag2_source",
-    "nerfstudio": "layouts.nerfstudio",
-    "scannet": "layouts.scannet",
-    "colmap": "layouts.colmap",
-    "scenenn": "layouts.scenenn",
-    "tum": "layouts.tum",
-    "7scenes": "layouts.seven_scenes",
-    "redwood": "layouts.redwood",
-    "posed-images": "layouts.posed_images",
-    "images": "layouts.image_folder",
-}
-"""Format -> module with `matches` and `open_source`, in the order in which they are tried."""
-
-
-def log_format(name: str) -> LogFormat:
-    """Return the reader of a format; its module is loaded now."""
-    module = importlib.import_module(f"stages.ingest.{MODULES[name]}")
+def log_format(layout: LogLayout) -> LogFormat:
+    """Return the reader of a layout; its module is loaded now."""
+    module = importlib.import_module(layout.reader)
     return LogFormat(module.matches, module.open_source)
 
 
@@ -47,15 +31,16 @@ def open_log(path: Path, parameters: IngestParameters) -> LogSource:
     """Recognise a log and list its frames. Raises BadInput when it is missing, of no known format, or damaged."""
     if not path.exists():
         raise BadInput(f"{path}: there is no such log", hint="check the path")
-    names = list(MODULES) if parameters.format == "auto" else [parameters.format]
-    for name in names:
-        reader = log_format(name)
+    layouts = [layout for layout in all_layouts() if parameters.format in ("auto", layout.name)]
+    for layout in layouts:
+        reader = log_format(layout)
         rule = reader.matches(path)
         if rule is not None:
             return reader.open_source(path, parameters, rule)
+    names = ", ".join(layout.name for layout in layouts)
     what = "a file" if path.is_file() else "a folder with " + (_listing(path) or "nothing in it")
     raise BadInput(
-        f"{path}: is not a log in a format that is known ({', '.join(names)}); it is {what}",
+        f"{path}: is not a log in a format that is known ({names}); it is {what}",
         hint="docs/LOGS.md describes the layouts",
     )
 

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
 from schemas.errors import UsageError
 from schemas.sequence import Sequence
 from stages.ingest.pose_convention_names import PoseConvention
+from stages.ingest.registry import all_layouts
 from stages.kit.estimates import LOG_MEGABYTES_PER_MEGAPIXEL, Estimate, Inputs
 from stages.kit.stage import External, Parameters, Stage
+
+if TYPE_CHECKING:
+    LogFormatName = str
+else:
+    LogFormatName = Literal["auto", *(layout.name for layout in all_layouts())]
 
 
 class IngestParameters(Parameters):
     """Options of `ingest`."""
 
-    format: Literal[
-        "auto", "mcap", "rosbag1", "rosbag2", "tum", "scenenn", "scannet", "nerfstudio", "colmap", "7scenes", "redwood",
-        "posed-images", "images",
-    ] = Field("auto", description="Layout of the log; auto tries each and records the rule that matched")  # fmt: skip
+    format: LogFormatName = Field(
+        "auto", description="Layout of the log; auto tries each and records the rule that matched"
+    )
     fx: float | None = Field(None, gt=0, description="Focal length along x [pixel], overrides the log")
     fy: float | None = Field(None, gt=0, description="Focal length along y [pixel], overrides the log")
     cx: float | None = Field(None, description="Principal point x [pixel], overrides the log")

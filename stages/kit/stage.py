@@ -50,6 +50,17 @@ class Optionally:
     what: type[Artifact] | External
 
 
+@dataclass(frozen=True)
+class Extra:
+    """A distribution that only some options of a step need and that does not come with the project."""
+
+    distribution: str
+    module: str
+    """What is imported of it."""
+    remedy: str
+    """What it is for and how to get it, for `doctor`."""
+
+
 Reads = Mapping[str, type[Artifact] | External | Optionally]
 
 
@@ -112,6 +123,8 @@ class Stage:
     """Module of the step's folder whose function `versions(parameters)` returns name -> version of what decides the
     bytes under these parameters alone: the library of a backend, the model that a service runs. It goes into the key
     and the manifest beside `libraries`; it may raise MissingDependency."""
+    extras: tuple[Extra, ...] = ()
+    """What some of its options need beyond what comes with the project; `doctor` lists them."""
     check: Callable[[Any, Mapping[str, Any]], None] | None = None
     """Optional check of parameters against the inputs given (role -> path), raising UsageError before work starts."""
 

@@ -14,7 +14,6 @@ from typing import Literal
 
 import numpy as np
 
-from stages.kit.motion.all_branches import panda_lengths
 from stages.kit.motion.compiled_check import link_frames
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.kinematics import ArmChain, arm_chain, forward, inverse_kinematics, random_starts
@@ -185,6 +184,21 @@ class FixedArm:
             answer = inverse_kinematics(self.chain, target, starts)
             self._numeric[key] = answer.arm if answer.found else None
         return self._numeric[key]
+
+
+def panda_lengths(chain: ArmChain) -> np.ndarray | None:
+    """Return shoulder height, upper arm, elbow offset, forearm, wrist offset (5,) [m]; None for another build."""
+    if len(chain.fixed) != 7:
+        return None
+    fixed = chain.fixed
+    lengths = np.array([fixed[0, 2, 3], -fixed[2, 1, 3], fixed[3, 0, 3], fixed[4, 1, 3], fixed[6, 0, 3]])
+    model = np.tile(np.eye(4), (7, 1, 1))
+    for joint, turn in enumerate((0.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0)):
+        if turn:
+            model[joint, 1:3, 1:3] = [[0.0, -turn], [turn, 0.0]]
+    model[0, 2, 3], model[2, 1, 3], model[3, 0, 3] = lengths[0], -lengths[1], lengths[2]
+    model[4, 0, 3], model[4, 1, 3], model[6, 0, 3] = -lengths[2], lengths[3], lengths[4]
+    return lengths if np.abs(model - fixed).max() < 1e-6 else None
 
 
 def _measures(chain: ArmChain) -> _Lengths:

@@ -20,15 +20,14 @@ class Backtracking:
     """Chronological backtracking: keeps what worked, draws the failed placement anew, after ten failures goes one back.
 
     The order of the boxes is drawn once; when even the first box's tries are spent, a new one is drawn. Placements are
-    those of `RandomRestarts`, or with `corners` positions that touch the basket's sides or boxes that already stand
-    (or fixed obstacles), drawn among those free of overlap: geometry as ours has it, without causes.
+    those of `RandomRestarts`.
     """
 
-    def __init__(self, seed: int, corners: bool = False) -> None:
-        self.name = "backtracking_corners" if corners else "backtracking"
+    name, stream = "backtracking", 4
+
+    def __init__(self, seed: int) -> None:
         self.calls = 0
-        self._corners = corners
-        self._random = np.random.default_rng([seed, 5 if corners else 4])
+        self._random = np.random.default_rng([seed, self.stream])
         self._order: list[BoxState] = []
         self._places: list[Place] = []
         self._failures: list[int] = []
@@ -71,11 +70,20 @@ class Backtracking:
         self._failures[level + 1 :] = [0] * (len(self._order) - level - 1)
 
     def _draw(self, box: BoxState, observation: Observation) -> Place:
-        if self._corners:
-            places = _touching(box, self._order, self._places, observation)
-            if places:
-                return places[int(self._random.integers(len(places)))]
         return inset_draw(box, observation, self._random)
+
+
+class CornerBacktracking(Backtracking):
+    """The same, with placements that touch the basket's sides or boxes that already stand (or fixed obstacles), drawn
+    among those free of overlap: geometry as ours has it, without causes."""
+
+    name, stream = "backtracking_corners", 5
+
+    def _draw(self, box: BoxState, observation: Observation) -> Place:
+        places = _touching(box, self._order, self._places, observation)
+        if places:
+            return places[int(self._random.integers(len(places)))]
+        return super()._draw(box, observation)
 
 
 def _extents(box: BoxState, yaw: float) -> tuple[float, float]:
@@ -89,7 +97,7 @@ def _touching(box: BoxState, order: list[BoxState], places: list[Place], observa
     for other, (x, y, yaw) in zip(order, places, strict=False):
         half_x, half_y = (side / 2 for side in _extents(other, yaw))
         taken.append((x - half_x, y - half_y, x + half_x, y + half_y))
-    found: list[Place] = []
+    places_free: list[Place] = []
     for yaw in QUARTER_TURNS:
         half_x, half_y = (side / 2 for side in _extents(box, yaw))
         xs = [low[0] + half_x, high[0] - half_x]
@@ -105,5 +113,5 @@ def _touching(box: BoxState, order: list[BoxState], places: list[Place], observa
                     x + half_x <= left or x - half_x >= right or y + half_y <= lower or y - half_y >= upper
                     for left, lower, right, upper in taken
                 ):
-                    found.append((x, y, yaw))
-    return found
+                    places_free.append((x, y, yaw))
+    return places_free

@@ -51,6 +51,7 @@ Reply with one JSON object of this form:
 ORDER_FORM = """\
 Reply with one JSON object of this form:
 {"reasoning": "...", "order": ["a_box", "another_box"]}"""
+FORMS: dict[Variant, str] = {"backtrack": PLAN_FORM, "scratch": PLAN_FORM, "symbolic": ORDER_FORM}
 
 
 def packing_language(observation: Observation) -> ActionLanguage:
@@ -78,7 +79,7 @@ def prompt(
         TASK,
         "Initial state\n" + observation_text(observation),
         "Plans so far, with what the motion planner said\n" + trace_text(trace, reasons=reasons),
-        QUESTIONS[variant] + "\n" + (ORDER_FORM if variant == "symbolic" else PLAN_FORM),
+        QUESTIONS[variant] + "\n" + FORMS[variant],
     ]
     return say("system", system), say("user", "\n\n".join(parts))
 

@@ -107,12 +107,12 @@ class SymbolicProposer:
                 if error.failure.kind == "unreadable_reply":
                     return ()
                 raise
-            found: tuple[Action, ...] | Failure | None = wrong_order(order, observation)
-            if found is None:
-                found = self._solve(observation, order, trace)
-            if not isinstance(found, Failure):
-                return found
-            refused.append(refused_order_text(order, found, reasons=self._reasons))
+            answer: tuple[Action, ...] | Failure | None = wrong_order(order, observation)
+            if answer is None:
+                answer = self._solve(observation, order, trace)
+            if not isinstance(answer, Failure):
+                return answer
+            refused.append(refused_order_text(order, answer, reasons=self._reasons))
         return ()
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -51,11 +51,27 @@ def scripted_reply(request: Request, variant: Variant, seed: int) -> str:
     random = np.random.default_rng([seed, *digest[:16]])
     seen = read_prompt(text)
     last = seen.plans[-1] if seen.plans else None
-    if variant == "symbolic":
-        return json.dumps({"reasoning": _reasoning(last), "order": _order(seen, random)})
+    return json.dumps({"reasoning": _reasoning(last)} | _ANSWERS[variant](seen, last, random))
+
+
+def _backtrack(seen: Seen, last: SeenPlan | None, random: np.random.Generator) -> dict[str, Any]:
     planner = _Planner(seen, random)
-    places = planner.mended(last) if variant == "backtrack" and last and last.places else planner.fresh()
-    return json.dumps({"reasoning": _reasoning(last), "plan": _calls(places)})
+    return {"plan": _calls(planner.mended(last) if last and last.places else planner.fresh())}
+
+
+def _scratch(seen: Seen, last: SeenPlan | None, random: np.random.Generator) -> dict[str, Any]:
+    return {"plan": _calls(_Planner(seen, random).fresh())}
+
+
+def _symbolic(seen: Seen, last: SeenPlan | None, random: np.random.Generator) -> dict[str, Any]:
+    return {"order": _order(seen, random)}
+
+
+_ANSWERS: dict[Variant, Callable[[Seen, SeenPlan | None, np.random.Generator], dict[str, Any]]] = {
+    "backtrack": _backtrack,
+    "scratch": _scratch,
+    "symbolic": _symbolic,
+}
 
 
 class _Planner:

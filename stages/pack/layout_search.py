@@ -8,21 +8,32 @@ is higher than the hand comes. Budgets count nodes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+BOX, X, Y, TURN, HALF_SIDE = 0, 1, 2, 3, 4
+"""Columns of placements: number of the box, its centre [m], quarter turns (0 or 1); half side [m] of the square around
+a refused one."""
+PLACED_X, PLACED_Y, PLACED_TURN = 0, 1, 2
+"""Columns of the places (B, 3) of all boxes; a turn of UNPLACED: none yet."""
+SCORE, ROW_X, ROW_Y, ROW_TURN = 0, 1, 2, 3
+"""Columns of the positions that are tried of a box, the least score first."""
+LOW_X, LOW_Y, HIGH_X, HIGH_Y = 0, 1, 2, 3
+"""Columns of rectangles."""
 UNPLACED = -1
 NODES = 500
 RESTARTS = 16
+HAND_GAP, TOUCH_GAP = 0.001, 0.0011
+"""Between the hand and what it must not hit, and where positions are tried [m]."""
 DENSEST = 0.97
 """Share of the container beyond which no layout is looked for."""
 
 
-@dataclass(frozen=True)
-class LayoutProblem:
-    """B boxes, F fixed rectangles, K footprints of parts of the hand. Rectangles: low x, low y, high x, high y [m]."""
+class LayoutProblem(NamedTuple):
+    """B boxes, F fixed rectangles, K footprints of parts of the hand. Rectangles: low x, low y, high x, high y [m]. The
+    compiled functions take it as it is."""
 
     extents: np.ndarray
     """(B, 2) width and length."""
@@ -39,9 +50,9 @@ class LayoutProblem:
     reach: float
     """Largest distance of a centre from the origin [m]."""
     refused: np.ndarray
-    """(T, 5) placements not to try again: box, x, y, turn, half side [m] of the square around them."""
-    preset: np.ndarray = field(default_factory=lambda: np.zeros((0, 4)))
-    """(P, 4) boxes that have their place: box, x, y, turn (0 or 1)."""
+    """(T, 5) placements not to try again, see BOX, X, Y, TURN, HALF_SIDE."""
+    preset: np.ndarray = np.zeros((0, 4))
+    """(P, 4) boxes that have their place, see BOX, X, Y, TURN."""
 
 
 def find_layout(
@@ -51,16 +62,13 @@ def find_layout(
     if not _area_allows(problem, gap):
         return None
     area = problem.extents[:, 0] * problem.extents[:, 1]
-    preset = {int(row[0]) for row in problem.preset}
+    preset = {int(row[BOX]) for row in problem.preset}
     free = [box for box in range(len(area)) if box not in preset]
     for restart in range(restarts):
         weight = area * random.uniform(0.5, 1.5, len(area)) if restart else area
         order = np.array(sorted(free, key=lambda box: -weight[box]), dtype=np.int64)
         corner = restart % 4
-        placed, done = _search(
-            problem.extents, problem.container, problem.fixed, problem.hand, problem.over_fixed, problem.over_boxes,
-            problem.reach, problem.refused, problem.preset, order, gap, corner, nodes,
-        )  # fmt: skip
+        placed, done = _search(problem, order, gap, corner, nodes)
         if done == 1:
             return placed
     return None
@@ -76,96 +84,137 @@ def _area_allows(problem: LayoutProblem, gap: float) -> bool:
     return float(np.prod(problem.extents + gap, axis=1).sum()) <= DENSEST * free
 
 
-@njit(cache=True)
-def _apart(ax, ay, bx, by, cx, cy, dx, dy, gap):  # type: ignore[no-untyped-def]
-    """Whether rectangles (ax, ay, bx, by) and (cx, cy, dx, dy) are at least `gap` apart along an axis."""
-    return bx + gap <= cx + 1e-9 or dx + gap <= ax + 1e-9 or by + gap <= cy + 1e-9 or dy + gap <= ay + 1e-9
+class _Rectangle(NamedTuple):
+    """Low and high corner [m]."""
+
+    low_x: float
+    low_y: float
+    high_x: float
+    high_y: float
 
 
 @njit(cache=True)
-def _allowed(extents, container, fixed, hand, over_fixed, over_boxes, reach, refused, placed, box, x, y, turn, gap):  # type: ignore[no-untyped-def]
-    half_x = extents[box, turn] / 2
-    half_y = extents[box, 1 - turn] / 2
-    ax, ay, bx, by = x - half_x, y - half_y, x + half_x, y + half_y
-    if ax < container[0] - 1e-9 or ay < container[1] - 1e-9 or bx > container[2] + 1e-9 or by > container[3] + 1e-9:
+def _apart(one, other, gap):  # type: ignore[no-untyped-def]
+    """Whether rectangles are at least `gap` apart along an axis."""
+    return (
+        one.high_x + gap <= other.low_x + 1e-9
+        or other.high_x + gap <= one.low_x + 1e-9
+        or one.high_y + gap <= other.low_y + 1e-9
+        or other.high_y + gap <= one.low_y + 1e-9
+    )
+
+
+@njit(cache=True)
+def _row(rectangles, row):  # type: ignore[no-untyped-def]
+    """Return one of (F, 4) rectangles."""
+    return _Rectangle(rectangles[row, LOW_X], rectangles[row, LOW_Y], rectangles[row, HIGH_X], rectangles[row, HIGH_Y])
+
+
+@njit(cache=True)
+def _box_at(extents, box, x, y, turn):  # type: ignore[no-untyped-def]
+    """Return what a box covers with its centre at (x, y)."""
+    half_x, half_y = extents[box, turn] / 2, extents[box, 1 - turn] / 2
+    return _Rectangle(x - half_x, y - half_y, x + half_x, y + half_y)
+
+
+@njit(cache=True)
+def _hand_at(hand, part, x, y, turn):  # type: ignore[no-untyped-def]
+    """Return what a part of the hand covers that holds a box at (x, y)."""
+    return _Rectangle(
+        x + hand[turn, part, LOW_X],
+        y + hand[turn, part, LOW_Y],
+        x + hand[turn, part, HIGH_X],
+        y + hand[turn, part, HIGH_Y],
+    )
+
+
+@njit(cache=True)
+def _allowed(problem, placed, box, x, y, turn, gap):  # type: ignore[no-untyped-def]
+    """Whether a box may stand at (x, y) beside those that are `placed` (B, 3)."""
+    own = _box_at(problem.extents, box, x, y, turn)
+    if (
+        own.low_x < problem.container[LOW_X] - 1e-9
+        or own.low_y < problem.container[LOW_Y] - 1e-9
+        or own.high_x > problem.container[HIGH_X] + 1e-9
+        or own.high_y > problem.container[HIGH_Y] + 1e-9
+    ):
         return False
-    if x * x + y * y > reach * reach:
+    if x * x + y * y > problem.reach * problem.reach:
         return False
-    for row in range(refused.shape[0]):
-        same = int(refused[row, 0]) == box and int(refused[row, 3]) == turn
-        if same and abs(refused[row, 1] - x) < refused[row, 4] and abs(refused[row, 2] - y) < refused[row, 4]:
+    for row in range(problem.refused.shape[0]):
+        same = int(problem.refused[row, BOX]) == box and int(problem.refused[row, TURN]) == turn
+        half_side = problem.refused[row, HALF_SIDE]
+        if same and abs(problem.refused[row, X] - x) < half_side and abs(problem.refused[row, Y] - y) < half_side:
             return False
-    for f in range(fixed.shape[0]):
-        if not _apart(ax, ay, bx, by, fixed[f, 0], fixed[f, 1], fixed[f, 2], fixed[f, 3], gap):
+    for f in range(problem.fixed.shape[0]):
+        obstacle = _row(problem.fixed, f)
+        if not _apart(own, obstacle, gap):
             return False
-        for k in range(hand.shape[1]):
-            if over_fixed[box, f, k] and not _apart(
-                x + hand[turn, k, 0], y + hand[turn, k, 1], x + hand[turn, k, 2], y + hand[turn, k, 3],
-                fixed[f, 0], fixed[f, 1], fixed[f, 2], fixed[f, 3], 0.001,
-            ):  # fmt: skip
+        for k in range(problem.hand.shape[1]):
+            if problem.over_fixed[box, f, k] and not _apart(_hand_at(problem.hand, k, x, y, turn), obstacle, HAND_GAP):
                 return False
     for other in range(placed.shape[0]):
-        if placed[other, 2] < 0:
+        if placed[other, PLACED_TURN] < 0:
             continue
-        ox, oy, turned = placed[other, 0], placed[other, 1], int(placed[other, 2])
-        ohx, ohy = extents[other, turned] / 2, extents[other, 1 - turned] / 2
-        if not _apart(ax, ay, bx, by, ox - ohx, oy - ohy, ox + ohx, oy + ohy, gap):
+        there_x, there_y, turned = placed[other, PLACED_X], placed[other, PLACED_Y], int(placed[other, PLACED_TURN])
+        stands = _box_at(problem.extents, other, there_x, there_y, turned)
+        if not _apart(own, stands, gap):
             return False
-        for k in range(hand.shape[1]):
-            if over_boxes[box, other, k] and not _apart(
-                x + hand[turn, k, 0], y + hand[turn, k, 1], x + hand[turn, k, 2], y + hand[turn, k, 3],
-                ox - ohx, oy - ohy, ox + ohx, oy + ohy, 0.001,
-            ):  # fmt: skip
+        for k in range(problem.hand.shape[1]):
+            if problem.over_boxes[box, other, k] and not _apart(
+                _hand_at(problem.hand, k, x, y, turn), stands, HAND_GAP
+            ):
                 return False
-            if over_boxes[other, box, k] and not _apart(
-                ox + hand[turned, k, 0], oy + hand[turned, k, 1], ox + hand[turned, k, 2], oy + hand[turned, k, 3],
-                ax, ay, bx, by, 0.001,
-            ):  # fmt: skip
+            if problem.over_boxes[other, box, k] and not _apart(
+                _hand_at(problem.hand, k, there_x, there_y, turned), own, HAND_GAP
+            ):
                 return False
     return True
 
 
 @njit(cache=True)
-def _lines(container, fixed, hand, over_fixed, over_boxes, extents, placed, box, axis, half, turn, gap, out):  # type: ignore[no-untyped-def]
-    """Write the centre coordinates along an axis at which the box touches something into `out`; return how many."""
+def _lines(problem, placed, box, turn, axis, gap, out):  # type: ignore[no-untyped-def]
+    """Write the centre coordinates along an axis (0: x, 1: y) at which the box touches something into `out`; return how
+    many."""
+    half = (problem.extents[box, turn] if axis == 0 else problem.extents[box, 1 - turn]) / 2
     count = 0
-    out[count] = container[axis] + half
-    out[count + 1] = container[axis + 2] - half
+    out[count] = problem.container[axis] + half
+    out[count + 1] = problem.container[axis + 2] - half
     count += 2
-    for f in range(fixed.shape[0]):
-        out[count] = fixed[f, axis + 2] + gap + half
-        out[count + 1] = fixed[f, axis] - gap - half
+    for f in range(problem.fixed.shape[0]):
+        out[count] = problem.fixed[f, axis + 2] + gap + half
+        out[count + 1] = problem.fixed[f, axis] - gap - half
         count += 2
-        for k in range(hand.shape[1]):
-            if over_fixed[box, f, k]:
-                out[count] = fixed[f, axis + 2] - hand[turn, k, axis] + 0.0011
-                out[count + 1] = fixed[f, axis] - hand[turn, k, axis + 2] - 0.0011
+        for k in range(problem.hand.shape[1]):
+            if problem.over_fixed[box, f, k]:
+                out[count] = problem.fixed[f, axis + 2] - problem.hand[turn, k, axis] + TOUCH_GAP
+                out[count + 1] = problem.fixed[f, axis] - problem.hand[turn, k, axis + 2] - TOUCH_GAP
                 count += 2
     for other in range(placed.shape[0]):
-        if placed[other, 2] < 0:
+        if placed[other, PLACED_TURN] < 0:
             continue
-        turned = int(placed[other, 2])
-        reach = (extents[other, turned] if axis == 0 else extents[other, 1 - turned]) / 2
+        turned = int(placed[other, PLACED_TURN])
+        reach = (problem.extents[other, turned] if axis == 0 else problem.extents[other, 1 - turned]) / 2
         out[count] = placed[other, axis] + reach + gap + half
         out[count + 1] = placed[other, axis] - reach - gap - half
         count += 2
-        for k in range(hand.shape[1]):
-            if over_boxes[box, other, k]:
-                out[count] = placed[other, axis] + reach - hand[turn, k, axis] + 0.0011
-                out[count + 1] = placed[other, axis] - reach - hand[turn, k, axis + 2] - 0.0011
+        for k in range(problem.hand.shape[1]):
+            if problem.over_boxes[box, other, k]:
+                out[count] = placed[other, axis] + reach - problem.hand[turn, k, axis] + TOUCH_GAP
+                out[count + 1] = placed[other, axis] - reach - problem.hand[turn, k, axis + 2] - TOUCH_GAP
                 count += 2
-            if over_boxes[other, box, k]:
-                out[count] = placed[other, axis] + hand[turned, k, axis + 2] + half + 0.0011
-                out[count + 1] = placed[other, axis] + hand[turned, k, axis] - half - 0.0011
+            if problem.over_boxes[other, box, k]:
+                out[count] = placed[other, axis] + problem.hand[turned, k, axis + 2] + half + TOUCH_GAP
+                out[count + 1] = placed[other, axis] + problem.hand[turned, k, axis] - half - TOUCH_GAP
                 count += 2
     return count
 
 
 @njit(cache=True)
-def _candidates(  # type: ignore[no-untyped-def]
-    extents, container, fixed, hand, over_fixed, over_boxes, reach, refused, placed, box, gap, corner, rows
-):
-    """Write (score, x, y, turn) of the allowed touching positions into `rows`, best first; return how many."""
+def _candidates(problem, placed, box, gap, corner, rows):  # type: ignore[no-untyped-def]
+    """Write the allowed touching positions into `rows` (N, 4), best first; return how many."""
+    extents, fixed, hand, reach = problem.extents, problem.fixed, problem.hand, problem.reach
+    over_fixed, over_boxes = problem.over_fixed, problem.over_boxes
     size = 4 + 2 * (fixed.shape[0] + placed.shape[0]) * (1 + 2 * hand.shape[1])
     xs, ys = np.empty(size), np.empty(size)
     count = 0
@@ -179,8 +228,8 @@ def _candidates(  # type: ignore[no-untyped-def]
     turns = 1 if abs(extents[box, 0] - extents[box, 1]) < 1e-6 and not needs_hand else 2
     for turn in range(turns):
         half_x, half_y = extents[box, turn] / 2, extents[box, 1 - turn] / 2
-        m = _lines(container, fixed, hand, over_fixed, over_boxes, extents, placed, box, 1, half_y, turn, gap, ys)
-        n = _lines(container, fixed, hand, over_fixed, over_boxes, extents, placed, box, 0, half_x, turn, gap, xs)
+        m = _lines(problem, placed, box, turn, 1, gap, ys)
+        n = _lines(problem, placed, box, turn, 0, gap, xs)
         for j in range(m):
             y = ys[j]
             extra = n
@@ -189,26 +238,23 @@ def _candidates(  # type: ignore[no-untyped-def]
                 extra = n + 1
             for i in range(extra):
                 x = xs[i]
-                if count < rows.shape[0] and _allowed(
-                    extents, container, fixed, hand, over_fixed, over_boxes, reach, refused, placed, box, x, y, turn,
-                    gap,
-                ):  # fmt: skip
+                if count < rows.shape[0] and _allowed(problem, placed, box, x, y, turn, gap):
                     # Near the robot first; ties towards the side that the restart prefers.
                     near = x - half_x
                     side = y - half_y if corner % 2 == 0 else -(y + half_y)
-                    rows[count, 0] = near + 0.3 * side if corner < 2 else 0.3 * near + side
-                    rows[count, 1], rows[count, 2], rows[count, 3] = x, y, turn
+                    rows[count, SCORE] = near + 0.3 * side if corner < 2 else 0.3 * near + side
+                    rows[count, ROW_X], rows[count, ROW_Y], rows[count, ROW_TURN] = x, y, turn
                     count += 1
-    order = np.argsort(rows[:count, 0])
+    order = np.argsort(rows[:count, SCORE])
     sorted_rows = rows[:count][order]
     kept = 0
     for row in range(count):
         same = False
         for earlier in range(kept):
             if (
-                abs(rows[earlier, 1] - sorted_rows[row, 1]) < 1e-6
-                and abs(rows[earlier, 2] - sorted_rows[row, 2]) < 1e-6
-                and rows[earlier, 3] == sorted_rows[row, 3]
+                abs(rows[earlier, ROW_X] - sorted_rows[row, ROW_X]) < 1e-6
+                and abs(rows[earlier, ROW_Y] - sorted_rows[row, ROW_Y]) < 1e-6
+                and rows[earlier, ROW_TURN] == sorted_rows[row, ROW_TURN]
             ):
                 same = True
                 break
@@ -219,17 +265,15 @@ def _candidates(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _search(extents, container, fixed, hand, over_fixed, over_boxes, reach, refused, preset, order, gap, corner, nodes):  # type: ignore[no-untyped-def]
+def _search(problem, order, gap, corner, nodes):  # type: ignore[no-untyped-def]
     """Depth first over `order`; return places (B, 3) and 1: found, 0: out of nodes, -1: there is none."""
-    placed = np.full((extents.shape[0], 3), -1.0)
+    preset = problem.preset
+    placed = np.full((problem.extents.shape[0], 3), -1.0)
     for row in range(preset.shape[0]):
-        box, turn = int(preset[row, 0]), int(preset[row, 3])
-        if not _allowed(
-            extents, container, fixed, hand, over_fixed, over_boxes, reach, refused, placed, box, preset[row, 1],
-            preset[row, 2], turn, 0.0,
-        ):  # fmt: skip
+        box, turn = int(preset[row, BOX]), int(preset[row, TURN])
+        if not _allowed(problem, placed, box, preset[row, X], preset[row, Y], turn, 0.0):
             return placed, -1
-        placed[box, 0], placed[box, 1], placed[box, 2] = preset[row, 1], preset[row, 2], turn
+        placed[box, PLACED_X], placed[box, PLACED_Y], placed[box, PLACED_TURN] = preset[row, X], preset[row, Y], turn
     depth_count = len(order)
     if depth_count == 0:
         return placed, 1
@@ -239,12 +283,10 @@ def _search(extents, container, fixed, hand, over_fixed, over_boxes, reach, refu
     at = np.zeros(depth_count, dtype=np.int64)
     depth = 0
     used = 0
-    counts[0] = _candidates(
-        extents, container, fixed, hand, over_fixed, over_boxes, reach, refused, placed, order[0], gap, corner, rows[0]
-    )
+    counts[0] = _candidates(problem, placed, order[0], gap, corner, rows[0])
     while depth >= 0:
         box = order[depth]
-        placed[box, 2] = -1.0
+        placed[box, PLACED_TURN] = -1.0
         if at[depth] >= counts[depth]:
             depth -= 1
             continue
@@ -253,13 +295,11 @@ def _search(extents, container, fixed, hand, over_fixed, over_boxes, reach, refu
             return placed, 0
         row = rows[depth, at[depth]]
         at[depth] += 1
-        placed[box, 0], placed[box, 1], placed[box, 2] = row[1], row[2], row[3]
+        placed[box, PLACED_X], placed[box, PLACED_Y] = row[ROW_X], row[ROW_Y]
+        placed[box, PLACED_TURN] = row[ROW_TURN]
         if depth + 1 == depth_count:
             return placed, 1
         depth += 1
         at[depth] = 0
-        counts[depth] = _candidates(
-            extents, container, fixed, hand, over_fixed, over_boxes, reach, refused, placed, order[depth], gap, corner,
-            rows[depth],
-        )  # fmt: skip
+        counts[depth] = _candidates(problem, placed, order[depth], gap, corner, rows[depth])
     return placed, -1

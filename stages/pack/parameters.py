@@ -56,7 +56,7 @@ def check_inputs(parameters: PackParameters, inputs: Mapping[str, Any]) -> None:
 
 STAGE = Stage(
     name="pack",
-    version=1,
+    version=2,
     summary="Pack boxes into a basket with an arm: plans are proposed, motion planning says what is wrong (LLM3)",
     parameters=PackParameters,
     reads={
@@ -64,7 +64,7 @@ STAGE = Stage(
         "transcript": Optionally(External("transcript.jsonl of an earlier run, for --language recorded or openai")),
     },
     writes=Packing,
-    libraries=("numpy", "scipy", "numba", "pybullet", "trimesh", "matplotlib"),
+    libraries=("numpy", "scipy", "numba", "ompl", "pybullet", "trimesh", "matplotlib"),
     data_files=lambda parameters: ("robots/panda.toml",),
     check=check_inputs,
     example="scenewright pack --suite hard/unreachable --instance 3 --proposer ours --out outputs/pack",

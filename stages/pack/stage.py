@@ -2,29 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from schemas.packing import Packing, PackingAttempt, PackingFile, PackingStep
+from stages.kit.language.chat import Chat
 from stages.kit.language.failures import LanguageFailed
 from stages.kit.language.opening import open_chat
 from stages.kit.stage import Context
-from stages.pack.backtracking import Backtracking
 from stages.pack.environment import PackingWorld
 from stages.pack.hard_suites import hard_instance
 from stages.pack.instances import Instance, published_instance
-from stages.pack.language_proposer import LanguageProposer, SymbolicProposer
+from stages.pack.language_prompt import Variant
 from stages.pack.language_scripted import scripted_backend
 from stages.pack.loop import Budget, GaveUp, PackingRun, run_loop
 from stages.pack.motion import MotionPlanner
-from stages.pack.own_proposer import OwnProposer, placement_solver
-from stages.pack.parameters import LANGUAGE_PROPOSERS, PackParameters
+from stages.pack.parameters import PackParameters
 from stages.pack.pictures import draw_attempts, draw_layout, draw_scene
 from stages.pack.problem_file import read_problem, to_file
+from stages.pack.proposers import PROPOSERS, Setting
 from stages.pack.records import Action, Attempt, Observation, Proposer
-from stages.pack.sampling import FixedLayout, RandomRestarts, RandomSampler
+
+INSTANCES: dict[str, Callable[[str, PackParameters], Instance]] = {
+    "published": lambda cell, parameters: published_instance(cell, parameters.instance),
+    "hard": lambda cell, parameters: hard_instance(cell, parameters.instance, parameters.limits),
+}
+"""Suite -> instance of one of its cells."""
 
 
 def run(problem: Path | None, transcript: Path | None, *, parameters: PackParameters, context: Context) -> Packing:
@@ -76,34 +81,18 @@ def _instance(problem: Path | None, parameters: PackParameters) -> Instance:
     if problem is not None:
         return read_problem(problem, parameters.limits)
     suite, cell = parameters.suite.split("/")
-    if suite == "published":
-        return published_instance(cell, parameters.instance)
-    return hard_instance(cell, parameters.instance, parameters.limits)
+    return INSTANCES[suite](cell, parameters)
 
 
 def _proposer(parameters: PackParameters, transcript: Path | None, context: Context) -> Proposer:
-    name, seed = parameters.proposer, context.seed
-    if name in LANGUAGE_PROPOSERS:
-        chat = open_chat(
-            parameters, scripted=scripted_backend(name, seed), transcript=transcript,  # type: ignore[arg-type]
+    def chat(variant: Variant) -> Chat:
+        return open_chat(
+            parameters, scripted=scripted_backend(variant, context.seed), transcript=transcript,
             record=context.output / "transcript.jsonl",
         )  # fmt: skip
-        if name == "symbolic":
-            return SymbolicProposer(
-                chat, placement_solver, trace_length=parameters.trace_length, reasons=parameters.reasons
-            )
-        return LanguageProposer(
-            chat, variant=name, reasons=parameters.reasons, trace_length=parameters.trace_length  # type: ignore[arg-type]
-        )  # fmt: skip
-    samplers: dict[str, Proposer] = {
-        "ours": OwnProposer(seed, reasons=parameters.reasons),
-        "random": RandomSampler(seed),
-        "random_restarts": RandomRestarts(seed),
-        "backtracking": Backtracking(seed),
-        "backtracking_corners": Backtracking(seed, corners=True),
-        "fixed_layout": FixedLayout(),
-    }
-    return samplers[name]
+
+    setting = Setting(context.seed, parameters.reasons, parameters.trace_length, chat)
+    return PROPOSERS[parameters.proposer](setting)
 
 
 def _attempt(attempt: Attempt) -> PackingAttempt:
@@ -148,8 +137,8 @@ def plan_text(told: PackingFile) -> str:
         lines.append(f"\nattempt {number}")
         for step in attempt.steps:
             where = "" if step.x is None else f" at ({step.x:.3f}, {step.y:.3f}), yaw {step.yaw:.2f}"
-            said = "not tried" if not step.tried else "feasible" if step.failure is None else step.failure.message
-            lines.append(f"  {step.name} {step.box}{where}: {said}")
+            outcome = "not tried" if not step.tried else "feasible" if step.failure is None else step.failure.message
+            lines.append(f"  {step.name} {step.box}{where}: {outcome}")
         if attempt.task is not None:
             lines.append(f"  {attempt.task.message}")
     end = "packed" if told.success else "not packed"

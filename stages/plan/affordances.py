@@ -81,4 +81,4 @@ def _of_support(model: WorldModel, name: str, feet: dict[str, tuple[float, float
 
 def _height(model: WorldModel, region: Region) -> float:
     middle = np.array([*(region.low + region.high) / 2, region.level])
-    return float(apply(region.world_from_closed(model), middle)[2])
+    return float(apply(model.world_from_region(region), middle)[2])

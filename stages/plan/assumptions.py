@@ -71,7 +71,7 @@ def believe(model: WorldModel, graph: ContactGraphFile, beliefs: list[Belief]) -
     for belief in beliefs:
         width, height, mass = USUAL[belief.class_name]
         region = _best_region(model, belief, width, height)
-        middle = apply(region.world_from_closed(model), np.array([*(region.low + region.high) / 2, region.level]))
+        middle = apply(model.world_from_region(region), np.array([*(region.low + region.high) / 2, region.level]))
         pose = transform_from_yaw(0.0, middle + [0.0, 0.0, 0.001])
         box = Box(center=as_vector(middle + [0.0, 0.0, height / 2]), size=(width, width, height))
         record = SceneBody(
@@ -100,7 +100,7 @@ def _best_region(model: WorldModel, belief: Belief, width: float, height: float)
 
     def discomfort(region: Region) -> float:
         middle = np.array([*(region.low + region.high) / 2, region.level])
-        return abs(float(apply(region.world_from_closed(model), middle)[2]) - COMFORT)
+        return abs(float(apply(model.world_from_region(region), middle)[2]) - COMFORT)
 
     return min(hidden, key=discomfort)
 

@@ -1,10 +1,13 @@
-"""Whether the goal holds in the room after execution, each condition with its numbers."""
+"""Whether a condition holds in the room after execution, with its numbers."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
-from schemas.plan import BodyMatch, Check
+from schemas.plan import Check
 from stages.kit.geometry.transforms import apply
 from stages.kit.simulation.shapes import link_shapes
 from stages.kit.simulation.world import PhysicsWorld
@@ -15,6 +18,20 @@ CLOSED_ANGLE, CLOSED_SLIDE = 0.1, 0.02
 """A door counts as shut below this [rad], a drawer below this [m]."""
 CONTACT_HEIGHT = 0.02
 """Largest distance of an item's lowest point from the height at which it touches its support [m]."""
+
+
+@dataclass(frozen=True)
+class GoalInRoom:
+    """A literal of the goal, with what its names are in the room of execution."""
+
+    world: PhysicsWorld
+    literal: str
+    bodies: tuple[str, ...]
+    """For each argument its body, or the body whose joint it is."""
+    joints: tuple[str, ...]
+    """The joint that the first argument is, or all joints of the body that it is."""
+    held: str | None
+    """What the hand holds."""
 
 
 def check_on(world: PhysicsWorld, literal: str, item: str, support: str) -> Check:
@@ -52,7 +69,7 @@ def _lowest_point(world: PhysicsWorld, item: str) -> float:
     )  # fmt: skip
 
 
-def check_joints(world: PhysicsWorld, literal: str, body: str, joints: list[str], shut: bool) -> Check:
+def check_joints(world: PhysicsWorld, literal: str, body: str, joints: Sequence[str], shut: bool) -> Check:
     """Whether all the joints of a body stand shut (or, `shut` false, open)."""
     values = {joint: world.joint_value(body, joint) for joint in joints}
     kinds = {joint.name: joint for joint in world.bodies[body].record.joints}
@@ -85,43 +102,3 @@ def check_in(world: PhysicsWorld, literal: str, item: str, container: str) -> Ch
         f"{'touching' if touching else 'not touching'} it",
         numbers={"outside": round(outside, 6), "speed": round(speed, 6)},
     )
-
-
-def check_goal(
-    world: PhysicsWorld,
-    goal: tuple[str, ...],
-    matches: dict[str, BodyMatch],
-    joint_names: dict[str, str],
-    held: str | None,
-) -> tuple[Check, ...]:
-    """Check ground literals such as `on(bottle_7, table_3)`, whose names are those of the plan.
-
-    `joint_names` maps joints of the plan to those of this world. A body without a match makes its condition false.
-    """
-    checks = []
-    for literal in goal:
-        predicate, inner = literal.rstrip(")").split("(")
-        names = [word.strip() for word in inner.split(",")]
-        owners = [name if name in matches else _owner(name, matches) for name in names]
-        missing = [name for name in owners if matches[name].matched is None]
-        if missing:
-            detail = f"the room has no body of the class of {missing[0]} near it"
-            checks.append(Check(condition=literal, holds=False, detail=detail))
-            continue
-        here = [matches[name].matched or "" for name in owners]
-        if predicate in ("on", "carried_along"):
-            checks.append(check_on(world, literal, here[0], here[1]))
-        elif predicate == "in":
-            checks.append(check_in(world, literal, here[0], here[1]))
-        elif predicate == "holding":
-            detail = f"the hand holds {held or 'nothing'}"
-            checks.append(Check(condition=literal, holds=held == here[0], detail=detail))
-        else:
-            whole = names[0] in matches
-            joints = list(world.bodies[here[0]].joints) if whole else [joint_names[names[0]]]
-            checks.append(check_joints(world, literal, here[0], joints, predicate == "closed"))
-    return tuple(checks)
-
-
-def _owner(joint: str, matches: dict[str, BodyMatch]) -> str:
-    return max((name for name in matches if joint.startswith(f"{name}__")), key=len)

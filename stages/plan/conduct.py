@@ -9,27 +9,24 @@ import numpy as np
 
 from schemas.interactive_scene import SceneBody
 from schemas.plan import BodyMatch, Failure
-from schemas.scene_parts import SurfacePlane
+from schemas.scene_parts import Joint, SurfacePlane
 from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.kinematics import forward
 from stages.kit.simulation.robot import base_pose
+from stages.plan.action import MotionRequest, action_named
 from stages.plan.arm_motion import ArmPlanner, Tally
+from stages.plan.carriers import NOTHING, carrier
 from stages.plan.correspondence import match_joint, renamed
-from stages.plan.door_motion import is_closed, is_open
 from stages.plan.execution import PhysicalRobot, true_record
 from stages.plan.level_carrying import LEVEL_PACE, levelled
 from stages.plan.motions import Segment, whole_body
 from stages.plan.pick_place import Budgets
-from stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level
-from stages.plan.refinement import Step, grasp_style, refine_action
-from stages.plan.tree_state import NOTHING, carrier
+from stages.plan.refinement import DRIVE, Step, grasp_style, refine_action
 from stages.plan.world_model import RobotState, WorldModel
 
 NOT_THERE = "not_found"
 """Failure of an action on what the room does not have: neither another attempt nor another plan helps."""
-MOST_TILT = 0.35
-"""What was put down stands when it is tilted by less [rad]."""
 JOINT_TOLERANCE = 0.05
 """A joint further than this from where a motion should have left it is looked at again [rad or m]."""
 
@@ -106,7 +103,7 @@ class Conduct:
                 return after, number
             state = after
             name, arguments = group[-1].name, group[-1].arguments
-            origin = arguments[1] if name == "place" else arguments[0]
+            origin = action_named(name).target(arguments)
             number += len(group)
             self.observe(number - 1)
         return state, number
@@ -120,17 +117,16 @@ class Conduct:
         """Carry out one action with its drives, trying again after a look; return the state after it (None: the arm
         does not get back) and whether it was carried out."""
         name, arguments = group[-1].name, group[-1].arguments
+        action = action_named(name)
         for attempt in range(self.attempts):
             self.physical.action = number
-            preferred = self._anchor(group[-1]) if attempt == 0 else None
+            anchor = self._anchor(group[-1]) if attempt == 0 else None
             try:
                 self._look(name, arguments)
-                if preferred is not None:
-                    preferred = self._re_anchored(group[-1], *preferred)
-                style = grasp_style(self.model, arguments[0], following) if name == "pick" else "any"
-                steps, after = refine_action(
-                    self.model, state, name, arguments, origin, self.budgets, self.random, preferred, style
-                )
+                preferred = None if anchor is None else self._re_anchored(group[-1], anchor)
+                style = grasp_style(self.model, arguments[0], following) if action.hand == "takes" else "any"
+                request = MotionRequest(arguments, self.budgets, self.random, preferred, style)
+                steps, after = refine_action(self.model, state, name, request, origin)
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
                 if failed.failure.kind == NOT_THERE:
@@ -151,15 +147,14 @@ class Conduct:
                 continue
             state = self._perceived(after)
             try:
-                if name == "pick" and self.model.laden(arguments[0]):
-                    state = self._level(state)
+                state = action.after_motion(self, state, arguments)
                 self._check_effect(name, arguments)
                 return state, True
             except MotionFailed as failed:
                 self._note(failed, name, arguments)
-                if name == "place":
+                if action.when_unmet == "stay":
                     return state, False
-                if name == "pick":  # the tray was lost, or something is in the way of levelling it
+                if action.when_unmet == "back":  # the tray was lost, or something is in the way of levelling it
                     return self._recovered(state, name, arguments), False
         return state, False
 
@@ -175,23 +170,17 @@ class Conduct:
         action = f"{name}({', '.join(arguments)})"
         self.failures.append(failed.failure.model_copy(update={"action": action}))
 
-    def _matched(self, body: str) -> str:
+    def matched(self, body: str) -> str:
         """Return the body of the room that a planned body is. Raises MotionFailed `not_found`."""
         match = self.matches[body]
         if match.matched is None:
             raise MotionFailed(NOT_THERE, f"the room has no body of the class of {body} near it", (body,))
         return match.matched
 
-    def _named_bodies(self, name: str, arguments: tuple[str, ...]) -> list[str]:
-        if name in ("open", "close"):
-            return [self.model.owner(arguments[0])]
-        bodies = [arguments[1]] if name == "place" else [arguments[0], arguments[1], *self.model.load(arguments[0])]
-        return [body for body in bodies if body in self.model.records]
-
     def _look(self, name: str, arguments: tuple[str, ...]) -> None:
         """Take over pose, joints and shape of the bodies that an action names, as they are in the room now."""
-        for body in self._named_bodies(name, arguments):
-            self._see(body, self._matched(body))
+        for body in action_named(name).bodies(self.model, arguments):
+            self._see(body, self.matched(body))
 
     def _see(self, body: str, here: str) -> None:
         """Take over a body of the room: pose, joints and shape; what it stands on stays as believed."""
@@ -216,34 +205,22 @@ class Conduct:
             elif record.movable or record.joints:
                 self._see(body, match.matched)
 
-    def _anchor(self, step: Step) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return the pose of what a planned motion is tied to, before the look: (world_from_body, empty)."""
-        if step.name in ("pick", "place"):
-            body = step.arguments[0] if step.name == "pick" else step.arguments[1]
-            return self.model.pose(body), np.zeros(0)
-        return None
+    def _anchor(self, step: Step) -> np.ndarray | None:
+        """Return the pose (4, 4) of the body that a planned motion is tied to, before the look."""
+        tied_to = action_named(step.name).tied_to
+        return None if tied_to is None else self.model.pose(step.arguments[tied_to])
 
-    def _re_anchored(self, step: Step, before: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _re_anchored(self, step: Step, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return base pose and grasp (or place) of the planned step, moved along with the body they are tied to."""
-        manipulation = step.manipulation
-        assert manipulation is not None
-        body = step.arguments[0] if step.name == "pick" else step.arguments[1]
-        shift = self.model.pose(body)[:3, 3] - before[:3, 3]
-        base = manipulation.base + np.array([shift[0], shift[1], 0.0])
-        if step.name == "pick":
-            assert manipulation.body_from_tool is not None
-            return base, manipulation.body_from_tool
-        assert manipulation.item_pose is not None
-        place = manipulation.item_pose.copy()
-        place[:3, 3] += shift
-        bottom = place[2, 3] + self.model.foot(step.arguments[0])
-        place[2, 3] += nearest_level(self.model, body, place[:2, 3], bottom) - bottom + PUT_DOWN_HEIGHT
-        return base, place
+        action = action_named(step.name)
+        assert step.manipulation is not None and action.tied_to is not None
+        shift = self.model.pose(step.arguments[action.tied_to])[:3, 3] - before[:3, 3]
+        return action.moved_along(self.model, step.arguments, step.manipulation, shift)
 
     def _execute(self, step: Step) -> None:
         item = None
-        if step.name == "pick":
-            item = self._matched(step.arguments[0])
+        if action_named(step.name).hand == "takes":
+            item = self.matched(step.arguments[0])
         for segment in step.segments:
             self.physical.follow(segment, item)
         self.physical.recording.keyframe(self.physical.action, step.name)
@@ -252,7 +229,7 @@ class Conduct:
         """Raises MotionFailed `condition_not_met` when a joint is not where the motion should have brought it: what
         follows was planned around it."""
         for planned, goal in step.manipulation.joint_values.items() if step.manipulation is not None else ():
-            there, body = self.joint_names[planned], self._matched(self.model.owner(planned))
+            there, body = self.joint_names[planned], self.matched(self.model.owner(planned))
             value = self.physical.world.joint_value(body, there)
             if abs(value - goal) > JOINT_TOLERANCE:
                 raise MotionFailed(
@@ -263,38 +240,14 @@ class Conduct:
                 )
 
     def _check_effect(self, name: str, arguments: tuple[str, ...]) -> None:
-        """Raises MotionFailed `condition_not_met` when a door, or what was put down, is not as the action should leave
-        it."""
-        if name == "place":
-            self._check_place(*arguments[:2])
-        if name not in ("open", "close"):
-            return
-        there = self.joint_names[arguments[0]]
-        body = self._matched(self.model.owner(arguments[0]))
-        joint = next(joint for joint in self.room.records[body].joints if joint.name == there)
-        value = self.physical.world.joint_value(body, there)
-        if not (is_open if name == "open" else is_closed)(joint, value):
-            raise MotionFailed(
-                "condition_not_met",
-                f"after {name} the joint {there} stands at {value:.3f} of {joint.upper:.3f}",
-                (arguments[0],),
-                {"value": value, "upper": joint.upper},
-            )
+        """Raises MotionFailed `condition_not_met` when the room is not as the action should leave it."""
+        action_named(name).check_effect(self, arguments)
 
-    def _check_place(self, item: str, target: str) -> None:
-        world, here, there = self.physical.world, self._matched(item), self._matched(target)
-        parent = carrier(world, here)
-        standing = self.model.standing(item)
-        tilt = float(np.arccos(np.clip((world.pose(here) @ standing.T)[2, 2], -1.0, 1.0)))
-        fell = tilt > MOST_TILT and abs(standing[2, 2]) > 0.5
-        if parent != there or fell:
-            raise MotionFailed(
-                "condition_not_met",
-                f"{item} was let go over {target} and is now on {parent or 'nothing'}, {np.degrees(tilt):.0f} degrees "
-                "from how it was to stand",
-                (item, target),
-                {"tilt": tilt},
-            )
+    def joint_in_room(self, planned: str) -> tuple[Joint, float]:
+        """Return the joint of the room that a planned joint is, and its value now. Raises MotionFailed `not_found`."""
+        body, there = self.matched(self.model.owner(planned)), self.joint_names[planned]
+        joint = next(joint for joint in self.room.records[body].joints if joint.name == there)
+        return joint, self.physical.world.joint_value(body, there)
 
     def _perceived(self, state: RobotState) -> RobotState:
         """Correct what the robot believes of itself and of what it holds by what the joints and a look say."""
@@ -309,7 +262,7 @@ class Conduct:
             self.model.checker.carry(state.holding, tool_from_item)
         return RobotState(base, arm, state.holding, tool_from_item, inverse(tool_from_item))
 
-    def _level(self, state: RobotState) -> RobotState:
+    def level(self, state: RobotState) -> RobotState:
         """Turn the hand so that a laden tray, which gave way in the fingers, stands level; return the state then.
 
         Raises MotionFailed as `PhysicalRobot.follow` does.
@@ -382,7 +335,7 @@ def _by_action(steps: list[Step]) -> list[list[Step]]:
         same = (
             groups and groups[-1][-1].name == step.name and groups[-1][-1].arguments == step.arguments
         )  # fmt: skip
-        if groups and (groups[-1][-1].name == "drive" or same):
+        if groups and (groups[-1][-1].name == DRIVE or same):
             groups[-1].append(step)
         else:
             groups.append([step])
@@ -406,7 +359,7 @@ def joint_pairs(
         if there is None:
             continue
         for joint in record.joints:
-            found = match_joint(record, joint.name, room[there])
-            if found is not None and found not in pairs.values():
-                pairs[joint.name] = found
+            counterpart = match_joint(record, joint.name, room[there])
+            if counterpart is not None and counterpart not in pairs.values():
+                pairs[joint.name] = counterpart
     return pairs

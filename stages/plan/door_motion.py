@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -87,17 +87,18 @@ def plan_close(
     joint = model.joint(body, joint_name)
     value = model.joint_value(body, joint_name)
     tally = Tally()
-    whole = _push(model, state, body, joint, value, -OVERSHOOT, budgets, random, tally)
+    search = JointSearch(model, state, body, joint, budgets, random, tally)
+    whole = _push(search, value, -OVERSHOOT)
     if whole is not None:
         return (whole,)
     for share in (0.5, 0.7, 0.3):
         middle = value * share
-        first = _push(model, state, body, joint, value, middle, budgets, random, tally)
+        first = _push(search, value, middle)
         if first is None:
             continue
         after = RobotState(first.base, first.segments[-1].path[-1, 3:])
         with model.joints_at(body, {joint_name: middle}):
-            second = _push(model, after, body, joint, middle, -OVERSHOOT, budgets, random, tally)
+            second = _push(replace(search, state=after), middle, -OVERSHOOT)
         if second is not None:
             return first, second
     tally.raise_for(f"close({joint_name})", (body, joint_name))
@@ -117,8 +118,9 @@ def plan_open(
     bar = np.array(joint.handle_axis) if joint.handle_axis is not None else np.array([0.0, 0.0, 1.0])
     roll = 0.0 if abs(bar[2]) > 0.5 else np.pi / 2
     tally = Tally()
+    search = JointSearch(model, state, body, joint, budgets, random, tally)
     for end in (open_value(joint), max(0.65 * open_value(joint), 0.62 * joint.upper)):
-        plan = _drag(model, state, body, joint, contact, roll, value, end, budgets, random, tally)
+        plan = _drag(search, contact, roll, value, end)
         if plan is not None:
             return (plan,)
     tally.raise_for(f"open({joint_name})", (body, joint_name))
@@ -167,10 +169,23 @@ def _candidate_bases(
     return np.array(rows).reshape(-1, 3)
 
 
-def _push(
-    model: WorldModel, state: RobotState, body: str, joint: Joint, start: float, end: float, budgets: Budgets,
-    random: np.random.Generator, tally: Tally,
-) -> Manipulation | None:  # fmt: skip
+@dataclass(frozen=True)
+class JointSearch:
+    """The search for a motion of one joint."""
+
+    model: WorldModel
+    state: RobotState
+    body: str
+    joint: Joint
+    budgets: Budgets
+    random: np.random.Generator
+    tally: Tally
+    """Counts what ended the attempts."""
+
+
+def _push(search: JointSearch, start: float, end: float) -> Manipulation | None:
+    model, state, body, joint, tally = search.model, search.state, search.body, search.joint, search.tally
+    budgets, random = search.budgets, search.random
     world_from_body = model.pose(body)
     lift = float(world_from_body[2, 3])
     part = model.part_mesh(body, joint.part)
@@ -188,16 +203,15 @@ def _push(
             for roll in (0.0, np.pi / 2):
                 arc = Arc(body, joint, contact, values, tilt, roll, gap, 0.0, 0.0)
                 for base in bases[:6]:
-                    found = _try_arc(model, state, arc, base, planner, tally)
-                    if found is not None:
-                        return found
+                    motion = _try_arc(model, state, arc, base, planner, tally)
+                    if motion is not None:
+                        return motion
     return None
 
 
-def _drag(
-    model: WorldModel, state: RobotState, body: str, joint: Joint, contact: ContactPoint, roll: float, start: float,
-    end: float, budgets: Budgets, random: np.random.Generator, tally: Tally,
-) -> Manipulation | None:  # fmt: skip
+def _drag(search: JointSearch, contact: ContactPoint, roll: float, start: float, end: float) -> Manipulation | None:
+    model, state, body, joint, tally = search.model, search.state, search.body, search.joint, search.tally
+    budgets, random = search.budgets, search.random
     world_from_body = model.pose(body)
     values = _values(start, end)
     route = np.array([
@@ -210,9 +224,9 @@ def _drag(
         for flip in (0.0, np.pi):
             arc = Arc(body, joint, contact, values, tilt, roll + flip, 0.0, opening, GRIP_SLACK)
             for base in bases[:10]:
-                found = _try_arc(model, state, arc, base, planner, tally)
-                if found is not None:
-                    return found
+                motion = _try_arc(model, state, arc, base, planner, tally)
+                if motion is not None:
+                    return motion
     return None
 
 
@@ -231,7 +245,7 @@ def _try_arc(
     start = planner.reachable(base, poses[0], tally)
     if start is None:
         return None
-    arms = _arc(model, planner, base, body, joint, values, poses, start, tally)
+    arms = _arc(planner, base, arc, poses, start, tally)
     if arms is None:
         return None
     checker = model.checker
@@ -277,10 +291,10 @@ def _try_arc(
 
 
 def _arc(
-    model: WorldModel, planner: ArmPlanner, base: np.ndarray, body: str, joint: Joint, values: np.ndarray,
-    poses: list[np.ndarray], start: np.ndarray, tally: Tally,
-) -> np.ndarray | None:  # fmt: skip
+    planner: ArmPlanner, base: np.ndarray, arc: Arc, poses: list[np.ndarray], start: np.ndarray, tally: Tally
+) -> np.ndarray | None:
     """Return arm values (K, 7) along the poses, free with the door where it is at each of them."""
+    model, body, joint, values = planner.model, arc.body, arc.joint, arc.values
     frame = inverse(base_pose(base, model.description))
     try:
         arms = follow(planner.model.chain, [frame @ pose for pose in poses], start)
@@ -304,3 +318,14 @@ def _arc(
         tally.collided(collision)
         return None
     return arms
+
+
+def check_joint(joint: Joint, value: float, action: str, planned: str, reached: Callable[[Joint, float], bool]) -> None:
+    """Raises MotionFailed `condition_not_met` when a joint of the room, `planned` in the plan, is not `reached`."""
+    if not reached(joint, value):
+        raise MotionFailed(
+            "condition_not_met",
+            f"after {action} the joint {joint.name} stands at {value:.3f} of {joint.upper:.3f}",
+            (planned,),
+            {"value": value, "upper": joint.upper},
+        )

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 from schemas.plan import Failure
 from stages.kit.simulation.urdf_split import PART_SEPARATOR
 from stages.kit.tasks.strips import Atom, GroundAction, atom_text
+from stages.plan.action import schemas_of_hand
 
-TAKING = ("pick", "take_out", "lift")
-PUTTING = ("place", "put_in", "stack")
+TAKING, PUTTING = schemas_of_hand("takes"), schemas_of_hand("puts")
 MOVED = "moved"
 Key = tuple[str, tuple[str, ...]]
 

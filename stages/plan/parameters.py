@@ -67,12 +67,12 @@ class PlanParameters(Parameters):
 
 STAGE = Stage(
     name="plan",
-    version=7,
+    version=8,
     summary="Plan what a robot does in the scene, execute it in physics, check the goal or say why not",
     parameters=PlanParameters,
     reads={"scene": InteractiveScene, "ground_truth": Optionally(GroundTruth)},
     writes=Plan,
-    libraries=("numpy", "scipy", "numba", "pybullet", "open3d", "trimesh"),
+    libraries=("numpy", "scipy", "numba", "ompl", "pybullet", "open3d", "trimesh"),
     data_files=lambda parameters: (f"robots/{parameters.robot}.toml",),
     example="scenewright plan --scene outputs/demo/interactive_scene --ground-truth outputs/demo/ground_truth "
     "--out outputs/demo/plan",

@@ -58,7 +58,7 @@ def sample_placements(
     regions = place_regions(model, item, target, door)
     turns: list[list[Placement]] = []
     for region in sorted(regions, key=lambda region: abs(_height(model, region) - COMFORT)):
-        world_from_closed = region.world_from_closed(model)
+        world_from_closed = model.world_from_region(region)
         low, high = region.low + 0.9 * radius, region.high - 0.9 * radius
         places = []
         drawer = region.joint is not None
@@ -79,7 +79,7 @@ def sample_placements(
 
 def _height(model: WorldModel, region: Region) -> float:
     middle = np.array([*(region.low + region.high) / 2, region.level])
-    return float(apply(region.world_from_closed(model), middle)[2])
+    return float(apply(model.world_from_region(region), middle)[2])
 
 
 def placement_style(
@@ -105,7 +105,7 @@ def nearest_level(model: WorldModel, body: str, place: np.ndarray, height: float
     itself when there is none."""
     found = [height + 1.0]
     for region in model.regions(body):
-        world_from_closed = region.world_from_closed(model)
+        world_from_closed = model.world_from_region(region)
         spot = apply(inverse(world_from_closed), np.array([*place, height]))
         if np.all(spot[:2] > region.low) and np.all(spot[:2] < region.high):
             found.append(height + region.level - float(spot[2]))

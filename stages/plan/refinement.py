@@ -13,16 +13,16 @@ from stages.kit.motion.failures import MotionFailed
 from stages.kit.tasks.fast_downward import plan_with_fast_downward
 from stages.kit.tasks.strips import Atom, Domain, GroundAction, Problem, apply_action, atom_text, ground
 from stages.kit.tasks.task_planner import Heuristic, TaskPlan, plan_task
-from stages.plan.domain import PLAIN_NAMES, START
-from stages.plan.door_motion import plan_close, plan_open
+from stages.plan.action import MotionRequest, action_named
+from stages.plan.domain import START
 from stages.plan.learning import Lessons
 from stages.plan.motions import Manipulation, Segment
-from stages.plan.pick_place import Budgets, GraspStyle, plan_pick, plan_place
-from stages.plan.placements import placement_style
-from stages.plan.world_model import RobotState, WorldModel
+from stages.plan.pick_place import Budgets, GraspStyle
+from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
 
 TASK_STATES = (6000, 50_000)
 """Most states of one task search, and of one for a shortest plan: tasks of rooms take some hundreds."""
+DRIVE = "drive"
 LADEN_PACE = 0.25
 """Share of the full speed at which the robot drives with a laden tray."""
 FINAL = ("no_grasp",)
@@ -34,7 +34,7 @@ class Step:
     """One action with its motion."""
 
     name: str
-    """`drive`, `pick`, `place`, `open`, `close`."""
+    """`drive`, or the name of an action with a motion (`actions/`)."""
     arguments: tuple[str, ...]
     segments: tuple[Segment, ...]
     manipulation: Manipulation | None
@@ -57,59 +57,29 @@ class RefinementFailed(Exception):
         self.failure = failure
 
 
-def manipulate(
-    model: WorldModel,
-    state: RobotState,
-    name: str,
-    arguments: tuple[str, ...],
-    budgets: Budgets,
-    random: np.random.Generator,
-    preferred: tuple[np.ndarray, np.ndarray] | None = None,
-    style: GraspStyle = "any",
-) -> tuple[Manipulation, ...]:
-    """Return the manipulations of `pick`, `place`, `open` or `close` (plain names). Raises MotionFailed.
-
-    Arguments: pick(item, from, ...), place(item, target[, door]), open(joint), close(joint).
-    """
-    if name == "pick":
-        return (plan_pick(model, state, arguments[0], arguments[1], budgets, random, preferred, style),)
-    if name == "place":
-        door = arguments[2] if len(arguments) > 2 else None
-        return (plan_place(model, state, arguments[0], arguments[1], door, budgets, random, preferred),)
-    plan = plan_open if name == "open" else plan_close
-    return plan(model, state, model.owner(arguments[0]), arguments[0], budgets, random)
-
-
 def grasp_style(model: WorldModel, item: str, following: list[tuple[str, tuple[str, ...]]]) -> GraspStyle:
-    """Return how an item is to be grasped for where it is put next: `following` are (plain name, arguments)."""
+    """Return how an item is to be grasped for where it is put next: `following` are (name, arguments) of actions."""
     for name, arguments in following:
-        if name == "place" and arguments[0] == item:
-            return placement_style(model, item, arguments[1], arguments[2] if len(arguments) > 2 else None)
+        style = action_named(name).grasp_style(model, item, arguments)
+        if style is not None:
+            return style
     return "any"
 
 
 def refine_action(
-    model: WorldModel,
-    state: RobotState,
-    name: str,
-    arguments: tuple[str, ...],
-    origin: str,
-    budgets: Budgets,
-    random: np.random.Generator,
-    preferred: tuple[np.ndarray, np.ndarray] | None = None,
-    style: GraspStyle = "any",
+    model: WorldModel, state: RobotState, name: str, request: MotionRequest, origin: str
 ) -> tuple[list[Step], RobotState]:
     """Return the drives and manipulations of one action, and the robot's state after it; the model is changed too.
 
     `origin` names where the drive begins. Raises MotionFailed; the model is then as before.
     """
+    action, arguments = action_named(name), request.arguments
+    target = action.target(arguments)
     snapshot = model.snapshot()
     steps: list[Step] = []
     try:
-        if name == "pick":
-            model.take_aboard(arguments[0])
-        for manipulation in manipulate(model, state, name, arguments, budgets, random, preferred, style):
-            target = arguments[1] if name == "place" else arguments[0]
+        action.begin(model, arguments)
+        for manipulation in action.manipulate(model, state, request):
             hold_for_checks(model, state)
             path = plan_drive(
                 state.base,
@@ -117,31 +87,22 @@ def refine_action(
                 state.arm,
                 model.checker,
                 model.room,
-                random,
-                samples=budgets.path_samples,
+                request.random,
+                samples=request.budgets.path_samples,
             )
             manipulation, path = _same_turns(manipulation, path)
             rows = np.concatenate([path, np.tile(state.arm, (len(path), 1))], axis=1)
             pace = LADEN_PACE if state.holding is not None and model.laden(state.holding) else 1.0
             if len(path) > 1:
                 # with the fingers together, though the way was checked with open ones: that much more clearance
-                steps.append(Step("drive", (origin, target), (Segment(rows, 0.0, pace, "", state.holding),), None))
+                steps.append(Step(DRIVE, (origin, target), (Segment(rows, 0.0, pace, "", state.holding),), None))
             steps.append(Step(name, arguments, manipulation.segments, manipulation))
-            state = apply_effect(model, state, name, arguments, manipulation)
+            state = action.effect(model, state, arguments, manipulation)
             origin = target
     except MotionFailed:
         model.restore(snapshot)
         raise
     return steps, state
-
-
-def hold_for_checks(model: WorldModel, state: RobotState) -> None:
-    """Make the checker carry what the robot holds (or nothing)."""
-    model.checker.allow(touch=model.links(state.holding) if state.holding else ())
-    if state.holding is not None and state.tool_from_item is not None:
-        model.checker.carry(state.holding, state.tool_from_item)
-    else:
-        model.checker.put_down()
 
 
 def _same_turns(manipulation: Manipulation, path: np.ndarray) -> tuple[Manipulation, np.ndarray]:
@@ -155,28 +116,6 @@ def _same_turns(manipulation: Manipulation, path: np.ndarray) -> tuple[Manipulat
     return replace(manipulation, base=manipulation.base + shift, segments=segments), path
 
 
-def apply_effect(
-    model: WorldModel, state: RobotState, name: str, arguments: tuple[str, ...], manipulation: Manipulation
-) -> RobotState:
-    """Bring the model to what it is after a manipulation, and return the robot's state."""
-    arm = manipulation.segments[-1].path[-1, 3:]
-    if name == "pick":
-        state = RobotState(
-            manipulation.base, arm, arguments[0], manipulation.tool_from_item, manipulation.body_from_tool
-        )
-        hold_for_checks(model, state)
-        return state
-    state = RobotState(manipulation.base, arm)
-    hold_for_checks(model, state)
-    if name == "place" and manipulation.item_pose is not None:
-        model.world.set_pose(arguments[0], manipulation.item_pose)
-        model.set_down()
-        model.put_on(arguments[0], arguments[1])
-    for joint, value in manipulation.joint_values.items():
-        model.move_joint(joint, value)
-    return state
-
-
 def refine_plan(
     model: WorldModel, state: RobotState, actions: list[GroundAction], budgets: Budgets, random: np.random.Generator
 ) -> list[Step]:
@@ -187,21 +126,22 @@ def refine_plan(
     snapshot = model.snapshot()
     steps: list[Step] = []
     origin = START
-    plain = [(PLAIN_NAMES.get(action.name, action.name), action.arguments) for action in actions]
+    plain = [(action.name, action.arguments) for action in actions]
     try:
-        for place, (action, (name, arguments)) in enumerate(zip(actions, plain, strict=True)):
-            if name == "drive":
+        for place, action in enumerate(actions):
+            kind, arguments = action_named(action.name), action.arguments
+            if not kind.has_motion:
                 continue
-            style = grasp_style(model, arguments[0], plain[place + 1 :]) if name == "pick" else "any"
+            style = grasp_style(model, arguments[0], plain[place + 1 :]) if kind.hand == "takes" else "any"
             try:
-                found, state = refine_action(
-                    model, state, name, arguments, origin, budgets, random, style=style
-                )  # fmt: skip
+                own, state = refine_action(
+                    model, state, kind.name, MotionRequest(arguments, budgets, random, style=style), origin
+                )
             except MotionFailed as failed:
                 failure = failed.failure.model_copy(update={"action": action.text})
                 raise RefinementFailed(place, action, failure) from None
-            steps += found
-            origin = arguments[1] if name == "place" else arguments[0]
+            steps += own
+            origin = kind.target(arguments)
     finally:
         model.restore(snapshot)
         hold_for_checks(model, RobotState(state.base, state.arm))
@@ -220,6 +160,16 @@ class Attempt:
     """What the failures taught the task search, in words."""
 
 
+@dataclass(frozen=True)
+class SearchSettings:
+    """How the task search and its alternation with geometry go."""
+
+    heuristic: Heuristic
+    task_attempts: int
+    refinement_attempts: int
+    planner: Literal["builtin", "fast-downward"] = "builtin"
+
+
 def plan_and_refine(
     model: WorldModel,
     state: RobotState,
@@ -227,11 +177,7 @@ def plan_and_refine(
     problem: Problem,
     budgets: Budgets,
     random: np.random.Generator,
-    *,
-    heuristic: Heuristic,
-    task_attempts: int,
-    refinement_attempts: int,
-    planner: Literal["builtin", "fast-downward"] = "builtin",
+    settings: SearchSettings,
 ) -> Attempt:
     """Alternate between task search and geometry.
 
@@ -242,22 +188,23 @@ def plan_and_refine(
     failures: list[Failure] = []
     lessons = Lessons(held=next((atom[1] for atom in problem.initial if atom[0] == "holding"), None))
     tried: list[TriedPlan] = []
-    for _ in range(task_attempts):
+    heuristic = settings.heuristic
+    for _ in range(settings.task_attempts):
         allowed = lessons.apply(actions)
-        if planner == "builtin":
-            found = plan_task(problem, allowed, heuristic=heuristic, limit=TASK_STATES[heuristic == "max"])
+        if settings.planner == "builtin":
+            plan = plan_task(problem, allowed, heuristic=heuristic, limit=TASK_STATES[heuristic == "max"])
         else:
-            found = plan_with_fast_downward(domain, problem, allowed)
-        if found.actions is None:
-            failures.append(_no_task_plan(problem, found, lessons))
+            plan = plan_with_fast_downward(domain, problem, allowed)
+        if plan.actions is None:
+            failures.append(_no_task_plan(problem, plan, lessons))
             return Attempt(None, None, failures, tuple(tried), tuple(lessons.words))
-        texts = tuple(action.text for action in found.actions)
+        texts = tuple(action.text for action in plan.actions)
         worst: RefinementFailed | None = None
-        for _ in range(refinement_attempts):
+        for _ in range(settings.refinement_attempts):
             try:
-                steps = refine_plan(model, state, found.actions, budgets, random)
+                steps = refine_plan(model, state, plan.actions, budgets, random)
                 tried.append(TriedPlan(actions=texts))
-                return Attempt(found.actions, steps, failures, tuple(tried), tuple(lessons.words))
+                return Attempt(plan.actions, steps, failures, tuple(tried), tuple(lessons.words))
             except RefinementFailed as failed:
                 failures.append(failed.failure)
                 tried.append(TriedPlan(actions=texts, failed_action=failed.place, failure=failed.failure))
@@ -266,28 +213,28 @@ def plan_and_refine(
                     break
         assert worst is not None
         before = problem.initial
-        for action in found.actions[: worst.place]:
+        for action in plan.actions[: worst.place]:
             before = apply_action(before, action)
         lessons.learn(worst.action, worst.failure, actions, before)
     return Attempt(None, None, failures, tuple(tried), tuple(lessons.words))
 
 
-def _no_task_plan(problem: Problem, found: TaskPlan, lessons: Lessons) -> Failure:
+def _no_task_plan(problem: Problem, plan: TaskPlan, lessons: Lessons) -> Failure:
     without = f" ({'; '.join(lessons.words)})" if lessons.words else ""
-    if found.unreachable:
-        names = ", ".join(atom_text(atom) for atom in found.unreachable)
-        message = f"no sequence of actions makes {names} true{without}{_lacking(problem, found.unreachable)}"
-    elif found.exhausted:
+    if plan.unreachable:
+        names = ", ".join(atom_text(atom) for atom in plan.unreachable)
+        message = f"no sequence of actions makes {names} true{without}{_lacking(problem, plan.unreachable)}"
+    elif plan.exhausted:
         names = ", ".join(sorted(atom_text(atom) for atom in problem.goal))
         message = f"each of {names} can be reached, but not all together{without}"
     else:
-        message = f"no task plan within {found.expanded} expanded states{without}"
-    objects = sorted({name for atom in found.unreachable or problem.goal for name in atom[1:]})
+        message = f"no task plan within {plan.expanded} expanded states{without}"
+    objects = sorted({name for atom in plan.unreachable or problem.goal for name in atom[1:]})
     return Failure(
-        kind="goal_unsatisfiable" if found.exhausted else "search_limit",
+        kind="goal_unsatisfiable" if plan.exhausted else "search_limit",
         message=message,
         objects=tuple(objects),
-        numbers={"expanded": float(found.expanded), "lessons": float(len(lessons.words))},
+        numbers={"expanded": float(plan.expanded), "lessons": float(len(lessons.words))},
     )
 
 

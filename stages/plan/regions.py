@@ -6,19 +6,15 @@ in a scene, so that generated rooms, reconstructed ones and what was looked at f
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import trimesh
 
 from schemas.scene_parts import Joint
-from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.motion.doors import body_from_moved
 from stages.kit.simulation.shapes import joined
-
-if TYPE_CHECKING:
-    from stages.plan.world_model import WorldModel
 
 LEVEL = 0.98
 MERGE_HEIGHT = 0.006
@@ -82,13 +78,6 @@ class Region:
         """Whether things can be put here: shelves in a swinging door are left alone."""
         return self.joint is None or self.joint.type == "prismatic"
 
-    def world_from_closed(self, model: WorldModel) -> np.ndarray:
-        """Return (4, 4) from the closed body frame to the world, the region where it is now."""
-        pose = model.pose(self.body)
-        if self.joint is None:
-            return pose
-        return pose @ body_from_moved(self.joint, model.joint_value(self.body, self.joint.name))
-
     def takes(self, radius: float, height: float) -> bool:
         """Whether an upright thing of this footprint radius and height [m] has room here."""
         wide = float((self.high - self.low).min())
@@ -100,7 +89,6 @@ class _Shape:
     mesh: trimesh.Trimesh
     owner: np.ndarray
     """(F,) number of the link of each face."""
-    links: tuple[str, ...]
     joints: dict[int, Joint]
     """Number of a link -> the joint that moves it."""
 
@@ -108,40 +96,35 @@ class _Shape:
         """Return, per ray from start (N, 3), (distance, link number) of everything that it meets."""
         rays = np.tile(direction, (len(start), 1))
         places, ray, faces = self.mesh.ray.intersects_location(start, rays, multiple_hits=True)
-        found: list[list[tuple[float, int]]] = [[] for _ in start]
+        met: list[list[tuple[float, int]]] = [[] for _ in start]
         distances = np.linalg.norm(places - start[ray], axis=1)
         for index, distance, owner in zip(
             ray.tolist(), distances.tolist(), self.owner[faces].tolist(), strict=True
         ):  # fmt: skip
-            found[index].append((distance, owner))
-        return found
+            met[index].append((distance, owner))
+        return met
 
 
-def find_regions(model: WorldModel, name: str) -> tuple[Region, ...]:
-    """Return the regions of a body, largest first."""
-    shape = _shape(model, name)
-    if shape is None:
-        return ()
-    found = []
-    for number, link in enumerate(shape.links):
-        for low, high, level in _levels(shape, number):
-            region = _region(shape, name, link, number, low, high, level)
-            if region is not None:
-                found.append(region)
-    return tuple(sorted(found, key=lambda region: -float(np.prod(region.high - region.low))))
-
-
-def _shape(model: WorldModel, name: str) -> _Shape | None:
-    joints = {joint.part: joint for joint in model.records[name].joints}
-    meshes, links = [], []
-    for link in model.shaped_links(name):
-        meshes.append(model.part_mesh(name, link))
-        links.append(link)
+def find_regions(body: str, joints: Iterable[Joint], meshes: Mapping[str, trimesh.Trimesh]) -> tuple[Region, ...]:
+    """Return the regions of a body, largest first. `meshes`: link -> collision mesh in the body frame with all of its
+    `joints` at 0."""
     if not meshes:
-        return None
-    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
-    moved = {number: joints[link] for number, link in enumerate(links) if link in joints}
-    return _Shape(joined(meshes), owner, tuple(links), moved)
+        return ()
+    shape = _shape(joints, meshes)
+    regions = []
+    for number, link in enumerate(meshes):
+        for low, high, level in _levels(shape, number):
+            region = _region(shape, body, link, number, low, high, level)
+            if region is not None:
+                regions.append(region)
+    return tuple(sorted(regions, key=lambda region: -float(np.prod(region.high - region.low))))
+
+
+def _shape(joints: Iterable[Joint], meshes: Mapping[str, trimesh.Trimesh]) -> _Shape:
+    by_part = {joint.part: joint for joint in joints}
+    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes.values()])
+    moved = {number: by_part[link] for number, link in enumerate(meshes) if link in by_part}
+    return _Shape(joined(list(meshes.values())), owner, moved)
 
 
 def _levels(shape: _Shape, number: int) -> list[tuple[np.ndarray, np.ndarray, float]]:
@@ -231,14 +214,11 @@ def _ways_in(shape: _Shape, points: np.ndarray, clearance: float) -> tuple[str, 
     return best
 
 
-def region_under(model: WorldModel, item: str, body: str) -> Region | None:
-    """Return the region of a body on which an item stands, None when it stands on none of them."""
-    points = apply(model.pose(item), model.points(item))
-    low, high = points.min(axis=0), points.max(axis=0)
-    foot = np.array([*(low + high)[:2] / 2, low[2]])
+def region_at(regions: Iterable[Region], feet: Iterable[np.ndarray]) -> Region | None:
+    """Return the region on which a thing stands, None when it stands on none of them. `feet`: the middle of its foot
+    (3,) in the closed body frame of each region."""
     best: tuple[float, Region] | None = None
-    for region in model.regions(body):
-        place = apply(inverse(region.world_from_closed(model)), foot)
+    for region, place in zip(regions, feet, strict=True):
         off = abs(float(place[2]) - region.level)
         over = bool(np.all(place[:2] > region.low - BESIDE) and np.all(place[:2] < region.high + BESIDE))
         if over and off < (NEAR_LEVEL if best is None else best[0]):

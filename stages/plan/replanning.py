@@ -14,9 +14,10 @@ from schemas.contact_graph import ContactGraphFile
 from schemas.plan import Failure, TriedPlan
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.tasks.strips import Atom, Problem
+from stages.plan.believed_tree import TreeState
 from stages.plan.refinement import Attempt, Step
 from stages.plan.symbols import parse_goal, symbolic_state, task_problem
-from stages.plan.tree_state import TreeState, graph_of_state
+from stages.plan.tree_state import graph_of_state
 from stages.plan.world_model import RobotState, WorldModel
 
 Search = Callable[[RobotState, Problem], Attempt]

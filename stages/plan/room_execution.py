@@ -16,18 +16,19 @@ from stages.kit.simulation.robot import Configuration
 from stages.kit.simulation.world import load_scene, read_scene_bodies
 from stages.kit.stage import Context
 from stages.plan.assumptions import Belief, match_beliefs
-from stages.plan.checks import check_goal
+from stages.plan.believed_tree import TreeState
 from stages.plan.conduct import Conduct, Room, joint_pairs
 from stages.plan.correspondence import match_bodies
 from stages.plan.execution import PhysicalRobot
 from stages.plan.execution_log import write_execution
+from stages.plan.goal_checks import check_goal
 from stages.plan.parameters import PlanParameters
 from stages.plan.pick_place import Budgets
 from stages.plan.pictures import RoomPictures, picture_camera
 from stages.plan.refinement import Step
 from stages.plan.replanning import Replanning, Search
 from stages.plan.trajectories import executed_rows
-from stages.plan.tree_state import TreeState, after_step, graph_of_state, observed_state, start_state, tree_differences
+from stages.plan.tree_state import after_step, graph_of_state, observed_state, start_state, tree_differences
 from stages.plan.world_model import RobotState, WorldModel, body_planes
 
 RECORD_RATE = 10.0

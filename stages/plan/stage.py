@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from stages.plan.goals import TABLE_CLASSES, default_goals
 from stages.plan.parameters import PlanParameters
 from stages.plan.pick_place import Budgets
 from stages.plan.plan_text import plan_text
-from stages.plan.refinement import Step, plan_and_refine
+from stages.plan.refinement import SearchSettings, Step, plan_and_refine
 from stages.plan.room_execution import Order, Outcome, execute, only_planned
 from stages.plan.start_pose import start_base
 from stages.plan.symbols import parse_goal, symbolic_state, task_problem
@@ -77,7 +77,7 @@ def run(
             order = Order(scene, ground_truth, graph, beliefs, found.literals, state, found.steps)
             anew = partial(
                 plan_and_refine, model, domain=DOMAIN, budgets=replace(budgets, size_uncertainty=0.0),
-                random=context.random(REPLANNING), **_search_options(parameters),
+                random=context.random(REPLANNING), settings=_search_settings(parameters),
             )  # fmt: skip
             with context.progress.step("execute"):
                 outcome = execute(
@@ -91,9 +91,10 @@ def run(
         model.close()
 
 
-def _search_options(parameters: PlanParameters) -> dict[str, Any]:
-    names = ("heuristic", "task_attempts", "refinement_attempts", "planner")
-    return {name: getattr(parameters, name) for name in names}
+def _search_settings(parameters: PlanParameters) -> SearchSettings:
+    return SearchSettings(
+        parameters.heuristic, parameters.task_attempts, parameters.refinement_attempts, parameters.planner
+    )
 
 
 def _find(
@@ -116,7 +117,7 @@ def _find(
     for number, (goal, literals) in enumerate(goals):
         attempt = plan_and_refine(
             model, state, DOMAIN, task_problem(objects, initial, goal), budgets, context.random(SEARCH, number),
-            **_search_options(parameters),
+            _search_settings(parameters),
         )  # fmt: skip
         found.failures += attempt.failures
         found.learned += attempt.learned

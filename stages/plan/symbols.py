@@ -12,10 +12,10 @@ from schemas.errors import UsageError
 from schemas.scene_parts import Joint
 from stages.kit.geometry.transforms import apply, inverse
 from stages.kit.tasks.strips import Atom, Problem, atom_text
+from stages.plan.action import goal_checks
 from stages.plan.affordances import LAYOUT, affordance_atoms
-from stages.plan.domain import DOMAIN, GOAL_PREDICATES, START
+from stages.plan.domain import DOMAIN, START
 from stages.plan.door_motion import is_closed, is_open
-from stages.plan.regions import region_under
 from stages.plan.world_model import WorldModel
 
 COMFORT = 0.9
@@ -31,7 +31,7 @@ def guarding_door(model: WorldModel, item: str, container: str) -> str | None:
     covers the item's centre, seen against the direction in which it closes. An item that stands on no region (it was
     not reconstructed where it is) is taken to be behind the part that comes nearest to covering it.
     """
-    region = region_under(model, item, container)
+    region = model.region_under(item, container)
     if region is not None and len(region.doors) < 2:
         return region.doors[0] if region.doors else None
     candidates = region.doors if region is not None else tuple(joint.name for joint in model.records[container].joints)
@@ -129,7 +129,7 @@ def parse_goal(literals: tuple[str, ...], objects: dict[str, str]) -> tuple[froz
     """
     atoms: set[Atom] = set()
     normal = []
-    allowed = {name: kinds for name, kinds in DOMAIN.predicates.items() if name in GOAL_PREDICATES}
+    allowed = {name: kinds for name, kinds in DOMAIN.predicates.items() if name in goal_checks()}
     for literal in literals:
         match = _LITERAL.match(literal)
         if match is None:

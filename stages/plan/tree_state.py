@@ -2,40 +2,21 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile
 from schemas.plan import BodyMatch, TreeDifference
 from stages.kit.simulation.world import PhysicsWorld
+from stages.plan.action import action_named
+from stages.plan.believed_tree import TreeState
+from stages.plan.carriers import HAND, NOTHING, carrier
 from stages.plan.door_motion import is_closed, is_open
 from stages.plan.refinement import Step
 from stages.plan.updated_graph import update_graph
 from stages.plan.world_model import WorldModel
 
-HAND = "hand"
-"""Parent of what is held."""
-NOTHING = "nothing"
-"""Parent of what touches nothing from above."""
 MOVED = 0.05
 """Things that moved less than this keep their place in the graph [m]."""
-STEEP = 0.5
-"""Least upward share of a contact normal of something that carries."""
-TOUCHING = 0.002
-
-
-@dataclass(frozen=True)
-class TreeState:
-    """Names are those of the plan."""
-
-    parents: dict[str, str]
-    """Movable body -> what carries it."""
-    poses: dict[str, np.ndarray]
-    """Movable body -> world_from_body (4, 4)."""
-    joints: dict[str, float]
-    held: str | None = None
 
 
 def start_state(model: WorldModel) -> TreeState:
@@ -51,25 +32,7 @@ def after_step(state: TreeState, step: Step) -> TreeState:
     """Return the state after a step of the plan: what is carried takes along what stands on it."""
     if step.manipulation is None:
         return state
-    if step.name == "pick":
-        return replace(state, parents={**state.parents, step.arguments[0]: HAND}, held=step.arguments[0])
-    if step.name == "place" and step.manipulation.item_pose is not None:
-        item = step.arguments[0]
-        change = step.manipulation.item_pose @ np.linalg.inv(state.poses[item])
-        poses = {**state.poses, **{name: change @ state.poses[name] for name in (item, *_above(state, item))}}
-        return replace(state, parents={**state.parents, item: step.arguments[1]}, poses=poses, held=None)
-    return replace(state, joints={**state.joints, **step.manipulation.joint_values})
-
-
-def _above(state: TreeState, item: str) -> list[str]:
-    found: list[str] = []
-    waiting = [item]
-    while waiting:
-        below = waiting.pop()
-        fresh = [name for name, parent in state.parents.items() if parent == below and name not in found]
-        found += fresh
-        waiting += fresh
-    return found
+    return action_named(step.name).predicted(state, step.arguments, step.manipulation)
 
 
 def observed_state(
@@ -97,25 +60,16 @@ def observed_state(
     return TreeState(parents, poses, joints, planned.get(held) if held is not None else None)
 
 
-def carrier(world: PhysicsWorld, name: str) -> str | None:
-    """Return the body of a world that pushes a thing upwards most, by the contacts of the last step; None: nothing."""
-    push: dict[str, float] = defaultdict(float)
-    for contact in world.contacts(world.bodies[name].body_id):
-        other = world.name_of(contact.other_body)
-        if other is None or other == name or contact.normal[2] < STEEP or contact.depth < -TOUCHING:
-            continue
-        push[other] += float(contact.normal[2]) * (contact.force + 1e-3)  # what sleeps has no forces
-    return max(sorted(push), key=lambda other: push[other]) if push else None
-
-
 def tree_differences(
     action: int, expected: TreeState, observed: TreeState, model: WorldModel
 ) -> tuple[TreeDifference, ...]:  # fmt: skip
     """Return where an observed state is not as expected: carriers of things, doors that are open or shut."""
-    found = []
+    differences = []
     for name, parent in sorted(observed.parents.items()):
         if expected.parents.get(name, parent) != parent:
-            found.append(TreeDifference(action=action, node=name, expected=expected.parents[name], observed=parent))
+            differences.append(
+                TreeDifference(action=action, node=name, expected=expected.parents[name], observed=parent)
+            )
     for record in model.records.values():
         for joint in record.joints:
             if joint.name not in observed.joints:
@@ -126,8 +80,8 @@ def tree_differences(
                 for state in (expected, observed)
             ]  # fmt: skip
             if words[0] != words[1]:
-                found.append(TreeDifference(action=action, node=joint.name, expected=words[0], observed=words[1]))
-    return tuple(found)
+                differences.append(TreeDifference(action=action, node=joint.name, expected=words[0], observed=words[1]))
+    return tuple(differences)
 
 
 def graph_of_state(

@@ -24,7 +24,7 @@ from stages.kit.simulation.robot_description import RobotDescription
 from stages.kit.simulation.shapes import joined, link_shapes, surface_points
 from stages.kit.simulation.world import PhysicsWorld, read_scene_bodies
 from stages.plan.joined_bodies import joined_text
-from stages.plan.regions import Region, find_regions, region_under
+from stages.plan.regions import Region, find_regions, region_at
 from stages.plan.support_planes import top_planes
 
 
@@ -144,7 +144,7 @@ class WorldModel:
         along = set()
         for item, record in self.records.items():
             if record.movable and record.parent == owner:
-                region = region_under(self, item, owner)
+                region = self.region_under(item, owner)
                 if region is not None and region.joint is not None and region.joint.name == joint_name:
                     along |= {item, *self.load(item)}
         for item in sorted(along):
@@ -233,8 +233,24 @@ class WorldModel:
     def regions(self, name: str) -> tuple[Region, ...]:
         """Return the level places of a body where things can stand, largest first."""
         if name not in self._regions:
-            self._regions[name] = find_regions(self, name)
+            meshes = {link: self.part_mesh(name, link) for link in self.shaped_links(name)}
+            self._regions[name] = find_regions(name, self.records[name].joints, meshes)
         return self._regions[name]
+
+    def world_from_region(self, region: Region) -> np.ndarray:
+        """Return (4, 4) from the closed frame of a region's body to the world, the region where it is now."""
+        pose = self.pose(region.body)
+        if region.joint is None:
+            return pose
+        return pose @ body_from_moved(region.joint, self.joint_value(region.body, region.joint.name))
+
+    def region_under(self, item: str, body: str) -> Region | None:
+        """Return the region of a body on which an item stands, None when it stands on none of them."""
+        points = apply(self.pose(item), self.points(item))
+        low, high = points.min(axis=0), points.max(axis=0)
+        foot = np.array([*(low + high)[:2] / 2, low[2]])
+        regions = self.regions(body)
+        return region_at(regions, (apply(inverse(self.world_from_region(region)), foot) for region in regions))
 
     def footprint(self, item: str) -> tuple[float, float]:
         """Return radius of the upright foot about the body's origin and height [m] of a rigid body."""
@@ -312,3 +328,12 @@ def moved_record(record: SceneBody, world_from_body: np.ndarray, joint_values: d
 def with_state(state: RobotState, **changes: object) -> RobotState:
     """Return the state with some fields changed."""
     return replace(state, **changes)  # type: ignore[arg-type]
+
+
+def hold_for_checks(model: WorldModel, state: RobotState) -> None:
+    """Make the checker carry what the robot holds (or nothing)."""
+    model.checker.allow(touch=model.links(state.holding) if state.holding else ())
+    if state.holding is not None and state.tool_from_item is not None:
+        model.checker.carry(state.holding, state.tool_from_item)
+    else:
+        model.checker.put_down()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,8 +47,7 @@ def run(sequence: Sequence, *, parameters: PosesParameters, context: Context) ->
         camera_name, frames = main_camera(reader, sequence)
         check_streams(reader, sequence, parameters)
         check_world(reader, frames, sequence, parameters)
-        work = _structure if parameters.method == "sfm" else _dense
-        result = work(reader, frames, camera_name, parameters, context)
+        result = METHODS[parameters.method].estimate(reader, frames, camera_name, parameters, context)
         return _finish(reader, camera_name, result, parameters, context)
 
 
@@ -66,8 +66,8 @@ def main_camera(reader: FrameReader, sequence: Sequence) -> tuple[str, list[int]
 
 def check_streams(reader: FrameReader, sequence: Sequence, parameters: PosesParameters) -> None:
     """Raise BadInput when colour is needed and there is none."""
-    needs = "--method sfm" if parameters.method == "sfm" else "--bundle-adjustment"
-    if (parameters.method == "sfm" or parameters.bundle_adjustment) and "color" not in reader.streams:
+    needs = METHODS[parameters.method].needs_color(parameters)
+    if needs and "color" not in reader.streams:
         raise BadInput(
             f"{sequence.root}: {needs} needs colour and its frames have none", hint="use --method rgbd alone"
         )
@@ -82,19 +82,19 @@ def check_world(reader: FrameReader, frames: list[int], sequence: Sequence, para
 def _dense(
     reader: FrameReader, frames: list[int], camera_name: str, parameters: PosesParameters, context: Context
 ) -> Result:
-    found = estimate(reader, frames, camera_name, parameters, context)
+    estimated = estimate(reader, frames, camera_name, parameters, context)
     if parameters.bundle_adjustment:
         from stages.poses.bundle_adjustment import adjust
 
         with context.progress.step("bundle adjustment"):
-            found = adjust(found, reader.cameras[camera_name], context.logger)
-    loops = loop_closures(found)
+            estimated = adjust(estimated, reader.cameras[camera_name], context.logger)
+    loops = loop_closures(estimated)
     kept = sum(loop.weight >= 0.5 for loop in loops)
-    counts = (("key_frames", len(found.track.keys)), ("loops", kept), ("loops_rejected", len(loops) - kept))
-    for how, count in sorted(found.track.rescues.items()):
+    counts = (("key_frames", len(estimated.track.keys)), ("loops", kept), ("loops_rejected", len(loops) - kept))
+    for how, count in sorted(estimated.track.rescues.items()):
         context.logger.info("tracking was rescued %d times: %s", count, how)
-    parts = len(set(found.parts.tolist()))
-    return Result(frame_poses(found), loops, found.solution.variance_factor, parts, counts)
+    parts = len(set(estimated.parts.tolist()))
+    return Result(frame_poses(estimated), loops, estimated.solution.variance_factor, parts, counts)
 
 
 def _structure(
@@ -104,6 +104,22 @@ def _structure(
 
     poses, parts = reconstruct(reader, frames, camera_name, parameters, context)
     return Result(poses, parts=parts)
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way of estimating poses."""
+
+    estimate: Callable[[FrameReader, list[int], str, PosesParameters, Context], Result]
+    """Of the given frames of the camera of this name."""
+    needs_color: Callable[[PosesParameters], str]
+    """The option that needs colour, empty when none does."""
+
+
+METHODS = {
+    "rgbd": Method(_dense, lambda parameters: "--bundle-adjustment" if parameters.bundle_adjustment else ""),
+    "sfm": Method(_structure, lambda parameters: "--method sfm"),
+}
 
 
 def _finish(

@@ -26,6 +26,7 @@ LABEL_FILES = {
     "words": "labels/words.toml",
 }
 """Label set -> file of data/."""
+LABEL_TABLES = tuple(LABEL_FILES.values())
 OWN = "scenewright"
 """The label set that is the vocabulary itself."""
 MATCHED = (OWN, "coco-panoptic", "ade20k", "words")
@@ -69,11 +70,11 @@ class LabelSet:
         return next((label for label in self.labels if label.id == number), None)
 
     def _by_name(self) -> dict[str, Label]:
-        found: dict[str, Label] = {}
+        labels: dict[str, Label] = {}
         for label in self.labels:
             for spelling in (label.name, *label.also):
-                found.setdefault(plain(spelling), label)
-        return found
+                labels.setdefault(plain(spelling), label)
+        return labels
 
 
 @dataclass(frozen=True)
@@ -108,8 +109,8 @@ def load_label_set(name: str) -> LabelSet:
         things = [label for label in load_label_set("coco-panoptic").labels if label.kind == "thing"]
         return LabelSet(name, tuple(things))
     if name not in LABEL_FILES:
-        known = ", ".join((*LABEL_FILES, "coco-80", OWN))
-        raise BadInput(f"no label set {name!r}", hint=f"label sets: {known}")
+        names = ", ".join((*LABEL_FILES, "coco-80", OWN))
+        raise BadInput(f"no label set {name!r}", hint=f"label sets: {names}")
     return read_label_table(LABELS_FOLDER.parent / LABEL_FILES[name])
 
 
@@ -192,14 +193,14 @@ def match_labels(names: Mapping[int, str], given: LabelSet | None = None, *, whe
     real = {number: name for number, name in names.items() if plain(name) not in ("", "n/a", "none", "background")}
     candidates = [given] if given else [load_label_set(name) for name in MATCHED]
     best = max(candidates, key=lambda labels: sum(labels.find(name) is not None for name in real.values()))
-    found = {number: label for number, name in real.items() if (label := best.find(name)) is not None}
+    matched = {number: label for number, name in real.items() if (label := best.find(name)) is not None}
     unknown = tuple(sorted({name for name in real.values() if best.find(name) is None}))
-    if not found:
+    if not matched:
         shown = ", ".join(list(real.values())[:5])
         raise BadInput(
             f"{where}: its labels ({shown}, ...) are in no table", hint="give a table of them: --labels FILE.toml"
         )
-    return LabelMap(best.name, found, unknown)
+    return LabelMap(best.name, matched, unknown)
 
 
 def _text(path: Path) -> str:

@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, create_model, field_validator
 from pydantic_core import PydanticCustomError
 
 from schemas.segments import Segments
 from schemas.sequence import Sequence
 from stages.kit.estimates import USUAL_FRAME, Estimate, Inputs
 from stages.kit.stage import External, Optionally, Parameters, Stage
-from stages.segment.backend_names import BACKENDS, LABEL_FILES, SERVICE, check_backend, is_service
+from stages.segment.registry import all_backends, backend_help, check_backend, data_files, weights_help
 
 
-class SegmentParameters(Parameters):
-    """Options of `segment`. Defaults of the geometric part and of the fusion are those of the published system."""
+class CommonParameters(Parameters):
+    """Options of `segment`, without those that one backend declares for itself. Defaults of the geometric part and of
+    the fusion are those of the published system."""
 
-    backend: str = Field(
-        "auto",
-        description="Where panoptic masks come from: "
-        + "; ".join(f"`{name}`: {what}" for name, what in BACKENDS.items())
-        + f"; or {SERVICE}",
-    )
-    corruption: float = Field(
-        0.0, ge=0, le=1, description="Level of the errors put into ground-truth masks (0 none; part of every name)"
-    )
+    backend: str = Field("auto", description=f"Where panoptic masks come from: {backend_help()}")
     fusion: Literal["ours", "thesis", "voxblox++"] = Field(
         "ours",
         description="`thesis` follows the text; `ours` also keeps small segments that a mask claims and cuts a "
@@ -83,28 +76,6 @@ class SegmentParameters(Parameters):
     suppression_overlap: float = Field(
         0.5, gt=0, lt=1, description="Detections of one class that overlap more than this are one (IoU)"
     )
-    tiles: bool = Field(
-        True, description="Detect on overlapping tiles at full resolution too (finds small things, five times slower)"
-    )
-
-    grouping: Literal["learned", "rules"] = Field(
-        "learned", description="What tells --backend objects which patches are one object: trained trees, or set rules"
-    )
-    largest_object: float = Field(0.6, gt=0, description="What is larger across is no object for --backend objects [m]")
-
-    words: str = Field(
-        "",
-        description="What an open-vocabulary model looks for: `cup, table, blue mug = cup`; a word without a class "
-        "gets that of its name or synonym, else `object`",
-    )
-    request_timeout: float = Field(60.0, gt=0, le=3600, description="A service has to answer within this [s]")
-    retries: int = Field(3, ge=0, le=100, description="How often a service is asked again after a fault that may pass")
-    retry_wait: float = Field(0.5, ge=0, le=60, description="Wait before the first of these, doubled every time [s]")
-    service_model: str = Field(
-        "",
-        description="What a service has to say it is (the end of an artifact's label); empty: it is asked, and another "
-        "model behind the same address is another result",
-    )
 
     @field_validator("backend")
     @classmethod
@@ -115,20 +86,12 @@ class SegmentParameters(Parameters):
             raise PydanticCustomError("backend", "{reason}", {"reason": str(error)}) from None
 
 
-LABELLED = frozenset({"huggingface", "onnx"})
-"""Backends whose labels are looked up in data/labels; services do too."""
-
-
-OWN_NETWORK = frozenset({"network", "auto"})
-"""Backends that read the checkpoint that comes with the project."""
-
-
-def _data_files(parameters: SegmentParameters) -> tuple[str, ...]:
-    if parameters.backend in OWN_NETWORK:
-        return ("networks/panoptic.safetensors",)
-    if parameters.backend == "objects":
-        return ("networks/tabletop_pairs.safetensors",) if parameters.grouping == "learned" else ()
-    return LABEL_FILES if parameters.backend in LABELLED or is_service(parameters.backend) else ()
+if TYPE_CHECKING:
+    SegmentParameters = CommonParameters
+else:
+    _OWN = [declared.parameters for declared in all_backends() if declared.parameters is not None]
+    SegmentParameters = create_model("SegmentParameters", __base__=(*reversed(_OWN), CommonParameters))
+    """Options of `segment`: the common ones and those of every backend."""
 
 
 def _estimate(parameters: SegmentParameters, inputs: Inputs) -> Estimate:
@@ -146,13 +109,7 @@ STAGE = Stage(
     parameters=SegmentParameters,
     reads={
         "sequence": Sequence,
-        "weights": Optionally(
-            External(
-                "Network: an ONNX file (detector, onnx), a model folder or hub id (huggingface), or a .safetensors "
-                "checkpoint of our own (network; one comes with the project)",
-                weights=True,
-            )
-        ),
+        "weights": Optionally(External(f"Network: {weights_help()}", weights=True)),
         "mask_weights": Optionally(
             External(
                 "Segment Anything folder or hub id that turns the boxes of an open-vocabulary model into masks",
@@ -166,8 +123,9 @@ STAGE = Stage(
     },
     writes=Segments,
     libraries=("numpy", "opencv-python-headless", "numba", "scipy"),
-    versions="versions",
-    data_files=_data_files,
+    versions="registry",
+    data_files=data_files,
+    extras=tuple(extra for declared in all_backends() for extra in declared.extras),
     example="scenewright segment --sequence outputs/demo/sequence --out outputs/demo/segments",
     estimate=_estimate,
 )

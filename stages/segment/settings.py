@@ -30,7 +30,6 @@ def geometric_settings(parameters: SegmentParameters) -> GeometricSettings:
 def fusion_settings(parameters: SegmentParameters) -> FusionSettings:
     """Return the constants of the fusion."""
     return FusionSettings(
-        rule=parameters.fusion,
         minimum_pixels=parameters.fusion_minimum,
         contained_share=parameters.contained_share,
         largest_part=parameters.largest_part,

@@ -13,11 +13,18 @@ from schemas.sequence import Sequence
 from stages.kit.formats.frames import Frame, FrameReader, require_depth
 from stages.kit.formats.masks import write_panoptic_zip
 from stages.kit.stage import Context
+from stages.segment import fusion_ours, fusion_thesis, fusion_voxblox
 from stages.segment.choice import Backend, BackendRequest, choose_backend
-from stages.segment.fusion import FusedFrame, fuse
+from stages.segment.fusion import FusedFrame, FusionRule
 from stages.segment.geometric import segment_depth
 from stages.segment.parameters import SegmentParameters
 from stages.segment.settings import fusion_settings, geometric_settings
+
+FUSION: dict[str, FusionRule] = {
+    "ours": fusion_ours.fuse,
+    "thesis": fusion_thesis.fuse,
+    "voxblox++": fusion_voxblox.fuse,
+}
 
 
 def run(
@@ -65,7 +72,7 @@ def run(
     SegmentsFile(
         backend=backend.name,
         label=backend.label,
-        corruption=parameters.corruption if backend.name == "ground-truth" else 0.0,
+        corruption=getattr(backend, "corruption", 0.0),
         width=info.camera.width,
         height=info.camera.height,
         frames=tuple(annotations),
@@ -90,6 +97,7 @@ def segment_frame(
     depth = frame.depth if frame.depth is not None else np.zeros(shape, dtype=np.float32)
     geometric = segment_depth(depth, camera, geometric_settings(parameters))
     panoptic = backend(frame, geometric, random)
+    fuse = FUSION[parameters.fusion]
     return fuse(geometric.labels, panoptic, geometric.points, fusion_settings(parameters), geometric.small)
 
 

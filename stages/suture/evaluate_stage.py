@@ -65,8 +65,8 @@ def run(
     MetricsFile(label=label, metrics=dict(sorted(figures.items())), notes=tuple(notes)).write(
         context.output / "metrics.json"
     )
-    told = [f"{label}.", *(f"{note}." for note in notes)]
-    context.output.joinpath("table.md").write_text("\n\n".join([*parts, *told]) + "\n", encoding="utf-8")
+    remarks = [f"{label}.", *(f"{note}." for note in notes)]
+    context.output.joinpath("table.md").write_text("\n\n".join([*parts, *remarks]) + "\n", encoding="utf-8")
     return SutureEvaluation(root=context.output, summary={"figures": len(figures), "tables": len(parts)})
 
 
@@ -114,7 +114,7 @@ def _groups(records: list[Estimate]) -> dict[str, list[Estimate]]:
         "needle_visible_filtered": [record for record in fused if record.visible],
         "needle_all_filtered": fused,
     }
-    return {name: found for name, found in named.items() if found}
+    return {name: of_case for name, of_case in named.items() if of_case}
 
 
 def thread_errors(thread: SutureThread, scene: SutureScene) -> list[ThreadError]:

@@ -83,21 +83,12 @@ def open_masks(
     source: Any = parameters.segmentation
     if source == "auto":
         source = "files" if masks is not None else "network"
-    said = SOURCES[source].format((masks or segmenter or BUNDLED).name)
-    if source == "files":
-        assert masks is not None
-        return _from_files(masks, size), source, said
-    if source == "network":
-        return _from_network(segmenter), source, said
-    if not isinstance(sequence, SutureScene):
-        raise BadInput(
-            f"{sequence.root}: no masks: a {sequence.kind!r} has no truth to take them from",
-            hint="give --masks FOLDER or --segmenter CHECKPOINT",
-        )
-    return _from_truth(sequence, source == "spoiled", size), source, said
+    words = SOURCES[source].format((masks or segmenter or BUNDLED).name)
+    return _MAKERS[source](sequence, masks, segmenter, size), source, words
 
 
-def _from_files(folder: Path, size: tuple[int, int]) -> MaskMaker:
+def _from_files(sequence: Sequence, folder: Path | None, segmenter: Path | None, size: tuple[int, int]) -> MaskMaker:
+    assert folder is not None  # the declaration asks for it
     if not folder.is_dir():
         raise BadInput(
             f"{folder}: no folder of masks", hint="give a folder with 000000_left.png, 000000_right.png, ..."
@@ -113,17 +104,40 @@ def _from_files(folder: Path, size: tuple[int, int]) -> MaskMaker:
     return make
 
 
-def _from_truth(scene: SutureScene, spoiled: bool, size: tuple[int, int]) -> MaskMaker:
-    views, folder = scene.truth.views, scene.path("truth")
+def _true_eyes(sequence: Sequence, size: tuple[int, int]) -> Callable[[Pair], tuple[Eye, Eye, int]]:
+    """Return what gives both eyes' truth of a pair, and its view's seed. Raises BadInput where there is no truth."""
+    if not isinstance(sequence, SutureScene):
+        raise BadInput(
+            f"{sequence.root}: no masks: a {sequence.kind!r} has no truth to take them from",
+            hint="give --masks FOLDER or --segmenter CHECKPOINT",
+        )
+    views, folder = sequence.truth.views, sequence.path("truth")
+
+    def eyes(pair: Pair) -> tuple[Eye, Eye, int]:
+        if pair.index >= len(views):
+            raise BadInput(f"{sequence.root}: frame {pair.index} has no truth", hint="make the scene again")
+        return *eyes_of_truth(folder, pair.index, size), views[pair.index].seed
+
+    return eyes
+
+
+def _from_spoiled(sequence: Sequence, masks: Path | None, segmenter: Path | None, size: tuple[int, int]) -> MaskMaker:
+    true_eyes = _true_eyes(sequence, size)
 
     def make(pair: Pair) -> EyeMasks:
-        if pair.index >= len(views):
-            raise BadInput(f"{scene.root}: frame {pair.index} has no truth", hint="make the scene again")
-        left, right = eyes_of_truth(folder, pair.index, size)
-        if spoiled:
-            shown = Eye(pair.left, left.bodies, left.depth, left.sees)
-            other = Eye(pair.right, right.bodies, right.depth, right.sees)
-            return spoiled_masks(shown, other, views[pair.index].seed)[0]
+        left, right, seed = true_eyes(pair)
+        shown = Eye(pair.left, left.bodies, left.depth, left.sees)
+        other = Eye(pair.right, right.bodies, right.depth, right.sees)
+        return spoiled_masks(shown, other, seed)[0]
+
+    return make
+
+
+def _from_truth(sequence: Sequence, masks: Path | None, segmenter: Path | None, size: tuple[int, int]) -> MaskMaker:
+    true_eyes = _true_eyes(sequence, size)
+
+    def make(pair: Pair) -> EyeMasks:
+        left, right, _ = true_eyes(pair)
         return EyeMasks(
             (left.mask(NEEDLE), right.mask(NEEDLE)),
             (left.mask(THREAD), right.mask(THREAD)),
@@ -133,13 +147,21 @@ def _from_truth(scene: SutureScene, spoiled: bool, size: tuple[int, int]) -> Mas
     return make
 
 
-def _from_network(checkpoint: Path | None) -> MaskMaker:
+def _from_network(sequence: Sequence, masks: Path | None, checkpoint: Path | None, size: tuple[int, int]) -> MaskMaker:
     segmenter = open_segmenter(checkpoint)
 
     def make(pair: Pair) -> EyeMasks:
         return learned_masks(segmenter.masks(pair.left), segmenter.masks(pair.right))
 
     return make
+
+
+_MAKERS: dict[MaskSource, Callable[[Sequence, Path | None, Path | None, tuple[int, int]], MaskMaker]] = {
+    "files": _from_files,
+    "network": _from_network,
+    "truth": _from_truth,
+    "spoiled": _from_spoiled,
+}
 
 
 def learned_masks(left: Masks, right: Masks) -> EyeMasks:

@@ -18,11 +18,9 @@ from stages.kit.stage import Context
 from stages.suture.masks import EyeMasks, MaskMaker, open_masks
 from stages.suture.motion_reports import motions_to_last
 from stages.suture.needle.drawing import draw_eyes, said
-from stages.suture.needle.estimate import estimate
-from stages.suture.needle.filter import fuse
+from stages.suture.needle.estimators import ESTIMATORS
 from stages.suture.needle.observation import NeedleEstimate
 from stages.suture.needle.records import as_estimate_record
-from stages.suture.needle.thesis import thesis_average, thesis_estimate
 from stages.suture.pairs import Pair, StereoPairs
 from stages.suture.parameters import NeedleParameters
 from stages.suture.rig import NEEDLE_RADIUS, NeedlePose
@@ -41,7 +39,7 @@ def run(
     views = sequence.truth.views if isinstance(sequence, SutureScene) else ()
     with StereoPairs(sequence) as pairs:
         size = (pairs.camera.height, pairs.camera.width)
-        make, source, told = open_masks(sequence, masks, segmenter, parameters, size)
+        make, source, masks_from = open_masks(sequence, masks, segmenter, parameters, size)
         motion = _motion(sequence, parameters, len(pairs))
         maps = _disparity_maps(disparity)
         try:
@@ -58,7 +56,7 @@ def run(
         statement=statement,
         estimator=parameters.estimator,
         masks=source,
-        masks_from=told,
+        masks_from=masks_from,
         disparity="" if disparity is None else disparity.matching.detail,
         rig=record,
         needle_radius=NEEDLE_RADIUS,
@@ -67,11 +65,11 @@ def run(
         filter=motion,  # type: ignore[arg-type]
     ).write(context.output / "needle.json")
     answered = sum(not answer.abstained for answer in answers)
-    known = answered > 0 if fused is None else not fused.abstained
+    is_known = answered > 0 if fused is None else not fused.abstained
     summary: dict[str, object] = {"frames": len(frames), "answered": answered, "masks": source, "filter": motion}
-    if not known:
+    if not is_known:
         summary["reason"] = statement
-    return SutureNeedle(root=context.output, outcome="ok" if known else "abstained", summary=summary)
+    return SutureNeedle(root=context.output, outcome="ok" if is_known else "abstained", summary=summary)
 
 
 class _Maps:
@@ -91,14 +89,14 @@ class _Maps:
         BadInput for a map of another size."""
         if pair.stamp not in self._stamps:
             return None
-        found = self._reader.read(pair.stamp).disparity
-        if found.shape != pair.left.shape[:2]:
+        disparity = self._reader.read(pair.stamp).disparity
+        if disparity.shape != pair.left.shape[:2]:
             raise BadInput(
-                f"{self._root}: the disparity of frame {pair.index} is {found.shape[1]} x {found.shape[0]}, the "
-                f"pictures are {pair.left.shape[1]} x {pair.left.shape[0]}",
+                f"{self._root}: the disparity of frame {pair.index} is {disparity.shape[1]} x {disparity.shape[0]}, "
+                f"the pictures are {pair.left.shape[1]} x {pair.left.shape[0]}",
                 hint="make the disparity of this sequence",
             )
-        return found
+        return disparity
 
 
 def _disparity_maps(disparity: Disparity | None) -> _Maps | None:
@@ -131,6 +129,7 @@ def _estimates(
     """Return every frame's record and estimate, and draw the first few."""
     frames: list[NeedleFrame] = []
     answers: list[NeedleEstimate] = []
+    of_view = ESTIMATORS[parameters.estimator].of_view
     guess: NeedlePose | None = None
     matched = 0
     for pair in context.progress.track(pairs, total=len(pairs), description="needles"):
@@ -138,10 +137,7 @@ def _estimates(
         matched += disparity is not None
         seen = make(pair)
         observation = seen.observation(pairs.rig, disparity)
-        if parameters.estimator == "thesis":
-            answer = thesis_estimate(observation, context.seed)
-        else:
-            answer = estimate(observation, context.seed, guess if follows else None)
+        answer = of_view(observation, context.seed, guess if follows else None)
         guess = answer.pose if not answer.abstained else None
         answers.append(answer)
         pixels = (int(seen.needle[0].sum()), int(seen.needle[1].sum()))
@@ -181,10 +177,7 @@ def _filtered(
     if motion == "kinematics":
         reports: Mapping[int, object] = {view.frame: view.reported_motion for view in views}
         steps = [np.array(reports[index]) for index in range(1, len(answers))]
-    to_last = motions_to_last(steps)
-    if estimator == "thesis":
-        return thesis_average(answers, to_last)
-    return fuse(list(zip(answers, to_last, strict=True)))
+    return ESTIMATORS[estimator].of_frames(answers, motions_to_last(steps))
 
 
 def _statement(answers: list[NeedleEstimate], fused: NeedleEstimate | None) -> str:
@@ -192,7 +185,7 @@ def _statement(answers: list[NeedleEstimate], fused: NeedleEstimate | None) -> s
         return f"filtered over {len(answers)} frames: {said(fused)}"
     if len(answers) == 1:
         return said(answers[0])
-    found = [answer for answer in answers if not answer.abstained]
-    if found:
-        return f"the needle is known in {len(found)} of {len(answers)} frames"
+    answered = [answer for answer in answers if not answer.abstained]
+    if answered:
+        return f"the needle is known in {len(answered)} of {len(answers)} frames"
     return f"the needle is known in none of {len(answers)} frames; in the last: {answers[-1].abstained}"

@@ -18,6 +18,8 @@ from stages.kit.stage import External, Optionally, Parameters, Stage
 from stages.suture.options import ARM_NAMES, CHECKPOINT, HolderName, MaskOptions, PlaceName
 
 DATA = Path(__file__).resolve().parents[2] / "data"
+NEED_DISPARITY = ("thesis",)
+"""Estimators that see no needle without a disparity."""
 MASKS = Optionally(
     External("folder of masks <frame:06d>_left.png, _right.png: 1 or 255 needle, 2 thread, 3 and 4 what hides them")
 )
@@ -92,9 +94,10 @@ def check_masks(parameters: MaskOptions, inputs: Mapping[str, Any]) -> None:
 def check_needle(parameters: NeedleParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for options and inputs that do not go together."""
     check_masks(parameters, inputs)
-    if parameters.estimator == "thesis" and inputs.get("disparity") is None:
+    if parameters.estimator in NEED_DISPARITY and inputs.get("disparity") is None:
         raise UsageError(
-            "--estimator thesis needs --disparity", hint="scenewright disparity --sequence SCENE --out FOLDER"
+            f"--estimator {parameters.estimator} needs --disparity",
+            hint="scenewright disparity --sequence SCENE --out FOLDER",
         )
 
 
@@ -198,7 +201,7 @@ SIMULATE = Stage(
 )
 EVALUATE = Stage(
     name="suture evaluate",
-    version=2,
+    version=3,
     summary="Figures of trials (table 4.1, figure 4.1) and of needle poses and threads against the truth",
     parameters=EvaluateParameters,
     reads={

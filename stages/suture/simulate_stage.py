@@ -93,11 +93,12 @@ def _eyes(model: PerceptionModel, seed: int, sight: str) -> LookingEyes | None:
 def _perception(arm: str, model: PerceptionModel, sight: str) -> SuturePerception:
     """Return what is said of how an arm sees."""
     if sight == "model":
-        told = " ".join(model.provenance.split())
-        return SuturePerception(arm=arm, model=model.name, measured=model.measured, provenance=told)
+        provenance = " ".join(model.provenance.split())
+        return SuturePerception(arm=arm, model=model.name, measured=model.measured, provenance=provenance)
+    from stages.suture.needle.estimators import ESTIMATORS
     from stages.suture.trials.sight import SIGHTS
 
-    whose = "the thesis's estimator" if model.name == "thesis" else "our estimator"
+    whose = ESTIMATORS[model.name].whose
     return SuturePerception(arm=arm, model=sight, measured=True, provenance=f"{whose}: {SIGHTS[sight]}")
 
 

@@ -12,14 +12,16 @@ from stages.kit.measurement.bootstrap import bootstrap_interval
 from stages.kit.stage import Context
 from stages.tableware.options import TierName
 from stages.tableware.parameters import EvaluateParameters
-from stages.tableware.planning.choice import chances_of, make_policy, time_model
-from stages.tableware.planning.policies import Policy
+from stages.tableware.planning.choice import chances_of, declared_policy, time_model
+from stages.tableware.planning.policy import Policy
 from stages.tableware.planning.time_model import Chances, TimeModel
 from stages.tableware.sight import Eyes
 from stages.tableware.simulation.fast import FastWorld, Trial, World, run_in, truth
 from stages.tableware.world.items import Table
 from stages.tableware.world.scenes import make_table
 
+BASELINE = "random"
+"""The policy against which ratios are taken."""
 SAME = 1e-6
 
 
@@ -37,12 +39,12 @@ def run(*, parameters: EvaluateParameters, context: Context) -> TablewareEvaluat
     times = parameters if "times_of" in parameters.model_fields_set else _with_times_of(parameters, parameters.tier)
     model, chances = time_model(times), chances_of(parameters.chances)
     seeds = range(parameters.first_scene, parameters.first_scene + parameters.scenes)
-    found: dict[str, list[OnTable]] = {policy: [] for policy in dict.fromkeys(parameters.policies)}
+    by_policy: dict[str, list[OnTable]] = {policy: [] for policy in dict.fromkeys(parameters.policies)}
     for seed in context.progress.track(seeds, total=parameters.scenes, description="scenes"):
         table = make_table(parameters.tier, seed)
-        for policy, rows in found.items():
+        for policy, rows in by_policy.items():
             rows.append(_on_table(table, policy, seed, model, chances, parameters))
-    results = tuple(_row(policy, rows, found, parameters) for policy, rows in found.items())
+    results = tuple(_row(policy, rows, by_policy, parameters) for policy, rows in by_policy.items())
     file = TablewareEvaluationFile(
         chances=parameters.chances, sight=parameters.sight, delay=parameters.delay, draws=parameters.draws,
         first_scene=parameters.first_scene, rows=results,
@@ -62,10 +64,11 @@ def _on_table(
 ) -> OnTable:
     """Return what a policy comes to on a table, every policy with the same luck."""
     sure = chances.sure and not chances.noise
-    same = None if name.startswith("random") else make_policy(name, model, chances, seed)
+    declared = declared_policy(name)
+    same = None if declared.draws else declared.make(model, chances, seed)
     done: list[Trial] = []
     for draw in range(1 if sure and same is not None and parameters.sight == "truth" else parameters.draws):
-        policy: Policy = same or make_policy(name, model, chances, 1000 * seed + draw)
+        policy: Policy = same or declared.make(model, chances, 1000 * seed + draw)
         see: Callable[[World], Table] = truth
         if parameters.sight == "image":
             see = Eyes(seed + 100_003 * draw, "usual", "dark_on_white", parameters.least_confidence)
@@ -78,25 +81,26 @@ def _on_table(
 
 
 def _row(
-    policy: str, rows: list[OnTable], found: dict[str, list[OnTable]], parameters: EvaluateParameters
+    policy: str, rows: list[OnTable], by_policy: dict[str, list[OnTable]], parameters: EvaluateParameters
 ) -> EvaluatedPolicy:
     seconds = np.array([row.seconds for row in rows])
     objects = np.array([row.objects_per_trip for row in rows])
     time, per_trip = (bootstrap_interval(values, np.random.default_rng(0)) for values in (seconds, objects))
     assert time is not None and per_trip is not None  # there is at least one scene
-    rival = found.get("random")
+    baseline = by_policy.get(BASELINE)
     failures = [failure for row in rows for failure in row.failures]
     share = None
-    if "pull" in found and "stack" in found and policy.startswith("ours"):
-        better = [min(one.seconds, other.seconds) for one, other in zip(found["pull"], found["stack"], strict=True)]
-        share = float(np.mean(seconds <= np.array(better) + SAME))
+    rivals = declared_policy(policy).rivals
+    if rivals and all(rival in by_policy for rival in rivals):
+        better = np.min([[row.seconds for row in by_policy[rival]] for rival in rivals], axis=0)
+        share = float(np.mean(seconds <= better + SAME))
     return EvaluatedPolicy(
         policy=policy, tier=parameters.tier, tables=len(rows), trials=len(failures), time=time.value,
         time_interval=(time.low, time.high), objects_per_trip=per_trip.value,
         objects_per_trip_interval=(per_trip.low, per_trip.high),
-        time_ratio=None if rival is None else float(np.mean([row.seconds for row in rival]) / seconds.mean()),
-        objects_per_trip_ratio=None if rival is None
-        else float(objects.mean() / np.mean([row.objects_per_trip for row in rival])),
+        time_ratio=None if baseline is None else float(np.mean([row.seconds for row in baseline]) / seconds.mean()),
+        objects_per_trip_ratio=None if baseline is None
+        else float(objects.mean() / np.mean([row.objects_per_trip for row in baseline])),
         failure_rate=float(np.mean([failure != "" for failure in failures])),
         failures_policy=failures.count("policy"), failures_perception=failures.count("perception"),
         no_slower_share=share,

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
 from stages.kit.stage import Parameters
+from stages.tableware import policies
+from stages.tableware.found_by_place import names_in
 
 TierName = Literal["tier0_cups", "tier0_bowls", "tier0_utensils", "tier1", "tier2", "tier3"]
-PolicyName = Literal[
-    "random", "random_piles", "pull", "stack", "ours", "ours_without_loaded_pulls", "ours_bold"
-]  # fmt: skip
+if TYPE_CHECKING:
+    PolicyName = str
+else:
+    PolicyName = Literal[names_in(policies)]
+THESIS_TIMES, PHYSICS_TIMES = "tableware/thesis_times.json", "tableware/physics_times.json"
+"""Below data/: times of actions, and chances, fitted to the thesis's tables; times of the arm in physics."""
 ChancesName = Literal["exact", "thesis", "thesis_spills", "thesis_failures"]
 
 

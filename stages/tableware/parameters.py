@@ -13,8 +13,10 @@ from schemas.tableware_plan import TablewarePlan
 from schemas.tableware_scene import TablewareScene
 from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
 from stages.kit.stage import Optionally, Parameters, Stage
+from stages.tableware import policies
 from stages.tableware.detect_parameters import DETECT
-from stages.tableware.options import ActionTimes, PolicyName, TierName
+from stages.tableware.found_by_place import names_in
+from stages.tableware.options import PHYSICS_TIMES, THESIS_TIMES, ActionTimes, PolicyName, TierName
 
 
 class SceneParameters(Parameters):
@@ -90,10 +92,10 @@ def check_simulate(parameters: SimulateParameters, inputs: Mapping[str, Any]) ->
 
 def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for an unknown policy."""
-    known = PolicyName.__args__  # type: ignore[attr-defined]
+    names = names_in(policies)
     for policy in parameters.policies:
-        if policy not in known:
-            raise UsageError(f"--policies: there is no policy {policy!r}", hint=f"choose of {', '.join(known)}")
+        if policy not in names:
+            raise UsageError(f"--policies: there is no policy {policy!r}", hint=f"choose of {', '.join(names)}")
 
 
 SCENE = Stage(
@@ -116,6 +118,7 @@ PLAN = Stage(
     writes=TablewarePlan,
     libraries=("numpy", "scipy", "numba", "opencv-python-headless", "trimesh", "pillow"),
     module="plan_stage",
+    data_files=lambda parameters: (THESIS_TIMES,),
     check=check_plan,
     example="scenewright tableware plan --detections outputs/tidy/detections --policy ours --out outputs/tidy/plan",
 )
@@ -128,6 +131,7 @@ SIMULATE = Stage(
     writes=TablewareTrial,
     libraries=("numpy", "numba", "pybullet", "trimesh", "embreex", "opencv-python-headless", "pillow"),
     module="simulate_stage",
+    data_files=lambda parameters: (THESIS_TIMES, PHYSICS_TIMES),
     check=check_simulate,
     example="scenewright tableware simulate --scene outputs/tidy/scene --policy ours --out outputs/tidy/trial",
 )
@@ -140,6 +144,7 @@ EVALUATE = Stage(
     writes=TablewareEvaluation,
     libraries=("numpy", "numba", "opencv-python-headless", "trimesh", "embreex"),
     module="evaluate_stage",
+    data_files=lambda parameters: (THESIS_TIMES,),
     check=check_evaluate,
     example="scenewright tableware evaluate --tier tier2 --scenes 50 --out outputs/tidy/evaluation",
 )

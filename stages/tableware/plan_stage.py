@@ -13,7 +13,7 @@ from schemas.tableware_plan import TablewarePlan, TablewarePlanFile, TablewareSt
 from schemas.tableware_scene import TablewareScene
 from stages.kit.stage import Context
 from stages.tableware.parameters import PlanParameters
-from stages.tableware.planning.choice import as_times, chances_of, make_policy, rules_of, time_model
+from stages.tableware.planning.choice import as_times, chances_of, declared_policy, make_policy, time_model
 from stages.tableware.planning.reasons import impossible_pairs
 from stages.tableware.planning.records import as_record
 from stages.tableware.planning.refusals import Accepted, accept, statement
@@ -22,7 +22,7 @@ from stages.tableware.planning.time_model import EXACT, Chances, TimeModel
 from stages.tableware.scene_files import read_image
 from stages.tableware.sight import look, understood
 from stages.tableware.simulation.fast import Done, FastWorld, Trial, run_in, run_trial
-from stages.tableware.table_pictures import Panel, draw_strip, words_of
+from stages.tableware.table_pictures import Panel, draw_strip
 from stages.tableware.vision.detections_file import from_file
 from stages.tableware.vision.overlay import draw_sight
 from stages.tableware.world.items import Table
@@ -63,7 +63,7 @@ def run(
         expected_objects_per_trip=expected.objects_per_trip,
         risk=expected.risk,
         draws=parameters.draws,
-        impossible=impossible_pairs(table, rules_of(parameters.policy)),
+        impossible=impossible_pairs(table, declared_policy(parameters.policy).rules),
         refused=accepted.refused,
         notes=notes,
         statement=statement(accepted, notes),
@@ -123,11 +123,12 @@ def _expected(table: Table, model: TimeModel, chances: Chances, parameters: Plan
     """Return what a policy comes to on the table as it was seen."""
     if not table.items:
         return Expected(0.0, 0.0, 0.0, 0.0)
-    policy = make_policy(parameters.policy, model, chances, seed)
+    declared = declared_policy(parameters.policy)
+    policy = declared.make(model, chances, seed)
     done: list[Trial] = []
     for draw in range(1 if chances.sure and not chances.noise else parameters.draws):
-        if parameters.policy.startswith("random"):
-            policy = make_policy(parameters.policy, model, chances, 1000 * seed + draw)
+        if declared.draws:
+            policy = declared.make(model, chances, 1000 * seed + draw)
         done.append(run_trial(table, policy, model, chances, (seed, draw)))
     return Expected(
         float(np.mean([trial.seconds for trial in done])),
@@ -140,7 +141,7 @@ def _expected(table: Table, model: TimeModel, chances: Chances, parameters: Plan
 def panels(done: list[Done], table: Table) -> list[Panel]:
     """Return the table before each action, and at the end."""
     rows: list[Panel] = [
-        (one.before, one.action, f"{number}. {words_of(one.action)} ({one.end - one.start:.1f} s)")
+        (one.before, one.action, f"{number}. {one.action.words} ({one.end - one.start:.1f} s)")
         for number, one in enumerate(done, start=1)
     ]
     last = done[-1] if done else None
@@ -152,7 +153,7 @@ def plan_text(file: TablewarePlanFile, done: list[Done]) -> str:
     """Return a plan as people read it."""
     lines = [file.statement, f"policy {file.policy}, items from {file.source}", ""]
     lines += [
-        f"{number:3}. {words_of(one.action)}, {one.end - one.start:.1f} s" for number, one in enumerate(done, start=1)
+        f"{number:3}. {one.action.words}, {one.end - one.start:.1f} s" for number, one in enumerate(done, start=1)
     ]
     lines += [
         "",

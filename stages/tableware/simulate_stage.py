@@ -2,36 +2,26 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterable
-from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from schemas.errors import BadInput, MissingDependency
+from schemas.errors import BadInput
 from schemas.tableware_plan import TablewarePlan
 from schemas.tableware_scene import TablewareScene
 from schemas.tableware_trial import TablewareTrial, TablewareTrialFile, TrialCounts, TrialStep
 from stages.kit.stage import Context
 from stages.tableware.parameters import SimulateParameters
 from stages.tableware.plan_stage import panels
-from stages.tableware.planning.actions import Action, Grasp, Pull, PullGrasp, Stack, StackGrasp
-from stages.tableware.planning.choice import as_times, chances_of, make_policy, time_model
+from stages.tableware.planning.action import Action
+from stages.tableware.planning.choice import chances_of, make_policy
 from stages.tableware.planning.records import as_action, as_record
 from stages.tableware.planning.time_model import Chances, TimeModel
 from stages.tableware.sight import Eyes, named_as
-from stages.tableware.simulation.arm_times import arm_times
-from stages.tableware.simulation.fast import Done, FastWorld, Trial, World, do_in, run_in, truth
-from stages.tableware.table_pictures import draw_strip, words_of, write_animation
+from stages.tableware.simulation.fast import Done, Trial, World, do_in, run_in, truth
+from stages.tableware.simulators import SIMULATORS
+from stages.tableware.table_pictures import draw_strip
 from stages.tableware.world.items import Table
 from stages.tableware.world.records import as_records, as_table
 from stages.tableware.world.shape_files import write_shapes
-
-ANIMATION_WIDTH = 560
-SIMULATION = "stages.tableware.simulation"
-"""Its modules of physics are loaded only when they are asked for."""
 
 
 def run(
@@ -40,48 +30,38 @@ def run(
     """Let a policy clear the table of a scene, or carry out a plan as it stands."""
     file = scene.info
     table = as_table(file.items)
-    model, chances = times_of(parameters), chances_of(parameters.chances)
+    simulator = SIMULATORS[parameters.simulator](parameters)
     eyes = Eyes(context.seed, file.light, file.colors, parameters.least_confidence)
-    in_physics = parameters.simulator == "physics"
-    policy = make_policy(parameters.policy, model, replace(chances, spills=chances.spills or in_physics), context.seed)
+    policy = make_policy(parameters.policy, simulator.times, simulator.told, context.seed)
     planned = None if plan is None else planned_actions(plan, table)
     done: list[Done] = []
-    recording = physics_part("recording").Recording() if in_physics else None
-    world = open_world(parameters.simulator, table, model, chances, context.seed, recording)
     try:
+        world = simulator.open(table, context.seed)
         with context.progress.step("clear"):
             if planned is not None:
                 trial = carry_out(world, planned, done)
             else:
-                again = physics_part("physics_trial").alone if in_physics else None
-                trial = run_in(world, policy, eyes if parameters.sight == "image" else truth, done.append, again)
+                see = eyes if parameters.sight == "image" else truth
+                trial = run_in(world, policy, see, done.append, simulator.again)
     finally:
-        close = getattr(world, "close", None)
-        if close is not None:
-            close()
-    counts = _counts(trial)
-    said = _statement(trial, len(table.items))
+        simulator.close()
+    statement = _statement(trial, len(table.items))
     TablewareTrialFile(
         policy="plan" if planned is not None else parameters.policy,
         simulator=parameters.simulator,
         sight=parameters.sight,
-        times=as_times(model) if parameters.simulator == "fast" else None,
-        chances=parameters.chances if parameters.simulator == "fast" else "contact",
-        counts=counts,
-        steps=tuple(_steps(done, model, chances)),
+        times=simulator.recorded_times,
+        chances=simulator.recorded_chances,  # type: ignore[arg-type]
+        counts=_counts(trial),
+        steps=tuple(_steps(done, simulator.times, chances_of(parameters.chances))),
         images=eyes.images,
-        statement=said,
+        statement=statement,
     ).write(context.output / "trial.json")
-    context.output.joinpath("trial.txt").write_text(_text(done, said), encoding="utf-8")
+    context.output.joinpath("trial.txt").write_text(_text(done, statement), encoding="utf-8")
     write_shapes(context.output)
     with context.progress.step("pictures"):
         draw_strip(panels(done, table), parameters.image_width).save(context.output / "keyframes.png")
-        width = min(ANIMATION_WIDTH, parameters.image_width)
-        if recording is not None:
-            _draw_physics(recording.arrays(), done, context.output, parameters.image_width, width)
-        else:
-            moving = [(one.action, one.before, one.after, f"{one.start:.0f} s: {words_of(one.action)}") for one in done]
-            write_animation(context.output / "clearing.gif", moving, width)
+        simulator.draw(done, context.output, parameters.image_width)
     summary: dict[str, object] = {
         "policy": "plan" if planned is not None else parameters.policy,
         "simulator": parameters.simulator,
@@ -90,49 +70,8 @@ def run(
         "objects_per_trip": round(trial.objects_per_trip, 2),
     }
     if trial.failed:
-        summary["reason"] = said
+        summary["reason"] = statement
     return TablewareTrial(root=context.output, outcome="not_cleared" if trial.failed else "ok", summary=summary)
-
-
-def times_of(parameters: SimulateParameters) -> TimeModel:
-    """Return the times by which the policy plans: the arm's own in physics; what is given explicitly in their place."""
-    if parameters.simulator == "fast":
-        return time_model(parameters)
-    arm = arm_times(parameters.delay)
-    given = {"trip": parameters.trip_seconds, "stack": parameters.stack_seconds, "pull": parameters.pull_seconds}
-    return replace(arm, **{name: value for name, value in given.items() if value is not None})
-
-
-def _draw_physics(
-    frames: dict[str, np.ndarray], done: list[Done], folder: Path, strip_width: int, animation_width: int
-) -> None:
-    """Write physics.png and clearing.gif from what was recorded."""
-    pictures = physics_part("physics_pictures")
-    words = [
-        next((words_of(one.action) for one in done if one.start <= seconds <= one.end + 1e-6), "")
-        for seconds in frames["seconds"]
-    ]
-    pictures.draw_physics_strip(frames, words, strip_width).save(folder / "physics.png")
-    pictures.write_physics_animation(folder / "clearing.gif", frames, words, animation_width)
-
-
-def physics_part(name: str) -> Any:
-    """Return a module of the simulation that needs a physics engine. Raises MissingDependency where there is none."""
-    try:
-        return importlib.import_module(f"{SIMULATION}.{name}")
-    except ImportError as error:
-        raise MissingDependency(f"tableware has no physics here: {error}", hint="--simulator fast") from None
-
-
-def open_world(
-    simulator: str, table: Table, model: TimeModel, chances: Chances, seed: int, recording: Any = None
-) -> World:
-    """Return a world with a table in it; physics tell `recording` of key frames. Raises MissingDependency where there
-    is no physics."""
-    if simulator == "fast":
-        return FastWorld(table, model, chances, seed)
-    world: World = physics_part("physics").PhysicsTable(table, record=recording)
-    return world
 
 
 def planned_actions(plan: TablewarePlan, table: Table) -> list[tuple[Action, Table]]:
@@ -152,38 +91,8 @@ def planned_actions(plan: TablewarePlan, table: Table) -> list[tuple[Action, Tab
         before = as_table(one.model_copy(update={"name": names.get(one.name, one.name),
                                                  "on": None if one.on is None else names.get(one.on, one.on)})
                           for one in step.before)  # fmt: skip
-        actions.append((renamed_action(as_action(step.action), names), before))
+        actions.append((as_action(step.action).renamed(names), before))
     return actions
-
-
-def renamed_action(action: Action, names: dict[str, str]) -> Action:
-    """Return an action with its things called by other names; those that have none keep theirs."""
-
-    def name(old: str) -> str:
-        return names.get(old, old)
-
-    if isinstance(action, PullGrasp):
-        return PullGrasp(_renamed_pull(action.u_P, names), _renamed_grasp(action.u_G, names))
-    if isinstance(action, StackGrasp):
-        put = action.u_S
-        return StackGrasp(
-            Stack(_renamed_grasp(put.u_G, names), name(put.onto), put.p_L, put.theta_L),
-            _renamed_grasp(action.u_G, names),
-        )
-    if isinstance(action, Pull):
-        return _renamed_pull(action, names)
-    if isinstance(action, Stack):
-        return Stack(_renamed_grasp(action.u_G, names), name(action.onto), action.p_L, action.theta_L)
-    return _renamed_grasp(action, names)
-
-
-def _renamed_grasp(action: Grasp, names: dict[str, str]) -> Grasp:
-    return Grasp(tuple(names.get(item, item) for item in action.items), action.p_G, action.theta_G)
-
-
-def _renamed_pull(action: Pull, names: dict[str, str]) -> Pull:
-    item, target = names.get(action.item, action.item), names.get(action.target, action.target)
-    return Pull(item, target, action.p_S, action.theta_S, action.p_E, action.theta_E)
 
 
 def carry_out(world: World, planned: Iterable[tuple[Action, Table]], done: list[Done]) -> Trial:
@@ -226,7 +135,7 @@ def _statement(trial: Trial, items: int) -> str:
 def _text(done: list[Done], statement: str) -> str:
     lines = [statement, ""]
     for one in done:
-        lines.append(f"{one.start:7.1f} s  {words_of(one.action)}")
+        lines.append(f"{one.start:7.1f} s  {one.action.words}")
         gone = [name for name in one.before.by_name if name not in one.after.by_name and name not in one.dropped]
         lines += [f"           binned: {', '.join(gone)}"] if gone else []
         lines += [f"           dropped: {', '.join(one.dropped)}"] if one.dropped else []

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import atan2, ceil, cos, hypot, pi, sin
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from stages.tableware.planning.actions import Action, Grasp, Pull, PullGrasp, Stack, StackGrasp
+from stages.tableware.actions.grasp import Grasp
+from stages.tableware.actions.pull import Pull
+from stages.tableware.actions.stack import Stack
+from stages.tableware.planning.action import Action, Primitive
 from stages.tableware.planning.rules import Rules
 from stages.tableware.world.items import TABLE_SIDES, Item, Kind, Table
 
@@ -80,7 +84,8 @@ def draw_table(table: Table, width: int, action: Action | None = None, caption: 
             sheet.draw.ellipse((u - r, v - r, u + r, v + r), fill=CLOTH, outline=INK, width=SUPERSAMPLING)
             sheet.draw.text((u, v), text, fill=INK, font=_font(0.024 * scale), anchor="mm")
     if action is not None:
-        _draw_action(sheet, action)
+        for part in action.parts:
+            _PAINTERS[type(part)](sheet, part)
     image = image.resize((width, round(height / SUPERSAMPLING)), Image.Resampling.LANCZOS)
     return captioned(image, caption) if caption else image
 
@@ -118,19 +123,12 @@ def _draw_item(sheet: _Sheet, item: Item, level: int) -> None:
     sheet.line((neck[0] + dy * wide / 2, neck[1] - dx * wide / 2), (neck[0] - dy * wide / 2, neck[1] + dx * wide / 2), color, 0.006)  # fmt: skip # noqa: E501
 
 
-def _draw_action(sheet: _Sheet, action: Action) -> None:
-    if isinstance(action, PullGrasp):
-        _draw_action(sheet, action.u_P)
-        _draw_action(sheet, action.u_G)
-    elif isinstance(action, StackGrasp):
-        _draw_action(sheet, action.u_S)
-        _draw_action(sheet, action.u_G)
-    elif isinstance(action, Pull):
-        sheet.arrow(action.p_S[:2], action.p_E[:2], PULL_INK)
-    elif isinstance(action, Stack):
-        sheet.arrow(action.u_G.p_G[:2], action.p_L[:2], STACK_INK)
-    else:
-        _draw_jaws(sheet, action)
+def _draw_pull(sheet: _Sheet, action: Pull) -> None:
+    sheet.arrow(action.p_S[:2], action.p_E[:2], PULL_INK)
+
+
+def _draw_stacking(sheet: _Sheet, action: Stack) -> None:
+    sheet.arrow(action.u_G.p_G[:2], action.p_L[:2], STACK_INK)
 
 
 def _draw_jaws(sheet: _Sheet, action: Grasp) -> None:
@@ -145,6 +143,11 @@ def _draw_jaws(sheet: _Sheet, action: Grasp) -> None:
         start = (middle[0] - rules.finger * dy, middle[1] + rules.finger * dx)
         end = (middle[0] + rules.finger * dy, middle[1] - rules.finger * dx)
         sheet.line(start, end, GRASP_INK, 0.008)
+
+
+_PAINTERS: dict[type[Primitive], Callable[[_Sheet, Any], None]] = {
+    Grasp: _draw_jaws, Pull: _draw_pull, Stack: _draw_stacking
+}  # fmt: skip
 
 
 def _lighter(color: str, share: float) -> str:
@@ -178,19 +181,6 @@ def _wrapped(text: str, width: int, size: int) -> list[str]:
         else:
             lines[-1] = longer
     return lines[:3]
-
-
-def words_of(action: Action) -> str:
-    """Return an action in words."""
-    if isinstance(action, PullGrasp):
-        return f"{words_of(action.u_P)}, take both"
-    if isinstance(action, StackGrasp):
-        return f"{words_of(action.u_S)}, take the pile"
-    if isinstance(action, Pull):
-        return f"pull {action.item} to {action.target}"
-    if isinstance(action, Stack):
-        return f"stack {action.u_G.items[0]} on {action.onto}"
-    return f"take {' and '.join(action.items)}"
 
 
 Panel = tuple[Table, Action | None, str]
@@ -242,13 +232,10 @@ def _padded(image: Image.Image, height: int) -> Image.Image:
 
 def _between(table: Table, action: Action, share: float) -> Table | None:
     """Return the table while something is on its way, None for a grasp."""
-    first = action.u_P if isinstance(action, PullGrasp) else action.u_S if isinstance(action, StackGrasp) else action
-    if isinstance(first, Pull):
-        name, end = first.item, first.p_E
-    elif isinstance(first, Stack):
-        name, end = first.u_G.items[0], first.p_L
-    else:
+    moves = action.parts[0].moves
+    if moves is None:
         return None
+    name, end = moves
     if name not in table.by_name:
         return None
     start = table.by_name[name].position

@@ -93,9 +93,12 @@ def read_words() -> dict[str, str]:
     return {row["word"]: load_vocabulary().by_name(row["class"]).name for row in rows}
 
 
+MATCHING = {"thesis": class_by_substring, "words": class_by_last_word}
+
+
 def classes_of(labels: dict[int, AnnotatedLabel], matching: str, words: dict[str, str]) -> dict[int, str]:
     """Return the class of every label that is of one. `matching` as in the parameters."""
-    decide = class_by_substring if matching == "thesis" else class_by_last_word
+    decide = MATCHING[matching]
     decided = {identity: decide(label, words) for identity, label in labels.items() if identity > 0}
     return {identity: name for identity, name in decided.items() if name is not None}
 

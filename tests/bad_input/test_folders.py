@@ -11,9 +11,9 @@ import pytest
 
 from schemas.errors import BadInput
 from stages.ingest.detection import open_log
-from stages.ingest.layouts.colmap_model import read_model
-from stages.ingest.layouts.depth_arrays import depth_array
-from stages.ingest.layouts.files import images_by_number, images_by_stem, natural_key
+from stages.ingest.folders.depth_arrays import depth_array
+from stages.ingest.folders.files import images_by_number, images_by_stem, natural_key
+from stages.ingest.layouts.colmap.model import read_model
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import Unusable
 from tests.unit.ingest.depth_array_writing import write_colmap_array, write_pfm

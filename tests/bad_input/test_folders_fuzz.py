@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 from schemas.errors import BadInput, UsageError
 from stages.ingest.detection import open_log
-from stages.ingest.layouts.calibration_files import read_calibration
-from stages.ingest.layouts.colmap_model import read_model
-from stages.ingest.layouts.depth_arrays import ARRAY_SUFFIXES, depth_array
-from stages.ingest.layouts.pose_files import read_pose_list
-from stages.ingest.layouts.stamped_poses import StampedPoses, exact_stamp
+from stages.ingest.folders.calibration_files import read_calibration
+from stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
+from stages.ingest.folders.pose_files import read_pose_list
+from stages.ingest.folders.stamped_poses import StampedPoses, exact_stamp
+from stages.ingest.layouts.colmap.model import read_model
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import LogSource, Unusable
 from tests.unit.ingest.folder_writers import (

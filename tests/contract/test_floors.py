@@ -103,9 +103,7 @@ def _users_of(module: str) -> set[str]:
 
 
 def test_modules_import_each_other_in_no_circle() -> None:
-    plain = grimp.build_graph(
-        "cli", "stages", "schemas", "benchmarks", exclude_type_checking_imports=True, cache_dir=None
-    )
+    plain = grimp.build_graph("cli", "stages", "schemas", "benchmarks", cache_dir=None)
     edges = networkx.DiGraph(
         (module, imported) for module in plain.modules for imported in plain.find_modules_directly_imported_by(module)
     )
@@ -113,8 +111,43 @@ def test_modules_import_each_other_in_no_circle() -> None:
     assert not circles
 
 
-@pytest.mark.parametrize("module", ["stages.fuse.mapping"])
-def test_cores_that_others_will_drive_need_no_stage(module: str) -> None:
+CORES = (
+    *("fuse.mapping", "fuse.ours", "fuse.closing"),
+    *("graph.building", "graph.ours"),
+    *("cad.candidates", "cad.choosing", "cad.ours"),
+    *(
+        "segment.fusion_ours",
+        "segment.geometric",
+        "segment.backends.objects.segmentation",
+        "segment.backends.network.grouping",
+    ),
+    *("poses.tracking", "poses.estimation"),
+    *("plan.world_model", "plan.pick_place", "plan.door_motion", "plan.conduct", "plan.execution", "plan.refinement"),
+)
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_cores_that_others_will_drive_need_no_stage(core: str) -> None:
     """An agent that maps while it acts takes the mapper without the step around it."""
-    chain = graph().find_shortest_chain(module, module.rsplit(".", 1)[0] + ".stage")
-    assert chain is None
+    module = f"stages.{core}"
+    assert graph().find_shortest_chain(module, f"stages.{floor(module)}.stage") is None
+
+
+@pytest.mark.parametrize(
+    "baseline",
+    ["graph.thesis", "fuse.thesis", "fuse.separate", "cad.thesis", "segment.fusion_thesis", "segment.fusion_voxblox"],
+)
+def test_a_baseline_reaches_nothing_of_ours(baseline: str) -> None:
+    """Whoever improves our method cannot change the one that it is compared with."""
+    folder = floor(f"stages.{baseline}")
+    reached = graph().find_upstream_modules(f"stages.{baseline}")
+    assert not reached & {f"stages.{folder}.ours", f"stages.{folder}.fusion_ours", *OURS_ALONE}
+
+
+OURS_ALONE = {
+    *("stages.graph.corrected_support", "stages.graph.shared_support", "stages.graph.beside", "stages.graph.hanging"),
+    *("stages.fuse.partition", "stages.fuse.class_scores"),
+    *("stages.cad.apart", "stages.cad.fitting", "stages.cad.scoring"),
+    *("stages.segment.claims",),
+}
+"""What only our methods are made of."""

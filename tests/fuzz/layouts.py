@@ -12,8 +12,8 @@ import numpy as np
 
 from schemas.errors import BadInput, UsageError
 from stages.ingest.detection import open_log
-from stages.ingest.layouts.calibration_files import read_calibration
-from stages.ingest.layouts.depth_arrays import ARRAY_SUFFIXES, depth_array
+from stages.ingest.folders.calibration_files import read_calibration
+from stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.source import Unusable
 from tests.fuzz.harness import Harness, as_file, chosen, scratch

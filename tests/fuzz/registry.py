@@ -26,8 +26,8 @@ NAMES = tuple(name for names in MODULES.values() for name in names)
 INSTRUMENTED = [
     "stages.ingest",
     "stages.segment.labels",
-    "stages.segment.onnx",
-    "stages.segment.service",
+    "stages.segment.backends.onnx",
+    "stages.segment.backends.service",
     "stages.kit.formats",
     "stages.kit.language",
     "stages.kit.services",

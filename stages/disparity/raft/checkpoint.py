@@ -10,13 +10,12 @@ import torch
 from schemas.errors import BadInput
 from stages.disparity.raft.architecture import OTHER_FILE, architecture_of
 from stages.disparity.raft.network import RaftStereo
+from stages.kit.formats.network_file import put_tensors, write_network
 from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
 
 FORMAT = "RAFT-Stereo checkpoint"
 PREFIX = "module."
 """Before every name in the authors' files, which were saved from several devices at once."""
-COUNTER = "num_batches_tracked"
-"""Of batch normalisation; not needed to use a network."""
 
 
 def load_network(path: Path) -> RaftStereo:
@@ -30,19 +29,8 @@ def network_of(tensors: dict[str, np.ndarray], where: str) -> RaftStereo:
     sizes = architecture_of({name: tensor.shape for name, tensor in tensors.items()}, where)
     with torch.device("meta"):
         network = RaftStereo(sizes)
-    state = network.state_dict()
-    needed = {name for name in state if not name.endswith(COUNTER)}
-    for name in sorted(needed | {name for name in tensors if not name.endswith(COUNTER)}):
-        there = tuple(tensors[name].shape) if name in tensors else None
-        wanted = tuple(state[name].shape) if name in needed else None
-        if there != wanted:
-            raise BadInput(f"{where}: tensor {name!r} has shape {there}, the network needs {wanted}", hint=OTHER_FILE)
-        if not np.isfinite(tensors[name]).all():
-            raise BadInput(f"{where}: tensor {name!r} holds numbers that are not finite", hint=OTHER_FILE)
-    loaded = {name: torch.from_numpy(tensors[name].astype(np.float32)) for name in needed}
-    loaded |= {name: torch.tensor(0) for name in state if name.endswith(COUNTER)}
-    network.load_state_dict(loaded, assign=True)
-    return network.eval()
+    put_tensors(network, tensors, where, OTHER_FILE)
+    return network
 
 
 def read_tensors(path: Path) -> dict[str, np.ndarray]:
@@ -74,9 +62,4 @@ def convert(source: Path, target: Path) -> None:
 
 def save_network(path: Path, network: RaftStereo, description: str) -> None:
     """Write a network of ours as safetensors of float16."""
-    tensors = {
-        name: tensor.detach().to(torch.float16).contiguous().numpy()
-        for name, tensor in network.state_dict().items()
-        if not name.endswith(COUNTER)
-    }
-    write_safetensors(path, tensors, {"format": FORMAT, "description": description})
+    write_network(path, network, {"format": FORMAT, "description": description})

@@ -1,1 +1,1 @@
-"""Logs that are folders of files: one file per layout."""
+"""What logs look like on disk: each folder is a layout of `ingest`, found because it lies here (docs/LOGS.md)."""

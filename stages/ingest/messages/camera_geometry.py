@@ -8,7 +8,7 @@ import numpy as np
 
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
-from stages.ingest.layouts.files import camera_from_options, overridden
+from stages.ingest.folders.files import camera_from_options, overridden
 from stages.ingest.lenses import Lens, check_calibrated, is_calibrated, lens_of, same_rays
 from stages.ingest.messages.cameras import CameraTopics, calibration_of, calibration_topic, fixed_transform
 from stages.ingest.messages.records import CalibrationRecord

@@ -12,7 +12,7 @@ import numpy as np
 from schemas.errors import BadInput
 from schemas.manifest import MANIFEST_NAME
 from schemas.sequence import Sequence
-from stages.ingest.detection import MODULES, log_format, open_log
+from stages.ingest.detection import log_format, open_log
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.pose_conventions import converted
 from stages.ingest.preflight.calibration import calibration_findings, calibration_report
@@ -44,6 +44,7 @@ from stages.ingest.preflight.steps import step_reports
 from stages.ingest.preflight.stereo import stereo_findings, stereo_report, with_stereo_depth
 from stages.ingest.preflight.streams import all_streams, clock_lines, stream_findings, stream_reports
 from stages.ingest.preflight.upright import gravity_findings, gravity_report
+from stages.ingest.registry import all_layouts
 from stages.ingest.selection import NOT_SELECTED, select
 from stages.ingest.source import Entry, LogSource, SourceCamera, Unusable
 from stages.ingest.stage import check_cameras
@@ -104,7 +105,9 @@ def inspect_log(
 
 def _refuse_what_is_nothing(path: Path, parameters: IngestParameters) -> None:
     """People who meant an artifact should hear of artifacts."""
-    if path.is_dir() and parameters.format == "auto" and not any(log_format(n).matches(path) for n in MODULES):
+    if not (path.is_dir() and parameters.format == "auto"):
+        return
+    if not any(log_format(layout).matches(path) for layout in all_layouts()):
         raise BadInput(
             f"{path}: not an artifact (no {MANIFEST_NAME}), and no log in a format that is known",
             hint="docs/LOGS.md describes the layouts",

@@ -69,6 +69,11 @@ def is_rigid(matrix: np.ndarray, tolerance: float = 1e-3) -> bool:
     )
 
 
+def wrapped(angles: ArrayLike) -> np.ndarray:
+    """Return angles [rad] from -pi (inclusive) to pi."""
+    return np.asarray((np.asarray(angles) + np.pi) % (2 * np.pi) - np.pi)
+
+
 def look_at(eye: np.ndarray, target: np.ndarray, up: ArrayLike = (0.0, 0.0, 1.0)) -> np.ndarray:
     """Return world_from_camera (4, 4) of an OpenCV camera at `eye` that looks at `target` [m], image up along `up`."""
     forward = np.asarray(target, dtype=float) - eye

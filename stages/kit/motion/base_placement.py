@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 
-from stages.kit.geometry.transforms import inverse
+from stages.kit.geometry.transforms import inverse, wrapped
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.path_query import Query
@@ -37,7 +37,7 @@ def sample_bases(
     angle = random.uniform(-np.pi, np.pi, count)
     distance = np.sqrt(random.uniform(nearest**2, farthest**2, count))
     x, y = target[0] + distance * np.cos(angle), target[1] + distance * np.sin(angle)
-    yaw = _wrapped(angle + np.pi + random.uniform(-heading, heading, count))
+    yaw = wrapped(angle + np.pi + random.uniform(-heading, heading, count))
     inside = (x > room[0][0]) & (x < room[1][0]) & (y > room[0][1]) & (y < room[1][1])
     return np.column_stack([x, y, yaw])[inside]
 
@@ -72,10 +72,6 @@ def in_arm_frame(base: np.ndarray, world_from_tool: np.ndarray, robot: RobotDesc
     return inverse(base_pose(base, robot)) @ world_from_tool
 
 
-def _wrapped(angle: np.ndarray) -> np.ndarray:
-    return (angle + np.pi) % (2 * np.pi) - np.pi
-
-
 def plan_drive(
     start: np.ndarray,
     goal: np.ndarray,
@@ -103,7 +99,7 @@ def base_query(start: np.ndarray, goal: np.ndarray, arm: np.ndarray, room: tuple
 
     The yaw goes the shorter way round; start and goal may stand outside the floor's corners.
     """
-    turn = float(_wrapped(np.array(goal[2] - start[2])))
+    turn = float(wrapped(np.array(goal[2] - start[2])))
     target = np.array([goal[0], goal[1], start[2] + turn])
     low = np.array([*np.minimum(room[0], np.minimum(start, goal)[:2]), start[2] - np.pi - abs(turn)])
     high = np.array([*np.maximum(room[1], np.maximum(start, goal)[:2]), start[2] + np.pi + abs(turn)])

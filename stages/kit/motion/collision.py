@@ -36,16 +36,6 @@ class Collision:
     """Penetration [m]; negative when only the clearance is missed."""
 
 
-@dataclass(frozen=True)
-class CheckerState:
-    """What a checker was told of the hand."""
-
-    carried: str | None
-    tool_from_carried: np.ndarray
-    touchable: frozenset[str]
-    rest_on: Mapping[str, float]
-
-
 class CollisionChecker:
     """Asks whether configurations (10,) of base and arm are free.
 
@@ -107,18 +97,6 @@ class CollisionChecker:
     def allow(self, touch: Iterable[str] = (), rest_on: Mapping[str, float] | None = None) -> None:
         """Say which links (by name) hand and fingers may touch, and how deep [m] the carried body may be in which."""
         self._touchable, self._rest_on = frozenset(touch), dict(rest_on or {})
-
-    def state(self) -> CheckerState:
-        """Return what is carried and allowed, for `restore`."""
-        return CheckerState(self.carried, self._tool_from_carried, self._touchable, self._rest_on)
-
-    def restore(self, state: CheckerState) -> None:
-        """Carry and allow what was carried and allowed before."""
-        if state.carried is None:
-            self.put_down()
-        else:
-            self.carry(state.carried, state.tool_from_carried)
-        self.allow(state.touchable, state.rest_on)
 
     def overlaps(self, name: str) -> dict[str, float]:
         """Return the links that touch a scene body where it is now, with the deepest penetration [m] of each.

@@ -1,13 +1,22 @@
-"""RRT-Connect (Kuffner & LaValle 2000) with shortcut smoothing; budgets are counted in samples, never in seconds."""
+"""RRT-Connect (Kuffner & LaValle 2000) of OMPL, asking a check in Python, with shortcut smoothing of our own.
+
+Budgets are counted in samples, never in seconds. OMPL draws its random numbers itself: its generator is seeded from
+ours before each search, and a search builds all of its objects anew, so that the same seed gives the same path whatever
+was searched before in the process.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 
+from schemas.errors import MissingDependency
 from stages.kit.motion.collision import Collision
 from stages.kit.motion.failures import end_in_collision, joint_limit, no_path
 
@@ -59,32 +68,6 @@ def first_collision(points: np.ndarray, check: Check) -> tuple[int, Collision] |
     return None
 
 
-class _Tree:
-    def __init__(self, root: np.ndarray, scale: np.ndarray, capacity: int) -> None:
-        self.points = np.empty((capacity, len(root)))
-        self.points[0] = root
-        self.parents = [-1]
-        self.scale = scale
-
-    def nearest(self, point: np.ndarray) -> int:
-        difference = (self.points[: len(self.parents)] - point) / self.scale
-        return int(np.argmin(np.einsum("ij,ij->i", difference, difference)))
-
-    def add(self, point: np.ndarray, parent: int) -> int:
-        if len(self.parents) == len(self.points):
-            self.points = np.concatenate([self.points, np.empty_like(self.points)])
-        self.points[len(self.parents)] = point
-        self.parents.append(parent)
-        return len(self.parents) - 1
-
-    def branch(self, index: int) -> list[np.ndarray]:
-        rows = []
-        while index >= 0:
-            rows.append(self.points[index].copy())
-            index = self.parents[index]
-        return rows
-
-
 def rrt_connect(
     start: np.ndarray,
     goal: np.ndarray,
@@ -99,7 +82,8 @@ def rrt_connect(
     """Return a path (N, D) of straight pieces from `start` to `goal` (D,) that `check` finds free.
 
     `step` is the longest extension, in resolutions. Raises MotionFailed: `joint_limit`, `start_in_collision`,
-    `goal_in_collision` (with the pair and its depth), `no_path` (with the samples used and the body that blocked most).
+    `goal_in_collision` (with the pair and its depth), `no_path` (with the samples used and the body that blocked most);
+    MissingDependency without OMPL.
     """
     for name, point in (("start", start), ("goal", goal)):
         if not space.holds(point):
@@ -108,23 +92,52 @@ def rrt_connect(
         if collision is not None:
             raise end_in_collision(name, collision.part, collision.other, collision.depth)
     blockers: Counter[str] = Counter()
+
+    def counted(point: np.ndarray) -> Collision | None:
+        collision = check(point)
+        if collision is not None:
+            blockers[collision.other] += 1
+        return collision
+
+    straight = first_collision(interpolate(start, goal, space.resolution), counted) is None
+    path: np.ndarray | None = np.array([start, goal]) if straight else None
     used = 0
     while used < samples:
-        path, spent = _grow(start, goal, check, space, random, samples - used, step, blockers)
-        used += spent
+        if path is None:
+            path, spent = _search(start, goal, counted, space, random, samples - used, step)
+            used += spent
         if path is None:
             break
         path = shortcut(path, check, space, random, smoothing) if len(path) > 2 else path
         # What lies between two checks was not looked at: look closer, and start again when it is not free.
-        found = first_collision(densify(path, space.resolution / FINER), check)
-        if found is None:
+        if first_collision(densify(path, space.resolution / FINER), counted) is None:
             return path
-        blockers[found[1].other] += 1
+        path = None
         used += 1
     raise no_path(samples, blockers)
 
 
-def _grow(
+@lru_cache(maxsize=1)
+def _ompl() -> tuple[ModuleType, ModuleType, ModuleType, type]:
+    """Return OMPL's base, geometric and util modules, and a validator of motions that asks `is_free`."""
+    try:
+        from ompl import base, geometric, util
+    except ImportError:
+        raise MissingDependency("the package ompl is not installed", hint="run `make setup`") from None
+
+    class Straight(base.MotionValidator):  # type: ignore[misc]
+        """Asks `is_free` whether the straight way between two states is free."""
+
+        is_free: Any = None
+
+        def checkMotion(self, begin: Any, end: Any, last: Any = None) -> bool:  # noqa: N802 (OMPL's name)
+            return bool(self.is_free(begin, end))
+
+    util.setLogLevel(util.LogLevel.LOG_NONE)
+    return base, geometric, util, Straight
+
+
+def _search(
     start: np.ndarray,
     goal: np.ndarray,
     check: Check,
@@ -132,44 +145,52 @@ def _grow(
     random: np.random.Generator,
     samples: int,
     step: float,
-    blockers: Counter[str],
 ) -> tuple[np.ndarray | None, int]:
     """Grow two trees until they meet; return the path (N, D) or None, and the samples used."""
+    base, geometric, util, straight = _ompl()
+    util.RNG.setSeed(int(random.integers(1, 2**31)))
+    dimension, scale = len(start), space.resolution
+    joints = base.RealVectorStateSpace(dimension)  # in resolutions, so that lengths of metres and radians compare
+    bounds = base.RealVectorBounds(dimension)
+    for joint in range(dimension):
+        bounds.setLow(joint, float(space.lower[joint] / scale[joint]))
+        bounds.setHigh(joint, float(space.upper[joint] / scale[joint]))
+    joints.setBounds(bounds)
+    setup = geometric.SimpleSetup(joints)
+    information = setup.getSpaceInformation()
 
-    def advance(tree: _Tree, near: int, target: np.ndarray, once: bool) -> tuple[int, bool]:
-        """Extend from a node towards the target; return the last node and whether the target was reached."""
-        points = interpolate(tree.points[near], target, space.resolution)
-        if once:
-            points = points[: int(step)]
-        last = near
-        for number, point in enumerate(points, start=1):
-            collision = check(point)
-            if collision is not None:
-                blockers[collision.other] += 1
-                if (number - 1) % int(step) and number > 1:
-                    last = tree.add(points[number - 2], last)
-                return last, False
-            if number % int(step) == 0 or number == len(points):
-                last = tree.add(point, last)
-        return last, bool(np.array_equal(tree.points[last], target))
+    def values(state: Any) -> np.ndarray:
+        return np.array([state[joint] for joint in range(dimension)]) * scale
 
-    trees = (_Tree(start, space.resolution, 256), _Tree(goal, space.resolution, 256))
-    if not blockers and advance(trees[0], 0, goal, once=False)[1]:
-        return np.array([start, goal]), 0
-    active = 0
-    for used in range(1, samples + 1):
-        grow, other = trees[active], trees[1 - active]
-        sample = random.uniform(space.lower, space.upper)
-        before = grow.nearest(sample)
-        node, _ = advance(grow, before, sample, once=True)
-        if node != before:
-            target = grow.points[node].copy()
-            end, reached = advance(other, other.nearest(target), target, once=False)
-            if reached:
-                first, second = (node, end) if active == 0 else (end, node)
-                return np.array([*reversed(trees[0].branch(first)), *trees[1].branch(second)[1:]]), used
-        active = 1 - active
-    return None, samples
+    def state_of(point: np.ndarray) -> Any:
+        state = joints.allocState()
+        for joint, value in enumerate(np.clip(point, space.lower, space.upper) / scale):
+            state[joint] = float(value)
+        return state
+
+    validator = straight(information)
+    validator.is_free = lambda begin, end: (
+        first_collision(interpolate(values(begin), values(end), scale), check) is None
+    )
+    setup.setStateValidityChecker(lambda state: check(values(state)) is None)
+    information.setMotionValidator(validator)
+    setup.setStartAndGoalStates(state_of(start), state_of(goal))
+    planner = geometric.RRTConnect(information)
+    planner.setRange(step)
+    setup.setPlanner(planner)
+    asked = 0
+
+    def spent() -> bool:  # OMPL asks before each sample
+        nonlocal asked
+        asked += 1
+        return asked > samples
+
+    setup.solve(base.PlannerTerminationCondition(spent))
+    if not setup.haveExactSolutionPath():
+        return None, samples
+    path = np.array([values(state) for state in setup.getSolutionPath().getStates()])
+    path[0], path[-1] = start, goal
+    return without_repeats(path), asked
 
 
 def shortcut(

@@ -10,6 +10,7 @@ from stages.kit.measurement.proportions import wilson_interval
 from stages.suture.evaluation.judgement import Estimate
 
 ARMS = ("thesis", "ours")
+"""In this order; any others come after."""
 OF_TIME = ("cpu_seconds", "hertz")
 INSIDE_95 = 12.592
 """The 95 % point of chi-squared with 6 degrees of freedom."""
@@ -55,14 +56,18 @@ def _mean(numbers: Iterable[float]) -> float:
     return float(np.mean(values)) if values else -1.0
 
 
+def by_arm(records: list[Estimate]) -> dict[str, list[Estimate]]:
+    """Return the records of each arm that has any."""
+    arms = dict.fromkeys((*ARMS, *(record.arm for record in records)))
+    groups = {arm: [record for record in records if record.arm == arm] for arm in arms}
+    return {arm: of_arm for arm, of_arm in groups.items() if of_arm}
+
+
 def metrics(groups: Mapping[str, list[Estimate]]) -> dict[str, float]:
     """Return `<arm>/<case>/<measure>` -> number of cases with their records of all arms."""
     result = {}
-    for case, found in groups.items():
-        for arm in ARMS:
-            of_arm = [record for record in found if record.arm == arm]
-            if not of_arm:
-                continue
+    for case, records in groups.items():
+        for arm, of_arm in by_arm(records).items():
             timed = any(record.seconds > 0 for record in of_arm)
             for measure, function in MEASURES.items():
                 if timed or measure not in OF_TIME:
@@ -108,9 +113,6 @@ HEADER = (
 def rows(title: str, groups: Mapping[str, list[Estimate]]) -> list[str]:
     """Return the lines of a table: a head, and a row for every group and arm that has records."""
     lines = [HEADER.format(f"{title}, arm")]
-    for name, found in groups.items():
-        for arm in ARMS:
-            of_arm = [record for record in found if record.arm == arm]
-            if of_arm:
-                lines.append(_row(f"{name}, {arm}", of_arm))
+    for name, records in groups.items():
+        lines += [_row(f"{name}, {arm}", of_arm) for arm, of_arm in by_arm(records).items()]
     return lines

@@ -10,7 +10,10 @@ import numpy as np
 from schemas.suture_trial import SutureRun
 from stages.kit.drawing.plots import SERIES_COLORS, STYLE, plt, save
 from stages.suture.evaluation.judgement import Estimate
+from stages.suture.evaluation.needle_figures import by_arm
 from stages.suture.motion.constants import THROWS
+
+COLORS = {"thesis": SERIES_COLORS[4], "ours": SERIES_COLORS[0]}
 
 
 def histogram(path: Path, runs: Sequence[SutureRun]) -> None:
@@ -33,13 +36,12 @@ def histogram(path: Path, runs: Sequence[SutureRun]) -> None:
 
 def pose_errors(path: Path, groups: Mapping[str, list[Estimate]]) -> None:
     """Draw normal and centre errors of all answers of `needle_all` (or of the last group), with the grasp tolerance."""
-    found = groups.get("needle_all", next(reversed(list(groups.values()))))
+    records = groups.get("needle_all", next(reversed(list(groups.values()))))
+    others = (color for color in SERIES_COLORS if color not in COLORS.values())
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(5.4, 3.6))
-        for arm, color in (("thesis", SERIES_COLORS[4]), ("ours", SERIES_COLORS[0])):
-            rows = [record for record in found if record.arm == arm]
-            if not rows:
-                continue
+        for arm, rows in by_arm(records).items():
+            color = COLORS.get(arm) or next(others)
             for answered, marker in ((True, "o"), (False, "x")):
                 chosen = [record for record in rows if record.answered == answered and record.guessed]
                 if not chosen:

@@ -1,38 +1,31 @@
-"""Figures of merit with 95 % intervals, and table 4.1 with ours beside it (Srinivas 2024)."""
+"""Figures of merit of trials with 95 % intervals, and their table."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from schemas.suture_trial import SutureRun
+from stages.kit.measurement.bootstrap import Interval, bootstrap_interval
 
 SEED_OF_INTERVALS, DRAWS = 0, 2000
 KINDS = "IEHT"
-PAIRS = (("ours", "thesis"), ("ours_one_at_a_time", "thesis"), ("ours_supervised", "thesis_supervised"))
-THESIS: dict[str, tuple[float, float, float, float, float, tuple[int, int, int, int], float | None]] = {
-    "sensing_only": (1.40, 51.6, 0.0, 0.0, 106.8, (9, 6, 0, 0), None),
-    "thread_handling": (1.80, 55.9, 20.0, 0.0, 117.9, (6, 5, 2, 2), None),
-    "thesis": (2.93, 69.4, 73.3, 0.0, 159.3, (8, 5, 0, 2), None),
-    "thesis_supervised": (4.47, 83.3, 100.0, 20.0, 141.9, (16, 10, 0, 2), 2.25),
-}
-"""Mean sutures to failure, single-suture rate, three throws, full wound [%], seconds a suture, errors of 15 trials,
-sutures to intervention, as printed."""
+Pairs = Sequence[tuple[str, str]]
+PAIRS = (("ours", "thesis"), ("ours_supervised", "thesis_supervised"))
+"""Arms whose figures are divided, on the seeds of both."""
 
 
-def interval(values: np.ndarray, weights: np.ndarray | None = None) -> tuple[float, float]:
-    """Return the 95 % percentile-bootstrap interval over trials of a mean (N,), or of a ratio of sums."""
+def interval_of(over: Callable[[np.ndarray], np.ndarray], trials: int) -> Interval:
+    """Return a figure of whole trials and its 95 % interval. `over`: numbers of trials (..., N) -> figure (...)."""
+
+    def statistic(numbers: np.ndarray, axis: int) -> np.ndarray:
+        return over(numbers.astype(int))
+
     random = np.random.default_rng(SEED_OF_INTERVALS)
-    rows = random.integers(len(values), size=(DRAWS, len(values)))
-    below = np.ones(len(values)) if weights is None else weights
-    drawn = values[rows].sum(axis=1) / np.maximum(below[rows].sum(axis=1), 1e-9)
-    return float(np.percentile(drawn, 2.5)), float(np.percentile(drawn, 97.5))
-
-
-def interval_of(values: Sequence[float]) -> tuple[float, float]:
-    """Return the interval of the mean of plain numbers."""
-    return interval(np.array(values, dtype=float))
+    interval = bootstrap_interval(np.arange(trials), random, statistic=statistic, resamples=DRAWS)
+    assert interval is not None  # an arm has a trial
+    return interval
 
 
 def by_arm(runs: Sequence[SutureRun]) -> dict[str, dict[int, SutureRun]]:
@@ -43,7 +36,7 @@ def by_arm(runs: Sequence[SutureRun]) -> dict[str, dict[int, SutureRun]]:
     return groups
 
 
-def metrics(runs: Sequence[SutureRun]) -> dict[str, float]:
+def metrics(runs: Sequence[SutureRun], pairs: Pairs = PAIRS) -> dict[str, float]:
     """Return `<arm>/trials/<measure>` -> number. Shares are 0 to 1; `_low` and `_high` bound 95 % intervals.
 
     `single_suture_rate` is completed over attempted throws; `seconds_per_suture` the seconds of all trials over
@@ -55,10 +48,12 @@ def metrics(runs: Sequence[SutureRun]) -> dict[str, float]:
     figures: dict[str, float] = {}
 
     def put(arm: str, name: str, values: np.ndarray, weights: np.ndarray | None = None) -> None:
-        below = len(values) if weights is None else weights.sum()
-        figures[f"{arm}/trials/{name}"] = float(values.sum() / max(below, 1e-9))
-        low, high = interval(values, weights)
-        figures[f"{arm}/trials/{name}_low"], figures[f"{arm}/trials/{name}_high"] = low, high
+        below = np.ones(len(values)) if weights is None else weights
+
+        def ratio(rows: np.ndarray) -> np.ndarray:
+            return np.asarray(values[rows].sum(axis=-1) / np.maximum(below[rows].sum(axis=-1), 1e-9))
+
+        figures.update(_bounded(f"{arm}/trials/{name}", interval_of(ratio, len(values))))
 
     for arm, group in groups.items():
         rows = list(group.values())
@@ -79,7 +74,7 @@ def metrics(runs: Sequence[SutureRun]) -> dict[str, float]:
             figures[f"{arm}/trials/errors_{kind.lower()}"] = float(sum(run.errors.count(kind) for run in rows))
         figures[f"{arm}/trials/seen_right_share"] = sum(run.right for run in rows) / max(1, sum(r.looks for r in rows))
         figures[f"{arm}/trials/count"] = float(len(rows))
-    for ours, rival in PAIRS:
+    for ours, rival in pairs:
         figures |= ratios(ours, groups.get(ours, {}), groups.get(rival, {}))
     return {name: round(value, 5) for name, value in figures.items()}
 
@@ -89,7 +84,6 @@ def ratios(arm: str, ours: dict[int, SutureRun], rival: dict[int, SutureRun]) ->
     seeds = sorted(set(ours) & set(rival))
     if not seeds:
         return {}
-    rows = np.random.default_rng(SEED_OF_INTERVALS).integers(len(seeds), size=(DRAWS, len(seeds)))
     pair = [[group[seed] for seed in seeds] for group in (ours, rival)]
     sutures, attempts, seconds = (
         np.array([[getattr(run, name) for run in runs] for runs in pair], dtype=float)
@@ -101,11 +95,16 @@ def ratios(arm: str, ours: dict[int, SutureRun], rival: dict[int, SutureRun]) ->
         ("seconds_ratio", seconds, attempts),
         ("seconds_completed_ratio", seconds, sutures),
     ):
-        figures[f"{arm}/trials/{name}"] = float(_over(above.sum(axis=1), below.sum(axis=1)))
-        drawn = _over(above[:, rows].sum(axis=2), below[:, rows].sum(axis=2))
-        for end, percent in (("low", 2.5), ("high", 97.5)):
-            figures[f"{arm}/trials/{name}_{end}"] = float(np.percentile(drawn, percent))
+
+        def ratio(rows: np.ndarray, above: np.ndarray = above, below: np.ndarray = below) -> np.ndarray:
+            return _over(above[:, rows].sum(axis=-1), below[:, rows].sum(axis=-1))
+
+        figures.update(_bounded(f"{arm}/trials/{name}", interval_of(ratio, len(seeds))))
     return figures
+
+
+def _bounded(at: str, interval: Interval) -> dict[str, float]:
+    return {at: interval.value, f"{at}_low": interval.low, f"{at}_high": interval.high}
 
 
 def _over(above: np.ndarray, below: np.ndarray) -> np.ndarray:
@@ -114,9 +113,10 @@ def _over(above: np.ndarray, below: np.ndarray) -> np.ndarray:
     return np.asarray(each[0] / np.maximum(each[1], 1e-9))
 
 
-def table(runs: Sequence[SutureRun]) -> str:
-    """Return table.md: table 4.1's layout, the thesis's row under each of ours where there is one; then what failed."""
-    figures, groups = metrics(runs), by_arm(runs)
+def table(runs: Sequence[SutureRun], pairs: Pairs = PAIRS, below: Mapping[str, str] | None = None) -> str:
+    """Return table.md in the layout of table 4.1 (Srinivas 2024), then what failed. `below`: arm -> a line that goes
+    below its row."""
+    figures, groups = metrics(runs, pairs), by_arm(runs)
     lines = [
         "# STITCH, whole trials in the simulator\n",
         "Layout of table 4.1. Mean [95 % bootstrap over trials]; errors are counts over all trials of the row.\n",
@@ -140,13 +140,9 @@ def table(runs: Sequence[SutureRun]) -> str:
             f"| {cell('seconds_per_suture', 1, 1)} | {errors} | {cell('sutures_to_intervention')} "
             f"| {cell('sutures_to_failure_neutral')} |"
         )
-        if arm in THESIS:
-            mean, single, three, full, seconds, counts, between = THESIS[arm]
-            lines.append(
-                f"| *printed* | 15 | {mean:.2f} | {single} % | {three} % | {full} % | {seconds} "
-                f"| {' '.join(map(str, counts))} | {'–' if between is None else between} | – |"
-            )
-    lines += _pairs_table(figures)
+        if below is not None and arm in below:
+            lines.append(below[arm])
+    lines += _pairs_table(figures, pairs)
     lines += ["", "## What ended trials\n", "| arm | class | reason | count |", "|---|---|---|---|"]
     for arm, group in groups.items():
         counted: dict[tuple[str, str], int] = {}
@@ -159,10 +155,10 @@ def table(runs: Sequence[SutureRun]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _pairs_table(figures: dict[str, float]) -> list[str]:
+def _pairs_table(figures: dict[str, float], pairs: Pairs) -> list[str]:
     """Return the lines on ratios of arms on the same seeds; none where no arms are paired."""
     rows = []
-    for ours, rival in PAIRS:
+    for ours, rival in pairs:
         cells = []
         for name in ("sutures_ratio", "seconds_ratio", "seconds_completed_ratio"):
             at = f"{ours}/trials/{name}"

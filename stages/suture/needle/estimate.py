@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stages.suture.needle.estimator import Estimator
 from stages.suture.needle.evidence import Evidence, evidence_of, left_over
-from stages.suture.needle.filter import difference, either_way
+from stages.suture.needle.filter import difference, either_way, fuse
 from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
 from stages.suture.needle.silhouette import Outline, Sheet, fit_outline, sheet_of
 from stages.suture.needle.starts import FARTHEST, NEAREST, starts
@@ -88,6 +90,13 @@ def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | 
     return answer
 
 
+def _of_frames(answers: Sequence[NeedleEstimate], motions: Sequence[np.ndarray]) -> NeedleEstimate:
+    return fuse(list(zip(answers, motions, strict=True)))
+
+
+OURS = Estimator("our estimator", estimate, _of_frames)
+
+
 def hypotheses(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | None = None) -> list[Hypothesis]:
     """Return the outlines that explain both masks best, most probable first; each mask must have a pixel."""
     eyes = windows(observation)
@@ -146,14 +155,14 @@ def _finalists(coarse: list[Outline]) -> list[Outline]:
 
 def _fine(rig: StereoRig, sheets: tuple[Sheet, Sheet], finalists: list[Outline]) -> list[Outline]:
     """Return every finalist fitted closely, and again with tip and swage exchanged; none like another."""
-    found: list[Outline] = []
+    outlines: list[Outline] = []
     for finalist in finalists:
         one = fit_outline(rig, sheets, finalist.pose, finalist.shift, NARROW_LEVELS, POLISH)
         other = fit_outline(rig, sheets, one.pose.swapped(), one.shift, NARROW_LEVELS, POLISH)
         for outline in (one, other):
-            if not any(_near(difference(outline.pose, rival.pose), ALIKE) for rival in found):
-                found.append(outline)
-    return found
+            if not any(_near(difference(outline.pose, rival.pose), ALIKE) for rival in outlines):
+                outlines.append(outline)
+    return outlines
 
 
 def _weighed(
@@ -166,8 +175,8 @@ def _weighed(
     logs = np.array([evidence.log_weight for _, evidence in weighed])
     shares = np.exp(logs - logs.max())
     shares /= shares.sum()
-    found = [Hypothesis(*pair, float(share)) for pair, share in zip(weighed, shares, strict=True)]
-    return sorted(found, key=lambda hypothesis: -hypothesis.probability)
+    rivals = [Hypothesis(*pair, float(share)) for pair, share in zip(weighed, shares, strict=True)]
+    return sorted(rivals, key=lambda hypothesis: -hypothesis.probability)
 
 
 def _near(step: np.ndarray, limits: tuple[float, float]) -> bool:

@@ -14,14 +14,13 @@ import numpy as np
 from stages.suture.needle.silhouette import (
     ANGLES,
     GROWTH,
-    ON_CIRCLE,
     PIECES,
-    RADII,
     TAPER_ANGLE,
+    Arc,
     Outline,
     Sheet,
+    arc_at,
     box_of,
-    camera_of,
     draw,
     trace,
 )
@@ -79,30 +78,15 @@ class Evidence:
 
 
 @numba.njit(cache=True, fastmath=True)
-def _explain(
-    pose: np.ndarray,
-    shift: np.ndarray,
-    camera: np.ndarray,
-    growth: float,
-    signed: np.ndarray,
-    weight: np.ndarray,
-    free: np.ndarray,
-    silent: np.ndarray,
-    corner: np.ndarray,
-    drawn: np.ndarray,
-    piece: np.ndarray,
-    eye: int,
-    on_circle: np.ndarray,
-    radii: np.ndarray,
-    state: np.ndarray,
-    lost: np.ndarray,
-    excess: np.ndarray,
-) -> float:
+def _explain(arc: Arc, sheet: Sheet, eye: int, state: np.ndarray, lost: np.ndarray, excess: np.ndarray) -> float:
     """Return the pixels of free mask within COVERED of the outline; write each piece's `state` (K,), 0 seen, 1 missing,
-    2 nothing can be said, and its part in the misfit for mask that is not there, `lost` (K,)."""
+    2 nothing can be said, its part in the misfit for mask that is not there, `lost` (K,), and by how much the mask is
+    wider there, `excess` (K,) [px]."""
+    growth, signed, weight, free, silent = arc.growth, sheet.signed, sheet.weight, sheet.free, sheet.silent
+    drawn, piece = sheet.drawn, sheet.piece
     height, width = signed.shape
     covered = 0.0
-    _, pixels = trace(pose, shift, camera, corner, eye, on_circle, radii)
+    _, pixels = trace(arc, sheet.corner, eye)
     draw(pixels, growth, COVERED + 0.5, 1, drawn, piece)
     for k in range(len(pixels) - 1):
         first, last, top, bottom = box_of(pixels, k, growth + COVERED + 0.5, 1, height, width)
@@ -141,27 +125,10 @@ def evidence_of(
     left_over = 0.0
     states, lost = np.zeros((2, PIECES), dtype=np.int64), np.zeros((2, PIECES))
     excess = np.zeros((2, PIECES))
-    for eye, s in enumerate(sheets):
-        covered = _explain(
-            outline.pose.camera_from_needle,
-            outline.shift,
-            camera_of(rig),
-            GROWTH,
-            s.signed,
-            s.weight,
-            s.free,
-            s.silent,
-            s.corner,
-            s.drawn,
-            s.piece,
-            eye,
-            ON_CIRCLE,
-            RADII,
-            states[eye],
-            lost[eye],
-            excess[eye],
-        )
-        left_over += float(s.free.sum()) - covered
+    arc = arc_at(rig, outline.pose.camera_from_needle, outline.shift)
+    for eye, sheet in enumerate(sheets):
+        covered = _explain(arc, sheet, eye, states[eye], lost[eye], excess[eye])
+        left_over += float(sheet.free.sum()) - covered
     hidden = (states > 0).all(axis=0)
     return Evidence(
         misfit=outline.misfit,
@@ -186,26 +153,26 @@ def _threads(rig: StereoRig, eye: EyeMask, outline: Outline, which: int) -> np.n
     pixels = rig.right(places) + outline.shift if which else rig.left(places)
     if not np.isfinite(pixels).all():
         return np.zeros(3)
-    found = []
+    has_thread = []
     for column, row in np.round(pixels - eye.corner).astype(int):
         rows = slice(max(row - CLOSE, 0), max(row + CLOSE + 1, 0))
         columns = slice(max(column - CLOSE, 0), max(column + CLOSE + 1, 0))
-        found.append(bool(eye.thread[rows, columns].any()))
-    return np.array(found).reshape(3, -1).mean(axis=1)
+        has_thread.append(bool(eye.thread[rows, columns].any()))
+    return np.array(has_thread).reshape(3, -1).mean(axis=1)
 
 
 def left_over(
     rig: StereoRig, eyes: tuple[EyeMask, EyeMask], sheets: tuple[Sheet, Sheet], outline: Outline
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return what (H, W) bool of each eye's mask, where no driver should be, lies beyond CLOSE of the outline."""
-    found = []
+    rests = []
+    arc = arc_at(rig, outline.pose.camera_from_needle, outline.shift)
     for which, (eye, s) in enumerate(zip(eyes, sheets, strict=True)):
-        place = outline.pose.camera_from_needle, outline.shift, camera_of(rig), s.corner, which, ON_CIRCLE, RADII
-        _, pixels = trace(*place)
+        _, pixels = trace(arc, s.corner, which)
         draw(pixels, GROWTH, CLOSE + 0.5, 1, s.drawn, s.piece)
         rest = s.free & ~((s.piece >= 0) & (s.drawn <= CLOSE))
         s.piece[:] = -1
         whole = np.zeros((rig.height, rig.width), dtype=bool)
         whole[eye.row : eye.row + rest.shape[0], eye.column : eye.column + rest.shape[1]] = rest
-        found.append(whole)
-    return found[0], found[1]
+        rests.append(whole)
+    return rests[0], rests[1]

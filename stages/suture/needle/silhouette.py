@@ -11,6 +11,7 @@ there is no mask; what the needle covers far from any mask says little, as masks
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numba
@@ -45,12 +46,12 @@ UNDETERMINED = np.diag([1.0 / 0.06**2] * 3 + [1.0 / 3.0**2] * 3 + [0.0] * 2)
 """Holds what the masks do not determine, in units of 60 mm and 3 rad."""
 
 
-@dataclass(frozen=True)
-class Sheet:
+class Sheet(NamedTuple):
     """One eye's window for the fit: `signed` (h, w) float32 distance [px] to the mask's outline, negative inside;
     `weight` (h, w) float32 of each pixel; `free` (h, w) bool: mask where no driver should be; `silent` (h, w) bool
     where missing mask says nothing; `corner` (2,): its first column and row; `total`: the misfit
-    without a needle; `drawn`, `piece` (h, w): room for the drawing, `piece` -1 between uses."""
+    without a needle; `drawn`, `piece` (h, w): room for the drawing, `piece` -1 between uses. The compiled functions
+    take it as it is."""
 
     signed: np.ndarray
     weight: np.ndarray
@@ -60,6 +61,19 @@ class Sheet:
     total: float
     drawn: np.ndarray
     piece: np.ndarray
+
+
+class Arc(NamedTuple):
+    """A needle that is drawn: `pose` (4, 4) in the left camera's frame [m], `shift` (2,) of the right image [px],
+    `camera` (4,) focal length, principal point, baseline, `on_circle` (K, 2) and `radii` (K,) of the wire [m], `growth`
+    of the mask beyond it [px]."""
+
+    pose: np.ndarray
+    shift: np.ndarray
+    camera: np.ndarray
+    on_circle: np.ndarray
+    radii: np.ndarray
+    growth: float
 
 
 @dataclass(frozen=True)
@@ -94,16 +108,9 @@ def _grown(mask: np.ndarray, side: int) -> np.ndarray:
 
 
 @numba.njit(cache=True, fastmath=True)
-def trace(
-    pose: np.ndarray,
-    shift: np.ndarray,
-    camera: np.ndarray,
-    corner: np.ndarray,
-    eye: int,
-    on_circle: np.ndarray,
-    radii: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
+def trace(arc: Arc, corner: np.ndarray, eye: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the arc's points (K, 3) [m] and their columns, rows and radii (K, 3) [px] in the window."""
+    pose, shift, camera, on_circle, radii = arc.pose, arc.shift, arc.camera, arc.on_circle, arc.radii
     count = len(radii)
     points, pixels = np.empty((count, 3)), np.empty((count, 3))
     for k in range(count):
@@ -160,28 +167,15 @@ def draw(pixels: np.ndarray, growth: float, reach: float, stride: int, drawn: np
 
 @numba.njit(cache=True, fastmath=True)
 def _compare(
-    pose: np.ndarray,
-    shift: np.ndarray,
-    camera: np.ndarray,
-    tau: float,
-    scale: float,
-    growth: float,
-    signed: np.ndarray,
-    weight: np.ndarray,
-    corner: np.ndarray,
-    drawn: np.ndarray,
-    piece: np.ndarray,
-    eye: int,
-    on_circle: np.ndarray,
-    radii: np.ndarray,
-    matrix: np.ndarray,
-    gradient: np.ndarray,
+    arc: Arc, sheet: Sheet, eye: int, tau: float, scale: float, matrix: np.ndarray, gradient: np.ndarray
 ) -> float:
     """Return the misfit less what it is without a needle; add to the normal equations (8, 8), (8,)."""
+    pose, camera, growth = arc.pose, arc.camera, arc.growth
+    signed, weight, drawn, piece = sheet.signed, sheet.weight, sheet.drawn, sheet.piece
     height, width = signed.shape
     reach, stride = 3.0 * tau + 0.7, 2 if tau > 1.0 else 1
     area = float(stride * stride)
-    points, pixels = trace(pose, shift, camera, corner, eye, on_circle, radii)
+    points, pixels = trace(arc, sheet.corner, eye)
     draw(pixels, growth, reach, stride, drawn, piece)
     cost = 0.0
     jacobian = np.empty(8)
@@ -200,13 +194,13 @@ def _compare(
                 distance, w = drawn[row, column], area * weight[row, column]
                 if w == 0.0 or distance > reach:
                     continue
-                found = 1.0 / (1.0 + np.exp(min(signed[row, column] / tau, 30.0)))
+                masked = 1.0 / (1.0 + np.exp(min(signed[row, column] / tau, 30.0)))
                 model = 1.0 / (1.0 + np.exp(distance / tau))
                 if distance < 0.0 and signed[row, column] > 0.0:
                     # masks end before the tip does: a wire thinner than a pixel or so need not be seen
                     w *= min(max(2.0 * pixels[k, 2] - 0.3, 0.05), 1.0)
-                error = found - model
-                cost += w * (error * error - found * found)
+                error = masked - model
+                cost += w * (error * error - masked * masked)
                 slope = model * (1.0 - model) / tau
                 share, x, y = _foot(pixels, k, column, row)
                 norm = np.sqrt(x * x + y * y)
@@ -233,9 +227,25 @@ def _compare(
     return cost
 
 
+@numba.njit(cache=True, fastmath=True)
+def _compare_both(
+    arc: Arc, sheets: tuple[Sheet, Sheet], tau: float, scale: float, matrix: np.ndarray, gradient: np.ndarray
+) -> tuple[float, float]:
+    """Return both eyes' misfits less what they are without a needle; add to the normal equations."""
+    misfits = np.zeros(2)
+    for eye, sheet in enumerate(sheets):
+        misfits[eye] = _compare(arc, sheet, eye, tau, scale, matrix, gradient)
+    return misfits[0], misfits[1]
+
+
 def camera_of(rig: StereoRig) -> np.ndarray:
     """Return the rig as the compiled functions take it: focal length, principal point, baseline."""
     return np.array([rig.focal, rig.centre[0], rig.centre[1], rig.baseline])
+
+
+def arc_at(rig: StereoRig, pose: np.ndarray, shift: np.ndarray) -> Arc:
+    """Return the needle at a pose (4, 4) for the compiled functions."""
+    return Arc(pose, shift, camera_of(rig), ON_CIRCLE, RADII, GROWTH)
 
 
 def _misfit(
@@ -245,10 +255,10 @@ def _misfit(
     matrix, gradient = np.zeros((8, 8)), np.zeros(8)
     precision = PIXEL_VARIANCE / CALIBRATION_SIGMA**2
     cost = precision * float(shift @ shift)
-    camera = camera_of(rig)
-    for eye, s in enumerate(sheets):
-        given = (s.signed, s.weight, s.corner, s.drawn, s.piece, eye, ON_CIRCLE, RADII, matrix, gradient)
-        cost += s.total + _compare(pose, shift, camera, tau, scale, GROWTH, *given)
+    arc = arc_at(rig, pose, shift)
+    left, right = _compare_both(arc, sheets, tau, scale, matrix, gradient)
+    cost += sheets[0].total + left
+    cost += sheets[1].total + right
     upper = np.triu(matrix)
     matrix = upper + np.triu(upper, 1).T
     matrix[6, 6] += precision

@@ -8,6 +8,8 @@ scored on both masks: how much of the best half circle lies on mask, and how muc
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import cv2
 import numba
 import numpy as np
@@ -45,9 +47,9 @@ def starts(
         (points, np.ones(len(points)), SCORED_DISPARITY),
     ):
         centres, normals = _circles_through(given, often, TRIPLES, random)
-        found = _scored(rig, eyes, distances, pixels, centres[:most], normals[:most])
-        scores.append(found[0])
-        poses.append(found[1])
+        scored, posed = _scored(rig, eyes, distances, pixels, centres[:most], normals[:most])
+        scores.append(scored)
+        poses.append(posed)
     ordered = np.concatenate(poses)[np.argsort(-np.concatenate(scores), kind="stable")]
     kept: list[np.ndarray] = []
     for pose in ordered:
@@ -68,7 +70,7 @@ def _differ(pose: np.ndarray, other: np.ndarray) -> bool:
 @numba.njit(cache=True)
 def _runs(mask: np.ndarray, longest: int) -> np.ndarray:
     """Return (R, 2): row and middle column of the runs of mask of at most `longest` pixels."""
-    found = []
+    runs = []
     for row in range(mask.shape[0]):
         start = -1
         for column in range(mask.shape[1] + 1):
@@ -77,10 +79,10 @@ def _runs(mask: np.ndarray, longest: int) -> np.ndarray:
                 start = column
             elif not inside and start >= 0:
                 if column - start <= longest:
-                    found.append((float(row), 0.5 * (start + column - 1)))
+                    runs.append((float(row), 0.5 * (start + column - 1)))
                 start = -1
-    result = np.empty((len(found), 2))
-    for index, pair in enumerate(found):
+    result = np.empty((len(runs), 2))
+    for index, pair in enumerate(runs):
         result[index, 0], result[index, 1] = pair
     return result
 
@@ -140,19 +142,22 @@ def _circles_through(
     return centre, normal / np.sqrt(squared)[:, None]
 
 
+class _BothMasks(NamedTuple):
+    """What circles are scored on: focal length, principal point and baseline (4,); each eye's distances [px] to its
+    mask, where it may be hidden, first columns and rows (2, 2), and some of each mask's pixels (P, 2)."""
+
+    camera: np.ndarray
+    distances: tuple[np.ndarray, np.ndarray]
+    hidden: tuple[np.ndarray, np.ndarray]
+    corners: np.ndarray
+    pixels: tuple[np.ndarray, np.ndarray]
+
+
 @numba.njit(cache=True, fastmath=True)
-def _score(
-    centre: np.ndarray,
-    normal: np.ndarray,
-    camera: np.ndarray,
-    distances: tuple[np.ndarray, np.ndarray],
-    hidden: tuple[np.ndarray, np.ndarray],
-    corners: np.ndarray,
-    pixels: tuple[np.ndarray, np.ndarray],
-    pose: np.ndarray,
-) -> float:
+def _score(centre: np.ndarray, normal: np.ndarray, masks: _BothMasks, pose: np.ndarray) -> float:
     """Return 0..2: share of the best half circle that lies on mask, plus share of the mask that it explains; write that
     half circle's pose (3, 4)."""
+    camera, distances, hidden, corners, pixels = masks
     count = 60
     columns, rows, good = np.empty((2, count)), np.empty((2, count)), np.zeros((2, count))
     width = 0.0005 * camera[0] / max(centre[2], 0.01)
@@ -215,19 +220,9 @@ def _score(
 
 
 @numba.njit(cache=True)
-def _scores(
-    centres: np.ndarray,
-    normals: np.ndarray,
-    camera: np.ndarray,
-    distances: tuple[np.ndarray, np.ndarray],
-    hidden: tuple[np.ndarray, np.ndarray],
-    corners: np.ndarray,
-    pixels: tuple[np.ndarray, np.ndarray],
-    poses: np.ndarray,
-    scores: np.ndarray,
-) -> None:
+def _scores(centres: np.ndarray, normals: np.ndarray, masks: _BothMasks, poses: np.ndarray, scores: np.ndarray) -> None:
     for index in range(len(centres)):
-        scores[index] = _score(centres[index], normals[index], camera, distances, hidden, corners, pixels, poses[index])
+        scores[index] = _score(centres[index], normals[index], masks, poses[index])
 
 
 def _scored(
@@ -246,5 +241,5 @@ def _scored(
     corners = np.array([[eyes[0].column, eyes[0].row], [eyes[1].column, eyes[1].row]], dtype=float)
     hidden = (eyes[0].hidden, eyes[1].hidden)
     poses, scores = np.tile(np.eye(4), (len(centres), 1, 1)), np.empty(len(centres))
-    _scores(centres, normals, camera, distances, hidden, corners, pixels, poses, scores)
+    _scores(centres, normals, _BothMasks(camera, distances, hidden, corners, pixels), poses, scores)
     return scores, poses

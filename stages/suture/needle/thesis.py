@@ -8,9 +8,12 @@ best. It does not say which endpoint is the tip, so none is.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from stages.suture.needle.estimator import Estimator
 from stages.suture.needle.filter import difference
 from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
 from stages.suture.rig import NeedlePose
@@ -51,7 +54,7 @@ def thesis_estimate(observation: NeedleObservation, seed: int = 0) -> NeedleEsti
     return NeedleEstimate(_pose(centre, normal, tip, swage, body), np.full((6, 6), np.inf), 0.5, "")
 
 
-def thesis_average(estimates: list[NeedleEstimate], motions: list[np.ndarray]) -> NeedleEstimate:
+def thesis_average(estimates: Sequence[NeedleEstimate], motions: Sequence[np.ndarray]) -> NeedleEstimate:
     """Return the mean of the thesis's estimates carried to the last frame: the thesis averages ten normals."""
     poses = [
         NeedlePose(motion @ one.pose.camera_from_needle)
@@ -70,6 +73,11 @@ def thesis_average(estimates: list[NeedleEstimate], motions: list[np.ndarray]) -
     matrix[:3, :3] = Rotation.from_rotvec(mean[3:]).as_matrix() @ matrix[:3, :3]
     matrix[:3, 3] += mean[:3]
     return NeedleEstimate(NeedlePose(matrix), np.full((6, 6), np.inf), 0.5, "")
+
+
+THESIS = Estimator(
+    "the thesis's estimator", lambda observation, seed, guess: thesis_estimate(observation, seed), thesis_average
+)
 
 
 def _pose(centre: np.ndarray, normal: np.ndarray, tip: np.ndarray, swage: np.ndarray, body: np.ndarray) -> NeedlePose:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from stages.kit.geometry.transforms import wrapped
 from stages.suture.robot.psm import (
     LOWER,
     PITCH_TO_YAW,
@@ -22,10 +23,6 @@ from stages.suture.robot.psm import (
 
 BRANCHES = 8
 SMALLEST = 1e-9
-
-
-def _wrapped(angle: np.ndarray) -> np.ndarray:
-    return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -83,7 +80,7 @@ def _branch(
     jaw_x = wrist[..., :, 0]
     yaw = np.arctan2(-(jaw_x * pitch_axis).sum(-1), (jaw_x * link).sum(-1)) + np.pi / 2
     insertion = reach + REMOTE_CENTRE_TO_CARRIAGE - TOOL_LENGTH
-    return np.stack([_wrapped(first), _wrapped(second), insertion, roll, _wrapped(pitch), _wrapped(yaw)], axis=-1)
+    return np.stack([wrapped(first), wrapped(second), insertion, roll, wrapped(pitch), wrapped(yaw)], axis=-1)
 
 
 def solutions(base_from_tip: np.ndarray, margin: float = 0.0) -> np.ndarray:

@@ -5,11 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
-import torch
-
 from schemas.errors import BadInput
-from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
+from stages.kit.formats.network_file import put_tensors, write_network
+from stages.kit.formats.safetensors_file import read_safetensors
 from stages.suture.segmentation.model import CLASSES, SutureNetwork
 
 FORMAT = "scenewright suture segmentation"
@@ -20,11 +18,6 @@ _OTHER = "give a checkpoint that `make stitch-train` wrote"
 
 def save_network(path: Path, network: SutureNetwork, description: str) -> None:
     """Write the network, its numbers as float16; counters of the batch normalisation are left out."""
-    tensors = {
-        name: tensor.detach().to(torch.float16).contiguous().numpy()
-        for name, tensor in network.state_dict().items()
-        if tensor.is_floating_point()
-    }
     metadata = {
         "format": FORMAT,
         "version": VERSION,
@@ -32,7 +25,7 @@ def save_network(path: Path, network: SutureNetwork, description: str) -> None:
         "widths": json.dumps(list(network.widths)),
         "description": description,
     }
-    write_safetensors(path, tensors, metadata)
+    write_network(path, network, metadata)
 
 
 def load_network(path: Path) -> tuple[SutureNetwork, str]:
@@ -48,19 +41,8 @@ def load_network(path: Path) -> tuple[SutureNetwork, str]:
             hint=_OTHER,
         )
     network = SutureNetwork(_widths(path, metadata))
-    state = network.state_dict()
-    wanted = {name: tuple(tensor.shape) for name, tensor in state.items() if tensor.is_floating_point()}
-    for name in sorted(wanted.keys() | tensors.keys()):
-        there = tensors[name].shape if name in tensors else None
-        if there != wanted.get(name):
-            raise BadInput(
-                f"{path}: tensor {name!r} has shape {there}, the network needs {wanted.get(name)}", hint=_OTHER
-            )
-        if not np.isfinite(tensors[name]).all():
-            raise BadInput(f"{path}: tensor {name!r} holds numbers that are not finite", hint=_OTHER)
-        state[name] = torch.from_numpy(tensors[name].astype(np.float32))
-    network.load_state_dict(state)
-    return network.eval(), metadata.get("description", "")
+    put_tensors(network, tensors, str(path), _OTHER)
+    return network, metadata.get("description", "")
 
 
 def _widths(path: Path, metadata: dict[str, str]) -> tuple[int, ...]:

@@ -151,9 +151,9 @@ def _curve(
     count = max(round(last * depth / rig.focal / POINTS_EVERY), 8)
     at = np.linspace(0.0, last, count + 1)
     left = np.stack([line.spline(at) for line in lines], axis=1)
-    found = np.maximum(shifts.spline(at), rig.focal * rig.baseline / 2.0)
-    points = rig.triangulate(left, found)
-    in_depth = points[:, 2] / found * np.hypot(shifts.deviation(at), COLUMN_ERROR)
+    shift = np.maximum(shifts.spline(at), rig.focal * rig.baseline / 2.0)
+    points = rig.triangulate(left, shift)
+    in_depth = points[:, 2] / shift * np.hypot(shifts.deviation(at), COLUMN_ERROR)
     across = points[:, 2] / rig.focal * np.hypot(lines[0].deviation(at), lines[1].deviation(at))
     sight = np.linalg.norm(points, axis=1) / points[:, 2]
     deviation = np.hypot(in_depth * sight, across)
@@ -163,8 +163,8 @@ def _curve(
     unmatched = 1.0 - len(index) / max(int(seen.sum()) / 2.0, 1.0)
     vague = float((deviation > DOUBTED_DEVIATION).mean())
     cut = scale * (end - last)
-    leaves = _at_border(left[-1], rig) or _at_border(left[-1] - [found[-1], 0.0], rig)
-    remarks = _remarks(path, scale, end, level, unmatched, vague, float(deviation.max()), cut, leaves)
+    leaves = _at_border(left[-1], rig) or _at_border(left[-1] - [shift[-1], 0.0], rig)
+    remarks = _remarks(path, _Doubts(scale, end, level, unmatched, vague, float(deviation.max()), cut, leaves))
     return ThreadCurve(points, deviation, length, "unsure" if remarks else "ok", remarks)
 
 
@@ -183,22 +183,31 @@ def _at_border(pixel: np.ndarray, rig: StereoRig) -> bool:
     return not (BORDER < column < rig.width - 1 - BORDER and BORDER < row < rig.height - 1 - BORDER)
 
 
-def _remarks(
-    path: Path,
-    scale: float,
-    end: float,
-    level: float,
-    unmatched: float,
-    vague: float,
-    vaguest: float,
-    cut: float,
-    leaves: bool,
-) -> tuple[str, ...]:
-    """Return what makes the curve doubtful, a sentence each; `scale` [m/px]."""
+@dataclass(frozen=True)
+class _Doubts:
+    """What may make a curve doubtful. `scale` [m/px]; `end`: the path's length, `level`: the longest part of it along
+    the rows [px]; `unmatched`: share of the left eye's thread that the right eye has not; `vague`: share of the curve
+    that is not well known, `vaguest`: its worst deviation [m]; `cut`: what is left out at the end [m]; `leaves`:
+    whether the thread leaves the picture."""
+
+    scale: float
+    end: float
+    level: float
+    unmatched: float
+    vague: float
+    vaguest: float
+    cut: float
+    leaves: bool
+
+
+def _remarks(path: Path, doubts: _Doubts) -> tuple[str, ...]:
+    """Return what makes the curve doubtful, a sentence each."""
+    scale, level, unmatched, cut = doubts.scale, doubts.level, doubts.unmatched, doubts.cut
+    vague, vaguest = doubts.vague, doubts.vaguest
     remarks = []
     gaps = sum(path.gaps) + path.start_gap
     longest = max([*path.gaps, path.start_gap], default=0.0)
-    if longest > DOUBTED_GAP or gaps > DOUBTED_SHARE * end:
+    if longest > DOUBTED_GAP or gaps > DOUBTED_SHARE * doubts.end:
         remarks.append(
             f"{len(path.gaps)} gaps of together {1000 * scale * gaps:.0f} mm, the longest of "
             f"{1000 * scale * longest:.0f} mm, are bridged along their tangents."
@@ -210,7 +219,7 @@ def _remarks(
             f"{1000 * scale * path.left_over:.0f} mm of thread in the left eye are not part of the curve: another "
             "thread, or a part that what lies before it cuts off."
         )
-    if leaves:
+    if doubts.leaves:
         remarks.append("The thread leaves the picture; its length is that of the part in it.")
     if path.doubtful_gaps:
         remarks.append(f"At {path.doubtful_gaps} gaps another strand would continue the thread almost as well.")

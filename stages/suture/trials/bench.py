@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,15 +10,12 @@ from stages.kit.geometry.transforms import inverse, transform_from
 from stages.suture.motion.needle import ARC_POINTS, SWAGE, about, point_at, turned, upright
 from stages.suture.motion.primitives import jaws, straight
 from stages.suture.robot.arms import ARMS
-from stages.suture.trials.perception import Eyes, Seen
+from stages.suture.trials.perception import Looking, Seen
 from stages.suture.trials.recording import Recorder
 from stages.suture.trials.rope import PARTICLES, drape, winding
 from stages.suture.trials.settings import Policy, World
 from stages.suture.trials.thread import Drawn, Thread, draw
 from stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT
-
-if TYPE_CHECKING:
-    from stages.suture.trials.sight import LookingEyes
 
 HOME = {
     "right": transform_from(jaws(np.array([0.5, 0.0, -0.85])), np.array([-0.050, 0.0, 0.055])),
@@ -60,7 +56,7 @@ class Bench:
 
     policy: Policy
     world: World
-    eyes: Eyes | LookingEyes
+    eyes: Looking
     random: np.random.Generator
     hand_eye: np.ndarray
     thread: Thread

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
@@ -12,14 +12,19 @@ from stages.suture.trials.bench import CORNER, HOME, Bench, Failed, loaded
 from stages.suture.trials.extraction import cinch, extract, sweep
 from stages.suture.trials.handover import hand_over
 from stages.suture.trials.insertion import corrected, insert, uncorrected
-from stages.suture.trials.perception import FOLDER, Eyes, PerceptionModel, perception_model
+from stages.suture.trials.perception import FOLDER, Eyes, Looking, PerceptionModel, perception_model
 from stages.suture.trials.recording import Recorder
 from stages.suture.trials.settings import Policy, World
 from stages.suture.trials.thread import LEFT_IN_FIRST_HOLE, Thread
 from stages.suture.trials.wound import exit_
 
-if TYPE_CHECKING:
-    from stages.suture.trials.sight import LookingEyes
+
+class Watching(Looking, Protocol):
+    """Who sees what is rendered of the trial."""
+
+    def watch(self, bench: Bench) -> None:
+        """Look at this trial from now on."""
+        ...
 
 
 @dataclass
@@ -53,7 +58,7 @@ def run_trial(
     world: World | None = None,
     model: PerceptionModel | None = None,
     recorder: Recorder | None = None,
-    eyes: LookingEyes | None = None,
+    eyes: Watching | None = None,
 ) -> Outcome:
     """Throw up to six sutures; the same seed gives every arm the same needle, thread and calibration error.
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -87,8 +88,22 @@ class Seen:
         return from_ends(self.normal, self.tip, self.swage)
 
 
+class Looking(Protocol):
+    """Who looks at the needle of a trial; `model` says how long an estimate takes and how well thread is seen, the
+    others count estimates."""
+
+    model: PerceptionModel
+    looks: int
+    right: int
+    abstained: int
+
+    def look(self, needle: np.ndarray, place: str) -> Seen | None:
+        """Return one estimate of a needle at its true pose (4, 4); None when it is abstained from."""
+        ...
+
+
 class Eyes:
-    """Sees needles with the errors of a model; `looks` and `right` count estimates, also for the 42 % of the thesis."""
+    """Sees needles with the errors of a model; `looks` and `right` count estimates."""
 
     def __init__(self, model: PerceptionModel, random: np.random.Generator) -> None:
         self.model = model

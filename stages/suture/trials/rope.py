@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from stages.kit.geometry.transforms import wrapped
+
 PARTICLES = 48
 THREAD_RADIUS = 0.00019
 GRAVITY_STEP = 4.0e-5
@@ -188,6 +190,6 @@ def winding(points: np.ndarray, foot: np.ndarray, direction: np.ndarray, reach: 
     first = np.cross(direction, helper)
     first /= np.linalg.norm(first)
     angle = np.arctan2(across @ np.cross(direction, first), across @ first)
-    change = (np.diff(angle) + np.pi) % (2 * np.pi) - np.pi
+    change = wrapped(np.diff(angle))
     beside = (height[1:] > 0.0) & (height[1:] < reach) & (np.linalg.norm(across[1:], axis=1) < 0.012)
     return float(abs(change[beside].sum()) / (2 * np.pi))

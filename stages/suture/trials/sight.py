@@ -11,18 +11,18 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from stages.kit.geometry.transforms import apply, inverse, transform_from
 from stages.suture.evaluation.judgement import judged
 from stages.suture.masks import EyeMasks, learned_masks, open_segmenter, spoiled_masks
-from stages.suture.needle.estimate import estimate
-from stages.suture.needle.thesis import thesis_estimate
+from stages.suture.needle.estimators import ESTIMATORS
 from stages.suture.rig import TWO_CAMERAS, NeedlePose
 from stages.suture.robot.arms import REMOTE_CENTRES
 from stages.suture.robot.psm import YAW_TO_TIP
+from stages.suture.trials.bench import Bench
 from stages.suture.trials.perception import PerceptionModel, Seen
 from stages.suture.world.corruption import noisy_disparity
 from stages.suture.world.render import StereoView, render
@@ -37,9 +37,6 @@ from stages.suture.world.tubes import (
     joined,
     needle_tube,
 )
-
-if TYPE_CHECKING:
-    from stages.suture.trials.bench import Bench
 
 PICTURED_FROM_TRIAL = transform_from(np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.zeros(3))
 """The needle world's wound runs away from the cameras, the trial's towards them."""
@@ -80,7 +77,7 @@ class LookingEyes:
         self.places: dict[str, Counter[str]] = {}
         """Of each place, how many looks were `right`, `swapped` (right but for the names of the ends), `abstained`,
         `wrong`."""
-        self._estimate = thesis_estimate if model.name == "thesis" else estimate
+        self._estimate = ESTIMATORS[model.name].of_view
         self._world = make_scene(seed, TWO_CAMERAS, calibration_error=CALIBRATION_ERROR)
         self._segmenter: Any = open_segmenter(None) if pictures else None
         self._bench: Bench | None = None
@@ -99,7 +96,7 @@ class LookingEyes:
         seed = LOOKS_OF_A_TRIAL * (self.seed + 1) + self.looks
         spoiled, random = spoiled_masks(view.left, view.right, seed)
         masks = spoiled if self._masks is None else self._masks
-        answer = self._estimate(masks.observation(view.rig, noisy_disparity(view, DISPARITY_NOISE, random)))
+        answer = self._estimate(masks.observation(view.rig, noisy_disparity(view, DISPARITY_NOISE, random)), 0, None)
         record = judged(self.model.name, "trial", seed, view, answer)
         fate = "abstained" if not record.answered else "wrong"
         if record.within:

@@ -7,6 +7,8 @@ and the lights, so that highlights on steel lie at different places of the needl
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
@@ -15,6 +17,40 @@ from stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, THREAD
 
 SUBPIXELS = 3
 """Sub-pixels a side."""
+
+
+class Cones(NamedTuple):
+    """Starts and ends (N, 3) [m] of cones in the camera's frame, their radii there (N,) [m], the body (N,) of each."""
+
+    starts: np.ndarray
+    ends: np.ndarray
+    start_radii: np.ndarray
+    end_radii: np.ndarray
+    bodies: np.ndarray
+
+
+class View(NamedTuple):
+    """A camera: focal length and principal point [px]; `rotation` (3, 3) turns its directions into the world, where it
+    stands at `place` (3,) [m]."""
+
+    focal: float
+    centre_x: float
+    centre_y: float
+    rotation: np.ndarray
+    place: np.ndarray
+
+
+class Lighting(NamedTuple):
+    """Lamps (L, 4): place [m] and strength; how the room is turned [rad]; the pad's texture and colour (3,); `shadow`
+    (S, S) in 0..1 darkens the pad at world (x, y) = origin + index / scale."""
+
+    lamps: np.ndarray
+    turn: float
+    salt: int
+    pad_colour: np.ndarray
+    shadow: np.ndarray
+    shadow_origin: float
+    shadow_scale: float
 
 
 @numba.njit(cache=True, fastmath=True)
@@ -46,22 +82,14 @@ def _hit(
 
 
 @numba.njit(cache=True, fastmath=True)
-def draw(
-    starts: np.ndarray,
-    ends: np.ndarray,
-    start_radii: np.ndarray,
-    end_radii: np.ndarray,
-    focal: float,
-    centre_x: float,
-    centre_y: float,
-    depth: np.ndarray,
-    cone: np.ndarray,
-) -> tuple[int, int, int, int]:
+def draw(cones: Cones, view: View, depth: np.ndarray, cone: np.ndarray) -> tuple[int, int, int, int]:
     """Fill the sub-pixel buffers `depth` (0: nothing) and `cone` (index of the tube's cone, -1: nothing).
 
     Both are (H * SUBPIXELS, W * SUBPIXELS). Returns the box (first row, end row, first column, end column) of pixels
     that were touched.
     """
+    starts, ends, start_radii, end_radii = cones.starts, cones.ends, cones.start_radii, cones.end_radii
+    focal, centre_x, centre_y = view.focal, view.centre_x, view.centre_y
     rows, columns = depth.shape
     box = [rows, 0, columns, 0]
     half = (SUBPIXELS - 1) / 2.0
@@ -86,9 +114,9 @@ def draw(
             ray_y = ((row - half) / SUBPIXELS - centre_y) / focal
             for column in range(first_column, end_column):
                 ray_x = ((column - half) / SUBPIXELS - centre_x) / focal
-                found, _ = _hit(ray_x, ray_y, start, axis, start_radii[index], end_radii[index])
-                if found > 0.0 and (cone[row, column] < 0 or found < depth[row, column]):
-                    depth[row, column] = found
+                nearest, _ = _hit(ray_x, ray_y, start, axis, start_radii[index], end_radii[index])
+                if nearest > 0.0 and (cone[row, column] < 0 or nearest < depth[row, column]):
+                    depth[row, column] = nearest
                     cone[row, column] = index
     return box[0] // SUBPIXELS, -(-box[1] // SUBPIXELS), box[2] // SUBPIXELS, -(-box[3] // SUBPIXELS)
 
@@ -132,17 +160,9 @@ def pad_depth(ray_x: float, ray_y: float, rotation: np.ndarray, eye: np.ndarray)
 
 
 @numba.njit(cache=True, fastmath=True)
-def hide_below_pad(
-    depth: np.ndarray,
-    cone: np.ndarray,
-    box: tuple[int, int, int, int],
-    focal: float,
-    centre_x: float,
-    centre_y: float,
-    rotation: np.ndarray,
-    eye: np.ndarray,
-) -> None:
+def hide_below_pad(depth: np.ndarray, cone: np.ndarray, box: tuple[int, int, int, int], view: View) -> None:
     """Take out of the buffers whatever lies behind the wound pad's surface: what is in the tissue is not seen."""
+    focal, centre_x, centre_y, rotation, eye = view
     half = (SUBPIXELS - 1) / 2.0
     for row in range(box[0] * SUBPIXELS, min(box[1] * SUBPIXELS, depth.shape[0])):
         ray_y = ((row - half) / SUBPIXELS - centre_y) / focal
@@ -227,28 +247,17 @@ def _shade_tube(
 def shade(
     depth: np.ndarray,
     cone: np.ndarray,
-    starts: np.ndarray,
-    ends: np.ndarray,
-    bodies: np.ndarray,
-    focal: float,
-    centre_x: float,
-    centre_y: float,
-    rotation: np.ndarray,
-    eye: np.ndarray,
-    lights: np.ndarray,
-    turn: float,
-    salt: int,
-    pad_colour: np.ndarray,
-    shadow: np.ndarray,
-    shadow_origin: float,
-    shadow_scale: float,
+    cones: Cones,
+    view: View,
+    lighting: Lighting,
     image: np.ndarray,
     depth_map: np.ndarray,
 ) -> None:
-    """Write the linear colour image (H, W, 3) of the buffers over the wound pad, and the pad's depth where it is seen.
-
-    `shadow` (S, S) in 0..1 darkens the pad at world (x, y) = origin + index / scale.
-    """
+    """Write the linear colour image (H, W, 3) of the buffers over the wound pad, and the pad's depth where it is
+    seen."""
+    starts, ends, bodies = cones.starts, cones.ends, cones.bodies
+    focal, centre_x, centre_y, rotation, eye = view
+    lights, turn, salt, pad_colour, shadow, shadow_origin, shadow_scale = lighting
     rows, columns = image.shape[0], image.shape[1]
     half = (SUBPIXELS - 1) / 2.0
     colour = np.zeros(3)

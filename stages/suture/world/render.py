@@ -12,6 +12,9 @@ from stages.kit.geometry.transforms import inverse
 from stages.suture.rig import NeedlePose, StereoRig
 from stages.suture.world.raster import (
     SUBPIXELS,
+    Cones,
+    Lighting,
+    View,
     draw,
     hide_below_pad,
     label,
@@ -113,34 +116,20 @@ def _eye(
     depth = np.zeros((rig.height * SUBPIXELS, rig.width * SUBPIXELS), dtype=np.float32)
     cone = np.full(depth.shape, -1, dtype=np.int16)
     starts, ends = np.ascontiguousarray(tubes.starts), np.ascontiguousarray(tubes.ends)
-    camera = (rig.focal, rig.centre[0], rig.centre[1])
-    box = draw(starts, ends, tubes.start_radii, tubes.end_radii, *camera, depth, cone)
-    hide_below_pad(depth, cone, box, *camera, rotation, place)
+    cones = Cones(starts, ends, tubes.start_radii, tubes.end_radii, tubes.bodies)
+    view = View(rig.focal, rig.centre[0], rig.centre[1], rotation, place)
+    box = draw(cones, view, depth, cone)
+    hide_below_pad(depth, cone, box, view)
     bodies = np.zeros((rig.height, rig.width), dtype=np.uint8)
     depth_map = np.zeros((rig.height, rig.width), dtype=np.float32)
     label(depth, cone, tubes.bodies, box, bodies, depth_map)
     image = None
     if pictures:
         linear = np.empty((rig.height, rig.width, 3), dtype=np.float32)
-        shade(
-            depth,
-            cone,
-            starts,
-            ends,
-            tubes.bodies,
-            *camera,
-            rotation,
-            place,
-            light.lamps,
-            light.room_turn,
-            light.salt,
-            light.pad_colour,
-            shadow,
-            SHADOW_ORIGIN,
-            SHADOW_SCALE,
-            linear,
-            depth_map,
+        lighting = Lighting(
+            light.lamps, light.room_turn, light.salt, light.pad_colour, shadow, SHADOW_ORIGIN, SHADOW_SCALE
         )
+        shade(depth, cone, cones, view, lighting, linear, depth_map)
         image = _sensor(linear, scene, random)
     sees = _seen_arc(rig, pose, cone, tubes.bodies)
     if not pictures:

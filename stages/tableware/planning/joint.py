@@ -11,24 +11,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from stages.tableware.planning.actions import (
-    Action,
-    Grasp,
-    PullGrasp,
-    StackGrasp,
-    after_pull,
-    after_stack,
-    grasp,
-    grasp_two,
-    pull,
-    stack,
-    taken,
-)
+from stages.tableware.actions.grasp import Grasp, grasp, grasp_two, taken
+from stages.tableware.actions.pull import pull
+from stages.tableware.actions.stack import stack
+from stages.tableware.planning.action import Action, Primitive
 from stages.tableware.planning.optimum import MOST_ITEMS, Optimum, Solution, Trip
-from stages.tableware.planning.policies import Policy, PullPolicy, StackPolicy, liftable
+from stages.tableware.planning.policy import Policy, liftable
 from stages.tableware.planning.rules import Rules, can_grasp_two, letters
 from stages.tableware.planning.time_model import Chances, TimeModel
 from stages.tableware.planning.trip_options import slip_cost
+from stages.tableware.policies.pull import PullPolicy
+from stages.tableware.policies.stack import StackPolicy
 from stages.tableware.world.items import Table
 
 SLACK = 0.029
@@ -106,11 +99,9 @@ def _alone(policy: Policy, table: Table, model: TimeModel, chances: Chances, lik
     is followed where that is likely enough, for `likely` is the chance that it comes to this table."""
     time = 0.0
     while table.items:
-        action = policy.decide(table)
-        if isinstance(action, PullGrasp):
-            time, table, action = time + model.pull, after_pull(table, action.u_P), action.u_G
-        elif isinstance(action, StackGrasp):
-            time, table, action = time + model.stack, after_stack(table, action.u_S), action.u_G
+        *before, action = policy.decide(table).parts
+        for part in before:
+            time, table = time + part.seconds(model), part.after(table)
         assert isinstance(action, Grasp)  # these policies neither pull nor stack without grasping
         time, rest = time + model.whole_trip, table.without(taken(table, action))
         if len(action.items) == 2:
@@ -124,8 +115,8 @@ def _alone(policy: Policy, table: Table, model: TimeModel, chances: Chances, lik
     return time
 
 
-def _cost(found: Plan, worth: float) -> float:
-    return found.seconds + worth * found.lost
+def _cost(plan: Plan, worth: float) -> float:
+    return plan.seconds + worth * plan.lost
 
 
 def _portion(table: Table) -> Table:
@@ -145,7 +136,7 @@ def _portion(table: Table) -> Table:
 
 
 class JointPolicy:
-    """Keeps a plan and takes its actions one at a time. `found` is a plan that was made before."""
+    """Keeps a plan and takes its actions one at a time. `made` is a plan that was made before."""
 
     def __init__(
         self,
@@ -154,11 +145,11 @@ class JointPolicy:
         chances: Chances,
         slack: float | None = None,
         worth: float = WORTH,
-        found: Plan | None = None,
+        made: Plan | None = None,
     ) -> None:
         self._make = lambda table: plan(table, rules, model, chances, slack, worth)
         self._rules = rules_in(rules, chances)
-        self._first, self._plan = found, found
+        self._first, self._plan = made, made
         self._trip: Trip | None = None
         self._expected: frozenset[tuple[str, str | None]] | None = None
 
@@ -179,24 +170,24 @@ class JointPolicy:
         return action
 
     def _next_trip(self, table: Table) -> Trip:
-        for known in (self._plan, self._first):
-            left = None if known is None else known.optimum.left_of(table)
-            if known is not None and left is not None:
-                return known.optimum.trips(known.solution, left)[0]
+        for earlier in (self._plan, self._first):
+            left = None if earlier is None else earlier.optimum.left_of(table)
+            if earlier is not None and left is not None:
+                return earlier.optimum.trips(earlier.solution, left)[0]
         self._plan = self._make(table)
         self._first = self._first or self._plan
         return self._plan.trips[0]
 
     def _next(self, table: Table, trip: Trip) -> Action | None:
-        action: Action
+        action: Primitive
         if trip.pull is not None:
             action = pull(table, *trip.pull, self._rules)
             self._trip = Trip(None, trip.stacks, trip.bases, trip.taken, trip.seconds)
-            self._expected = _state(after_pull(table, action))
+            self._expected = _state(action.after(table))
         elif trip.stacks:
             action = stack(table, *trip.stacks[0])
             self._trip = Trip(None, trip.stacks[1:], trip.bases, trip.taken, trip.seconds)
-            self._expected = _state(after_stack(table, action))
+            self._expected = _state(action.after(table))
         else:
             if len(trip.bases) == 2 and not can_grasp_two(table, trip.bases[0], trip.bases[1], self._rules):
                 return None

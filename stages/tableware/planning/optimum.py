@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import hypot
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -63,10 +64,14 @@ class Optimum:
         self.table = table
         self._rules, self._worth = rules, worth
         self._options: TripOptions = trip_options(table, rules, model, chances, worth)
-        self._number_of = np.full(1 << count, -1, dtype=np.int32)
-        self._number_of[self._options.masks] = np.arange(len(self._options.masks))
+        options = self._options
+        number_of = np.full(1 << count, -1, dtype=np.int32)
+        number_of[options.masks] = np.arange(len(options.masks))
+        self._columns = _Options(
+            number_of, options.starts, options.seconds, options.lost, options.slips, options.stays, options.blockers
+        )
         self._choice_of = np.repeat(np.arange(len(self._options.masks)), np.diff(self._options.starts))
-        self._masks = _masks(table)
+        self._piles = _piles(table)
         self._row = {item.name: number for number, item in enumerate(table.items)}
 
     @property
@@ -77,13 +82,7 @@ class Optimum:
     def solve(self, per_trip: float = 0.0) -> Solution:
         """Return the best next trip for whatever is left; `per_trip` seconds are charged for each beyond what it
         takes."""
-        options = self._options
-        return Solution(
-            *_solve(
-                len(self.table.items), *self._masks, self._number_of, options.starts, options.seconds, options.lost,
-                options.slips, options.stays, options.blockers, self._worth, per_trip,
-            )
-        )  # fmt: skip
+        return Solution(*_solve(self._piles, self._columns, self._worth, per_trip))
 
     def left_of(self, table: Table) -> int | None:
         """Return what is left of this table as bits; None when something has moved, or was not there."""
@@ -109,10 +108,7 @@ class Optimum:
         before = np.full(1 << len(self.table.items), np.inf)
         before[0] = 0.0
         while before[self.everything] > limit:
-            before, chosen = _one_trip_more(
-                len(self.table.items), *self._masks, self._number_of, options.starts, options.seconds, options.blockers,
-                before,
-            )  # fmt: skip
+            before, chosen = _one_trip_more(self._piles, self._columns, before)
             layers.append(chosen)
         option, seconds, trips = best.option.copy(), best.seconds.copy(), best.trips.copy()
         left, spent = self.everything, float(before[self.everything])
@@ -126,13 +122,13 @@ class Optimum:
         """Return the trips that clear the table, or what is left of it, in order, when nothing slips."""
         solution = solution or self.solve()
         left = self.everything if left is None else left
-        found = []
+        trips = []
         while left:
             option = int(solution.option[left])
             choice = int(self._choice_of[option])
             left &= ~int(self._options.masks[choice])
-            found.append(self._as_trip(choice, option))
-        return found
+            trips.append(self._as_trip(choice, option))
+        return trips
 
     def _as_trip(self, choice: int, option: int) -> Trip:
         """Return an option with the names of what is pulled and stacked, in order."""
@@ -165,12 +161,12 @@ def seconds(trips: list[Trip]) -> float:
     return sum(trip.seconds for trip in trips)
 
 
-def _masks(table: Table) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each item which one it stands on and which stand above it, as (N,) bit masks."""
+def _piles(table: Table) -> _Piles:
+    """Return what stands on what."""
     row = {item.name: number for number, item in enumerate(table.items)}
     below = np.array([0 if item.on is None else 1 << row[item.on] for item in table.items], dtype=np.int64)
     above = np.array([sum(1 << row[other.name] for other in table.load(item.name)) for item in table.items], np.int64)
-    return below, above
+    return _Piles(below, above)
 
 
 @njit(cache=True)
@@ -182,13 +178,33 @@ def _meets(items, masks, others):  # type: ignore[no-untyped-def]
     return False
 
 
+class _Piles(NamedTuple):
+    """Of each item (N,) the one that it stands on and those that stand above it, as bits."""
+
+    below: np.ndarray
+    above: np.ndarray
+
+
+class _Options(NamedTuple):
+    """Which choice (2^N,) takes exactly these items (-1: none), where its options begin (C + 1,), and of each option
+    (O,) what TripOptions says."""
+
+    number_of: np.ndarray
+    starts: np.ndarray
+    seconds: np.ndarray
+    lost: np.ndarray
+    slips: np.ndarray
+    stays: np.ndarray
+    blockers: np.ndarray
+
+
 @njit(cache=True)
-def _solve(  # type: ignore[no-untyped-def]
-    count, below, above, number_of, starts, seconds, lost, slips, stays, blockers, worth, per_trip
-):
+def _solve(piles, options, worth, per_trip):  # type: ignore[no-untyped-def]
     """f over all sets of items that may be left: (2^N,) row of the best option, and from there on seconds, trips,
     losses."""
-    size = 1 << count
+    below, above = piles
+    number_of, starts, seconds, lost, slips, stays, blockers = options
+    size = 1 << len(below)
     best = np.full(size, np.inf)
     chosen = np.full(size, -1, np.int64)
     time, trips, losses = np.zeros(size), np.zeros(size), np.zeros(size)
@@ -218,9 +234,11 @@ def _solve(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _one_trip_more(count, below, above, number_of, starts, seconds, blockers, before):  # type: ignore[no-untyped-def]
+def _one_trip_more(piles, options, before):  # type: ignore[no-untyped-def]
     """From the least seconds to clear what is left in at most k trips, (2^N,), those for k + 1 and the next option."""
-    size = 1 << count
+    below, above = piles
+    number_of, starts, seconds, blockers = options.number_of, options.starts, options.seconds, options.blockers
+    size = 1 << len(below)
     best = np.full(size, np.inf)
     chosen = np.full(size, -1, np.int64)
     best[0] = 0.0

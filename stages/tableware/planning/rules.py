@@ -32,8 +32,8 @@ class Rules:
     """Half the width of a finger; what lies under the jaws when they come down is in the way (ours)."""
     similar: float = 0.005
     """Greatest difference of two grasp heights in a multi-object grasp: the thesis's adjustable threshold, without a
-    number there. At 0.005 (like with like) Pull comes nearer to its tiers 1 and 2 than at 0.02 (tuning seeds 0 to
-    39: 92.7 and 79.6 s against 86.3 and 74.3 s; the thesis has 102.1 and 84.2 s)."""
+    number there. At 0.005 (like with like) Pull comes nearer to the thesis's times of tiers 1 and 2 than at 0.02
+    (tuning seeds 0 to 39)."""
     parallel: float = pi / 6
     """Greatest angle between two utensils that are grasped together (ours)."""
     pull_gap: float = 0.01

@@ -1,36 +1,62 @@
-"""What actions cost, and what goes wrong in them, fitted to the thesis's tables (Srinivas 2024, tables 7.1 to 7.3).
+"""What actions cost, and what goes wrong in them: times and chances that were fitted to tables of the thesis.
 
 A table is cleared in `trips x trip + stackings x stack + pulls x pull` seconds; a bin farther away adds its delay to
-each trip twice (table 7.2). Trips follow from table 7.2 (ten more seconds a trip at 5 s delay), seconds from 7.1.
+each trip twice. The file is written by `python -m benchmarks.tidy.thesis_fit`, which has the tables.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from math import pi, sqrt
+from pathlib import Path
 
 import numpy as np
+from pydantic import Field
+
+from schemas.base import Model
+from stages.tableware.options import THESIS_TIMES
+
+FILE = Path(__file__).resolve().parents[3] / "data" / THESIS_TIMES
+PLACEMENT_KINDS = ("cup", "bowl")
 
 
-@dataclass(frozen=True)
-class Row:
-    """Seconds without delay and with 5 s of it, of the thesis's three policies."""
+class Times(Model):
+    """Seconds of a trip to the bin, of a stacking and of a pull."""
 
-    random: tuple[float, float]
-    stack: tuple[float, float]
-    pull: tuple[float, float]
-    piles: int | None = None
-    """Piles at the start; None: as many as Random's trips."""
+    trip: float = Field(gt=0.0)
+    stack: float = Field(ge=0.0)
+    pull: float = Field(ge=0.0)
 
 
-TABLE_7_2: dict[str, Row] = {
-    "tier0_cups": Row((78.2, 154.8), (58.5, 88.5), (48.8, 85.4), 6),
-    "tier0_bowls": Row((63.3, 123.3), (60.2, 90.2), (41.3, 74.6), 6),
-    "tier0_utensils": Row((64.1, 124.1), (64.3, 97.6), (55.3, 88.7), 6),
-    "tier1": Row((121.3, 241.3), (111.3, 171.3), (102.1, 178.8), 12),
-    "tier2": Row((93.5, 176.9), (88.2, 134.9), (84.2, 137.5)),
-}
+class Drops(Model):
+    """Chances that an action lets something fall off the table."""
+
+    grasp: float = Field(ge=0.0, le=1.0)
+    stack: float = Field(ge=0.0, le=1.0)
+    pull: float = Field(ge=0.0, le=1.0)
+
+
+class Fit(Model):
+    """data/tableware/thesis_times.json."""
+
+    source: str
+    command: str
+    times: dict[str, Times]
+    """Tier -> its times; tier 3, which the thesis has not, takes those of tier 2."""
+    hold: dict[str, float]
+    """Letter of what a pile stands on -> chance that a multi-object grasp keeps the second of two such piles."""
+    drops: Drops
+    """As often as trials failed."""
+    placement: dict[str, tuple[tuple[float, float], ...]]
+    """Kind -> (length of a pull, mean distance of where the dish came to stand from where it should) [m]."""
+
+
+@lru_cache(maxsize=1)
+def thesis_fit() -> Fit:
+    """Return the file's content."""
+    return Fit.read(FILE)
 
 
 @dataclass(frozen=True)
@@ -49,60 +75,19 @@ class TimeModel:
         return self.trip + 2.0 * self.delay
 
 
-def trips_of(seconds: tuple[float, float]) -> float:
-    """Return the trips that a row of table 7.2 implies: 5 s both ways are 10 s a trip."""
-    return (seconds[1] - seconds[0]) / 10.0
-
-
 def fitted(tier: str, delay: float = 0.0) -> TimeModel:
-    """Return the time model of a tier, solved from its three rows; tier 3 has none and takes tier 2's.
-
-    Every pile less than at the start that a policy carried away is one stacking, or one pull, more.
-    """
-    row = TABLE_7_2["tier2" if tier == "tier3" else tier]
-    trip = row.random[0] / trips_of(row.random)
-    piles = trips_of(row.random) if row.piles is None else row.piles
-
-    def increment(seconds: tuple[float, float]) -> float:
-        trips = trips_of(seconds)
-        return (seconds[0] - trips * trip) / (piles - trips)
-
-    return TimeModel(trip, increment(row.stack), increment(row.pull), delay)
-
-
-TABLE_7_3: dict[str, tuple[tuple[float, float], ...]] = {
-    "cup": ((0.20, 0.0028), (0.30, 0.0019), (0.40, 0.0018)),
-    "bowl": ((0.20, 0.0092), (0.30, 0.0089), (0.40, 0.0076)),
-}
-"""Length of a pull -> mean distance of where the dish came to stand from where it should [m]."""
+    """Return the time model of a tier."""
+    times = thesis_fit().times["tier2" if tier == "tier3" else tier]
+    return TimeModel(times.trip, times.stack, times.pull, delay)
 
 
 def placement_error(kind: str, length: float, random: np.random.Generator) -> tuple[float, float]:
-    """Draw by how much (x, y) [m] a pull over `length` [m] misses: Gaussian, the same in both directions, of the mean
-    distance of table 7.3 between its lengths; plates as bowls, utensils (not measured) as cups."""
-    rows = TABLE_7_3["bowl" if kind in ("bowl", "plate") else "cup"]
+    """Draw by how much (x, y) [m] a pull over `length` [m] misses: Gaussian, the same in both directions, of the
+    measured mean distance between its lengths; plates as bowls, utensils (not measured) as cups."""
+    rows = thesis_fit().placement["bowl" if kind in ("bowl", "plate") else "cup"]
     mean = float(np.interp(length, [row[0] for row in rows], [row[1] for row in rows]))
     x, y = random.normal(0.0, mean / sqrt(pi / 2), size=2)
     return float(x), float(y)
-
-
-def expected_trips(count: int, hold: float) -> float:
-    """Return how many trips `count` equal items take in pairs when the second stays behind with chance 1 - `hold`."""
-    trips = [0.0, 1.0]
-    for number in range(2, count + 1):
-        trips.append(1.0 + hold * trips[number - 2] + (1.0 - hold) * trips[number - 1])
-    return trips[count]
-
-
-def fitted_hold(tier: str) -> float:
-    """Return the chance that a multi-object grasp keeps its second pile, by which Pull's trips on a tier-0 row of the
-    thesis come out."""
-    trips = trips_of(TABLE_7_2[tier].pull)
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if expected_trips(6, middle) > trips else (low, middle)
-    return (low + high) / 2
 
 
 @dataclass(frozen=True)
@@ -140,32 +125,21 @@ class Chances:
         return min(self.hold.get(first, 1.0), self.hold.get(second, 1.0))
 
 
-FAILED_TRIALS: dict[str, tuple[int, int, int]] = {
-    "tier0_cups": (0, 0, 2), "tier0_bowls": (0, 0, 0), "tier0_utensils": (0, 0, 1), "tier1": (1, 2, 3),
-    "tier2": (0, 2, 3),
-}  # fmt: skip
-"""Failed trials of three: Random, Stack, Pull (table 7.1)."""
-
 EXACT = Chances()
 """Everything goes as planned."""
 
 
 def measured() -> Chances:
-    """Return the thesis's world: pulls miss as in table 7.3, second piles slip as often as Pull's trips say."""
-    bowls = fitted_hold("tier0_bowls")
-    hold = {"c": fitted_hold("tier0_cups"), "b": bowls, "p": bowls, "u": fitted_hold("tier0_utensils")}
-    return Chances(hold, noise=True)
+    """Return the thesis's world: pulls miss as measured, second piles slip as often as Pull's trips say."""
+    return Chances(thesis_fit().hold, noise=True)
 
 
 def with_thesis_failures() -> Chances:
-    """Return the thesis's world, dropping as often as its trials failed: the chances of a grasp, a stacking and a pull
-    by which the expected number of failed trials of table 7.1 comes out, grasps from Random's, the others from Stack's
-    and Pull's. The thesis counts items left behind for want of perception among these, and so do we here."""
-    single = _chance_of_failures(0, 0.0)
-    stacking, pulling = _chance_of_failures(1, single), _chance_of_failures(2, single)
+    """Return the thesis's world, dropping as often as its trials failed."""
+    drops = thesis_fit().drops
     return replace(
-        measured(), drop_single=single, drop_two=single, drop_stack=stacking, drop_pull=pulling,
-        drop_loaded_pull=pulling,
+        measured(), drop_single=drops.grasp, drop_two=drops.grasp, drop_stack=drops.stack, drop_pull=drops.pull,
+        drop_loaded_pull=drops.pull,
     )  # fmt: skip
 
 
@@ -174,21 +148,10 @@ def with_spills() -> Chances:
     return replace(measured(), spills=True)
 
 
-def _chance_of_failures(policy: int, single: float) -> float:
-    """Return the chance a stacking or a pull (Random: a grasp) fails with; grasps fail with `single`."""
-    wanted = sum(failures[policy] for failures in FAILED_TRIALS.values())
-
-    def expected(chance: float) -> float:
-        total = 0.0
-        for row in TABLE_7_2.values():
-            trips = trips_of((row.random, row.stack, row.pull)[policy])
-            others = (trips_of(row.random) if row.piles is None else row.piles) - trips if policy else 0.0
-            grasp = single if policy else chance
-            total += 3.0 * (1.0 - (1.0 - grasp) ** trips * (1.0 - chance) ** others)
-        return total
-
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if expected(middle) < wanted else (low, middle)
-    return (low + high) / 2
+WORLDS: dict[str, Callable[[], Chances]] = {
+    "exact": lambda: EXACT,
+    "thesis": measured,
+    "thesis_spills": with_spills,
+    "thesis_failures": with_thesis_failures,
+}
+"""What goes wrong, by the names of the command line."""

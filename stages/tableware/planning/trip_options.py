@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -76,28 +77,30 @@ def trip_options(table: Table, rules: Rules, model: TimeModel, chances: Chances,
     parts = tuple(part for run in runs for part in run)
     types = {key: number for number, key in enumerate(sorted({(part.kinds, part.whole) for part in parts}))}
     type_of = np.array([types[part.kinds, part.whole] for part in parts], dtype=np.int64)
-    chosen, masks, signatures, known = _choices(runs, type_of.tolist(), list(types), rules)
+    chosen, masks, signatures, ways_of_signature = _choices(runs, type_of.tolist(), list(types), rules)
     longest = max((len(rows) for rows in chosen), default=1)
     rows = np.full((len(chosen), longest), -1, dtype=np.int64)
     for number, choice in enumerate(chosen):
         rows[number, : len(choice)] = choice
-    bases = np.full(len(known), -1, dtype=np.int64)
-    two = np.zeros((len(known), len(types), len(types)), dtype=np.bool_)
-    for number, (base, pairs) in enumerate(known):
+    bases = np.full(len(ways_of_signature), -1, dtype=np.int64)
+    two = np.zeros((len(ways_of_signature), len(types), len(types)), dtype=np.bool_)
+    for number, (base, pairs) in enumerate(ways_of_signature):
         if base is not None:
             bases[number] = types.get((base, True), types.get((base, False), -1))
         for one, other in pairs:
             two[number, types[one, True], types[other, True]] = True
-    costs = np.array(
-        [model.whole_trip, model.stack, chances.drop_stack, chances.drop_single, chances.drop_two, worth], np.float64
-    )
-    found = _ways_of(
-        rows, masks, signatures, bases, two, np.array([part.lowest for part in parts], np.int64),
-        np.array([part.whole for part in parts], np.bool_), np.array([len(part.items) for part in parts], np.int64),
-        np.array([part.mask for part in parts], np.int64), type_of, *_pairs(table, rules, model, chances, worth), costs,
-        rules.loaded_pulls, chances.drop_loaded_pull,
+    costs = _Costs(
+        float(model.whole_trip), float(model.stack), float(chances.drop_stack), float(chances.drop_single),
+        float(chances.drop_two), float(chances.drop_loaded_pull), float(worth), rules.loaded_pulls,
     )  # fmt: skip
-    return TripOptions(parts, tuple(chosen), masks, *found)
+    columns = _Parts(
+        np.array([part.lowest for part in parts], np.int64), np.array([part.whole for part in parts], np.bool_),
+        np.array([len(part.items) for part in parts], np.int64), np.array([part.mask for part in parts], np.int64),
+        type_of,
+    )  # fmt: skip
+    choices = _Choices(rows, masks, signatures)
+    ways = _ways_of(choices, _Signatures(bases, two), columns, _pairs(table, rules, model, chances, worth), costs)
+    return TripOptions(parts, tuple(chosen), masks, *ways)
 
 
 def _runs(table: Table, rules: Rules) -> list[list[Part]]:
@@ -117,12 +120,13 @@ def _runs(table: Table, rules: Rules) -> list[list[Part]]:
     return runs
 
 
-Known = tuple[str | None, frozenset[tuple[str, str]]]
+Ways = tuple[str | None, frozenset[tuple[str, str]]]
+"""On which kind of part all others of a signature can be stacked, and on which two they can be shared out."""
 
 
 def _choices(
     runs: list[list[Part]], type_of: list[int], types: list[tuple[str, bool]], rules: Rules
-) -> tuple[list[tuple[int, ...]], np.ndarray, np.ndarray, list[Known]]:
+) -> tuple[list[tuple[int, ...]], np.ndarray, np.ndarray, list[Ways]]:
     """Return every choice that some way can take: rows of its parts, its mask, its signature; and for each signature
     what `_ways` says."""
     follow: dict[tuple[int, int], int] = {}
@@ -151,15 +155,15 @@ def _choices(
                         ((*chosen, row), mask | part.mask, number, has_dishes + dishes, has_utensils + utensils)
                     )
             row += 1
-    known = [_ways(tuple(sorted(types[kind] for kind in signature)), rules) for signature in signatures]
-    kept = [choice for choice in choices[1:] if known[choice[2]][0] is not None or known[choice[2]][1]]
+    ways = [_ways(tuple(sorted(types[kind] for kind in signature)), rules) for signature in signatures]
+    kept = [choice for choice in choices[1:] if ways[choice[2]][0] is not None or ways[choice[2]][1]]
     masks = np.array([mask for _, mask, *_ in kept], dtype=np.int64)
     numbers = np.array([number for _, _, number, *_ in kept], dtype=np.int64)
-    return [chosen for chosen, *_ in kept], masks, numbers, known
+    return [chosen for chosen, *_ in kept], masks, numbers, ways
 
 
 @lru_cache(maxsize=262144)
-def _ways(signature: tuple[tuple[str, bool], ...], rules: Rules) -> Known:
+def _ways(signature: tuple[tuple[str, bool], ...], rules: Rules) -> Ways:
     """Return for the kinds of a choice's parts, and whether each stands on the table, which of them all others can be
     stacked on (None: no one), and on which two they can be shared out."""
     if not signature:
@@ -184,15 +188,12 @@ def _ways(signature: tuple[tuple[str, bool], ...], rules: Rules) -> Known:
     return base, frozenset(two)
 
 
-def _pairs(
-    table: Table, rules: Rules, model: TimeModel, chances: Chances, worth: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the pairs that one grasp could take, the first pulled to the second or as they stand, from the cheapest
-    on: rows of both (P,), blockers, seconds beyond the trip, chance of a loss, chance of a slip, pulled."""
+def _pairs(table: Table, rules: Rules, model: TimeModel, chances: Chances, worth: float) -> _Pairs:
+    """Return the pairs that one grasp could take."""
     row = {item.name: number for number, item in enumerate(table.items)}
     pile = {item.name: stack[0].name for stack in table.stacks for item in stack}
     bases = [stack[0] for stack in table.stacks]
-    found: list[tuple[int, int, float, float, float, bool]] = []
+    pairs: list[_Pair] = []
     covers: list[Footprint] = []
     owners: list[int] = []
     for one in bases:
@@ -212,24 +213,40 @@ def _pairs(
                 places, pulled, cost, lost = sweep(one, other, rules), True, model.pull, chances.drop_pull
             if obstructed(places, table):
                 continue
-            owners.extend([len(found)] * len(places))
+            owners.extend([len(pairs)] * len(places))
             covers.extend(places)
-            found.append((first, second, cost, lost, slips, pulled))
-    blockers = np.zeros(len(found), dtype=np.int64)
+            pairs.append(_Pair(first, second, cost, lost, slips, pulled))
+    blockers = np.zeros(len(pairs), dtype=np.int64)
     if covers:
         hits = overlapped(covers, [footprint(item) for item in table.items])
         for owner, hit in zip(owners, hits, strict=True):
             blockers[owner] |= sum(1 << int(item) for item in np.flatnonzero(hit))
     own = {base.name: sum(1 << row[name] for name, lowest in pile.items() if lowest == base.name) for base in bases}
-    for number, (first, second, *_) in enumerate(found):
-        blockers[number] &= ~(own[table.items[first].name] | own[table.items[second].name])
-    order = sorted(range(len(found)), key=lambda n: found[n][2] + worth * found[n][3] + found[n][4] * slip_cost(model))
-    columns = list(zip(*(found[number] for number in order), strict=True)) or [()] * 6
-    return (
-        np.array(columns[0], np.int64), np.array(columns[1], np.int64), blockers[np.array(order, np.int64)],
-        np.array(columns[2], np.float64), np.array(columns[3], np.float64), np.array(columns[4], np.float64),
-        np.array(columns[5], np.bool_),
-    )  # fmt: skip
+    for number, pair in enumerate(pairs):
+        blockers[number] &= ~(own[table.items[pair.first].name] | own[table.items[pair.second].name])
+    slip = slip_cost(model)
+    order = sorted(range(len(pairs)), key=lambda n: pairs[n].seconds + worth * pairs[n].lost + pairs[n].slips * slip)
+    ordered = [pairs[number] for number in order]
+    return _Pairs(
+        np.array([pair.first for pair in ordered], np.int64),
+        np.array([pair.second for pair in ordered], np.int64),
+        blockers[np.array(order, np.int64)],
+        np.array([pair.seconds for pair in ordered], np.float64),
+        np.array([pair.lost for pair in ordered], np.float64),
+        np.array([pair.slips for pair in ordered], np.float64),
+        np.array([pair.pulled for pair in ordered], np.bool_),
+    )
+
+
+class _Pair(NamedTuple):
+    """Rows of two things, seconds beyond the trip, chances of a loss and of a slip, whether the first is pulled."""
+
+    first: int
+    second: int
+    seconds: float
+    lost: float
+    slips: float
+    pulled: bool
 
 
 def slip_cost(model: TimeModel) -> float:
@@ -242,13 +259,68 @@ def slip_cost(model: TimeModel) -> float:
     return (model.whole_trip + model.pull) / 2
 
 
+class _Choices(NamedTuple):
+    """Of each choice (C,): rows of its parts (C, P; -1: none), its items as bits, its signature (S of them)."""
+
+    rows: np.ndarray
+    masks: np.ndarray
+    signatures: np.ndarray
+
+
+class _Signatures(NamedTuple):
+    """Of each signature: the type of part that all others can be stacked on (S,; -1: none), and which two types they
+    can be shared out on (S, T, T)."""
+
+    bases: np.ndarray
+    two: np.ndarray
+
+
+class _Parts(NamedTuple):
+    """Of each part (P,): row of its lowest item, whether that stands on the table, number of items, these as bits, its
+    type."""
+
+    lowest: np.ndarray
+    whole: np.ndarray
+    length: np.ndarray
+    masks: np.ndarray
+    types: np.ndarray
+
+
+class _Pairs(NamedTuple):
+    """Of each pair that one grasp could take, the first pulled to the second or as they stand, (P,) from the cheapest
+    on: rows of both, what must be gone before as bits, seconds beyond the trip, chances of a loss and of a slip,
+    whether the first is pulled."""
+
+    first: np.ndarray
+    second: np.ndarray
+    blockers: np.ndarray
+    seconds: np.ndarray
+    lost: np.ndarray
+    slips: np.ndarray
+    pulled: np.ndarray
+
+
+class _Costs(NamedTuple):
+    """Seconds, chances of a loss, what a loss counts for [s], and whether dishes that carry others may be pulled."""
+
+    whole_trip: float
+    stack: float
+    drop_stack: float
+    drop_single: float
+    drop_two: float
+    drop_loaded: float
+    worth: float
+    loaded_pulls: bool
+
+
 @njit(cache=True)
-def _ways_of(  # type: ignore[no-untyped-def]
-    rows, masks, signatures, bases, two, lowest, whole, length, part_mask, type_of, pair_first, pair_second,
-    pair_blockers, pair_seconds, pair_lost, pair_slips, pair_pulled, costs, loaded_pulls, drop_loaded,
-):  # fmt: skip
-    """Return starts (C + 1,) and the options of all choices, see TripOptions."""
-    whole_trip, stack, drop_stack, drop_single, drop_two, worth = costs
+def _ways_of(choices, kinds, parts, pairs, costs):  # type: ignore[no-untyped-def]
+    """Return starts (C + 1,) and the options of all choices, see TripOptions; `kinds` are _Signatures."""
+    rows, masks, signatures = choices
+    bases, two = kinds
+    lowest, whole, length, part_mask, type_of = parts
+    pair_first, pair_second, pair_blockers, pair_seconds, pair_lost, pair_slips, pair_pulled = pairs
+    whole_trip, stack, drop_stack, drop_single, drop_two, drop_loaded, worth, loaded_pulls = costs
     starts = np.zeros(len(rows) + 1, np.int64)
     seconds, lost, slips = [0.0], [0.0], [0.0]
     stays, blockers, first, second, pulled = [0], [0], [0], [0], [False]

@@ -10,9 +10,10 @@ from pathlib import Path
 from pydantic import Field
 
 from schemas.base import Model
+from stages.tableware.options import PHYSICS_TIMES
 from stages.tableware.planning.time_model import TimeModel
 
-FILE = Path(__file__).resolve().parents[3] / "data" / "tableware" / "physics_times.json"
+FILE = Path(__file__).resolve().parents[3] / "data" / PHYSICS_TIMES
 
 
 class ArmTimes(Model):
@@ -32,5 +33,5 @@ class ArmTimes(Model):
 
 def arm_times(delay: float = 0.0) -> TimeModel:
     """Return the arm's time model with a bin that is `delay` [s] farther each way."""
-    found = ArmTimes.read(FILE)
-    return TimeModel(found.trip, found.stack, found.pull, delay)
+    times = ArmTimes.read(FILE)
+    return TimeModel(times.trip, times.stack, times.pull, delay)

@@ -13,23 +13,16 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import atan2, cos, hypot, pi, sin
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 from zlib import crc32
 
 import numpy as np
 
-from stages.tableware.planning.actions import (
-    Action,
-    Grasp,
-    Pull,
-    PullGrasp,
-    Stack,
-    StackGrasp,
-    after_pull,
-    after_stack,
-    taken,
-)
-from stages.tableware.planning.policies import Policy
+from stages.tableware.actions.grasp import Grasp, taken
+from stages.tableware.actions.pull import Pull, after_pull
+from stages.tableware.actions.stack import Stack, after_stack
+from stages.tableware.planning.action import Action, Primitive
+from stages.tableware.planning.policy import Policy
 from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold, letters
 from stages.tableware.planning.time_model import Chances, TimeModel, placement_error
 from stages.tableware.world.footprints import footprint, gap, overlapped
@@ -97,6 +90,9 @@ class FastWorld:
         """What did not go as planned in the last action."""
         self.vain: tuple[str, ...] = ()
         """What the hand closed on in vain in the last action."""
+        self._motions: dict[type[Primitive], Callable[[Any], None]] = {
+            Grasp: self._grasp, Pull: self._pull, Stack: self._stack
+        }  # fmt: skip
 
     def _luck(self, what: str, name: str) -> np.random.Generator:
         """Return the generator of one thing that happens to an item, another at each attempt."""
@@ -111,18 +107,8 @@ class FastWorld:
         """Carry out an action, a composite one without looking in between. Items go by their names, whatever was seen:
         what is not there is reached for in vain, and a pile that is more than the jaws hold is dropped."""
         self.troubles, self.vain = [], ()
-        if isinstance(action, PullGrasp):
-            self._pull(action.u_P)
-            self._grasp(action.u_G)
-        elif isinstance(action, StackGrasp):
-            self._stack(action.u_S)
-            self._grasp(action.u_G)
-        elif isinstance(action, Pull):
-            self._pull(action)
-        elif isinstance(action, Stack):
-            self._stack(action)
-        else:
-            self._grasp(action)
+        for part in action.parts:
+            self._motions[type(part)](part)
         self.trial.left = len(self.table.items)
 
     def _pull(self, action: Pull) -> None:
@@ -152,10 +138,10 @@ class FastWorld:
     def _stack(self, action: Stack) -> None:
         self.trial.seconds += self._model.stack
         self.trial.stacks += 1
-        if not self._there(action.u_G.items[0], action.onto):
+        if not self._there(action.item, action.onto):
             return
-        if self._goes_wrong(self._chances.drop_stack, "stack", action.u_G.items[0]):
-            self._drop(action.u_G.items[0])
+        if self._goes_wrong(self._chances.drop_stack, "stack", action.item):
+            self._drop(action.item)
             return
         self.table = after_stack(self.table, action)
 

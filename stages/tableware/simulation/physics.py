@@ -1,4 +1,4 @@
-"""Clearing a table in physics: the actions of planning/actions.py, carried out by an arm that touches things.
+"""Clearing a table in physics: the actions of stages/tableware/actions, carried out by an arm that touches things.
 
 Nothing is fastened to anything: what is carried is held by friction between the pads, and may slip, tip or fall.
 """
@@ -8,12 +8,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import atan2, cos, hypot, pi, sin
+from typing import Any
 
 import numpy as np
 
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.simulation.world import PhysicsWorld
-from stages.tableware.planning.actions import Action, Grasp, Pull, PullGrasp, Stack, StackGrasp, after_pull, after_stack
+from stages.tableware.actions.grasp import Grasp
+from stages.tableware.actions.pull import Pull
+from stages.tableware.actions.stack import Stack
+from stages.tableware.planning.action import Action, Primitive
 from stages.tableware.simulation.arm import BACK_FRICTION, PAD_FRICTION, Arm
 from stages.tableware.simulation.fast import Trial
 from stages.tableware.simulation.holds import (
@@ -91,6 +95,9 @@ class PhysicsTable:
         """What the hand closed on in vain in the last action: nothing was between the fingers."""
         self.fallen: list[str] = []
         """Everything that fell off the table or over, in order."""
+        self._motions: dict[type[Primitive], Callable[[Any, Table], None]] = {
+            Grasp: self._grasp, Pull: self._pull, Stack: self._stack
+        }  # fmt: skip
         self._key("start")
 
     def close(self) -> None:
@@ -120,18 +127,9 @@ class PhysicsTable:
         seen = seen or self.table
         self.troubles, self.vain = [], ()
         try:
-            if isinstance(action, PullGrasp):
-                self._pull(action.u_P, seen)
-                self._grasp(action.u_G, _after(seen, action))
-            elif isinstance(action, StackGrasp):
-                self._stack(action.u_S, seen)
-                self._grasp(action.u_G, _after(seen, action))
-            elif isinstance(action, Pull):
-                self._pull(action, seen)
-            elif isinstance(action, Stack):
-                self._stack(action, seen)
-            else:
-                self._grasp(action, seen)
+            for number, part in enumerate(action.parts):
+                seen = action.parts[number - 1].after(seen) if number else seen
+                self._motions[type(part)](part, seen)
         except MotionFailed as failure:
             self.troubles.append(str(failure))
             self._retreat()
@@ -454,8 +452,3 @@ def _raised(pose: np.ndarray, height: float) -> np.ndarray:
     high = pose.copy()
     high[2, 3] = max(height, pose[2, 3])
     return high
-
-
-def _after(seen: Table, action: PullGrasp | StackGrasp) -> Table:
-    """Return the table as it is thought to be after the first half of a composite action."""
-    return after_pull(seen, action.u_P) if isinstance(action, PullGrasp) else after_stack(seen, action.u_S)

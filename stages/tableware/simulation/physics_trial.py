@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from math import hypot, pi
 from typing import Literal
 
-from stages.tableware.planning.actions import Action, Grasp, Pull, PullGrasp, Stack, StackGrasp, grasp
-from stages.tableware.planning.policies import Policy, liftable
-from stages.tableware.planning.rules import Rules, letters
+from stages.tableware.actions.grasp import grasp
+from stages.tableware.planning.action import Action
+from stages.tableware.planning.policy import Policy, liftable
+from stages.tableware.planning.rules import Rules
 from stages.tableware.sight import Eyes
 from stages.tableware.simulation.fast import Done, Trial, most_actions, run_in, truth
 from stages.tableware.simulation.physics import PhysicsTable, Speeds
@@ -41,9 +42,9 @@ class Outcome:
         self.actions += 1
         self.troubles = (*self.troubles, *done.troubles)
         kinds = {item.name: item.kind for item in done.before.items}
-        what = said(done.action, done.seen)
+        what = done.action.in_kinds(done.seen)
         self.losses = (*self.losses, *(f"{kinds.get(name, 'item')}: {what}" for name in done.dropped))
-        if all(_rightly(item, done.before) for item in meant(done.action, done.seen)):
+        if all(_rightly(item, done.before) for item in done.action.meant(done.seen)):
             self.policy += len(done.dropped)
         else:
             self.perception += len(done.dropped)
@@ -78,38 +79,11 @@ def alone(seen: Table, last: Done, idle: int) -> Action:
     """Return a grasp after actions that changed nothing, a quarter turn on each time: first of the pile that was meant,
     alone, then of the highest thing of one pile after another."""
     if idle == 1:
-        for item in meant(last.action, last.seen):
+        for item in last.action.meant(last.seen):
             pile = next((pile for pile in seen.stacks if any(other.name == item.name for other in pile)), None)
             if pile is not None:
                 return grasp(seen, liftable(seen, pile, Rules()), 0.5 * pi)
     return grasp(seen, seen.tops[(idle - 1) % len(seen.tops)].name, 0.5 * pi * idle)
-
-
-def meant(action: Action, seen: Table) -> list[Item]:
-    """Return the items that an action is about."""
-    names: tuple[str, ...]
-    if isinstance(action, Grasp):
-        names = action.items
-    elif isinstance(action, Pull):
-        names = (action.item, action.target)
-    elif isinstance(action, PullGrasp):
-        names = (action.u_P.item, action.u_P.target)
-    elif isinstance(action, Stack):
-        names = (action.u_G.items[0], action.onto)
-    else:
-        assert isinstance(action, StackGrasp)
-        names = (action.u_S.u_G.items[0], action.u_S.onto)
-    return [seen.by_name[name] for name in names if name in seen.by_name]
-
-
-def said(action: Action, seen: Table) -> str:
-    """Return what an action does with which piles, as `take cc|c`, `pull-grasp b to bu`, `stack u on b`."""
-    piles = [letters((item, *seen.load(item.name))) for item in meant(action, seen)]
-    if isinstance(action, Grasp):
-        return f"take {'|'.join(piles)}"
-    if isinstance(action, (Pull, PullGrasp)):
-        return f"{'pull' if isinstance(action, Pull) else 'pull-grasp'} {' to '.join(piles)}"
-    return f"{'stack' if isinstance(action, Stack) else 'stack-grasp'} {' on '.join(piles)}"
 
 
 def _rightly(item: Item, truth: Table) -> bool:

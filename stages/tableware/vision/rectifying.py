@@ -8,6 +8,7 @@ its pixels: patches between neighbours at like depth are filled, what no ray saw
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -146,8 +147,13 @@ def rectify(
     view = overhead_camera()
     world = points @ frame[:3, :3].T + frame[:3, 3]
     top, picture = _splatted(
-        world.astype(np.float64), depth.astype(np.float64), color, view.camera.fx, view.camera.cx, view.camera.cy,
-        float(view.world_from_camera[2, 3]), view.camera.height, view.camera.width,
+        world.astype(np.float64),
+        depth.astype(np.float64),
+        color,
+        _LooksDown(
+            view.camera.fx, view.camera.cx, view.camera.cy, float(view.world_from_camera[2, 3]), view.camera.height,
+            view.camera.width,
+        ),
     )  # fmt: skip
     seen = top > 0.0
     ground = seen & (np.abs(float(view.world_from_camera[2, 3]) - top) < THICKNESS)
@@ -205,13 +211,24 @@ def _workspace_frame(frame: np.ndarray, points: np.ndarray) -> tuple[np.ndarray,
     return move @ frame, sides, sides != (float(width), float(height))
 
 
+class _LooksDown(NamedTuple):
+    """A camera at height `above` [m]: focal length, principal point and size [px]."""
+
+    focal: float
+    cx: float
+    cy: float
+    above: float
+    rows: int
+    columns: int
+
+
 @njit(cache=True)
 def _splatted(
-    world: np.ndarray, depth: np.ndarray, color: np.ndarray, focal: float, cx: float, cy: float, above: float,
-    rows: int, columns: int,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Return (z-depth (rows, columns) [m], colour) from a camera at height `above` [m] that looks straight down:
-    patches between four neighbouring pixels are filled where their depths are alike; the highest point counts."""
+    world: np.ndarray, depth: np.ndarray, color: np.ndarray, camera: _LooksDown
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return (z-depth (rows, columns) [m], colour) from a camera that looks straight down: patches between four
+    neighbouring pixels are filled where their depths are alike; the highest point counts."""
+    focal, cx, cy, above, rows, columns = camera
     top = np.zeros((rows, columns))
     picture = np.zeros((rows, columns, 3), np.uint8)
     for r in range(depth.shape[0]):

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from stages.tableware.vision.height_map import HeightMap
-from stages.tableware.vision.rim_fitting import RAYS, fit_circle
+from stages.tableware.vision.rim_fitting import RAYS, SoughtLip, fit_circle
 from stages.tableware.vision.rim_votes import cast_votes
 from stages.tableware.world.items import DISHES, MEASURES, Kind
 
@@ -74,9 +74,8 @@ def fit_rim(heights: HeightMap, kind: Kind, u: float, v: float) -> Rim | None:
     """Return the rim of a kind near pixel (u, v), or None where heights do not bear it out."""
     measures = MEASURES[kind]
     low, high = LIPS[kind]
-    u, v, lip, support, radius = fit_circle(
-        heights.smooth, u, v, measures.rim_radius, low, high, heights.focal[0], heights.camera_height, RAYS
-    )
+    sought = SoughtLip(measures.rim_radius, low, high, heights.focal[0], heights.camera_height)
+    u, v, lip, support, radius = fit_circle(heights.smooth, u, v, sought, RAYS)
     if support < LEAST_SUPPORT:
         return None
     wall = (measures.rim_radius - measures.inner_radius(measures.height)) * float(heights.scale(lip))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -86,13 +88,24 @@ def _circle_shift(edge: np.ndarray, kept: np.ndarray, rays: np.ndarray) -> np.nd
     return shift
 
 
+class SoughtLip(NamedTuple):
+    """A lip of `rim_radius` [m] between heights `low` and `high` [m], seen with a focal length [px] from
+    `camera_height` [m]."""
+
+    rim_radius: float
+    low: float
+    high: float
+    focal: float
+    camera_height: float
+
+
 @njit(cache=True)
 def fit_circle(
-    smooth: np.ndarray, u: float, v: float, rim_radius: float, low: float, high: float,
-    focal: float, camera_height: float, rays: np.ndarray,
-) -> tuple[float, float, float, float, float]:  # fmt: skip
-    """Return (u, v [px], lip [m], support 0..1, radius [px]) of a lip of `rim_radius` [m]
-    between heights `low` and `high` [m] near pixel (u, v); support is 0 where heights do not bear one out."""
+    smooth: np.ndarray, u: float, v: float, sought: SoughtLip, rays: np.ndarray
+) -> tuple[float, float, float, float, float]:
+    """Return (u, v [px], lip [m], support 0..1, radius [px]) of a lip near pixel (u, v); support is 0 where heights do
+    not bear one out."""
+    rim_radius, low, high, focal, camera_height = sought
     count = len(rays)
     profile = np.empty((count, 2 * WINDOW + 1))
     found, kept = np.zeros(count, np.bool_), np.zeros(count, np.bool_)

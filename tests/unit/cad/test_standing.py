@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.panoptic_map import PanopticMap
-from stages.cad.arranging import stays_on
+from stages.cad.apart import stays_on
 from stages.cad.bearing import borne_share, shift_to_bearing
 from stages.cad.coloring import part_colors
 from stages.cad.conflicts import convex_solid, penetration

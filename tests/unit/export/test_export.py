@@ -22,8 +22,9 @@ from stages.engine.digests import content_digest, record_files
 from stages.engine.discovery import all_stages
 from stages.engine.runner import run_stage
 from stages.engine.verification import verify
+from stages.export.formats.tum import LARGEST_MILLIMETRES
+from stages.export.formats.tum.writer import depth_units, stamp_text
 from stages.export.parameters import ExportParameters, check
-from stages.export.tum import LARGEST_MILLIMETRES, depth_units, stamp_text
 from stages.kit.formats.frames import FrameReader
 from tests.unit.export.sequences import CAMERA, OTHER, export, png, write_sequence
 from tests.unit.ingest.tiny_room import camera_poses

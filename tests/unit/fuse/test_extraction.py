@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from stages.fuse.extraction import confidence_of, extract_entities, face_labels, label_of_segments
+from stages.fuse.extraction import (
+    ExtractionSettings,
+    confidence_of,
+    extract_entities,
+    face_labels,
+    label_of_segments,
+)
+from stages.fuse.merging import Grouping
 from stages.fuse.parts import absorb_pieces, absorb_specks, connected_parts, drop_far_parts, spread_labels
 from stages.fuse.surface import Surface
 from tests.unit.fuse.test_association import CHAIR, TABLE, counted
 
 THINGS = frozenset({CHAIR, TABLE})
+SETTINGS = ExtractionSettings(
+    minimum_share=0.15, minimum_voxels=3, minimum_observations=1, speck_share=0.0, part_distance=1.0
+)
 
 
 def strip(length: int, spacing: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
@@ -23,9 +35,9 @@ def strip(length: int, spacing: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
 
 def test_labels_of_segments() -> None:
     counts = counted((1, CHAIR, 1, 3), (2, TABLE, 5, 1), (4, TABLE, 5, 2))
-    classes, instances = label_of_segments(counts, {1: 3, 2: 10, 4: 10}, 5, 0.15)
+    classes, instances = label_of_segments(Grouping(counts, {}, {}), {1: 3, 2: 10, 4: 10}, 5, 0.15)
     assert classes.tolist() == [0, CHAIR, 0, 0, TABLE, 0] and instances.tolist() == [0, 1, 0, 0, 5, 0]
-    _, instances = label_of_segments(counts, {1: 3, 2: 10, 4: 10}, 5, 0.0)
+    _, instances = label_of_segments(Grouping(counts, {}, {}), {1: 3, 2: 10, 4: 10}, 5, 0.0)
     assert instances.tolist() == [0, 1, 5, 0, 5, 0], "the rule of the thesis: the background has no vote"
 
 
@@ -97,9 +109,8 @@ def test_entities_partition_the_surface() -> None:
     counts = counted((1, CHAIR, 4, 5), (2, CHAIR, 4, 5), (3, TABLE, 2, 5))
     seen = {4: 0b111, 2: 0b1}
     entities, labels = extract_entities(
-        surface, segment, counts, seen, {1: 5, 2: 5, 3: 5}, THINGS,
-        minimum_share=0.15, minimum_voxels=3, minimum_observations=1, speck_share=0.0, part_distance=1.0,
-    )  # fmt: skip
+        surface, segment, Grouping(counts, {}, seen), {1: 5, 2: 5, 3: 5}, THINGS, SETTINGS
+    )
     assert [(e.instance, e.class_id, e.segments, e.observations) for e in entities] == [
         (2, TABLE, (3,), 1),
         (4, CHAIR, (1, 2), 3),
@@ -107,10 +118,10 @@ def test_entities_partition_the_surface() -> None:
     assert sum(len(e.mesh.faces) for e in entities) == len(faces) - 2, "the two faces between them belong to neither"
     assert labels.instance.tolist() == [4] * 28 + [2] * 12
     assert labels.class_id.tolist() == [CHAIR] * 28 + [TABLE] * 12
+    settings = replace(SETTINGS, minimum_observations=2)
     entities, labels = extract_entities(
-        surface, segment, counts, seen, {1: 5, 2: 5, 3: 5}, THINGS,
-        minimum_share=0.15, minimum_voxels=3, minimum_observations=2, speck_share=0.0, part_distance=1.0,
-    )  # fmt: skip
+        surface, segment, Grouping(counts, {}, seen), {1: 5, 2: 5, 3: 5}, THINGS, settings
+    )
     assert [e.instance for e in entities] == [4] and labels.instance.tolist() == [4] * 28 + [0] * 12
 
 
@@ -160,9 +171,7 @@ def test_things_without_a_name_are_no_pieces_of_each_other(unnamed: int | None, 
     vertices, faces = strip(30)
     surface = Surface(vertices, faces, np.full((60, 3), 9, np.uint8), np.zeros(60, np.int32))
     segment = np.array([1] * 52 + [2] * 8, dtype=np.int32)
-    entities, _ = extract_entities(
-        surface, segment, counted((1, CHAIR, 4, 5), (2, CHAIR, 5, 5)), {4: 0b111, 5: 0b111}, {1: 5, 2: 5}, THINGS,
-        minimum_share=0.15, minimum_voxels=3, minimum_observations=1, speck_share=0.0, part_distance=1.0,
-        piece_share=0.2, unnamed=unnamed,
-    )  # fmt: skip
+    grouping = Grouping(counted((1, CHAIR, 4, 5), (2, CHAIR, 5, 5)), {}, {4: 0b111, 5: 0b111})
+    settings = replace(SETTINGS, piece_share=0.2, unnamed=unnamed)
+    entities, _ = extract_entities(surface, segment, grouping, {1: 5, 2: 5}, THINGS, settings)
     assert [entity.instance for entity in entities] == expected

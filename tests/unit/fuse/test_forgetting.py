@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.segments import FrameSegment
-from stages.fuse import mapping
+from stages.fuse import ours
 from stages.fuse.counts import TripleCounts
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.parameters import FuseParameters
@@ -58,9 +58,11 @@ def test_forgetting_pairs_undoes_observing(frames: list[list[int]], gone: int) -
 
 def test_a_camera_that_stands_still_fills_no_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every frame gives the wall another segment in a new place, which the next ones vote down."""
-    monkeypatch.setattr(mapping, "FIRST_FORGETTING", 30)
+    monkeypatch.setattr(ours, "FIRST_FORGETTING", 30)
     chair = class_id("chair")
-    mapper = PanopticMapper(FuseParameters(voxel_size=0.05), frozenset({chair}))
+    parameters = FuseParameters(voxel_size=0.05)
+    merging = ours.Ours(parameters, frozenset({chair}))
+    mapper = PanopticMapper(parameters, merging)
     depth = np.full((CAMERA.height, CAMERA.width), 1.5, dtype=np.float32)
     random = np.random.default_rng(0)
     for _ in range(150):
@@ -76,5 +78,5 @@ def test_a_camera_that_stands_still_fills_no_memory(monkeypatch: pytest.MonkeyPa
     assert roots.max() > 60, "labels were made all the time"
     held = set(roots[np.unique(mapper.blocks.segment[: mapper.blocks.count])].tolist())
     limit = max(30, 2 * len(held)) + 2
-    assert len(mapper.sightings) <= limit and len(mapper.counts.by_segment) <= limit
-    assert {label for pair in mapper.shared.apart for label in pair} <= set(mapper.sightings)
+    assert len(mapper.sightings) <= limit and len(merging.counts.by_segment) <= limit
+    assert {label for pair in merging.shared.apart for label in pair} <= set(mapper.sightings)

@@ -6,16 +6,20 @@ import numpy as np
 import pytest
 
 from stages.fuse.counts import TripleCounts
+from stages.fuse.merging import SharedSegment
+from stages.fuse.parameters import FuseParameters
 from stages.fuse.regularization import (
     MergedLabels,
     PairEvidence,
-    label_pairs,
     merge_evident_instances,
     merge_instances,
     merge_segments,
     merge_stuff,
+    pairs_of_one_class,
     shared_share,
 )
+from stages.fuse.separate import Separate
+from stages.fuse.thesis import Thesis
 from tests.unit.fuse.test_association import CHAIR, TABLE, counted
 
 WALL = 2
@@ -107,21 +111,29 @@ def test_contested_pairs_need_a_majority() -> None:
 
 
 @pytest.mark.parametrize(
-    ("class_id", "guarded", "expected"),
+    ("class_id", "expected"),
     [
-        (CHAIR, True, [(1, 4)]),  # the chair and what was never predicted
-        (TABLE, True, [(2, 4)]),
-        (0, True, []),  # a background segment joins nothing that was predicted
-        (0, False, [(1, 2), (1, 4), (2, 4)]),  # the thesis joins everything
+        (CHAIR, [(1, 4)]),  # the chair and what was never predicted
+        (TABLE, [(2, 4)]),
+        (0, []),  # a background segment joins nothing that was predicted
     ],
 )
-def test_which_labels_a_frame_segment_speaks_for(class_id: int, guarded: bool, expected: list[tuple[int, int]]) -> None:
+def test_which_labels_a_frame_segment_speaks_for(class_id: int, expected: list[tuple[int, int]]) -> None:
     counts = counted((1, CHAIR, 1, 5), (2, TABLE, 2, 5))
-    assert label_pairs([4, 1, 2], class_id, counts, guarded=guarded) == expected
+    assert pairs_of_one_class([4, 1, 2], class_id, counts) == expected
 
 
 def test_background_joins_what_was_never_predicted() -> None:
-    assert label_pairs([3, 4], 0, TripleCounts(), guarded=True) == [(3, 4)]
+    assert pairs_of_one_class([3, 4], 0, TripleCounts()) == [(3, 4)]
+
+
+@pytest.mark.parametrize("rule", [Thesis, Separate])
+def test_the_baselines_join_all_that_lies_in_one_segment(rule: type[Thesis] | type[Separate]) -> None:
+    merging = rule(FuseParameters(), frozenset({CHAIR, TABLE}))
+    merging.counts.add(1, CHAIR, 1, 5)
+    merging.counts.add(2, TABLE, 2, 5)
+    merging.observe_segments([SharedSegment(0, [4, 1, 2])], [1, 2, 4])
+    assert set(merging.shared.together) == {(1, 2), (1, 4), (2, 4)} and not merging.shared.apart
 
 
 def test_instances_that_frames_saw_as_one() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.graph.observed_box import observed_box, side_yaw, trimmed_extent
+from stages.graph.observed_box import BoxFit, observed_box, side_yaw, trimmed_extent
 from stages.kit.geometry.boxes import box_iou, box_yaw, gravity_aligned_box
 
 TRUE_YAW = 0.3
@@ -47,7 +47,7 @@ def test_a_corner_of_a_top_does_not_turn_the_box() -> None:
     points, normals = side_points(TRUE_YAW, ("front", "top"), random)
     local = points @ np.array([[np.cos(TRUE_YAW), -np.sin(TRUE_YAW)], [np.sin(TRUE_YAW), np.cos(TRUE_YAW)], [0, 0]])
     seen = (np.arange(len(points)) < 400) | (local[:, 0] / 0.6 + local[:, 1] / 0.4 < -0.35)
-    box, _ = observed_box(points[seen], normals[seen], stray_share=0.05, stray_distance=0.1, trim=0.01, side_share=0.5)
+    box, _ = observed_box(points[seen], normals[seen], BoxFit(0.05, 0.1, trim=0.01, side_share=0.5))
     assert abs((box_yaw(box) - TRUE_YAW + np.pi / 4) % (np.pi / 2) - np.pi / 4) < 0.03
 
 
@@ -58,9 +58,8 @@ def test_strays_within_reach_of_the_body_are_trimmed() -> None:
     cloud = np.concatenate([points, strays])
     directions = np.concatenate([normals, np.tile((0.0, 0.0, 1.0), (4, 1))])
     true = gravity_aligned_box((0, 0, 0), (0.6, 0.4, 0.3), TRUE_YAW)
-    options = {"stray_share": 0.05, "stray_distance": 0.2, "side_share": 0.5}
-    trimmed, _ = observed_box(cloud, directions, trim=0.01, **options)
-    stretched, _ = observed_box(cloud, directions, trim=0.0, **options)
+    trimmed, _ = observed_box(cloud, directions, BoxFit(0.05, 0.2, trim=0.01, side_share=0.5))
+    stretched, _ = observed_box(cloud, directions, BoxFit(0.05, 0.2, trim=0.0, side_share=0.5))
     assert box_iou(trimmed, true) > 0.9 > 0.6 > box_iou(stretched, true)
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stages.graph.observed_box import observed_box
+from stages.graph.observed_box import BoxFit, observed_box
 from stages.graph.round_footprint import round_footprint
 from stages.kit.geometry.boxes import box_yaw
 
@@ -73,9 +73,7 @@ def test_a_handle_turns_and_widens_the_box() -> None:
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     points = np.concatenate([points, handle]) @ turn.T
     normals = np.concatenate([normals, np.tile([0.0, 0.0, 1.0], (40, 1))]) @ turn.T
-    box, _ = observed_box(
-        points, normals, stray_share=0.05, stray_distance=0.1, trim=0.0, side_share=0.5, may_be_round=True
-    )
+    box, _ = observed_box(points, normals, BoxFit(0.05, 0.1, side_share=0.5, may_be_round=True))
     assert box_yaw(box) == pytest.approx(np.pi / 2, abs=0.05)
     assert box.size[:2] == pytest.approx([0.115, 0.08], abs=0.003)
     assert box.center[1] == pytest.approx((0.075 - 0.04) / 2, abs=0.002)
@@ -83,8 +81,7 @@ def test_a_handle_turns_and_widens_the_box() -> None:
 
 def test_half_a_bottle_gets_the_box_of_the_whole() -> None:
     points, normals = side_of_cylinder(0.035, 2.5, (0.5, 0.5))
-    options = {"stray_share": 0.05, "stray_distance": 0.1, "trim": 0.0, "side_share": 0.5}
-    whole, _ = observed_box(points, normals, **options, may_be_round=True)
-    seen, _ = observed_box(points, normals, **options)
+    whole, _ = observed_box(points, normals, BoxFit(0.05, 0.1, side_share=0.5, may_be_round=True))
+    seen, _ = observed_box(points, normals, BoxFit(0.05, 0.1, side_share=0.5))
     assert whole.size[:2] == pytest.approx([0.07, 0.07], abs=0.001)
     assert min(seen.size[:2]) < 0.06

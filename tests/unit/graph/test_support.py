@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 
 from schemas.scene_parts import SurfacePlane
+from stages.graph import thesis
+from stages.graph.corrected_support import candidates_for, hull_overlap, prefer_the_highest
 from stages.graph.nodes import Entity, Patch, is_horizontal, level_patch, plane_height
 from stages.graph.parameters import GraphParameters
 from stages.graph.support import (
     Candidate,
-    candidates_for,
     height_gap,
-    hull_overlap,
-    prefer_the_highest,
-    rectangle_overlap,
     support_score,
 )
 from stages.graph.touching import seam_share, smaller_share
@@ -70,10 +68,10 @@ def test_height_of_a_sloping_plane_is_taken_under_the_child():
 def test_rectangle_overlap_is_2_2_as_the_thesis_words_it():
     child = gravity_aligned_box((0.0, 0.0, 1.0), (2.0, 1.0, 1.0), 0.0)
     points = np.array([[-0.5, -0.5, 0.5], [0.5, 0.25, 0.5], [5.0, 5.0, 0.5]])
-    assert rectangle_overlap(points, child) == pytest.approx(1.0 * 0.75 / 2.0)
+    assert thesis.rectangle_overlap(points, child) == pytest.approx(1.0 * 0.75 / 2.0)
     turned = gravity_aligned_box((0.0, 0.0, 1.0), (2.0, 1.0, 1.0), np.pi / 2)
-    assert rectangle_overlap(np.array([[0.5, -1.0, 0], [-0.5, 1.0, 0]]), turned) == pytest.approx(1.0)
-    assert rectangle_overlap(points[2:], child) == 0.0
+    assert thesis.rectangle_overlap(np.array([[0.5, -1.0, 0], [-0.5, 1.0, 0]]), turned) == pytest.approx(1.0)
+    assert thesis.rectangle_overlap(points[2:], child) == 0.0
 
 
 def test_hull_overlap_spans_the_hole_under_the_child():
@@ -82,7 +80,7 @@ def test_hull_overlap_spans_the_hole_under_the_child():
     seen = grid[(np.abs(grid - 0.5).max(axis=1) > 0.22) & (grid[:, 1] < 0.95)]
     assert hull_overlap(SQUARE, child) == pytest.approx(1.0)
     # The camera looked along +y: nothing was seen inside the footprint.
-    assert rectangle_overlap(np.column_stack([seen, np.zeros(len(seen))]), child) < 0.5
+    assert thesis.rectangle_overlap(np.column_stack([seen, np.zeros(len(seen))]), child) < 0.5
     half_off = gravity_aligned_box((1.0, 0.5, 1.0), (0.4, 0.4, 1.0), 0.0)
     assert hull_overlap(SQUARE, half_off) == pytest.approx(0.5)
     assert hull_overlap(np.zeros((0, 2)), child) == 0.0
@@ -123,12 +121,12 @@ def test_a_plane_through_the_child_does_not_carry_it():
     table = solid("table_2", (0, 0, 0), (1, 1, 0.75), class_name="table", movable=False)
     chair = solid("chair_3", (0.3, 0.3, 0.5), (0.7, 0.7, 0.9), class_name="chair", movable=False)
     assert candidates_for(chair, [table, chair], GraphParameters()) == []
-    thesis = candidates_for(
+    baseline = thesis.candidates_for(
         chair,
         [entity("table_2", table.box, [Patch(table.patches[0].plane, SQUARE_3D, SQUARE)]), chair],
         GraphParameters(method="thesis"),
     )
-    assert thesis[0].parent == "table_2"
+    assert baseline[0].parent == "table_2"
 
 
 SQUARE_3D = np.column_stack([0.3 + 0.4 * SQUARE, np.full(4, 0.75)])
@@ -203,8 +201,8 @@ def test_a_board_lies_on_a_post_that_is_narrower_than_itself():
     assert smaller_share(board.box, post.box) == pytest.approx(1.0)
     best = candidates_for(board, [table, post, board], GraphParameters())[0]
     assert best.parent == "object_2" and best.hidden is not None
-    thesis = candidates_for(board, [table, post, board], GraphParameters(method="thesis"))
-    assert not [c for c in thesis if c.parent == "object_2"]
+    baseline = thesis.candidates_for(board, [table, post, board], GraphParameters(method="thesis"))
+    assert not [c for c in baseline if c.parent == "object_2"]
 
 
 @pytest.mark.parametrize(("gap", "parent"), [(0.0, "object_2"), (0.09, "object_2"), (0.13, "table_1")])

@@ -90,9 +90,9 @@ def test_what_did_not_change_is_not_looked_at_again(tmp_path, monkeypatch):
     looked = []
     honest = entities_module.load_entity
 
-    def counting(panoptic_map, entry, parameters, context):
+    def counting(panoptic_map, entry, method, parameters, context):
         looked.append(entry.instance)
-        return honest(panoptic_map, entry, parameters, context)
+        return honest(panoptic_map, entry, method, parameters, context)
 
     monkeypatch.setattr(entities_module, "load_entity", counting)
     meshes, classes = {1: floor_mesh(), 4: BOOK}, {1: "floor", 4: "book"}

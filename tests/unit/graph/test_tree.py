@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.contact_graph import SCENE_NODE
+from stages.graph.ours import Ours
 from stages.graph.parameters import GraphParameters
 from stages.graph.support import Candidate
-from stages.graph.tree import choose_parents, ranked_candidates
+from stages.graph.tree import choose_parents
 from tests.unit.graph.test_support import solid
 
 FLOOR = solid("floor_1", (-9, -9, -0.01), (9, 9, 0.0), class_name="floor", node_type="layout")
@@ -39,7 +40,7 @@ def stacks(draw):
 @settings(max_examples=60, deadline=None)
 def test_stacks_give_the_true_support_tree(scene):
     entities, parents = scene
-    chosen = choose_parents(ranked_candidates(entities, GraphParameters()))
+    chosen = choose_parents(Ours(GraphParameters()).ranked_candidates(entities))
     assert {name: candidate.parent for name, candidate in chosen.items()} == parents
     assert all(candidate.relation == "supports" for candidate in chosen.values())
 
@@ -58,7 +59,7 @@ def test_any_heap_of_boxes_gives_a_tree(seed, count):
         entities.append(
             solid(f"{kind}_{k + 1}", low, high, class_name=str(kind), node_type=node, movable=kind == "cup")
         )
-    chosen = choose_parents(ranked_candidates(entities, GraphParameters()))
+    chosen = choose_parents(Ours(GraphParameters()).ranked_candidates(entities))
     assert set(chosen) == {entity.name for entity in entities}
     for name in chosen:
         seen = {name}
@@ -102,7 +103,7 @@ def test_lists_without_a_way_out_are_refused():
 
 def test_nothing_below_and_no_wall_leaves_low_confidence():
     lonely = solid("box_2", (0, 0, 2.0), (0.3, 0.3, 2.2))
-    with_floor = choose_parents(ranked_candidates([FLOOR, lonely], GraphParameters()))["box_2"]
+    with_floor = choose_parents(Ours(GraphParameters()).ranked_candidates([FLOOR, lonely]))["box_2"]
     assert with_floor.parent == "floor_1" and with_floor.score <= 0.1
-    without = choose_parents(ranked_candidates([lonely], GraphParameters()))["box_2"]
+    without = choose_parents(Ours(GraphParameters()).ranked_candidates([lonely]))["box_2"]
     assert without.parent == SCENE_NODE and without.score <= 0.1

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from schemas.errors import BadInput
-from stages.ingest.layouts.files import natural_key
+from stages.ingest.folders.files import natural_key
 from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.trajectories import read_tum
 from tests.unit.ingest.running import ingest

@@ -457,7 +457,7 @@ def test_colmap_cameras_agree_with_the_library(tmp_path: Path, model: str, tail:
 def test_colmap_reader_agrees_with_the_library(tmp_path: Path) -> None:
     import pycolmap
 
-    from stages.ingest.layouts.colmap_model import read_model
+    from stages.ingest.layouts.colmap.model import read_model
 
     for binary in (True, False):
         log = write_colmap(tmp_path / str(binary), frames(4), binary=binary)

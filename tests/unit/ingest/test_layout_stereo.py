@@ -12,7 +12,7 @@ import pytest
 from schemas.errors import BadInput, UsageError
 from schemas.scene_parts import Camera
 from stages.ingest.detection import open_log
-from stages.ingest.layouts.image_folder import depth_of_disparity
+from stages.ingest.layouts.images.reader import depth_of_disparity
 from stages.ingest.parameters import IngestParameters
 from stages.kit.geometry.cameras import intrinsic_matrix, project
 from stages.kit.geometry.transforms import inverse, transform_from

@@ -5,14 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.kit.motion.base_placement import plan_drive, sample_bases
+from stages.kit.motion.base_placement import base_query, plan_drive, sample_bases
 from stages.kit.motion.collision import Collision, CollisionChecker
 from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.kinematics import arm_chain
+from stages.kit.motion.path_query import Effort, Query
+from stages.kit.motion.path_search import find_path
 from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
 from stages.kit.motion.timing import sample_times, time_path
 from stages.kit.simulation.robot_description import load_robot
 
 PANDA = load_robot("panda")
+CHAIN = arm_chain(PANDA)
+ARM = SearchSpace(CHAIN.lower, CHAIN.upper, np.full(7, 0.05))
+HOME = np.concatenate([[0.0, 0.0, 0.0], PANDA.carry])
+REACHING = np.array([0.8, 0.5, 0.2, -1.4, 0.1, 2.0, 0.5])
 SQUARE = SearchSpace(np.zeros(2), np.ones(2), np.full(2, 0.01))
 ROOM = (np.array([-2.5, -2.5]), np.array([2.5, 2.5]))
 
@@ -38,12 +45,29 @@ def test_rrt_goes_around_a_wall_and_every_point_is_free() -> None:
     assert length < 2.6  # the shortest way is about 1.8; smoothing must have worked
 
 
-def test_rrt_is_the_same_for_the_same_seed() -> None:
-    paths = [
-        rrt_connect(np.array([0.1, 0.1]), np.array([0.9, 0.1]), wall_with_gap, SQUARE, np.random.default_rng(5))
-        for _ in range(2)
-    ]
-    np.testing.assert_array_equal(paths[0], paths[1])
+def test_rrt_is_the_same_for_the_same_seed_whatever_was_searched_before() -> None:
+    def path(seed: int) -> np.ndarray:
+        start, goal = np.array([0.1, 0.1]), np.array([0.9, 0.1])
+        return rrt_connect(start, goal, wall_with_gap, SQUARE, np.random.default_rng(seed))
+
+    first = path(5)
+    assert not np.array_equal(path(6), first)
+    np.testing.assert_array_equal(path(5), first)
+
+
+def test_what_the_check_raises_leaves_the_search() -> None:
+    class Stop(Exception):
+        pass
+
+    left = iter(range(60))
+
+    def check(point: np.ndarray) -> Collision | None:
+        if next(left, None) is None:
+            raise Stop
+        return wall_with_gap(point)
+
+    with pytest.raises(Stop):
+        rrt_connect(np.array([0.1, 0.1]), np.array([0.9, 0.1]), check, SQUARE, np.random.default_rng(0))
 
 
 def test_typed_failures() -> None:
@@ -66,6 +90,55 @@ def test_typed_failures() -> None:
     failure = raised.value.failure
     assert failure.kind == "joint_limit"
     assert failure.numbers["outside"] == pytest.approx(0.2)
+
+
+def arm_query(goal: np.ndarray, start: np.ndarray = HOME) -> Query:
+    return Query(start, np.arange(3, 10), start[3:], goal[None], ARM)
+
+
+def test_an_arm_query_ends_free_at_its_goal(checker: CollisionChecker) -> None:
+    query, effort = arm_query(REACHING), Effort()
+    first = find_path(query, checker, np.random.default_rng(3), effort=effort)
+    np.testing.assert_array_equal(find_path(query, checker, np.random.default_rng(3)), first)
+    np.testing.assert_array_equal(first[[0, -1]], [PANDA.carry, REACHING])
+    assert all(checker.check_meshes(query.whole(row)) is None for row in densify(first, np.full(7, 0.02)))
+    assert effort.mesh_checks > 0
+
+
+def test_failures_of_a_query_have_kinds_and_numbers(checker: CollisionChecker) -> None:
+    def failure(query: Query, samples: int = 2000):  # type: ignore[no-untyped-def]
+        with pytest.raises(MotionFailed) as raised:
+            find_path(query, checker, np.random.default_rng(0), samples=samples)
+        return raised.value.failure
+
+    beyond = REACHING.copy()
+    beyond[3] = 0.1
+    found = failure(arm_query(beyond))
+    assert (found.kind, found.numbers["joint"]) == ("joint_limit", 3)
+    assert found.numbers["outside"] == pytest.approx(0.1698)
+
+    found = failure(arm_query(REACHING, np.concatenate([[0.69, 0.9, 0.0], PANDA.carry])))
+    assert found.kind == "start_in_collision"
+    assert found.objects[-1].startswith("fridge_2")
+    assert found.numbers["depth"] > 0.05
+
+    found = failure(arm_query(np.array([0.0, -1.7, 0.0, -3.05, 0.0, 1.0, 0.0])))
+    assert found.kind == "goal_in_collision"
+    assert found.numbers["depth"] > 0
+
+    drive = base_query(np.array([-1.3, 0.0, 0.0]), np.array([-1.3, -2.0, 1.0]), PANDA.carry, ROOM)
+    found = failure(drive, samples=1)
+    assert (found.kind, found.objects, found.numbers["samples"]) == ("no_path", ("table_3",), 1)
+
+
+def test_what_an_earlier_search_took_is_no_part_of_the_budget(checker: CollisionChecker) -> None:
+    query = base_query(np.array([-1.3, 0.0, 0.0]), np.array([-1.3, -2.0, 1.0]), PANDA.carry, ROOM)
+    fresh, used = Effort(), Effort(samples=5000, rejected=9)
+    paths = [find_path(query, checker, np.random.default_rng(0), samples=500, effort=entry) for entry in (fresh, used)]
+    np.testing.assert_array_equal(*paths)
+    assert (used.samples, used.rejected) == (5000 + fresh.samples, 9)
+    assert 0 < fresh.samples < 500
+    assert not used.by_meshes
 
 
 def test_the_checker_names_what_is_hit(checker: CollisionChecker) -> None:

@@ -14,8 +14,8 @@ from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
 from stages.plan import conduct as conduct_module
-from stages.plan import refinement
-from stages.plan.conduct import MOST_TILT, Conduct, Room
+from stages.plan.actions.place import MOST_TILT, Place
+from stages.plan.conduct import Conduct, Room
 from stages.plan.motions import Manipulation
 from stages.plan.pick_place import Budgets
 from stages.plan.refinement import Step
@@ -208,8 +208,8 @@ class Tries(Conduct):
 
 @pytest.fixture
 def tries(monkeypatch: pytest.MonkeyPatch) -> Tries:
-    def refine(model, state, name, arguments, *_):  # type: ignore[no-untyped-def]
-        return [act(name, *arguments)], RobotState(state.base + 10.0, state.arm, state.holding)
+    def refine(model, state, name, request, origin):  # type: ignore[no-untyped-def]
+        return [act(name, *request.arguments)], RobotState(state.base + 10.0, state.arm, state.holding)
 
     monkeypatch.setattr(conduct_module, "refine_action", refine)
     monkeypatch.setattr(conduct_module, "grasp_style", lambda *_: "any")
@@ -265,7 +265,7 @@ def test_a_tray_lost_while_it_is_levelled_is_a_failed_action_and_no_crash(
         raise MotionFailed("grasp_lost", "it slipped")
 
     tries.model.laden = lambda name: True  # type: ignore[method-assign]
-    monkeypatch.setattr(tries, "_level", lose)
+    monkeypatch.setattr(tries, "level", lose)
     after, done = tries._act(START, [act("pick", "tray", "desk")], "start", 0, [])
     assert not done and after is not None and float(after.base[0]) == 9.0  # back along the way
     assert [failure.kind for failure in tries.failures] == ["grasp_lost"]
@@ -315,7 +315,6 @@ def lying() -> np.ndarray:
 
 def test_what_stands_where_it_was_put_is_left_alone(looking: Conduct) -> None:
     put(looking.physical.world, transform_from_yaw(0.5, ON_TABLE))
-    looking._check_place("bottle_7", "table_3")
     looking._check_effect("place", ("bottle_7", "table_3"))
     looking._check_effect("pick", ("bottle_7", "fridge_2"))  # of a pick there is nothing to see here
 
@@ -333,13 +332,13 @@ def test_what_is_on_nothing_is_a_failure(looking: Conduct) -> None:
     looking.physical.world.set_pose("bottle_7", transform_from_yaw(0.0, ON_TABLE + [0.0, 0.0, 0.3]))
     looking.physical.world.step(2)
     with pytest.raises(MotionFailed, match="is now on nothing"):
-        looking._check_place("bottle_7", "table_3")
+        looking._check_effect("place", ("bottle_7", "table_3"))
 
 
 def test_what_fell_over_is_a_failure(looking: Conduct) -> None:
     put(looking.physical.world, lying())
     with pytest.raises(MotionFailed, match="on table_3, 90 degrees") as raised:
-        looking._check_place("bottle_7", "table_3")
+        looking._check_effect("place", ("bottle_7", "table_3"))
     assert raised.value.failure.numbers["tilt"] == pytest.approx(np.pi / 2, abs=0.02)
     assert raised.value.failure.numbers["tilt"] > MOST_TILT
 
@@ -350,15 +349,15 @@ def test_what_was_upside_down_or_lying_is_put_down_so(looking: Conduct) -> None:
     fallen = tuple(tuple(row) for row in lying().tolist())
     looking.model.records["bottle_7"] = record.model_copy(update={"world_from_body": fallen})
     put(looking.physical.world, lying())
-    looking._check_place("bottle_7", "table_3")
+    looking._check_effect("place", ("bottle_7", "table_3"))
     over = transform_from_yaw(0.3, ON_TABLE + [0.0, 0.0, 0.2]) @ np.diag([1.0, -1.0, -1.0, 1.0])
     upside_down = tuple(tuple(row) for row in over.tolist())
     looking.model.records["bottle_7"] = record.model_copy(update={"world_from_body": upside_down})
     put(looking.physical.world, over)
-    looking._check_place("bottle_7", "table_3")
+    looking._check_effect("place", ("bottle_7", "table_3"))
     put(looking.physical.world, transform_from_yaw(0.0, ON_TABLE))
     with pytest.raises(MotionFailed, match="180 degrees"):
-        looking._check_place("bottle_7", "table_3")
+        looking._check_effect("place", ("bottle_7", "table_3"))
 
 
 def test_a_look_around_sees_what_moves(looking: Conduct) -> None:
@@ -414,11 +413,11 @@ def test_a_place_without_a_motion_leaves_the_load_on_its_tray(
     """The second attempt has to carry as level as the first."""
     laden = []
 
-    def refuse(model, *_):  # type: ignore[no-untyped-def]
+    def refuse(self, model, *_):  # type: ignore[no-untyped-def]
         laden.append(model.laden("bottle_7"))
         raise MotionFailed("no_path", "no way")
 
-    monkeypatch.setattr(refinement, "manipulate", refuse)
+    monkeypatch.setattr(Place, "manipulate", refuse)
     carrying.attempts = 3
     carrying._anchor = lambda step: None  # type: ignore[method-assign]
     after, done = carrying._act(HOLDING, [act("place", "bottle_7", "table_3")], "start", 0, [])

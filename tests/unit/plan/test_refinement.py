@@ -14,12 +14,13 @@ from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.rrt_connect import densify
 from stages.kit.simulation.robot_description import load_robot
+from stages.plan.action import MotionRequest
 from stages.plan.door_motion import plan_close
 from stages.plan.goals import default_goals
 from stages.plan.pick_place import Budgets, plan_pick
-from stages.plan.refinement import hold_for_checks, plan_and_refine, refine_action
+from stages.plan.refinement import SearchSettings, plan_and_refine, refine_action
 from stages.plan.symbols import DOMAIN, parse_goal, symbolic_state, task_problem
-from stages.plan.world_model import RobotState, WorldModel
+from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
 from tests.unit.simulation.handmade_scene import HandmadeBody, kitchen, write_scene
 
 PANDA = load_robot("panda")
@@ -77,7 +78,7 @@ def test_every_motion_of_a_refined_plan_is_free_of_collision(
     goal, _ = parse_goal(("on(bottle_7, table_3)",), objects)
     attempt = plan_and_refine(
         model, START, DOMAIN, task_problem(objects, initial, goal), BUDGETS, np.random.default_rng(0),
-        heuristic="add", task_attempts=2, refinement_attempts=3,
+        SearchSettings("add", task_attempts=2, refinement_attempts=3),
     )  # fmt: skip
     assert attempt.steps is not None
     assert [step.name for step in attempt.steps] == ["drive", "pick", "drive", "place"]
@@ -156,7 +157,13 @@ def test_a_robot_walled_in_cannot_drive(tmp_path: Path) -> None:
     model, _ = model_of(tmp_path, [*kitchen(), cage])
     try:
         with pytest.raises(MotionFailed) as raised:
-            refine_action(model, START, "pick", ("bottle_7", "fridge_2"), "start", BUDGETS, np.random.default_rng(0))
+            refine_action(
+                model,
+                START,
+                "pick",
+                MotionRequest(("bottle_7", "fridge_2"), BUDGETS, np.random.default_rng(0)),
+                "start",
+            )
         assert model.checker.carried is None
     finally:
         model.close()
@@ -191,7 +198,7 @@ def test_what_the_hand_cannot_take_is_known_before_any_geometry(tmp_path: Path) 
         goal, _ = parse_goal(("holding(box_9)",), objects)
         attempt = plan_and_refine(
             model, START, DOMAIN, task_problem(objects, initial, goal), BUDGETS, np.random.default_rng(0),
-            heuristic="add", task_attempts=3, refinement_attempts=2,
+            SearchSettings("add", task_attempts=3, refinement_attempts=2),
         )  # fmt: skip
     finally:
         model.close()

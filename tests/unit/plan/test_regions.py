@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 import trimesh
 
 from schemas.scene_parts import Joint
-from stages.plan.regions import OPEN_AIR, find_regions
+from stages.plan.regions import OPEN_AIR, Region, find_regions
 
 SLIDE = Joint(
     name="chest__slide", type="prismatic", part="chest__drawer", origin=(0, 0, 0), axis=(0, -1, 0), lower=0, upper=0.3
@@ -17,7 +15,7 @@ SLIDE = Joint(
 RAIL = ((-0.25, -0.21, 0.3), (0.25, -0.19, 0.4))
 
 
-def chest(rail: bool) -> SimpleNamespace:
+def chest(rail: bool) -> tuple[Region, ...]:
     """A top board 0.29 m over a drawer's bottom, and a rail over its front that leaves 0.19 m."""
     body = [((-0.25, -0.2, 0.4), (0.25, 0.2, 0.42)), *([RAIL] if rail else [])]
     parts = {"chest": body, "chest__drawer": [((-0.24, -0.19, 0.1), (0.24, 0.19, 0.11))]}
@@ -25,15 +23,11 @@ def chest(rail: bool) -> SimpleNamespace:
         link: trimesh.util.concatenate([trimesh.creation.box(bounds=bounds) for bounds in boxes])
         for link, boxes in parts.items()
     }
-    return SimpleNamespace(
-        records={"chest": SimpleNamespace(joints=(SLIDE,))},
-        shaped_links=lambda name: tuple(meshes),
-        part_mesh=lambda name, link: meshes[link].copy(),
-    )
+    return find_regions("chest", [SLIDE], meshes)
 
 
-def drawer_of(model):
-    return next(region for region in find_regions(model, "chest") if region.link == "chest__drawer")
+def drawer_of(regions: tuple[Region, ...]) -> Region:
+    return next(region for region in regions if region.link == "chest__drawer")
 
 
 def test_what_stands_in_a_drawer_passes_under_the_rail():
@@ -53,5 +47,5 @@ def test_without_a_rail_the_top_alone_counts():
 
 
 def test_the_top_is_open_air():
-    top = next(region for region in find_regions(chest(rail=False), "chest") if region.link == "chest")
+    top = next(region for region in chest(rail=False) if region.link == "chest")
     assert top.clearance == OPEN_AIR and top.level == pytest.approx(0.42) and top.doors == ()

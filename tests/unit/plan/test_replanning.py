@@ -13,9 +13,11 @@ from schemas.plan import Failure, TriedPlan
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.tasks.strips import Problem
+from stages.plan.believed_tree import TreeState
+from stages.plan.carriers import HAND, NOTHING
 from stages.plan.refinement import Attempt, Step
 from stages.plan.replanning import Replanning, in_the_middle
-from stages.plan.tree_state import HAND, NOTHING, TreeState, start_state
+from stages.plan.tree_state import start_state
 from stages.plan.world_model import RobotState, WorldModel
 
 FIRST = frozenset({

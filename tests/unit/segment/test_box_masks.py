@@ -8,11 +8,11 @@ import pytest
 from schemas.scene_parts import Camera
 from schemas.vocabulary import load_vocabulary
 from stages.kit.geometry.transforms import look_at
-from stages.segment.backend_detector import Found, merge_duplicates, paint
-from stages.segment.box_masks import FrameGeometry, box_mask, frame_geometry
+from stages.segment.backends.detector.backend import Thing, merge_duplicates, paint
+from stages.segment.backends.detector.box_masks import FrameGeometry, box_mask, frame_geometry
+from stages.segment.backends.detector.plausibility import extent_of, is_plausible
+from stages.segment.backends.detector.room import find_floor, find_room, find_walls, room_masks, sample_surface
 from stages.segment.geometric import segment_depth
-from stages.segment.plausibility import extent_of, is_plausible
-from stages.segment.room import find_floor, find_room, find_walls, room_masks, sample_surface
 from tests.unit.segment.scenes import combine
 
 VOCABULARY = load_vocabulary()
@@ -186,18 +186,18 @@ def rectangle(top: int, left: int, bottom: int, right: int) -> np.ndarray:
 def test_duplicates_are_merged_and_small_things_painted_on_top() -> None:
     chair, cup, table = (VOCABULARY.by_name(name) for name in ("chair", "cup", "table"))
     back, whole = rectangle(0, 0, 40, 40), rectangle(10, 0, 80, 40)
-    merged = merge_duplicates([Found(chair, 0.5, whole), Found(chair, 0.7, back)])
+    merged = merge_duplicates([Thing(chair, 0.5, whole), Thing(chair, 0.7, back)])
     assert len(merged) == 1 and merged[0].score == 0.7 and (merged[0].mask == (back | whole)).all()
-    apart = merge_duplicates([Found(chair, 0.5, back), Found(chair, 0.7, rectangle(60, 60, 90, 90))])
+    apart = merge_duplicates([Thing(chair, 0.5, back), Thing(chair, 0.7, rectangle(60, 60, 90, 90))])
     assert len(apart) == 2
-    contest = merge_duplicates([Found(cup, 0.4, back), Found(chair, 0.6, back)])
+    contest = merge_duplicates([Thing(cup, 0.4, back), Thing(chair, 0.6, back)])
     assert [item.semantic.name for item in contest] == ["chair"]
-    unnamed = Found(VOCABULARY.by_name("object"), 0.9, back)
-    assert [item.semantic.name for item in merge_duplicates([unnamed, Found(chair, 0.4, back)])] == ["chair"]
+    unnamed = Thing(VOCABULARY.by_name("object"), 0.9, back)
+    assert [item.semantic.name for item in merge_duplicates([unnamed, Thing(chair, 0.4, back)])] == ["chair"]
     small, large = rectangle(20, 20, 30, 30), rectangle(0, 0, 100, 100)
     layout = {"floor": rectangle(50, 0, 120, 160)}
     frame = paint(
-        layout, [Found(cup, 0.4, small), Found(table, 0.9, large)], {"floor": VOCABULARY.by_name("floor")}, (120, 160)
+        layout, [Thing(cup, 0.4, small), Thing(table, 0.9, large)], {"floor": VOCABULARY.by_name("floor")}, (120, 160)
     )
     names = {VOCABULARY.by_id(mask.category_id).name: number for number, mask in frame.masks.items()}
     assert frame.ids[25, 25] == names["cup"] and frame.ids[5, 5] == names["table"]

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.segment.corruption import CorruptionRates, corrupt, displace_boundaries, rates_of_level
+from stages.segment.backends.ground_truth.corruption import (
+    CorruptionRates,
+    corrupt,
+    displace_boundaries,
+    rates_of_level,
+)
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
 CLASSES = {True: (4, 5, 17), False: (1, 2)}

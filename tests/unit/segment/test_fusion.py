@@ -10,23 +10,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from stages.segment import fusion_ours, fusion_thesis
 from stages.segment.claims import claim_unlabelled
 from stages.segment.clustering import clouds_touch, largest_cluster
 from stages.segment.fusion import (
+    FusionRule,
     FusionSettings,
     far_from_instance,
-    fuse,
-    has_core,
     majority_labels,
     overlap_table,
-    reach_of,
     split_contained,
 )
+from stages.segment.fusion_ours import has_core, reach_of
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
 HEIGHT, WIDTH = 480, 640
-THESIS = FusionSettings(rule="thesis")
-OURS = FusionSettings()
+SETTINGS = FusionSettings()
 THING = PanopticMask(category_id=17, is_thing=True, score=0.9)
 OTHER = PanopticMask(category_id=5, is_thing=True, score=0.8)
 STUFF = PanopticMask(category_id=1, is_thing=False)
@@ -57,13 +56,13 @@ def test_overlap_table_counts_pixels() -> None:
     assert table[1, 3] == 50 and table[2, 3] == 50 and table[1, 0] == 50 and table.sum() == HEIGHT * WIDTH
 
 
-@pytest.mark.parametrize("settings", [THESIS, OURS])
-def test_a_contained_mask_is_split_out(settings: FusionSettings) -> None:
+@pytest.mark.parametrize("fuse", [fusion_thesis.fuse, fusion_ours.fuse])
+def test_a_contained_mask_is_split_out(fuse: FusionRule) -> None:
     """The keyboard of figure 2.2: flat on the desk, no crease, yet recognised."""
     geometric = image((1, 200, 100, 400, 500))
     keyboard = (2, 280, 250, 320, 350)
     panoptic = PanopticFrame(image((1, 200, 100, 400, 500), keyboard), {1: OTHER, 2: THING})
-    fused = fuse(geometric, panoptic, points(), settings)
+    fused = fuse(geometric, panoptic, points(), SETTINGS)
     assert np.array_equal(by_category(fused, 17), image((1, *keyboard[1:])) == 1)
     assert by_category(fused, 5).sum() == 200 * 400 - 40 * 100
     assert sorted(segment.instance for segment in fused.segments) == [1, 2]
@@ -101,7 +100,7 @@ def test_majority_takes_the_larger_share_and_ties_the_smaller_id() -> None:
 def test_geometry_completes_a_mask() -> None:
     geometric = image((1, 100, 100, 300, 300))
     panoptic = PanopticFrame(image((1, 100, 100, 300, 220)), {1: THING})
-    fused = fuse(geometric, panoptic, points(), THESIS)
+    fused = fusion_thesis.fuse(geometric, panoptic, points(), SETTINGS)
     assert by_category(fused, 17).sum() == 200 * 200
 
 
@@ -110,18 +109,18 @@ def test_far_background_leaves_the_instance() -> None:
     geometric = image((1, 100, 100, 300, 200), (2, 100, 200, 200, 300))
     depth = np.where(geometric == 2, 3.0, 1.0)
     panoptic = PanopticFrame(image((1, 100, 100, 300, 300)), {1: THING})
-    fused = fuse(geometric, panoptic, points(depth), THESIS)
+    fused = fusion_thesis.fuse(geometric, panoptic, points(depth), SETTINGS)
     assert np.array_equal(by_category(fused, 17), geometric == 1)
     background = [segment for segment in fused.segments if segment.category_id == 0]
     assert len(background) == 1 and background[0].instance == 0 and background[0].area == 100 * 100
-    near = fuse(geometric, panoptic, points(np.where(geometric == 2, 1.04, 1.0)), THESIS)
+    near = fusion_thesis.fuse(geometric, panoptic, points(np.where(geometric == 2, 1.04, 1.0)), SETTINGS)
     assert by_category(near, 17).sum() == 200 * 100 + 100 * 100
 
 
 def test_stuff_is_not_clustered() -> None:
     geometric = image((1, 100, 100, 300, 200), (2, 100, 400, 300, 500))
     panoptic = PanopticFrame(image((1, 100, 100, 300, 500)), {1: STUFF})
-    fused = fuse(geometric, panoptic, points(), THESIS)
+    fused = fusion_thesis.fuse(geometric, panoptic, points(), SETTINGS)
     assert by_category(fused, 1).sum() == 2 * 200 * 100
     assert {segment.instance for segment in fused.segments} == {1}
 
@@ -158,16 +157,17 @@ def test_small_segments() -> None:
     geometric = image((1, 100, 100, 300, 300), small)
     cup = PanopticFrame(image((1, *small[1:])), {1: THING})
     nothing = PanopticFrame(image(), {})
-    assert not fuse(geometric, cup, points(), THESIS).ids[10:30, 10:49].any(), "the thesis discards it"
-    assert by_category(fuse(geometric, cup, points(), OURS), 17).sum() == 780
-    assert not fuse(geometric, nothing, points(), OURS).ids[10:30, 10:49].any()
-    assert fuse(geometric, nothing, points(), replace(THESIS, minimum_pixels=780)).ids[10:30, 10:49].all()
+    assert not fusion_thesis.fuse(geometric, cup, points(), SETTINGS).ids[10:30, 10:49].any(), "the thesis discards it"
+    assert by_category(fusion_ours.fuse(geometric, cup, points(), SETTINGS), 17).sum() == 780
+    assert not fusion_ours.fuse(geometric, nothing, points(), SETTINGS).ids[10:30, 10:49].any()
+    lower = replace(SETTINGS, minimum_pixels=780)
+    assert fusion_thesis.fuse(geometric, nothing, points(), lower).ids[10:30, 10:49].all()
 
 
 def test_two_things_without_a_crease() -> None:
     geometric = image((1, 100, 100, 300, 500), (2, 100, 500, 300, 560))
     panoptic = PanopticFrame(image((1, 100, 100, 300, 320), (2, 100, 320, 300, 560)), {1: THING, 2: OTHER})
-    thesis, ours = (fuse(geometric, panoptic, points(), settings) for settings in (THESIS, OURS))
+    thesis, ours = (rule.fuse(geometric, panoptic, points(), SETTINGS) for rule in (fusion_thesis, fusion_ours))
     assert by_category(thesis, 17).sum() == 200 * 400, "three quarters of the second mask are not contained"
     assert by_category(ours, 17).sum() == 200 * 220 and by_category(ours, 5).sum() == 200 * 240
 
@@ -177,7 +177,7 @@ def test_ours_gives_a_mask_the_pixels_that_no_segment_holds() -> None:
     geometric = image((1, 200, 100, 400, 500))
     panoptic = PanopticFrame(image((1, 200, 100, 400, 500), (2, 170, 200, 200, 230)), {1: OTHER, 2: THING})
     depth = np.where(image((1, 170, 222, 200, 230)) == 1, 3.0, 1.0)
-    ours, thesis = (fuse(geometric, panoptic, points(depth), settings) for settings in (OURS, THESIS))
+    ours, thesis = (rule.fuse(geometric, panoptic, points(depth), SETTINGS) for rule in (fusion_ours, fusion_thesis))
     assert not by_category(thesis, 17).any()
     assert np.array_equal(by_category(ours, 17), image((1, 170, 200, 200, 222)) == 1)
     assert by_category(ours, 0)[170:200, 222:230].all(), "the far part is background"
@@ -200,19 +200,19 @@ def test_mask_pixels_without_depth_do_not_count() -> None:
     depth = np.where(geometric == 1, 1.0, 0.0)
     # A third of the mask lies where there is no depth: of what has depth, all is inside.
     panoptic = PanopticFrame(image((1, 150, 80, 200, 140)), {1: THING})
-    fused = fuse(geometric, panoptic, points(depth), THESIS)
+    fused = fusion_thesis.fuse(geometric, panoptic, points(depth), SETTINGS)
     assert by_category(fused, 17).sum() == 50 * 40
 
 
 def test_an_empty_frame() -> None:
-    fused = fuse(image(), PanopticFrame(image(), {}), points(0.0), OURS)
+    fused = fusion_ours.fuse(image(), PanopticFrame(image(), {}), points(0.0), SETTINGS)
     assert not fused.ids.any() and fused.segments == ()
 
 
 def test_ids_are_numbered_in_order_and_areas_add_up() -> None:
     geometric = image((7, 300, 0, 480, 640), (3, 0, 0, 200, 300), (5, 0, 300, 200, 640))
     panoptic = PanopticFrame(image((4, 0, 0, 200, 640), (2, 300, 0, 480, 640)), {4: THING, 2: STUFF})
-    fused = fuse(geometric, panoptic, points(), OURS)
+    fused = fusion_ours.fuse(geometric, panoptic, points(), SETTINGS)
     assert [segment.id for segment in fused.segments] == [1, 2, 3]
     assert fused.ids[0, 0] == 1 and fused.ids[0, 639] == 2 and fused.ids[479, 0] == 3
     assert [segment.instance for segment in fused.segments] == [1, 1, 2]
@@ -222,9 +222,9 @@ def test_ids_are_numbered_in_order_and_areas_add_up() -> None:
 def test_pixel_counts_follow_the_area_of_the_image() -> None:
     geometric = image((1, 100, 100, 128, 128))[::2, ::2]  # 784 pixels become 196, the limit 800 becomes 200
     nothing = PanopticFrame(np.zeros_like(geometric), {})
-    assert not fuse(geometric, nothing, points()[::2, ::2], THESIS).ids.any()
+    assert not fusion_thesis.fuse(geometric, nothing, points()[::2, ::2], SETTINGS).ids.any()
     larger = image((1, 100, 100, 130, 130))[::2, ::2]  # 900 become 225
-    assert (fuse(larger, nothing, points()[::2, ::2], THESIS).ids > 0).sum() == 225
+    assert (fusion_thesis.fuse(larger, nothing, points()[::2, ::2], SETTINGS).ids > 0).sum() == 225
 
 
 def test_a_rim_has_no_core_and_a_patch_has() -> None:
@@ -241,9 +241,10 @@ def test_the_foot_of_a_monitor_leaves_the_desk_and_a_rim_does_not() -> None:
     geometric = image(desk, screen)
     for foot, leaves in (((2, 260, 290, 275, 350), True), ((2, 240, 200, 243, 440), False)):
         panoptic = PanopticFrame(image(desk, screen, foot), {1: OTHER, 2: THING})
-        found = by_category(fuse(geometric, panoptic, points(), OURS), 17)
+        found = by_category(fusion_ours.fuse(geometric, panoptic, points(), SETTINGS), 17)
         assert found[foot[1] + 1, foot[2] + 20] == leaves, foot
-        assert not by_category(fuse(geometric, panoptic, points(), THESIS), 17)[foot[1] + 1, foot[2] + 20]
+        thesis = by_category(fusion_thesis.fuse(geometric, panoptic, points(), SETTINGS), 17)
+        assert not thesis[foot[1] + 1, foot[2] + 20]
 
 
 def test_parts_may_lie_as_far_apart_as_the_thing_is_large() -> None:
@@ -257,5 +258,5 @@ def test_the_foot_of_a_lamp_stays_with_its_shade() -> None:
     shade, foot = (1, 100, 270, 200, 370), (2, 240, 290, 270, 350)
     geometric = image(shade, foot)
     panoptic = PanopticFrame(np.where(geometric > 0, 1, 0).astype(np.int32), {1: THING})
-    assert by_category(fuse(geometric, panoptic, points(), OURS), 17)[255, 320]
-    assert not by_category(fuse(geometric, panoptic, points(), THESIS), 17)[255, 320]
+    assert by_category(fusion_ours.fuse(geometric, panoptic, points(), SETTINGS), 17)[255, 320]
+    assert not by_category(fusion_thesis.fuse(geometric, panoptic, points(), SETTINGS), 17)[255, 320]

@@ -16,11 +16,11 @@ from schemas.vocabulary import load_vocabulary
 from stages.engine.hub_cache import is_hub_id
 from stages.engine.model_cache import resolve_weights
 from stages.kit.formats.frames import Frame
+from stages.segment.backends.huggingface import panoptic
+from stages.segment.backends.huggingface.backend import HuggingFaceSettings, make_backend
+from stages.segment.backends.huggingface.loading import short_name
+from stages.segment.backends.huggingface.open_vocabulary import make_prompts, word_scores
 from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.huggingface import panoptic
-from stages.segment.huggingface.backend import make_backend
-from stages.segment.huggingface.loading import short_name
-from stages.segment.huggingface.open_vocabulary import make_prompts, word_scores
 from stages.segment.labels import LabelSet, parse_words
 from stages.segment.parameters import SegmentParameters
 from tests.unit.segment import tiny_models
@@ -42,13 +42,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 def backend(weights: Path | None, **options: Any) -> Any:
-    given = {
-        "mask_weights": None, "labels": None, "words": "", "score_threshold": 0.01, "suppression_overlap": 0.5,
-        "minimum_pixels": 60, "device": "cpu", **options,
-    }  # fmt: skip
-    return make_backend(
-        weights, given.pop("mask_weights"), given.pop("labels"), given.pop("words"), VOCABULARY, **given
-    )
+    return make_backend(weights, HuggingFaceSettings(**{"score_threshold": 0.01, **options}), VOCABULARY)
 
 
 def segmenter_of(made: Any) -> Any:

@@ -12,10 +12,10 @@ import pytest
 from schemas.errors import BadInput, MissingDependency
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.frames import Frame
+from stages.segment.backends.onnx.decoding import _pasted
+from stages.segment.backends.onnx.network import fit
+from stages.segment.backends.onnx.sidecar import Sidecar, find_layout, read_sidecar
 from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.onnx.decoding import _pasted
-from stages.segment.onnx.network import fit
-from stages.segment.onnx.sidecar import Sidecar, find_layout, read_sidecar
 from stages.segment.parameters import SegmentParameters
 
 onnx = pytest.importorskip("onnx")

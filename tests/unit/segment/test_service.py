@@ -30,11 +30,8 @@ from stages.kit.formats.masks import encode_panoptic_png
 from stages.kit.progress import SilentProgress
 from stages.kit.services.connection import Connection
 from stages.kit.stage import Context
-from stages.segment.backend_names import BACKENDS, check_backend
-from stages.segment.choice import BUILDERS, BackendRequest, choose_backend
-from stages.segment.parameters import STAGE, SegmentParameters
-from stages.segment.service import reply_cache
-from stages.segment.service.protocol import (
+from stages.segment.backends.service import reply_cache
+from stages.segment.backends.service.protocol import (
     PROTOCOL,
     Category,
     SegmentRequest,
@@ -44,7 +41,10 @@ from stages.segment.service.protocol import (
     parse_request,
     split_multipart,
 )
-from stages.segment.service.server import SegmentationServer
+from stages.segment.backends.service.server import SegmentationServer
+from stages.segment.choice import BackendRequest, choose_backend
+from stages.segment.parameters import STAGE, SegmentParameters
+from stages.segment.registry import all_backends, check_backend
 from stages.segment.settings import geometric_settings
 from stages.segment.stage import run
 from tests.unit.segment.test_stage import Written, payload, write_sequence
@@ -511,8 +511,9 @@ def test_the_revision_follows_what_decides_the_answers(tmp_path: Path) -> None:
         open_server({"backend": "http://127.0.0.1:1"}, {})
 
 
-def test_every_backend_has_a_name_and_a_builder() -> None:
-    assert set(BACKENDS) == set(BUILDERS)
+def test_every_backend_has_a_name_and_can_be_opened() -> None:
+    for declared in all_backends():
+        assert callable(declared.load("backend").open_backend)
     for address in (
         "http://",
         "http://host:99999",

@@ -15,7 +15,7 @@ from schemas.segments import Segments
 from schemas.sequence import Gravity, LabelEntry, Sequence, SequenceCamera, SequenceFile
 from schemas.vocabulary import load_vocabulary
 from stages.ingest.color_registration import color_in_depth_camera
-from stages.ingest.layouts.seven_scenes import COLOR_CAMERA, COLOR_FROM_DEPTH
+from stages.ingest.layouts.seven_scenes.reader import COLOR_CAMERA, COLOR_FROM_DEPTH
 from stages.kit.formats.frames import FrameReader, FrameWriter
 from stages.kit.formats.masks import PanopticReader
 from stages.kit.geometry.transforms import look_at, transform_from_quaternion

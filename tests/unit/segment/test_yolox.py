@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.errors import BadInput, MissingDependency
+from stages.segment.backends.detector.yolox import Detector, decode, letterbox, tile_windows
 from stages.segment.coco import COCO_NAMES
-from stages.segment.yolox import Detector, decode, letterbox, overlap_of_boxes, suppress, tile_windows
+from stages.segment.suppression import overlap_of_boxes, suppress
 from tests.real_data import real_data
 
 

@@ -12,34 +12,30 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.tidy.thesis_fit import TABLE_7_2, expected_trips, fit, fitted_hold, trips_of
 from schemas.errors import UsageError
-from stages.tableware.planning.actions import (
-    after_pull,
-    after_stack,
-    grasp_two,
-    pull,
-    pull_grasp,
-    stack,
-    stack_grasp,
-    taken,
-)
+from stages.tableware.actions.grasp import grasp_two, taken
+from stages.tableware.actions.pull import after_pull, pull
+from stages.tableware.actions.pull_grasp import pull_grasp
+from stages.tableware.actions.stack import after_stack, stack
+from stages.tableware.actions.stack_grasp import stack_grasp
 from stages.tableware.planning.joint import JointPolicy
 from stages.tableware.planning.optimum import Optimum, clear, seconds
-from stages.tableware.planning.policies import PullPolicy, RandomOne, RandomPile, StackPolicy
 from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold, can_pull, can_put, can_stack, letters
 from stages.tableware.planning.time_model import (
     EXACT,
-    TABLE_7_2,
     Chances,
     TimeModel,
-    expected_trips,
     fitted,
-    fitted_hold,
     measured,
     placement_error,
-    trips_of,
+    thesis_fit,
 )
 from stages.tableware.planning.trip_options import slip_cost
+from stages.tableware.policies.pull import PullPolicy
+from stages.tableware.policies.random import RandomOne
+from stages.tableware.policies.random_piles import RandomPile
+from stages.tableware.policies.stack import StackPolicy
 from stages.tableware.simulation.fast import FastWorld, run_trial
 from stages.tableware.world.footprints import Footprint, footprint, gap
 from stages.tableware.world.items import MEASURES, Item, Table, make_item, rise
@@ -122,6 +118,10 @@ def test_time_model_gives_back_the_rows_it_was_fitted_to(tier: str) -> None:
     for printed, increment in ((row.stack, model.stack), (row.pull, model.pull)):
         trips = trips_of(printed)
         assert trips * model.trip + (piles - trips) * increment == pytest.approx(printed[0])
+
+
+def test_the_product_plans_by_what_was_fitted() -> None:
+    assert fit() == thesis_fit()
 
 
 def test_hold_chance_gives_back_the_trips() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import cos, pi, sin
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,18 +15,21 @@ from benchmarks.tidy.physics_records import PhysicsRun, metrics, table
 from benchmarks.tidy.physics_times import fit
 from stages.kit.motion.kinematics import arm_chain, forward
 from stages.kit.simulation.robot_description import load_robot
+from stages.tableware.actions.grasp import Grasp, grasp, grasp_two
+from stages.tableware.actions.stack import stack
 from stages.tableware.parameters import SimulateParameters
-from stages.tableware.planning.actions import Action, Grasp, grasp, grasp_two, stack
-from stages.tableware.simulate_stage import times_of
+from stages.tableware.planning.action import Action
+from stages.tableware.planning.time_model import TimeModel
 from stages.tableware.simulation.arm_times import FILE, ArmTimes, arm_times
 from stages.tableware.simulation.fast import Done, Trial, most_actions, run_in
 from stages.tableware.simulation.holds import Hold, pair_hold, rim_hold, unevenness
 from stages.tableware.simulation.physics import PhysicsTable, Speeds, finger_force
 from stages.tableware.simulation.physics_pictures import key_frames
-from stages.tableware.simulation.physics_trial import alone, said
+from stages.tableware.simulation.physics_trial import alone
 from stages.tableware.simulation.pieces import DISH_DENSITY, MARGIN, shell_pieces, solid
 from stages.tableware.simulation.recording import Recording
 from stages.tableware.simulation.tabletop import where_it_passed
+from stages.tableware.simulators import SIMULATORS
 from stages.tableware.world.dish_shapes import shell_volume
 from stages.tableware.world.items import MEASURES, Item, Kind, Table, make_item, stand_height
 
@@ -206,7 +210,7 @@ def test_after_an_idle_action_the_pile_that_was_meant_is_taken_alone_then_the_hi
     )
     seen = Table(cups)
     done = Done(grasp_two(seen, "b", "a"), seen, seen, 0.0, 0.3, seen=seen)
-    assert done.idle and said(done.action, seen) == "take c|cc"
+    assert done.idle and done.action.in_kinds(seen) == "take c|cc"
     first, second = alone(seen, done, 1), alone(seen, done, 2)
     assert isinstance(first, Grasp) and first.items == ("b",)
     assert isinstance(second, Grasp) and second.items == ("c",)
@@ -259,10 +263,14 @@ def test_the_times_of_the_arm_are_found_back_and_those_kept_say_where_they_are_f
 
 
 def test_in_physics_policies_plan_by_the_times_of_the_arm() -> None:
-    assert times_of(SimulateParameters(simulator="physics")) == arm_times()
-    given = times_of(SimulateParameters(simulator="physics", stack_seconds=1.5))
+    def times(**options: Any) -> TimeModel:
+        parameters = SimulateParameters(**options)
+        return SIMULATORS[parameters.simulator](parameters).times
+
+    assert times(simulator="physics") == arm_times()
+    given = times(simulator="physics", stack_seconds=1.5)
     assert (given.stack, given.trip) == (1.5, arm_times().trip)
-    assert times_of(SimulateParameters(simulator="fast")).trip != arm_times().trip
+    assert times(simulator="fast").trip != arm_times().trip
 
 
 def test_a_cup_is_stacked_into_another() -> None:

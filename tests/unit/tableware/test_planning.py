@@ -11,30 +11,34 @@ import pytest
 
 from benchmarks.tidy.records import Run
 from benchmarks.tidy.tables import metrics, no_slower
+from benchmarks.tidy.thesis_fit import FAILED_TRIALS, TABLE_7_2, trips_of
 from schemas.errors import BadInput, MissingDependency
 from schemas.tableware_plan import TablewareAction
-from stages.tableware import simulate_stage
-from stages.tableware.planning.actions import Grasp, grasp, grasp_two, pull, pull_grasp, stack, stack_grasp
+from stages.tableware import simulators
+from stages.tableware.actions.grasp import Grasp, grasp, grasp_two
+from stages.tableware.actions.pull import pull
+from stages.tableware.actions.pull_grasp import pull_grasp
+from stages.tableware.actions.stack import stack
+from stages.tableware.actions.stack_grasp import stack_grasp
+from stages.tableware.parameters import SimulateParameters
 from stages.tableware.planning.choice import make_policy
 from stages.tableware.planning.joint import JointPolicy, _alone, plan, rules_in
 from stages.tableware.planning.optimum import Optimum, seconds
-from stages.tableware.planning.policies import PullPolicy, StackPolicy
 from stages.tableware.planning.reasons import impossible_pairs
-from stages.tableware.planning.records import as_action, as_record, risk_of
+from stages.tableware.planning.records import as_action, as_record
 from stages.tableware.planning.refusals import Doubt, Unknown, accept, statement
 from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold_two, can_pull, can_put, split_over_two
 from stages.tableware.planning.time_model import (
     EXACT,
-    FAILED_TRIALS,
-    TABLE_7_2,
     Chances,
     TimeModel,
     fitted,
     measured,
-    trips_of,
     with_spills,
     with_thesis_failures,
 )
+from stages.tableware.policies.pull import PullPolicy
+from stages.tableware.policies.stack import StackPolicy
 from stages.tableware.sight import named_as, understood, without_places
 from stages.tableware.simulation.fast import FastWorld, run_in, run_trial
 from stages.tableware.table_pictures import draw_strip, draw_table
@@ -60,7 +64,7 @@ def test_the_expected_time_is_that_of_many_trials() -> None:
     table = make_table("tier0_cups", 3)
     chances = replace(measured(), noise=False)
     found = plan(table, RULES, MODEL, chances, slack=0.0)
-    policy = JointPolicy(RULES, MODEL, chances, slack=0.0, found=found)
+    policy = JointPolicy(RULES, MODEL, chances, slack=0.0, made=found)
     times = [run_trial(table, policy, MODEL, chances, (3, draw)).seconds for draw in range(300)]
     assert np.mean(times) == pytest.approx(found.seconds, abs=3.0 * np.std(times) / np.sqrt(300))
     assert np.std(times) > 1.0
@@ -234,7 +238,7 @@ def test_actions_survive_their_records() -> None:
     for action in actions:
         record = TablewareAction.model_validate_json(as_record(action, table, MODEL, chances).model_dump_json())
         assert as_action(record) == action
-        assert record.risk == pytest.approx(risk_of(action, table, chances)) and record.risk > 0.0
+        assert record.risk == pytest.approx(action.risk(table, chances)) and record.risk > 0.0
     with pytest.raises(ValueError, match="u_P"):
         TablewareAction(name="pull", seconds=1.0, risk=0.0)
 
@@ -281,9 +285,9 @@ def test_a_pile_that_is_more_than_seen_is_dropped() -> None:
 
 
 def test_physics_that_is_not_there_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulate_stage, "SIMULATION", "stages.tableware.no_such_package")
+    monkeypatch.setattr(simulators, "SIMULATION", "stages.tableware.no_such_package")
     with pytest.raises(MissingDependency, match="no physics"):
-        simulate_stage.open_world("physics", Table(()), MODEL, EXACT, 0)
+        simulators.SIMULATORS["physics"](SimulateParameters(simulator="physics"))
 
 
 def test_no_slower_goes_by_the_means_of_the_draws() -> None:

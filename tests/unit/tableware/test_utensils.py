@@ -8,7 +8,7 @@ import pytest
 from stages.tableware.vision.bar_search import bar_candidates
 from stages.tableware.vision.dish_reading import dishes_of
 from stages.tableware.vision.rim_finding import Rim, overlapping
-from stages.tableware.vision.rim_fitting import RAYS, _circle_shift, fit_circle
+from stages.tableware.vision.rim_fitting import RAYS, SoughtLip, _circle_shift, fit_circle
 from stages.tableware.vision.stack_reading import read_stacks
 from stages.tableware.vision.tines import tine_difference
 from stages.tableware.vision.utensil_finding import search_bars
@@ -117,10 +117,11 @@ def test_a_lip_is_found_from_beside_it():
     distance = np.hypot(columns - 103.3, rows - 97.6)
     radius = 640.0 / (0.83 - 0.08) * 0.045
     ring = np.where(np.abs(distance - radius + 1.5) < 1.5, 0.08, 0.0).astype(np.float32)
-    u, v, lip, support, fitted = fit_circle(ring, 99.0, 101.0, 0.045, 0.066, 0.17, 640.0, 0.83, RAYS)
+    sought = SoughtLip(0.045, 0.066, 0.17, 640.0, 0.83)
+    u, v, lip, support, fitted = fit_circle(ring, 99.0, 101.0, sought, RAYS)
     assert (u, v) == pytest.approx((103.3, 97.6), abs=0.3)
     assert lip == pytest.approx(0.08, abs=0.004) and support > 0.9 and fitted == pytest.approx(radius, abs=2.5)
-    assert fit_circle(np.zeros_like(ring), 99.0, 101.0, 0.045, 0.066, 0.17, 640.0, 0.83, RAYS)[3] == 0.0
+    assert fit_circle(np.zeros_like(ring), 99.0, 101.0, sought, RAYS)[3] == 0.0
 
 
 def heights_for_doubt(white=0.0):

@@ -16,8 +16,8 @@ from benchmarks.training.targets import IGNORED, make_targets
 from benchmarks.training.train import PEAK_RATE, WARM_UP, Plan, Run, class_weights
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
-from stages.segment.network.features import CHANNELS
-from stages.segment.network.model import Widths
+from stages.segment.backends.network.features import CHANNELS
+from stages.segment.backends.network.model import Widths
 
 TINY = Widths(encoder=(4, 4, 4, 6, 6), decoder=(4, 4, 4, 6), blocks=1)
 CAMERA = Camera(width=WIDTH, height=HEIGHT, fx=260.0, fy=260.0, cx=159.5, cy=119.5)

@@ -23,9 +23,9 @@ from stages.kit.formats.link_poses import link_poses
 from stages.kit.formats.scene_bundle import write_scene_bundle
 from stages.kit.formats.urdf_file import parse_urdf
 from stages.kit.simulation.world import load_scene
+from stages.urdf.exporters.glb import linear
 from stages.urdf.exports import write_exports
 from stages.urdf.mujoco_settle import mujoco_motions
-from stages.urdf.scene_glb import linear
 from stages.urdf.settle_report import settle_report
 from tests.unit.urdf.small_room import graph_of, room
 

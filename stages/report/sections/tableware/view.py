@@ -12,7 +12,7 @@ from PIL import Image
 
 from schemas.errors import BadInput
 from schemas.tableware_detections import TablewareDetections
-from schemas.tableware_plan import TablewareAction, TablewarePlan
+from schemas.tableware_plan import TablewarePlan
 from schemas.tableware_trial import EvaluatedPolicy, TablewareEvaluation, TablewareTrial
 from stages.report.images import Picture, from_file
 from stages.report.page import Page
@@ -133,19 +133,8 @@ def _rows(trial: TablewareTrial | None) -> tuple[TablewareRow, ...]:
         came = f"to the bin: {', '.join(step.binned)}" if step.binned else ""
         wrong = "; ".join(step.troubles)
         text = "; ".join(part for part in (came, wrong) if part)
-        rows.append(TablewareRow(number, words(step.action), f"{step.start:.1f}", text, bool(wrong)))
+        rows.append(TablewareRow(number, step.action.words, f"{step.start:.1f}", text, bool(wrong)))
     return tuple(rows)
-
-
-def words(action: TablewareAction) -> str:
-    """Return an action in words."""
-    pull = action.u_P or (action.u_PG.u_P if action.u_PG else None)
-    put = action.u_S or (action.u_SG.u_S if action.u_SG else None)
-    if pull is not None:
-        return f"pull {pull.item} to {pull.target}" + (", take both" if action.u_PG else "")
-    if put is not None:
-        return f"stack {put.u_G.items[0]} on {put.onto}" + (", take the pile" if action.u_SG else "")
-    return f"take {' and '.join(action.u_G.items)}" if action.u_G is not None else action.name
 
 
 def animation(path: Path, alt: str) -> Picture:

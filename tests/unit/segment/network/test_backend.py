@@ -10,8 +10,8 @@ import pytest
 from schemas.errors import BadInput, UsageError
 from stages.kit.formats.frames import FrameReader
 from stages.kit.geometry.cameras import back_project
+from stages.segment.backends.network.backend import camera_of_points
 from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.network.backend import camera_of_points
 from stages.segment.parameters import SegmentParameters
 from tests.unit.segment.network.test_weights import tiny_checkpoint
 from tests.unit.segment.test_box_masks import WIDE

@@ -7,7 +7,14 @@ import pytest
 
 from schemas.scene_parts import Camera
 from stages.kit.geometry.transforms import look_at
-from stages.segment.network.features import CHANNELS, Mount, features, input_camera, mount_of_pose, viewing_axes
+from stages.segment.backends.network.features import (
+    CHANNELS,
+    Mount,
+    features,
+    input_camera,
+    mount_of_pose,
+    viewing_axes,
+)
 
 CAMERA = Camera(width=64, height=48, fx=60.0, fy=60.0, cx=31.5, cy=23.5)
 POSE = look_at(np.array([0.3, -0.5, 1.4]), np.array([0.4, 1.0, 0.2]))

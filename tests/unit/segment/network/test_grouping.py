@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.training.targets import IGNORED, make_targets
-from stages.segment.network.grouping import (
+from stages.segment.backends.network.grouping import (
     GroupingSettings,
     Named,
     assign_to_centres,

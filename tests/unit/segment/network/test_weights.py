@@ -12,9 +12,9 @@ import torch
 from schemas.errors import BadInput
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.safetensors_file import read_safetensors, write_safetensors
-from stages.segment.network.features import CHANNELS
-from stages.segment.network.model import PanopticNetwork, Widths
-from stages.segment.network.weights import BUNDLED, load_checkpoint, save_checkpoint
+from stages.segment.backends.network.features import CHANNELS
+from stages.segment.backends.network.model import PanopticNetwork, Widths
+from stages.segment.backends.network.weights import BUNDLED, load_checkpoint, save_checkpoint
 
 TINY = Widths(encoder=(4, 4, 4, 6, 6), decoder=(4, 4, 4, 6), blocks=1)
 CLASSES = ("floor", "wall", "chair")

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stages.segment.objects.cuts import pixels_by_label
-from stages.segment.objects.hulls import convex_hull, hull_content, hull_span, inside_hull
-from stages.segment.objects.pairs import inverse_plane
-from stages.segment.objects.regions import POINT_SUMS, lab_image
-from stages.segment.objects.segmentation import _holes_closed
-from stages.segment.objects.support import SupportSettings, find_supports, surface_inverse
+from stages.segment.backends.objects.cuts import pixels_by_label
+from stages.segment.backends.objects.hulls import convex_hull, hull_content, hull_span, inside_hull
+from stages.segment.backends.objects.pairs import inverse_plane
+from stages.segment.backends.objects.regions import POINT_SUMS, lab_image
+from stages.segment.backends.objects.segmentation import _holes_closed
+from stages.segment.backends.objects.support import SupportSettings, find_supports, surface_inverse
 from tests.unit.segment.scenes import CAMERA, plane_depth, rays
 
 

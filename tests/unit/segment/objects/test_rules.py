@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.training.pair_rules import JOINS, choose_rules, fit_weights
-from stages.segment.objects.pairs import FEATURES
-from stages.segment.objects.rules import (
+from stages.segment.backends.objects.pairs import FEATURES
+from stages.segment.backends.objects.rules import (
     APART,
     CUT,
     OVER,

@@ -7,16 +7,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.training.pair_recording import record_pairs
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.frames import Frame
-from stages.segment.objects.backend import BUNDLED, ObjectsBackend
-from stages.segment.objects.boosting import read_trees, score_rows, write_trees
-from stages.segment.objects.grouping import Recording
-from stages.segment.objects.pairs import FEATURES
-from stages.segment.objects.plain import segment_plain
-from stages.segment.objects.segmentation import ObjectFrame, segment_objects
+from stages.segment.backends.objects.backend import BUNDLED, ObjectsBackend
+from stages.segment.backends.objects.boosting import read_trees, score_rows, write_trees
+from stages.segment.backends.objects.grouping import by_trees
+from stages.segment.backends.objects.pairs import FEATURES
+from stages.segment.backends.objects.plain import segment_plain
+from stages.segment.backends.objects.segmentation import (
+    BY_SET_RULES,
+    ObjectFrame,
+    ObjectSettings,
+    cut_pieces,
+    segment_objects,
+)
 from tests.unit.segment.scenes import best_overlap, box_depth, combine, plane_depth, rays
 
 CAMERA = Camera(width=320, height=240, fx=262.5, fy=262.5, cx=159.5, cy=119.5)
@@ -40,7 +47,7 @@ def painted(owner: np.ndarray, *colors: tuple[int, int, int]) -> np.ndarray:
 
 def both(color: np.ndarray, depth: np.ndarray) -> list[ObjectFrame]:
     """Rules and trees."""
-    return [segment_objects(color, depth, CAMERA), segment_objects(color, depth, CAMERA, trees=TREES)]
+    return [segment_objects(color, depth, CAMERA), segment_objects(color, depth, CAMERA, by_trees(TREES))]
 
 
 def test_two_boxes_apart_are_two_objects() -> None:
@@ -70,19 +77,19 @@ def test_a_box_behind_a_post_is_one_object() -> None:
 def test_a_recording_knows_which_pairs_are_one_object() -> None:
     depth, owner = tabletop(((-0.08, 0.25, 0.8), (0.16, 0.2, 0.1)), ((0.08, 0.25, 0.8), (0.16, 0.2, 0.1)))
     color = painted(owner, (210, 60, 40), (30, 80, 200))
-    recording = Recording(owner, np.random.default_rng(0), by_truth=1.0)
-    found = segment_objects(color, depth, CAMERA, recording=recording).labels
-    assert found.max() == 2  # by the truth
+    pieces = cut_pieces(color, depth, CAMERA, ObjectSettings())
+    recorded = record_pairs(pieces, owner, BY_SET_RULES, 0.0, 1.0, np.random.default_rng(0))
+    assert len(np.unique(pieces.groups.group_of[1:])) == 2  # by the truth
     # Each box shows two faces, so that there are pairs of both kinds, and the last one looked at is the two boxes.
-    assert set(recording.answers.tolist()) == {0, 1}
-    assert recording.answers[-1] == 0
-    assert recording.features.shape == (len(recording.answers), len(FEATURES))
+    assert set(recorded.answers.tolist()) == {0, 1}
+    assert recorded.answers[-1] == 0
+    assert recorded.features.shape == (len(recorded.answers), len(FEATURES))
 
 
 def test_the_same_frame_gives_the_same_labels() -> None:
     depth, owner = tabletop(((-0.08, 0.25, 0.8), (0.16, 0.2, 0.1)), ((0.2, 0.25, 0.9), (0.15, 0.2, 0.1)))
     color = painted(owner, (210, 60, 40), (30, 80, 200))
-    first, second = (segment_objects(color, depth, CAMERA, trees=TREES).labels for _ in range(2))
+    first, second = (segment_objects(color, depth, CAMERA, by_trees(TREES)).labels for _ in range(2))
     assert np.array_equal(first, second)
 
 
@@ -104,7 +111,7 @@ def test_the_backend_names_objects_and_drops_what_is_too_large() -> None:
     frame = Frame(index=0, time=0.0, color=color, depth=depth, labels=None, world_from_camera=None)
     vocabulary = load_vocabulary()
     for largest, count in ((0.6, 2), (0.05, 0)):
-        backend = ObjectsBackend(vocabulary, CAMERA, learned=True, largest=largest)
+        backend = ObjectsBackend(vocabulary, CAMERA, scorer=by_trees(TREES), largest=largest)
         panoptic = backend(frame, None, np.random.default_rng(0))  # type: ignore[arg-type]
         assert len(panoptic.masks) == count
         assert set(np.unique(panoptic.ids)) - {0} == set(panoptic.masks)

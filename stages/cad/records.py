@@ -1,0 +1,99 @@
+"""What was decided, in the form of the files: scene.json and graph.json."""
+
+from __future__ import annotations
+
+from schemas.base import as_transform
+from schemas.cad_scene import CadCandidate, CadSceneFile, Replacement
+from schemas.contact_graph import ContactGraphFile, GraphNode
+from schemas.scene_parts import TREE_RELATIONS
+from stages.cad.arranging import Arrangement
+from stages.cad.candidates import Shortlist
+from stages.cad.conflicts import Selection
+from stages.cad.model_surfaces import ModelSurface
+from stages.cad.placing import placed_box, placed_planes
+from stages.cad.shapes import Placement
+from stages.kit.geometry.transforms import transform_from
+
+
+def candidate_record(placement: Placement) -> CadCandidate:
+    """Return a placement as it is written."""
+    return CadCandidate(
+        model_id=placement.shape.model.id,
+        joints=placement.shape.joints,
+        scale=placement.scale,
+        world_from_model=as_transform(transform_from(placement.rotation, placement.translation)),
+        matching_error=placement.matching_error,
+        alignment_error=placement.alignment_error,
+    )
+
+
+def scene_file(
+    graph: ContactGraphFile,
+    shortlists: dict[str, Shortlist],
+    arranged: Arrangement,
+    colors: dict[str, dict[str, tuple[int, int, int]]],
+    selection: Selection,
+    conflicts_after: int,
+) -> CadSceneFile:
+    """Return scene.json: the decision on every node. `colors`: node -> part -> colour in the map."""
+    replacements = []
+    for node in graph.nodes:
+        if node.node_type == "layout":
+            replacements.append(Replacement(node=node.id, decision="layout"))
+        elif node.id in arranged.placements:
+            entry, placement = shortlists[node.id], arranged.placements[node.id]
+            chosen = candidate_record(placement)
+            others = [candidate_record(p) for p in entry.placements if p.score != placement.score]
+            first = candidate_record(entry.placements[0])
+            replacements.append(
+                Replacement(
+                    node=node.id,
+                    decision="cad",
+                    reason=entry.reason,
+                    chosen=chosen,
+                    best_single=first,
+                    part_colors=colors[node.id],
+                    alternatives=tuple(others),
+                    rejected=entry.rejected,
+                )
+            )
+        elif node.id in shortlists:
+            entry = shortlists[node.id]
+            replacements.append(
+                Replacement(node=node.id, decision="mesh", reason=entry.reason, rejected=entry.rejected)
+            )
+    return CadSceneFile(
+        replacements=tuple(replacements),
+        conflicts_before=selection.conflicts_before,
+        conflicts_after=conflicts_after,
+        iterations=selection.steps,
+    )
+
+
+def cad_graph(graph: ContactGraphFile, arranged: Arrangement, surfaces: dict[str, ModelSurface]) -> ContactGraphFile:
+    """Return cg': the same nodes and relations, with model, pose, scale, joints, and the model's box and planes."""
+    nodes: list[GraphNode] = []
+    for node in graph.nodes:
+        placement = arranged.placements.get(node.id)
+        if placement is None:
+            nodes.append(node)
+            continue
+        nodes.append(
+            node.model_copy(
+                update={
+                    "box": placed_box(placement, surfaces[placement.shape.model.id]),
+                    "planes": placed_planes(placement),
+                    "model_id": placement.shape.model.id,
+                    "world_from_model": as_transform(transform_from(placement.rotation, placement.translation)),
+                    "scale": placement.scale,
+                    "joints": dict(placement.shape.joints),
+                }
+            )
+        )
+    links = tuple(
+        arranged.relations.get(link.target, link)
+        if link.relation in TREE_RELATIONS
+        else link.model_copy(update={"plane": None})  # it counted the planes that were seen, not the model's
+        for link in graph.links
+    )
+    return graph.model_copy(update={"nodes": tuple(nodes), "links": links})

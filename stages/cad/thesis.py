@@ -1,0 +1,76 @@
+"""CAD replacement as the thesis words it: matching, alignment and check of section 2.4 (Han 2024)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from schemas.panoptic_map import PanopticMap
+from stages.cad.alignment import align
+from stages.cad.arranging import Placer, Standing
+from stages.cad.free_space import NOTHING_KNOWN, FreeSpace
+from stages.cad.matching import rank_matches
+from stages.cad.method import Proposals, alignment_weights, matching_weights
+from stages.cad.model_surfaces import ModelSurface, alignment_error
+from stages.cad.parameters import CadParameters
+from stages.cad.placing import placement_of
+from stages.cad.shapes import Placement, shape_of_state
+from stages.cad.target import Target, scale_fits, stands_in_wall
+
+
+@dataclass(frozen=True)
+class Thesis:
+    """The baseline (`CadMethod`). Whoever corrects something does it in ours.py."""
+
+    parameters: CadParameters
+
+    @property
+    def keeps_surroundings(self) -> bool:
+        """Only what has a node is in the scene."""
+        return False
+
+    def free_space(self, panoptic_map: PanopticMap) -> FreeSpace:
+        """Seen empty space has no say."""
+        return NOTHING_KNOWN
+
+    def propose(self, target: Target) -> Proposals:
+        """Match every stored state by planes and size, align by planes, measure on the vertices."""
+        parameters = self.parameters
+        matches, counts = rank_matches(
+            target.frames(all_frames=False),
+            [shape_of_state(model, state) for model in target.models for state in model.states],
+            weights=matching_weights(parameters),
+            unmatched=None,
+            scale_range=(parameters.minimum_scale, parameters.maximum_scale),
+            keep=parameters.candidates,
+        )
+        rejected = Counter(counts)
+        weights = alignment_weights(parameters)
+        placements = []
+        for match in matches:
+            placement = placement_of(match, align(match, weights, parameters.evaluations))
+            if not scale_fits(placement, parameters):
+                rejected["aligned scale out of range"] += 1
+                continue
+            error = alignment_error(target.surfaces[match.shape.model.id], placement, target.points)
+            placements.append(replace(placement, alignment_error=error, score=error))
+        return Proposals(placements, rejected)
+
+    def why_invalid(self, placement: Placement, target: Target) -> str | None:
+        """Scale and walls."""
+        if not scale_fits(placement, self.parameters):
+            return "refined scale out of range"
+        return "stands in a wall" if stands_in_wall(placement, target, self.parameters) else None
+
+    def missing_allowed(self, missing: Sequence[int]) -> int:
+        """A candidate that one child has no surface on is none."""
+        return 0
+
+    def eligible(self, scores: Sequence[float]) -> int:
+        """All."""
+        return len(scores)
+
+    def placer(self, alternatives: Mapping[str, Sequence[Placement]], surfaces: Mapping[str, ModelSurface]) -> Placer:
+        """Every model stands on its support and stays where the alignment put it."""
+        return Standing(surfaces)

@@ -1,0 +1,164 @@
+"""Writing an MCAP file of ROS 2 messages (CDR, embedded ros2msg schemas) as a ROS 2 recorder would.
+
+Topics of a camera called `camera`: `/camera/color/image_raw/compressed`, `/camera/depth/image_raw` (16UC1, mm),
+`/camera/labels/image_raw` (mono16), `/camera/right/image_raw/compressed`, and a `camera_info` beside each; `/tf`
+world -> camera. Log time and header stamp are the frame's time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
+from rosbags.typesys import Stores, get_typestore
+
+from schemas.scene_parts import Camera
+from stages.export.formats.ros2 import FORMAT
+from stages.export.frames import ExportFrame, ExportJob
+from stages.export.pictures import picture_suffix
+from stages.kit.formats.frames import LABELS_METADATA, WORLD_FRAME, WORLD_METADATA
+from stages.kit.geometry.transforms import quaternion_of
+
+IMAGE, COMPRESSED_IMAGE = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+CAMERA_INFO, TF_MESSAGE = "sensor_msgs/msg/CameraInfo", "tf2_msgs/msg/TFMessage"
+
+
+@cache
+def _types() -> Any:
+    return get_typestore(Stores.ROS2_HUMBLE)
+
+
+def _header(stamp: int, frame_id: str) -> Any:
+    types = _types().types
+    time = types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9)
+    return types["std_msgs/msg/Header"](stamp=time, frame_id=frame_id)
+
+
+def compressed_image(stamp: int, encoded: bytes, frame_id: str) -> Any:
+    """Return a sensor_msgs/CompressedImage of JPEG or PNG bytes, stamped `stamp` [ns]."""
+    kind = "png" if picture_suffix(encoded) == ".png" else "jpeg"
+    data = np.frombuffer(encoded, np.uint8)
+    return _types().types[COMPRESSED_IMAGE](header=_header(stamp, frame_id), format=kind, data=data)
+
+
+def image(stamp: int, pixels: np.ndarray, encoding: str, frame_id: str) -> Any:
+    """Return a sensor_msgs/Image of an (H, W) uint16 array, little-endian, rows without padding."""
+    height, width = pixels.shape
+    return _types().types[IMAGE](
+        header=_header(stamp, frame_id),
+        height=height,
+        width=width,
+        encoding=encoding,
+        is_bigendian=0,
+        step=2 * width,
+        data=np.ascontiguousarray(pixels, dtype="<u2").view(np.uint8).reshape(-1),
+    )
+
+
+def camera_info(stamp: int, camera: Camera, frame_id: str, baseline: float = 0.0) -> Any:
+    """Return the sensor_msgs/CameraInfo of a camera without distortion.
+
+    With a `baseline` [m] it is that of the right eye of a rectified pair: P[3] = -fx baseline.
+    """
+    types = _types().types
+    matrix = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
+    projection = [camera.fx, 0.0, camera.cx, -camera.fx * baseline, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0]
+    return types[CAMERA_INFO](
+        header=_header(stamp, frame_id),
+        height=camera.height,
+        width=camera.width,
+        distortion_model="plumb_bob",
+        d=np.zeros(5),
+        k=np.array(matrix),
+        r=np.eye(3).reshape(-1),
+        p=np.array(projection),
+        binning_x=0,
+        binning_y=0,
+        roi=types["sensor_msgs/msg/RegionOfInterest"](x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),
+    )
+
+
+def transforms(stamp: int, parent: str, child: str, parent_from_child: np.ndarray) -> Any:
+    """Return a tf2_msgs/TFMessage with the one transform parent -> child, (4, 4)."""
+    types = _types().types
+    x, y, z = (float(value) for value in parent_from_child[:3, 3])
+    qx, qy, qz, qw = (float(value) for value in quaternion_of(parent_from_child))
+    transform = types["geometry_msgs/msg/Transform"](
+        translation=types["geometry_msgs/msg/Vector3"](x=x, y=y, z=z),
+        rotation=types["geometry_msgs/msg/Quaternion"](x=qx, y=qy, z=qz, w=qw),
+    )
+    stamped = types["geometry_msgs/msg/TransformStamped"](
+        header=_header(stamp, parent), child_frame_id=child, transform=transform
+    )
+    return types[TF_MESSAGE](transforms=[stamped])
+
+
+class _BagWriter:
+    """An MCAP file in the profile of rosbag2; schemas and channels are registered when they first occur."""
+
+    def __init__(self, path: Path, metadata: Mapping[str, dict[str, str]]) -> None:
+        self._file = path.open("wb")
+        self._writer = McapWriter(self._file, chunk_size=1 << 20, compression=CompressionType.ZSTD)
+        self._writer.start(profile="ros2", library="scenewright")
+        for name, table in metadata.items():
+            self._writer.add_metadata(name, table)
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+
+    def __enter__(self) -> _BagWriter:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self._writer.finish()
+        self._file.close()
+
+    def add(self, topic: str, message: Any, stamp: int, sequence: int) -> None:
+        """Append a message at `stamp` [ns]."""
+        name = message.__msgtype__
+        if name not in self._schemas:
+            text, _ = _types().generate_msgdef(name, ros_version=2)
+            self._schemas[name] = self._writer.register_schema(name, "ros2msg", text.encode())
+        if topic not in self._channels:
+            self._channels[topic] = self._writer.register_channel(topic, "cdr", self._schemas[name])
+        data = bytes(_types().serialize_cdr(message, name))
+        self._writer.add_message(self._channels[topic], stamp, data, publish_time=stamp, sequence=sequence)
+
+
+def write(job: ExportJob) -> None:
+    """Write the frames."""
+    info, cameras, tally = job.info, job.cameras, job.tally
+    baselines = {camera.name: camera.baseline for camera in info.cameras}
+    registered = "yes" if info.color_depth_registered else "no"
+    metadata = {WORLD_METADATA: {"world_frame": WORLD_FRAME, "world_up": job.world_up, "registered": registered}}
+    if info.label_table:
+        metadata[LABELS_METADATA] = {str(entry.instance): entry.class_name for entry in info.label_table}
+    with _BagWriter(job.root / FORMAT.log, metadata) as bag:
+        for frame in job.frames:
+            for topic, stream, message in _messages(frame, cameras[frame.camera_name], baselines[frame.camera_name]):
+                bag.add(topic, message, frame.stamp, tally.frames)
+                tally.streams.add(stream)
+            tally.frames += 1
+
+
+def _messages(frame: ExportFrame, camera: Camera, baseline: float | None) -> Iterable[tuple[str, str, Any]]:
+    """Yield (topic, stream, message) of a frame; a camera_info precedes each image."""
+    name, stamp = frame.camera_name, frame.stamp
+    if frame.world_from_camera is not None:
+        yield "/tf", "pose", transforms(stamp, WORLD_FRAME, name, frame.world_from_camera)
+    if frame.color is not None:
+        yield f"/{name}/color/camera_info", "color", camera_info(stamp, camera, name)
+        yield f"/{name}/color/image_raw/compressed", "color", compressed_image(stamp, frame.color, name)
+    if frame.depth is not None:
+        yield f"/{name}/depth/camera_info", "depth", camera_info(stamp, camera, name)
+        yield f"/{name}/depth/image_raw", "depth", image(stamp, frame.depth, "16UC1", name)
+    if frame.labels is not None:
+        yield f"/{name}/labels/image_raw", "labels", image(stamp, frame.labels, "mono16", name)
+    if frame.right is not None:
+        yield f"/{name}/right/camera_info", "right", camera_info(stamp, camera, name, baseline or 0.0)
+        yield f"/{name}/right/image_raw/compressed", "right", compressed_image(stamp, frame.right, name)

@@ -1,0 +1,93 @@
+"""From the map while it is being built to what it comes to: surface, labels, entities (Han 2024, section 2.3.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.base import as_vector
+from schemas.panoptic_map import EntitiesFile, Entity
+from schemas.vocabulary import Vocabulary
+from stages.fuse.counts import TripleCounts
+from stages.fuse.extraction import ExtractedEntity, ExtractionSettings, LabelledSurface, extract_entities
+from stages.fuse.mapping import PanopticMapper
+from stages.fuse.smoothing import smoothed_tsdf
+from stages.fuse.surface import Surface, extract_surface
+from stages.kit.stage import Progress
+
+UNNAMED = "object"
+"""The class of things that masks found and did not recognise."""
+
+
+@dataclass(frozen=True)
+class ClosedMap:
+    """What a map comes to: its entities, surface and labels."""
+
+    file: EntitiesFile
+    entities: list[ExtractedEntity]
+    surface: Surface
+    labelled: LabelledSurface
+    counts: TripleCounts
+    merged: np.ndarray
+    """Merged segment label of every segment label."""
+
+
+def mesh_name(instance: int) -> str:
+    """Return the name of an entity's mesh within the artifact."""
+    return f"entities/{instance}.ply"
+
+
+def describe(entity: ExtractedEntity, vocabulary: Vocabulary) -> Entity:
+    """Return an entity's row of entities.json."""
+    return Entity(
+        instance=entity.instance,
+        class_name=vocabulary.by_id(entity.class_id).name,
+        mesh=mesh_name(entity.instance),
+        vertices=len(entity.mesh.vertices),
+        triangles=len(entity.mesh.faces),
+        box_minimum=as_vector(entity.mesh.vertices.min(axis=0)),
+        box_maximum=as_vector(entity.mesh.vertices.max(axis=0)),
+        confidence=round(entity.confidence, 6),
+        observations=entity.observations,
+        segments=entity.segments,
+    )
+
+
+def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, progress: Progress) -> ClosedMap:
+    """Merge what is one instance, draw the surface and cut it into entities. `label` says whose masks these are.
+
+    Labels of the mapper are merged by it.
+    """
+    parameters = mapper.parameters
+    with progress.step("merge instances"):
+        mapper.regularize()
+    with progress.step("extract surface"):
+        tsdf = smoothed_tsdf(mapper.blocks, parameters.smoothing)
+        surface = extract_surface(mapper.blocks, minimum_weight=parameters.minimum_weight, tsdf=tsdf)
+    with progress.step("extract entities"):
+        merged = mapper.labels.table()
+        unnamed = vocabulary.by_name(UNNAMED).id
+        fewest = min(parameters.minimum_observations, max(1, mapper.labelled_frames // 10))
+        grouping = mapper.merging.grouping(mapper.seen_in, fewest, unnamed)
+        settings = ExtractionSettings(
+            minimum_share=parameters.minimum_prediction_share,
+            minimum_voxels=parameters.minimum_entity_voxels,
+            minimum_observations=fewest,
+            speck_share=parameters.speck_share,
+            part_distance=parameters.part_distance,
+            spread_steps=parameters.spread_steps,
+            piece_share=parameters.piece_share,
+            unnamed=unnamed,
+        )
+        entities, labelled = extract_entities(
+            surface, merged[surface.segment], grouping, mapper.sightings, mapper.merging.things, settings
+        )
+    file = EntitiesFile(
+        voxel_size=parameters.voxel_size,
+        truncation_distance=mapper.truncation_distance,
+        frames_integrated=mapper.frames_integrated,
+        segmentation=label,
+        entities=tuple(describe(entity, vocabulary) for entity in entities),
+    )
+    return ClosedMap(file, entities, surface, labelled, grouping.counts, merged)

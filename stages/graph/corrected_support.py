@@ -1,0 +1,189 @@
+"""Ours: supporting relations that hold although the camera saw less than all, and more than was there."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from schemas.scene_parts import Box
+from stages.graph.nodes import Entity, level_patch, plane_height
+from stages.graph.parameters import GraphParameters
+from stages.graph.support import (
+    ORDER_TOLERANCE,
+    Candidate,
+    best_first,
+    height_gap,
+    inside_share,
+    possible_parents,
+    stands_inside,
+    support_score,
+)
+from stages.graph.touching import SINKING, hidden_reach, seam_share, smaller_share, touches
+from stages.kit.geometry.boxes import clip_polygon, footprint, polygon_area
+
+HIDDEN_FACTOR = 0.8
+"""A plane that nobody saw is worth less than the same plane seen."""
+BURIED_FACTOR = 0.6
+"""A hidden plane in the middle of an object (the seat under a pile of clothes) is worth less again."""
+BOARD_FACTOR = 0.8
+"""Share of a container that a board, of which a part was seen, is supposed to span."""
+FLOOR_FACTOR = 0.9
+"""Share of a footprint that counts as floor where no floor was seen."""
+MOVABLE_FACTOR = 0.5
+"""Furniture on top of a movable thing: possible, and unlikely."""
+SINKING_OF_A_TIE = 0.02
+"""The highest plane of a tie may be this much above the child's bottom [m]."""
+LEDGE_FACTOR = 0.7
+"""A level surface labelled wall is a sill, or floor or furniture that was mislabelled: all else equal, the latter."""
+HIDDEN_TOP_DISTANCE = 0.15
+"""A hidden supporting plane is looked for this close to the top of a box [m]."""
+NAMELESS = "object"
+"""Class of things that masks found and nobody named."""
+LEAST_SEAM = 0.2
+"""Share of its foot along which a plane must be seen to reach up to an object that is hardly over it."""
+LEAST_SMALLER_SHARE = 0.4
+"""Share of the smaller footprint that must lie in the other where an object lies on something narrower than itself."""
+
+
+def hull_overlap(hull: np.ndarray, child: Box) -> float:
+    """Equation 2.2 with the hull (M, 2) of the plane's inliers instead of a rectangle.
+
+    A thing hides the surface that it stands on: below it and in the camera's shadow behind it the parent has no
+    vertices, so the thesis's rectangle covers a strip in front of it. The hull of the whole plane spans the hole; it
+    is also not stretched by two stray vertices.
+    """
+    area = polygon_area(footprint(child))
+    if len(hull) < 3 or area <= 0.0:
+        return 0.0
+    return float(min(1.0, max(0.0, polygon_area(clip_polygon(hull, footprint(child)))) / area))
+
+
+def candidates_for(child: Entity, entities: list[Entity], parameters: GraphParameters) -> list[Candidate]:
+    """Return every acceptable supporting relation of one object, best first (section 2.2.2, corrected).
+
+    A relation is acceptable when (2.1) and (2.2) hold within a_th and b_th and the score (2.3) reaches
+    `minimum_score`; contact and height then decide among those that score alike.
+    """
+    candidates: list[Candidate] = []
+    for parent in possible_parents(child, entities):
+        seen = [seen_candidate(child, parent, k, parameters) for k in parent.supporting]
+        accepted = [candidate for candidate in seen if candidate is not None]
+        candidates += accepted
+        # A shelf shows its boards to a camera that is too low to see its top, on which the child stands.
+        close = [candidate for candidate in accepted if abs(candidate.gap) <= HIDDEN_TOP_DISTANCE]
+        if not close and parent.node_type != "layout":
+            hidden = hidden_candidate(child, parent, parameters)
+            if hidden is not None:
+                candidates.append(hidden)
+    return prefer_contact(prefer_the_highest(best_first(candidates, entities), parameters))
+
+
+def seen_candidate(child: Entity, parent: Entity, k: int, parameters: GraphParameters) -> Candidate | None:
+    """Return the relation over the parent's patch `k`, or None."""
+    patch = parent.patches[k]
+    height = plane_height(patch.plane, np.asarray(child.box.center[:2]))
+    gap = height_gap(child.box, patch)
+    # A plane through the child's body does not carry it: without this, what is left of a chair pushed under a table
+    # (its back) would hang on the table top.
+    if gap < -parameters.maximum_sinking:
+        return None
+    if child.class_name in parameters.wall_classes and gap > parameters.floating_gap:
+        return None
+    # Legs are missed, so furniture may seem to float; a cup or a keyboard does not lose its lower half metre.
+    if child.movable and gap > parameters.movable_gap:
+        return None
+    inside = stands_inside(child, parent, height)
+    least = parameters.area_threshold
+    overlap = effective = hull_overlap(patch.hull, child.box)
+    if parent.class_name == "floor":
+        # The floor goes on under furniture and outside the camera's view.
+        effective = max(overlap, FLOOR_FACTOR)
+    elif inside:
+        # A board spans its container, though the camera saw the front edge only.
+        effective = max(overlap, BOARD_FACTOR * inside_share(child.box, parent.box))
+    touching = touches(gap)
+    if touching and effective < least and parent.node_type != "layout":
+        seam = seam_share(child, patch)
+        if seam >= LEAST_SEAM:
+            effective, least = max(effective, HIDDEN_FACTOR * seam), 0.0
+    if effective < least:
+        return None
+    score = support_score(gap, effective)
+    if parent.movable and not child.movable:
+        score *= MOVABLE_FACTOR
+    if parent.node_type == "layout" and parent.class_name != "floor":
+        score *= LEDGE_FACTOR
+    if score < parameters.minimum_score:
+        return None
+    relation: Literal["supports", "contains"] = "contains" if inside else "supports"
+    return Candidate(child.name, parent.name, score, relation, gap, overlap, height, k, touching=touching)
+
+
+def hidden_candidate(child: Entity, parent: Entity, parameters: GraphParameters) -> Candidate | None:
+    """Return the relation over a supporting plane that nobody saw, or None.
+
+    The thesis puts no limit on where such a plane may lie; we want it near the parent's top, or inside a container, or
+    (worth less) within a parent that shows no horizontal plane at all.
+    """
+    share = inside_share(child.box, parent.box)
+    over_top = child.bottom - parent.top
+    touching = False
+    if child.top > parent.top:
+        touching = touches(over_top)
+        if share < parameters.area_threshold and smaller_share(child.box, parent.box) >= LEAST_SMALLER_SHARE:
+            if child.movable or child.class_name == NAMELESS:
+                touching = -SINKING <= over_top <= min(HIDDEN_TOP_DISTANCE, hidden_reach(child.box, parent.box))
+            if touching:
+                share = max(parameters.area_threshold, HIDDEN_FACTOR * smaller_share(child.box, parent.box))
+    if share < parameters.area_threshold:
+        return None
+    outline = clip_polygon(footprint(parent.box), footprint(child.box))
+    if len(outline) < 3:
+        return None
+    height = child.bottom
+    inside = stands_inside(child, parent, height) and height >= parent.bottom - ORDER_TOLERANCE
+    if child.class_name in parameters.wall_classes and not inside:
+        return None
+    if inside:
+        score = HIDDEN_FACTOR * share
+    elif abs(over_top) <= HIDDEN_TOP_DISTANCE and child.top > parent.top:
+        score = HIDDEN_FACTOR * support_score(over_top, share)
+    elif not parent.supporting and parent.bottom < height < parent.top:
+        score = BURIED_FACTOR * share
+    else:
+        return None
+    if parent.movable and not child.movable:
+        score *= MOVABLE_FACTOR
+    if score < parameters.minimum_score:
+        return None
+    relation: Literal["supports", "contains"] = "contains" if inside else "supports"
+    patch = level_patch(outline, height, hidden=True)
+    return Candidate(child.name, parent.name, score, relation, 0.0, share, height, None, patch, touching)
+
+
+def prefer_contact(ranked: list[Candidate]) -> list[Candidate]:
+    """Put the best relation in contact before one to a plane that lies deeper: nothing floats over what it touches.
+
+    Legs that a map misses make furniture float, but not onto something that ends just where the seat begins.
+    """
+    best = next((candidate for candidate in ranked if candidate.touching), None)
+    if best is None or best.height <= ranked[0].height:
+        return ranked
+    return [best, *(candidate for candidate in ranked if candidate is not best)]
+
+
+def prefer_the_highest(ranked: list[Candidate], parameters: GraphParameters) -> list[Candidate]:
+    """Among relations whose scores are within `tie_margin` of the best put the highest plane first.
+
+    Things fall onto the first surface below them. (2.3) measures the gap in metres, so the table 3 cm below the book
+    that a cup stands on costs 0.03 only, less than the rim of the cup that sticks out over the book.
+    """
+    if not ranked:
+        return []
+    best = ranked[0].score
+    tied = [c for c in ranked if c.score >= best - parameters.tie_margin and c.gap >= -SINKING_OF_A_TIE]
+    if not tied:
+        return ranked
+    first = max(tied, key=lambda c: (round(c.height, 6), c.score))
+    return [first, *(c for c in ranked if c is not first)]

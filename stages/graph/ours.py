@@ -1,0 +1,118 @@
+"""Ours: the thesis's contact graph with what a map of a real room asks for beside (docs/GRAPH.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.scene_parts import Box, Relation
+from schemas.vocabulary import SemanticClass
+from stages.graph.beside import relations_beside
+from stages.graph.corrected_support import HIDDEN_TOP_DISTANCE, candidates_for
+from stages.graph.hanging import hanging_candidate
+from stages.graph.nodes import Entity, SmallSupports
+from stages.graph.observed_box import BoxFit, observed_box
+from stages.graph.parameters import GraphParameters
+from stages.graph.shared_support import shared_candidates
+from stages.graph.support import Candidate
+from stages.graph.tree import fallback_candidates, level_floors, objects_of, upright_layout
+from stages.graph.walls import search_trees, wall_candidate
+from stages.kit.geometry.boxes import box_volume, boxes_overlap_volume
+
+LEDGE_AREA = 0.05
+"""Least area of a supporting surface in a wall entity [m^2]."""
+LEDGE_GAP = 0.2
+"""Gap between supporting surfaces of one wall entity [m]."""
+PIECE_SHARE = 0.7
+"""Share of its box that a piece has within the whole."""
+MOVABLE_REACH = 1 / 3
+"""Movable things have to be this much nearer to a wall to hang on it."""
+
+
+@dataclass(frozen=True)
+class Ours:
+    """The corrected method (`GraphMethod`)."""
+
+    parameters: GraphParameters
+
+    @property
+    def name(self) -> str:
+        """As graph.json has it."""
+        return "ours"
+
+    def box(self, points: np.ndarray, normals: np.ndarray, class_name: str) -> tuple[Box, np.ndarray]:
+        """Return the box that turns with the sides, or is put around a disc, without what leaked."""
+        fit = BoxFit(
+            self.parameters.stray_share,
+            self.parameters.stray_distance,
+            trim=self.parameters.box_trim,
+            side_share=self.parameters.side_share,
+            may_be_round=class_name in self.parameters.round_classes,
+        )
+        return observed_box(points, normals, fit)
+
+    def small_supports(self, semantic: SemanticClass) -> SmallSupports | None:
+        """Return which small planes may support, None for floors and ceilings."""
+        if semantic.name in ("floor", "ceiling"):
+            return None
+        if semantic.is_layout:
+            # Window sills, and furniture that was taken for a piece of the wall behind it.
+            return SmallSupports(LEDGE_AREA, LEDGE_GAP)
+        return SmallSupports(self.parameters.minimum_support_area)
+
+    def fragments(self, entities: list[Entity]) -> dict[str, str]:
+        """Return entities that can only be pieces of another one: name -> name of the whole."""
+        return fragments(entities)
+
+    def ranked_candidates(self, entities: list[Entity]) -> dict[str, list[Candidate]]:
+        """Return supports (two carriers together where none reaches up), then wall or ceiling, then floor or scene."""
+        parameters = self.parameters
+        ceilings = [entity for entity in entities if entity.class_name == "ceiling"]
+        walls = [entity for entity in upright_layout(entities) if entity not in ceilings]
+        trees = search_trees(walls)
+        floors = level_floors(entities)
+        ranked: dict[str, list[Candidate]] = {}
+        for child in objects_of(entities):
+            choices = candidates_for(child, entities, parameters)
+            close = [c for c in choices if abs(c.gap) <= HIDDEN_TOP_DISTANCE and c.overlap >= parameters.area_threshold]
+            if not close:
+                # Two in contact come before one that is deeper, and before one of them alone.
+                choices = [*shared_candidates(child, entities, parameters), *choices]
+            # A cup does not hang on the wall that the desk, which the map lacks, stands at.
+            reach = parameters.wall_distance * (MOVABLE_REACH if child.movable else 1.0)
+            wall = wall_candidate(child, walls, reach, trees)
+            hanging = hanging_candidate(child, ceilings, reach)
+            held = [candidate for candidate in (wall, hanging) if candidate is not None]
+            choices += sorted(held, key=lambda candidate: -candidate.score)
+            ranked[child.name] = choices + fallback_candidates(child, floors)
+        return ranked
+
+    def maximum_extension(self, entity: Entity) -> float:
+        """Furniture misses its legs; a cup does not lose its lower half metre [m]."""
+        most = self.parameters.maximum_extension
+        return min(most, self.parameters.movable_gap) if entity.movable else most
+
+    def relations_beside(self, entities: list[Entity], chosen: dict[str, Candidate]) -> list[Relation]:
+        """Return further carriers, and what keeps an object from falling over."""
+        return relations_beside(entities, chosen, self.parameters)
+
+
+def fragments(entities: list[Entity]) -> dict[str, str]:
+    """Return entities that can only be pieces of another one: name -> name of the whole.
+
+    Furniture of one class does not interpenetrate, so a chair whose box lies within the box of a larger chair is a
+    part of it that the map failed to merge. Small things of one class do lie in each other (bowls, boxes).
+    """
+    whole_of: dict[str, str] = {}
+    for piece in entities:
+        if piece.movable or piece.node_type == "layout":
+            continue
+        for whole in entities:
+            if whole.class_name != piece.class_name or len(whole.points) <= len(piece.points):
+                continue
+            shared = boxes_overlap_volume(piece.box, whole.box)
+            if shared >= PIECE_SHARE * box_volume(piece.box) and whole.name not in whole_of:
+                whole_of[piece.name] = whole.name
+                break
+    return whole_of

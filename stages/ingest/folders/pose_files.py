@@ -1,0 +1,97 @@
+"""Poses beside plain images: a file with a pose an image, a stamped trajectory, or a file of 4x4 numbers an image.
+
+Poses are taken to be world_from_camera. What a row holds is told by its columns: 7 is tx ty tz qx qy qz qw, 8 has a
+stamp before these (TUM), 12 is a 3x4 matrix row by row (KITTI), 16 a 4x4 matrix.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import BadInput
+from stages.ingest.folders.files import files_of, images_by_number
+from stages.ingest.folders.stamped_poses import StampedPoses, read_stamped_poses
+from stages.kit.formats.trajectories import number_rows, read_matrix, read_open3d_log, read_text, transform_from_numbers
+
+FILES = ("pose.txt", "poses.txt", "groundtruth.txt", "trajectory.txt", "trajectory.tum", "traj.txt", "trajectory.log")
+FOLDERS = ("pose", "poses")
+COLUMNS = (7, 8, 12, 16)
+Pose = tuple[np.ndarray | None, str | None]
+"""world_from_camera (4, 4), or the reason why there is none."""
+
+
+def pose_file(root: Path) -> Path | None:
+    """Return the file or folder of poses in a folder, None without any."""
+    named = [root / name for name in FILES if (root / name).is_file()]
+    named += [path for path in files_of(root, (".txt",)) if path.name.startswith("traj")]
+    named += [root / name for name in FOLDERS if (root / name).is_dir()]
+    return named[0] if named else None
+
+
+def columns_of(path: Path) -> int:
+    """Return the number of columns in the first row of a text file, 0 when it has none. Raises BadInput."""
+    with path.open("rb") as file:
+        start = file.read(4096).decode("utf-8", "replace")
+    rows = (line.split("#", 1)[0].split() for line in start.splitlines())
+    return next((len(row) for row in rows if row), 0)
+
+
+def read_pose_list(path: Path, names: list[str]) -> list[Pose] | StampedPoses:
+    """Return the pose of each image of `names` (stems, in order), or a stamped trajectory when the file is one.
+
+    Raises BadInput when the numbers of poses and images differ, and for rows that are none.
+    """
+    if path.is_dir():
+        return _folder(path, names)
+    if path.suffix == ".log":
+        matrices: list[Pose] = [(matrix, None) for matrix in read_open3d_log(path)]
+        return _counted(matrices, names, path)
+    columns = columns_of(path)
+    if columns == 8:
+        return read_stamped_poses(path)
+    if columns not in COLUMNS:
+        read_text(path)
+        raise BadInput(f"{path}: {columns} columns are no pose", hint="7, 8 (with a stamp), 12 or 16 numbers a line")
+    return _counted([_pose(row, f"{path}: line {line}") for line, row in number_rows(path, columns)], names, path)
+
+
+def _pose(row: np.ndarray, where: str) -> Pose:
+    if not np.isfinite(row).all():
+        return None, "non_finite_pose"
+    if len(row) == 7:
+        try:
+            return transform_from_numbers(row, where), None
+        except BadInput:
+            return None, "non_rigid_pose"
+    return np.vstack([row.reshape(-1, 4)[:3], [0, 0, 0, 1] if len(row) == 12 else row[12:]]), None
+
+
+def _counted(poses: list[Pose], names: list[str], path: Path) -> list[Pose]:
+    if len(poses) != len(names):
+        raise BadInput(f"{path}: {len(poses)} poses for {len(names)} images", hint="one pose an image, in order")
+    return poses
+
+
+def _folder(folder: Path, names: list[str]) -> list[Pose]:
+    by_stem = {path.stem: path for path in files_of(folder, (".txt",))}
+    if not by_stem.keys() & set(names):
+        numbered = images_by_number(folder, (".txt",))
+        keys = [_last_number(name) for name in names]
+        by_stem = {name: numbered[key] for name, key in zip(names, keys, strict=True) if key in numbered}
+    poses: list[Pose] = []
+    for name in names:
+        if name not in by_stem:
+            poses.append((None, None))
+            continue
+        try:
+            poses.append((read_matrix(by_stem[name]), None))
+        except BadInput:
+            poses.append((None, "unreadable_pose"))
+    return poses
+
+
+def _last_number(name: str) -> int | None:
+    digits = "".join(letter if letter in "0123456789" else " " for letter in name).split()
+    return int(digits[-1]) if digits else None

@@ -1,0 +1,316 @@
+"""nerfstudio's transforms.json: OpenGL cameras (y up, z back), camera-to-world, intrinsics for all or for each frame.
+
+Pixel coordinates in the file put the centre of the first pixel at (0.5, 0.5); ours are half a pixel less.
+`applied_transform` and `applied_scale` (saved = scale * transform * original) are undone, so that poses are in the
+world and the unit of the original data again. Folders of the Replica rendering (traj.txt, results/) are in replica.py.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from schemas.errors import BadInput
+from stages.ingest.folders.camera_groups import grouped
+from stages.ingest.folders.files import (
+    COLOR_SUFFIXES,
+    all_intrinsics_given,
+    chosen_cameras,
+    color_image_size,
+    depth_image_size,
+    depth_units,
+    named_file,
+    natural_key,
+    pinhole,
+    read_json,
+    refuse_exr,
+    stream,
+    text_stream,
+)
+from stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
+from stages.ingest.folders.undistortion import PINHOLE, Lens, RecordedCamera, lens_of, overridden_recording
+from stages.ingest.layouts.nerfstudio import replica
+from stages.ingest.parameters import IngestParameters
+from stages.ingest.source import Entry, LogSource, SourceCamera
+from stages.kit.geometry.transforms import inverse, is_rigid
+
+NAMES = ("transforms.json", "transforms_train.json")
+OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
+DEFAULT_UNIT = 0.001
+"""Metres per unit of depth when the file does not say: millimetres."""
+PERSPECTIVE = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL")
+LARGEST_SIZE = 100_000
+
+
+@dataclass(frozen=True)
+class _Frame:
+    where: str
+    name: str
+    color: Path
+    depth: Path | None
+    pose: np.ndarray | None
+    problem: str | None
+    time: float | None
+    """`timestamp` of the frame [s], which our own exports have."""
+    fields: dict[str, Any]
+    """Intrinsics of the frame over those of the file."""
+
+
+@dataclass(frozen=True)
+class _Stated:
+    """Intrinsics as a frame states them, for images of `size`."""
+
+    size: tuple[int, int] | None
+    focal_x: float | None
+    focal_y: float | None
+    center_x: float | None
+    center_y: float | None
+    angle: float | None
+    """Horizontal field of view [rad]."""
+    lens: Lens
+
+
+def matches(path: Path) -> str | None:
+    """Return the rule that matched, or None."""
+    file = _transforms(path)
+    if file is not None:
+        return f"{'file' if path.is_file() else f'folder with {file.name}'}: nerfstudio transforms"
+    return replica.matches(path)
+
+
+def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSource:
+    """List the frames of a transforms.json. Raises BadInput for what is none, names outside of its folder, cameras
+    that cannot be undistorted."""
+    file = _transforms(path)
+    if file is None:
+        return replica.open_source(path, parameters, rule)
+    document = read_json(file)
+    if not isinstance(document, dict) or not isinstance(document.get("frames"), list):
+        raise BadInput(f"{file}: has no list of frames")
+    frames = sorted(_frames(document, file), key=lambda frame: natural_key(frame.name))
+    stamped = all(frame.time is not None for frame in frames)
+    if stamped:
+        frames.sort(key=lambda frame: frame.time or 0.0)
+    has_depth = any(frame.depth is not None for frame in frames)
+    refuse_exr((frame.depth.name for frame in frames if frame.depth is not None), str(file))
+    default_unit = _number(document, "depth_unit_scale_factor", str(file), DEFAULT_UNIT)
+    if not default_unit > 0:
+        raise BadInput(f"{file}: depth_unit_scale_factor {default_unit:g} is not positive")
+    units, unit_note = depth_units(parameters, 1 / default_unit)
+    recorded, given = _recorded(frames, has_depth, parameters)
+    groups, group_notes = grouped(recorded, _labels(frames, recorded))
+    counts = {group.name: len(group.members) for group in groups}
+    chosen = chosen_cameras(counts, parameters, str(file)) if counts else ()
+    world, world_notes = _world_from_saved(document, file, has_depth)
+    group_of = {index: group for group in groups for index in group.members}
+    entries = []
+    for index, frame in enumerate(frames):
+        group = group_of[index]
+        if group.name not in chosen:
+            continue
+        form = FrameFormat(recorded[index], group.camera, True, has_depth, units)
+        load = frame_loader(FrameFiles(frame.color, frame.depth), form)
+        pose = None if frame.pose is None else world(frame.pose)
+        time = index / parameters.frame_rate if frame.time is None or not stamped else frame.time
+        entries.append(Entry(frame.name, time, pose, load, frame.problem, group.name))
+    cameras = [SourceCamera(group.name, group.camera) for group in groups if group.name in chosen]
+    if not cameras:
+        raise BadInput(f"{file}: has no frames")
+    lenses = sorted({one.lens.words for one in recorded if not one.lens.is_pinhole})
+    notes = (
+        f"intrinsics read from {file.name}",
+        *given,
+        *group_notes,
+        *(
+            (f"lens distortion undone ({lenses[0] if len(lenses) == 1 else f'{len(lenses)} lenses'})",)
+            if lenses
+            else ()
+        ),
+        *((unit_note,) if has_depth else ()),
+        *world_notes,
+        "times from timestamp"
+        if stamped
+        else f"times assumed: order of the names / {parameters.frame_rate:g} per second",
+    )
+    stamps = np.array([round((frame.time or 0.0) * 1e9) for frame in frames if stamped], np.int64)
+    streams = [stream("file_path", "color", [frame.color for frame in frames], stamps)]
+    if has_depth:
+        streams.append(stream("depth_file_path", "depth", [frame.depth for frame in frames if frame.depth]))
+    streams.append(text_stream("transform_matrix", "pose", sum(frame.pose is not None for frame in frames)))
+    others = tuple(name for name in counts if name not in chosen)
+    return LogSource(
+        "nerfstudio", rule, tuple(cameras), tuple(entries), notes, streams=tuple(streams), other_cameras=others
+    )
+
+
+def _transforms(path: Path) -> Path | None:
+    if path.is_dir():
+        return next((path / name for name in NAMES if (path / name).is_file()), None)
+    if path.suffix.lower() == ".json" and path.is_file():
+        with path.open("rb") as file:
+            start = file.read(1_000_000)
+        return path if b'"frames"' in start and b'"transform_matrix"' in start else None
+    return None
+
+
+def _frames(document: dict[str, Any], file: Path) -> list[_Frame]:
+    root, frames = file.parent, []
+    shared = {key: value for key, value in document.items() if key != "frames"}
+    for index, fields in enumerate(document["frames"]):
+        where = f"{file}: frame {index}"
+        if not isinstance(fields, dict):
+            raise BadInput(f"{where}: is no object")
+        color = _with_suffix(named_file(root, fields.get("file_path"), where))
+        depth = fields.get("depth_file_path")
+        pose, problem = _pose(fields.get("transform_matrix"))
+        frames.append(
+            _Frame(
+                where,
+                str(fields["file_path"]),
+                color,
+                None if depth is None else named_file(root, depth, where),
+                pose,
+                problem,
+                None if fields.get("timestamp") is None else _number(fields, "timestamp", where, largest=9e9),
+                {**shared, **fields},
+            )
+        )
+    return frames
+
+
+def _with_suffix(path: Path) -> Path:
+    """Return the image itself where the file leaves the ending away, as Blender's do."""
+    if path.suffix.lower() in COLOR_SUFFIXES:
+        return path
+    candidates = (path.with_name(path.name + suffix) for suffix in COLOR_SUFFIXES)
+    return next((candidate for candidate in candidates if candidate.is_file()), path)
+
+
+def _pose(value: Any) -> tuple[np.ndarray | None, str | None]:
+    try:
+        matrix = np.array(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        return None, "unreadable_pose"
+    if matrix.shape == (3, 4):
+        matrix = np.vstack([matrix, [0, 0, 0, 1]])
+    return (matrix, None) if matrix.shape == (4, 4) else (None, "unreadable_pose")
+
+
+def _number(fields: dict[str, Any], name: str, where: str, default: float | None = None, largest: float = 1e9) -> float:
+    value = fields.get(name, default)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= largest:
+        raise BadInput(f"{where}: {name} = {value!r:.40} is no number")
+    return float(value)
+
+
+def _recorded(
+    frames: list[_Frame], has_depth: bool, parameters: IngestParameters
+) -> tuple[list[RecordedCamera], tuple[str, ...]]:
+    """Return each frame's camera at the size of its images. Sizes are looked up once for each kind of intrinsics."""
+    alike: dict[_Stated, list[_Frame]] = {}
+    stated = [_stated(frame) for frame in frames]
+    for one, frame in zip(stated, frames, strict=True):
+        alike.setdefault(one, []).append(frame)
+    known: dict[_Stated, RecordedCamera] = {}
+    notes: tuple[str, ...] = ()
+    for one, same in alike.items():
+        where = same[0].where
+        color_size = color_image_size(frame.color for frame in same) if one.size is None or not has_depth else None
+        depth_size = depth_image_size(frame.depth for frame in same if frame.depth is not None) if has_depth else None
+        camera = _camera(one, one.size or color_size or depth_size, all_intrinsics_given(parameters), where)
+        known[one], notes = overridden_recording(camera.at(depth_size or color_size, where), parameters)
+    return [known[one] for one in stated], notes
+
+
+def _stated(frame: _Frame) -> _Stated:
+    fields, where = frame.fields, frame.where
+
+    def optional(name: str) -> float | None:
+        return None if fields.get(name) is None else _number(fields, name, where)
+
+    size = None
+    if fields.get("w") is not None and fields.get("h") is not None:
+        width, height = _number(fields, "w", where), _number(fields, "h", where)
+        if not (1 <= width <= LARGEST_SIZE and 1 <= height <= LARGEST_SIZE):
+            raise BadInput(f"{where}: images of {width:g}x{height:g} pixels")
+        size = (round(width), round(height))
+    return _Stated(
+        size, optional("fl_x"), optional("fl_y"), optional("cx"), optional("cy"), optional("camera_angle_x"),
+        _lens(fields, where),
+    )  # fmt: skip
+
+
+def _camera(stated: _Stated, size: tuple[int, int] | None, replaced: bool, where: str) -> RecordedCamera:
+    """Return the camera of a frame whose intrinsics are for images of `size`, or will be `replaced` by options."""
+    width, height = size or (0, 0)
+    focal_x, focal_y = stated.focal_x, stated.focal_y
+    if focal_x is None and (size is None or replaced):
+        focal_x = 1.0  # without any image that can be decoded there will be no frame; the log is described all the same
+    if focal_x is None:
+        if stated.angle is None or not 0 < stated.angle < math.pi:
+            raise BadInput(f"{where}: there is neither fl_x nor a camera_angle_x", hint="give --fx --fy --cx --cy")
+        focal_x = 0.5 * width / math.tan(0.5 * stated.angle)
+    center_x = width / 2 if stated.center_x is None else stated.center_x
+    center_y = height / 2 if stated.center_y is None else stated.center_y
+    numbers = (focal_x, focal_x if focal_y is None else focal_y, center_x - 0.5, center_y - 0.5)
+    return RecordedCamera(pinhole(numbers, size, where), stated.lens)
+
+
+def _lens(fields: dict[str, Any], where: str) -> Lens:
+    model = fields.get("camera_model", "OPENCV")
+    k1, k2, k3, k4, p1, p2 = (_number(fields, name, where, 0.0) for name in ("k1", "k2", "k3", "k4", "p1", "p2"))
+    if model == "OPENCV_FISHEYE" or fields.get("is_fisheye") is True:
+        return lens_of((k1, k2, k3, k4), where, fisheye=True)
+    if model not in PERSPECTIVE:
+        raise BadInput(f"{where}: cameras of model {model!r:.40} are not read", hint="undistort the images first")
+    lens = lens_of((k1, k2, p1, p2, k3), where)
+    return PINHOLE if lens.is_pinhole else lens
+
+
+def _labels(frames: list[_Frame], recorded: list[RecordedCamera]) -> list[str]:
+    """Return the name of each frame's camera: `camera_name`, else the number of its kind in order of appearance."""
+    numbers: dict[RecordedCamera, int] = {}
+    labels = []
+    for frame, one in zip(frames, recorded, strict=True):
+        name = frame.fields.get("camera_name")
+        number = numbers.setdefault(one, len(numbers) + 1)
+        labels.append(name if isinstance(name, str) and name else str(number))
+    return labels
+
+
+def _world_from_saved(
+    document: dict[str, Any], file: Path, has_depth: bool
+) -> tuple[Callable[[np.ndarray], np.ndarray], tuple[str, ...]]:
+    """Return a function from a pose in the file to world_from_camera in the original world, and notes."""
+    scale = _number(document, "applied_scale", str(file), 1.0)
+    if not scale > 0:
+        raise BadInput(f"{file}: applied_scale {scale:g} is not positive")
+    applied = np.eye(4)
+    if document.get("applied_transform") is not None:
+        matrix, problem = _pose(document["applied_transform"])
+        if matrix is None or not is_rigid(matrix, 1e-2):
+            raise BadInput(
+                f"{file}: applied_transform is no rigid transform", hint=problem or "3x4, rotation and shift"
+            )
+        applied = matrix
+    original_from_saved = inverse(applied)
+    notes = []
+    if not np.array_equal(applied, np.eye(4)):
+        notes.append("applied_transform undone: poses are in the world of the original data")
+    if scale != 1:
+        notes.append(f"applied_scale {scale:g} undone: lengths are those of the original data")
+    if not has_depth:
+        notes.append("WARNING: scale unknown: without depth nothing says that lengths in transforms.json are metres")
+
+    def world(pose: np.ndarray) -> np.ndarray:
+        with np.errstate(invalid="ignore", over="ignore"):  # poses that are not finite are counted later
+            metric = pose @ OPENGL_FROM_OPENCV
+            metric[:3, 3] /= scale
+            return original_from_saved @ metric
+
+    return world, tuple(notes)

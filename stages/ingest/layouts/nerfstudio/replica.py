@@ -1,0 +1,96 @@
+"""Replica as rendered for RGB-D mapping: traj.txt (4x4 camera-to-world a line), results/frame*.jpg and depth*.png,
+cam_params.json in the folder or the one above it. Cameras are OpenCV's, depth is 1/6553.5 m."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from schemas.errors import BadInput
+from schemas.scene_parts import Camera
+from stages.ingest.folders.files import (
+    camera_from_options,
+    depth_image_size,
+    depth_units,
+    image_loader,
+    images_by_number,
+    overridden,
+    pinhole,
+    read_json,
+    resized_camera,
+    stream,
+    text_stream,
+)
+from stages.ingest.parameters import IngestParameters
+from stages.ingest.source import Entry, LogSource, SourceCamera
+from stages.kit.formats.trajectories import number_rows
+
+TRAJECTORY, RESULTS, CAMERA = "traj.txt", "results", "cam_params.json"
+UNITS_PER_METRE = 6553.5
+RENDERED = ((1200, 680), (600.0, 600.0, 599.5, 339.5))
+"""Size and intrinsics of these renderings, for folders from which cam_params.json was left out."""
+
+
+def matches(root: Path) -> str | None:
+    """Return the rule that matched, or None."""
+    if (root / TRAJECTORY).is_file() and any(root.glob(f"{RESULTS}/frame*")):
+        return f"folder with {TRAJECTORY} and {RESULTS}/frame*: Replica"
+    return None
+
+
+def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
+    """List the frames of a Replica folder. Raises BadInput for a damaged trajectory or unknown intrinsics."""
+    colors = images_by_number(root / RESULTS, (".jpg", ".jpeg", ".png"), "frame")
+    depths = images_by_number(root / RESULTS, (".png",), "depth")
+    rows = number_rows(root / TRAJECTORY, 16)
+    numbers = sorted(colors.keys() | depths.keys())
+    size = depth_image_size(depths.values())
+    path = next((folder / CAMERA for folder in (root, root.parent) if (folder / CAMERA).is_file()), None)
+    default_units = UNITS_PER_METRE
+    if path is not None:
+        camera, default_units = _read_camera(path, size)
+        source = f"intrinsics read from {path.name}"
+    elif size == RENDERED[0]:
+        camera, source = pinhole(RENDERED[1], size, str(root)), "intrinsics assumed: Replica, 600 600 599.5 339.5"
+    else:
+        camera, source = camera_from_options(size, parameters, f"{root}: there is no {CAMERA}"), "no cam_params.json"
+    camera, given = overridden(camera, parameters)
+    units, unit_note = depth_units(parameters, default_units)
+    entries = tuple(
+        Entry(
+            f"frame {number}",
+            number / parameters.frame_rate,
+            rows[number][1].reshape(4, 4) if number < len(rows) else None,
+            image_loader(colors.get(number), depths.get(number), camera, units),
+        )
+        for number in numbers
+    )
+    notes = (
+        source,
+        *given,
+        unit_note,
+        f"poses assumed: line n of {TRAJECTORY} belongs to image n, counted from 0",
+        f"times assumed: frame number / {parameters.frame_rate:g} per second",
+    )
+    streams = (
+        stream(f"{RESULTS}/frame", "color", colors.values()),
+        stream(f"{RESULTS}/depth", "depth", depths.values()),
+        text_stream(TRAJECTORY, "pose", len(rows)),
+    )
+    return LogSource("nerfstudio", rule, (SourceCamera("camera", camera),), entries, notes, streams=streams)
+
+
+def _read_camera(path: Path, size: tuple[int, int] | None) -> tuple[Camera, float]:
+    """Return the camera and depth units per metre in `{"camera": {w h fx fy cx cy scale}}`."""
+    document = read_json(path)
+    fields = document.get("camera", document) if isinstance(document, dict) else None
+    if not isinstance(fields, dict):
+        raise BadInput(f"{path}: has no camera")
+    try:
+        stated = (int(fields["w"]), int(fields["h"]))
+        numbers = [fields[name] for name in ("fx", "fy", "cx", "cy")]
+        units = float(fields.get("scale", UNITS_PER_METRE))
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise BadInput(f"{path}: no camera with w, h, fx, fy, cx, cy ({type(error).__name__}: {error})") from None
+    if not 0 < units < 1e9 or not all(0 < value < 1e5 for value in stated):
+        raise BadInput(f"{path}: size {stated[0]}x{stated[1]} or scale {units:g} is impossible")
+    return resized_camera(pinhole(numbers, stated, str(path)), size, str(path)), units

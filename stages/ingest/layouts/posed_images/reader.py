@@ -1,0 +1,86 @@
+"""Folders of posed images: color|rgb|image/, depth/, pose.txt with a line `tx ty tz qx qy qz qw` an image.
+
+The poses are world_from_camera (as in slambook2's diningroom); intrinsics come from options. Folders with a
+calibration file, or with other pose lines, are the plain images of layouts/images.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import BadInput
+from stages.ingest.folders.calibration_files import calibration_file
+from stages.ingest.folders.files import (
+    COLOR_SUFFIXES,
+    DEPTH_SUFFIXES,
+    camera_from_options,
+    depth_image_size,
+    depth_units,
+    first_subfolder,
+    image_loader,
+    images_by_stem,
+    natural_key,
+    stream,
+    text_stream,
+)
+from stages.ingest.folders.pose_files import columns_of
+from stages.ingest.parameters import IngestParameters
+from stages.ingest.source import Entry, LogSource, SourceCamera
+from stages.kit.formats.trajectories import number_rows, transform_from_numbers
+
+COLOR_FOLDERS = ("color", "rgb", "image")
+POSES = ("pose.txt", "poses.txt")
+
+
+def matches(root: Path) -> str | None:
+    """Return the rule that matched, or None."""
+    color = first_subfolder(root, COLOR_FOLDERS)
+    poses = next((name for name in POSES if (root / name).is_file()), None)
+    if color is None or poses is None or not (root / "depth").is_dir():
+        return None
+    if calibration_file(root) is not None or columns_of(root / poses) in (8, 12, 16):
+        return None
+    return f"folder with {color.name}/, depth/ and {poses}: posed images"
+
+
+def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
+    """List the frames of a posed image folder. Raises BadInput when poses or intrinsics are not to be had."""
+    color_folder = first_subfolder(root, COLOR_FOLDERS)
+    pose_file = next(root / name for name in POSES if (root / name).is_file())
+    assert color_folder is not None
+    colors = images_by_stem(color_folder, COLOR_SUFFIXES)
+    depths = images_by_stem(root / "depth", DEPTH_SUFFIXES)
+    rows = number_rows(pose_file, 7)
+    stems = sorted(colors.keys() | depths.keys(), key=natural_key)
+    if len(rows) != len(stems):
+        raise BadInput(f"{pose_file}: {len(rows)} poses for {len(stems)} images", hint="one line an image, in order")
+    camera = camera_from_options(depth_image_size(list(depths.values())), parameters, f"{root}: posed images")
+    units, unit_note = depth_units(parameters, 1000.0)
+    entries = []
+    for index, (stem, (line, numbers)) in enumerate(zip(stems, rows, strict=True)):
+        pose, problem = _pose(numbers, f"{pose_file}: line {line}")
+        loader = image_loader(colors.get(stem), depths.get(stem), camera, units)
+        entries.append(Entry(stem, index / parameters.frame_rate, pose, loader, problem))
+    notes = (
+        "intrinsics given by option",
+        unit_note,
+        f"times assumed: {parameters.frame_rate:g} frames per second",
+        "poses assumed: tx ty tz qx qy qz qw, world_from_camera",
+    )
+    streams = (
+        stream(color_folder.name, "color", colors.values()),
+        stream("depth", "depth", depths.values()),
+        text_stream(pose_file.name, "pose", len(rows)),
+    )
+    return LogSource("posed-images", rule, (SourceCamera("camera", camera),), tuple(entries), notes, streams=streams)
+
+
+def _pose(numbers: np.ndarray, where: str) -> tuple[np.ndarray | None, str | None]:
+    if not np.isfinite(numbers).all():
+        return None, "non_finite_pose"
+    try:
+        return transform_from_numbers(numbers, where), None
+    except BadInput:
+        return None, "non_rigid_pose"

@@ -1,0 +1,103 @@
+"""Redwood / Open3D folders: image|color|rgb/, depth/, trajectory.log (world_from_camera), camera_intrinsic.json."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from schemas.errors import BadInput
+from schemas.scene_parts import Camera
+from stages.ingest.folders.files import (
+    COLOR_SUFFIXES,
+    DEPTH_SUFFIXES,
+    depth_image_size,
+    depth_units,
+    first_subfolder,
+    image_loader,
+    images_by_stem,
+    overridden,
+    read_json,
+    stream,
+    text_stream,
+)
+from stages.ingest.parameters import IngestParameters
+from stages.ingest.source import Entry, LogSource, SourceCamera
+from stages.kit.formats.trajectories import read_open3d_log
+
+COLOR_FOLDERS = ("image", "color", "rgb")
+TRAJECTORY = "trajectory.log"
+INTRINSICS = ("camera_intrinsic.json", "intrinsic.json")
+PRIMESENSE = {"fx": 525.0, "fy": 525.0, "cx": 319.5, "cy": 239.5}
+"""open3d.camera.PinholeCameraIntrinsicParameters.PrimeSenseDefault, 640x480."""
+
+
+def matches(root: Path) -> str | None:
+    """Return the rule that matched, or None."""
+    if not (root / "depth").is_dir() or not (root / TRAJECTORY).is_file():
+        return None
+    color = first_subfolder(root, COLOR_FOLDERS)
+    return f"folder with {color.name}/, depth/ and {TRAJECTORY}: Redwood/Open3D" if color else None
+
+
+def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
+    """List the frames of a Redwood folder. Raises BadInput for a damaged trajectory or intrinsics."""
+    color_folder = first_subfolder(root, COLOR_FOLDERS)
+    assert color_folder is not None
+    colors = list(images_by_stem(color_folder, COLOR_SUFFIXES).values())
+    depths = list(images_by_stem(root / "depth", DEPTH_SUFFIXES).values())
+    poses = read_open3d_log(root / TRAJECTORY)
+    camera, notes = _camera(root, depth_image_size(depths))
+    camera, given = overridden(camera, parameters)
+    units, unit_note = depth_units(parameters, 1000.0)
+    if len(colors) != len(depths):
+        raise BadInput(
+            f"{root}: {len(colors)} colour and {len(depths)} depth images are not pairs",
+            hint="the format pairs them by order, so one missing image would shift all that follow",
+        )
+    if len(poses) > len(depths):
+        raise BadInput(f"{root / TRAJECTORY}: {len(poses)} poses for {len(depths)} images")
+    entries = tuple(
+        Entry(
+            name=depth.name,
+            time=index / parameters.frame_rate,
+            world_from_camera=poses[index] if index < len(poses) else None,
+            load=image_loader(color, depth, camera, units),
+        )
+        for index, (color, depth) in enumerate(zip(colors, depths, strict=True))
+    )
+    notes = (*notes, *given, unit_note, f"times assumed: {parameters.frame_rate:g} frames per second")
+    streams = (
+        stream(color_folder.name, "color", colors),
+        stream("depth", "depth", depths),
+        text_stream(TRAJECTORY, "pose", len(poses)),
+    )
+    return LogSource("redwood", rule, (SourceCamera("camera", camera),), entries, notes, streams=streams)
+
+
+def _camera(root: Path, size: tuple[int, int] | None) -> tuple[Camera, tuple[str, ...]]:
+    width, height = size or (0, 0)
+    for name in INTRINSICS:
+        path = root / name
+        if path.exists():
+            return _read_intrinsics(path, size), (f"intrinsics read from {name}",)
+    if size is not None and size != (640, 480):
+        raise BadInput(
+            f"{root}: images are {width}x{height} and there is no {INTRINSICS[0]}", hint="add it (Open3D layout)"
+        )
+    note = "intrinsics assumed: PrimeSense default, fx = fy = 525, cx = 319.5, cy = 239.5"
+    return Camera(width=width, height=height, **PRIMESENSE), (note,)
+
+
+def _read_intrinsics(path: Path, size: tuple[int, int] | None) -> Camera:
+    try:
+        document = read_json(path)
+        matrix = [float(value) for value in document["intrinsic_matrix"]]  # column major
+        width, height = int(document["width"]), int(document["height"])
+        fx, fy, cx, cy = matrix[0], matrix[4], matrix[6], matrix[7]
+    except (ValueError, KeyError, TypeError, IndexError, OverflowError) as error:
+        raise BadInput(f"{path}: no Open3D intrinsics ({type(error).__name__}: {error})") from None
+    if not all(map(math.isfinite, matrix)) or fx <= 0 or fy <= 0 or min(width, height) < 1:
+        raise BadInput(f"{path}: focal lengths {fx:g}, {fy:g} are not positive")
+    if size is not None and size != (width, height):
+        raise BadInput(f"{path}: is for {width}x{height}, the depth images are {size[0]}x{size[1]}")
+    return Camera(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)

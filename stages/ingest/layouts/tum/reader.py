@@ -1,0 +1,220 @@
+"""TUM RGB-D folders: rgb.txt and depth.txt name stamped images, groundtruth.txt the poses; ICL-NUIM in that form too.
+
+Colour and depth of the data set are registered one to one in the colour camera's picture as it was taken, so both have
+its lens distortion, which is undone in both (depth takes the nearest pixel); the ground truth is the pose of that
+camera. The data set's page offers 525 525 319.5 239.5 without any undistortion as a simpler choice: giving these four
+by option does that.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import BadInput
+from stages.ingest.association import mutual_nearest
+from stages.ingest.folders.files import (
+    all_intrinsics_given,
+    camera_from_options,
+    color_image_size,
+    depth_image_size,
+    depth_units,
+    named_file,
+    pinhole,
+    refuse_exr,
+    stream,
+    text_stream,
+)
+from stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
+from stages.ingest.folders.stamped_poses import StampedPoses, exact_stamp, read_stamped_poses
+from stages.ingest.folders.undistortion import RecordedCamera, lens_of, overridden_recording
+from stages.ingest.parameters import IngestParameters
+from stages.ingest.source import Entry, LogSource, SourceCamera
+from stages.kit.formats.trajectories import read_text
+
+COLOR_LIST, DEPTH_LIST = "rgb.txt", "depth.txt"
+ASSOCIATIONS = ("associated.txt", "associations.txt", "association.txt", "associate.txt")
+CALIBRATIONS = ("calibration.txt", "camera.txt", "intrinsics.txt")
+UNITS_PER_METRE = 5000.0
+FREIBURG = {
+    "1": ((517.3, 516.5, 318.6, 255.3), (0.2624, -0.9531, -0.0054, 0.0026, 1.1633)),
+    "2": ((520.9, 521.0, 325.1, 249.7), (0.2312, -0.7849, -0.0033, -0.0001, 0.9172)),
+    "3": ((535.4, 539.2, 320.1, 247.6), ()),
+}
+"""Colour cameras of the data set at 640x480 as its page states them: fx fy cx cy; k1 k2 p1 p2 k3."""
+FREIBURG_NAME = re.compile(r"(?:freiburg|(?<![a-z])fr)([123])(?!\d)")
+ICL_NUIM = (481.2, 480.0, 319.5, 239.5)
+ICL_NUIM_NAME = re.compile(r"icl[-_ ]?nuim|(?:living_?room|office)_?traj\d|(?<![a-z])(?:lr|of)_?kt\d")
+MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class _Stamped:
+    """The images that a list names."""
+
+    stamps: np.ndarray
+    """(N,) int64 [ns], ascending."""
+    paths: tuple[Path, ...]
+
+
+def matches(root: Path) -> str | None:
+    """Return the rule that matched, or None."""
+    if not root.is_dir():
+        return None
+    if (root / COLOR_LIST).is_file():
+        more = f" and {DEPTH_LIST}" if (root / DEPTH_LIST).is_file() else ", no depth"
+        return f"folder with {COLOR_LIST}{more}: TUM RGB-D"
+    pairs = next((name for name in ASSOCIATIONS if (root / name).is_file()), None)
+    return f"folder with {pairs}: TUM RGB-D" if pairs else None
+
+
+def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
+    """List the frames of a TUM RGB-D folder. Raises BadInput for damaged lists, poses or unknown intrinsics."""
+    icl_nuim = _is_icl_nuim(root)
+    # ICL-NUIM numbers its frames where TUM has stamps.
+    unit = 1 / parameters.frame_rate if icl_nuim else 1.0
+    colors, depths = _images(root, unit)
+    refuse_exr((path.name for path in depths.paths), str(root))
+    poses = _poses(root, unit)
+    size = depth_image_size(depths.paths) if depths.paths else color_image_size(colors.paths)
+    recorded, notes = _camera(root, size, parameters, icl_nuim)
+    recorded, given = overridden_recording(recorded, parameters)
+    units, unit_note = depth_units(parameters, UNITS_PER_METRE)
+    form = FrameFormat(recorded, recorded.camera, True, bool(depths.paths), units)
+    tolerance = round(parameters.maximum_time_difference * 1e9)
+    partners = mutual_nearest(colors.stamps, depths.stamps, tolerance)
+    entries = []
+    for stamp, path, partner in zip(colors.stamps, colors.paths, partners, strict=True):
+        missing = bool(depths.paths) and partner < 0
+        depth = depths.paths[partner] if partner >= 0 else None
+        # The shape of the scene comes from the depth image, so its time is that of the frame.
+        moment = int(depths.stamps[partner] if partner >= 0 else stamp)
+        pose = poses.at(moment, parameters) if poses else None
+        if pose is not None and icl_nuim:
+            pose = MIRROR @ pose @ MIRROR
+        problem = "no_depth_within_tolerance" if missing else None
+        load = frame_loader(FrameFiles(path, depth), form)
+        entries.append(Entry(str(path.relative_to(root)), moment * 1e-9, pose, load, problem))
+    unpaired = len(depths.paths) - int((partners >= 0).sum())
+    notes = (
+        *notes,
+        *given,
+        *((unit_note,) if depths.paths else ()),
+        *(poses.notes if poses else ()),
+        *((f"{unpaired} depth images are paired with no colour image",) if unpaired else ()),
+        *(_icl_notes(parameters) if icl_nuim else ()),
+    )
+    streams = [stream("rgb", "color", colors.paths, colors.stamps)]
+    if depths.paths:
+        streams.append(stream("depth", "depth", depths.paths, depths.stamps))
+    if poses:
+        streams.append(text_stream("groundtruth.txt", "pose", len(poses.stamps), poses.stamps))
+    camera = SourceCamera("camera", recorded.camera)
+    return LogSource("tum", rule, (camera,), tuple(entries), notes, streams=tuple(streams))
+
+
+def _images(root: Path, unit: float) -> tuple[_Stamped, _Stamped]:
+    """Return the colour and depth images; a list in which stamp and name alternate serves where the two are missing."""
+    if (root / COLOR_LIST).is_file():
+        depths = _read_list(root, DEPTH_LIST, unit) if (root / DEPTH_LIST).is_file() else _sorted([], [])
+        return _read_list(root, COLOR_LIST, unit), depths
+    path = next(root / name for name in ASSOCIATIONS if (root / name).is_file())
+    columns: tuple[tuple[list[int], list[Path]], ...] = (([], []), ([], []))
+    for where, fields in _rows(path):
+        if len(fields) != 4:
+            raise BadInput(f"{where}: {len(fields)} columns, expected stamp, name, stamp, name")
+        pairs = [(fields[0], fields[1]), (fields[2], fields[3])]
+        if "depth" in fields[1].split("/")[0] and "depth" not in fields[3].split("/")[0]:
+            pairs.reverse()  # ICL-NUIM lists depth first
+        for (stamps, paths), (stamp, name) in zip(columns, pairs, strict=True):
+            stamps.append(round(exact_stamp(stamp, where) * unit))
+            paths.append(named_file(root, name, where))
+    return _sorted(*columns[0]), _sorted(*columns[1])
+
+
+def _read_list(root: Path, name: str, unit: float) -> _Stamped:
+    stamps, paths = [], []
+    for where, fields in _rows(root / name, maximum_splits=1):
+        if len(fields) != 2:
+            raise BadInput(f"{where}: expected a time stamp and a file name")
+        stamps.append(round(exact_stamp(fields[0], where) * unit))
+        paths.append(named_file(root, fields[1].strip(), where))
+    return _sorted(stamps, paths)
+
+
+def _rows(path: Path, maximum_splits: int = -1) -> list[tuple[str, list[str]]]:
+    """Return (place, fields) of every line; blank lines and # comments are skipped."""
+    lines = enumerate(read_text(path).splitlines(), start=1)
+    return [
+        (f"{path}: line {number}", line.split(None, maximum_splits))
+        for number, line in lines
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+
+
+def _sorted(stamps: list[int], paths: list[Path]) -> _Stamped:
+    order = sorted(range(len(stamps)), key=lambda index: stamps[index])
+    return _Stamped(np.array([stamps[i] for i in order], np.int64), tuple(paths[i] for i in order))
+
+
+def _poses(root: Path, unit: float) -> StampedPoses | None:
+    names = ["groundtruth.txt", *sorted(path.name for path in root.glob("*.gt.freiburg"))]
+    path = next((root / name for name in names if (root / name).is_file()), None)
+    return read_stamped_poses(path, unit) if path else None
+
+
+def _is_icl_nuim(root: Path) -> bool:
+    """Whether the folder is of the ICL-NUIM data set: rendered, with frame numbers for stamps."""
+    return any(root.glob("*.gt.freiburg")) or bool(ICL_NUIM_NAME.search(root.resolve().name.lower()))
+
+
+def _icl_notes(parameters: IngestParameters) -> tuple[str, ...]:
+    return (
+        f"times assumed: ICL-NUIM frame number / {parameters.frame_rate:g} per second",
+        "ICL-NUIM poses mirrored in y: they are those of a renderer with y up (hence its negative fy), its images are "
+        "stored from the top down",
+    )
+
+
+def _camera(
+    root: Path, size: tuple[int, int] | None, parameters: IngestParameters, icl_nuim: bool
+) -> tuple[RecordedCamera, tuple[str, ...]]:
+    """Return the colour camera: from a file, else the data set's own by the folder's name, else from options."""
+    path = next((root / name for name in CALIBRATIONS if (root / name).is_file()), None)
+    if path is not None:
+        return _read_calibration(path, size), (f"intrinsics read from {path.name}",)
+    standard = size in (None, (640, 480))
+    if icl_nuim and standard:
+        return RecordedCamera(pinhole(ICL_NUIM, size, str(root))), (
+            "intrinsics assumed: ICL-NUIM, 481.2 480 319.5 239.5",
+        )
+    match = FREIBURG_NAME.search(root.resolve().name.lower())
+    if match and standard:
+        numbers, coefficients = FREIBURG[match[1]]
+        listed = " ".join(f"{value:g}" for value in numbers)
+        recorded = RecordedCamera(pinhole(numbers, size, str(root)), lens_of(coefficients, str(root)))
+        undone = ", lens distortion undone in colour and depth" if coefficients else ""
+        return recorded, (f"intrinsics assumed: freiburg{match[1]} colour camera, {listed}{undone}",)
+    if all_intrinsics_given(parameters):
+        return RecordedCamera(camera_from_options(size, parameters, str(root))), ()
+    shape = f"images are {size[0]}x{size[1]}" if size else "no image can be decoded"
+    raise BadInput(
+        f"{root}: intrinsics are not known: there is no {CALIBRATIONS[0]}, and the folder's name and images ({shape}) "
+        "are not those of freiburg1, 2 or 3",
+        hint="give --fx --fy --cx --cy",
+    )
+
+
+def _read_calibration(path: Path, size: tuple[int, int] | None) -> RecordedCamera:
+    """Return the camera in a text file with fx fy cx cy, and distortion coefficients or none."""
+    fields = [field for _, row in _rows(path) for field in row]
+    try:
+        numbers = [float(field) for field in fields]
+    except ValueError:
+        raise BadInput(f"{path}: expected the numbers fx fy cx cy [k1 k2 p1 p2 [k3]]") from None
+    if len(numbers) not in (4, 8, 9):
+        raise BadInput(f"{path}: {len(numbers)} numbers, expected fx fy cx cy [k1 k2 p1 p2 [k3]]")
+    return RecordedCamera(pinhole(numbers[:4], size, str(path)), lens_of(numbers[4:], str(path)))

@@ -1,0 +1,41 @@
+"""Push a door or drawer shut."""
+
+from __future__ import annotations
+
+from stages.kit.tasks.strips import Schema
+from stages.plan.action import Execution, MotionRequest, PlanAction
+from stages.plan.checks import check_joints
+from stages.plan.door_motion import check_joint, is_closed, plan_close
+from stages.plan.motions import Manipulation
+from stages.plan.world_model import RobotState, WorldModel
+
+
+class Close(PlanAction):
+    """close(joint)."""
+
+    name = "close"
+    order = 50
+    goals = {
+        "closed": lambda goal: check_joints(goal.world, goal.literal, goal.bodies[0], goal.joints, shut=True),
+    }
+    schemas = (
+        Schema(
+            "close",
+            (("?door", "door"),),
+            (("near", "?door"), ("hand_empty",)),
+            (("closed", "?door"),),
+            (("open", "?door"),),
+        ),
+    )
+
+    def manipulate(self, model: WorldModel, state: RobotState, request: MotionRequest) -> tuple[Manipulation, ...]:
+        """Return the motions that push it shut. Raises MotionFailed as `plan_close` does."""
+        joint = request.arguments[0]
+        return plan_close(model, state, model.owner(joint), joint, request.budgets, request.random)
+
+    def check_effect(self, conduct: Execution, arguments: tuple[str, ...]) -> None:
+        """The joint stands shut."""
+        check_joint(*conduct.joint_in_room(arguments[0]), self.name, arguments[0], is_closed)
+
+
+ACTION = Close()

@@ -1,0 +1,41 @@
+"""Pull a door or drawer open."""
+
+from __future__ import annotations
+
+from stages.kit.tasks.strips import Schema
+from stages.plan.action import Execution, MotionRequest, PlanAction
+from stages.plan.checks import check_joints
+from stages.plan.door_motion import check_joint, is_open, plan_open
+from stages.plan.motions import Manipulation
+from stages.plan.world_model import RobotState, WorldModel
+
+
+class Open(PlanAction):
+    """open(joint)."""
+
+    name = "open"
+    order = 40
+    goals = {
+        "open": lambda goal: check_joints(goal.world, goal.literal, goal.bodies[0], goal.joints, shut=False),
+    }
+    schemas = (
+        Schema(
+            "open",
+            (("?door", "door"),),
+            (("near", "?door"), ("hand_empty",)),
+            (("open", "?door"),),
+            (("closed", "?door"),),
+        ),
+    )
+
+    def manipulate(self, model: WorldModel, state: RobotState, request: MotionRequest) -> tuple[Manipulation, ...]:
+        """Return the motions that pull it open by its handle. Raises MotionFailed as `plan_open` does."""
+        joint = request.arguments[0]
+        return plan_open(model, state, model.owner(joint), joint, request.budgets, request.random)
+
+    def check_effect(self, conduct: Execution, arguments: tuple[str, ...]) -> None:
+        """The joint stands open."""
+        check_joint(*conduct.joint_in_room(arguments[0]), self.name, arguments[0], is_open)
+
+
+ACTION = Open()

@@ -1,0 +1,39 @@
+"""Whether the goal holds in the room after execution."""
+
+from __future__ import annotations
+
+from schemas.plan import BodyMatch, Check
+from stages.kit.simulation.world import PhysicsWorld
+from stages.plan.action import goal_checks
+from stages.plan.checks import GoalInRoom
+
+
+def check_goal(
+    world: PhysicsWorld,
+    goal: tuple[str, ...],
+    matches: dict[str, BodyMatch],
+    joint_names: dict[str, str],
+    held: str | None,
+) -> tuple[Check, ...]:
+    """Check ground literals such as `on(bottle_7, table_3)`, whose names are those of the plan.
+
+    `joint_names` maps joints of the plan to those of this world. A body without a match makes its condition false.
+    """
+    checks = []
+    for literal in goal:
+        predicate, inner = literal.rstrip(")").split("(")
+        names = [word.strip() for word in inner.split(",")]
+        owners = [name if name in matches else _owner(name, matches) for name in names]
+        missing = [name for name in owners if matches[name].matched is None]
+        if missing:
+            detail = f"the room has no body of the class of {missing[0]} near it"
+            checks.append(Check(condition=literal, holds=False, detail=detail))
+            continue
+        here = tuple(matches[name].matched or "" for name in owners)
+        joints = tuple(world.bodies[here[0]].joints) if names[0] in matches else (joint_names[names[0]],)
+        checks.append(goal_checks()[predicate](GoalInRoom(world, literal, here, joints, held)))
+    return tuple(checks)
+
+
+def _owner(joint: str, matches: dict[str, BodyMatch]) -> str:
+    return max((name for name in matches if joint.startswith(f"{name}__")), key=len)

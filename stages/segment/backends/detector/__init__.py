@@ -1,0 +1,26 @@
+"""Backend `detector`: boxes of an object detector turned into masks by the depth; floor, walls, ceiling by geometry."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from stages.kit.stage import Parameters
+from stages.segment.registry import BackendDeclaration
+
+
+class DetectorParameters(Parameters):
+    """Options of the backend `detector`."""
+
+    tiles: bool = Field(
+        True, description="Detect on overlapping tiles at full resolution too (finds small things, five times slower)"
+    )
+
+
+BACKEND = BackendDeclaration(
+    name="detector",
+    summary="an ONNX object detector and the depth",
+    order=40,
+    needs=frozenset({"color"}),
+    weights="an ONNX file",
+    parameters=DetectorParameters,
+)

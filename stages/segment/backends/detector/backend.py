@@ -1,0 +1,194 @@
+"""Backend `detector`: boxes of an object detector turned into masks by the depth; floor, walls, ceiling by geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import MissingDependency
+from schemas.sequence import SequenceFile
+from schemas.vocabulary import SemanticClass, Vocabulary, load_vocabulary
+from stages.kit.formats.frames import Frame, FrameReader
+from stages.segment.backends.detector import DetectorParameters
+from stages.segment.backends.detector.box_masks import box_mask, frame_geometry
+from stages.segment.backends.detector.plausibility import extent_of, is_plausible
+from stages.segment.backends.detector.room import Room, SurfaceSample, find_room, room_masks, sample_surface
+from stages.segment.backends.detector.yolox import Detections, Detector
+from stages.segment.choice import BackendRequest
+from stages.segment.coco import COCO_NAMES
+from stages.segment.geometric import GeometricFrame, GeometricSettings, pixels_at, segment_depth
+from stages.segment.panoptic import PanopticFrame, PanopticMask
+from stages.segment.settings import geometric_settings
+
+LARGE_FACED = frozenset({"table", "desk", "bed", "sofa", "bench", "monitor", "fridge"})
+"""A box around a part of these is still a detection of the whole: one face fills most of the box."""
+FLAT_TOPPED = frozenset({"table", "desk"})
+UNNAMED = "object"
+LARGEST_UNNAMED = 0.8
+"""A detection of impossible size still points at some item when that is small; at furniture size it says nothing, and
+its votes would drown those of the frames in which the thing was recognised [m]."""
+SAMPLED_FRAMES = 25
+DUPLICATE_OVERLAP = 0.5
+"""Two masks of one class that share this much of the smaller one are the same thing."""
+
+
+@dataclass(frozen=True)
+class Thing:
+    """One detected thing in a frame."""
+
+    semantic: SemanticClass
+    score: float
+    mask: np.ndarray
+    """(H, W) bool."""
+
+
+class DetectorBackend:
+    """Detector boxes combined with geometric segments.
+
+    Looks at a few frames of the whole sequence first, to find floor, walls and ceiling.
+    """
+
+    name = "detector"
+    streams: tuple[str, ...] = ("color", "depth")
+
+    def __init__(
+        self,
+        sequence: SequenceFile,
+        reader: FrameReader,
+        vocabulary: Vocabulary,
+        detector: Detector,
+        *,
+        weights: Path,
+        geometric: GeometricSettings,
+        minimum_pixels: int,
+    ) -> None:
+        self.label = f"detector {Path(weights).stem} + geometric segments"
+        self.minimum_pixels = minimum_pixels
+        self._detector = detector
+        self._classes = [vocabulary.by_alias(name, "coco") for name in COCO_NAMES]
+        self._anything = vocabulary.by_name(UNNAMED)
+        self._layout = {name: vocabulary.by_name(name) for name in ("floor", "wall", "ceiling")}
+        self.room: Room = find_room(
+            _surface_samples(reader, geometric),
+            floor_is_zero=sequence.gravity.method in ("given", "floor_plane"),
+        )
+
+    def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
+        """Return the masks of a frame; one without colour has layout masks alone."""
+        layout = {}
+        if frame.world_from_camera is not None:
+            layout = room_masks(geometric.points, geometric.normals, frame.world_from_camera, self.room)
+        things = self._things(frame, geometric, layout) if frame.color is not None else []
+        return paint(layout, things, self._layout, geometric.labels.shape)
+
+    def _things(self, frame: Frame, geometric: GeometricFrame, layout: dict[str, np.ndarray]) -> list[Thing]:
+        assert frame.color is not None
+        available = geometric.points[..., 2] > 0
+        for mask in layout.values():
+            available &= ~mask
+        geometry = frame_geometry(
+            geometric.labels, geometric.points, geometric.normals, available, frame.world_from_camera
+        )
+        detections: Detections = self._detector.detect(frame.color)
+        things = []
+        for box, score, number in zip(detections.boxes, detections.scores, detections.classes, strict=True):
+            semantic = self._classes[int(number)]
+            if semantic is None:
+                continue
+            mask = box_mask(
+                box,
+                geometry,
+                large_face=semantic.name in LARGE_FACED,
+                flat_topped=semantic.name in FLAT_TOPPED,
+            )
+            if mask.sum() < pixels_at(self.minimum_pixels, mask.shape):
+                continue
+            height, width = mask.shape
+            cut_off = bool(box[0] < 4 or box[1] < 4 or box[2] > width - 4 or box[3] > height - 4)
+            extent = extent_of(geometric.points[mask])
+            if not is_plausible(semantic.name, extent, cut_off=cut_off):
+                if extent > LARGEST_UNNAMED:
+                    continue
+                semantic = self._anything
+            things.append(Thing(semantic, float(score), mask))
+        return merge_duplicates(things)
+
+
+def _surface_samples(reader: FrameReader, settings: GeometricSettings) -> Iterator[SurfaceSample]:
+    every = max(1, len(reader) // SAMPLED_FRAMES)
+    for index in range(0, len(reader), every):
+        frame = reader.read(index, streams=("depth",))
+        if frame.depth is not None and frame.world_from_camera is not None:
+            geometric = segment_depth(frame.depth, reader.cameras[frame.camera_name], settings)
+            yield sample_surface(geometric.points, geometric.normals, frame.world_from_camera)
+
+
+def merge_duplicates(things: list[Thing]) -> list[Thing]:
+    """Return the things with those merged that are the same, best score first.
+
+    Two masks that share half of the smaller one are one thing when they have the same class (a chair and its back,
+    boxed twice): it gets the union. Of two classes for nearly the same mask the better scored stays, but any class
+    goes before `object`, which is what is left of a detection of impossible size.
+    """
+    kept: list[Thing] = []
+    for item in sorted(things, key=lambda thing: (thing.semantic.name == UNNAMED, -thing.score)):
+        for index, other in enumerate(kept):
+            shared = int((item.mask & other.mask).sum())
+            smaller, union = min(item.mask.sum(), other.mask.sum()), (item.mask | other.mask).sum()
+            if item.semantic.id == other.semantic.id and shared > DUPLICATE_OVERLAP * smaller:
+                kept[index] = Thing(other.semantic, other.score, other.mask | item.mask)
+                break
+            if shared > 0.6 * union:
+                break
+        else:
+            kept.append(item)
+    return kept
+
+
+def paint(
+    layout: dict[str, np.ndarray], things: list[Thing], classes: dict[str, SemanticClass], shape: tuple[int, ...]
+) -> PanopticFrame:
+    """Return one frame of masks: layout below, large things over it, small things on top (they stand in front)."""
+    ids = np.zeros(shape, dtype=np.int32)
+    masks: dict[int, PanopticMask] = {}
+    for name, mask in layout.items():
+        if mask.any():
+            masks[len(masks) + 1] = PanopticMask(classes[name].id, is_thing=False)
+            ids[mask] = len(masks)
+    for thing in sorted(things, key=lambda item: (-int(item.mask.sum()), -item.score)):
+        masks[len(masks) + 1] = PanopticMask(thing.semantic.id, thing.semantic.kind == "thing", thing.score)
+        ids[thing.mask] = len(masks)
+    present = set(np.unique(ids).tolist())
+    return PanopticFrame(ids, {key: mask for key, mask in masks.items() if key in present})
+
+
+def open_backend(request: BackendRequest) -> DetectorBackend:
+    """Return the backend that the request asks for.
+
+    Raises UsageError without a log, MissingDependency without weights, BadInput when they are no such detector.
+    """
+    parameters = request.parameters
+    sequence, reader = request.log()
+    if request.weights is None:
+        raise MissingDependency(
+            "--backend detector needs the weights of a detector",
+            hint="give an ONNX export of a YOLOX model (COCO-80) with --weights, or use --backend geometric",
+        )
+    detector = Detector(
+        request.weights,
+        score_threshold=parameters.score_threshold,
+        suppression_overlap=parameters.suppression_overlap,
+        tile_side=min(reader.camera.width, reader.camera.height) if request.own(DetectorParameters).tiles else 0,
+    )
+    return DetectorBackend(
+        sequence.info,
+        reader,
+        load_vocabulary(),
+        detector,
+        weights=request.weights,
+        geometric=geometric_settings(parameters),
+        minimum_pixels=parameters.small_object_pixels,
+    )

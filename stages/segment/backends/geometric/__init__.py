@@ -1,0 +1,7 @@
+"""Backend `geometric`: class-agnostic, the segments of the depth."""
+
+from __future__ import annotations
+
+from stages.segment.registry import BackendDeclaration
+
+BACKEND = BackendDeclaration(name="geometric", summary="every geometric segment is an `object`", order=20)

@@ -1,0 +1,26 @@
+"""Backend `ground-truth`: the labels stream of a generated log, corrupted on request."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from stages.kit.stage import Parameters
+from stages.segment.registry import BackendDeclaration
+
+
+class GroundTruthParameters(Parameters):
+    """Options of the backend `ground-truth`."""
+
+    corruption: float = Field(
+        0.0, ge=0, le=1, description="Level of the errors put into ground-truth masks (0 none; part of every name)"
+    )
+
+
+BACKEND = BackendDeclaration(
+    name="ground-truth",
+    summary="the log's own labels",
+    order=10,
+    needs=frozenset({"labels"}),
+    parameters=GroundTruthParameters,
+    exclusive=("corruption",),
+)

@@ -1,0 +1,70 @@
+"""Backend `ground-truth`: the labels stream of a generated log, corrupted on request."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.sequence import SequenceFile
+from schemas.vocabulary import Vocabulary, load_vocabulary
+from stages.kit.formats.frames import Frame
+from stages.segment.backends.ground_truth import GroundTruthParameters
+from stages.segment.backends.ground_truth.corruption import corrupt, rates_of_level
+from stages.segment.choice import BackendRequest
+from stages.segment.geometric import GeometricFrame
+from stages.segment.panoptic import PanopticFrame, PanopticMask
+
+
+class GroundTruthBackend:
+    """True masks with a stated level of errors.
+
+    Raises BadInput when the sequence has no labels stream, or no table that says what the labels mean.
+    """
+
+    name = "ground-truth"
+    streams: tuple[str, ...] = ("depth", "labels")
+
+    def __init__(self, sequence: SequenceFile, vocabulary: Vocabulary, level: float) -> None:
+        if "labels" not in sequence.streams or not sequence.label_table:
+            raise BadInput(
+                "this sequence has no ground-truth labels",
+                hint="use --backend detector with --weights, or --backend geometric (class-agnostic)",
+            )
+        self.corruption = level
+        self.label = f"ground-truth masks, corruption {level:g}"
+        self._rates = rates_of_level(level)
+        self._corrupted = level > 0
+        self._masks: dict[int, PanopticMask] = {}
+        stuff: dict[int, int] = {}
+        self._lookup = np.zeros(1 << 16, dtype=np.int32)
+        for entry in sequence.label_table:
+            semantic = vocabulary.by_name(entry.class_name)
+            # Masks are numbered 1..n, whatever the log's instance numbers are: the overlap tables stay small.
+            mask_id = len(self._masks) + 1
+            if semantic.kind == "stuff":
+                # A stuff class has one instance label: every wall is the wall.
+                mask_id = stuff.setdefault(semantic.id, mask_id)
+            self._lookup[entry.instance] = mask_id
+            self._masks[mask_id] = PanopticMask(semantic.id, semantic.kind == "thing")
+        self._lookup[0] = 0
+        # Classes that came after `object` take no part, so that a seed keeps its confusions as the vocabulary grows.
+        named = [c for c in vocabulary.classes if c.id < vocabulary.by_name("object").id]
+        self._classes = {
+            True: tuple(c.id for c in named if c.kind == "thing"),
+            False: tuple(c.id for c in named if c.kind == "stuff"),
+        }
+
+    def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
+        """Return the masks of a frame. Raises BadInput when the frame has no labels."""
+        if frame.labels is None:
+            raise BadInput(f"frame {frame.index} has no labels image", hint="synthesize the log again")
+        ids = self._lookup[frame.labels]
+        present = set(np.unique(ids).tolist()) - {0}
+        true = PanopticFrame(ids=ids, masks={i: self._masks[i] for i in sorted(present)})
+        return corrupt(true, self._rates, self._classes, random) if self._corrupted else true
+
+
+def open_backend(request: BackendRequest) -> GroundTruthBackend:
+    """Return the backend that the request asks for. Raises UsageError without a log, BadInput as the class does."""
+    sequence, _ = request.log()
+    return GroundTruthBackend(sequence.info, load_vocabulary(), request.own(GroundTruthParameters).corruption)

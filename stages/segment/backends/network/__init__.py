@@ -1,0 +1,15 @@
+"""Backend `network`: our own RGB-D panoptic network, trained on generated rooms and tabletops (docs/NETWORK.md)."""
+
+from __future__ import annotations
+
+from stages.segment.registry import BackendDeclaration
+
+BACKEND = BackendDeclaration(
+    name="network",
+    summary="a compact RGB-D network of our own, trained on generated rooms",
+    order=50,
+    automatic=True,
+    weights="a .safetensors checkpoint of our own, where the one that comes with the project is not wanted",
+    libraries=("torch",),
+    data_files=lambda parameters: ("networks/panoptic.safetensors",),
+)

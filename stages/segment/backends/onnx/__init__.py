@@ -1,0 +1,18 @@
+"""Backend `onnx`: instance and panoptic networks as ONNX files, run by ONNX Runtime."""
+
+from __future__ import annotations
+
+from stages.kit.stage import Extra
+from stages.segment.labels import LABEL_TABLES
+from stages.segment.registry import BackendDeclaration
+
+BACKEND = BackendDeclaration(
+    name="onnx",
+    summary="an ONNX instance or panoptic network",
+    order=70,
+    needs=frozenset({"color"}),
+    weights="an ONNX file",
+    libraries=("onnxruntime",),
+    extras=(Extra("onnxruntime", "onnxruntime", "segment --backend onnx: pip install onnxruntime"),),
+    data_files=lambda parameters: LABEL_TABLES,
+)

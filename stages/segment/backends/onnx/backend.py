@@ -1,0 +1,149 @@
+"""Backend `onnx`: the masks of an ONNX network with classes of the vocabulary."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import BadInput, MissingDependency
+from schemas.vocabulary import Vocabulary, load_vocabulary
+from stages.kit.formats.frames import Frame
+from stages.segment.backends.onnx import decoding
+from stages.segment.backends.onnx.network import HINT, Network, fit
+from stages.segment.backends.onnx.sidecar import read_sidecar
+from stages.segment.choice import BackendRequest
+from stages.segment.geometric import GeometricFrame, pixels_at
+from stages.segment.labels import LabelMap, LabelSet, load_label_set, match_labels, read_label_file
+from stages.segment.naming import InstanceMask, NamedSegment, name_instances, name_segments
+from stages.segment.panoptic import PanopticFrame
+
+SETS_BY_SIZE = {80: "coco-80", 133: "coco-panoptic", 150: "ade20k"}
+"""Number of classes -> label set of published networks, in its order."""
+
+logger = logging.getLogger("scenewright")
+
+
+class OnnxBackend:
+    """An instance or panoptic network. `minimum_pixels` holds at 640x480.
+
+    Raises MissingDependency without weights or ONNX Runtime, BadInput when the network's layout or labels are unknown.
+    """
+
+    name = "onnx"
+    streams: tuple[str, ...] = ("color", "depth")
+
+    def __init__(
+        self,
+        weights: Path | None,
+        sidecar: Path | None,
+        labels: LabelSet | None,
+        vocabulary: Vocabulary,
+        *,
+        score_threshold: float,
+        suppression_overlap: float,
+        minimum_pixels: int,
+        device: str,
+    ) -> None:
+        if weights is None:
+            raise MissingDependency(
+                "--backend onnx needs a network", hint="give an .onnx file with --weights (docs/SEGMENTATION.md)"
+            )
+        self._network = Network(weights, read_sidecar(sidecar) if sidecar else None, device)
+        self._labels = _label_map(self._network, labels)
+        self._vocabulary = vocabulary
+        self._threshold, self._overlap, self._minimum = score_threshold, suppression_overlap, minimum_pixels
+        self.label = f"onnx {Path(weights).stem} ({self._network.sidecar.layout}, {self._labels.set_name})"
+
+    def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
+        """Return the masks of a frame; a frame without colour has none. Raises BadInput when the network fails."""
+        if frame.color is None:
+            return PanopticFrame(np.zeros(geometric.labels.shape, dtype=np.int32))
+        shape = (frame.color.shape[0], frame.color.shape[1])
+        least = pixels_at(self._minimum, shape)
+        fitted = fit(frame.color, self._network.sidecar, self._network.size)
+        outputs = self._network(fitted)
+        if self._network.sidecar.layout == "panoptic":
+            ids, segments = decoding.panoptic(
+                outputs["classes"], outputs["masks"], fitted, shape,
+                score_threshold=self._threshold, stuff=self._labels.stuff(),
+            )  # fmt: skip
+            named = {
+                segment: NamedSegment(self._labels.labels[number], score)
+                for segment, (number, score) in segments.items()
+                if number in self._labels.labels
+            }
+            return name_segments(ids, named, self._vocabulary, minimum_pixels=least)
+        if self._network.sidecar.layout == "yolo-seg":
+            things = decoding.yolo_seg(
+                outputs["predictions"], outputs["prototypes"], fitted, shape,
+                score_threshold=self._threshold, suppression_overlap=self._overlap,
+            )  # fmt: skip
+        else:
+            things = decoding.instances(
+                outputs["boxes"], outputs["labels"], outputs["scores"], outputs["masks"], fitted, shape,
+                score_threshold=self._threshold,
+            )  # fmt: skip
+        masks = [
+            InstanceMask(thing.mask, self._labels.labels[thing.number], thing.score)
+            for thing in things
+            if thing.number in self._labels.labels
+        ]
+        return name_instances(masks, shape, self._vocabulary, minimum_pixels=least)
+
+
+def _label_map(network: Network, given: LabelSet | None) -> LabelMap:
+    """Return what the network's numbers stand for: by its metadata, its sidecar, or the number of its classes."""
+    sidecar, name = network.sidecar, network.path.name
+    if isinstance(sidecar.labels, tuple):
+        return _warned(match_labels(dict(enumerate(sidecar.labels)), given, where=name), name)
+    if not sidecar.labels and (names := network.names()):
+        return _warned(match_labels(names, given, where=name), name)
+    count = class_count(network)
+    wanted = sidecar.labels or SETS_BY_SIZE.get(count or 0, "")
+    if not wanted:
+        raise BadInput(f"{name}: nothing says what its {count} classes are", hint=f"{HINT}: labels = [...]")
+    labels = load_label_set(wanted)
+    if not sidecar.labels:
+        logger.info("%s: %d classes, taken for %s in its order", name, count, wanted)
+    if sidecar.numbering == "id":
+        names = {label.id: label.name for label in labels.labels if label.id is not None}
+    else:
+        if count is not None and count != len(labels.labels):
+            raise BadInput(f"{name}: has {count} classes, {wanted} has {len(labels.labels)}", hint=HINT)
+        names = {number: label.name for number, label in enumerate(labels.labels)}
+    return _warned(match_labels(names, given or labels, where=name), name)
+
+
+def class_count(network: Network) -> int | None:
+    """Return how many classes the shapes of the outputs tell of; None when they do not."""
+    if network.sidecar.layout == "panoptic":
+        return network.shapes["classes"][2] - 1
+    if network.sidecar.layout == "yolo-seg":
+        return network.shapes["predictions"][1] - 4 - network.shapes["prototypes"][1]
+    return None
+
+
+def _warned(matched: LabelMap, name: str) -> LabelMap:
+    if matched.unknown:
+        logger.warning(
+            "%s: %d of its labels are in no table and stay void: %s",
+            name, len(matched.unknown), ", ".join(matched.unknown[:10]),
+        )  # fmt: skip
+    return matched
+
+
+def open_backend(request: BackendRequest) -> OnnxBackend:
+    """Return the backend that the request asks for. Raises as the class does, and BadInput for damaged labels."""
+    parameters = request.parameters
+    return OnnxBackend(
+        request.weights,
+        request.sidecar,
+        read_label_file(request.labels) if request.labels else None,
+        load_vocabulary(),
+        score_threshold=parameters.score_threshold,
+        suppression_overlap=parameters.suppression_overlap,
+        minimum_pixels=parameters.small_object_pixels,
+        device=request.device,
+    )

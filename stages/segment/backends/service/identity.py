@@ -1,0 +1,25 @@
+"""What a service says it is, for the key of an artifact: the same address may have another model tomorrow."""
+
+from __future__ import annotations
+
+from stages.segment.backends.service import ServiceParameters
+from stages.segment.backends.service.backend import connect, read_info
+from stages.segment.parameters import SegmentParameters
+
+
+def versions(parameters: SegmentParameters) -> dict[str, str]:
+    """Return what the service says of itself now, or what --service-model says it has to be.
+
+    Raises MissingDependency when it does not answer, BadInput when it is no segmentation service.
+    """
+    assert isinstance(parameters, ServiceParameters)
+    address = parameters.backend
+    return {f"service {address}": parameters.service_model or _asked(address, parameters)}
+
+
+def _asked(address: str, own: ServiceParameters) -> str:
+    connection = connect(address, own)
+    try:
+        return read_info(connection).identity
+    finally:
+        connection.close()

@@ -1,1 +1,0 @@
-"""Backend `huggingface`: published panoptic and open-vocabulary models, through the transformers library."""

@@ -1,1 +1,0 @@
-"""Class-agnostic objects of one RGB-D frame: arrays in, labels out."""

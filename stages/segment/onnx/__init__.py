@@ -1,1 +1,0 @@
-"""Backend `onnx`: instance and panoptic networks as ONNX files, run by ONNX Runtime."""

@@ -1,1 +1,0 @@
-"""Segmentation as a service: any model behind a small HTTP protocol (docs/SEGMENTATION.md)."""

@@ -1,0 +1,42 @@
+"""What a policy is, and what a file of stages/tableware/policies declares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from stages.tableware.planning.action import Action
+from stages.tableware.planning.rules import Rules, can_hold, letters
+from stages.tableware.planning.time_model import Chances, TimeModel
+from stages.tableware.world.items import Item, Table
+
+THESIS = replace(Rules(), utensils_in_cups=True, both_piles=False)
+"""What section 6.2 (Srinivas 2024) allows."""
+
+
+class Policy(Protocol):
+    """Decides one action for each image."""
+
+    def decide(self, table: Table) -> Action:
+        """Return the next action on a table with at least one item."""
+        ...
+
+
+@dataclass(frozen=True)
+class DeclaredPolicy:
+    """POLICY of a policy's file; the command line calls it as the file."""
+
+    make: Callable[[TimeModel, Chances, int], Policy]
+    """From the times and chances that it may plan by, and a seed."""
+    rules: Rules = THESIS
+    """What it allows itself."""
+    draws: bool = False
+    """Whether it decides by chance: it is then made anew, with another seed, for every draw of what goes wrong."""
+    rivals: tuple[str, ...] = ()
+    """Policies that it aims to be no slower than, table by table."""
+
+
+def liftable(table: Table, stack: tuple[Item, ...], rules: Rules) -> str:
+    """Return the lowest thing of a pile that one grasp lifts with all that is on it."""
+    return next(item.name for row, item in enumerate(stack) if can_hold(letters(stack[row:]), rules))

@@ -1,0 +1,19 @@
+"""Ours: pulls, stackings and grasps chosen together for the whole table, as far as physics bears it."""
+
+from __future__ import annotations
+
+from stages.tableware.planning.joint import JointPolicy
+from stages.tableware.planning.policy import DeclaredPolicy
+from stages.tableware.planning.rules import Rules
+
+RIVALS = ("pull", "stack")
+_BOWLS = ("b", "bb", "bc", "bcc", "bbc")
+_PAIRS = frozenset(
+    {("u", "u"), ("c", "c"), ("c", "cc"), ("cc", "cc"), ("b", "bbb"), ("bb", "bbb"), ("bbb", "bc")}
+    | {(one, other) for one in _BOWLS for other in _BOWLS if one <= other}
+)
+RULES = Rules(most_utensils=2, plates_alone=True, beside=_PAIRS)
+"""What physics bears (docs/TIDY.md): two utensils a pile, plates alone, and side by side the pairs of piles
+that came whole in every grasp measured there. Dishes that carry utensils are lifted side by side as they stand only
+where the world's chances say that nothing spills."""
+POLICY = DeclaredPolicy(lambda model, chances, seed: JointPolicy(RULES, model, chances), RULES, rivals=RIVALS)

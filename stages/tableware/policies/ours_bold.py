@@ -1,0 +1,11 @@
+"""Ours with all that the jaws allow, whether physics bears it or not."""
+
+from __future__ import annotations
+
+from stages.tableware.planning.joint import JointPolicy
+from stages.tableware.planning.policy import DeclaredPolicy
+from stages.tableware.planning.rules import Rules
+from stages.tableware.policies import ours
+
+RULES = Rules()
+POLICY = DeclaredPolicy(lambda model, chances, seed: JointPolicy(RULES, model, chances), RULES, rivals=ours.RIVALS)

@@ -1,0 +1,12 @@
+"""Ours, which pulls no dish that carries others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from stages.tableware.planning.joint import JointPolicy
+from stages.tableware.planning.policy import DeclaredPolicy
+from stages.tableware.policies import ours
+
+RULES = replace(ours.RULES, loaded_pulls=False)
+POLICY = DeclaredPolicy(lambda model, chances, seed: JointPolicy(RULES, model, chances), RULES, rivals=ours.RIVALS)

@@ -1,0 +1,30 @@
+"""Pull, algorithm 1 of Srinivas 2024, section 6.4."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+from stages.tableware.actions.grasp import grasp, grasp_two
+from stages.tableware.actions.pull_grasp import pull_grasp
+from stages.tableware.planning.action import Action
+from stages.tableware.planning.policy import THESIS, DeclaredPolicy, liftable
+from stages.tableware.planning.rules import can_grasp_two, can_pull
+from stages.tableware.world.items import Table
+
+
+class PullPolicy:
+    """What can be grasped in pairs, then what can after a pull, then singly. Pairs in the order seen."""
+
+    def decide(self, table: Table) -> Action:
+        """Return a multi-object grasp, else a pull-grasp, else a grasp."""
+        bases = [stack[0].name for stack in table.stacks]
+        for first, second in permutations(bases, 2):
+            if can_grasp_two(table, first, second, THESIS):
+                return grasp_two(table, first, second)
+        for first, second in permutations(bases, 2):
+            if can_pull(table, first, second, THESIS):
+                return pull_grasp(table, first, second, THESIS)
+        return grasp(table, liftable(table, table.stacks[0], THESIS))
+
+
+POLICY = DeclaredPolicy(lambda model, chances, seed: PullPolicy())

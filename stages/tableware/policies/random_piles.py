@@ -1,0 +1,26 @@
+"""The baseline as its tier-2 figure implies: more than one object a trip (Srinivas 2024, table 7.1)."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+
+from stages.tableware.actions.grasp import Grasp, grasp
+from stages.tableware.planning.policy import THESIS, DeclaredPolicy, liftable
+from stages.tableware.world.items import Table
+
+
+class RandomPile:
+    """A random pile whole, or what can be lifted of it."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = np.random.default_rng([seed, 74])
+
+    def decide(self, table: Table) -> Grasp:
+        """Return a grasp of a random pile."""
+        stack = table.stacks[int(self._random.integers(len(table.stacks)))]
+        return grasp(table, liftable(table, stack, THESIS), float(self._random.uniform(-pi, pi)))
+
+
+POLICY = DeclaredPolicy(lambda model, chances, seed: RandomPile(seed), draws=True)

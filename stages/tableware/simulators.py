@@ -1,0 +1,129 @@
+"""Where a table is cleared: the simulators by the names of the command line. Physics are loaded when asked for."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from schemas.errors import MissingDependency
+from schemas.tableware_plan import TimesOfActions
+from stages.tableware.parameters import SimulateParameters
+from stages.tableware.planning.action import Action
+from stages.tableware.planning.choice import as_times, chances_of, time_model
+from stages.tableware.planning.time_model import Chances, TimeModel
+from stages.tableware.simulation.arm_times import arm_times
+from stages.tableware.simulation.fast import Done, FastWorld, World
+from stages.tableware.table_pictures import write_animation
+from stages.tableware.world.items import Table
+
+ANIMATION_WIDTH = 560
+SIMULATION = "stages.tableware.simulation"
+"""Its modules of physics are loaded only when they are asked for."""
+Again = Callable[[Table, Done, int], Action]
+"""Decides in the policy's place after actions that changed nothing (fast.run_in)."""
+
+
+class Simulator(Protocol):
+    """One table in one world."""
+
+    times: TimeModel
+    """By which the policy plans."""
+    told: Chances
+    """What the policy is told of what goes wrong."""
+    again: Again | None
+    recorded_times: TimesOfActions | None
+    """As the artifact keeps them; None where time is what the world takes."""
+    recorded_chances: str
+
+    def open(self, table: Table, seed: int) -> World:
+        """Return the world with a table in it."""
+        ...
+
+    def close(self) -> None:
+        """Free what the world holds."""
+        ...
+
+    def draw(self, done: Sequence[Done], folder: Path, width: int) -> None:
+        """Write clearing.gif, and what else there is to see; strips are `width` [px] wide."""
+        ...
+
+
+class FastSimulator:
+    """The fitted time model."""
+
+    again: Again | None = None
+
+    def __init__(self, parameters: SimulateParameters) -> None:
+        self.times, self.told = time_model(parameters), chances_of(parameters.chances)
+        self.recorded_times: TimesOfActions | None = as_times(self.times)
+        self.recorded_chances: str = parameters.chances
+
+    def open(self, table: Table, seed: int) -> World:
+        """Return the fast world."""
+        return FastWorld(table, self.times, self.told, seed)
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def draw(self, done: Sequence[Done], folder: Path, width: int) -> None:
+        """Write clearing.gif."""
+        moving = [(each.action, each.before, each.after, f"{each.start:.0f} s: {each.action.words}") for each in done]
+        write_animation(folder / "clearing.gif", moving, min(ANIMATION_WIDTH, width))
+
+
+class PhysicsSimulator:
+    """Contact physics; the arm's own times, but for those that are given explicitly. Raises MissingDependency where
+    there is no physics."""
+
+    recorded_times: TimesOfActions | None = None
+    recorded_chances: str = "contact"
+
+    def __init__(self, parameters: SimulateParameters) -> None:
+        given = {"trip": parameters.trip_seconds, "stack": parameters.stack_seconds, "pull": parameters.pull_seconds}
+        arm = arm_times(parameters.delay)
+        self.times = replace(arm, **{name: value for name, value in given.items() if value is not None})
+        self.told = replace(chances_of(parameters.chances), spills=True)
+        self.again: Again | None = physics_part("physics_trial").alone
+        self._recording = physics_part("recording").Recording()
+        self._world: Any = None
+
+    def open(self, table: Table, seed: int) -> World:
+        """Return the world of bodies."""
+        self._world = physics_part("physics").PhysicsTable(table, record=self._recording)
+        world: World = self._world
+        return world
+
+    def close(self) -> None:
+        """Free the physics engine."""
+        if self._world is not None:
+            self._world.close()
+
+    def draw(self, done: Sequence[Done], folder: Path, width: int) -> None:
+        """Write physics.png and clearing.gif from what was recorded."""
+        frames: dict[str, np.ndarray] = self._recording.arrays()
+        pictures = physics_part("physics_pictures")
+        words = [
+            next((each.action.words for each in done if each.start <= seconds <= each.end + 1e-6), "")
+            for seconds in frames["seconds"]
+        ]
+        pictures.draw_physics_strip(frames, words, width).save(folder / "physics.png")
+        pictures.write_physics_animation(folder / "clearing.gif", frames, words, min(ANIMATION_WIDTH, width))
+
+
+SIMULATORS: dict[str, Callable[[SimulateParameters], Simulator]] = {
+    "fast": FastSimulator,
+    "physics": PhysicsSimulator,
+}
+
+
+def physics_part(name: str) -> Any:
+    """Return a module of the simulation that needs a physics engine. Raises MissingDependency where there is none."""
+    try:
+        return importlib.import_module(f"{SIMULATION}.{name}")
+    except ImportError as error:
+        raise MissingDependency(f"tableware has no physics here: {error}", hint="--simulator fast") from None

@@ -1,0 +1,1 @@
+"""What is written beside scene.urdf: each file is an exporter, found because it lies here."""
