@@ -99,7 +99,7 @@ def run(
     for line in table_lines(records):
         context.logger.info(line)
     if imported == 0:
-        why = records[-1].findings[0] if records and records[-1].findings else "it holds no model files"
+        why = _why(records[-1]) if records else "it holds no model files"
         raise BadInput(f"{models}: nothing was imported: {why}", hint="see docs/LIBRARY.md; --class-name, --mapping")
     known = tuple(uses[model.id] for model in taken if model.id in uses)
     LibraryFile(seed=seed, models=tuple(taken), affordances=known).write(context.output / "library.json")
@@ -113,6 +113,12 @@ def run(
         "joints": sum(len(model.joints) for model in taken),
     }
     return CadLibrary(context.output, summary=summary)
+
+
+def _why(record: ImportedModel) -> str:
+    """Return why a model was left out, with its name."""
+    reason = record.findings[0] if record.findings else "it was left out"
+    return reason if record.name in reason or record.source in reason else f"{record.name}: {reason}"
 
 
 def _check_options(models: Path, parameters: AdditionParameters) -> None:

@@ -35,12 +35,12 @@ class Sections:
     that of the solids."""
 
     def __init__(self, most: int, where: str) -> None:
-        self.most, self.left, self._where = most, most, where
+        self.most, self.taken, self._where = most, 0, where
 
     def take(self, count: int) -> None:
         """Count some. Raises BadInput beyond the bound."""
-        self.left -= count
-        if self.left < 0:
+        self.taken += count
+        if self.taken > self.most:
             raise BadInput(f"{self._where}: its surfaces take more than {self.most} cross-sections", hint=TOO_INTRICATE)
 
 

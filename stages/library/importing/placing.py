@@ -134,8 +134,8 @@ def _library_joint(group: Group, rotation: np.ndarray, unit: float, taken: set[s
             turn = Rotation.from_rotvec(closed * axis).as_matrix()
             root_from_closed = transform_from(turn, origin - turn @ origin)
     length = unit if source.kind == "prismatic" else 1.0
-    if upper * length > LONGEST_SLIDE:
-        raise BadInput(f"joint {source.name!r:.60} moves by {upper * length:.3g}, more than {LONGEST_SLIDE:g}")
+    if source.kind == "prismatic" and upper * length > LONGEST_SLIDE:
+        raise BadInput(f"joint {source.name!r:.60} slides by {upper * length:.3g} m, more than {LONGEST_SLIDE:g} m")
     part = plain_name(group.name) or "part"
     while part in taken:
         part += "_"
