@@ -83,10 +83,6 @@ REFUSED: dict[str, tuple[dict[str, str | bytes], str]] = {
         },
         "chair.*refquat of length 0",
     ),
-    "capsule thinner than numbers": (
-        {"chair.xml": mjcf('<geom type="capsule" size="1e-14 1"/>')},
-        r"chair.*(cannot be used|m large)",
-    ),
     "ellipsoid as flat as a sheet": (
         {"chair.xml": mjcf('<geom type="ellipsoid" size="1 1 1e-16"/>')},
         "chair.*cannot be used: QhullError",
@@ -234,8 +230,9 @@ def test_refused_in_one_line_with_the_name_of_the_model(tmp_path: Path, fault: s
     assert "\n" not in str(caught.value) and caught.value.exit_code == 3
 
 
-def test_a_flat_collision_hull_is_thickened(tmp_path: Path) -> None:
-    write(tmp_path / "in" / "chair.urdf", urdf(BOX, '<geometry><box size="1 1 1e-15"/></geometry>'))
+@pytest.mark.parametrize("shape", ['<box size="1 1 1e-15"/>', '<cylinder radius="1" length="1e-15"/>'])
+def test_a_flat_collision_hull_is_thickened(tmp_path: Path, shape: str) -> None:
+    write(tmp_path / "in" / "chair.urdf", urdf(BOX, f"<geometry>{shape}</geometry>"))
     (model,) = add(tmp_path / "in", tmp_path / "out").info.models
     assert 0 < model.mass < 1
 
@@ -441,7 +438,6 @@ def test_pictures_in_a_glb_count_each_time_they_would_be_decoded() -> None:
     [
         (lambda: b"<a>" + b"<b/>" * 1_000_001 + b"</a>", "elements"),
         (lambda: b"<a " + b" ".join(b'a%d=""' % k for k in range(600_000)) + b"/>", "a tag of more than"),
-        (lambda: b"<a><b" + b' a=""' * 1 + b"/>" + b'<b a="" c=""/>' * 400_000 + b"</a>", "elements"),
     ],
 )
 def test_xml_of_very_many_elements(data: Callable[[], bytes], reason: str) -> None:
@@ -450,13 +446,11 @@ def test_xml_of_very_many_elements(data: Callable[[], bytes], reason: str) -> No
 
 
 def test_memory_is_bounded(tmp_path: Path) -> None:
-    """Files of 3 to 25 MB, most of which took more than half a gigabyte."""
+    """Files of 3 to 12 MB that took a third of a gigabyte or more."""
     (tmp_path / "numbers.dae").write_bytes(
-        collada(f"<node>{INSTANCE}</node>").replace("0 0 0 1 0 0 0 1 0 0 0 1", "0 " * 6_000_000).encode()
+        collada(f"<node>{INSTANCE}</node>").replace("0 0 0 1 0 0 0 1 0 0 0 1", "0 " * 3_000_000).encode()
     )
-    (tmp_path / "lines.obj").write_bytes(b"v 0 0 0\n" * 3_200_000)
-    (tmp_path / "face.obj").write_bytes(CUBE.encode() + b"f " + b"1 " * 5_000_000)
-    (tmp_path / "elements.urdf").write_bytes(b"<robot>" + b'<a b=""/>' * 1_300_000 + b"</robot>")
+    (tmp_path / "lines.obj").write_bytes(b"v 0 0 0\n" * 1_500_000)
     views = [{"buffer": 0, "byteLength": 2_500_000}] * 200
     (tmp_path / "views.glb").write_bytes(lengthened(glb(bufferViews=views), bytes(2_500_000)))
     embedded = base64.b64encode(bytes(2_500_000)).decode()
@@ -467,11 +461,11 @@ import resource, sys
 from pathlib import Path
 from stages.library.importing.discovery import find_models
 from stages.library.importing.source_folder import SourceFolder
-resource.setrlimit(resource.RLIMIT_DATA, (480 << 20, 480 << 20))
+resource.setrlimit(resource.RLIMIT_DATA, (350 << 20, 350 << 20))
 for model in find_models(SourceFolder(Path(sys.argv[1]))):
     print(model.source, getattr(model, "reason", "read"))
 """
     command = [sys.executable, "-c", code, str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "OMP_NUM_THREADS": "1"})
     assert done.returncode == 0, done.stderr[-500:]
-    assert len(done.stdout.splitlines()) == 6 and "MemoryError" not in done.stdout
+    assert len(done.stdout.splitlines()) == 4 and "MemoryError" not in done.stdout

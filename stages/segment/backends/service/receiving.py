@@ -260,7 +260,6 @@ class BoundedHandler(BaseHTTPRequestHandler):
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
         """Refuse a malformed request, as Python's parser asks for it."""
-        self.request_version = "HTTP/1.0" if self.request_version == "HTTP/0.9" else self.request_version
         self._refuse_unread(code, message or self.responses.get(code, ("refused", ""))[0])
 
     def body(self) -> bytes | None:
@@ -313,6 +312,7 @@ class BoundedHandler(BaseHTTPRequestHandler):
     def _refuse_unread(self, status: int, reason: str, headers: Mapping[str, str] | None = None) -> None:
         """Refuse a request whose body may still come: the connection ends with it."""
         self.close_connection = self._unread = True
+        self.request_version = "HTTP/1.0" if self.request_version == "HTTP/0.9" else self.request_version
         with suppress(OSError):
             self.refuse(status, reason, headers)
 
