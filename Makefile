@@ -83,45 +83,49 @@ clean: ## Remove everything that runs made (outputs/*)
 
 # ---- experiments and measurements ---------------------------------------------------------------------------------
 
+# `python -m benchmarks` lists the experiments. What is measured already is kept, trial by trial, until the code that it
+# was measured with changes. QUICK=1: fewer seeds, smaller trials; FRESH=1 measures again; OPTIONS="--arms ours --count 5".
+EXPERIMENT := $(PYTHON) -m benchmarks
+ASKED = $(if $(QUICK),--quick) $(if $(FRESH),--fresh) $(OPTIONS)
+
 # The folder that holds the real logs (see docs/DATA.md); none of it is part of the project.
 REAL_DATA ?= ../shared/data
 
 .PHONY: real bench bench-preflight
 real: setup ## The chain on real logs, one table; fails unless it finds what the pictures show (REAL_DATA=folder)
-	$(PYTHON) -m benchmarks.tables.real --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real
+	$(EXPERIMENT) real --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real $(ASKED)
 
 # Twelve generated rooms (three with QUICK=1) and the real logs, each with every planted fault.
 bench-preflight: setup ## What `inspect` makes of planted faults (QUICK=1: three rooms)
-	$(PYTHON) -m benchmarks.tables.preflight $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-preflight
+	$(EXPERIMENT) preflight --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-preflight $(ASKED)
 
 .PHONY: bench-poses
 # The red kitchen, Redwood's living room, the dining room (REAL_DATA), and six generated rooms of the reporting seeds
-# (QUICK=1: one). What is measured already is kept; FRESH=1 measures it again.
+# (QUICK=1: one).
 bench-poses: setup ## Estimated camera paths: error, speed, effect on the map (QUICK=1: one room, two arms)
-	$(PYTHON) -m benchmarks.tables.poses $(if $(QUICK),--quick) $(if $(FRESH),--fresh) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-poses$(if $(QUICK),-quick)
+	$(EXPERIMENT) poses --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-poses$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: bench-mapping
-# Twenty generated rooms (three of fewer frames with QUICK=1), every arm on the same frames and masks. A stopped run
-# goes on where it was.
+# Twenty generated rooms (three of fewer frames with QUICK=1), every arm on the same frames and masks.
 bench-mapping: setup ## The panoptic map beside the thesis and Voxblox++, tables 2.1 to 2.4 (QUICK=1: three rooms)
-	$(PYTHON) -m benchmarks.mapping $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-mapping$(if $(QUICK),-quick)
+	$(EXPERIMENT) mapping --out $(OUTPUTS)/experiments/bench-mapping$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: bench-scene
 # The rooms of bench-mapping and its maps (made where they are missing), then the logs of `make real` where it has run.
 bench-scene: setup ## Contact graphs, CAD replacement and physics beside the thesis (QUICK=1: three rooms)
-	$(PYTHON) -m benchmarks.scene $(if $(QUICK),--quick) --maps $(OUTPUTS)/experiments/bench-mapping$(if $(QUICK),-quick) --real $(OUTPUTS)/experiments/real --out $(OUTPUTS)/experiments/bench-scene$(if $(QUICK),-quick)
+	$(EXPERIMENT) scene --maps $(OUTPUTS)/experiments/bench-mapping$(if $(QUICK),-quick) --real $(OUTPUTS)/experiments/real --out $(OUTPUTS)/experiments/bench-scene$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: mosd train-pairs pair-rules
 mosd: setup ## Objects of real tabletop frames against their labels (QUICK=1: every fifth frame; REAL_DATA=folder)
-	$(PYTHON) -m benchmarks.tables.mosd $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/mosd$(if $(QUICK),-quick)
+	$(EXPERIMENT) mosd --data $(REAL_DATA) --out $(OUTPUTS)/experiments/mosd$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: real-supports
 real-supports: setup ## Contact graphs of the real logs against what stands on what there, after `make real`
-	$(PYTHON) -m benchmarks.tables.real_supports --runs $(OUTPUTS)/experiments/real --out $(OUTPUTS)/experiments/real-supports
+	$(EXPERIMENT) real_supports --runs $(OUTPUTS)/experiments/real --out $(OUTPUTS)/experiments/real-supports $(ASKED)
 
 .PHONY: mosd-supports
 mosd-supports: setup ## Which object rests on which on real tabletop frames (QUICK=1: every fifth frame; REAL_DATA=folder)
-	$(PYTHON) -m benchmarks.tables.mosd_supports $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/mosd-supports$(if $(QUICK),-quick)
+	$(EXPERIMENT) mosd_supports --data $(REAL_DATA) --out $(OUTPUTS)/experiments/mosd-supports$(if $(QUICK),-quick) $(ASKED)
 
 # About a quarter of an hour on one core; stands in data/networks/tabletop_pairs.safetensors.
 train-pairs: setup ## Train the trees of `segment --backend objects` anew (QUICK=1: few generated frames)
@@ -142,22 +146,25 @@ bench-growth: setup ## What a frame costs as the map grows, and what holds the m
 .PHONY: bench-supports bench-timeline
 # Four studios of tuning and four of reporting seeds, on perfect maps.
 bench-supports: setup ## Hanging, leaning, contained, carried by two: edges by relation, ours and thesis (QUICK=1: one room)
-	$(PYTHON) -m benchmarks.graph.less_common_supports $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-supports$(if $(QUICK),-quick)
+	$(EXPERIMENT) graph_supports --out $(OUTPUTS)/experiments/bench-supports$(if $(QUICK),-quick) $(ASKED)
 
 bench-timeline: setup ## The contact graph while the map grows: edit distance and cost of every snapshot (QUICK=1: one room)
-	$(PYTHON) -m benchmarks.graph.growing_graph $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-timeline$(if $(QUICK),-quick)
+	$(EXPERIMENT) graph_timeline --out $(OUTPUTS)/experiments/bench-timeline$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: scenenn
-# DATA=folder with SceneNN's scenes (docs/DATA.md); OPTIONS are those of the module, for example
+# DATA=folder with SceneNN's scenes (docs/DATA.md); OPTIONS are those of the experiment, for example
 # OPTIONS="--backend detector --weights yolox.onnx --arms ours thesis --sequences 011 030".
 scenenn: setup ## The thesis's tables on SceneNN: make scenenn DATA=folder (OPTIONS="--backend ... --arms ...")
-	$(PYTHON) -m benchmarks.tables.scenenn $(if $(DATA),--data $(DATA)) $(OPTIONS) --out $(OUTPUTS)/experiments/scenenn
+	$(EXPERIMENT) scenenn $(if $(DATA),--data $(DATA)) --out $(OUTPUTS)/experiments/scenenn $(ASKED)
 
 .PHONY: bench-planning
 # 100 reporting seeds a query set (QUICK=1: 10); SCENE is an interactive scene, for the case reconstructed_room.
 SCENE ?= $(OUTPUTS)/demo/interactive_scene
+PLANNING := $(OUTPUTS)/experiments/bench-planning$(if $(QUICK),-quick)
 bench-planning: setup ## Planning beside OMPL with pybullet checks (QUICK=1: 10 queries a set; SCENE=folder)
-	$(PYTHON) -m benchmarks.planning $(if $(QUICK),--quick) $(if $(wildcard $(SCENE)),--scene $(SCENE)) --out $(OUTPUTS)/experiments/bench-planning$(if $(QUICK),-quick)
+	$(EXPERIMENT) planning_motion $(if $(wildcard $(SCENE)),--scene $(SCENE)) --out $(PLANNING)/motion $(ASKED)
+	$(EXPERIMENT) planning_tamp --out $(PLANNING)/tamp $(ASKED)
+	$(PYTHON) -m benchmarks.gather planning --out $(PLANNING)
 
 .PHONY: tidy
 # Fast: 200 reporting seeds a tier, about 20 minutes of one core; seen: images before each action, a second each;
@@ -219,10 +226,10 @@ llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2,
 # Rendered pairs are kept below the output folder; the network's arms run when its checkpoint is there.
 STEREO_NETWORK ?= data/disparity/raft_stereo_small.safetensors
 bench-disparity: setup ## Disparity beside OpenCV's matchers: Middlebury, endoscope, rooms, needles (QUICK=1: fewer frames; REAL_DATA=folder)
-	OMP_NUM_THREADS=1 $(PYTHON) -m benchmarks.disparity $(if $(QUICK),--quick) --data $(REAL_DATA) $(if $(wildcard $(STEREO_NETWORK)),--network $(STEREO_NETWORK)) --out $(OUTPUTS)/experiments/bench-disparity$(if $(QUICK),-quick)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) disparity --data $(REAL_DATA) $(if $(wildcard $(STEREO_NETWORK)),--network $(STEREO_NETWORK)) --out $(OUTPUTS)/experiments/bench-disparity$(if $(QUICK),-quick) $(ASKED)
 
 bench-reconstruct-stereo: setup ## Rooms reconstructed from two eyes beside a depth camera, a reporting seed (QUICK=1: few small frames)
-	$(PYTHON) -m benchmarks.disparity.reconstruction $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-reconstruct-stereo$(if $(QUICK),-quick)
+	$(EXPERIMENT) stereo_rooms --out $(OUTPUTS)/experiments/bench-reconstruct-stereo$(if $(QUICK),-quick) $(ASKED)
 
 # Half an hour of one core with rendering; stop it and start it again at will.
 train-stereo: setup ## Train the small RAFT-Stereo on our own renderings (QUICK=1: 10 steps)
@@ -242,4 +249,4 @@ train-network: setup ## Make the network of `segment --backend network` anew (QU
 	$(PYTHON) -m benchmarks.training $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/train-network$(if $(QUICK),-quick)
 
 bench-network: setup ## Our own network on rooms held back, real clouds and real logs (QUICK=1: fewer frames)
-	$(PYTHON) -m benchmarks.tables.network $(if $(QUICK),--quick) --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-network
+	$(EXPERIMENT) network --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-network$(if $(QUICK),-quick) $(ASKED)

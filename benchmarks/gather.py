@@ -14,6 +14,7 @@ from pathlib import Path
 from schemas.errors import BadInput
 
 PARTS = {
+    "planning": ("motion", "tamp"),
     "tidy": ("fast", "seen", "physics", "pulls", "holds", "detect", "detect_real"),
     "stitch": ("needle", "segmentation", "thread", "trials", "chain"),
 }

@@ -6,7 +6,7 @@ import numpy as np
 import open3d as o3d
 import trimesh
 
-from benchmarks.scene.perfect_maps import perfect_map, tiles, write_map
+from benchmarks.perfect_maps import perfect_map, tiles, write_map
 from stages.kit.geometry.point_clouds import sample_large_triangles, thin_to_grid
 
 __all__ = [

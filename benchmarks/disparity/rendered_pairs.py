@@ -13,8 +13,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from benchmarks.steps import made
 from schemas.errors import BadInput
-from stages.engine.chain import run_command
 from stages.kit.formats.frames import FrameReader
 from stages.suture.rig import TWO_CAMERAS, StereoRig
 from stages.suture.world.render import render
@@ -66,11 +66,10 @@ def _room_pairs(
     work: Path, library: Path, seed: int, frames: int, size: tuple[int, int], every: int
 ) -> Iterator[KeptPair]:
     made(
-        ["synthesize", "--library", str(library), "--frames", str(frames), "--seed", str(seed), "--no-depth-noise"]
-        + ["--width", str(size[0]), "--height", str(size[1]), "--stereo-baseline", str(BASELINE)]
-        + ["--picture-noise", str(PICTURE_NOISE), "--out", str(work / "truth")]
-    )
-    made(["ingest", "--log", str(work / "truth" / "log.mcap"), "--out", str(work / "sequence")])
+        "synthesize", work / "truth", "--library", library, "--frames", frames, "--seed", seed, "--no-depth-noise",
+        "--width", size[0], "--height", size[1], "--stereo-baseline", BASELINE, "--picture-noise", PICTURE_NOISE,
+    )  # fmt: skip
+    made("ingest", work / "sequence", "--log", work / "truth" / "log.mcap")
     with FrameReader(work / "sequence" / "frames.mcap") as reader:
         for frame in reader.frames(("color", "right", "depth"), every=every):
             assert frame.color is not None and frame.right is not None and frame.depth is not None
@@ -78,13 +77,6 @@ def _room_pairs(
                 disparity = np.where(frame.depth > 0, reader.camera.fx * BASELINE / frame.depth, np.nan)
             bodies = np.zeros(disparity.shape, np.uint8)
             yield KeptPair(frame.color, frame.right, disparity.astype(np.float32), bodies)
-
-
-def made(arguments: list[str]) -> None:
-    """Run a command of ours. Raises RuntimeError when it fails."""
-    code, _ = run_command([*arguments, "--quiet"])
-    if code != 0:
-        raise RuntimeError(f"scenewright {' '.join(arguments)} ended with {code}")
 
 
 def keep(stem: Path, pair: KeptPair) -> None:

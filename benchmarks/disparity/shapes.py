@@ -53,7 +53,7 @@ def _clouds(random: np.random.Generator, sizes: tuple[float, ...]) -> np.ndarray
     total = np.zeros(CANVAS, np.float32)
     for size in sizes:
         shrink = max(1, int(size / 1.5))
-        small = random.standard_normal((CANVAS[0] // shrink + 2, CANVAS[1] // shrink + 2), dtype=np.float32)
+        small: np.ndarray = random.standard_normal((CANVAS[0] // shrink + 2, CANVAS[1] // shrink + 2), dtype=np.float32)
         small = cv2.GaussianBlur(small, (0, 0), size / shrink)
         total += cv2.resize(small / small.std(), CANVAS[::-1], interpolation=cv2.INTER_CUBIC)
     return total / np.sqrt(len(sizes))
@@ -90,7 +90,7 @@ def shapes_pair(
         for picture, matrix in ((left, straight), (right, moved)):
             flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
             seen = cv2.warpAffine(colors, matrix, size, flags=flags, borderMode=cv2.BORDER_REFLECT)
-            share = np.ones((height, width), np.float32)
+            share: np.ndarray = np.ones((height, width), np.float32)
             if opacity is not None:
                 share = cv2.warpAffine(opacity, matrix, size, flags=flags, borderMode=cv2.BORDER_CONSTANT)
             picture += share[..., None] * (seen - picture)

@@ -19,8 +19,9 @@ import torch
 from torch.nn import functional
 
 from benchmarks.disparity.crops import TEXTURES, Kept, Sample, kept_sample, shapes_sample
-from benchmarks.disparity.rendered_pairs import made, needle_stem, room_stems
+from benchmarks.disparity.rendered_pairs import needle_stem, room_stems
 from benchmarks.disparity.shapes import texture_bank
+from benchmarks.steps import made
 from benchmarks.training.run import TrainingRun, rate_at, train
 from stages.disparity.raft.architecture import SMALL
 from stages.disparity.raft.checkpoint import save_network
@@ -62,7 +63,7 @@ class Sources:
         few = 1 if quick else None
         library = folder / "cad_library"
         shapes = ["--shapes-per-class", "4", "--small-shapes-per-class", "4"]
-        made(["library", "build", *shapes, "--seed", "1", "--out", str(library)])
+        made("library build", library, *shapes, "--seed", 1)
         frames = 2 if quick else ROOM_FRAMES
         rooms = [stem for seed in ROOMS[:few] for stem in room_stems(folder, library, seed, frames, ROOM_SIZE)]
         needles = [needle_stem(folder, seed, calibration_error=NEEDLE_CALIBRATION) for seed in NEEDLES[:few]]
@@ -109,7 +110,7 @@ class Run(TrainingRun):
     def __init__(self, plan: Plan, out: Path) -> None:
         self.plan = plan
         torch.manual_seed(plan.seed)
-        network = RaftStereo(SMALL).to(memory_format=torch.channels_last)
+        network = RaftStereo(SMALL).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         for module in network.modules():
             if isinstance(module, torch.nn.Conv2d):
                 torch.nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")

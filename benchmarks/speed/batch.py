@@ -210,7 +210,7 @@ class InstantExecutor:
         return [
             SceneResult(
                 job=job.name, scene=job.scene, fingerprint=job.fingerprint, outcome="done", exit_code=0, seconds=1.0,
-                started="2026-01-01T00:00:00", measures=measures,
+                started="2026-01-01T00:00:00", measures=measures, peak_memory_bytes=0, attempts=1,
             )
         ]  # fmt: skip
 

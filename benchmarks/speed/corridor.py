@@ -112,7 +112,8 @@ def make_frames(count: int, seed: int = 0) -> list[CorridorFrame]:
             middle = np.add(low, high) / 2 + [cell * LENGTH, 0, 0]
             box = trimesh.creation.box(extents, trimesh.transformations.translation_matrix(middle))
             scene.add_triangles(
-                o3d.core.Tensor(box.vertices.astype(np.float32)), o3d.core.Tensor(box.faces.astype(np.uint32))
+                o3d.core.Tensor(box.vertices.astype(np.float32)),  # type: ignore[call-overload]
+                o3d.core.Tensor(box.faces.astype(np.uint32)),  # type: ignore[call-overload]
             )
             owner = len(ROOM) + SAME.get(number - len(ROOM), number - len(ROOM)) if number >= len(ROOM) else number
             instances.append(instance_of(owner, cell))
@@ -128,7 +129,7 @@ def _frame(  # type: ignore[no-untyped-def]
 
     directions = back_project(np.ones((CAMERA.height, CAMERA.width), dtype=np.float32), CAMERA) @ pose[:3, :3].T
     rays = np.concatenate([np.broadcast_to(pose[:3, 3], directions.shape), directions], axis=-1)
-    hit = scene.cast_rays(o3d.core.Tensor(rays.astype(np.float32)))
+    hit = scene.cast_rays(o3d.core.Tensor(rays.astype(np.float32)))  # type: ignore[call-overload]
     true = np.minimum(hit["t_hit"].numpy(), 2 * RANGE)
     geometry = hit["geometry_ids"].numpy().astype(np.int64)
     instances = table[np.minimum(geometry, len(table) - 1)].astype(np.int32)
@@ -141,7 +142,7 @@ def _frame(  # type: ignore[no-untyped-def]
         entry = vocabulary.by_name(class_of(instance))
         masks[instance] = PanopticMask(entry.id, entry.kind == "thing")
     panoptic = PanopticFrame(instances, masks)
-    options = SegmentParameters()
+    options = SegmentParameters.model_validate({})
     geometric = segment_depth(depth, CAMERA, geometric_settings(options))
     fused = fuse(geometric.labels, panoptic, geometric.points, fusion_settings(options))
     return CorridorFrame(depth, color, pose, fused.ids, describe(0, fused).segments, panoptic)

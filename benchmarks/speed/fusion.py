@@ -94,7 +94,7 @@ def render_frames(count: int) -> dict[str, np.ndarray]:
         pose = look_at(eye, np.array([-0.9 * np.cos(angle), -0.7 * np.sin(angle), 0.5]))
         directions = back_project(np.ones((CAMERA.height, CAMERA.width), dtype=np.float32), CAMERA) @ pose[:3, :3].T
         rays = np.concatenate([np.broadcast_to(eye, directions.shape), directions], axis=-1)
-        hit = scene.cast_rays(o3d.core.Tensor(rays.astype(np.float32)))
+        hit = scene.cast_rays(o3d.core.Tensor(rays.astype(np.float32)))  # type: ignore[call-overload]
         depth = hit["t_hit"].numpy()
         depth = depth + (0.0012 + 0.0019 * (depth - 0.4) ** 2) * random.standard_normal(depth.shape)
         ids = hit["geometry_ids"].numpy().astype(np.int64)
@@ -117,7 +117,9 @@ def ours(frames: dict[str, np.ndarray], voxel_size: float, whole: bool) -> tuple
     from stages.fuse.stage import new_mapper
     from stages.fuse.surface import extract_surface
 
-    options = FuseParameters(voxel_size=voxel_size, truncation_voxels=TRUNCATION_VOXELS, maximum_depth=RANGE)
+    options = FuseParameters.model_validate(
+        {"voxel_size": voxel_size, "truncation_voxels": TRUNCATION_VOXELS, "maximum_depth": RANGE}
+    )
     vocabulary = load_vocabulary()
     mapper = new_mapper(options, vocabulary)
     classes = [vocabulary.by_name(name) for name, _, _ in room()]
@@ -161,20 +163,20 @@ def open3d(frames: dict[str, np.ndarray], voxel_size: float, color: bool) -> tup
     core, geometry = o3d.core, o3d.t.geometry
     names = ("tsdf", "weight", "color") if color else ("tsdf", "weight")
     grid = geometry.VoxelBlockGrid(
-        names, (core.float32,) * len(names), ((1), (1), (3))[: len(names)], voxel_size, 8,
+        names, (core.float32,) * len(names), ((1), (1), (3))[: len(names)], voxel_size, 8,  # type: ignore[arg-type]
         40_000 if voxel_size < 0.015 else 10_000, core.Device("CPU:0"),
     )  # fmt: skip
     # Its pixels begin at integer coordinates, ours are centred there: without the shift it would be half a pixel off.
     shifted = CAMERA.model_copy(update={"cx": CAMERA.cx + 0.5, "cy": CAMERA.cy + 0.5})
-    intrinsic = core.Tensor(intrinsic_matrix(shifted))
+    intrinsic = core.Tensor(intrinsic_matrix(shifted))  # type: ignore[call-overload]
     options = (1.0, RANGE, TRUNCATION_VOXELS)
 
     def step(k: int) -> None:
-        depth = geometry.Image(core.Tensor(frames["depth"][k]))
-        extrinsic = core.Tensor(np.linalg.inv(frames["poses"][k]))
+        depth = geometry.Image(core.Tensor(frames["depth"][k]))  # type: ignore[call-overload]
+        extrinsic = core.Tensor(np.linalg.inv(frames["poses"][k]))  # type: ignore[call-overload]
         blocks = grid.compute_unique_block_coordinates(depth, intrinsic, extrinsic, *options)
         if color:
-            image = geometry.Image(core.Tensor(frames["color"][k]).to(core.float32))
+            image = geometry.Image(core.Tensor(frames["color"][k]).to(core.float32))  # type: ignore[call-overload]
             grid.integrate(blocks, depth, image, intrinsic, extrinsic, *options)
         else:
             grid.integrate(blocks, depth, intrinsic, extrinsic, *options)

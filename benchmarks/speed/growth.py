@@ -108,7 +108,7 @@ def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standi
     timers.wrap(mapping, "integrate", "integration")
     timers.wrap(mapping.PanopticMapper, "regularize", "regularisation")
     timers.wrap(mapping.PanopticMapper, "_associate", "labels")
-    options = FuseParameters(voxel_size=voxel_size, maximum_depth=RANGE)
+    options = FuseParameters.model_validate({"voxel_size": voxel_size, "maximum_depth": RANGE})
 
     def extract(mapper: mapping.PanopticMapper) -> int:
         with tempfile.TemporaryDirectory() as folder:
@@ -172,7 +172,7 @@ def segment_parts(frames: list[CorridorFrame]) -> dict[str, float]:
     from stages.segment.parameters import SegmentParameters
     from stages.segment.settings import fusion_settings, geometric_settings
 
-    options = SegmentParameters()
+    options = SegmentParameters.model_validate({})
     reset_peak()
     before = memory("VmRSS")
     taken = {"geometric": 0.0, "fusion": 0.0, "wall": 0.0}
@@ -298,12 +298,12 @@ def as_tables(results: dict[tuple[str, str], list[dict[str, float]]]) -> list[Ta
     listing = results.get(("listing", "640x480"))
     if listing:
         row = listing[0]
-        cells = (
+        held = (
             int(row["frames"]), int(row["segments"]), row["memory_mb"], 1024 * row["memory_mb"] / row["frames"],
             row["peak_mb"],
         )  # fmt: skip
-        names = ("frames", "segments", "MB", "kB a frame", "MB while it is read")
-        tables.append(Table("listing", "What fuse holds of every frame: the list of its segments", names, (cells,)))
+        columns = ("frames", "segments", "MB", "kB a frame", "MB while it is read")
+        tables.append(Table("listing", "What fuse holds of every frame: the list of its segments", columns, (held,)))
     return tables
 
 

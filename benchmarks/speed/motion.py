@@ -15,6 +15,7 @@ import json
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from ompl import base as ob
@@ -50,6 +51,7 @@ def boxes_world() -> PhysicsWorld:
         pose[:3, 3] = [0.65 * np.cos(angle), 0.65 * np.sin(angle), random.uniform(0.4, 1.2)]
         record = SceneBody(
             name=f"box_{number}", class_name="box", movable=False, world_from_body=as_transform(pose), mass=1.0,
+            world_from_reconstructed=None,
             box=Box(center=tuple(pose[:3, 3].tolist()), size=tuple(size.tolist())),
         )  # fmt: skip
         shape = f'<geometry><box size="{size[0]} {size[1]} {size[2]}"/></geometry>'
@@ -144,7 +146,7 @@ def measure_paths(robot: Robot, queries: int) -> dict[str, float]:
     chain = arm_chain(robot.description)
     random = np.random.default_rng(1)
 
-    def check(arm: np.ndarray):  # noqa: ANN202 (a Collision or None)
+    def check(arm: np.ndarray) -> Any:
         return checker.check_meshes(np.concatenate([BASE, arm]))
 
     samples = random_starts(chain, 2000, random)

@@ -15,7 +15,9 @@ import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numba
@@ -172,14 +174,16 @@ def measure(repeats: int, weights: Path | None) -> dict[str, Timing]:
         numbers = np.unique(instance[instance > 0]).tolist()
         panoptic.append(PanopticFrame(instance.astype(np.int32), {n: PanopticMask(4, n > 1) for n in numbers}))
     opencv = {
-        name: cv2.RgbdNormals_create(480, 640, cv2.CV_32F, intrinsic_matrix(CAMERA), 5, 50, method)
+        name: cv2.RgbdNormals_create(  # type: ignore[attr-defined]
+            480, 640, cv2.CV_32F, intrinsic_matrix(CAMERA), 5, 50, method
+        )
         for name, method in (
             ("FALS", cv2.RGBD_NORMALS_RGBD_NORMALS_METHOD_FALS),
             ("SRI", cv2.RGBD_NORMALS_RGBD_NORMALS_METHOD_SRI),
         )
     }
 
-    def pick(items: list, k: int) -> object:
+    def pick(items: list[Any], k: int) -> Any:
         return items[k % VIEWS]
 
     # OpenCV wants four channels, and NaN where there is no depth.
@@ -216,8 +220,12 @@ def measure(repeats: int, weights: Path | None) -> dict[str, Timing]:
         color = np.random.default_rng(1).integers(0, 255, (480, 640, 3), dtype=np.uint8)
         for name, side in (("detector-whole-image", 0), ("detector-tiles", 480)):
             detector = Detector(weights, score_threshold=0.3, suppression_overlap=0.5, tile_side=side)
-            seconds[f"ours/{name}"] = median_seconds(lambda k, d=detector: d.detect(color), slow)
+            seconds[f"ours/{name}"] = median_seconds(partial(_detect, detector, color), slow)
     return seconds
+
+
+def _detect(detector: Any, color: np.ndarray, k: int) -> object:
+    return detector.detect(color)
 
 
 def table(seconds: dict[str, Timing], repeats: int) -> str:
@@ -246,7 +254,7 @@ def table(seconds: dict[str, Timing], repeats: int) -> str:
 
 def main() -> None:
     """Measure, print the table, write metrics.json and table.md."""
-    numba.config.THREADING_LAYER = "omp"  # the default probes TBB first and warns about its version
+    numba.config.THREADING_LAYER = "omp"  # type: ignore[attr-defined] # the default probes TBB first and warns about its version
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, help="folder for metrics.json and table.md")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions")

@@ -158,8 +158,9 @@ def _slab_table(size: np.ndarray, top: float, random: np.random.Generator) -> tr
             leg = trimesh.creation.box(extents=(0.05, 0.05, top - thickness))
             leg.apply_translation([x * size[0], y * size[1], (top - thickness) / 2])
             parts.append(leg)
-    table = trimesh.util.concatenate(parts)
-    table.visual.face_colors = np.array([*random.integers(30, 240, 3), 255], dtype=np.uint8)
+    table: trimesh.Trimesh = trimesh.util.concatenate(parts)  # type: ignore[assignment]
+    color = np.array([*random.integers(30, 240, 3), 255], dtype=np.uint8)
+    table.visual.face_colors = color  # type: ignore[union-attr]
     return table
 
 
@@ -228,7 +229,8 @@ def vary_look(
     for _ in range(int(random.integers(1, 4))):
         place = random.uniform([-size[0] / 2, -size[1] / 2, 0.6 * size[2]], [size[0] / 2, size[1] / 2, size[2] - 0.05])
         color = random.uniform(0.2, 0.9) * random.uniform(0.75, 1.0, 3)
-        lamps.append(AreaLight(tuple(map(float, place)), (0.1, 0, 0), (0, -0.1, 0), tuple(map(float, color))))
+        (x, y, z), (red, green, blue) = map(float, place), map(float, color)
+        lamps.append(AreaLight((x, y, z), (0.1, 0, 0), (0, -0.1, 0), (red, green, blue)))
     renderer.lights = tuple(lamps)
     renderer.ambient = (random.uniform(0.15, 0.6) * random.uniform(0.85, 1.0, 3)).astype(np.float32)
     renderer.shadows = bool(random.random() < 0.5)

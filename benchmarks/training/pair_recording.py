@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.tables.mosd import CAMERA, LabelledFrame
+from benchmarks.mosd_frames import CAMERA, LabelledFrame
 from stages.segment.backends.objects.grouping import Agglomeration, PairScorer
 from stages.segment.backends.objects.segmentation import ObjectSettings, Pieces, cut_pieces
 

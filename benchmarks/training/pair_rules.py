@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
-from benchmarks.tables.mosd import CAMERA, LabelledFrame, read_frames
-from benchmarks.tables.object_masks import score_object_masks
+from benchmarks.mosd_frames import CAMERA, LabelledFrame, read_frames
+from benchmarks.object_masks import score_object_masks
 from benchmarks.training.pair_recording import pairs_of_frame
 from benchmarks.training.tabletop_pairs import FOLDS, GENERATED, GENERATED_QUICK, generated_frames
 from schemas.errors import BadInput

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -39,7 +40,7 @@ class FrameSet:
     """All frames of a set of shards, memory-mapped. Raises BadInput for a folder without shards."""
 
     def __init__(self, folder: Path) -> None:
-        self._shards = []
+        self._shards: list[tuple[list[np.ndarray], list[Any]]] = []
         self._places: list[tuple[int, int]] = []
         for shard in sorted(file.parent for file in Path(folder).glob("shard_*/frames.json")):
             rows = json.loads((shard / "frames.json").read_text())

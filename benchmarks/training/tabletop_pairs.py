@@ -21,8 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.tables.mosd import CAMERA, LabelledFrame, read_frames
-from benchmarks.tables.object_masks import score_object_masks
+from benchmarks.mosd_frames import CAMERA, LabelledFrame, read_frames
+from benchmarks.object_masks import score_object_masks
 from benchmarks.training.pair_recording import pairs_of_frame
 from benchmarks.training.tabletops import make_tabletop
 from benchmarks.training.tree_growing import grow_trees

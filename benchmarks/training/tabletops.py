@@ -146,7 +146,7 @@ def make_round(random: np.random.Generator) -> Thing:
             handle = trimesh.creation.torus(0.3 * height, 0.006, major_sections=20, minor_sections=8)
             handle.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
             handle.apply_translation([0.5 * (radius + bottom) + 0.2 * height, 0, 0])
-            mesh = trimesh.util.concatenate([mesh, handle])
+            mesh = trimesh.util.concatenate([mesh, handle])  # type: ignore[assignment]
     else:
         radius, height, wall = random.uniform(0.06, 0.11), random.uniform(0.05, 0.11), 0.004
         foot = random.uniform(0.35, 1.0) * radius
@@ -160,7 +160,7 @@ def make_round(random: np.random.Generator) -> Thing:
             for sign in (-1, 1):
                 grip = trimesh.creation.box(extents=[0.03, 0.05, 0.012])
                 grip.apply_translation([sign * (radius + 0.01), 0, 0.3 * height])
-                mesh = trimesh.util.concatenate([mesh, grip])
+                mesh = trimesh.util.concatenate([mesh, grip])  # type: ignore[assignment]
     if random.random() < 0.2:
         mesh.apply_transform(trimesh.transformations.rotation_matrix(np.pi, [1, 0, 0]))
     return _with_prints(Thing(mesh, np.ptp(mesh.bounds, axis=0), round=True), random)
@@ -325,12 +325,15 @@ def make_tabletop(seed: int) -> Tabletop:
     table.apply_translation([0, 0, -0.01])
     for mesh, pose in [(table, np.eye(4)), *((thing.mesh, thing.world_from_thing) for thing in things)]:
         vertices = mesh.vertices @ pose[:3, :3].T + pose[:3, 3]
-        scene.add_triangles(o3d.core.Tensor(vertices.astype(np.float32)), o3d.core.Tensor(mesh.faces.astype(np.uint32)))
+        scene.add_triangles(
+            o3d.core.Tensor(vertices.astype(np.float32)),  # type: ignore[call-overload]
+            o3d.core.Tensor(mesh.faces.astype(np.uint32)),  # type: ignore[call-overload]
+        )
     rays_in_camera = back_project(np.ones((CAMERA.height, CAMERA.width), np.float32), CAMERA).reshape(-1, 3)
     directions = rays_in_camera @ world_from_camera[:3, :3].T
     origins = np.broadcast_to(world_from_camera[:3, 3], directions.shape)
     rays = np.concatenate([origins, directions], axis=1).astype(np.float32)
-    hits = scene.cast_rays(o3d.core.Tensor(rays), nthreads=1)
+    hits = scene.cast_rays(o3d.core.Tensor(rays), nthreads=1)  # type: ignore[call-overload]
     depth = hits["t_hit"].numpy()
     hit = np.isfinite(depth)
     depth = np.where(hit, depth, 0).astype(np.float32)
@@ -344,7 +347,8 @@ def make_tabletop(seed: int) -> Tabletop:
     reach = projector - points
     length = np.linalg.norm(reach, axis=1, keepdims=True)
     shadow_rays = np.concatenate([points + normals * 0.002, reach / length], axis=1).astype(np.float32)
-    lit = ~scene.test_occlusions(o3d.core.Tensor(shadow_rays), 0.0, 10.0, nthreads=1).numpy()
+    tensor = o3d.core.Tensor(shadow_rays)  # type: ignore[call-overload]
+    lit = ~scene.test_occlusions(tensor, 0.0, 10.0, nthreads=1).numpy()
 
     lamp = random.normal(0, 1, 3) * [1, 1, 0] + [0, 0, random.uniform(0.8, 3)]
     lamp /= np.linalg.norm(lamp)
@@ -362,7 +366,7 @@ def make_tabletop(seed: int) -> Tabletop:
     color = cv2.GaussianBlur(color.astype(np.float32), (0, 0), random.uniform(0.5, 1.1))
     color += random.normal(0, 0.012, color.shape).astype(np.float32)
     # The two cameras of such a device agree within a pixel or two.
-    shift = np.float32([[1, 0, random.normal(0, 1.2)], [0, 1, random.normal(0, 0.8)]])
+    shift = np.array([[1, 0, random.normal(0, 1.2)], [0, 1, random.normal(0, 0.8)]], np.float32)
     color = cv2.warpAffine(color, shift, (shape[1], shape[0]), borderMode=cv2.BORDER_REPLICATE)
     sensed, rows, columns = _sensed(depth.reshape(shape), slant.reshape(shape), lit.reshape(shape), random)
     labels = np.where(sensed > 0, owner.reshape(shape)[rows, columns], 0).astype(np.int32)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -41,7 +42,7 @@ def main() -> None:
     names = {entry.id: entry.name for entry in vocabulary.classes}
     predictor = load_predictor(arguments.weights, vocabulary)
     frames = FrameSet(arguments.data / "validation")
-    choices = [dict(zip(GRID, values, strict=True)) for values in product(*GRID.values())]
+    choices: list[dict[str, Any]] = [dict(zip(GRID, values, strict=True)) for values in product(*GRID.values())]
     sums: list[dict[str, ClassQuality]] = [{} for _ in choices]
     for index in range(0, len(frames), arguments.every):
         frame = frames[index]

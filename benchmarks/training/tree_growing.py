@@ -65,12 +65,11 @@ def _grow_tree(
         for k in range(len(rows)):
             node = node_of[k]
             node_of[k] = 2 * node + (2 if bins[rows[k], feature[node]] > cut[node] else 1)
-    g = np.zeros(2**depth)
-    h = np.zeros(2**depth)
+    leaf_gradient, leaf_curvature = np.zeros(2**depth), np.zeros(2**depth)
     for k in range(len(rows)):
-        g[node_of[k] - inner] += gradient[rows[k]]
-        h[node_of[k] - inner] += curvature[rows[k]]
-    return feature, cut, -g / (h + ridge)
+        leaf_gradient[node_of[k] - inner] += gradient[rows[k]]
+        leaf_curvature[node_of[k] - inner] += curvature[rows[k]]
+    return feature, cut, -leaf_gradient / (leaf_curvature + ridge)
 
 
 @njit(cache=True)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.disparity.__main__ import measured, scores, table
-from benchmarks.disparity.arms import CLASSICAL, DERIVED, WORDS, arms_of
-from benchmarks.disparity.cases import Pair
-from benchmarks.disparity.reconstruction import depth_figures, pipeline_of
-from benchmarks.disparity.reconstruction import table as table_of_rooms
+from benchmarks.experiment import Bench, Results, Trial
+from benchmarks.experiments.disparity.arms import CLASSICAL, DERIVED, WORDS, arms_of
+from benchmarks.experiments.disparity.cases import Pair
+from benchmarks.experiments.disparity.experiment import EXPERIMENT, DisparityParameters, measured, scores
+from benchmarks.experiments.stereo_rooms import depth_figures, pipeline_of
+from benchmarks.results import write_results
 from schemas.scene_parts import Camera
 from stages.engine.pipelines import resolve_variables, step_arguments
 from stages.kit.formats.frames import FrameWriter
@@ -27,12 +29,15 @@ def test_scores_are_the_closed_form() -> None:
     assert figures["epe"] == pytest.approx(1.5) and figures["median"] == pytest.approx(1.0)
 
 
-def test_cases_that_were_not_run_have_no_table() -> None:
-    metrics = {f"{arm}/motorcycle/{measure}": 1.0 for arm in CLASSICAL for measure in (
-        "bad2", "bad2_all", "epe", "median", "coverage", "cpu_seconds"
-    )}  # fmt: skip
-    text = table(metrics | {"pairs/motorcycle/count": 1.0})
-    assert "### motorcycle (1 pair)" in text and "rooms" not in text
+def test_parts_of_cases_have_figures_and_a_table(tmp_path: Path) -> None:
+    values = {"bad2": 1.0, "bad2_all": 2.0, "epe": 3.0, "median": 4.0, "coverage": 5.0, "cpu_seconds": 6.0}
+    records = {Trial("ours", "needles", "3100"): {"": values, "needle": {"coverage": 50.0}}}
+    results = Results(EXPERIMENT, Bench(tmp_path, DisparityParameters.model_validate({})), records)
+    text = write_results(results, ["python"], [])
+    assert "| ours/needles_needle |" in text and "rooms" not in text
+    metrics = json.loads((tmp_path / "metrics.json").read_text())
+    assert metrics["ours/needles/epe"] == 3.0 and metrics["pairs/needles/count"] == 1.0
+    assert metrics["ours/needles_needle/coverage"] == 50.0 and "ours/needles_needle/epe" not in metrics
 
 
 def test_parts_of_a_picture_are_scored_by_themselves() -> None:
@@ -48,7 +53,7 @@ def test_parts_of_a_picture_are_scored_by_themselves() -> None:
     maps, figures = measured(pair, {"ours": arm})
     found = figures["ours"]
     assert found[""]["bad2"] == pytest.approx(25) and found["needle"]["bad2"] == pytest.approx(100)
-    assert np.isnan(found["none"]["bad2"]) and found["none"]["cpu_seconds"] >= 0
+    assert "bad2" not in found["none"] and found["none"]["cpu_seconds"] >= 0
     assert set(maps) == {"ours", "ours_trusted", "constant"}  # the network did not run
     assert (maps["constant"].disparity == 7.5).all() and figures["constant"]["needle"]["bad2"] == 0
 
@@ -94,8 +99,3 @@ def test_depth_is_compared_frame_by_frame(tmp_path: Path) -> None:
     found = depth_figures(tmp_path / "found", tmp_path / "exact")
     assert found["depth_share"] == pytest.approx(80)
     assert found["depth_median_mm"] == pytest.approx(10, abs=1e-3)
-
-
-def test_the_table_has_a_column_a_room_and_arm() -> None:
-    text = table_of_rooms({"two_eyes/room_7/map/pq": 0.5, "depth_camera/room_7/map/pq": 0.75})
-    assert "room 7, two eyes" in text and "| 0.5 | 0.75 |" in text

@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
-from benchmarks.mapping.arms import EVERYWHERE, SHOWN, all_arms
-from benchmarks.mapping.drift import TRANSLATION_PER_METRE, drifting_poses
-from benchmarks.mapping.experiment import Outcome
-from benchmarks.mapping.figures_of_merit import MEASURES, difference, interval, pooled_curve, ranked
-from benchmarks.mapping.records import read_outcomes, write_outcomes
-from benchmarks.mapping.rooms import REPORTING, TUNING
-from benchmarks.mapping.tables import by_room, differences, headline, printed_by_the_thesis, quality_by_class
+from benchmarks.experiment import Bench, Results, Trial
+from benchmarks.experiments.mapping.arms import EVERYWHERE, SHOWN, all_arms
+from benchmarks.experiments.mapping.drift import TRANSLATION_PER_METRE, drifting_poses
+from benchmarks.experiments.mapping.experiment import EXPERIMENT
+from benchmarks.experiments.mapping.figures_of_merit import MEASURES, pooled_curve
+from benchmarks.experiments.mapping.measuring import MappingParameters, Outcome, ranked
+from benchmarks.generated_rooms import REPORTING, TUNING
+from benchmarks.results import figures_of, table
 from stages.kit.measurement.average_precision import Candidates, average_precision
 from stages.kit.measurement.panoptic_quality import ClassQuality
 from stages.synthesize.recipes import load_recipe
@@ -25,13 +27,17 @@ def straight_walk(steps: int, length: float) -> np.ndarray:
     return poses
 
 
-def outcome(room: str, arm: str, found: int, missed: int) -> Outcome:
+def outcome(found: int, missed: int) -> Outcome:
     quality = {"chair": ClassQuality(found, 0, missed, 0.8 * found), "floor": ClassQuality(1, 0, 0, 0.9)}
     total = found + missed
-    candidates = {"chair": Candidates(np.eye(total)[:found], np.arange(found, 0.0, -1.0)), "any": Candidates(
-        np.eye(total)[:found], np.ones(found)
-    )}  # fmt: skip
-    return Outcome(room, arm, SHOWN, quality, quality, candidates, candidates, candidates, 10, 2.0)
+    boxes = Candidates(np.eye(total)[:found], np.arange(found, 0.0, -1.0))
+    candidates = ranked({"chair": boxes, "any": Candidates(np.eye(total)[:found], np.ones(found))})
+    return Outcome(quality, quality, candidates, candidates, candidates, 10, 2.0)
+
+
+def results_of(outcomes: dict[tuple[str, str], Outcome]) -> Results:
+    bench = Bench(Path("nowhere"), MappingParameters.model_validate({}))
+    return Results(EXPERIMENT, bench, {Trial(arm, SHOWN, room): made for (arm, room), made in outcomes.items()})
 
 
 def test_drift_grows_with_the_square_root_of_the_way() -> None:
@@ -46,10 +52,11 @@ def test_drift_grows_with_the_square_root_of_the_way() -> None:
 
 def test_rooms_and_arms_are_those_that_are_stated() -> None:
     assert (len(TUNING), len(REPORTING), len(set(REPORTING))) == (10, 20, 20)
-    for recipe, seed in TUNING + REPORTING:
+    for name in TUNING + REPORTING:
+        recipe, seed = name.split("-")
         seeds = load_recipe(recipe).seeds
-        first, last = seeds.reporting if (recipe, seed) in REPORTING else seeds.tuning
-        assert first <= seed <= last
+        first, last = seeds.reporting if name in REPORTING else seeds.tuning
+        assert first <= int(seed) <= last
     assert {arm.name for arm in all_arms(0.02)} >= EVERYWHERE
     by_name = {arm.name: arm for arm in all_arms(0.01)}
     assert {arm.fuse.voxel_size for arm in by_name.values()} == {0.01}
@@ -57,47 +64,38 @@ def test_rooms_and_arms_are_those_that_are_stated() -> None:
     assert by_name["voxblox++"].segment.fusion == "voxblox++" and by_name["thesis"].graph.method == "thesis"
 
 
-def test_outcomes_survive_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "room.json"
-    write_outcomes(path, [outcome("a", "ours", 3, 1), outcome("a", "thesis", 0, 4)])
-    back = read_outcomes(path)
-    assert [o.qualities for o in back] == [outcome("a", "ours", 3, 1).qualities, outcome("a", "thesis", 0, 4).qualities]
-    assert back[0].instances["chair"].iou.shape == (3, 4) and back[1].instances["chair"].iou.shape == (0, 4)
-    assert back[0].seconds == 2.0 and not list(tmp_path.glob("*.partial"))
+def test_outcomes_survive_the_file() -> None:
+    adapter = TypeAdapter(Outcome)
+    for made in (outcome(3, 1), outcome(0, 4)):
+        assert adapter.validate_json(adapter.dump_json(made)) == made
 
 
 def test_figures_are_pooled_before_they_are_divided() -> None:
-    rooms = [outcome("a", "ours", 3, 1), outcome("b", "ours", 1, 5)]
+    rooms = [outcome(3, 1), outcome(1, 5)]
     # Chairs: 4 of 10 found at IoU 0.8, SQ 0.8, RQ 4 / (4 + 3); floors 0.9.
-    assert MEASURES["pq"](rooms) == pytest.approx((0.8 * 4 / 7 + 0.9) / 2)
-    assert MEASURES["instance_ap"](rooms) == pytest.approx(0.4)
-    assert MEASURES["instance_ap_thesis_code"](rooms) == pytest.approx(1.0), "recall that was not reached counts"
-    assert MEASURES["frames_per_second"](rooms) == pytest.approx(5.0)
-    found = interval(rooms, MEASURES["pq"], np.random.default_rng(0))
-    assert found is not None and found.low < found.value < found.high
-    same = difference(rooms, rooms, MEASURES["pq"], np.random.default_rng(0))
-    assert same is not None and (same.value, same.low, same.high) == (0.0, 0.0, 0.0)
+    assert MEASURES["pq"].of(rooms) == pytest.approx((0.8 * 4 / 7 + 0.9) / 2)
+    assert MEASURES["instance_ap"].of(rooms) == pytest.approx(0.4)
+    assert MEASURES["instance_ap_thesis_code"].of(rooms) == pytest.approx(1.0), "recall that was not reached counts"
+    assert MEASURES["frames_per_second"].of(rooms) == pytest.approx(5.0)
 
 
 def test_pooled_rooms_share_the_ranking_but_not_the_truth() -> None:
     # The sure miss of the second room stands before the hit of the first one: precision 0, 1/2.
     first = Candidates(np.array([[0.9]]), np.array([5.0]))
     second = Candidates(np.array([[0.1, 0.2]]), np.array([9.0]))
-    curve = pooled_curve([ranked(first), ranked(second)])
+    curve = pooled_curve([ranked({"": found})[""] for found in (first, second)])
     assert curve.true_count == 3 and curve.precision.tolist() == [0.0, 0.5]
     assert average_precision(curve) == pytest.approx(1 / 3 * 1 / 2)
     assert average_precision(pooled_curve([])) is None
 
 
-def test_tables_show_every_arm_and_the_thesis_beside() -> None:
-    results = {
-        ("ours", SHOWN): [outcome("a", "ours", 3, 1), outcome("b", "ours", 4, 0)],
-        ("thesis", SHOWN): [outcome("a", "thesis", 1, 3), outcome("b", "thesis", 2, 2)],
-    }
-    arms = {"thesis": "thesis", "ours": "ours"}
-    assert headline(results, arms, [SHOWN]).count("| middle |") == 2
-    assert "| middle | ours – thesis |" in differences(results, [SHOWN])
-    assert by_room(results, arms, SHOWN).splitlines()[-1].startswith("| b |")
+def test_figures_are_there_for_every_arm_and_class_and_the_thesis_beside() -> None:
+    found = {("ours", "a"): (3, 1), ("ours", "b"): (4, 0), ("thesis", "a"): (1, 3), ("thesis", "b"): (2, 2)}
+    results = results_of({key: outcome(*counts) for key, counts in found.items()})
+    figures = figures_of(results)
     # Chairs of both rooms: 7 of 8 found, PQ 0.8 * 7 / 7.5.
-    assert "| ours | PQ | 82.3 | 90.0 | 74.7 | 90.0 | 74.7 |" in quality_by_class(results, arms, SHOWN)
-    assert "| Han 2024: ours | 35.4 | 80.5 | 43.1 | 58.1 | 45.3 |" in printed_by_the_thesis()
+    assert figures["ours/middle/pq_chair"].value == pytest.approx(0.8 * 7 / 7.5)
+    assert figures["ours/middle/pq"].low is not None and figures["ours/middle/sq"].low is None
+    text = table(results, figures)
+    assert "| middle: ours – thesis |" in text and "| middle, b |" in text
+    assert "| Han 2024: ours | 35.4 | 80.5 | 43.1 | 58.1 | 45.3 |" in text

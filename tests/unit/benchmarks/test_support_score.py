@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks.tables.support_score import f1, levels_of, score_graph
-from benchmarks.tables.tabletop_maps import upright_pose
+from benchmarks.experiments.mosd_supports.support_score import f1, levels_of, score_graph
+from benchmarks.experiments.mosd_supports.tabletop_maps import upright_pose
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.scene_parts import Camera, Relation
 from stages.kit.geometry.cameras import back_project

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.tables.scenenn import main
-from benchmarks.tables.scenenn_scenes import Scene, find_scene
-from benchmarks.tables.scenenn_tables import Outcome, all_figures, make_tables, read_published
+from benchmarks.command import main
+from benchmarks.experiments.mapping.measuring import Outcome, ranked
+from benchmarks.experiments.scenenn.scenes import Scene, find_scene
+from benchmarks.experiments.scenenn.tables import all_figures, make_tables, read_published
 from schemas.vocabulary import load_vocabulary
 from stages.kit.measurement.average_precision import Candidates
 from stages.kit.measurement.panoptic_quality import ClassQuality
@@ -71,24 +72,26 @@ def test_what_a_scene_lacks_is_said(data, tmp_path):
 
 
 def test_without_the_data_one_line_says_what_to_fetch(capsys, tmp_path):
-    assert main([]) == 2
+    words = ["scenenn", "--out", str(tmp_path / "out")]
+    assert main(words) == 2
     told = capsys.readouterr().err.strip()
     assert "\n" not in told and "https://hkust-vgd.github.io/scenenn/" in told
-    assert main(["--data", str(tmp_path), "--sequences", SCENE]) == 3
+    assert main([*words, "--data", str(tmp_path), "--sequences", SCENE]) == 3
 
 
-def outcome(scene: str, arm: str, found: int, missed: int, confidence: float) -> Outcome:
+def outcome(found: int, missed: int, confidence: float) -> Outcome:
     """Tables alone: `found` of them with IoU 0.8, `missed` not; one prediction is wrong."""
     quality = {"table": ClassQuality(found, 1, missed, 0.8 * found), "shelf": ClassQuality(0, 5, 0, 0.0)}
     iou = np.zeros((found + 1, found + missed))
     iou[np.arange(found), np.arange(found)] = 0.8
-    candidates = {"table": Candidates(iou, confidence - np.arange(found + 1.0))}
-    return Outcome(scene, arm, quality, quality, candidates, candidates, candidates)
+    candidates = ranked({"table": Candidates(iou, confidence - np.arange(found + 1.0))})
+    return Outcome(quality, quality, candidates, candidates, candidates)
 
 
 def test_figures_add_up_over_sequences_before_they_are_averaged():
     published = read_published()
-    metrics = all_figures([outcome("011", "ours", 3, 0, 50.0), outcome("030", "ours", 1, 4, 10.0)], published)
+    outcomes = {("ours", "011"): outcome(3, 0, 50.0), ("ours", "030"): outcome(1, 4, 10.0)}
+    metrics = all_figures(outcomes, published)
     assert metrics["ours/011/pq"] == pytest.approx(0.8 * 3 / 3.5)
     assert metrics["ours/all/pq_table"] == pytest.approx(0.8 * 4 / (4 + 1 + 2))
     # Classes outside of the ten take no part, whatever was predicted of them.
@@ -106,7 +109,19 @@ def test_figures_add_up_over_sequences_before_they_are_averaged():
 @pytest.mark.slow
 def test_the_whole_chain_on_a_small_scene(data, tmp_path):
     """Geometric masks name no class, so only that everything runs and is told is looked at."""
-    words = ["--data", str(data), "--backend", "geometric", "--arms", "ours", "--every", "1", "--voxel-size", "0.05"]
+    words = [
+        "scenenn",
+        "--data",
+        str(data),
+        "--backend",
+        "geometric",
+        "--arms",
+        "ours",
+        "--every",
+        "1",
+        "--voxel-size",
+        "0.05",
+    ]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
     text = (tmp_path / "out" / "table.md").read_text()
     assert "1 of the thesis's 20 sequences: 011" in text and "005 (no folder)" in text and "name no classes" in text

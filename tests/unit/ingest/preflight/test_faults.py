@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.tables.preflight import FAULTS, doubled, on_poses, scaled_depth, shifted_color, stretched
+from benchmarks.experiments.preflight.faults import FAULTS, doubled, on_poses, scaled_depth, shifted_color, stretched
 from stages.ingest.preflight.page import render
 from stages.ingest.preflight.report import InspectionReport
 from stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.tables.preflight import FAULTS
+from benchmarks.experiments.preflight.faults import FAULTS
 from schemas.errors import MachineFailure
 from stages.ingest.preflight.page import render, write_page
 from stages.ingest.preflight.text import as_text

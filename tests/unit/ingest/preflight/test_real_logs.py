@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.tables.preflight import FAULTS, judge
+from benchmarks.experiments.preflight.experiment import judge
+from benchmarks.experiments.preflight.faults import FAULTS
 from stages.ingest.preflight.settings import ingest_parameters
 from tests.real_data import real_data
 

@@ -1,0 +1,113 @@
+"""`python -m benchmarks NAME`: the one command line of all experiments. Without a name it lists them."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
+
+from benchmarks.discovery import experiment_files, load_experiment, summary_of
+from benchmarks.experiment import Bench, Experiment, Results
+from benchmarks.keeping import measure_missing, read_record, wanted_trials
+from benchmarks.results import write_results
+from schemas.errors import ScenewrightError
+
+UNMET = 4
+"""Exit code when an expectation does not hold."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run an experiment; return the exit code (docs/ARCHITECTURE.md)."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    if not words or words[0] in ("-h", "--help"):
+        print("python -m benchmarks NAME --out FOLDER [options]; NAME --help lists them\n")
+        for name, file in experiment_files().items():
+            print(f"  {name:18} {summary_of(file)}")
+        return 0
+    try:
+        return run(load_experiment(words[0]), words)
+    except KeyboardInterrupt:
+        print("stopped; what is measured is kept", file=sys.stderr)
+        return 130
+    except ScenewrightError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return error.exit_code
+
+
+def run(experiment: Experiment, words: Sequence[str]) -> int:
+    """Measure what is missing and write the results. `words`: the command line, the experiment's name first."""
+    options = parser_of(experiment).parse_args(words[1:])
+    bench = bench_of(experiment, vars(options))
+    trials = wanted_trials(
+        experiment, bench, arms=options.arms, cases=options.cases, seeds=options.seeds, most=options.count
+    )
+    code = 0
+    if not options.kept:
+        jobs = options.jobs or experiment.jobs
+        code = measure_missing(experiment, bench, trials, jobs=jobs, fresh=options.fresh or not experiment.keeps)
+    found = {trial: read_record(experiment, bench, trial, any_code=options.kept) for trial in trials}
+    records = {trial: record for trial, record in found.items() if record is not None}
+    if not records:
+        print(f"{experiment.name}: nothing is measured", file=sys.stderr)
+        return code
+    results = Results(experiment, bench, records)
+    missing = [trial for trial in trials if trial not in records]
+    print(write_results(results, ("python", "-m", "benchmarks", *words), missing))
+    problems = experiment.problems(results) if experiment.problems else ()
+    for problem in problems:
+        print(f"expectation not met: {problem}", file=sys.stderr)
+    return code or (UNMET if problems else 0)
+
+
+def bench_of(experiment: Experiment, options: Mapping[str, Any]) -> Bench:
+    """Return the bench of the options, which hold the experiment's own where they are given. Raises SystemExit(2) for
+    a value out of range."""
+    own = {name: options[name] for name in experiment.parameters.model_fields if options.get(name) is not None}
+    quick = bool(options.get("quick"))
+    try:
+        parameters = experiment.parameters.model_validate({**(experiment.quick if quick else {}), **own})
+    except ValidationError as error:
+        first = error.errors()[0]
+        print(f"error: --{str(first['loc'][0]).replace('_', '-')}: {first['msg']}", file=sys.stderr)
+        raise SystemExit(2) from None
+    return Bench(Path(options["out"]), parameters, quick, bool(options.get("tuning")))
+
+
+def parser_of(experiment: Experiment) -> argparse.ArgumentParser:
+    """Return the parser: options of every experiment, and those of its parameters."""
+    described = f"{experiment.title}. Simulated: {experiment.simulated} Does not show: {experiment.does_not_show}"
+    parser = argparse.ArgumentParser(prog=f"python -m benchmarks {experiment.name}", description=described)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--quick", action="store_true", help="fewer seeds, smaller trials")
+    parser.add_argument("--tuning", action="store_true", help="the tuning seeds instead of those for reporting")
+    parser.add_argument("--arms", nargs="+", default=[], metavar="ARM", help=", ".join(experiment.arms))
+    parser.add_argument("--cases", nargs="+", default=[], metavar="CASE", help=", ".join(experiment.cases))
+    parser.add_argument("--seeds", nargs="+", default=[], metavar="SEED", help="only these")
+    parser.add_argument("--count", type=int, help="only so many seeds of every case, in their order")
+    parser.add_argument("--jobs", type=int, help=f"measure so many at a time (default: {experiment.jobs})")
+    parser.add_argument("--fresh", action="store_true", help="measure again what is kept")
+    parser.add_argument("--kept", action="store_true", help="measure nothing: tabulate what is kept, of any code")
+    for name, field in experiment.parameters.model_fields.items():
+        _add_option(parser, name, field)
+    return parser
+
+
+def _add_option(parser: argparse.ArgumentParser, name: str, field: FieldInfo) -> None:
+    kind = field.annotation
+    if get_origin(kind) is Union or type(kind).__name__ == "UnionType":
+        kind = next(each for each in get_args(kind) if each is not type(None))
+    option = f"--{name.replace('_', '-')}"
+    text = f"{field.description} (default: {field.default})".replace("%", "%%")
+    if kind is bool:
+        parser.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=text)
+    elif get_origin(kind) is Literal:
+        parser.add_argument(option, choices=get_args(kind), help=text)
+    elif get_origin(kind) is tuple:
+        parser.add_argument(option, nargs="*", type=get_args(kind)[0], help=text)
+    else:
+        parser.add_argument(option, type=kind, help=text)  # type: ignore[arg-type]

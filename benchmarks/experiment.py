@@ -1,0 +1,264 @@
+"""What an experiment declares: arms x cases x seeds, a function that measures trials, and how records become figures.
+
+An experiment is `benchmarks/experiments/<name>.py`, or `<name>/experiment.py` there where it needs more files, with an
+`EXPERIMENT`; it is found by that place. `python -m benchmarks NAME` does the rest: which trials are wanted, which of
+them are kept already, processes, intervals, metrics.json, figures.json, table.md, pictures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+
+from stages.kit.measurement.bootstrap import Interval, figure_interval, paired_interval
+from stages.kit.stage import Parameters
+
+RESAMPLES = 2000
+SEED_OF_INTERVALS = 0
+LEAST_CLUSTERS = 2
+"""With fewer there is nothing to resample."""
+
+
+@dataclass(frozen=True, order=True)
+class Trial:
+    """One arm on one seed of one case. `seed` names what is drawn or looked at: a room, a frame, a number."""
+
+    arm: str
+    case: str
+    seed: str
+
+    def __str__(self) -> str:
+        return f"{self.arm}/{self.case}/{self.seed}"
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What a run was asked for, and where it keeps things."""
+
+    out: Path
+    parameters: Any
+    """The experiment's own options, of its class `parameters`."""
+    quick: bool = False
+    tuning: bool = False
+    """The tuning seeds instead of those for reporting."""
+
+    def folder(self, trial: Trial) -> Path:
+        """Folder of a trial: its record, and the files that `measure` leaves beside it."""
+        parts = (*trial.case.split("/"), trial.seed)
+        return Path(self.out, "trials", quote(trial.arm, safe=" +"), *(quote(part, safe=" +") for part in parts))
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A figure over the records of an arm's seeds in a case: pooled counts, a mean, a median; None if undefined."""
+
+    of: Callable[[Sequence[Any]], float | None]
+    unit: str = ""
+    interval: bool = True
+    """False for what resampling says nothing about: counts, and what is dear to compute."""
+
+
+Measuring = Callable[[Bench, Sequence[Trial]], Iterable[tuple[Trial, Any]]]
+
+
+def _itself(trial: Trial) -> Hashable:
+    return trial
+
+
+def _everywhere(arm: str, case: str) -> bool:
+    return True
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One experiment. `measure` and everything that it reaches is what a kept record was measured with."""
+
+    name: str
+    title: str
+    simulated: str
+    """What of it was simulated."""
+    knows: str
+    """What the methods were allowed to know."""
+    does_not_show: str
+    arms: Mapping[str, str]
+    """Name -> title, in the order of the tables."""
+    cases: Sequence[str]
+    measure: Measuring
+    """Yield (trial, record) for each of the trials given, which share work (`together`), as soon as it is measured."""
+    record: Any
+    """Type of a record: a dataclass or pydantic model of plain values, or dict[str, float]."""
+    measures: Mapping[str, Measure]
+    """Name in metrics.json -> figure."""
+    tuning: Sequence[str] = ()
+    """Seeds that were looked at while methods and constants were chosen; `--tuning` runs these."""
+    reporting: Sequence[str] = ()
+    """Seeds for figures alone."""
+    seeds_of: Callable[[Bench, str], Sequence[str]] | None = None
+    """(bench, case) -> seeds, where they depend on the case or on data that may not be there; none leaves it out."""
+    default_cases: Callable[[Bench], Sequence[str]] | None = None
+    """The cases without `--cases`, where not all of them run everywhere."""
+    default_arms: Callable[[Bench], Sequence[str]] | None = None
+    runs: Callable[[str, str], bool] = _everywhere
+    """(arm, case) -> whether the arm runs in the case."""
+    together: Callable[[Trial], Hashable] = _itself
+    """Trials of one value are measured by one call."""
+    cluster: Callable[[str], str] = str
+    """Seed -> what intervals resample: trials of one room are drawn together."""
+    parameters: type[Parameters] = Parameters
+    places: frozenset[str] = frozenset()
+    """Parameters that only say where things are, and are in no key."""
+    quick_seeds: int | None = None
+    """So many seeds a case with `--quick`."""
+    quick: Mapping[str, Any] = field(default_factory=dict)
+    """Parameters with `--quick`, unless they are given."""
+    keeps: bool = True
+    """False where the steps that `measure` runs keep everything themselves, and others read their artifacts."""
+    jobs: int = 1
+    """Calls of `measure` at a time without `--jobs`; more than one only where no arm is timed by the wall."""
+    prepare: Callable[[Bench, Sequence[Trial]], None] | None = None
+    """Once before trials run beside each other: what all of them share."""
+    inputs: Callable[[Bench, Trial], Sequence[Path]] | None = None
+    """Files and folders whose content a trial depends on; artifacts count by their manifest's digest."""
+    steps: Sequence[str] = ()
+    """Commands whose code counts: those that `measure` runs, and those whose parts are found by their place."""
+    code: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """Arm -> modules that it runs, where it is not all that `measure` reaches."""
+    pairs: Sequence[tuple[str, str]] = ()
+    """(first, second): arms whose difference on the same seeds is told."""
+    compared: Sequence[str] = ()
+    """Measures of the differences."""
+    more_figures: Callable[[Results], Mapping[str, float | None]] | None = None
+    """Further `<arm>/<case>/<measure>` -> value, without intervals."""
+    notes: Callable[[Results], str] | None = None
+    """What table.md says after the figures, the differences and the single seeds."""
+    pictures: Callable[[Results], None] | None = None
+    """Draws and writes into the output folder what table.md does not hold."""
+    problems: Callable[[Results], Sequence[str]] | None = None
+    """What was expected and does not hold, in words; any makes the command exit with 4."""
+
+
+@dataclass
+class Results:
+    """The records of a run."""
+
+    experiment: Experiment
+    bench: Bench
+    records: Mapping[Trial, Any]
+    _clusters: dict[tuple[str, str], dict[str, list[Any]]] = field(default_factory=dict)
+    _values: dict[tuple[str, ...], dict[tuple[int, ...], float | None]] = field(default_factory=dict)
+
+    @property
+    def cases(self) -> list[str]:
+        """The cases that ran, in their order."""
+        return list(dict.fromkeys(trial.case for trial in self.records))
+
+    def arms(self, case: str | None = None) -> list[str]:
+        """The arms that ran (in a case), in the order of the declaration."""
+        there = {trial.arm for trial in self.records if case in (None, trial.case)}
+        return [arm for arm in self.experiment.arms if arm in there]
+
+    def seeds(self, case: str) -> list[str]:
+        """The seeds of a case that any arm ran on."""
+        return list(dict.fromkeys(trial.seed for trial in self.records if trial.case == case))
+
+    def of(self, arm: str, case: str) -> list[Any]:
+        """The records of an arm in a case, by seed."""
+        return [record for group in self._grouped(arm, case).values() for record in group]
+
+    def get(self, arm: str, case: str, seed: str) -> Any | None:
+        """The record of one trial."""
+        return self.records.get(Trial(arm, case, seed))
+
+    def value(self, arm: str, case: str, measure: str) -> float | None:
+        """A measure of an arm in a case."""
+        records = self.of(arm, case)
+        return self.experiment.measures[measure].of(records) if records else None
+
+    def interval(self, arm: str, case: str, measure: str) -> Interval | None:
+        """A measure with its 95 % percentile bootstrap interval over clusters of seeds; None where it is undefined, or
+        where there are fewer than two clusters."""
+        names = list(self._grouped(arm, case))
+        if len(names) < LEAST_CLUSTERS:
+            return None
+        random = np.random.default_rng(SEED_OF_INTERVALS)
+        return figure_interval(self._figure(arm, case, measure, names), range(len(names)), random, resamples=RESAMPLES)
+
+    def difference(self, first: str, second: str, case: str, measure: str) -> Interval | None:
+        """`first` minus `second` over the clusters that both ran on, drawn together, with its 95 % interval."""
+        other = self._grouped(second, case)
+        names = [name for name in self._grouped(first, case) if name in other]
+        if len(names) < LEAST_CLUSTERS:
+            return None
+        figures = [self._figure(arm, case, measure, names) for arm in (first, second)]
+        numbers = [(which, k) for which in (0, 1) for k in range(len(names))]
+
+        def of_either(samples: Sequence[tuple[int, int]]) -> float | None:
+            return figures[samples[0][0]]([k for _, k in samples])
+
+        half = len(names)
+        random = np.random.default_rng(SEED_OF_INTERVALS)
+        return paired_interval(of_either, numbers[:half], numbers[half:], random, resamples=RESAMPLES)
+
+    def _grouped(self, arm: str, case: str) -> dict[str, list[Any]]:
+        if (arm, case) not in self._clusters:
+            groups: dict[str, list[Any]] = {}
+            for trial, record in self.records.items():
+                if (trial.arm, trial.case) == (arm, case):
+                    groups.setdefault(self.experiment.cluster(trial.seed), []).append(record)
+            self._clusters[arm, case] = groups
+        return self._clusters[arm, case]
+
+    def _figure(
+        self, arm: str, case: str, measure: str, names: Sequence[str]
+    ) -> Callable[[Sequence[int]], float | None]:
+        """The measure over clusters given by their numbers; remembered by how often each is drawn."""
+        groups, of = self._grouped(arm, case), self.experiment.measures[measure].of
+        values = self._values.setdefault((arm, case, measure, *names), {})
+
+        def figure(numbers: Sequence[int]) -> float | None:
+            drawn = tuple(sorted(numbers))
+            if drawn not in values:
+                values[drawn] = of([record for k in drawn for record in groups[names[k]]])
+            return values[drawn]
+
+        return figure
+
+
+def mean(name: str, unit: str = "", *, interval: bool = True) -> Measure:
+    """Return the mean over trials of an entry of the record (of a dict, or an attribute)."""
+    return Measure(statistic(name, np.mean), unit, interval)
+
+
+def median(name: str, unit: str = "", *, interval: bool = True) -> Measure:
+    """Return the median over trials of an entry of the record."""
+    return Measure(statistic(name, np.median), unit, interval)
+
+
+def only(name: str, unit: str = "") -> Measure:
+    """Return the entry of the record where a case has one seed; a mean over seeds otherwise."""
+    return mean(name, unit, interval=False)
+
+
+def statistic(name: str, function: Callable[..., Any]) -> Callable[[Sequence[Any]], float | None]:
+    """Return a figure: a statistic over the trials whose record has the entry."""
+
+    def figure(records: Sequence[Any]) -> float | None:
+        values = [v for r in records if (v := entry(r, name)) is not None]
+        return float(function(values)) if values else None
+
+    return figure
+
+
+def entry(record: Any, name: str) -> float | None:
+    """Return an entry of a record, None where it has none."""
+    return record.get(name) if isinstance(record, Mapping) else getattr(record, name, None)
+
+
+def count(records: Sequence[Any]) -> float:
+    """The number of trials, as a figure."""
+    return float(len(records))

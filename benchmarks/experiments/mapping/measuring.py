@@ -1,0 +1,203 @@
+"""One room through arms and cases: frames are read once, geometric segments and masks are shared."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from pydantic import Field
+
+from benchmarks.experiment import Bench, Trial
+from benchmarks.experiments.mapping.arms import DRIFTING, LEVELS, NETWORK, Arm, all_arms
+from benchmarks.experiments.mapping.drift import drifting_poses
+from benchmarks.generated_rooms import make_room
+from benchmarks.steps import context_in, opened, unrecorded
+from schemas.contact_graph import ContactGraphFile
+from schemas.ground_truth import GroundTruth
+from schemas.panoptic_map import PanopticMap
+from schemas.sequence import Sequence as SequenceArtifact
+from schemas.vocabulary import load_vocabulary
+from stages.evaluate.graph_measures import box_candidates
+from stages.evaluate.map_measures import (
+    PredictedMap,
+    instance_candidates,
+    label_true_points,
+    load_map,
+    measure_quality,
+    quality_thesis_code,
+)
+from stages.evaluate.parameters import EvaluateParameters
+from stages.evaluate.results import Part
+from stages.evaluate.truth import TrueRoom, load_truth
+from stages.fuse.mapping import PanopticMapper
+from stages.fuse.stage import new_mapper, write_map
+from stages.kit.formats.frames import Frame, FrameReader
+from stages.kit.measurement.average_precision import Candidates, match_greedily
+from stages.kit.measurement.panoptic_quality import ClassQuality
+from stages.kit.stage import Parameters
+from stages.segment.choice import BackendRequest, choose_backend
+from stages.segment.geometric import GeometricFrame, GeometricSettings, segment_depth
+from stages.segment.parameters import SegmentParameters
+from stages.segment.settings import fusion_settings, geometric_settings
+from stages.segment.stage import FUSION, describe
+
+DRIFT_STREAM = 11
+SEED = 0
+
+
+class MappingParameters(Parameters):
+    """Options of the experiment."""
+
+    voxel_size: float = Field(0.02, gt=0, description="Voxel edge of all arms [m] (the publications: 0.01)")
+    frames: int = Field(60, ge=1, description="Frames of every room")
+    untrained: bool = Field(False, description="With --tuning: rooms that our own network never saw")
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """Predictions of one class in one room with whether each found something true. Matching never crosses rooms, so
+    that it is done once and pooling is a sort."""
+
+    confidence: tuple[float, ...]
+    hits: tuple[bool, ...]
+    true_count: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one arm made of one room in one case, by class."""
+
+    qualities: dict[str, ClassQuality]
+    qualities_thesis_code: dict[str, ClassQuality]
+    instances: dict[str, Ranked]
+    boxes: dict[str, Ranked]
+    boxes_refined: dict[str, Ranked]
+    frames: int = 0
+    seconds: float = 0.0
+    """Wall clock of this arm's own work on the frames: geometric segments, fusion with the masks, integration."""
+
+
+@dataclass(frozen=True)
+class SharedFrame:
+    """What every arm and case gets of a frame."""
+
+    frame: Frame
+    geometric: dict[GeometricSettings, tuple[GeometricFrame, float]]
+    """Geometric segments by settings, and the seconds they took."""
+
+
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outcome]]:
+    """Yield the outcomes of the trials of one room, case after case; the maps are left in the folders of the trials."""
+    parameters: MappingParameters = bench.parameters
+    room = make_room(bench.out / "rooms", trials[0].seed, parameters.frames)
+    sequence, truth_artifact = opened(SequenceArtifact, room.sequence), opened(GroundTruth, room.ground_truth)
+    options = EvaluateParameters.model_validate({})
+    truth = load_truth(truth_artifact, np.array(sequence.info.gravity.world_from_log), options.minimum_visible_points)
+    arms = {arm.name: arm for arm in all_arms(parameters.voxel_size)}
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        shared = read_frames(reader, [arms[name] for name in dict.fromkeys(trial.arm for trial in trials)])
+        for case in dict.fromkeys(trial.case for trial in trials):
+            present = {trial.arm: trial for trial in trials if trial.case == case}
+            seconds = dict.fromkeys(present, 0.0)
+            mappers = build_maps(sequence, reader, shared, [arms[name] for name in present], case, SEED, seconds)
+            for name, trial in present.items():
+                output = bench.folder(trial)
+                panoptic_map = finish_map(mappers.pop(name), output, SEED)
+                found = outcome_of(arms[name], truth, panoptic_map, options, output)
+                yield trial, replace(found, frames=len(shared), seconds=seconds[name])
+
+
+def read_frames(reader: FrameReader, arms: Sequence[Arm]) -> list[SharedFrame]:
+    """Return the frames that have depth and a pose, with the geometric segments that the arms need."""
+    wanted = list(dict.fromkeys(geometric_settings(arm.segment) for arm in arms))
+    shared = []
+    for frame in reader.frames():
+        if frame.depth is None or frame.world_from_camera is None:
+            continue
+        made = {}
+        for settings in wanted:
+            start = time.perf_counter()
+            geometric = segment_depth(frame.depth, reader.cameras[frame.camera_name], settings)
+            made[settings] = (geometric, time.perf_counter() - start)
+        shared.append(SharedFrame(frame, made))
+    return shared
+
+
+def build_maps(
+    sequence: SequenceArtifact,
+    reader: FrameReader,
+    shared: Sequence[SharedFrame],
+    arms: Sequence[Arm],
+    case: str,
+    seed: int,
+    seconds: dict[str, float],
+) -> dict[str, PanopticMapper]:
+    """Return the map of every arm after all frames of a case; adds the time of each to `seconds`."""
+    vocabulary = load_vocabulary()
+    mappers = {arm.name: new_mapper(arm.fuse, vocabulary) for arm in arms}
+    own = {"backend": NETWORK} if case == NETWORK else {"backend": "ground-truth", "corruption": _level(case)}
+    backend = choose_backend(BackendRequest(SegmentParameters.model_validate(own), sequence=sequence, reader=reader))
+    poses = np.array([entry.frame.world_from_camera for entry in shared])
+    if case == DRIFTING:
+        poses = drifting_poses(poses, np.random.default_rng([seed, DRIFT_STREAM]))
+    for entry, pose in zip(shared, poses, strict=True):
+        frame, camera = entry.frame, reader.cameras[entry.frame.camera_name]
+        # The same generator for every case: levels differ in their rates alone.
+        random = np.random.default_rng([seed, frame.index])
+        masks = backend(frame, next(iter(entry.geometric.values()))[0], random)
+        for arm in arms:
+            geometric, spent = entry.geometric[geometric_settings(arm.segment)]
+            start = time.perf_counter()
+            fuse = FUSION[arm.segment.fusion]
+            fused = fuse(geometric.labels, masks, geometric.points, fusion_settings(arm.segment), geometric.small)
+            listing = describe(frame.index, fused).segments
+            assert frame.depth is not None
+            mappers[arm.name].add_frame(camera, frame.depth, frame.color, pose, fused.ids, listing)
+            seconds[arm.name] += spent + time.perf_counter() - start
+    return mappers
+
+
+def _level(case: str) -> float:
+    return LEVELS[case.split("/")[0]]
+
+
+def finish_map(mapper: PanopticMapper, output: Path, seed: int) -> PanopticMap:
+    """Close the map and write it as a panoptic_map without a manifest under `output`."""
+    mapper.regularize()
+    return write_map(mapper, load_vocabulary(), "benchmark", {}, context_in(output / "panoptic_map", seed))
+
+
+def outcome_of(
+    arm: Arm, truth: TrueRoom, panoptic_map: PanopticMap, options: EvaluateParameters, output: Path
+) -> Outcome:
+    """Measure a finished map: PQ, instances, and the boxes of the contact graph built from it."""
+    graph = unrecorded("graph", output / "contact_graph", arm.graph, seed=SEED, panoptic_map=panoptic_map).info
+    return outcome_of_map(truth, load_map(panoptic_map), graph, options)
+
+
+def outcome_of_map(
+    truth: TrueRoom, predicted: PredictedMap, graph: ContactGraphFile, options: EvaluateParameters
+) -> Outcome:
+    """Measure a map and the boxes of its contact graph against the truth, by class."""
+    labels = label_true_points(truth, predicted, options.label_distance)
+    points: Mapping[int, int] = {entity.instance: entity.vertices for entity in predicted.info.entities}
+    return Outcome(
+        qualities=measure_quality(Part("map"), truth, predicted, labels, options),
+        qualities_thesis_code=quality_thesis_code(truth, predicted, options),
+        instances=ranked(instance_candidates(truth, predicted, labels)),
+        boxes=ranked(box_candidates(truth, graph, points, "box_observed", options.match_iou)),
+        boxes_refined=ranked(box_candidates(truth, graph, points, "box", options.match_iou)),
+    )
+
+
+def ranked(candidates: Mapping[str, Candidates]) -> dict[str, Ranked]:
+    """Match the predictions of each class in falling confidence (`average_precision.match_greedily`)."""
+    result = {}
+    for name, found in candidates.items():
+        matches = match_greedily(found.iou, found.confidence)
+        confidence = tuple(float(found.confidence[row]) for row, _ in matches)
+        result[name] = Ranked(confidence, tuple(truth is not None for _, truth in matches), found.iou.shape[1])
+    return result

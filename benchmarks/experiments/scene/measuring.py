@@ -1,0 +1,307 @@
+"""One generated room through all arms of a case: map, contact graph, CAD scene, URDF scene, each measured."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from benchmarks.experiment import Bench, Trial
+from benchmarks.experiments.mapping.experiment import EXPERIMENT as MAPPING
+from benchmarks.experiments.scene.arms import ARMS, HELD_OUT, MASK_LEVEL, PERFECT, REAL, Arm
+from benchmarks.generated_rooms import make_library, make_room, room_at
+from benchmarks.graph_scores import OPTIONS, distance_figures, judge
+from benchmarks.keeping import measure_missing
+from benchmarks.perfect_maps import perfect_map
+from benchmarks.steps import StepFailed, context_in, made, opened, unrecorded
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import CadScene
+from schemas.contact_graph import ContactGraphFile
+from schemas.ground_truth import GroundTruth
+from schemas.panoptic_map import PanopticMap
+from schemas.sequence import Sequence as SequenceArtifact
+from stages.cad.candidates import Shortlist
+from stages.cad.model_surfaces import ModelSurface
+from stages.cad.stage import METHODS, choose_and_write, find_candidates
+from stages.evaluate.correspondence import point_overlaps
+from stages.evaluate.map_measures import label_true_points, load_map
+from stages.evaluate.replacement_measures import ObjectResult, replacements_of
+from stages.evaluate.truth import TrueRoom, load_truth
+from stages.kit.stage import Parameters
+from stages.urdf.settle_report import SettleReport, settle_report
+
+SEED = 0
+HELD_OUT_SEED = 501
+"""Of the library whose shapes no room has."""
+ANNOTATIONS = Path(__file__).resolve().parents[3] / "data" / "annotations" / "real"
+
+
+class SceneParameters(Parameters):
+    """Options of the experiment."""
+
+    maps: Path = Field(Path("outputs/experiments/bench-mapping"), description="What `mapping` writes: its rooms, maps")
+    real: Path | None = Field(None, description="What `make real` wrote; the case `real` needs its maps")
+    frames: int = Field(60, ge=1, description="Frames of every room")
+    as_is: bool = Field(False, description="Take rooms and maps as they stand, even of older code")
+    keep: bool = Field(False, description="Keep the artifacts (100 MB an arm and case)")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one arm made of one room in one case: plain numbers, so that rooms run in processes of their own."""
+
+    graph: dict[str, float]
+    """Edit distance and its parts."""
+    edges: dict[str, tuple[int, int, int]]
+    """Relation -> (true, predicted, agreed)."""
+    cad: dict[str, float | None] = field(default_factory=dict)
+    """`room_summary`; empty where no models are true."""
+    failures: tuple[tuple[str, str, str], ...] = ()
+    """(object, class, why): objects that are no success."""
+    physics: dict[str, float] = field(default_factory=dict)
+    unsettled: tuple[str, ...] = ()
+    """What did not stay, in words."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """Truth and maps of one room."""
+
+    name: str
+    truth_artifact: GroundTruth
+    truth: TrueRoom
+    world_from_log: np.ndarray
+    maps: Mapping[str, Path]
+    """Arm of `mapping` -> its map of this room."""
+    libraries: Mapping[bool, CadLibrary]
+    """Held out? -> library."""
+
+
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outcome]]:
+    """Yield the outcomes of the trials of one room, or of one real log."""
+    wanted = {(trial.case, trial.arm): trial for trial in trials}
+    shared = Shared()
+    if trials[0].case == REAL:
+        folder, scratch = bench.parameters.real / trials[0].seed, bench.out / "scenes" / trials[0].seed
+        for name, outcome in run_real(folder, scratch, [arm for arm in ARMS if (REAL, arm.name) in wanted]):
+            yield wanted[REAL, name], outcome
+        return
+    room = load_room(bench, trials[0].seed, with_maps=any(trial.case != PERFECT for trial in trials))
+    for case in dict.fromkeys(trial.case for trial in trials):
+        arms = [arm for arm in ARMS if (case, arm.name) in wanted]
+        outcomes = run_case(room, arms, case, bench.out / "scenes", shared, keep=bench.parameters.keep)
+        for arm, made_of_it in zip(arms, outcomes, strict=True):
+            yield wanted[case, arm.name], made_of_it
+
+
+def held_out_library(bench: Bench) -> Path:
+    """Where the library stands that shares no shape with the rooms."""
+    return bench.out / "held_out_library"
+
+
+def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
+    """Make both libraries before rooms run beside each other."""
+    if not bench.parameters.as_is:
+        make_library(bench.parameters.maps / "rooms")
+    made("library build", held_out_library(bench), "--seed", HELD_OUT_SEED)
+
+
+def load_room(bench: Bench, name: str, *, with_maps: bool) -> Room:
+    """Read a room, and make what is missing of it and of its maps. Raises BadInput or StepFailed."""
+    parameters: SceneParameters = bench.parameters
+    rooms = parameters.maps / "rooms"
+    folder = room_at(rooms, name, parameters.frames)
+    if not (parameters.as_is and folder.ground_truth.is_dir() and folder.sequence.is_dir()):
+        folder = make_room(rooms, name, parameters.frames)
+    mapping = Bench(parameters.maps, MAPPING.parameters.model_validate({"frames": parameters.frames}), bench.quick)
+    trials = [Trial(arm, MASK_LEVEL, name) for arm in sorted({arm.map_arm for arm in ARMS})]
+    if with_maps and (code := measure_missing(MAPPING, mapping, trials, any_code=parameters.as_is)):
+        raise StepFailed(f"mapping of {name}", code)
+    sequence, artifact = opened(SequenceArtifact, folder.sequence), opened(GroundTruth, folder.ground_truth)
+    world_from_log = np.array(sequence.info.gravity.world_from_log)
+    truth = load_truth(artifact, world_from_log, OPTIONS.minimum_visible_points)
+    libraries = {
+        False: CadLibrary(rooms / "cad_library"),
+        True: CadLibrary(held_out_library(bench)),
+    }
+    maps = {trial.arm: mapping.folder(trial) / "panoptic_map" for trial in trials}
+    return Room(name, artifact, truth, world_from_log, maps, libraries)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What arms that differ in the global check alone share of one map and library."""
+
+    shortlists: dict[str, Shortlist]
+    surfaces: dict[str, ModelSurface]
+    seconds: float
+
+
+class Shared:
+    """Contact graphs by map and method, candidates by case and method: made once, whichever arm asks first."""
+
+    def __init__(self) -> None:
+        self.graphs: dict[tuple[Path, str], ContactGraphFile] = {}
+        self.overlaps: dict[Path, dict[tuple[int, int], float]] = {}
+        self.found: dict[tuple[str, Path, str], Found] = {}
+
+
+def run_case(
+    room: Room, arms: Sequence[Arm], case: str, scratch: Path, shared: Shared, *, keep: bool
+) -> Iterator[Outcome]:
+    """Yield the outcome of every arm. Artifacts are written under `scratch` and deleted again unless `keep`."""
+    folder = scratch / room.name / case
+    shutil.rmtree(folder, ignore_errors=True)
+    if case == PERFECT:
+        perfect_map(room.truth_artifact, folder / "map")
+    for arm in arms:
+        map_folder = folder / "map" if case == PERFECT else room.maps[arm.map_arm]
+        yield _run_arm(room, arm, case, PanopticMap(map_folder), folder / arm.name, shared)
+    if not keep:
+        shutil.rmtree(folder)
+
+
+def _run_arm(room: Room, arm: Arm, case: str, panoptic_map: PanopticMap, folder: Path, shared: Shared) -> Outcome:
+    library, method = room.libraries[case == HELD_OUT], arm.graph.method
+    of_graph = (panoptic_map.root, method)
+    if of_graph not in shared.graphs:
+        built = unrecorded("graph", folder / "contact_graph", arm.graph, seed=SEED, panoptic_map=panoptic_map)
+        shared.graphs[of_graph] = built.info
+    graph = shared.graphs[of_graph]
+    key = (case, panoptic_map.root, arm.cad.method)
+    context = context_in(folder / "cad_scene", SEED)
+    replacing = METHODS[arm.cad.method](arm.cad)
+    if key not in shared.found:
+        surfaces: dict[str, ModelSurface] = {}
+        start = time.process_time()
+        shortlists = find_candidates(graph, panoptic_map, library, surfaces, replacing, context)
+        shared.found[key] = Found(shortlists, surfaces, time.process_time() - start)
+    found = shared.found[key]
+    start = time.process_time()
+    scene = choose_and_write(graph, panoptic_map, library, found.shortlists, found.surfaces, replacing, context)
+    seconds = found.seconds + time.process_time() - start
+    settled = settle(scene, folder / "interactive_scene")
+    if panoptic_map.root not in shared.overlaps:
+        shared.overlaps[panoptic_map.root] = overlaps_of(room.truth, panoptic_map)
+    overlaps = shared.overlaps[panoptic_map.root]
+    measured = replacements_of(
+        room.truth_artifact,
+        room.truth,
+        scene,
+        world_from_log=room.world_from_log,
+        overlaps=overlaps,
+        minimum_iou=OPTIONS.node_match_iou,
+        library_models=library.path("models"),
+    )
+    assert measured is not None
+    objects = sum(node.node_type in ("rigid", "articulated") for node in graph.nodes)
+    distance, edges = measure_graph(room.truth, graph, overlaps)
+    summary = scene.info
+    extra = {
+        "seconds_per_object": seconds / max(1, objects),
+        "conflicts_before": float(summary.conflicts_before),
+        "conflicts_after": float(summary.conflicts_after),
+    }
+    return Outcome(
+        graph=distance,
+        edges=edges,
+        cad={**measured.summary, **extra},
+        failures=tuple((r.name, r.class_name, why_no_success(r)) for r in measured.objects if not r.success),
+        physics=physics_of(settled),
+        unsettled=what_moved(settled),
+    )
+
+
+def settle(scene: CadScene, folder: Path) -> SettleReport:
+    """Write the URDF scene and let it go."""
+    unrecorded("urdf", folder, seed=SEED, cad_scene=scene)
+    return settle_report(folder)
+
+
+def annotated_runs(real: Path | None) -> list[str]:
+    """Return the annotated logs whose map stands under `real` (`make real`), by name."""
+    names = sorted(file.stem for file in ANNOTATIONS.glob("*.json"))
+    return [name for name in names if real and (real / name / "panoptic_map" / "manifest.json").is_file()]
+
+
+def run_real(folder: Path, scratch: Path, arms: Sequence[Arm]) -> Iterator[tuple[str, Outcome]]:
+    """Yield arm and outcome for a log of `annotated_runs`.
+
+    All arms start from the one map that is there. No CAD model is true, so that only graph and physics are measured.
+    Raises BadInput when sequence, map or library of a run are broken.
+    """
+    annotation, map_folder = ANNOTATIONS / f"{folder.name}.json", folder / "panoptic_map"
+    told = ("--annotation", annotation, "--sequence", folder / "sequence", "--panoptic-map", map_folder)
+    truth_artifact = opened(GroundTruth, made("truth supports", scratch / "ground_truth", *told))
+    given: dict[str, Any] = {"panoptic_map": opened(PanopticMap, map_folder)}
+    truth = load_truth(truth_artifact, np.eye(4), OPTIONS.minimum_visible_points)
+    overlaps = overlaps_of(truth, given["panoptic_map"])
+    library = opened(CadLibrary, folder / "cad_library")
+    for arm in arms:
+        # `cad` takes every mesh that it finds in its folder for a thing of the scene, those of an earlier run too.
+        shutil.rmtree(scratch / arm.name, ignore_errors=True)
+        graph = unrecorded("graph", scratch / arm.name / "graph", arm.graph, seed=SEED, **given)
+        scene = unrecorded(
+            "cad", scratch / arm.name / "cad_scene", arm.cad, seed=SEED, contact_graph=graph, library=library, **given
+        )
+        settled = settle(scene, scratch / arm.name / "interactive_scene")
+        distance, edges = measure_graph(truth, graph.info, overlaps)
+        yield arm.name, Outcome(distance, edges, physics=physics_of(settled), unsettled=what_moved(settled))
+
+
+def overlaps_of(truth: TrueRoom, panoptic_map: PanopticMap) -> dict[tuple[int, int], float]:
+    """IoU of true and predicted instances over the true points that were seen (`point_overlaps`)."""
+    predicted = load_map(panoptic_map)
+    labels = label_true_points(truth, predicted, OPTIONS.label_distance)
+    return point_overlaps(truth, labels, {entry.instance: entry.class_name for entry in predicted.info.entities})
+
+
+def measure_graph(
+    truth: TrueRoom, graph: ContactGraphFile, overlaps: Mapping[tuple[int, int], float]
+) -> tuple[dict[str, float], dict[str, tuple[int, int, int]]]:
+    """Return the edit distance with its parts, and (true, predicted, agreed) edges by relation."""
+    comparison, edges = judge(truth, graph, overlaps)
+    parts = {name: float(value) for name, value in distance_figures(comparison).items() if value is not None}
+    return parts, {name: (found.true_count, found.predicted_count, found.agreed) for name, found in edges.items()}
+
+
+def physics_of(report: SettleReport) -> dict[str, float]:
+    """Return the figures of a settle test."""
+    return {
+        "settled_rooms": float(report.settled),
+        "movable": float(len(report.bodies)),
+        "unsettled": float(len(report.unsettled)),
+        "joints": float(len(report.joints)),
+        "blocked_joints": float(len(report.blocked)),
+        "max_penetration_mm": report.max_penetration_mm,
+        "collisions": float(len(report.collisions)),
+    }
+
+
+def what_moved(report: SettleReport) -> tuple[str, ...]:
+    """Return what did not stay, what is blocked and what lies in what, in words."""
+    words = [f"{b.name} moved {1000 * b.moved:.0f} mm, {np.degrees(b.turned):.0f} deg" for b in report.unsettled]
+    words += [f"{j.joint} blocked by {j.hit_link}" for j in report.blocked]
+    words += [f"{o.first} lies {1000 * o.depth:.0f} mm in {o.second}" for o in report.collisions]
+    return tuple(words)
+
+
+def why_no_success(result: ObjectResult) -> str:
+    """Return the first reason that keeps an object from success."""
+    if not result.detected:
+        return "missed"
+    if result.model is None or result.alignment is None:
+        return "no model"
+    if not result.class_right:
+        return f"class {result.model_class}"
+    error = result.alignment
+    return (
+        f"{1000 * error.translation:.0f} mm, {np.degrees(error.rotation):.0f} deg, scale {100 * error.scale:.0f} %, "
+        f"{result.model} for {result.true_model}"
+    )

@@ -1,1 +1,0 @@
-"""Planning beside named peers: motion, and task and motion."""

@@ -1,1 +1,0 @@
-"""The tables of the theses, and what the real logs give."""
