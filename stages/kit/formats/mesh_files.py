@@ -30,7 +30,7 @@ MOST_TRIANGLES, MOST_VERTICES = 50_000_000, 150_000_000
 """Of a mesh, where nothing else is asked for; those of a glTF count each time that a node shows them."""
 MOST_GLTF_VALUES = 1_000_000
 """Numbers, texts, lists and objects of a glTF description."""
-MOST_NODES, DEEPEST_NODES = 20_000, 200
+MOST_NODES, DEEPEST_NODES = 5_000, 200
 MOST_OVERLAP = 4
 """Bytes of the arrays of a GLB for one of the file."""
 LARGEST_TEXT_MESH = 128 * 2**20

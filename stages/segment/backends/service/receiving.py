@@ -200,6 +200,7 @@ class BoundedHandler(BaseHTTPRequestHandler):
     server_version = "scenewright"
     sys_version = ""
     _stream: _TimedStream
+    _received: io.BufferedReader
     _unread = False
     """Whether more of the request may come that nobody will read."""
 
@@ -207,7 +208,7 @@ class BoundedHandler(BaseHTTPRequestHandler):
         """Read through a stream that knows its deadline."""
         super().setup()
         self._stream = _TimedStream(self.connection)
-        self.rfile = io.BufferedReader(self._stream, 8192)
+        self.rfile = self._received = io.BufferedReader(self._stream, 8192)
 
     def handle_one_request(self) -> None:
         """Receive the head of a request, judge it, and let its route answer."""
@@ -216,7 +217,7 @@ class BoundedHandler(BaseHTTPRequestHandler):
         try:
             self.server.waits(self.connection, True)
             self._stream.allow(IDLE_SECONDS, LARGEST_HEAD)
-            if not self.rfile.peek(1):
+            if not self._received.peek(1):
                 return
             self._stream.allow(HEAD_SECONDS, LARGEST_HEAD)
             self._stream.begun = True
