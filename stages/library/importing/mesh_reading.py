@@ -28,6 +28,7 @@ MESH_SUFFIXES = (".obj", ".stl", ".dae", ".glb", ".gltf", ".ply")
 LARGEST_MATERIALS = 16 * 2**20
 MOST_MATERIAL_FILES = 100
 MOST_KEPT_FILES = 1000
+MOST_LINES = 20_000_000
 LONGEST_LINE = 1 << 20
 """Characters of a line of an OBJ file."""
 Y_UP = (0.0, 1.0, 0.0)
@@ -135,9 +136,13 @@ def _read_collada(folder: SourceFolder, path: Path) -> MeshContent:
 def _lines(data: bytes, path: Path) -> Iterator[str]:
     """Yield the lines of a text, whatever ends them. Raises BadInput for one that does not end."""
     text = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8", errors="replace")
+    count = 0
     while line := text.readline(LONGEST_LINE):
+        count += 1
         if len(line) == LONGEST_LINE:
             raise BadInput(f"{path}: a line of {LONGEST_LINE} characters or more", hint=HINT)
+        if count > MOST_LINES:
+            raise BadInput(f"{path}: more than {MOST_LINES} lines", hint=HINT)
         yield line
 
 
