@@ -29,7 +29,7 @@ from stages.kit.formats.scenenn_annotation import (
 from stages.kit.geometry.boxes import is_round, minimum_box
 from stages.kit.geometry.transforms import apply
 from stages.kit.stage import Context
-from stages.truth.labelled_mesh_file import LabelledMesh, read_labelled_mesh
+from stages.truth.labelled_mesh import LabelledMesh, read_labelled_mesh
 from stages.truth.parameters import WORDS, SceneNNParameters
 from stages.truth.surface import surface_points
 

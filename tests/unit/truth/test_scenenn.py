@@ -33,7 +33,7 @@ from stages.kit.formats.scenenn_annotation import (
 )
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
-from stages.truth.labelled_mesh_file import read_labelled_mesh
+from stages.truth.labelled_mesh import read_labelled_mesh
 from stages.truth.parameters import SceneNNParameters
 from stages.truth.stage import read_words, run
 from stages.truth.surface import surface_points
