@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +13,8 @@ from cli.batch_command import batch
 from cli.collection_command import gc
 from cli.comparison_command import diff
 from cli.inspect_command import inspect
+from cli.output import out as _out
+from cli.output import say as _say
 from cli.serve_command import serve
 from cli.timeline_command import timeline
 from cli.urdf_check_command import urdf_check
@@ -29,14 +30,6 @@ Json = Annotated[bool, typer.Option("--json", help="One JSON object on standard 
 Quiet = Annotated[bool, typer.Option("--quiet", help="Warnings only.")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 Settings = Annotated[list[str] | None, typer.Option("--set", help="variable=value; may be repeated.")]
-
-
-def _out(text: str) -> None:
-    sys.stdout.write(text + "\n")
-
-
-def _say(text: str) -> None:
-    sys.stderr.write(text + "\n")
 
 
 def _settings(pairs: list[str] | None) -> dict[str, str]:
@@ -279,7 +272,7 @@ def makefile(
     from stages.engine.make_rules import makefile_for
     from stages.engine.pipelines import pipeline_path, read_pipeline
 
-    sys.stdout.write(makefile_for(read_pipeline(pipeline_path(pipeline))))
+    _out(makefile_for(read_pipeline(pipeline_path(pipeline))).removesuffix("\n"))
     return 0
 
 

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
+from cli.output import out
 from schemas.artifact import Artifact
 from schemas.errors import BadInput, UsageError
 from schemas.manifest import MANIFEST_NAME
@@ -50,10 +51,16 @@ def inspect(
     from stages.ingest.preflight.settings import ingest_parameters
     from stages.kit.progress import progress_for
 
+    try:
+        os.stat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        pass  # whoever looks for a log says what it expects
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror}", hint="give an artifact folder or a log") from None
     given = {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "depth_scale": depth_scale}
     settings = [*(settings or ()), *(f"{name}={value:.17g}" for name, value in given.items() if value is not None)]
     progress = progress_for(sys.stderr.isatty(), quiet=quiet or json_output)
-    if not (path / MANIFEST_NAME).exists():
+    if not os.path.exists(path / MANIFEST_NAME):
         if frames < 2:
             raise UsageError(f"--frames {frames}: a log is judged by its frames", hint="give at least 2")
         found = inspect_log(path, ingest_parameters(settings), frames, progress, keep_pictures=html is not None)
@@ -67,11 +74,11 @@ def inspect(
     if not isinstance(artifact, FrameSequence) or artifact.outcome == "empty" or frames == 0:
         if html is not None:
             raise UsageError("--html is for logs and sequences", hint="`scenewright report` makes a page of a run")
-        sys.stdout.write(artifact.manifest.model_dump_json() + "\n" if json_output else _manifest_text(artifact))
+        out(artifact.manifest.model_dump_json() if json_output else _manifest_text(artifact).removesuffix("\n"))
         return 4 if expect is not None and artifact.outcome != expect else 0
     found = inspect_sequence(artifact, frames, progress, keep_pictures=html is not None)
     if not json_output:
-        sys.stdout.write(_manifest_text(artifact) + "\n")
+        out(_manifest_text(artifact))
     _show(found, html, json_output, artifact.manifest.model_dump(mode="json"))
     return _exit_code(found.report, expect, artifact.outcome)
 
@@ -112,7 +119,7 @@ def _show(found: Any, html: Path | None, json_output: bool, manifest: dict[str, 
         write_page(found, html)
     report = found.report.model_dump(mode="json")
     document = {**manifest, "preflight": report} if manifest else report
-    sys.stdout.write(json.dumps(document, sort_keys=True) + "\n" if json_output else as_text(found.report))
+    out(json.dumps(document, sort_keys=True) if json_output else as_text(found.report).removesuffix("\n"))
     sys.stdout.flush()
 
 

@@ -15,6 +15,7 @@ import typer
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from cli.output import out, say, say_error
 from schemas.errors import UsageError
 from stages.engine.chain import OUTCOME_EXIT_CODE
 from stages.engine.memory_limit import parse_limit
@@ -163,21 +164,21 @@ def report_result(result: RunResult, stage: Stage, accept: tuple[str, ...], json
             "nondeterministic": result.nondeterministic,
             "estimate": result.estimate.as_json() if result.estimate else None,
         }
-        sys.stdout.write(json.dumps(facts, sort_keys=True) + "\n")
+        out(json.dumps(facts, sort_keys=True))
     else:
         if manifest is not None:
             summary = ", ".join(f"{name} {value}" for name, value in manifest.summary.items())
             seconds = f" in {manifest.provenance.seconds:.1f} s" if result.status == "made" else ""
             why = f" ({result.reason})" if result.status == "taken" else ""
-            sys.stderr.write(f"{stage.name}: {result.status}{seconds}{why}: {result.outcome}. {summary}\n")
+            say(f"{stage.name}: {result.status}{seconds}{why}: {result.outcome}. {summary}")
         else:
             expected = f"; {result.estimate}" if result.estimate else ""
-            sys.stderr.write(f"{stage.name}: {result.status}: {result.reason}{expected}\n")
-        sys.stdout.write(f"{result.path}\n")
+            say(f"{stage.name}: {result.status}: {result.reason}{expected}")
+        out(str(result.path))
     if manifest is not None and manifest.outcome != "ok" and manifest.outcome not in accept:
-        sys.stderr.write(
-            f"error: {stage.name}: outcome is {manifest.outcome!r}: "
-            f"{manifest.summary.get('reason', 'see the summary')} (--accept {manifest.outcome} goes on)\n"
+        say_error(
+            f"{stage.name}: outcome is {manifest.outcome!r}: "
+            f"{manifest.summary.get('reason', 'see the summary')} (--accept {manifest.outcome} goes on)"
         )
         return OUTCOME_EXIT_CODE
     return 0

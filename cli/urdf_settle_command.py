@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
+
+from cli.output import out
 
 Engine = Literal["bullet", "mujoco"]
 
@@ -56,10 +57,10 @@ def urdf_settle(
     if report.verdict == "nothing_movable":
         lines.append(f"nothing can move: {report.reason}")
     if json_output:
-        sys.stdout.write(json.dumps({"scene": str(scene), "sound": report.settled, **report.as_json()}) + "\n")
+        out(json.dumps({"scene": str(scene), "sound": report.settled, **report.as_json()}))
     else:
         for line in lines:
-            sys.stdout.write(f"{scene}: {line}\n")
+            out(f"{scene}: {line}")
         if report.settled:
-            sys.stdout.write(f"{scene}: settles: {report.reason}\n")
+            out(f"{scene}: settles: {report.reason}")
     return 0 if report.settled else OUTCOME_EXIT_CODE

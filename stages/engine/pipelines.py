@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -63,10 +64,12 @@ class Pipeline(BaseModel):
 def pipeline_path(name_or_path: str) -> Path:
     """Return the file of a pipeline given by name (data/pipelines) or by path. Raises UsageError."""
     for candidate in (Path(name_or_path), PIPELINES_FOLDER / f"{name_or_path}.toml"):
-        if candidate.is_file():
+        if os.path.isfile(candidate):
             return candidate
     known = ", ".join(sorted(p.stem for p in PIPELINES_FOLDER.glob("*.toml")))
-    raise UsageError(f"no pipeline {name_or_path!r}", hint=f"give a TOML file or one of: {known}")
+    if os.path.exists(name_or_path):
+        raise UsageError(f"{name_or_path}: not a regular file", hint="a pipeline is a TOML file")
+    raise UsageError(f"no pipeline {name_or_path!r:.200}", hint=f"give a TOML file or one of: {known}")
 
 
 def read_pipeline(path: Path) -> Pipeline:

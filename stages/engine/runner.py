@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 from schemas.artifact import Artifact
 from schemas.errors import BadInput, MachineFailure, MissingDependency, ScenewrightError, UsageError
-from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
+from schemas.manifest import LONGEST_PATH, MANIFEST_NAME, InputRecord, Manifest
 from stages.engine import estimation, interruption, memory_limit, shared_artifacts, store
 from stages.engine.digests import content_digest, record_files
 from stages.engine.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
@@ -68,6 +68,10 @@ OUT_OF_MEMORY = re.compile(
     re.IGNORECASE,
 )
 
+NO_CODE_CACHE = "cannot cache function"
+"""How numba begins what it says when every folder for it is read-only."""
+NO_CODE_CACHE_TEXT = "compiled code can be kept nowhere, neither beside the program nor in a home folder"
+NO_CODE_CACHE_HINT = "set NUMBA_CACHE_DIR to a folder that can be written"
 
 Stamp = tuple[tuple[str, int, int, int], ...]
 """Path, inode, time of change [ns] and size of files: what differs once one is replaced or written to."""
@@ -243,6 +247,8 @@ def _machine_errors(out: Path) -> Iterator[None]:
     except ScenewrightError:
         raise
     except Exception as error:  # native libraries say it in words of their own
+        if NO_CODE_CACHE in str(error):
+            raise MachineFailure(NO_CODE_CACHE_TEXT, hint=NO_CODE_CACHE_HINT) from error
         if isinstance(error, MemoryError) or OUT_OF_MEMORY.search(str(error)):
             raise MachineFailure(f"{out}: out of memory", hint="use fewer frames or larger voxels") from error
         raise
@@ -332,8 +338,7 @@ def run_stage(
                 content_digest=content_digest(records),
                 files=records,
                 inputs=tuple(
-                    InputRecord(role=i.role, kind=i.kind, digest=i.digest, path=os.path.relpath(i.path, out))
-                    for i in opened
+                    InputRecord(role=i.role, kind=i.kind, digest=i.digest, path=_path_from(i.path, out)) for i in opened
                 ),
                 parameters=facts["parameters"],
                 seed=seed,
@@ -355,6 +360,12 @@ def run_stage(
     if nondeterministic:
         logger.warning("%s: the same key gave other bytes than before: this step is not deterministic", stage.name)
     return RunResult("made", reason, out, key, manifest, nondeterministic)
+
+
+def _path_from(path: Path, out: Path) -> str:
+    """Return how a manifest at `out` names an input: from there, or from the root where that were too long."""
+    relative = os.path.relpath(path, out)
+    return relative if len(relative) <= LONGEST_PATH else os.path.abspath(path)
 
 
 def _work(stage: Stage, opened: list[_OpenInput], parameters: Parameters, context: Context) -> Artifact:

@@ -334,9 +334,7 @@ def _by_action(steps: list[Step]) -> list[list[Step]]:
     """Group steps so that each group ends with the last manipulation of one action."""
     groups: list[list[Step]] = []
     for step in steps:
-        same = (
-            groups and groups[-1][-1].name == step.name and groups[-1][-1].arguments == step.arguments
-        )  # fmt: skip
+        same = groups and groups[-1][-1].name == step.name and groups[-1][-1].arguments == step.arguments
         if groups and (groups[-1][-1].name == DRIVE or same):
             groups[-1].append(step)
         else:

@@ -40,7 +40,7 @@ def checked_scenes(cad_scene: CadScene, shelf: ModelShelf) -> list[CheckedScene]
     steps: list[tuple[str, Callable[[Replacement], CadCandidate | None]]] = [("After the global check", after_check)]
     if any(r.best_single is not None for r in scene.replacements):
         steps.insert(0, ("Before the global check, every object by itself", before_check))
-    found = []
+    scenes = []
     for title, choose in steps:
         candidates = {r.node: choose(r) for r in scene.replacements if r.decision != "layout"}
         model = cad_model(cad_scene, shelf, candidates)
@@ -48,8 +48,8 @@ def checked_scenes(cad_scene: CadScene, shelf: ModelShelf) -> list[CheckedScene]
             conflicts = conflicts_of(cad_scene, shelf, candidates)
             models = sum(candidate is not None for candidate in candidates.values())
             caption = _caption(title, conflicts, models)
-            found.append(CheckedScene(_painted(model, cad_scene, conflicts), conflicts, caption))
-    return found
+            scenes.append(CheckedScene(_painted(model, cad_scene, conflicts), conflicts, caption))
+    return scenes
 
 
 def conflicts_of(
@@ -61,7 +61,7 @@ def conflicts_of(
     return [pair for pair in room_penetrations(pieces, layout) if pair.collides]
 
 
-def _painted(model: Model, cad_scene: CadScene, conflicts: list[Penetration]) -> Model:
+def _painted(model: Model, conflicts: list[Penetration]) -> Model:
     """The model with objects in conflict in red and everything else pale."""
     guilty = {pair.first for pair in conflicts} | {pair.second for pair in conflicts if not pair.layout}
     numbers = [

@@ -202,7 +202,7 @@ def test_interrupted_replacement_is_completed(tmp_path: Path, stop_after: str) -
     out = tmp_path / "a"
     make(out, text="old")
     make(tmp_path / "new", text="new")
-    partial, old = tmp_path / ".a.partial-1-x", tmp_path / ".a.old-x"
+    partial, old = tmp_path / ".a.partial-1-0123abcd", tmp_path / ".a.old-0123abcd"
     shutil.move(tmp_path / "new", partial)
     (tmp_path / ".a.journal").write_text(json.dumps({"partial": partial.name, "old": old.name}))
     if stop_after != "journal":

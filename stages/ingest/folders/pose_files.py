@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from schemas.errors import BadInput
+from schemas.outside import opened
 from stages.ingest.folders.files import files_of, images_by_number
 from stages.ingest.folders.stamped_poses import StampedPoses, read_stamped_poses
 from stages.kit.formats.trajectories import (
@@ -40,7 +41,7 @@ def pose_file(root: Path) -> Path | None:
 
 
 def columns_of(path: Path) -> int:
-    """Return the number of columns in the first row of a text file, 0 when it has none."""
+    """Return the number of columns in the first row of a text file, 0 when it has none. Raises BadInput."""
     return len(_first_row(path))
 
 
@@ -55,7 +56,7 @@ def has_names(path: Path) -> bool:
 
 
 def _first_row(path: Path) -> list[str]:
-    with path.open("rb") as file:
+    with opened(path) as file:
         start = file.read(4096).decode("utf-8", "replace")
     rows = (line.split("#", 1)[0].split() for line in start.splitlines())
     return next((row for row in rows if row), [])

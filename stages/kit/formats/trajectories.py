@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from schemas.errors import BadInput
+from schemas.outside import file_text
 from stages.kit.geometry.transforms import is_rigid
 
 INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
@@ -154,18 +155,7 @@ def write_open3d_log(path: Path, world_from_camera: np.ndarray) -> None:
 
 def read_text(path: Path) -> str:
     """Return the text of a file. Raises BadInput when it is missing, no text, or larger than LARGEST_TEXT bytes."""
-    try:
-        with Path(path).open("rb") as file:
-            data = file.read(LARGEST_TEXT + 1)
-        if len(data) > LARGEST_TEXT:
-            raise BadInput(f"{path}: text file of more than {LARGEST_TEXT // 1_000_000} MB")
-        return data.decode("utf-8-sig")
-    except FileNotFoundError:
-        raise BadInput(f"{path}: file is missing") from None
-    except PermissionError:
-        raise BadInput(f"{path}: file may not be read", hint="check its permissions") from None
-    except (UnicodeDecodeError, IsADirectoryError, NotADirectoryError):
-        raise BadInput(f"{path}: not a text file") from None
+    return file_text(path, LARGEST_TEXT)
 
 
 def _numbers(fields: list[str], where: str) -> np.ndarray:
