@@ -58,7 +58,10 @@ def load_free_space(panoptic_map: PanopticMap) -> FreeSpace:
     if not path.is_file():
         return NOTHING_KNOWN
     info = panoptic_map.info
-    blocks, tsdf, weight = read_arrays(path, "block_coordinates", "tsdf", "weight", hint="make the panoptic map again")
+    blocks, tsdf, weight = read_arrays(
+        path, "block_coordinates", "tsdf", "weight",
+        shapes=("B 3", f"B {SIDE**3}", f"B {SIDE**3}"), hint="make the panoptic map again",
+    )  # fmt: skip
     keys = _packed(blocks)
     order = np.argsort(keys, kind="stable")
     tsdf, weight = tsdf[order], weight[order]

@@ -50,7 +50,7 @@ def load_map(panoptic_map: PanopticMap) -> PredictedMap:
     """Read mesh and labels. Raises BadInput when they disagree."""
     surface = read_surface(panoptic_map.path("mesh.ply"))
     path = panoptic_map.path("mesh_labels.npz")
-    instances = read_arrays(path, "instance")[0].astype(np.int64)
+    instances = read_arrays(path, "instance", shapes=("V",))[0].astype(np.int64)
     if len(instances) != len(surface.vertices):
         raise BadInput(f"{path}: {len(instances)} labels for {len(surface.vertices)} vertices")
     return PredictedMap(panoptic_map.info, surface, instances)

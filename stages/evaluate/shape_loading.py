@@ -73,7 +73,7 @@ def _shape_of_body(
             if visual[link]
         },
         joints=tuple(_without_prefix(joint, prefix) for joint in body.joints),
-        movable=body.movable,
+        movable=body.carriable,
         contains=body.contains,
     )
 

@@ -54,7 +54,7 @@ def parse_priors(priors: tuple[str, ...], model: WorldModel) -> list[Belief]:
         _, kind, container = match.groups()
         if kind not in USUAL:
             raise UsageError(f"assumption {prior!r}: no usual size of {kind!r}", hint=f"known: {', '.join(USUAL)}")
-        if container not in model.records or model.records[container].movable:
+        if container not in model.records or model.records[container].carriable:
             raise UsageError(f"assumption {prior!r}: the scene has no furniture {container!r}", hint="see scene.json")
         width, height, _ = USUAL[kind]
         words = (
@@ -134,7 +134,7 @@ def match_beliefs(
         taken = {match.matched for match in with_beliefs.values()}
         best: tuple[float, str] | None = None
         for name, record in room.items():
-            if container is None or name in taken or record.class_name != belief.class_name or not record.movable:
+            if container is None or name in taken or record.class_name != belief.class_name or not record.carriable:
                 continue
             box = room[container].box
             away = np.linalg.norm(np.subtract(record.box.center, box.center))

@@ -21,7 +21,7 @@ MOVED = 0.05
 
 def start_state(model: WorldModel) -> TreeState:
     """Return what is believed at the beginning."""
-    movable = [name for name, record in model.records.items() if record.movable]
+    movable = [name for name, record in model.records.items() if record.carriable]
     joints = {joint.name: model.joint_value(name, joint.name)
               for name, record in model.records.items() for joint in record.joints}  # fmt: skip
     parents = {name: model.records[name].parent or SCENE_NODE for name in movable}
@@ -46,7 +46,7 @@ def observed_state(
     planned = {match.matched: name for name, match in matches.items() if match.matched is not None}
     parents, poses = {}, {}
     for name, match in matches.items():
-        if match.matched is None or not world.bodies[match.matched].record.movable:
+        if match.matched is None or not world.bodies[match.matched].record.carriable:
             continue
         poses[name] = world.pose(match.matched)
         below = carrier(world, match.matched)

@@ -164,8 +164,8 @@ def test_the_reference_server_equals_the_local_backend(room: Written, tmp_path: 
     ours, theirs = payload(local), payload(remote)
     assert ours[1] == theirs[1]  # every pixel of every frame
     assert [entry.segments for entry in local.info.frames] == [entry.segments for entry in remote.info.frames]
-    assert remote.info.backend == "service"
-    assert remote.info.label.startswith("service geometric segments, class-agnostic r1 labels ")
+    assert remote.info.backend == "masks"
+    assert remote.info.label.startswith("masks of geometric segments, class-agnostic r1 labels ")
 
 
 def test_foreign_categories_are_mapped_by_name(room: Written, tmp_path: Path) -> None:

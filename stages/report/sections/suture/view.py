@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from schemas.artifact import Artifact
+from schemas.outside import LARGEST_SHOWN, file_text
 from schemas.suture_needle import NeedleFrame, SutureNeedle, SutureThread
 from schemas.suture_trial import SutureEvaluation, SutureRun, SutureTrial
 from stages.report.images import Picture, from_file
@@ -104,7 +105,7 @@ def suture_view(
         runs_left_out=0 if file is None else max(0, len(file.runs) - MOST_RUNS),
         assumed=() if file is None else tuple(source.arm for source in file.perception if not source.measured),
         plots=_plots(evaluation, width),
-        tables=() if evaluation is None else tables_of(evaluation.path("table.md").read_text(encoding="utf-8")),
+        tables=() if evaluation is None else tables_of(file_text(evaluation.path("table.md"), LARGEST_SHOWN)),
         notes=() if metrics is None else (metrics.label, *metrics.notes),
     )  # fmt: skip
 

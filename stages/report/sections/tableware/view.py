@@ -11,6 +11,7 @@ from typing import Any
 from PIL import Image
 
 from schemas.errors import BadInput
+from schemas.outside import file_content
 from schemas.tableware_detections import TablewareDetections
 from schemas.tableware_plan import TablewarePlan
 from schemas.tableware_trial import EvaluatedPolicy, TablewareEvaluation, TablewareTrial
@@ -144,11 +145,9 @@ def animation(path: Path, alt: str) -> Picture:
     try:
         with Image.open(path) as opened:
             width, height = opened.size
-        data = path.read_bytes()
+        data = file_content(path, LARGEST_ANIMATION)
     except (OSError, SyntaxError, Image.DecompressionBombError) as error:
         raise BadInput(f"{path}: {error}", hint="make the artifact again") from None
-    if len(data) > LARGEST_ANIMATION:
-        raise BadInput(f"{path}: {len(data)} bytes are too large an animation", hint="make the artifact again")
     return Picture(f"data:image/gif;base64,{base64.b64encode(data).decode('ascii')}", width, height, alt)
 
 
