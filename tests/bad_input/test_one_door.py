@@ -29,7 +29,6 @@ BOUNDED = "a container read piece by piece, regular files only, with bounds of i
 PICTURE = "a picture whose size is looked at before it is decoded"
 DEVICE = "the null device"
 CACHE = "what this program keeps for itself; what cannot be read is asked for anew"
-FOLDER = "a file of a folder of models, behind the bounds of stages/library"
 WORLD = "no file: a simulator's world"
 SERVICE = "a message of a service, cut at the largest body"
 
@@ -72,10 +71,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/kit/simulation/urdf_split.py": {"ElementTree.fromstring": PARSED},
     "stages/kit/tasks/fast_downward.py": {"read_text": MADE},
     "stages/library/importing/classes.py": {"tomllib.loads": OURS, "read_text": OURS},
-    "stages/library/importing/loose_models.py": {"open": FOLDER, "csv.DictReader": PARSED, "csv.reader": PARSED},
-    "stages/library/importing/mapping.py": {"tomllib.loads": FOLDER, "read_text": FOLDER},
-    "stages/library/importing/mesh_reading.py": {"json.loads": PARSED},
-    "stages/library/importing/source_folder.py": {"read_bytes": FOLDER},
+    "stages/library/importing/loose_models.py": {"csv.reader": PARSED},
     "stages/library/importing/urdf_models.py": {"json.loads": PARSED},
     "stages/pack/language_reading.py": {"json.loads": PARSED},
     "stages/plan/correspondence.py": {"ElementTree.fromstring": PARSED},
