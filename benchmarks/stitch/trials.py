@@ -16,30 +16,19 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from dataclasses import replace
 from pathlib import Path
 
+from benchmarks.stitch.trials_arms import ARMS, WITHOUT
 from benchmarks.stitch.trials_printed import PAIRS, printed_rows
 from benchmarks.stitch.trials_records import Run, read_runs
 from stages.suture.evaluation.trial_figures import metrics, table
 from stages.suture.trials.machine import run_trial
 from stages.suture.trials.perception import PerceptionModel, perception_model
+from stages.suture.trials.policies import POLICIES
 from stages.suture.trials.recording import Recorder
 from stages.suture.trials.records import run_of
-from stages.suture.trials.settings import POLICIES
 
 REPORTING, TUNING, TRIALS, QUICK, FRAMES = 1400, 0, 200, 10, 18
-ARMS = {
-    **POLICIES,
-    "ours_thesis_eyes": replace(POLICIES["ours"], perception="thesis"),
-    "ours_one_at_a_time": replace(POLICIES["ours"], moves_both=False),
-    "thesis_other_test": replace(POLICIES["thesis"], retries_when_unchanged=False),
-}
-MECHANISMS = (
-    "servoes_ends", "keeps_books", "cinches_before_handover", "checks_place", "centres_jaws", "expects",
-    "watches_slack", "fuses_looks", "checks_turn", "sweeps",
-)  # fmt: skip
-WITHOUT = {f"ours_without_{name}": replace(POLICIES["ours"], **{name: False}) for name in MECHANISMS}
 
 
 def one(arm: str, seed: int, model: PerceptionModel | None = None) -> Run:

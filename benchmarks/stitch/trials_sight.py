@@ -23,8 +23,8 @@ from benchmarks.stitch.trials_records import Run
 from stages.kit.measurement.bootstrap import bootstrap_interval
 from stages.suture.trials.machine import run_trial
 from stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
+from stages.suture.trials.policies import POLICIES
 from stages.suture.trials.records import run_of
-from stages.suture.trials.settings import POLICIES
 from stages.suture.trials.sight import SIGHTS, LookingEyes
 
 TRIALS = {"geometry": 30, "pictures": 8}

@@ -26,7 +26,8 @@ from schemas.base import Model
 from stages.tableware.planning.choice import make_policy
 from stages.tableware.planning.time_model import fitted
 from stages.tableware.sight import Eyes
-from stages.tableware.simulation.fast import FastWorld, run_in
+from stages.tableware.simulation.fast import FastWorld
+from stages.tableware.simulation.trial import run_in
 from stages.tableware.world.scenes import make_table
 
 ARMS = ("random", "stack", "pull", "ours")

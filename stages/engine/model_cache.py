@@ -117,7 +117,7 @@ def resolve_weights(path: Path) -> Path:
     if not found:
         if is_hub_id(name):
             return find_in_hub_cache(name)
-        listed = next((model for model in known_models() if name in (model.name, model.file)), None)
+        listed = next((model for model in known_models() if path.name in (model.name, model.file)), None)
         if listed is not None:
             hint = f"get {listed.file} from {listed.source}, then: scenewright models --add {listed.file}"
             raise MissingDependency(f"{name}: not in the cache {cache_folder()}", hint=hint)

@@ -17,6 +17,7 @@ from stages.kit.stage import Stage
 
 PIPELINES_FOLDER = Path(__file__).resolve().parents[2] / "data" / "pipelines"
 _VARIABLE = re.compile(r"^\$([a-z_]+)$")
+SHARED_FOLDER = ".shared"
 _NAME = re.compile(r"^[a-z][a-z0-9_]*$")
 
 
@@ -43,6 +44,11 @@ class Step(BaseModel):
     """Parameter -> value, or `$variable`."""
     seed: int | str | None = None
     accept: tuple[str, ...] = ()
+    """Outcomes after which the chain goes on; `run` ends with 4 all the same, unless its user accepts them too."""
+    shared: bool = False
+    """Taken from the folder `.shared` beside the run folder where another run has made the same."""
+    needs: dict[str, str] = {}
+    """Entry of the artifact's summary -> what to do when it is 0: `run` then stops with 3 after this step."""
 
 
 class Pipeline(BaseModel):
@@ -101,6 +107,8 @@ def _check_step(path: Path, pipeline: Pipeline, step: Step, stage: Stage, done: 
             raise UsageError(f"{where}: {stage.name} has no input {role!r}", hint=f"inputs: {', '.join(stage.reads)}")
         if not _VARIABLE.match(source) and source.split("/")[0] not in done:
             raise UsageError(f"{where}: input {role!r} comes from {source!r}, which is no earlier step", hint="reorder")
+    if step.shared and step.inputs:
+        raise UsageError(f"{where}: a shared step has no inputs", hint="leave `shared` out")
     missing = [role for role in stage.required() if role not in step.inputs]
     if missing:
         raise UsageError(f"{where}: input {missing[0]!r} is missing", hint=f"{stage.name} needs it")
@@ -140,6 +148,8 @@ def step_arguments(step: Step, run_folder: str, values: Mapping[str, str | None]
         arguments += _option("seed", values[match[1]] if match else step.seed)
     for outcome in step.accept:
         arguments += ["--accept", outcome]
+    if step.shared:
+        arguments += ["--shared", f"{run_folder}/../{SHARED_FOLDER}"]
     return [*arguments, "--out", f"{run_folder}/{step.name}"]
 
 

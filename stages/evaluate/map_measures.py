@@ -168,7 +168,7 @@ def measure_instances(
 ) -> dict[str, ClassPrecision]:
     """Record the instance AP by class over things; see `instance_candidates`. Returns it by class."""
     candidates = instance_candidates(truth, predicted, labels)
-    result = {name: class_precision(found, parameters.match_iou) for name, found in candidates.items()}
+    result = {name: class_precision(listed, parameters.match_iou) for name, listed in candidates.items()}
     agnostic = result.pop(ANY_CLASS)
     part.set("instance_ap50_class_agnostic", agnostic.all_point)
     record_precision(part, "instance_ap50", {} if is_nameless(predicted) else result)

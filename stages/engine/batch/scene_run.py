@@ -246,12 +246,15 @@ def run_scene(job: Job, cancelled: Callable[[], bool] = lambda: False, host: str
         reached = steps.index(follower.step) if follower.step is not None else 0
         steps = steps[: reached + (outcome == "not ok")]
     made = manifests(folder, steps)
+    failed_step = None if outcome == "done" else follower.step
+    if outcome == "not ok":  # the chain may have gone on after it
+        failed_step = next((step for step, manifest in made.items() if manifest.outcome != "ok"), failed_step)
     return SceneResult.model_validate(
         identity
         | {
             "outcome": outcome,
             "exit_code": code,
-            "failed_step": None if outcome == "done" else follower.step,
+            "failed_step": failed_step,
             "reason": reason,
             "seconds": round(time.monotonic() - begun, 3),
             "peak_memory_bytes": found.peak_memory,

@@ -91,6 +91,21 @@ def number_rows(path: Path, columns: int) -> list[tuple[int, np.ndarray]]:
     return rows
 
 
+def named_rows(path: Path, columns: int) -> list[tuple[int, str, np.ndarray]]:
+    """Return (line number, name, (columns - 1,) numbers) of every line of a table whose first column holds names.
+
+    Blank lines and # comments are skipped. Raises BadInput as `number_rows` does.
+    """
+    rows = []
+    for line, text in enumerate(read_text(path).splitlines(), start=1):
+        fields = text.split("#", 1)[0].split()
+        if fields and len(fields) != columns:
+            raise BadInput(f"{path}: line {line}: {len(fields)} columns, expected {columns}")
+        if fields:
+            rows.append((line, fields[0], _numbers(fields[1:], f"{path}: line {line}")))
+    return rows
+
+
 def read_matrix(path: Path, rows: int = 4, columns: int = 4) -> np.ndarray:
     """Return the (rows, columns) matrix in a text file, whatever the line breaks. Raises BadInput."""
     fields = read_text(path).split()

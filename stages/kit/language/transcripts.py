@@ -85,11 +85,11 @@ class Transcript:
 
     def find(self, digest: str, occurrence: int) -> Exchange | None:
         """Return what was replied when this request was made for the `occurrence`-th time (0 first), or None."""
-        found = self._by_digest.get(digest, [])
-        return found[occurrence] if occurrence < len(found) else None
+        exchanges = self._by_digest.get(digest, [])
+        return exchanges[occurrence] if occurrence < len(exchanges) else None
 
     def __iter__(self) -> Iterator[Exchange]:
-        return (exchange for found in self._by_digest.values() for exchange in found)
+        return (exchange for exchanges in self._by_digest.values() for exchange in exchanges)
 
     def __len__(self) -> int:
         return sum(map(len, self._by_digest.values()))

@@ -88,6 +88,16 @@ class Seen:
         return from_ends(self.normal, self.tip, self.swage)
 
 
+def nearer_end(seen: Seen, driver: np.ndarray) -> np.ndarray:
+    """Return the end (3,) of a seen needle that is nearer to a driver at (3,)."""
+    return min((seen.tip, seen.swage), key=lambda end: float(np.linalg.norm(end - driver)))
+
+
+def farther_end(seen: Seen, driver: np.ndarray) -> np.ndarray:
+    """Return the end (3,) of a seen needle that is farther from a driver at (3,)."""
+    return max((seen.tip, seen.swage), key=lambda end: float(np.linalg.norm(end - driver)))
+
+
 class Looking(Protocol):
     """Who looks at the needle of a trial; `model` says how long an estimate takes and how well thread is seen, the
     others count estimates."""
