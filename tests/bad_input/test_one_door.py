@@ -29,7 +29,7 @@ BOUNDED = "a container read piece by piece, regular files only, with bounds of i
 PICTURE = "a picture whose size is looked at before it is decoded"
 DEVICE = "the null device"
 CACHE = "what this program keeps for itself; what cannot be read is asked for anew"
-WORLD = "no file: a simulator's world"
+WORLD = "no file: a method of this name, of a simulator or a format"
 SERVICE = "a message of a service, cut at the largest body"
 
 WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
@@ -49,6 +49,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/engine/memory_limit.py": {"read_text": KERNEL},
     "stages/engine/model_cache.py": {"open": WRITES},
     "stages/engine/store.py": {"os.open": WRITES},
+    "stages/fuse/annotated_scan.py": {"json.loads": PARSED},
     "stages/ingest/folders/calibration_files.py": {"json.loads": PARSED},
     "stages/ingest/layouts/colmap/model.py": {"np.memmap": BOUNDED},
     "stages/ingest/messages/json_messages.py": {"json.loads": PARSED},
@@ -81,6 +82,9 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/report/images.py": {"Image.open": PICTURE},
     "stages/report/page.py": {"read_text": OURS},
     "stages/report/sections/tableware/view.py": {"Image.open": PICTURE},
+    "stages/segment/backends/masks/backend.py": {"open": WORLD},
+    "stages/segment/backends/masks/formats/npz_stacks.py": {"zipfile.ZipFile": BOUNDED},
+    "stages/segment/backends/masks/listing.py": {"json.loads": PARSED},
     "stages/segment/backends/network/weights.py": {"json.loads": PARSED},
     "stages/segment/backends/service/protocol.py": {"json.loads": SERVICE},
     "stages/segment/backends/service/reply_cache.py": {"read_bytes": CACHE},
