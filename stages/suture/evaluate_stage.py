@@ -130,9 +130,9 @@ def thread_errors(thread: SutureThread, scene: SutureScene) -> list[ThreadError]
             raise BadInput(
                 f"{thread.root}: frame {record.frame} is not in the scene", hint="give the thread's own scene"
             )
-        (true,) = read_arrays(scene.path("threads.npz"), f"thread_{record.frame:06d}")
+        (true,) = read_arrays(scene.path("threads.npz"), f"thread_{record.frame:06d}", shapes=("N 3",))
         points = np.zeros((0, 3))
         if record.points:
-            (points,) = read_arrays(thread.path("threads.npz"), f"points_{record.frame:06d}")
+            (points,) = read_arrays(thread.path("threads.npz"), f"points_{record.frame:06d}", shapes=("N 3",))
         errors.append(thread_error(points, record.length, true))
     return errors

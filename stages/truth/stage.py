@@ -19,12 +19,17 @@ from schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
 from schemas.sequence import Sequence
 from schemas.vocabulary import VOCABULARY_FILE, load_vocabulary
 from stages.kit.drawing.palette import instance_color
+from stages.kit.formats.labelled_mesh import LabelledMesh, read_labelled_mesh
 from stages.kit.formats.ply_files import ColoredMesh, write_ply
+from stages.kit.formats.scenenn_annotation import (
+    AnnotatedLabel,
+    class_by_last_word,
+    class_by_substring,
+    read_annotation,
+)
 from stages.kit.geometry.boxes import is_round, minimum_box
 from stages.kit.geometry.transforms import apply
 from stages.kit.stage import Context
-from stages.truth.annotation import AnnotatedLabel, class_by_last_word, class_by_substring, read_annotation
-from stages.truth.labelled_mesh import LabelledMesh, read_labelled_mesh
 from stages.truth.parameters import WORDS, SceneNNParameters
 from stages.truth.surface import surface_points
 
@@ -70,9 +75,9 @@ def run(
     write_ply(context.output / "mesh.ply", colored(vertices, scan.faces, instances))
     if unlisted:
         context.logger.warning("%d vertices carry a label that %s does not list; void", unlisted, annotation.name)
-    found: dict[str, int] = {}
+    counts: dict[str, int] = {}
     for entry in objects:
-        found[entry.class_name] = found.get(entry.class_name, 0) + 1
+        counts[entry.class_name] = counts.get(entry.class_name, 0) + 1
     return GroundTruth(
         context.output,
         summary={
@@ -82,7 +87,7 @@ def run(
             "unlisted_vertices": unlisted,
             "points": len(points),
             "labelled_share": round(float((point_instances > 0).mean()), 3),
-            **{f"true_{name}": count for name, count in sorted(found.items())},
+            **{f"true_{name}": count for name, count in sorted(counts.items())},
         },
     )
 

@@ -6,7 +6,6 @@ often, their fate: a highlight or a thread in front of the needle does not go aw
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -16,6 +15,7 @@ from pydantic import Field, ValidationError
 
 from schemas.base import Model
 from schemas.errors import BadInput
+from schemas.outside import file_toml
 from stages.suture.motion.needle import SWAGE, TIP, from_ends
 
 FOLDER = Path(__file__).resolve().parents[3] / "data" / "stitch"
@@ -64,8 +64,8 @@ class PerceptionModel(Model):
 def perception_model(path: Path) -> PerceptionModel:
     """Read an error model (TOML). Raises BadInput when the file is not one."""
     try:
-        return PerceptionModel.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, tomllib.TOMLDecodeError, ValidationError) as error:
+        return PerceptionModel.model_validate(file_toml(path))
+    except (BadInput, ValidationError) as error:
         reason = " ".join(str(error).split())[:200]
         if isinstance(error, ValidationError):
             first = error.errors()[0]

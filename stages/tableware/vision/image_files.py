@@ -9,7 +9,6 @@ camera.json | scene.json            {"camera": {width, height, fx, fy, cx, cy}, 
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from pydantic import ValidationError
 
 from schemas.base import Model, Transform
 from schemas.errors import BadInput
+from schemas.outside import file_json
 from schemas.scene_parts import Camera
 from stages.kit.formats.numpy_files import read_array, read_arrays
 
@@ -72,14 +72,7 @@ def read_image(
 def read_camera(path: Path) -> CameraFile:
     """Return the camera of a camera.json, or of a scene.json that says more. Raises BadInput."""
     hint = 'it needs {"camera": {"width", "height", "fx", "fy", "cx", "cy"}}; docs/TIDY.md has an example'
-    try:
-        if path.stat().st_size > LARGEST_JSON:
-            raise BadInput(f"{path}: larger than {LARGEST_JSON} bytes", hint=hint)
-        document = json.loads(path.read_bytes())
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}", hint=hint) from None
-    except ValueError:
-        raise BadInput(f"{path}: no JSON", hint=hint) from None
+    document = file_json(path, LARGEST_JSON, hint=hint)
     if not isinstance(document, dict):
         raise BadInput(f"{path}: no JSON object", hint=hint)
     try:

@@ -16,12 +16,12 @@ from schemas.vocabulary import load_vocabulary
 from stages.engine.hub_cache import is_hub_id
 from stages.engine.model_cache import resolve_weights
 from stages.kit.formats.frames import Frame
+from stages.kit.labels import LabelSet, parse_words
 from stages.segment.backends.huggingface import panoptic
 from stages.segment.backends.huggingface.backend import HuggingFaceSettings, make_backend
 from stages.segment.backends.huggingface.loading import short_name
 from stages.segment.backends.huggingface.open_vocabulary import make_prompts, word_scores
 from stages.segment.choice import BackendRequest, choose_backend
-from stages.segment.labels import LabelSet, parse_words
 from stages.segment.parameters import SegmentParameters
 from tests.unit.segment import tiny_models
 
@@ -194,7 +194,7 @@ def test_what_folders_can_lack(folders: dict[str, Path], tmp_path: Path) -> None
     for folder, text in (
         (pickled, "no .safetensors"), (torn, "cannot be loaded"), (wrong, "parameters are missing or of another shape"),
         (other, "type 'bert'"), (garbled, "no JSON"), (blind, "preprocessor_config"), (nameless, "no table"),
-        (tmp_path, "No such file"),
+        (tmp_path, "file is missing"),
     ):  # fmt: skip
         with pytest.raises(BadInput, match=text) as caught:
             backend(folder)

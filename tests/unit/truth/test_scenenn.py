@@ -23,12 +23,17 @@ from stages.evaluate.surfaces import Surface
 from stages.evaluate.truth import load_truth
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.stage import run as ingest
+from stages.kit.formats.labelled_mesh import read_labelled_mesh
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.numpy_files import read_arrays
+from stages.kit.formats.scenenn_annotation import (
+    AnnotatedLabel,
+    class_by_last_word,
+    class_by_substring,
+    read_annotation,
+)
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
-from stages.truth.annotation import AnnotatedLabel, class_by_last_word, class_by_substring, read_annotation
-from stages.truth.labelled_mesh import read_labelled_mesh
 from stages.truth.parameters import SceneNNParameters
 from stages.truth.stage import read_words, run
 from stages.truth.surface import surface_points
@@ -191,7 +196,7 @@ def test_bad_annotations_are_told(tmp_path, xml, message):
 
 
 def test_a_missing_annotation_is_told(tmp_path):
-    with pytest.raises(BadInput, match="No such file"):
+    with pytest.raises(BadInput, match="file is missing"):
         read_annotation(tmp_path / "011.xml")
 
 
