@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
@@ -11,6 +12,8 @@ from schemas.interactive_scene import InteractiveScene
 from schemas.plan import Plan
 from stages.kit.estimates import grows_with
 from stages.kit.stage import Optionally, Parameters, Stage
+
+DATA = Path(__file__).resolve().parents[2] / "data"
 
 
 class PlanParameters(Parameters):
@@ -65,6 +68,12 @@ class PlanParameters(Parameters):
     image_width: int = Field(640, ge=64, le=4096, description="Width of the key frames [px]")
 
 
+def robot_files(parameters: PlanParameters) -> tuple[str, ...]:
+    """Return the files of `data/` that describe the robot: its URDF too where it lies there."""
+    names = (f"robots/{parameters.robot}.toml", f"robots/{parameters.robot}.urdf")
+    return names if (DATA / names[1]).is_file() else names[:1]
+
+
 STAGE = Stage(
     name="plan",
     version=8,
@@ -73,7 +82,7 @@ STAGE = Stage(
     reads={"scene": InteractiveScene, "ground_truth": Optionally(GroundTruth)},
     writes=Plan,
     libraries=("numpy", "scipy", "numba", "ompl", "pybullet", "open3d", "trimesh"),
-    data_files=lambda parameters: (f"robots/{parameters.robot}.toml",),
+    data_files=robot_files,
     example="scenewright plan --scene outputs/demo/interactive_scene --ground-truth outputs/demo/ground_truth "
     "--out outputs/demo/plan",
     estimate=grows_with("scene", 2.2, 0.0, 640, 0.0),

@@ -133,7 +133,8 @@ def mask_files(parameters: MaskOptions) -> tuple[str, ...]:
 
 def perception_files(parameters: SimulateParameters) -> tuple[str, ...]:
     """Return the files of `data/` that the arms see by."""
-    return ("stitch/perception_ours.toml", "stitch/perception_thesis.toml")
+    models = ("stitch/perception_ours.toml", "stitch/perception_thesis.toml")
+    return (*models, CHECKPOINT) if parameters.sight == "pictures" and (DATA / CHECKPOINT).is_file() else models
 
 
 SCENE = Stage(

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     PolicyName = str
 else:
     PolicyName = Literal[names_in(policies)]
-THESIS_TIMES, PHYSICS_TIMES = "tableware/thesis_times.json", "tableware/physics_times.json"
+THESIS_TIMES = "tableware/thesis_times.json"
+PHYSICS_TIMES = "tableware/physics_times.json"
 """Below data/: times of actions, and chances, fitted to the thesis's tables; times of the arm in physics."""
 ChancesName = Literal["exact", "thesis", "thesis_spills", "thesis_failures"]
 
