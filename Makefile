@@ -63,7 +63,7 @@ format: setup ## Format the code
 
 rules: setup ## Generate data/pipelines/*.mk and schemas/json from their declarations
 	for name in $(PIPELINES); do $(PYTHON) -m cli makefile $$name > data/pipelines/$$name.mk.new; mv data/pipelines/$$name.mk.new data/pipelines/$$name.mk; done
-	$(PYTHON) -m cli schemas
+	$(PYTHON) -m cli schemas --out schemas/json
 
 # ---- pipelines ----------------------------------------------------------------------------------------------------
 

@@ -10,11 +10,9 @@ from typing import Annotated
 
 import typer
 
+from cli import output
+from cli.output import say as _say
 from schemas.errors import UsageError
-
-
-def _say(text: str) -> None:
-    sys.stderr.write(text + "\n")
 
 
 def batch(
@@ -72,5 +70,5 @@ def batch(
 
 
 def _report(facts: dict[str, object], json_output: bool, code: int) -> int:
-    sys.stdout.write((json.dumps(facts, sort_keys=True) if json_output else str(facts["batch"])) + "\n")
+    output.out(json.dumps(facts, sort_keys=True) if json_output else str(facts["batch"]))
     return code

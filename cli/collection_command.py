@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+
+from cli.output import out
 
 
 def gc(
@@ -42,9 +43,9 @@ def gc(
             "items": [{**vars(item), "path": str(item.path)} for item in items],
             "failed": [{**vars(item), "path": str(item.path)} for item in stayed],
         }
-        sys.stdout.write(json.dumps(document, sort_keys=True) + "\n")
+        out(json.dumps(document, sort_keys=True))
     else:
-        sys.stdout.write("\n".join(_lines(items, gone, stayed, delete)) + "\n")
+        out("\n".join(_lines(items, gone, stayed, delete)))
     return 6 if stayed else 0
 
 

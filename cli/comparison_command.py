@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections import Counter
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+
+from cli.output import out
 
 LISTED_FILES = 6
 MEGABYTE = 1e6
@@ -33,9 +34,9 @@ def diff(
             "counts": dict(sorted(counts.items())),
             "artifacts": [item.as_json() for item in found],
         }
-        sys.stdout.write(json.dumps(document, sort_keys=True) + "\n")
+        out(json.dumps(document, sort_keys=True))
     else:
-        sys.stdout.write("\n".join(_lines(found, everything)) + "\n")
+        out("\n".join(_lines(found, everything)))
     return 0
 
 

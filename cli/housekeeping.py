@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,6 +13,8 @@ from cli.batch_command import batch
 from cli.collection_command import gc
 from cli.comparison_command import diff
 from cli.inspect_command import inspect
+from cli.output import out as _out
+from cli.output import say as _say
 from cli.serve_command import serve
 from cli.timeline_command import timeline
 from cli.urdf_check_command import urdf_check
@@ -21,19 +22,14 @@ from cli.urdf_settle_command import urdf_settle
 from cli.weights_command import convert_weights
 from schemas.errors import BadInput, UsageError
 
+if TYPE_CHECKING:
+    from stages.engine.chain import StepReport
+
 Paths = Annotated[list[Path], typer.Argument(help="Artifact folders.")]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Warnings only.")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 Settings = Annotated[list[str] | None, typer.Option("--set", help="variable=value; may be repeated.")]
-
-
-def _out(text: str) -> None:
-    sys.stdout.write(text + "\n")
-
-
-def _say(text: str) -> None:
-    sys.stderr.write(text + "\n")
 
 
 def _settings(pairs: list[str] | None) -> dict[str, str]:
@@ -72,13 +68,18 @@ def run(
     max_memory: Annotated[
         str | None, typer.Option("--max-memory", help="Stop a step that uses more than this: 4GiB.")
     ] = None,
+    accept: Annotated[
+        list[str] | None, typer.Option("--accept", help="Outcome besides ok that exits with 0; may be repeated.")
+    ] = None,
     json_output: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> int:
-    """Run a pipeline: the same commands that the Makefile chains."""
+    """Run a pipeline: the same commands that the Makefile chains. Exits with the gravest code of its steps."""
+    from stages.engine.batch.outcomes import worst_exit_code
     from stages.engine.chain import run_pipeline
     from stages.engine.estimation import estimate_pipeline, warn_or_refuse
+    from stages.engine.given_inputs import check_given_inputs
     from stages.engine.memory_limit import parse_limit
     from stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables
 
@@ -87,9 +88,13 @@ def run(
     if max_memory is not None:
         parse_limit(max_memory)
         extra += ("--max-memory", max_memory)
+    accepted = tuple(accept or ())
+    extra += tuple(word for outcome in accepted for word in ("--accept", outcome))
     chain = read_pipeline(pipeline_path(pipeline))
     values = _settings(settings)
-    expected = estimate_pipeline(chain, out, resolve_variables(chain, values), tuple(only or ()))
+    resolved = resolve_variables(chain, values)
+    check_given_inputs(chain, resolved, tuple(only or ()))
+    expected = estimate_pipeline(chain, out, resolved, tuple(only or ()))
     warn_or_refuse(f"pipeline {chain.name}", expected.total, out)
     if dry_run:
         for line in expected.lines():
@@ -112,7 +117,35 @@ def run(
         _out(json.dumps(facts, sort_keys=True))
     else:
         _out(str(out))
-    return reports[-1].exit_code if reports else 0
+    if not dry_run and not quiet:
+        _say_what_to_trust(reports)
+    _say_what_was_not_ok(reports, accepted, tuple(chain.variables))
+    return worst_exit_code(report.code(accepted) for report in reports)
+
+
+def _say_what_to_trust(reports: list[StepReport]) -> None:
+    from stages.report.outlook import Facts, outlook
+
+    facts = {
+        report.name: Facts(str(report.facts.get("outcome", "")), report.facts["summary"])
+        for report in reports
+        if report.facts.get("summary")
+    }
+    if "panoptic_map" in facts:
+        for line in outlook(facts).lines():
+            _say(line)
+
+
+def _say_what_was_not_ok(reports: list[StepReport], accepted: tuple[str, ...], variables: tuple[str, ...]) -> None:
+    """Name the outcomes after which the chain went on, and say how a step that stopped it is given its options."""
+    for report in reports:
+        if report.exit_code == 0 and report.code(accepted):
+            outcome, reason = report.facts["outcome"], report.facts.get("summary", {}).get("reason", "see its summary")
+            _say(f"error: {report.name}: outcome is {outcome!r}: {reason} (--accept {outcome} exits with 0)")
+        elif report.exit_code in (2, 3):
+            _say(
+                f"{report.name} stopped the run; what it asks for is given as --set name=value: {', '.join(variables)}"
+            )
 
 
 def verify(paths: Paths, json_output: Json = False, debug: Debug = False) -> int:
@@ -219,7 +252,7 @@ def doctor(json_output: Json = False, debug: Debug = False) -> int:
 
 
 def schemas(
-    out: Annotated[Path, typer.Option("--out", help="Folder.")] = Path("schemas/json"), debug: Debug = False
+    out: Annotated[Path, typer.Option("--out", help="Folder; `make rules` gives schemas/json.")], debug: Debug = False
 ) -> int:
     """Export the JSON Schemas of the manifest and every payload file."""
     from stages.engine.json_schemas import json_schemas
@@ -239,7 +272,7 @@ def makefile(
     from stages.engine.make_rules import makefile_for
     from stages.engine.pipelines import pipeline_path, read_pipeline
 
-    sys.stdout.write(makefile_for(read_pipeline(pipeline_path(pipeline))))
+    _out(makefile_for(read_pipeline(pipeline_path(pipeline))).removesuffix("\n"))
     return 0
 
 

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
+import shlex
+import shutil
 import sys
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from cli.output import out
 from schemas.artifact import Artifact
 from schemas.errors import BadInput, UsageError
 from schemas.manifest import MANIFEST_NAME
@@ -26,6 +32,11 @@ def inspect(
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="Option of ingest as name=value (depth_scale=5000); repeatable.")
     ] = None,
+    fx: Annotated[float | None, typer.Option("--fx", help="As for ingest [pixel], with --fy, --cx and --cy.")] = None,
+    fy: Annotated[float | None, typer.Option("--fy", help="As for ingest [pixel].")] = None,
+    cx: Annotated[float | None, typer.Option("--cx", help="As for ingest [pixel].")] = None,
+    cy: Annotated[float | None, typer.Option("--cy", help="As for ingest [pixel].")] = None,
+    depth_scale: Annotated[float | None, typer.Option("--depth-scale", help="As for ingest [units a metre].")] = None,
     json_output: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
@@ -34,33 +45,69 @@ def inspect(
 
     Exits with 3 when it would be.
     """
-    from schemas.sequence import Sequence
+    from schemas.sequence import Sequence as FrameSequence
     from stages.engine.reading import open_artifact
     from stages.ingest.preflight.inspection import inspect_log, inspect_sequence
     from stages.ingest.preflight.settings import ingest_parameters
     from stages.kit.progress import progress_for
 
+    try:
+        os.stat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        pass  # whoever looks for a log says what it expects
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror}", hint="give an artifact folder or a log") from None
+    given = {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "depth_scale": depth_scale}
+    settings = [*(settings or ()), *(f"{name}={value:.17g}" for name, value in given.items() if value is not None)]
     progress = progress_for(sys.stderr.isatty(), quiet=quiet or json_output)
-    if not (path / MANIFEST_NAME).exists():
+    if not os.path.exists(path / MANIFEST_NAME):
         if frames < 2:
             raise UsageError(f"--frames {frames}: a log is judged by its frames", hint="give at least 2")
-        found = inspect_log(path, ingest_parameters(settings or ()), frames, progress, keep_pictures=html is not None)
+        found = inspect_log(path, ingest_parameters(settings), frames, progress, keep_pictures=html is not None)
+        found = replace(found, report=found.report.model_copy(update={"command": _command(found.report, settings)}))
         _show(found, html, json_output, {})
         return _exit_code(found.report, expect, found.report.verdict)
     if settings:
         raise UsageError("--set is for logs", hint="an artifact has the options it was made with")
     artifact = open_artifact(path)
     assert artifact.manifest is not None
-    if not isinstance(artifact, Sequence) or artifact.outcome == "empty" or frames == 0:
+    if not isinstance(artifact, FrameSequence) or artifact.outcome == "empty" or frames == 0:
         if html is not None:
             raise UsageError("--html is for logs and sequences", hint="`scenewright report` makes a page of a run")
-        sys.stdout.write(artifact.manifest.model_dump_json() + "\n" if json_output else _manifest_text(artifact))
+        out(artifact.manifest.model_dump_json() if json_output else _manifest_text(artifact).removesuffix("\n"))
         return 4 if expect is not None and artifact.outcome != expect else 0
     found = inspect_sequence(artifact, frames, progress, keep_pictures=html is not None)
     if not json_output:
-        sys.stdout.write(_manifest_text(artifact) + "\n")
+        out(_manifest_text(artifact))
     _show(found, html, json_output, artifact.manifest.model_dump(mode="json"))
     return _exit_code(found.report, expect, artifact.outcome)
+
+
+def _command(report: Any, settings: Sequence[str]) -> str:
+    """Return the command that reconstructs the log with these options of ingest, ready to paste; empty where none can.
+
+    Options that the pipeline has no variable for are left out.
+    """
+    from stages.engine.pipelines import pipeline_path, read_pipeline
+
+    streams = {stream for camera in report.cameras for stream in camera.streams}
+    if report.verdict == "wasted" or "depth" not in streams or not streams & {"pose", "color"}:
+        return ""
+    name = "reconstruct" if "pose" in streams else "reconstruct-without-poses"
+    known = read_pipeline(pipeline_path(name)).variables
+    given = [pair.partition("=") for pair in (f"log={report.path}", *settings)]
+    pairs = {key.strip().lstrip("-").replace("-", "_"): value for key, _, value in given}
+    words = [word for key, value in pairs.items() if key in known for word in ("--set", f"{key}={value}")]
+    folder = Path(report.path).resolve().stem or "run"
+    return shlex.join([*_program(), "run", name, *words, "--out", f"outputs/{folder}"])
+
+
+def _program() -> list[str]:
+    """Return the words that start scenewright from here: it is on the PATH only in an active environment."""
+    if shutil.which("scenewright"):
+        return ["scenewright"]
+    script = Path(sys.executable).with_name("scenewright")
+    return [os.path.relpath(script)] if script.is_file() else [os.path.relpath(sys.executable), "-m", "cli"]
 
 
 def _show(found: Any, html: Path | None, json_output: bool, manifest: dict[str, Any]) -> None:
@@ -72,7 +119,7 @@ def _show(found: Any, html: Path | None, json_output: bool, manifest: dict[str, 
         write_page(found, html)
     report = found.report.model_dump(mode="json")
     document = {**manifest, "preflight": report} if manifest else report
-    sys.stdout.write(json.dumps(document, sort_keys=True) + "\n" if json_output else as_text(found.report))
+    out(json.dumps(document, sort_keys=True) if json_output else as_text(found.report).removesuffix("\n"))
     sys.stdout.flush()
 
 

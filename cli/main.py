@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import os
 import sys
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parent.parent
-INTERRUPTED = 130
 INTERRUPTED_TEXT = "interrupted; every finished artifact is as it was"
 
 
@@ -21,16 +19,26 @@ def _refuse_foreign_packages() -> None:
     for package in (schemas, stages):
         found = Path(package.__file__ or "").resolve().parent.parent
         if found != REPOSITORY:
-            sys.stderr.write(
-                f"error: package {package.__name__!r} comes from {found}, not from {REPOSITORY} "
-                "(run from another folder, or clear PYTHONPATH)\n"
-            )
+            if sys.stderr is not None:
+                sys.stderr.write(
+                    f"error: package {package.__name__!r} comes from {found}, not from {REPOSITORY} "
+                    "(run from another folder, or clear PYTHONPATH)\n"
+                )
             raise SystemExit(5)
+
+
+class _Lines(logging.Formatter):
+    """Messages on one line each, cleaned of what they name."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        from schemas.plain_text import one_line
+
+        return one_line(super().format(record)) if record.exc_info is None else super().format(record)
 
 
 def _set_up_logging(level: int) -> None:
     handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(logging.Formatter("%(message)s"))
+    handler.setFormatter(_Lines("%(message)s"))
     logger = logging.getLogger("scenewright")
     logger.handlers[:] = [handler]
     logger.setLevel(level)
@@ -42,8 +50,11 @@ def run(arguments: list[str]) -> int:
     import typer
     from typer.exceptions import TyperException
 
-    from schemas.errors import ScenewrightError
+    from cli.output import say_error
+    from cli.streams import INTERRUPTED, ReaderLeft
+    from schemas.errors import MachineFailure, ScenewrightError
     from stages.engine import interruption
+    from stages.engine.runner import NO_CODE_CACHE, NO_CODE_CACHE_HINT, NO_CODE_CACHE_TEXT
 
     debug = "--debug" in arguments
     _set_up_logging(logging.WARNING if "--quiet" in arguments else logging.DEBUG if debug else logging.INFO)
@@ -53,66 +64,68 @@ def run(arguments: list[str]) -> int:
         with interruption.heard():
             result = build_application()(args=arguments, prog_name="scenewright", standalone_mode=False)
         if result == INTERRUPTED:  # typer's own translation of KeyboardInterrupt
-            _say_error(INTERRUPTED_TEXT)
+            say_error(INTERRUPTED_TEXT)
         return result if isinstance(result, int) else 0
+    except ReaderLeft as error:
+        return error.exit_code
     except ScenewrightError as error:
         if debug:
             raise
-        _say_error(str(error))
+        say_error(str(error))
         return error.exit_code
     except (KeyboardInterrupt, typer.Abort):
-        _say_error(INTERRUPTED_TEXT)
+        say_error(INTERRUPTED_TEXT)
         return INTERRUPTED
     except TyperException as error:
         context = getattr(error, "ctx", None)
         where = f"{context.command_path}: " if context is not None else ""
         message = error.format_message() if hasattr(error, "format_message") else str(error)
-        _say_error(f"{where}{message} (see --help)")
+        say_error(f"{where}{message} (see --help)")
         return 2
-    except BrokenPipeError:
-        return _reader_left()
     except ImportError as error:
         if debug:
             raise
-        _say_error(f"{error} (run: scenewright doctor)")
+        say_error(f"{error} (run: scenewright doctor)")
         return 5
+    except (OSError, MemoryError) as error:  # inputs and outputs have their own words where they are opened
+        if debug:
+            raise
+        place, what = getattr(error, "filename", None), getattr(error, "strerror", None)
+        say_error(f"{f'{place}: ' if place else ''}{what or str(error) or 'out of memory'} (the machine failed)")
+        return MachineFailure.exit_code
     except Exception as error:
         if debug:
             raise
-        _say_error(f"internal error: {type(error).__name__}: {error} (a bug of ours; --debug shows where)")
+        if NO_CODE_CACHE in str(error):
+            say_error(f"{NO_CODE_CACHE_TEXT} ({NO_CODE_CACHE_HINT})")
+            return MachineFailure.exit_code
+        say_error(f"internal error: {type(error).__name__}: {error} (a bug of ours; --debug shows where)")
         return 1
 
 
-def _say_error(text: str) -> None:
-    with contextlib.suppress(BrokenPipeError):
-        sys.stderr.write("error: " + " ".join(text.split()) + "\n")
+def _check_surroundings() -> None:
+    """Raise MachineFailure where no command can work: in a folder that is gone."""
+    from schemas.errors import MachineFailure
 
-
-def _reader_left() -> int:
-    """Nobody reads our output any more (`| head`): an interruption, and the exit must not stumble over it again."""
-    nothing = os.open(os.devnull, os.O_WRONLY)
-    for stream in (sys.stdout, sys.stderr):
-        os.dup2(nothing, stream.fileno())
-    return INTERRUPTED
-
-
-def _keep_standard_output_for_data() -> None:
-    """Send what native libraries print to file descriptor 1 (pybullet greets there) to standard error instead."""
-    sys.stdout.flush()
-    data = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)
-    sys.stdout = data
+    try:
+        os.getcwd()
+    except OSError as error:
+        raise MachineFailure(f"the current folder: {error.strerror}", hint="go to one that is there") from None
 
 
 def main() -> None:
     """Run the command line of this process."""
     _refuse_foreign_packages()
+    from cli import streams
+    from cli.output import say_error
+    from schemas.errors import ScenewrightError
     from stages.engine import interruption
 
+    streams.set_up()
     try:
         interruption.install()
         interruption.end_with_parent()
-        _keep_standard_output_for_data()
+        _check_surroundings()
         os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the default probes TBB first, warns about its version
         os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads sleep: spinning halves the rate when busy
         code = run(sys.argv[1:])
@@ -120,11 +133,14 @@ def main() -> None:
         sys.stdout.flush()
     except KeyboardInterrupt:  # before `run` could catch it, or a second one while it did
         interruption.ignore()
-        _say_error(INTERRUPTED_TEXT)
-        code = INTERRUPTED
-    except BrokenPipeError:
-        code = _reader_left()
-    if code == INTERRUPTED:
+        say_error(INTERRUPTED_TEXT)
+        code = streams.INTERRUPTED
+    except streams.ReaderLeft as error:
+        code = error.exit_code
+    except ScenewrightError as error:
+        say_error(str(error))
+        code = error.exit_code
+    if code == streams.INTERRUPTED:
         # Python ends by SIGINT, not by our code, when the exception once passed through an `exec` (dataclasses use it).
         sys.stderr.flush()
         os._exit(code)

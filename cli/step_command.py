@@ -15,14 +15,14 @@ import typer
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from cli.output import out, say, say_error
 from schemas.errors import UsageError
+from stages.engine.chain import OUTCOME_EXIT_CODE
 from stages.engine.memory_limit import parse_limit
 from stages.engine.runner import RunResult, run_stage
 from stages.kit.configuration import parameters_for, read_config
 from stages.kit.progress import progress_for
 from stages.kit.stage import External, Optionally, Stage
-
-OUTCOME_EXIT_CODE = 4
 
 _BOUNDS = (("ge", "at least"), ("gt", "above"), ("le", "at most"), ("lt", "below"))
 
@@ -126,6 +126,7 @@ def _common_options(stage: Stage) -> list[inspect.Parameter]:
             Optional[str],  # noqa: UP045
             typer.Option(None, "--max-memory", help="Stop with exit code 6 when the step uses more: 4GiB.", **panel),
         ),
+        *([] if stage.required() else [_shared_option(panel)]),
         flag("force", "Make it again even when it is up to date."),
         flag("dry_run", "Say what would run and why; write nothing."),
         _parameter(
@@ -139,6 +140,11 @@ def _common_options(stage: Stage) -> list[inspect.Parameter]:
         flag("quiet", "No progress, warnings only."),
         flag("debug", "Show the traceback of an error."),
     ]
+
+
+def _shared_option(panel: dict[str, Any]) -> inspect.Parameter:
+    text = "Folder in which runs share it: taken from there when the same was made before, kept there when made."
+    return _parameter("shared", Optional[Path], typer.Option(None, "--shared", help=text, **panel))  # noqa: UP045
 
 
 def report_result(result: RunResult, stage: Stage, accept: tuple[str, ...], json_output: bool) -> int:
@@ -158,20 +164,21 @@ def report_result(result: RunResult, stage: Stage, accept: tuple[str, ...], json
             "nondeterministic": result.nondeterministic,
             "estimate": result.estimate.as_json() if result.estimate else None,
         }
-        sys.stdout.write(json.dumps(facts, sort_keys=True) + "\n")
+        out(json.dumps(facts, sort_keys=True))
     else:
         if manifest is not None:
             summary = ", ".join(f"{name} {value}" for name, value in manifest.summary.items())
             seconds = f" in {manifest.provenance.seconds:.1f} s" if result.status == "made" else ""
-            sys.stderr.write(f"{stage.name}: {result.status}{seconds}: {result.outcome}. {summary}\n")
+            why = f" ({result.reason})" if result.status == "taken" else ""
+            say(f"{stage.name}: {result.status}{seconds}{why}: {result.outcome}. {summary}")
         else:
             expected = f"; {result.estimate}" if result.estimate else ""
-            sys.stderr.write(f"{stage.name}: {result.status}: {result.reason}{expected}\n")
-        sys.stdout.write(f"{result.path}\n")
+            say(f"{stage.name}: {result.status}: {result.reason}{expected}")
+        out(str(result.path))
     if manifest is not None and manifest.outcome != "ok" and manifest.outcome not in accept:
-        sys.stderr.write(
-            f"error: {stage.name}: outcome is {manifest.outcome!r}: "
-            f"{manifest.summary.get('reason', 'see the summary')} (--accept {manifest.outcome} goes on)\n"
+        say_error(
+            f"{stage.name}: outcome is {manifest.outcome!r}: "
+            f"{manifest.summary.get('reason', 'see the summary')} (--accept {manifest.outcome} goes on)"
         )
         return OUTCOME_EXIT_CODE
     return 0
@@ -202,6 +209,7 @@ def make_command(stage: Stage) -> Callable[..., int]:
             progress=progress_for(sys.stderr.isatty(), quiet=options["quiet"] or options["json_output"]),
             command=("scenewright", *sys.argv[1:]),
             max_memory=parse_limit(options["max_memory"]) if options["max_memory"] is not None else None,
+            shared=options.get("shared"),
         )
         return report_result(result, stage, tuple(options["accept"] or ()), options["json_output"])
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from cli.output import out
 
 
 def timeline(
@@ -27,7 +28,7 @@ def timeline(
             hint="run `scenewright fuse` with --snapshot-every 20, then `scenewright graph` again",
         )
     if json_output:
-        sys.stdout.write(grown.model_dump_json() + "\n")
+        out(grown.model_dump_json())
         return 0
 
     def lines_of(snapshot: GraphSnapshot) -> list[str]:
@@ -46,6 +47,7 @@ def timeline(
         ]
 
     for snapshot in grown.snapshots:
-        sys.stdout.write(f"{snapshot.frames} frames: {len(snapshot.nodes) - 1} nodes, {len(snapshot.links)} links\n")
-        sys.stdout.writelines(f"  {line}\n" for line in lines_of(snapshot))
+        out(f"{snapshot.frames} frames: {len(snapshot.nodes) - 1} nodes, {len(snapshot.links)} links")
+        for line in lines_of(snapshot):
+            out(f"  {line}")
     return 0

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from cli.output import out
 
 BAD_INPUT = 3
 
@@ -38,10 +39,10 @@ def urdf_check(
         ]
     if json_output:
         findings = [{"kind": p.kind, "element": p.element, "message": p.message} for p in problems]
-        sys.stdout.write(json.dumps({"file": str(file), "sound": not problems, "findings": findings}) + "\n")
+        out(json.dumps({"file": str(file), "sound": not problems, "findings": findings}))
     else:
         for problem in problems:
-            sys.stdout.write(f"{file}: {problem}\n")
+            out(f"{file}: {problem}")
         if not problems:
-            sys.stdout.write(f"{file}: sound\n")
+            out(f"{file}: sound")
     return BAD_INPUT if problems else 0

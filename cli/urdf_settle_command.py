@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-BAD_INPUT = 3
+from cli.output import out
+
 Engine = Literal["bullet", "mujoco"]
 
 
@@ -28,8 +28,9 @@ def urdf_settle(
 ) -> int:
     """Let go of a scene in physics and open its doors and drawers; a line for each body that moves, turns or falls
     through the floor, for each joint that meets something in the first tenth of its range, and for each pair of bodies
-    more than 5 mm in each other. Exits with 3 when there is any.
+    more than 5 mm in each other. Exits with 4 when there is any, or when nothing can move: the outcome of `urdf`.
     """
+    from stages.engine.chain import OUTCOME_EXIT_CODE
     from stages.urdf.settle_report import SettleReport, settle_report
 
     limits = {"moved_limit": moved, "turned_limit": math.radians(turned)}
@@ -53,14 +54,13 @@ def urdf_settle(
         f"{pair.first_link}: lies {1000 * pair.depth:.1f} mm in {pair.second_link} at rest"
         for pair in report.collisions
     ]
-    sound = report.settled and not report.collisions
+    if report.verdict == "nothing_movable":
+        lines.append(f"nothing can move: {report.reason}")
     if json_output:
-        sys.stdout.write(json.dumps({"scene": str(scene), "sound": sound, **report.as_json()}) + "\n")
+        out(json.dumps({"scene": str(scene), "sound": report.settled, **report.as_json()}))
     else:
         for line in lines:
-            sys.stdout.write(f"{scene}: {line}\n")
-        if sound:
-            sys.stdout.write(
-                f"{scene}: settles: {len(report.bodies)} movable bodies stay, {len(report.joints)} joints are free\n"
-            )
-    return 0 if sound else BAD_INPUT
+            out(f"{scene}: {line}")
+        if report.settled:
+            out(f"{scene}: settles: {report.reason}")
+    return 0 if report.settled else OUTCOME_EXIT_CODE

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from cli import output
 
 
 def convert_weights(
@@ -26,5 +27,5 @@ def convert_weights(
     if not file.is_file():
         raise MissingDependency(f"{file}: no such file", hint="fetch the authors' models, see docs/DISPARITY.md")
     convert(file, out)
-    sys.stdout.write(f"{out}\n")
+    output.out(str(out))
     return 0

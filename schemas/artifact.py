@@ -115,9 +115,12 @@ class Artifact:
 
     @property
     def inputs(self) -> dict[str, Path]:
-        """Role -> where the input stood when this was made."""
+        """Role -> where the input stood when this was made. Raises BadInput for what can be no place."""
         records = self.manifest.inputs if self.manifest is not None else ()
-        return {record.role: (self.root / record.path).resolve() for record in records}
+        try:
+            return {record.role: (self.root / record.path).resolve() for record in records}
+        except (OSError, ValueError, RuntimeError) as error:
+            raise BadInput(f"{self.root}: an input is named that can be nowhere: {error}") from None
 
     def __repr__(self) -> str:
         facts = ", ".join(f"{name} {value}" for name, value in list(self.summary.items())[:4])

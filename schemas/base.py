@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from schemas.errors import BadInput
+from schemas.outside import LARGEST_DOCUMENT, check_integers, file_content
 
 
 def canonical_json(value: Any) -> str:
@@ -69,24 +70,26 @@ class Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, protected_namespaces=())
 
     @classmethod
-    def read(cls, path: Path, *, largest: int | None = None, hint: str = "make the artifact again") -> Self:
+    def read(cls, path: Path, *, largest: int = LARGEST_DOCUMENT, hint: str = "make the artifact again") -> Self:
         """Read and validate a JSON file of at most `largest` bytes.
 
         Raises BadInput naming the file and the first wrong field; `hint` says what to do about it.
         """
-        path = Path(path)
+        data = file_content(path, largest, hint=hint)
+        check_integers(data, str(path), hint=hint)
         try:
-            if largest is not None and path.stat().st_size > largest:
-                raise BadInput(f"{path}: larger than {largest} bytes", hint=hint)
-            return cls.model_validate_json(path.read_bytes())
-        except FileNotFoundError:
-            raise BadInput(f"{path}: file is missing", hint=hint) from None
-        except OSError as error:
-            raise BadInput(f"{path}: {error.strerror}", hint=hint) from None
+            model = cls.model_validate_json(data)
+            model.check_read()
+            return model
         except ValidationError as error:
             first = error.errors()[0]
             where = ".".join(str(part) for part in first["loc"]) or "document"
-            raise BadInput(f"{path}: {where}: {first['msg']}", hint=hint) from None
+            raise BadInput(f"{path}: {where:.200}: {first['msg']}", hint=hint) from None
+        except ValueError as error:
+            raise BadInput(f"{path}: {error}", hint=hint) from None
+
+    def check_read(self) -> None:
+        """Raise ValueError when the parts of what was read do not fit each other; kinds say here what has to."""
 
     def write(self, path: Path) -> None:
         """Write the model as indented JSON with sorted keys and a final newline."""

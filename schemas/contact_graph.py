@@ -45,6 +45,30 @@ class ContactGraphFile(Model):
     nodes: tuple[GraphNode, ...]
     links: tuple[Relation, ...]
 
+    def check_read(self) -> None:
+        """Raise ValueError unless it has each node once, and relations of nodes and planes it has."""
+        nodes = {node.id: node for node in self.nodes}
+        if len(nodes) < len(self.nodes):
+            raise ValueError("a node is there twice")
+        for link in self.links:
+            if link.source not in nodes or link.target not in nodes:
+                raise ValueError(f"{link.source!r:.60} {link.relation} {link.target!r:.60}: no such node")
+            if link.plane is not None and not 0 <= link.plane < len(nodes[link.source].planes):
+                raise ValueError(f"{link.source} {link.relation} {link.target}: it has no plane {link.plane}")
+        self._check_tree()
+
+    def _check_tree(self) -> None:
+        """Raise ValueError when the tree of supports leads in a circle."""
+        parents = {link.target: link.source for link in self.links if link.relation in TREE_RELATIONS}
+        standing = {SCENE_NODE}
+        for node in self.nodes:
+            above = [node.id]
+            while above[-1] in parents and above[-1] not in standing:
+                above.append(parents[above[-1]])
+                if len(above) > len(self.nodes):
+                    raise ValueError(f"what {node.id!r} stands on leads in a circle")
+            standing.update(above)
+
     def node(self, node_id: str) -> GraphNode:
         """Return the node with this id. Raises KeyError."""
         for entry in self.nodes:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from schemas.plain_text import cleaned
+
 
 class ScenewrightError(Exception):
-    """Base of every expected failure: `message` says what and where, `hint` says what to do next."""
+    """Base of every expected failure: `message` says what and where, `hint` says what to do next.
+
+    Both are cleaned: they name what came from outside.
+    """
 
     exit_code = 1
 
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)
-        self.message = message
-        self.hint = hint
+        self.message = cleaned(message)
+        self.hint = cleaned(hint)
 
     def __str__(self) -> str:
         return f"{self.message} ({self.hint})" if self.hint else self.message

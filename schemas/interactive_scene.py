@@ -21,6 +21,8 @@ class SceneBody(Model):
     class_name: str
     movable: bool
     """Movable bodies hang on floating joints in scene.urdf and have a file of their own."""
+    furniture: bool = Field(False, exclude_if=lambda value: not value)
+    """Movable, but nothing that an arm carries: a chair, a screen, a lamp. Absent otherwise."""
     file: RelativePath | None = None
     """`bodies/<name>.urdf` for movable bodies, None for those in static.urdf."""
     parent: str | None = None
@@ -37,6 +39,11 @@ class SceneBody(Model):
     mass: float
     contains: bool = False
     grasp_width: float | None = None
+
+    @property
+    def carriable(self) -> bool:
+        """Whether it is free, and small and light enough for an arm."""
+        return self.movable and not self.furniture
 
 
 class InteractiveSceneFile(Model):

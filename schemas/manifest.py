@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, Field
 
 from schemas.base import Model
+from schemas.errors import BadInput
+from schemas.outside import LARGEST_INTEGER, check_bounds
 
 MANIFEST_NAME = "manifest.json"
 FORMAT_VERSION = 1
@@ -23,11 +27,35 @@ CONVENTIONS: dict[str, str] = {
 }
 
 
+MOST_INPUTS = 1000
+LONGEST_PATH = 4096
+"""Letters; no system opens longer ones."""
+
+
+def _check_path(path: str) -> str:
+    if not path or "\0" in path or len(path) > LONGEST_PATH:
+        raise ValueError(f"{path!r:.60} is no path")
+    return path
+
+
+def _check_values(values: dict[str, Any]) -> dict[str, Any]:
+    try:
+        check_bounds(values, "it holds")
+    except BadInput as error:
+        raise ValueError(error.message) from None
+    return values
+
+
+AnyPath = Annotated[str, AfterValidator(_check_path)]
+Count = Annotated[int, Field(ge=0, le=LARGEST_INTEGER)]
+Values = Annotated[dict[str, Any], AfterValidator(_check_values)]
+
+
 class FileRecord(Model):
     """One payload file. `digested` is false for files that hold wall-clock figures."""
 
-    path: str
-    bytes: int
+    path: AnyPath
+    bytes: Count
     sha256: str
     digested: bool = True
 
@@ -38,7 +66,7 @@ class InputRecord(Model):
     role: str
     kind: str
     digest: str
-    path: str
+    path: AnyPath
 
 
 class Provenance(Model):
@@ -54,7 +82,7 @@ class Provenance(Model):
     device: str = "cpu"
     started: str = ""
     seconds: float = 0.0
-    peak_memory_bytes: int = 0
+    peak_memory_bytes: Count = 0
 
 
 class Manifest(Model):
@@ -68,8 +96,8 @@ class Manifest(Model):
     key: str
     content_digest: str
     files: tuple[FileRecord, ...]
-    inputs: tuple[InputRecord, ...] = ()
-    parameters: dict[str, Any] = {}
+    inputs: Annotated[tuple[InputRecord, ...], Field(max_length=MOST_INPUTS)] = ()
+    parameters: Values = {}
     seed: int = 0
     libraries: dict[str, str] = {}
     data_files: dict[str, str] = {}
@@ -77,5 +105,5 @@ class Manifest(Model):
     device_kind: str = "cpu"
     conventions: dict[str, str] = CONVENTIONS
     outcome: str = "ok"
-    summary: dict[str, Any] = {}
+    summary: Values = {}
     provenance: Provenance = Provenance()

@@ -11,6 +11,9 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+from schemas.errors import BadInput
+from schemas.outside import LARGEST_DOCUMENT, file_json
+
 Migration = Callable[[Path, Path], None]
 
 MIGRATIONS: dict[tuple[str, int], Migration] = {}
@@ -31,8 +34,11 @@ def migration(kind: str, from_version: int) -> Callable[[Migration], Migration]:
 def sequence_of_several_cameras(old: Path, new: Path) -> None:
     """Version 2 lists its cameras; those of version 1 had one, called `camera`."""
     shutil.copytree(old, new, dirs_exist_ok=True, ignore=shutil.ignore_patterns("manifest.json"))
-    document = json.loads((old / "sequence.json").read_text(encoding="utf-8"))
-    document["cameras"] = [
-        {"name": "camera", "camera": document["camera"], "baseline": None, "frame_count": document["frame_count"]}
-    ]
+    path = old / "sequence.json"
+    document = file_json(path, LARGEST_DOCUMENT, hint="make the artifact again")
+    try:
+        camera, frame_count = document["camera"], document["frame_count"]
+        document["cameras"] = [{"name": "camera", "camera": camera, "baseline": None, "frame_count": frame_count}]
+    except (KeyError, TypeError):
+        raise BadInput(f"{path}: tells no camera and frame_count", hint="make the artifact again") from None
     (new / "sequence.json").write_text(json.dumps(document, sort_keys=True, indent=1) + "\n", encoding="utf-8")

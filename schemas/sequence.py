@@ -66,6 +66,13 @@ class SequenceFile(Model):
     start_time: float = 0.0
     end_time: float = 0.0
 
+    def check_read(self) -> None:
+        """Raise ValueError without a camera, or with counts that cannot be."""
+        if not self.cameras:
+            raise ValueError("names no camera")
+        if min(self.frame_count, *(entry.frame_count for entry in self.cameras)) < 0:
+            raise ValueError("counts fewer than no frames")
+
 
 class Sequence(Artifact):
     """`frames.mcap` (stages/kit/formats/frames.py reads and writes it), `sequence.json`, `trajectory.tum`."""

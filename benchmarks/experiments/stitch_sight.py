@@ -19,8 +19,8 @@ from schemas.suture_trial import SutureRun
 from stages.suture.options import ARM_NAMES
 from stages.suture.trials.machine import run_trial
 from stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
+from stages.suture.trials.policies import POLICIES
 from stages.suture.trials.records import run_of
-from stages.suture.trials.settings import POLICIES
 from stages.suture.trials.sight import LookingEyes
 
 TRIALS = {"geometry": 30, "pictures": 8, "error_model": 30}

@@ -16,7 +16,8 @@ from benchmarks.experiments.tidy_fast.arms import WORLDS
 from stages.tableware.planning.choice import make_policy
 from stages.tableware.planning.time_model import fitted
 from stages.tableware.sight import Eyes
-from stages.tableware.simulation.fast import FastWorld, run_in
+from stages.tableware.simulation.fast import FastWorld
+from stages.tableware.simulation.trial import run_in
 from stages.tableware.world.scenes import TIERS, make_table
 
 LEAST_CONFIDENCE = 0.3

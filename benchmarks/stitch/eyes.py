@@ -15,7 +15,7 @@ from stages.suture.motion.needle import ARC_POINTS
 from stages.suture.rig import TWO_CAMERAS
 from stages.suture.trials.machine import run_trial
 from stages.suture.trials.perception import FOLDER, Seen, perception_model
-from stages.suture.trials.settings import POLICIES
+from stages.suture.trials.policies import POLICIES
 from stages.suture.trials.sight import PICTURED_FROM_TRIAL, LookingEyes
 
 ACROSS, STATES, SHOWN = 3, 9, (640, 480)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from cli.viewing.canvas import Canvas
 from schemas.evaluation import Evaluation, Report
 from schemas.exported_sequence import ExportedSequence
+from schemas.outside import LARGEST_SHOWN, file_content, file_text
 
 
 def draw_evaluation(evaluation: Evaluation, canvas: Canvas) -> None:
@@ -16,9 +17,9 @@ def draw_evaluation(evaluation: Evaluation, canvas: Canvas) -> None:
     rows += ["", *(f"- {note}" for note in metrics.notes)]
     canvas.document("figures", "\n".join(rows))
     for table in sorted(evaluation.path("tables").glob("*.md")):
-        canvas.document(f"tables/{table.stem}", table.read_text(encoding="utf-8"))
+        canvas.document(f"tables/{table.stem}", file_text(table, LARGEST_SHOWN))
     for plot in sorted(evaluation.path("plots").glob("*.png")):
-        canvas.picture(f"plots/{plot.stem}", plot.read_bytes())
+        canvas.picture(f"plots/{plot.stem}", file_content(plot, LARGEST_SHOWN))
 
 
 def draw_report(report: Report, canvas: Canvas) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from cli.viewing.canvas import Canvas
 from cli.viewing.robot_view import animate_arm, draw_robot
+from schemas.outside import LARGEST_SHOWN, file_content
 from schemas.packing import BASKET_SLAB, BASKET_TOP, TABLE_TOP, Packing, PackingArea, PackingBox, PackingStep
 from schemas.scene_parts import Box
 from stages.kit.formats.numpy_files import read_arrays
@@ -26,7 +27,7 @@ def draw_packing(packing: Packing, canvas: Canvas) -> None:
     for name in PICTURES:
         path = packing.path(f"{name}.png")
         if path.is_file():
-            canvas.picture(name, path.read_bytes())
+            canvas.picture(name, file_content(path, LARGEST_SHOWN))
     basket = area_box(instance.basket, BASKET_TOP - BASKET_SLAB, BASKET_TOP)
     canvas.boxes("basket", [basket], ["basket"], [BASKET_COLOR])
     blocks = instance.obstacles

@@ -8,6 +8,7 @@ import trimesh
 from cli.viewing.canvas import Canvas
 from cli.viewing.sequence_view import draw_sequence
 from schemas.errors import BadInput
+from schemas.outside import LARGEST_SHOWN, file_content, file_text
 from schemas.scene_parts import Box
 from schemas.suture_needle import NeedleEstimateRecord, SutureNeedle, SutureThread
 from schemas.suture_scene import StereoRigRecord, SutureScene
@@ -61,7 +62,7 @@ def draw_suture_needle(needle: SutureNeedle, canvas: Canvas) -> None:
         _pose("needle", one.estimate, file.needle_radius, canvas)
         path = needle.path(f"pictures/{one.frame:06d}.png")
         if path.is_file():
-            canvas.picture("eyes/needle", path.read_bytes())
+            canvas.picture("eyes/needle", file_content(path, LARGEST_SHOWN))
     if file.filtered is not None:
         _pose("filtered", file.filtered, file.needle_radius, canvas)
 
@@ -79,13 +80,13 @@ def draw_suture_thread(thread: SutureThread, canvas: Canvas) -> None:
             canvas.line("thread", [points], [THREAD], radius=LINE)
         path = thread.path(f"pictures/{one.frame:06d}.png")
         if path.is_file():
-            canvas.picture("eyes/thread", path.read_bytes())
+            canvas.picture("eyes/thread", file_content(path, LARGEST_SHOWN))
 
 
 def draw_suture_trial(trial: SutureTrial, canvas: Canvas) -> None:
     """Draw the recorded trial: both drivers and the needle as they move, the thread at the key frames."""
-    canvas.document("trial", "```\n" + trial.path("trial.txt").read_text(encoding="utf-8") + "```")
-    canvas.picture("strip/panels", trial.path("strip.png").read_bytes())
+    canvas.document("trial", "```\n" + file_text(trial.path("trial.txt"), LARGEST_SHOWN) + "```")
+    canvas.picture("strip/panels", file_content(trial.path("strip.png"), LARGEST_SHOWN))
     top = Box(center=(0.0, 0.0, -PAD[2] / 2), size=PAD)
     canvas.boxes("pad", [top], ["pad"], [(0.93, 0.78, 0.7)], show_labels=False)
     wound = ridge()
@@ -111,9 +112,9 @@ def draw_suture_trial(trial: SutureTrial, canvas: Canvas) -> None:
 
 def draw_suture_evaluation(evaluation: SutureEvaluation, canvas: Canvas) -> None:
     """Show the tables and the plots."""
-    canvas.document("figures", evaluation.path("table.md").read_text(encoding="utf-8"))
+    canvas.document("figures", file_text(evaluation.path("table.md"), LARGEST_SHOWN))
     for path in sorted(evaluation.path("plots").glob("*.png")):
-        canvas.picture(f"plots/{path.stem}", path.read_bytes())
+        canvas.picture(f"plots/{path.stem}", file_content(path, LARGEST_SHOWN))
 
 
 def _eyes(rig: StereoRigRecord, canvas: Canvas) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from cli.viewing.canvas import Canvas
 from schemas.artifact import Artifact
+from schemas.outside import LARGEST_SHOWN, file_content, file_text
 from schemas.scene_parts import Box
 from schemas.tableware_detections import TablewareDetections
 from schemas.tableware_plan import TablewarePlan
@@ -29,14 +30,14 @@ def draw_tableware_scene(scene: TablewareScene, canvas: Canvas) -> None:
         canvas.transform(f"items/{item.name}", _pose(item))
     canvas.transform("camera", np.array(file.world_from_camera))
     canvas.camera("camera", file.camera)
-    canvas.picture("camera/color", scene.path("color.png").read_bytes())
+    canvas.picture("camera/color", file_content(scene.path("color.png"), LARGEST_SHOWN))
 
 
 def draw_tableware_detections(found: TablewareDetections, canvas: Canvas) -> None:
     """Show what was seen: the statement, the picture, and every item as a point at its lip, green by confidence."""
     told = found.info
     canvas.document("seen", "\n\n".join([told.statement, *told.notes]))
-    canvas.picture("overlay", found.path("overlay.png").read_bytes())
+    canvas.picture("overlay", file_content(found.path("overlay.png"), LARGEST_SHOWN))
     _table(canvas)
     for number, item in enumerate(told.items, start=1):
         share = item.confidence if item.kind is not None else 0.0
@@ -47,11 +48,11 @@ def draw_tableware_detections(found: TablewareDetections, canvas: Canvas) -> Non
 
 def draw_tableware_plan(plan: TablewarePlan, canvas: Canvas) -> None:
     """Show the plan in words, its pictures, and pulls and stackings as lines over the table."""
-    canvas.document("plan", plan.path("plan.txt").read_text(encoding="utf-8"))
+    canvas.document("plan", file_text(plan.path("plan.txt"), LARGEST_SHOWN))
     _table(canvas)
     for name in ("strip", "detections"):
         if plan.path(f"{name}.png").is_file():
-            canvas.picture(name, plan.path(f"{name}.png").read_bytes())
+            canvas.picture(name, file_content(plan.path(f"{name}.png"), LARGEST_SHOWN))
     for number, step in enumerate(plan.info.steps, start=1):
         action = step.action
         pull = action.u_P or (action.u_PG.u_P if action.u_PG else None)
@@ -66,9 +67,9 @@ def draw_tableware_trial(trial: TablewareTrial, canvas: Canvas) -> None:
     """Draw the table being cleared: each thing where it is after each action; what was binned stands beside the
     table."""
     file = trial.info
-    canvas.document("trial", trial.path("trial.txt").read_text(encoding="utf-8"))
+    canvas.document("trial", file_text(trial.path("trial.txt"), LARGEST_SHOWN))
     _table(canvas)
-    canvas.picture("keyframes", trial.path("keyframes.png").read_bytes())
+    canvas.picture("keyframes", file_content(trial.path("keyframes.png"), LARGEST_SHOWN))
     first = file.steps[0].before if file.steps else ()
     _shapes(trial, first, canvas)
     canvas.time(0.0)
@@ -89,7 +90,7 @@ def draw_tableware_trial(trial: TablewareTrial, canvas: Canvas) -> None:
 
 def draw_tableware_evaluation(evaluation: TablewareEvaluation, canvas: Canvas) -> None:
     """Show the table of policies."""
-    canvas.document("policies", evaluation.path("table.md").read_text(encoding="utf-8"))
+    canvas.document("policies", file_text(evaluation.path("table.md"), LARGEST_SHOWN))
 
 
 def _table(canvas: Canvas) -> None:

@@ -16,7 +16,7 @@ SHAPES ?= 4
 all: $(FOLDER)/cad_library/manifest.json $(FOLDER)/ground_truth/manifest.json $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/plan/manifest.json $(FOLDER)/geometric_segments/manifest.json $(FOLDER)/geometric_map/manifest.json $(FOLDER)/geometric_evaluation/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
 
 $(FOLDER)/cad_library/manifest.json: data/pipelines/demo.toml
-	$(PYTHON) -m cli library build --shapes-per-class '$(SHAPES)' --small-shapes-per-class '$(SHAPES)' --seed 1 --out $(FOLDER)/cad_library
+	$(PYTHON) -m cli library build --shapes-per-class '$(SHAPES)' --small-shapes-per-class '$(SHAPES)' --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
 
 $(FOLDER)/ground_truth/manifest.json: data/pipelines/demo.toml $(FOLDER)/cad_library/manifest.json
 	$(PYTHON) -m cli synthesize --library $(FOLDER)/cad_library --recipe '$(RECIPE)' --frames '$(FRAMES)' --width '$(WIDTH)' --height '$(HEIGHT)' --seed '$(SEED)' --out $(FOLDER)/ground_truth
@@ -37,7 +37,7 @@ $(FOLDER)/cad_scene/manifest.json: data/pipelines/demo.toml $(FOLDER)/contact_gr
 	$(PYTHON) -m cli cad --contact-graph $(FOLDER)/contact_graph --panoptic-map $(FOLDER)/panoptic_map --library $(FOLDER)/cad_library --out $(FOLDER)/cad_scene
 
 $(FOLDER)/interactive_scene/manifest.json: data/pipelines/demo.toml $(FOLDER)/cad_scene/manifest.json
-	$(PYTHON) -m cli urdf --cad-scene $(FOLDER)/cad_scene --out $(FOLDER)/interactive_scene
+	$(PYTHON) -m cli urdf --cad-scene $(FOLDER)/cad_scene --accept unsettled --accept penetrating --accept nothing_movable --out $(FOLDER)/interactive_scene
 
 $(FOLDER)/plan/manifest.json: data/pipelines/demo.toml $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/ground_truth/manifest.json
 	$(PYTHON) -m cli plan --scene $(FOLDER)/interactive_scene --ground-truth $(FOLDER)/ground_truth --accept infeasible --accept execution_failed --out $(FOLDER)/plan

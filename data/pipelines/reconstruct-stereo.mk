@@ -20,7 +20,7 @@ MAXIMUM_DEPTH ?= 4
 all: $(FOLDER)/cad_library/manifest.json $(FOLDER)/ground_truth/manifest.json $(FOLDER)/stereo_pairs/manifest.json $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
 
 $(FOLDER)/cad_library/manifest.json: data/pipelines/reconstruct-stereo.toml
-	$(PYTHON) -m cli library build --shapes-per-class '$(SHAPES)' --small-shapes-per-class '$(SHAPES)' --seed 1 --out $(FOLDER)/cad_library
+	$(PYTHON) -m cli library build --shapes-per-class '$(SHAPES)' --small-shapes-per-class '$(SHAPES)' --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
 
 $(FOLDER)/ground_truth/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLDER)/cad_library/manifest.json
 	$(PYTHON) -m cli synthesize --library $(FOLDER)/cad_library --recipe '$(RECIPE)' --clutter '$(CLUTTER)' --frames '$(FRAMES)' --width '$(WIDTH)' --height '$(HEIGHT)' --stereo-baseline '$(BASELINE)' --no-depth --picture-noise '$(PICTURE_NOISE)' --seed '$(SEED)' --out $(FOLDER)/ground_truth
@@ -44,7 +44,7 @@ $(FOLDER)/cad_scene/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLD
 	$(PYTHON) -m cli cad --contact-graph $(FOLDER)/contact_graph --panoptic-map $(FOLDER)/panoptic_map --library $(FOLDER)/cad_library --out $(FOLDER)/cad_scene
 
 $(FOLDER)/interactive_scene/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLDER)/cad_scene/manifest.json
-	$(PYTHON) -m cli urdf --cad-scene $(FOLDER)/cad_scene --out $(FOLDER)/interactive_scene
+	$(PYTHON) -m cli urdf --cad-scene $(FOLDER)/cad_scene --accept unsettled --accept penetrating --accept nothing_movable --out $(FOLDER)/interactive_scene
 
 $(FOLDER)/evaluation/manifest.json: data/pipelines/reconstruct-stereo.toml $(FOLDER)/ground_truth/manifest.json $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/cad_library/manifest.json $(FOLDER)/interactive_scene/manifest.json
 	$(PYTHON) -m cli evaluate --ground-truth $(FOLDER)/ground_truth --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --cad-library $(FOLDER)/cad_library --interactive-scene $(FOLDER)/interactive_scene --out $(FOLDER)/evaluation

@@ -5,17 +5,18 @@ OUTPUTS ?= outputs
 RUN ?= reconstruct-without-poses
 FOLDER := $(OUTPUTS)/$(RUN)
 $(if $(LOG),,$(error reconstruct-without-poses needs LOG=... (log file or folder)))
-BACKEND ?= geometric
+BACKEND ?= auto
 VOXEL_SIZE ?= 0.02
 EVERY ?= 1
 FORMAT ?= auto
 POSES_METHOD ?= rgbd
 SEED ?= 0
+$(if $(LOG),$(if $(wildcard $(LOG)),,$(error LOG=$(LOG): no such file or folder)))
 .PHONY: all
 all: $(FOLDER)/cad_library/manifest.json $(FOLDER)/sequence/manifest.json $(FOLDER)/trajectory/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
 
 $(FOLDER)/cad_library/manifest.json: data/pipelines/reconstruct-without-poses.toml
-	$(PYTHON) -m cli library build --seed 1 --out $(FOLDER)/cad_library
+	$(PYTHON) -m cli library build --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
 
 $(FOLDER)/sequence/manifest.json: data/pipelines/reconstruct-without-poses.toml $(LOG)
 	$(PYTHON) -m cli ingest --log '$(LOG)' --format '$(FORMAT)' $(if $(CAMERA),--camera '$(CAMERA)') --every '$(EVERY)' $(if $(MAX_FRAMES),--max-frames '$(MAX_FRAMES)') $(if $(DEPTH_SCALE),--depth-scale '$(DEPTH_SCALE)') $(if $(FX),--fx '$(FX)') $(if $(FY),--fy '$(FY)') $(if $(CX),--cx '$(CX)') $(if $(CY),--cy '$(CY)') --out $(FOLDER)/sequence
@@ -23,7 +24,7 @@ $(FOLDER)/sequence/manifest.json: data/pipelines/reconstruct-without-poses.toml 
 $(FOLDER)/trajectory/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json
 	$(PYTHON) -m cli poses --sequence $(FOLDER)/sequence --method '$(POSES_METHOD)' --seed '$(SEED)' --accept tracking_lost --out $(FOLDER)/trajectory
 
-$(FOLDER)/segments/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(WEIGHTS)
+$(FOLDER)/segments/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(wildcard $(WEIGHTS))
 	$(PYTHON) -m cli segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments
 
 $(FOLDER)/panoptic_map/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/trajectory/manifest.json
@@ -36,7 +37,7 @@ $(FOLDER)/cad_scene/manifest.json: data/pipelines/reconstruct-without-poses.toml
 	$(PYTHON) -m cli cad --contact-graph $(FOLDER)/contact_graph --panoptic-map $(FOLDER)/panoptic_map --library $(FOLDER)/cad_library --seed '$(SEED)' --out $(FOLDER)/cad_scene
 
 $(FOLDER)/interactive_scene/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/cad_scene/manifest.json
-	$(PYTHON) -m cli urdf --cad-scene $(FOLDER)/cad_scene --out $(FOLDER)/interactive_scene
+	$(PYTHON) -m cli urdf --cad-scene $(FOLDER)/cad_scene --accept unsettled --accept penetrating --accept nothing_movable --out $(FOLDER)/interactive_scene
 
 $(FOLDER)/evaluation/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/trajectory/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json
 	$(PYTHON) -m cli evaluate --sequence $(FOLDER)/sequence --trajectory $(FOLDER)/trajectory --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --interactive-scene $(FOLDER)/interactive_scene --out $(FOLDER)/evaluation

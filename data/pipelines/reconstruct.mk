@@ -5,22 +5,23 @@ OUTPUTS ?= outputs
 RUN ?= reconstruct
 FOLDER := $(OUTPUTS)/$(RUN)
 $(if $(LOG),,$(error reconstruct needs LOG=... (log file or folder)))
-BACKEND ?= geometric
+BACKEND ?= auto
 VOXEL_SIZE ?= 0.02
 EVERY ?= 1
 FORMAT ?= auto
 POSE_CONVENTION ?= as-is
 SEED ?= 0
+$(if $(LOG),$(if $(wildcard $(LOG)),,$(error LOG=$(LOG): no such file or folder)))
 .PHONY: all
 all: $(FOLDER)/cad_library/manifest.json $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
 
 $(FOLDER)/cad_library/manifest.json: data/pipelines/reconstruct.toml
-	$(PYTHON) -m cli library build --seed 1 --out $(FOLDER)/cad_library
+	$(PYTHON) -m cli library build --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
 
 $(FOLDER)/sequence/manifest.json: data/pipelines/reconstruct.toml $(LOG)
 	$(PYTHON) -m cli ingest --log '$(LOG)' --format '$(FORMAT)' $(if $(CAMERA),--camera '$(CAMERA)') --every '$(EVERY)' $(if $(MAX_FRAMES),--max-frames '$(MAX_FRAMES)') $(if $(DEPTH_SCALE),--depth-scale '$(DEPTH_SCALE)') --pose-convention '$(POSE_CONVENTION)' $(if $(FX),--fx '$(FX)') $(if $(FY),--fy '$(FY)') $(if $(CX),--cx '$(CX)') $(if $(CY),--cy '$(CY)') --out $(FOLDER)/sequence
 
-$(FOLDER)/segments/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/sequence/manifest.json $(WEIGHTS)
+$(FOLDER)/segments/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/sequence/manifest.json $(wildcard $(WEIGHTS))
 	$(PYTHON) -m cli segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments
 
 $(FOLDER)/panoptic_map/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json
@@ -33,7 +34,7 @@ $(FOLDER)/cad_scene/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/con
 	$(PYTHON) -m cli cad --contact-graph $(FOLDER)/contact_graph --panoptic-map $(FOLDER)/panoptic_map --library $(FOLDER)/cad_library --seed '$(SEED)' --out $(FOLDER)/cad_scene
 
 $(FOLDER)/interactive_scene/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/cad_scene/manifest.json
-	$(PYTHON) -m cli urdf --cad-scene $(FOLDER)/cad_scene --out $(FOLDER)/interactive_scene
+	$(PYTHON) -m cli urdf --cad-scene $(FOLDER)/cad_scene --accept unsettled --accept penetrating --accept nothing_movable --out $(FOLDER)/interactive_scene
 
 $(FOLDER)/evaluation/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json
 	$(PYTHON) -m cli evaluate --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --panoptic-map $(FOLDER)/panoptic_map --contact-graph $(FOLDER)/contact_graph --cad-scene $(FOLDER)/cad_scene --interactive-scene $(FOLDER)/interactive_scene --out $(FOLDER)/evaluation

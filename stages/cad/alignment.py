@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -126,33 +127,48 @@ def plane_errors(
     return offsets_y - along - offsets_x, 1.0 - (normals_x * normals_y).sum(axis=1)
 
 
+class _Fixed(NamedTuple):
+    """What the residuals of a match depend on beside the parameters: object x, oriented model y, M matched planes."""
+
+    center_x: np.ndarray
+    """(3,) [m]"""
+    size_x: np.ndarray
+    """(3,) [m]"""
+    yaw_x: float
+    """[rad]"""
+    support_height: float
+    """[m]"""
+    size_y: np.ndarray
+    """(3,) [m]"""
+    normals_x: np.ndarray
+    """(M, 3)"""
+    offsets_x: np.ndarray
+    """(M,) [m]"""
+    normals_y: np.ndarray
+    offsets_y: np.ndarray
+    offset_weight: np.ndarray
+    """(M,) roots of the weights, as the two below."""
+    angle_weight: float
+    box_weight: np.ndarray
+    """(2,) containment and height."""
+
+
 @njit(cache=True)
-def _residuals(
-    parameters: np.ndarray,
-    center_x: np.ndarray,
-    size_x: np.ndarray,
-    yaw_x: float,
-    support_height: float,
-    size_y: np.ndarray,
-    normals_x: np.ndarray,
-    offsets_x: np.ndarray,
-    normals_y: np.ndarray,
-    offsets_y: np.ndarray,
-    offset_weight: np.ndarray,
-    angle_weight: float,
-    box_weight: np.ndarray,
-) -> np.ndarray:
+def _residuals(parameters: np.ndarray, fixed: _Fixed) -> np.ndarray:
     """e of equation 2.12, times the roots of the weights. Compiled, as every candidate asks for it 200 times."""
+    size_y, normals_y = fixed.size_y, fixed.normals_y
     scale, yaw = parameters[0], parameters[1]
-    position = np.array([parameters[2], parameters[3], support_height + scale * size_y[2] / 2])
+    position = np.array([parameters[2], parameters[3], fixed.support_height + scale * size_y[2] / 2])
     cosine, sine = math.cos(yaw), math.sin(yaw)
     turned = np.empty_like(normals_y)
     turned[:, 0] = cosine * normals_y[:, 0] - sine * normals_y[:, 1]
     turned[:, 1] = sine * normals_y[:, 0] + cosine * normals_y[:, 1]
     turned[:, 2] = normals_y[:, 2]
-    offset, angle = plane_errors(normals_x, offsets_x, turned, scale * offsets_y, position - center_x)
-    box = box_errors(center_x, size_x, yaw_x, size_y, scale, yaw, position)
-    return np.concatenate((box_weight * box, offset_weight * offset, angle_weight * angle))
+    offset, angle = plane_errors(
+        fixed.normals_x, fixed.offsets_x, turned, scale * fixed.offsets_y, position - fixed.center_x
+    )
+    box = box_errors(fixed.center_x, fixed.size_x, fixed.yaw_x, size_y, scale, yaw, position)
+    return np.concatenate((fixed.box_weight * box, fixed.offset_weight * offset, fixed.angle_weight * angle))
 
 
 def residual_function(match: Match, weights: AlignmentWeights) -> Callable[[np.ndarray], np.ndarray]:
@@ -162,7 +178,7 @@ def residual_function(match: Match, weights: AlignmentWeights) -> Callable[[np.n
     rows = np.array([pair[0] for pair in match.pairs], dtype=int)
     columns = np.array([pair[1] for pair in match.pairs], dtype=int)
     carries = frame.planes.supporting[rows]
-    fixed = (
+    fixed = _Fixed(
         np.asarray(frame.center, dtype=float),
         np.asarray(frame.size, dtype=float),
         float(frame.yaw),
@@ -176,7 +192,7 @@ def residual_function(match: Match, weights: AlignmentWeights) -> Callable[[np.n
         math.sqrt(weights.angle),
         np.sqrt([weights.containment, weights.height]),
     )
-    return lambda parameters: _residuals(parameters, *fixed)
+    return lambda parameters: _residuals(parameters, fixed)
 
 
 def levenberg_marquardt(

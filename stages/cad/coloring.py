@@ -20,11 +20,11 @@ def part_colors(
 
     `vertices`, `normals` (N, 3) world frame, `colors` (N, 3) uint8. Parts that were not seen are left out.
     """
-    found = surface.closest(to_model(placement, vertices), placement.shape.joints, normals @ placement.rotation)
-    near = placement.scale * found.distance <= NEAR
+    nearest = surface.closest(to_model(placement, vertices), placement.shape.joints, normals @ placement.rotation)
+    near = placement.scale * nearest.distance <= NEAR
     result = {}
     for k, part in enumerate(surface.model.parts):
-        own = near & (found.part == k)
+        own = near & (nearest.part == k)
         if np.count_nonzero(own) >= LEAST_VERTICES:
             red, green, blue = (int(value) for value in np.round(np.median(colors[own], axis=0)))
             result[part] = (red, green, blue)

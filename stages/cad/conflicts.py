@@ -123,13 +123,13 @@ def min_conflicts(
     choice = [0] * len(counts)
 
     def colliding(selected: list[int]) -> list[tuple[int, int, float]]:
-        found = []
+        conflicts = []
         for i in range(len(selected)):
             for j in range(i + 1, len(selected)):
                 value = depth(i, selected[i], j, selected[j])
                 if value > tolerance:
-                    found.append((i, j, value))
-        return found
+                    conflicts.append((i, j, value))
+        return conflicts
 
     pairs = colliding(choice)
     before = len(pairs)

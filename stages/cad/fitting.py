@@ -66,14 +66,14 @@ def refine(
     prior = (SCALE_PRIOR * placement.scale * float(np.linalg.norm(placement.shape.size))) ** 2
     best_error, best_state = best.alignment_error, (scale, rotation, translation, dict(joints))
     for _ in range(iterations):
-        found = surface.closest((points - translation) @ rotation / scale, joints, normals @ rotation)
-        error = scale * float(np.sqrt(np.mean(found.distance**2)))
+        nearest = surface.closest((points - translation) @ rotation / scale, joints, normals @ rotation)
+        error = scale * float(np.sqrt(np.mean(nearest.distance**2)))
         if error < best_error:
             best_error, best_state = error, (scale, rotation, translation, dict(joints))
-        target = scale * found.points @ rotation.T + translation
-        normal = found.normals @ rotation.T
+        target = scale * nearest.points @ rotation.T + translation
+        normal = nearest.normals @ rotation.T
         gap = np.einsum("ij,ij->i", normal, points - target)
-        weight = np.minimum(1.0, ROBUST_DISTANCE / np.maximum(scale * found.distance, 1e-9)) / len(points)
+        weight = np.minimum(1.0, ROBUST_DISTANCE / np.maximum(scale * nearest.distance, 1e-9)) / len(points)
         # The model grows and turns about its foot below the model origin.
         anchor = np.array([*translation[:2], foot])
         arm = target - anchor
@@ -82,10 +82,10 @@ def refine(
         columns += [normal[:, 0], normal[:, 1]] + ([normal[:, 2]] if free_height else [])
         first_joint = len(columns)
         for joint in limits:
-            owned = found.part == surface.model.parts.index(joint.part)
+            owned = nearest.part == surface.model.parts.index(joint.part)
             axis = np.asarray(joint.axis)
             if joint.type == "revolute":
-                motion = scale * np.cross(axis, found.points - np.asarray(joint.origin)) @ rotation.T
+                motion = scale * np.cross(axis, nearest.points - np.asarray(joint.origin)) @ rotation.T
             else:
                 motion = np.broadcast_to(scale * rotation @ axis, target.shape)
             columns.append(np.where(owned, np.einsum("ij,ij->i", normal, motion), 0.0))

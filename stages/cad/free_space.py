@@ -38,9 +38,9 @@ class FreeSpace:
         block, inner = voxel // SIDE, voxel % SIDE
         wanted = _packed(block)
         row = np.minimum(np.searchsorted(self.keys, wanted), len(self.keys) - 1)
-        known = self.keys[row] == wanted
+        held = self.keys[row] == wanted
         column = inner[:, 0] + SIDE * inner[:, 1] + SIDE * SIDE * inner[:, 2]
-        return np.where(known, self.distance[row, column].astype(float), 0.0)
+        return np.where(held, self.distance[row, column].astype(float), 0.0)
 
 
 NOTHING_KNOWN = FreeSpace(np.zeros(0, dtype=np.int64), np.zeros((0, SIDE**3), dtype=np.float16), 1.0)
@@ -58,7 +58,10 @@ def load_free_space(panoptic_map: PanopticMap) -> FreeSpace:
     if not path.is_file():
         return NOTHING_KNOWN
     info = panoptic_map.info
-    blocks, tsdf, weight = read_arrays(path, "block_coordinates", "tsdf", "weight", hint="make the panoptic map again")
+    blocks, tsdf, weight = read_arrays(
+        path, "block_coordinates", "tsdf", "weight",
+        shapes=("B 3", f"B {SIDE**3}", f"B {SIDE**3}"), hint="make the panoptic map again",
+    )  # fmt: skip
     keys = _packed(blocks)
     order = np.argsort(keys, kind="stable")
     tsdf, weight = tsdf[order], weight[order]

@@ -152,11 +152,11 @@ def rank_matches(
                 rejected["scale out of range"] += len(rotations)
                 continue
             for orientation, rotation in enumerate(rotations):
-                found = matching_error(frame, shape, rotation, weights, unmatched)
-                if found is None:
+                error_and_pairs = matching_error(frame, shape, rotation, weights, unmatched)
+                if error_and_pairs is None:
                     rejected["no admissible plane assignment"] += 1
                 else:
-                    matches.append(Match(shape, frame, orientation, *found))
+                    matches.append(Match(shape, frame, orientation, *error_and_pairs))
     matches.sort(key=lambda match: match.error)
     rejected["matching rank"] = max(0, len(matches) - keep)
     return matches[:keep], rejected

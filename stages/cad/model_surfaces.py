@@ -83,12 +83,12 @@ class ModelSurface:
                 answer = asked_of.scene.compute_closest_points(
                     o3d.core.Tensor.from_numpy(np.ascontiguousarray(local[rows]))
                 )
-                found = answer["points"].numpy().astype(float)
-                gap = np.linalg.norm(local[rows] - found, axis=1)
+                foot = answer["points"].numpy().astype(float)
+                gap = np.linalg.norm(local[rows] - foot, axis=1)
                 closer = gap < distance[rows]
                 chosen = rows[closer]
                 distance[chosen], part_index[chosen] = gap[closer], k
-                nearest[chosen] = apply(model_from_part, found[closer])
+                nearest[chosen] = apply(model_from_part, foot[closer])
                 facing = answer["primitive_normals"].numpy()[closer].astype(float)
                 normal[chosen] = facing @ model_from_part[:3, :3].T
         return Nearest(distance, nearest, normal, part_index)
@@ -181,8 +181,8 @@ def alignment_error(
     With `normals` (N, 3, world) the distance is to surface that faces the same way (ModelSurface.closest).
     """
     turned = None if normals is None else normals @ placement.rotation
-    found = surface.closest(to_model(placement, points), placement.shape.joints, turned)
-    return placement.scale * float(np.sqrt(np.mean(found.distance**2)))
+    nearest = surface.closest(to_model(placement, points), placement.shape.joints, turned)
+    return placement.scale * float(np.sqrt(np.mean(nearest.distance**2)))
 
 
 def robust_error(
@@ -195,5 +195,5 @@ def robust_error(
     a plain mean of squares.
     """
     turned = None if normals is None else normals @ placement.rotation
-    found = surface.closest(to_model(placement, points), placement.shape.joints, turned)
-    return float(np.sqrt(np.mean(np.minimum(placement.scale * found.distance, truncation) ** 2)))
+    nearest = surface.closest(to_model(placement, points), placement.shape.joints, turned)
+    return float(np.sqrt(np.mean(np.minimum(placement.scale * nearest.distance, truncation) ** 2)))

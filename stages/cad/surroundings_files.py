@@ -25,7 +25,7 @@ def surroundings_of(panoptic_map: PanopticMap, pieces: list[Piece], parameters: 
     if not path.is_file() or not panoptic_map.path("mesh.ply").is_file():
         return None
     mesh = load_entity_mesh(panoptic_map.path("mesh.ply"))
-    (instance,) = read_arrays(path, "instance", hint="make the map again")
+    (instance,) = read_arrays(path, "instance", shapes=("V",), hint="make the map again")
     if len(instance) != len(mesh.vertices):
         raise BadInput(f"{path}: {len(instance)} labels for {len(mesh.vertices)} vertices", hint="make the map again")
     return nameless_surface(

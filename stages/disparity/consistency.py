@@ -30,11 +30,11 @@ def left_right_difference(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     the difference is infinite where one of the two is missing or the match lies outside of the picture.
     """
     width = left.shape[1]
-    known = np.isfinite(left)
-    column = np.rint(np.arange(width) - np.where(known, left, 0.0)).astype(np.int64)
-    inside = known & (column >= 0) & (column < width)
+    matched = np.isfinite(left)
+    column = np.rint(np.arange(width) - np.where(matched, left, 0.0)).astype(np.int64)
+    inside = matched & (column >= 0) & (column < width)
     back = np.take_along_axis(right, np.clip(column, 0, width - 1), axis=1)
-    difference = np.abs(np.where(known, left, 0.0) - back)
+    difference = np.abs(np.where(matched, left, 0.0) - back)
     return np.where(inside & np.isfinite(difference), difference, np.inf).astype(np.float32)
 
 

@@ -76,19 +76,19 @@ def check_eyes(
         if frame.color is not None and frame.right is not None:
             pairs.append(matched_features(gray_of(frame.color), gray_of(frame.right)))
     camera = reader.cameras[name]
-    found = check_rows(pairs, camera)
-    if found.checked and found.negative_share > SWAPPED:
+    rows = check_rows(pairs, camera)
+    if rows.checked and rows.negative_share > SWAPPED:
         raise BadInput(
-            f"{sequence.root}: left and right of {name!r} are swapped: {100 * found.negative_share:.0f} % of "
-            f"{found.matches} matched features lie further right in the right picture",
+            f"{sequence.root}: left and right of {name!r} are swapped: {100 * rows.negative_share:.0f} % of "
+            f"{rows.matches} matched features lie further right in the right picture",
             hint="exchange the two eyes (--color-topic and --right-topic, or the folders left/ and right/)",
         )
-    if found.checked and abs(found.median_disparity) < NO_PARALLAX:
+    if rows.checked and abs(rows.median_disparity) < NO_PARALLAX:
         logger.warning(
             "%s: %d matched features of %r have a median disparity of %.2f px: one picture twice, or nothing near",
-            sequence.root, found.matches, name, found.median_disparity,
+            sequence.root, rows.matches, name, rows.median_disparity,
         )  # fmt: skip
-    report = row_report(found, name, len(pairs), parameters)
+    report = row_report(rows, name, len(pairs), parameters)
     _tell(report, sequence, parameters, camera, logger)
     return report
 
@@ -100,26 +100,26 @@ def is_blank(picture: np.ndarray) -> bool:
     return bool(high - low < BLANK_SPAN)
 
 
-def row_report(found: RowCheck, name: str, frames: int, parameters: DisparityParameters) -> RowReport:
+def row_report(rows: RowCheck, name: str, frames: int, parameters: DisparityParameters) -> RowReport:
     """Return the record of a check, with the verdict under these parameters."""
-    if not found.checked:
-        return RowReport(camera=name, verdict="not_checked", frames=frames, matches=found.matches)
-    rectified = found.error <= parameters.largest_row_error
-    small = max(abs(found.pitch), abs(found.roll)) <= LARGEST_TURN
-    helped = found.corrected_error <= max(LEAST_GAIN * found.error, 0.0)
+    if not rows.checked:
+        return RowReport(camera=name, verdict="not_checked", frames=frames, matches=rows.matches)
+    rectified = rows.error <= parameters.largest_row_error
+    small = max(abs(rows.pitch), abs(rows.roll)) <= LARGEST_TURN
+    helped = rows.corrected_error <= max(LEAST_GAIN * rows.error, 0.0)
     fixed = not rectified and parameters.rectification == "correct" and small and helped
     return RowReport(
         camera=name,
         verdict="rectified" if rectified else "corrected" if fixed else "not_rectified",
         frames=frames,
-        matches=found.matches,
-        row_error=round(found.error, 3),
-        row_error_90=round(found.error_90, 3),
-        row_offset=round(found.offset, 3),
-        pitch=round(found.pitch, 7),
-        roll=round(found.roll, 7),
-        corrected_row_error=round(found.corrected_error, 3),
-        negative_share=round(found.negative_share, 3),
+        matches=rows.matches,
+        row_error=round(rows.error, 3),
+        row_error_90=round(rows.error_90, 3),
+        row_offset=round(rows.offset, 3),
+        pitch=round(rows.pitch, 7),
+        roll=round(rows.roll, 7),
+        corrected_row_error=round(rows.corrected_error, 3),
+        negative_share=round(rows.negative_share, 3),
     )
 
 

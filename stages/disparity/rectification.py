@@ -60,13 +60,13 @@ def matched_features(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, n
     detector = cv2.SIFT.create(nfeatures=FEATURES)
     points, descriptors = [], []
     for picture in (left, right):
-        found, described = detector.detectAndCompute(picture, None)
-        if described is None or len(found) < 2:
+        features, described = detector.detectAndCompute(picture, None)
+        if described is None or len(features) < 2:
             return np.zeros((0, 2)), np.zeros((0, 2))
-        points.append(np.array([point.pt for point in found]))
+        points.append(np.array([point.pt for point in features]))
         descriptors.append(described)
     matcher = cv2.BFMatcher(cv2.NORM_L2)
-    back = {found.queryIdx: found.trainIdx for found in matcher.match(descriptors[1], descriptors[0])}
+    back = {pair.queryIdx: pair.trainIdx for pair in matcher.match(descriptors[1], descriptors[0])}
     pairs = [
         (best.queryIdx, best.trainIdx)
         for best, second in matcher.knnMatch(descriptors[0], descriptors[1], k=2)

@@ -25,10 +25,10 @@ def search_range(left: np.ndarray, right: np.ndarray) -> tuple[int, int]:
     small = [shrunken(picture, factor) for picture in (left, right)]
     reach = int(LARGEST_SHARE * small[0].shape[1])
     levels = STEP * max(1, -(-reach // STEP))
-    found = small_disparities(small[0], small[1], levels)
-    if len(found) < 50:
+    disparities = small_disparities(small[0], small[1], levels)
+    if len(disparities) < 50:
         return 0, STEP * max(1, -(-int(LARGEST_SHARE * width) // STEP))
-    lowest, highest = np.quantile(found, [SHARE, 1 - SHARE]) * factor
+    lowest, highest = np.quantile(disparities, [SHARE, 1 - SHARE]) * factor
     margin = MARGIN * highest + 2 * factor
     low = max(0, int(np.floor(lowest - margin)))
     high = min(int(np.ceil(highest + margin)) + 1, int(LARGEST_SHARE * width) + STEP)
@@ -40,10 +40,12 @@ def usual_range(left: np.ndarray, right: np.ndarray) -> tuple[float, float]:
     show, (0, 0) without any: where most of the pair lies, while `search_range` holds what is rare too."""
     factor = max(1, -(-left.shape[1] // SMALL_WIDTH))
     small = [shrunken(picture, factor) for picture in (left, right)]
-    found = small_disparities(small[0], small[1], STEP * max(1, -(-int(LARGEST_SHARE * small[0].shape[1]) // STEP)))
-    if len(found) < 50:
+    disparities = small_disparities(
+        small[0], small[1], STEP * max(1, -(-int(LARGEST_SHARE * small[0].shape[1]) // STEP))
+    )
+    if len(disparities) < 50:
         return 0.0, 0.0
-    low, high = np.percentile(found, [3, 97]) * factor
+    low, high = np.percentile(disparities, [3, 97]) * factor
     return float(low), float(high)
 
 

@@ -87,9 +87,7 @@ def mirrored(picture: np.ndarray) -> np.ndarray:
 def directed(left: np.ndarray, right: np.ndarray, settings: SemiGlobalSettings, low: int, levels: int) -> np.ndarray:
     """Return disparities (H, W) float32 [px] of the left picture, NaN where the matcher has none."""
     area = settings.block_size**2
-    modes = {
-        "low": cv2.StereoSGBM_MODE_SGBM_3WAY, "medium": cv2.StereoSGBM_MODE_HH4, "high": cv2.StereoSGBM_MODE_HH
-    }  # fmt: skip
+    modes = {"low": cv2.StereoSGBM_MODE_SGBM_3WAY, "medium": cv2.StereoSGBM_MODE_HH4, "high": cv2.StereoSGBM_MODE_HH}
     matcher = cv2.StereoSGBM.create(
         minDisparity=low, numDisparities=levels, blockSize=settings.block_size, P1=settings.small_penalty * area,
         P2=settings.large_penalty * area, disp12MaxDiff=-1, preFilterCap=settings.filter_cap,
@@ -103,9 +101,9 @@ def directed(left: np.ndarray, right: np.ndarray, settings: SemiGlobalSettings, 
 
 def without_speckles(disparity: np.ndarray, settings: SemiGlobalSettings) -> np.ndarray:
     """Return disparities (H, W) float32 without islands smaller than the settings allow."""
-    known = np.isfinite(disparity)
+    matched = np.isfinite(disparity)
     if settings.speckle_size == 0:
         return disparity
-    fixed = np.where(known, np.rint(16 * np.where(known, disparity, 0.0)), -16).astype(np.int16)
+    fixed = np.where(matched, np.rint(16 * np.where(matched, disparity, 0.0)), -16).astype(np.int16)
     cv2.filterSpeckles(fixed, -16, settings.speckle_size, 16 * settings.speckle_range)
     return np.where(fixed >= 0, disparity, np.nan).astype(np.float32)

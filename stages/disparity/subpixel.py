@@ -35,9 +35,9 @@ def unlocked(disparity: np.ndarray) -> np.ndarray:
 def smoothed(disparity: np.ndarray) -> np.ndarray:
     """Return disparities (H, W) float32 averaged with near ones of the same surface (a bilateral filter on the
     disparity itself); holes stay holes and add nothing, steps stay steps."""
-    known = np.isfinite(disparity)
-    if not known.any():
+    matched = np.isfinite(disparity)
+    if not matched.any():
         return disparity
-    filled = np.where(known, disparity, disparity[known].min() - FAR_OFF).astype(np.float32)
+    filled = np.where(matched, disparity, disparity[matched].min() - FAR_OFF).astype(np.float32)
     result = cv2.bilateralFilter(filled, REACH, SAME_SURFACE, REACH / 2, borderType=cv2.BORDER_REPLICATE)
-    return np.where(known, result, np.nan).astype(np.float32)
+    return np.where(matched, result, np.nan).astype(np.float32)

@@ -6,14 +6,17 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from schemas.errors import BadInput
 from stages.engine.interruption import PARENT_VARIABLE
-from stages.engine.pipelines import Pipeline, resolve_variables, step_arguments
+from stages.engine.pipelines import Pipeline, Step, resolve_variables, step_arguments
 
+OUTCOME_EXIT_CODE = 4
+"""An artifact was written, but its outcome is not ok."""
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 
@@ -24,6 +27,14 @@ class StepReport:
     name: str
     exit_code: int
     facts: dict[str, Any]
+
+    def code(self, accept: Collection[str] = ()) -> int:
+        """Return its exit code; 4 where it ended with 0 because the pipeline goes on after an outcome that is neither
+        ok nor one of `accept`."""
+        outcome = self.facts.get("outcome", "ok")
+        if self.exit_code == 0 and outcome not in ("ok", "unknown", *accept):
+            return OUTCOME_EXIT_CODE
+        return self.exit_code
 
 
 def command_prefix() -> list[str]:
@@ -57,7 +68,10 @@ def run_pipeline(
     """Run the steps in order and stop at the first that does not exit with 0.
 
     `extra` words are added to every command (`--dry-run`, `--force`). A dry run stops at the first step that would
-    run, as what follows depends on its result. Raises UsageError for unknown or missing variables.
+    run, as what follows depends on its result.
+
+    Raises UsageError for unknown or missing variables, BadInput after a step whose artifact lacks what the pipeline
+    needs of it.
     """
     values = resolve_variables(pipeline, given)
     reports = []
@@ -71,6 +85,15 @@ def run_pipeline(
         except json.JSONDecodeError:
             facts = {}
         reports.append(StepReport(step.name, code, facts))
+        if code == 0:
+            _check_needs(step, facts)
         if code != 0 or facts.get("status") == "would run":
             break
     return reports
+
+
+def _check_needs(step: Step, facts: Mapping[str, Any]) -> None:
+    summary = facts.get("summary", {})
+    for name, remedy in step.needs.items():
+        if summary.get(name, 1) == 0:
+            raise BadInput(f"{step.name}: {name} is 0", hint=remedy)

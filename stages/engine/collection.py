@@ -27,12 +27,15 @@ from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
 from stages.engine import store
 from stages.engine.discovery import all_stages
 from stages.engine.keys import artifact_key
-from stages.engine.reading import read_manifest
+from stages.engine.reading import input_place, read_manifest
 from stages.kit.digests import external_digest
 
 Category = Literal["leftover", "superseded", "intermediate", "result"]
 LEFTOVER = re.compile(r"\.(?P<target>.+)\.(?:partial-\d+-[0-9a-f]{8}|old-[0-9a-f]{8}|journal)")
 """Names that `store` gives to what must not outlive a run."""
+
+LONGEST_REASON = 300
+"""Letters after which the way to the first cause is no longer told."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,10 @@ class _Artifact:
     inputs: list[tuple[InputRecord, Path, Path | None]] = field(default_factory=list)
     """Record, path, and the surveyed artifact that the path is or lies in."""
     users: set[Path] = field(default_factory=set)
+    odd: str = ""
+    """Why nothing can be said about how it would be made again; empty for what a step wrote."""
+    stale: str = ""
+    """Why it is not what its inputs would give today; empty when it is."""
     ours: bool = True
     """Whether it is within the folders asked about; others only count as users."""
 
@@ -75,9 +82,9 @@ def survey(
     unknown = sorted(set(keep) - set(KINDS))
     if unknown:
         raise BadInput(f"no kind {unknown[0]!r}", hint=f"kinds: {', '.join(sorted(KINDS))}")
-    roots = [Path(path).resolve() for path in paths]
+    roots = [Path(os.path.realpath(path)) for path in paths]
     for root in roots:
-        if not root.is_dir():
+        if not os.path.isdir(root):
             raise BadInput(f"{root}: no such folder", hint="give run folders, or a folder of runs")
     leftovers, folders = _find(roots)
     artifacts = _read_artifacts(folders, roots)
@@ -103,7 +110,7 @@ def collect(items: Iterable[Item]) -> tuple[list[Item], list[Item]]:
             else:
                 _remove(item)
             gone.append(item)
-        except (ScenewrightError, OSError) as error:
+        except (ScenewrightError, OSError, RecursionError) as error:
             stayed.append(replace(item, collectable=False, reason=str(error)))
     return gone, stayed
 
@@ -147,11 +154,16 @@ def _read_artifacts(folders: set[Path], roots: list[Path]) -> dict[Path, _Artifa
             continue  # torn, or not ours: nothing is known of it, so nothing is done to it
     for artifact in artifacts.values():
         for record in artifact.manifest.inputs:
-            path = (artifact.path / record.path).resolve()
+            try:
+                path = input_place(artifact.path, record.path)
+            except BadInput as error:
+                artifact.odd = str(error)
+                continue
             owner = next((place for place in (path, *path.parents) if place in artifacts), None)
             artifact.inputs.append((record, path, owner))
             if owner is not None:
                 artifacts[owner].users.add(artifact.path)
+    _follow_inputs(artifacts)
     return artifacts
 
 
@@ -180,7 +192,7 @@ def folder_bytes(path: Path) -> int:
 def is_locked(target: Path) -> bool:
     """Whether a run holds the lock of a target now."""
     try:
-        descriptor = os.open(target.with_name(f".{target.name}.lock"), os.O_RDONLY)
+        descriptor = os.open(target.with_name(f".{target.name}.lock"), os.O_RDONLY | os.O_NONBLOCK)
     except OSError:
         return False
     try:
@@ -218,9 +230,10 @@ def _classified(
     artifact = artifacts[path]
     manifest = artifact.manifest
     item = Item(path, "result", manifest.kind, folder_bytes(path), "nothing else reads it", key=manifest.key)
-    stale = _superseded_by(path, artifacts)
-    if stale:
-        item = replace(item, category="superseded", reason=stale, collectable=superseded)
+    if artifact.odd:
+        item = replace(item, reason=artifact.odd)
+    elif artifact.stale:
+        item = replace(item, category="superseded", reason=artifact.stale, collectable=superseded)
     elif artifact.users:
         missing = _cannot_be_remade(artifact)
         readers = ", ".join(sorted({user.name for user in artifact.users}))
@@ -236,23 +249,58 @@ def _classified(
     return item
 
 
-def _superseded_by(path: Path, artifacts: dict[Path, _Artifact], above: tuple[Path, ...] = ()) -> str:
-    """Why an artifact is not what its inputs would give today; empty when it is."""
-    for record, place, owner in artifacts[path].inputs:
-        if owner is None or owner in above:
+def _follow_inputs(artifacts: dict[Path, _Artifact]) -> None:
+    """Note of every artifact whether it is stale or odd, inputs before what was made from them, each once."""
+    external: dict[Path, str] = {}
+    done: set[Path] = set()
+    for first in sorted(artifacts):
+        path = {} if first in done else {first: iter(artifacts[first].inputs)}
+        while path:
+            current, rest = next(reversed(path.items()))
+            artifact = artifacts[current]
+            for _, _, owner in rest:
+                if owner is None:
+                    continue
+                if owner in path:
+                    artifact.odd = artifact.odd or f"its inputs lead in a circle, by {owner.name}"
+                    continue
+                if owner not in done:
+                    path[owner] = iter(artifacts[owner].inputs)
+                    break
+            else:
+                _note_inputs(artifact, artifacts, external)
+                done.add(current)
+                del path[current]
+
+
+def _note_inputs(artifact: _Artifact, artifacts: dict[Path, _Artifact], external: dict[Path, str]) -> None:
+    """Note what the inputs of an artifact, which have been noted before, say about it."""
+    for record, place, owner in artifact.inputs:
+        if owner is None or owner == artifact.path:
             continue
-        if _digest_now(record, place, artifacts[owner]) != record.digest:
-            return f"{owner.name} was made again with another result since"
-        reason = _superseded_by(owner, artifacts, (*above, path))
-        if reason:
-            return f"made from {owner.name}: {reason}"
-    return ""
+        made = artifacts[owner]
+        if made.odd and not artifact.odd:
+            artifact.odd = _made_from(owner, made.odd)
+        if artifact.stale:
+            continue
+        if _digest_now(record, place, made, external) != record.digest:
+            artifact.stale = f"{owner.name} was made again with another result since"
+        elif made.stale:
+            artifact.stale = _made_from(owner, made.stale)
 
 
-def _digest_now(record: InputRecord, place: Path, owner: _Artifact) -> str | None:
+def _made_from(owner: Path, reason: str) -> str:
+    return f"made from {owner.name}: {reason}" if len(reason) < LONGEST_REASON else reason
+
+
+def _digest_now(record: InputRecord, place: Path, owner: _Artifact, external: dict[Path, str]) -> str | None:
     """Digest of an input as its artifact states it now; None when it is no longer there."""
     if place == owner.path:
-        return owner.manifest.content_digest if record.kind != "external" else external_digest(place)
+        if record.kind != "external":
+            return owner.manifest.content_digest
+        if place not in external:
+            external[place] = external_digest(place)
+        return external[place]
     name = place.relative_to(owner.path).as_posix()
     known = {file.path: file.sha256 for file in owner.manifest.files}
     return known.get(name, record.digest if place.is_dir() else None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -111,7 +112,7 @@ def compare(first: Path, second: Path) -> list[ArtifactComparison]:
     """
     first, second = Path(first), Path(second)
     for path in (first, second):
-        if not path.is_dir():
+        if not os.path.isdir(path):
             raise BadInput(f"{path}: no such folder", hint="give two run folders, or two artifact folders")
     if is_artifact(first) and is_artifact(second):
         name = first.name if first.name == second.name else f"{first.name} | {second.name}"

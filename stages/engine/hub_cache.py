@@ -9,13 +9,24 @@ import os
 import re
 from pathlib import Path
 
-from schemas.errors import MissingDependency
+from schemas.errors import BadInput, MachineFailure, MissingDependency
+from schemas.outside import file_text
 
 HUB_ID = re.compile(
     r"(?P<model>[A-Za-z0-9][\w.-]{0,95}/[A-Za-z0-9][\w.-]{0,95})(@(?P<revision>\w[\w.-]*(/\w[\w.-]*)*))?", re.ASCII
 )
 """`organisation/model`, or `organisation/model@revision` (a branch, tag, commit or `refs/pr/N`)."""
+LONGEST_REFERENCE = 4096
+"""Bytes of a file that names a commit."""
 FILE_ENDINGS = frozenset({".onnx", ".safetensors", ".pt", ".pth", ".bin", ".toml", ".txt", ".json"})
+
+
+def home_folder() -> Path:
+    """Return the home folder. Raises MachineFailure where there is none."""
+    try:
+        return Path.home()
+    except RuntimeError:
+        raise MachineFailure("no home folder is known", hint="set HOME") from None
 
 
 def hub_folder() -> Path:
@@ -24,7 +35,7 @@ def hub_folder() -> Path:
     if given:
         return Path(given)
     home = os.environ.get("HF_HOME")
-    return (Path(home) if home else Path.home() / ".cache" / "huggingface") / "hub"
+    return (Path(home) if home else home_folder() / ".cache" / "huggingface") / "hub"
 
 
 def is_hub_id(name: str) -> bool:
@@ -39,8 +50,8 @@ def find_in_hub_cache(name: str) -> Path:
     model, revision = match["model"], match["revision"] or "main"
     root = hub_folder() / f"models--{model.replace('/', '--')}"
     try:
-        commit = (root / "refs" / revision).read_text(encoding="ascii").strip()
-    except (OSError, ValueError):
+        commit = file_text(root / "refs" / revision, LONGEST_REFERENCE).strip()
+    except BadInput:
         commit = revision
     folder = root / "snapshots" / commit
     if re.fullmatch(r"[\w.-]+", commit, re.ASCII) and commit not in (".", "..") and folder.is_dir():

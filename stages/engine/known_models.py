@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from pathlib import Path
 
@@ -31,7 +32,7 @@ def known_models() -> tuple[KnownModel, ...]:
 
 def identify(path: Path) -> KnownModel:
     """Return the known network whose checksum a file has. Raises BadInput when it is none of them."""
-    if not Path(path).is_file():
+    if not os.path.isfile(path):
         raise BadInput(f"{path}: no such file", hint="see: scenewright models")
     digest = sha256_of_file(path)
     for model in known_models():

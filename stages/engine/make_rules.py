@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 
+from stages.engine.given_inputs import given_inputs
 from stages.engine.pipelines import Pipeline, Step, step_arguments
 
 _VARIABLE = re.compile(r"^\$([a-z_]+)$")
@@ -47,14 +48,23 @@ def makefile_for(pipeline: Pipeline) -> str:
             lines.append(f"{upper} ?= {variable.default}")
         elif not variable.optional:
             lines.append(f"$(if $({upper}),,$(error {pipeline.name} needs {upper}=... ({variable.description})))")
+    raw = dict(given_inputs(pipeline))
+    for given, what in raw.items():
+        if not what.weights:  # those may be the name of cached ones
+            reference = f"$({given.upper()})"
+            missing = f"$(error {given.upper()}={reference}: no such file or folder)"
+            lines.append(f"$(if {reference},$(if $(wildcard {reference}),,{missing}))")
     lines += [".PHONY: all", "all: " + " ".join(f"$(FOLDER)/{step.name}/manifest.json" for step in pipeline.step), ""]
     for step in pipeline.step:
         prerequisites = [specification]
         for source in step.inputs.values():
             match = _VARIABLE.match(source)
-            prerequisites.append(
-                f"$({match[1].upper()})" if match else f"$(FOLDER)/{source.split('/')[0]}/manifest.json"
-            )
+            if match and raw[match[1]].weights:
+                prerequisites.append(f"$(wildcard $({match[1].upper()}))")
+            elif match:
+                prerequisites.append(f"$({match[1].upper()})")
+            else:
+                prerequisites.append(f"$(FOLDER)/{source.split('/')[0]}/manifest.json")
         lines.append(f"$(FOLDER)/{step.name}/manifest.json: {' '.join(dict.fromkeys(prerequisites))}")
         lines.append(f"\t$(PYTHON) -m cli {_recipe(step, pipeline)}")
         lines.append("")

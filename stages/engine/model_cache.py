@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from schemas.errors import BadInput, MachineFailure, MissingDependency
-from stages.engine.hub_cache import find_in_hub_cache, is_hub_id
+from stages.engine.hub_cache import find_in_hub_cache, home_folder, is_hub_id
 from stages.engine.known_models import KnownModel, known_models
 from stages.engine.store import sync_folder
 from stages.kit.digests import sha256_of_file
@@ -43,7 +43,7 @@ def cache_folder() -> Path:
     given = os.environ.get(ENVIRONMENT)
     if given:
         return Path(given)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "scenewright" / "models"
+    return Path(os.environ.get("XDG_CACHE_HOME") or home_folder() / ".cache") / "scenewright" / "models"
 
 
 def cached_models() -> tuple[CachedModel, ...]:
@@ -67,7 +67,7 @@ def add_model(path: Path) -> CachedModel:
     folder cannot be written.
     """
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise BadInput(f"{path}: no such file", hint="give a weight file")
     digest = sha256_of_file(path)
     for model in known_models():
@@ -109,7 +109,7 @@ def resolve_weights(path: Path) -> Path:
     BadInput when several have the name or the cached file is damaged.
     """
     path = Path(path)
-    if path.is_file() or path.is_dir():
+    if os.path.isfile(path) or os.path.isdir(path):
         return path
     name = str(path)
     cached = cached_models()
@@ -117,7 +117,7 @@ def resolve_weights(path: Path) -> Path:
     if not found:
         if is_hub_id(name):
             return find_in_hub_cache(name)
-        listed = next((model for model in known_models() if name in (model.name, model.file)), None)
+        listed = next((model for model in known_models() if path.name in (model.name, model.file)), None)
         if listed is not None:
             hint = f"get {listed.file} from {listed.source}, then: scenewright models --add {listed.file}"
             raise MissingDependency(f"{name}: not in the cache {cache_folder()}", hint=hint)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,6 +17,7 @@ from stages.kit.stage import Stage
 
 PIPELINES_FOLDER = Path(__file__).resolve().parents[2] / "data" / "pipelines"
 _VARIABLE = re.compile(r"^\$([a-z_]+)$")
+SHARED_FOLDER = ".shared"
 _NAME = re.compile(r"^[a-z][a-z0-9_]*$")
 
 
@@ -42,6 +44,11 @@ class Step(BaseModel):
     """Parameter -> value, or `$variable`."""
     seed: int | str | None = None
     accept: tuple[str, ...] = ()
+    """Outcomes after which the chain goes on; `run` ends with 4 all the same, unless its user accepts them too."""
+    shared: bool = False
+    """Taken from the folder `.shared` beside the run folder where another run has made the same."""
+    needs: dict[str, str] = {}
+    """Entry of the artifact's summary -> what to do when it is 0: `run` then stops with 3 after this step."""
 
 
 class Pipeline(BaseModel):
@@ -57,10 +64,12 @@ class Pipeline(BaseModel):
 def pipeline_path(name_or_path: str) -> Path:
     """Return the file of a pipeline given by name (data/pipelines) or by path. Raises UsageError."""
     for candidate in (Path(name_or_path), PIPELINES_FOLDER / f"{name_or_path}.toml"):
-        if candidate.is_file():
+        if os.path.isfile(candidate):
             return candidate
     known = ", ".join(sorted(p.stem for p in PIPELINES_FOLDER.glob("*.toml")))
-    raise UsageError(f"no pipeline {name_or_path!r}", hint=f"give a TOML file or one of: {known}")
+    if os.path.exists(name_or_path):
+        raise UsageError(f"{name_or_path}: not a regular file", hint="a pipeline is a TOML file")
+    raise UsageError(f"no pipeline {name_or_path!r:.200}", hint=f"give a TOML file or one of: {known}")
 
 
 def read_pipeline(path: Path) -> Pipeline:
@@ -98,6 +107,8 @@ def _check_step(path: Path, pipeline: Pipeline, step: Step, stage: Stage, done: 
             raise UsageError(f"{where}: {stage.name} has no input {role!r}", hint=f"inputs: {', '.join(stage.reads)}")
         if not _VARIABLE.match(source) and source.split("/")[0] not in done:
             raise UsageError(f"{where}: input {role!r} comes from {source!r}, which is no earlier step", hint="reorder")
+    if step.shared and step.inputs:
+        raise UsageError(f"{where}: a shared step has no inputs", hint="leave `shared` out")
     missing = [role for role in stage.required() if role not in step.inputs]
     if missing:
         raise UsageError(f"{where}: input {missing[0]!r} is missing", hint=f"{stage.name} needs it")
@@ -137,6 +148,8 @@ def step_arguments(step: Step, run_folder: str, values: Mapping[str, str | None]
         arguments += _option("seed", values[match[1]] if match else step.seed)
     for outcome in step.accept:
         arguments += ["--accept", outcome]
+    if step.shared:
+        arguments += ["--shared", f"{run_folder}/../{SHARED_FOLDER}"]
     return [*arguments, "--out", f"{run_folder}/{step.name}"]
 
 

@@ -24,14 +24,27 @@ def read_manifest(root: Path) -> Manifest:
         path = root / MANIFEST_NAME
         if not path.exists():
             raise BadInput(f"{root}: not an artifact (no {MANIFEST_NAME})", hint="give the folder that a step wrote")
-        if path.stat().st_size > LARGEST_MANIFEST:
-            raise BadInput(f"{path}: {path.stat().st_size} bytes are no manifest", hint="make the artifact again")
-        manifest = Manifest.read(path)
-    except (OSError, ValueError) as error:  # no permission, a name too long or with a zero byte, a loop of links
+        manifest = Manifest.read(path, largest=LARGEST_MANIFEST)
+    except (OSError, ValueError, RuntimeError) as error:  # no permission, too long, with a zero byte, a loop of links
         raise BadInput(f"{root}: {getattr(error, 'strerror', None) or error}", hint="give an artifact folder") from None
     if manifest.format_version > FORMAT_VERSION:
         raise BadInput(f"{root}: written by a newer scenewright", hint="upgrade scenewright")
     return manifest
+
+
+def input_place(root: Path, path: str) -> Path:
+    """Return where an input stood that the manifest at `root` names. Raises BadInput for what can be no place."""
+    try:
+        place = (root / path).resolve()
+        os.stat(place)
+    except (FileNotFoundError, NotADirectoryError):
+        pass  # no longer there, which is no fault
+    except (OSError, ValueError, RuntimeError) as error:  # too long, a zero byte, a loop of links
+        reason = getattr(error, "strerror", None) or "a loop of links"
+        raise BadInput(f"{root}: input {path!r:.80}: {reason}", hint="make the artifact again") from None
+    if place == Path(root).resolve():
+        raise BadInput(f"{root}: names itself as its input", hint="make the artifact again")
+    return place
 
 
 def check_version(root: Path, manifest: Manifest) -> type[Artifact]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from schemas.errors import BadInput
@@ -12,12 +13,12 @@ from stages.engine.store import complete_interrupted
 def is_artifact(folder: Path) -> bool:
     """Whether a folder holds a manifest; an interrupted replacement of it is completed first."""
     complete_interrupted(folder)
-    return (folder / MANIFEST_NAME).is_file()
+    return os.path.isfile(folder / MANIFEST_NAME)
 
 
 def artifacts_of(run: Path) -> dict[str, Path]:
     """Return name -> folder of the artifacts directly in a run folder, by name. Raises BadInput when there are none."""
-    if not run.is_dir():
+    if not os.path.isdir(run):
         raise BadInput(f"{run}: no such run folder", hint="give the --out of `scenewright run`")
     found = {
         entry.name: entry

@@ -17,8 +17,8 @@ from typing import Any, Literal
 
 from schemas.artifact import Artifact
 from schemas.errors import BadInput, MachineFailure, MissingDependency, ScenewrightError, UsageError
-from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
-from stages.engine import estimation, interruption, memory_limit, store
+from schemas.manifest import LONGEST_PATH, MANIFEST_NAME, InputRecord, Manifest
+from stages.engine import estimation, interruption, memory_limit, shared_artifacts, store
 from stages.engine.digests import content_digest, record_files
 from stages.engine.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
 from stages.engine.model_cache import resolve_weights
@@ -32,11 +32,15 @@ from stages.kit.stage import Context, External, Optionally, Parameters, Stage
 logger = logging.getLogger("scenewright")
 
 
+Status = Literal["made", "taken", "up to date", "would run"]
+"""`taken`: copied from the folder that runs share, where the same key had been made before."""
+
+
 @dataclass(frozen=True)
 class RunResult:
     """What came of a run."""
 
-    status: Literal["made", "up to date", "would run"]
+    status: Status
     reason: str
     """Why it ran, or would."""
     path: Path
@@ -64,6 +68,10 @@ OUT_OF_MEMORY = re.compile(
     re.IGNORECASE,
 )
 
+NO_CODE_CACHE = "cannot cache function"
+"""How numba begins what it says when every folder for it is read-only."""
+NO_CODE_CACHE_TEXT = "compiled code can be kept nowhere, neither beside the program nor in a home folder"
+NO_CODE_CACHE_HINT = "set NUMBA_CACHE_DIR to a folder that can be written"
 
 Stamp = tuple[tuple[str, int, int, int], ...]
 """Path, inode, time of change [ns] and size of files: what differs once one is replaced or written to."""
@@ -187,7 +195,7 @@ def _open_inputs(stage: Stage, paths: Mapping[str, Path]) -> list[_OpenInput]:
 def _reason_to_run(out: Path, key: str, manifest: Manifest | None, force: bool, changed: list[str]) -> str | None:
     """Why the step has to run, or None when the artifact on disk is what it would make."""
     if manifest is None:
-        return f"{out} does not exist"
+        return "nothing is made yet"
     if manifest.key != key:
         return f"changed: {', '.join(changed) or 'key format'}"
     if force:
@@ -239,6 +247,8 @@ def _machine_errors(out: Path) -> Iterator[None]:
     except ScenewrightError:
         raise
     except Exception as error:  # native libraries say it in words of their own
+        if NO_CODE_CACHE in str(error):
+            raise MachineFailure(NO_CODE_CACHE_TEXT, hint=NO_CODE_CACHE_HINT) from error
         if isinstance(error, MemoryError) or OUT_OF_MEMORY.search(str(error)):
             raise MachineFailure(f"{out}: out of memory", hint="use fewer frames or larger voxels") from error
         raise
@@ -257,15 +267,19 @@ def run_stage(
     progress: SilentProgress | None = None,
     command: tuple[str, ...] = (),
     max_memory: int | None = None,
+    shared: Path | None = None,
 ) -> RunResult:
     """Make the artifact at `out`, unless it is there already (docs/ARCHITECTURE.md, the stage contract).
 
-    The step is stopped when its resident memory passes `max_memory` [bytes], in the main thread only.
+    The step is stopped when its resident memory passes `max_memory` [bytes], in the main thread only. An artifact of
+    the same key in the folder `shared` is copied instead of made (not with `force`), and what is made is kept there.
     Raises BadInput, UsageError, MissingDependency or MachineFailure; whatever stood at `out` is then untouched.
     """
     out = _resolved(out)
     if stage.check is not None:
         stage.check(parameters, inputs)
+    if shared is not None and inputs:
+        raise UsageError(f"{stage.name}: --shared is for steps without inputs", hint="leave it out")
     opened = _open_inputs(stage, inputs)
     device = choose_device(device) if device != "cpu" else device
     digests = {item.role: item.digest for item in opened}
@@ -287,7 +301,7 @@ def run_stage(
     if dry_run:
         previous = _previous_manifest(out)
         reason = _reason_to_run(out, key, previous, force, _what_changed(previous, facts) if previous else [])
-        status: Literal["up to date", "would run"] = "up to date" if reason is None else "would run"
+        status: Status = "up to date" if reason is None else "would run"
         expected = estimation.estimate_step(stage, parameters, inputs) if reason is not None else None
         return RunResult(status, reason or "", out, key, previous if reason is None else None, estimate=expected)
 
@@ -296,7 +310,13 @@ def run_stage(
         reason = _reason_to_run(out, key, previous, force, _what_changed(previous, facts) if previous else [])
         if reason is None:
             return RunResult("up to date", "", out, key, previous)
-        logger.info("%s: %s", stage.name, reason)
+        if shared is not None and not force:
+            with store.partial_folder(out) as partial:
+                manifest = shared_artifacts.take(shared, stage, key, partial)
+                if manifest is not None:
+                    store.take_place(partial, out)
+                    return RunResult("taken", f"made before, kept in {shared}", out, key, manifest)
+        logger.info("%s: %s (%s)", stage.name, stage.summary, reason)
         estimation.warn_or_refuse(stage.name, estimation.estimate_step(stage, parameters, inputs), out)
         started = datetime.now(UTC)
         progress = progress or SilentProgress()
@@ -318,8 +338,7 @@ def run_stage(
                 content_digest=content_digest(records),
                 files=records,
                 inputs=tuple(
-                    InputRecord(role=i.role, kind=i.kind, digest=i.digest, path=os.path.relpath(i.path, out))
-                    for i in opened
+                    InputRecord(role=i.role, kind=i.kind, digest=i.digest, path=_path_from(i.path, out)) for i in opened
                 ),
                 parameters=facts["parameters"],
                 seed=seed,
@@ -333,12 +352,20 @@ def run_stage(
             manifest.write(partial / MANIFEST_NAME)
             interruption.raise_if_requested()
             store.take_place(partial, out)
+        if shared is not None:
+            shared_artifacts.keep(shared, stage, key, out)
     nondeterministic = (
         previous is not None and previous.key == key and previous.content_digest != manifest.content_digest
     )
     if nondeterministic:
         logger.warning("%s: the same key gave other bytes than before: this step is not deterministic", stage.name)
     return RunResult("made", reason, out, key, manifest, nondeterministic)
+
+
+def _path_from(path: Path, out: Path) -> str:
+    """Return how a manifest at `out` names an input: from there, or from the root where that were too long."""
+    relative = os.path.relpath(path, out)
+    return relative if len(relative) <= LONGEST_PATH else os.path.abspath(path)
 
 
 def _work(stage: Stage, opened: list[_OpenInput], parameters: Parameters, context: Context) -> Artifact:

@@ -20,9 +20,12 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from schemas.errors import MachineFailure, UsageError
+from schemas.errors import BadInput, MachineFailure, UsageError
 from schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME
+from schemas.outside import file_content, json_of
 
+LARGEST_JOURNAL = 2**20
+"""Bytes."""
 AT_FDCWD = -100
 RENAME_EXCHANGE = 2
 TIMINGS_NAME = "timings.json"
@@ -31,6 +34,11 @@ TIMINGS_NAME = "timings.json"
 
 def _beside(target: Path, suffix: str) -> Path:
     return target.with_name(f".{target.name}.{suffix}")
+
+
+def _ours(target: Path) -> re.Pattern[str]:
+    """Names of what a run leaves beside its target, letter by letter: it may be called `run[1]` or `*`."""
+    return re.compile(re.escape(f".{target.name}.") + r"(partial-\d+|old)-[0-9a-f]{8}")
 
 
 def sync_folder(path: Path) -> None:
@@ -87,12 +95,15 @@ def _journalled_replace(partial: Path, target: Path) -> None:
 def recover(target: Path) -> None:
     """Complete or undo a replacement that a kill interrupted. Call with the lock held."""
     journal = _beside(target, "journal")
-    try:
-        plan = json.loads(journal.read_text())
-        partial, old = (target.with_name(plan[role]) for role in ("partial", "old"))
-    except FileNotFoundError:
+    if not os.path.lexists(journal):
         return
-    except (ValueError, TypeError, KeyError, RecursionError):
+    text = file_content(journal, LARGEST_JOURNAL, hint="no journal of ours; move it away")
+    try:
+        plan = json_of(text, str(journal))
+        if not all(_ours(target).fullmatch(plan[role]) for role in ("partial", "old")):
+            raise ValueError("names what is not ours")
+        partial, old = (target.with_name(plan[role]) for role in ("partial", "old"))
+    except (BadInput, ValueError, TypeError, KeyError):
         journal.unlink()  # killed while writing it: nothing had been renamed yet
         return
     if not target.exists():
@@ -106,8 +117,7 @@ def recover(target: Path) -> None:
 
 def sweep(target: Path) -> None:
     """Remove what killed runs left beside `target`. Call with the lock held: only its holder owns such folders."""
-    # Compared letter by letter instead of by glob: a target may be called `run[1]` or `*`.
-    ours = re.compile(re.escape(f".{target.name}.") + r"(partial-\d+|old)-[0-9a-f]{8}")
+    ours = _ours(target)
     with contextlib.suppress(OSError):
         for leftover in [entry.path for entry in os.scandir(target.parent) if ours.fullmatch(entry.name)]:
             shutil.rmtree(leftover, ignore_errors=True)
@@ -138,7 +148,7 @@ def locked(target: Path) -> Iterator[None]:
 
 def complete_interrupted(target: Path) -> None:
     """For readers: complete an interrupted replacement, if there is one and nobody is at it."""
-    if _beside(target, "journal").exists():
+    if target.name and os.path.exists(_beside(target, "journal")):
         with contextlib.suppress(MachineFailure, OSError), locked(target):  # a reader may not be allowed to
             pass
 
@@ -162,11 +172,9 @@ def check_target(target: Path, kind: str) -> None:
 
 def _kind_on_disk(manifest: Path) -> str | None:
     """Return the kind that a manifest states, or None when it is torn."""
-    if manifest.stat().st_size > LARGEST_MANIFEST:
-        return None
     try:
-        return str(json.loads(manifest.read_bytes())["kind"])
-    except (ValueError, TypeError, KeyError, RecursionError, IsADirectoryError):
+        return str(json_of(file_content(manifest, LARGEST_MANIFEST), str(manifest))["kind"])
+    except (BadInput, TypeError, KeyError):
         return None
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from schemas.errors import BadInput, ScenewrightError
-from schemas.manifest import MANIFEST_NAME, Manifest
+from schemas.manifest import MANIFEST_NAME, InputRecord, Manifest
 from stages.engine.digests import content_digest, payload_files
-from stages.engine.reading import check_sizes, check_version, read_manifest
+from stages.engine.reading import check_sizes, check_version, input_place, read_manifest
 from stages.engine.store import TIMINGS_NAME
 from stages.kit.digests import external_digest, sha256_of_file
 
@@ -50,46 +50,114 @@ def _check_models(root: Path, manifest: Manifest) -> list[str]:
     return problems
 
 
+@dataclass
+class _Visit:
+    """An artifact whose inputs are being followed."""
+
+    root: Path
+    manifest: Manifest
+    problems: list[str]
+    notes: list[str] = field(default_factory=list)
+    followed: int = 0
+    """How many of its inputs have been."""
+
+    def finding(self) -> Finding:
+        return Finding(self.root, self.manifest.kind, tuple(self.problems), tuple(self.notes))
+
+
+class _Digests:
+    """Digests of what inputs name, each taken once: many artifacts read the same log."""
+
+    def __init__(self) -> None:
+        self._external: dict[Path, str] = {}
+        self._content: dict[Path, str] = {}
+
+    def external(self, place: Path) -> str:
+        """Return the digest of a raw file or folder. Raises BadInput."""
+        if place not in self._external:
+            self._external[place] = external_digest(place)
+        return self._external[place]
+
+    def content(self, place: Path) -> str:
+        """Return the content digest that an artifact states. Raises ScenewrightError."""
+        if place not in self._content:
+            self._content[place] = read_manifest(place).content_digest
+        return self._content[place]
+
+
 def verify(root: Path, seen: dict[Path, Finding] | None = None) -> list[Finding]:
-    """Re-hash an artifact and follow its inputs back to the log. Returns one finding per artifact reached."""
+    """Re-hash an artifact and follow its inputs back to the log, each artifact once, however many ways lead there.
+
+    Returns one finding per artifact reached that was not in `seen`; inputs that lead in a circle are a problem of the
+    artifact that closes it.
+    """
     seen = {} if seen is None else seen
-    root = Path(root).resolve()
+    digests = _Digests()
+    reached: list[Path] = []
+    path: dict[Path, _Visit] = {}
+    """The artifacts between the first and the one that is looked at, in this order."""
+
+    def enter(place: Path) -> None:
+        reached.append(place)
+        visit = _opened(place)
+        if isinstance(visit, Finding):
+            seen[place] = visit
+        else:
+            path[place] = visit
+
+    try:
+        root = Path(root).resolve()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise BadInput(f"{root}: {getattr(error, 'strerror', None) or error}", hint="give an artifact folder") from None
     if root in seen:
         return []
-    problems: list[str] = []
-    notes: list[str] = []
+    enter(root)
+    while path:
+        visit = next(reversed(path.values()))
+        if visit.followed == len(visit.manifest.inputs):
+            seen[visit.root] = visit.finding()
+            del path[visit.root]
+            continue
+        record = visit.manifest.inputs[visit.followed]
+        visit.followed += 1
+        place = _checked_input(visit, record, digests)
+        if place in path:
+            visit.problems.append(f"input {record.role}: leads back to {place}, which was made from this one")
+        elif place is not None and place not in seen:
+            enter(place)
+    return [seen[place] for place in reached]
+
+
+def _opened(root: Path) -> _Visit | Finding:
+    """Return an artifact with what is wrong with itself, or the verdict on what cannot be read."""
     try:
         manifest = read_manifest(root)
         check_version(root, manifest)
     except ScenewrightError as error:
-        seen[root] = Finding(root, "unknown", (str(error),))
-        return [seen[root]]
+        return Finding(root, "unknown", (str(error),))
     try:
         check_sizes(root, manifest)
+        return _Visit(root, manifest, _check_bytes(root, manifest) + _check_models(root, manifest))
     except BadInput as error:
-        problems.append(str(error))
-    else:
-        problems += _check_bytes(root, manifest) + _check_models(root, manifest)
-    findings: list[Finding] = []
-    for record in manifest.inputs:
-        source = (root / record.path).resolve()
+        return _Visit(root, manifest, [str(error)])
+
+
+def _checked_input(visit: _Visit, record: InputRecord, digests: _Digests) -> Path | None:
+    """Compare an input with its record; return the artifact that it is, or lies in, or None."""
+    try:
+        source = input_place(visit.root, record.path)
         if not source.exists():
-            notes.append(f"input {record.role} is no longer at {source}")
-        elif record.kind == "external":
-            if external_digest(source) != record.digest:
-                problems.append(f"input {record.role} ({source}) is not what the artifact was made from")
-            elif (source.parent / MANIFEST_NAME).exists():  # a payload file of an artifact, such as a generated log
-                findings += verify(source.parent, seen)
-            elif (source / TIMINGS_NAME).exists() and (source / MANIFEST_NAME).exists():  # a log that `export` wrote
-                findings += verify(source, seen)
-        else:
-            try:
-                digest = read_manifest(source).content_digest
-            except ScenewrightError as error:
-                problems.append(f"input {record.role}: {error}")
-                continue
-            if digest != record.digest:
-                problems.append(f"input {record.role} ({source}) was made again with another result since")
-            findings += verify(source, seen)
-    seen[root] = Finding(root, manifest.kind, tuple(problems), tuple(notes))
-    return [seen[root], *findings]
+            visit.notes.append(f"input {record.role} is no longer at {source}")
+        elif record.kind != "external":
+            if digests.content(source) != record.digest:
+                visit.problems.append(f"input {record.role} ({source}) was made again with another result since")
+            return source
+        elif digests.external(source) != record.digest:
+            visit.problems.append(f"input {record.role} ({source}) is not what the artifact was made from")
+        elif (source.parent / MANIFEST_NAME).exists():  # a payload file of an artifact, such as a generated log
+            return source.parent
+        elif (source / TIMINGS_NAME).exists() and (source / MANIFEST_NAME).exists():  # a log that `export` wrote
+            return source
+    except ScenewrightError as error:
+        visit.problems.append(f"input {record.role}: {error}")
+    return None

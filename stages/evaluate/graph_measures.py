@@ -127,7 +127,7 @@ def measure_boxes(
     """
     for measure, field in (("obb_ap50_observed", "box_observed"), ("obb_ap50_refined", "box")):
         candidates = box_candidates(truth, graph, points, field, parameters.match_iou)
-        result = {name: class_precision(found, parameters.match_iou) for name, found in candidates.items()}
+        result = {name: class_precision(listed, parameters.match_iou) for name, listed in candidates.items()}
         agnostic = result.pop(ANY_CLASS)
         record_precision(part, measure, result)
         part.set(f"{measure}_class_agnostic", agnostic.all_point)

@@ -85,28 +85,30 @@ def line_distance(point: np.ndarray, origin: np.ndarray, axis: np.ndarray) -> fl
     return float(np.linalg.norm(away - (away @ axis) * axis))
 
 
-def joint_errors(true: list[PlacedJoint], found: list[PlacedJoint]) -> list[JointError]:
+def joint_errors(true: list[PlacedJoint], estimated: list[PlacedJoint]) -> list[JointError]:
     """Pair joints of the same type one to one by least summed distance, and compare them; one entry a true joint.
 
     The distance is that of the axes (revolute) or of the middles of the moving parts (both), plus their angle.
     """
-    cost = np.array([[_distance(a, b) for b in found] for a in true]).reshape(len(true), len(found))
+    cost = np.array([[_distance(a, b) for b in estimated] for a in true]).reshape(len(true), len(estimated))
     partners: dict[int, int] = {}
     if cost.size:
         rows, columns = linear_sum_assignment(cost)
         partners = {int(i): int(j) for i, j in zip(rows, columns, strict=True) if cost[i, j] < NEVER}
     return [
-        _compare(joint, found[partners[i]]) if i in partners else JointError(joint.name, joint.type)
+        _compare(joint, estimated[partners[i]]) if i in partners else JointError(joint.name, joint.type)
         for i, joint in enumerate(true)
     ]
 
 
-def _distance(true: PlacedJoint, found: PlacedJoint) -> float:
-    if true.type != found.type:
+def _distance(true: PlacedJoint, estimated: PlacedJoint) -> float:
+    if true.type != estimated.type:
         return NEVER
-    apart = float(np.linalg.norm(true.center - found.center)) + ANGLE_WEIGHT * _line_angle(true.axis, found.axis)
+    apart = float(np.linalg.norm(true.center - estimated.center)) + ANGLE_WEIGHT * _line_angle(
+        true.axis, estimated.axis
+    )
     if true.type == "revolute":
-        apart += line_distance(true.origin, found.origin, found.axis)
+        apart += line_distance(true.origin, estimated.origin, estimated.axis)
     return apart
 
 
@@ -115,16 +117,16 @@ def _line_angle(a: np.ndarray, b: np.ndarray) -> float:
     return min(angle, np.pi - angle)
 
 
-def _compare(true: PlacedJoint, found: PlacedJoint) -> JointError:
-    lower, upper, value = found.lower, found.upper, found.value
-    if true.axis @ found.axis < 0:  # the same motion, counted the other way round
+def _compare(true: PlacedJoint, estimated: PlacedJoint) -> JointError:
+    lower, upper, value = estimated.lower, estimated.upper, estimated.value
+    if true.axis @ estimated.axis < 0:  # the same motion, counted the other way round
         lower, upper, value = -upper, -lower, -value
     return JointError(
         joint=true.name,
         type=true.type,
-        partner=found.name,
-        angle=_line_angle(true.axis, found.axis),
-        offset=line_distance(true.origin, found.origin, found.axis) if true.type == "revolute" else None,
+        partner=estimated.name,
+        angle=_line_angle(true.axis, estimated.axis),
+        offset=line_distance(true.origin, estimated.origin, estimated.axis) if true.type == "revolute" else None,
         limits=max(abs(lower - true.lower), abs(upper - true.upper)),
         value=abs(value - true.value),
     )

@@ -50,7 +50,7 @@ def load_map(panoptic_map: PanopticMap) -> PredictedMap:
     """Read mesh and labels. Raises BadInput when they disagree."""
     surface = read_surface(panoptic_map.path("mesh.ply"))
     path = panoptic_map.path("mesh_labels.npz")
-    instances = read_arrays(path, "instance")[0].astype(np.int64)
+    instances = read_arrays(path, "instance", shapes=("V",))[0].astype(np.int64)
     if len(instances) != len(surface.vertices):
         raise BadInput(f"{path}: {len(instances)} labels for {len(surface.vertices)} vertices")
     return PredictedMap(panoptic_map.info, surface, instances)
@@ -168,7 +168,7 @@ def measure_instances(
 ) -> dict[str, ClassPrecision]:
     """Record the instance AP by class over things; see `instance_candidates`. Returns it by class."""
     candidates = instance_candidates(truth, predicted, labels)
-    result = {name: class_precision(found, parameters.match_iou) for name, found in candidates.items()}
+    result = {name: class_precision(listed, parameters.match_iou) for name, listed in candidates.items()}
     agnostic = result.pop(ANY_CLASS)
     part.set("instance_ap50_class_agnostic", agnostic.all_point)
     record_precision(part, "instance_ap50", {} if is_nameless(predicted) else result)

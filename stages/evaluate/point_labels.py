@@ -17,7 +17,7 @@ def nearest_labels(
         return np.zeros(len(points), dtype=np.int64)
     tree = cKDTree(labelled_points, balanced_tree=False, compact_nodes=False)
     distance, index = tree.query(points, distance_upper_bound=maximum_distance, workers=1)
-    found = np.isfinite(distance)
+    within = np.isfinite(distance)
     result = np.zeros(len(points), dtype=np.int64)
-    result[found] = labels[index[found]]
+    result[within] = labels[index[within]]
     return result

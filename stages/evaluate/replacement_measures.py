@@ -34,7 +34,6 @@ class ObjectResult:
     true_model: str
     node: str | None = None
     """The graph node of the same place; None: not detected."""
-    node_class: str | None = None
     decision: str = "none"
     model: str | None = None
     model_class: str | None = None
@@ -104,9 +103,9 @@ def pair_objects(
     true_graph, _ = merge_stuff_nodes(truth.graph)
     found_graph, _ = merge_stuff_nodes(graph)
     true = [n for n in true_graph.nodes if n.node_type != "scene" and n.instance in seen]
-    found = [n for n in found_graph.nodes if n.node_type != "scene"]
-    pairs = assign(node_affinity(true, found, overlaps, minimum_iou))
-    return {true[i].id: found[j].id for i, j in pairs}
+    predicted = [n for n in found_graph.nodes if n.node_type != "scene"]
+    pairs = assign(node_affinity(true, predicted, overlaps, minimum_iou))
+    return {true[i].id: predicted[j].id for i, j in pairs}
 
 
 def measure_replacements(
@@ -128,14 +127,11 @@ def measure_replacements(
     true_graph, _ = merge_stuff_nodes(truth.graph)
     found_graph, _ = merge_stuff_nodes(graph)
     replacements = {r.node: r for r in scene.replacements}
-    classes = {node.id: node.class_name for node in graph.nodes}
     results = []
     for true in sorted((o for o in truth.evaluated(things_only=True) if o.model_id is not None), key=lambda o: o.name):
         node = partner.get(true.name)
         relation = same_relation(true_graph, found_graph, partner, true.name)
-        results.append(
-            _compare(true, true_models.get(true.name), node, classes, replacements, models, relation=relation)
-        )
+        results.append(_compare(true, true_models.get(true.name), node, replacements, models, relation=relation))
     return results
 
 
@@ -143,7 +139,6 @@ def _compare(
     true: TrueObject,
     shape: PlacedShape | None,
     node: str | None,
-    classes: Mapping[str, str],
     replacements: Mapping[str, Replacement],
     models: Mapping[str, ModelShape],
     *,
@@ -152,13 +147,11 @@ def _compare(
     replacement = None if node is None else replacements.get(node)
     model_id = true.model_id or ""
     if node is None or replacement is None:
-        return ObjectResult(true.name, true.class_name, model_id, node, classes.get(node or ""))
+        return ObjectResult(true.name, true.class_name, model_id, node)
     rank = retrieval_rank(replacement, model_id)
     chosen = replacement.chosen if replacement.decision == "cad" else None
     if chosen is None:
-        return ObjectResult(
-            true.name, true.class_name, model_id, node, classes.get(node), replacement.decision, rank=rank
-        )
+        return ObjectResult(true.name, true.class_name, model_id, node, replacement.decision, rank=rank)
     placed = placed_candidate(chosen, models)
     error = None if placed is None or shape is None else alignment_error(shape, placed, is_round=true.round)
     joints: tuple[JointError, ...] = ()
@@ -178,7 +171,7 @@ def _compare(
             colors=replacement.part_colors,
         )
     return ObjectResult(
-        true.name, true.class_name, model_id, node, classes.get(node), replacement.decision, chosen.model_id,
+        true.name, true.class_name, model_id, node, replacement.decision, chosen.model_id,
         model_class, rank, error, joints, spurious, judged,
     )  # fmt: skip
 

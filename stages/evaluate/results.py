@@ -32,6 +32,6 @@ class Part:
         self.set(f"{measure}_mean", interval.value if interval else None)
         self.set(f"{measure}_median", float(np.median(values)) if values else None)
         # A single value has no spread to resample; an interval of width zero would claim certainty.
-        known = interval is not None and len(values) > 1
-        self.set(f"{measure}_mean_low", interval.low if known and interval else None)
-        self.set(f"{measure}_mean_high", interval.high if known and interval else None)
+        has_interval = interval is not None and len(values) > 1
+        self.set(f"{measure}_mean_low", interval.low if has_interval and interval else None)
+        self.set(f"{measure}_mean_high", interval.high if has_interval and interval else None)

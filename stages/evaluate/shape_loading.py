@@ -73,7 +73,7 @@ def _shape_of_body(
             if visual[link]
         },
         joints=tuple(_without_prefix(joint, prefix) for joint in body.joints),
-        movable=body.movable,
+        movable=body.carriable,
         contains=body.contains,
     )
 
@@ -100,12 +100,12 @@ def model_shape(folder: Path) -> ModelShape:
 
 def model_shapes(model_ids: Sequence[str], roots: Sequence[Path]) -> dict[str, ModelShape]:
     """Return model id -> shape for ids that have a folder below one of `roots` (`models/` of a scene or library)."""
-    found: dict[str, ModelShape] = {}
+    shapes: dict[str, ModelShape] = {}
     for model_id in sorted(set(model_ids)):
         folder = next((root / model_id for root in roots if (root / model_id).is_dir()), None)
         if folder is not None:
-            found[model_id] = model_shape(folder)
-    return found
+            shapes[model_id] = model_shape(folder)
+    return shapes
 
 
 def placed_candidate(candidate: CadCandidate, shapes: Mapping[str, ModelShape]) -> PlacedShape | None:

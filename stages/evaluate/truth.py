@@ -76,7 +76,7 @@ def load_truth(truth: GroundTruth, world_from_log: np.ndarray, minimum_visible_p
     file = truth.info
     if file.source == "scan":  # it is in the sequence's world already
         world_from_log = np.eye(4)
-    points, instances = read_arrays(truth.path("visible.npz"), "points", "instance")
+    points, instances = read_arrays(truth.path("visible.npz"), "points", "instance", shapes=("N 3", "N"))
     points, instances = points.astype(float), instances.astype(np.int64)
     if points.shape != (len(instances), 3):
         raise BadInput(f"{truth.path('visible.npz')}: {points.shape} points for {len(instances)} instances")

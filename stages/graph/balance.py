@@ -98,8 +98,8 @@ def leaning_relation(child: Entity, parent: str, entities: list[Entity]) -> Rela
         contact = other.points[nearest[touching], :2].mean(axis=0)
         if (contact - middle) @ outward <= 0.0:
             continue
-        found = (float(np.sort(distance[touching])[LEAST_TOUCHING - 1]), other.instance, other.name)
-        best = found if best is None else min(best, found)
+        candidate = (float(np.sort(distance[touching])[LEAST_TOUCHING - 1]), other.instance, other.name)
+        best = candidate if best is None else min(best, candidate)
     if best is None:
         return None
     return Relation(

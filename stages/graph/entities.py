@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +13,7 @@ from schemas.vocabulary import load_vocabulary
 from stages.graph.method import GraphMethod
 from stages.graph.nodes import THINNEST_DISTANCE, Entity, PlaneSearch, patch_from_fit, surface_planes
 from stages.graph.parameters import GraphParameters
+from stages.kit.digests import sha256_of_file
 from stages.kit.formats.entity_meshes import load_entity_mesh
 from stages.kit.geometry.boxes import convex_hull, minimum_box
 from stages.kit.geometry.planes import PlaneFit
@@ -67,7 +67,7 @@ def _load_once(
     path = panoptic_map.path(entry.mesh)
     if kept is None or not path.is_file():
         return load_entity(panoptic_map, entry, method, parameters, context)
-    key = f"{entry.class_name}_{entry.instance} {hashlib.sha256(path.read_bytes()).hexdigest()}"
+    key = f"{entry.class_name}_{entry.instance} {sha256_of_file(path)}"
     if key not in kept:
         kept[key] = load_entity(panoptic_map, entry, method, parameters, context)
     entity = kept[key]

@@ -50,15 +50,15 @@ def relation_of(candidate: Candidate, entities: dict[str, Entity]) -> Relation:
         return _from_above(relation, candidate, child, parent)
     if candidate.patch is None:
         return relation
-    found: dict[str, object] = {
+    measured: dict[str, object] = {
         "plane": candidate.patch,
         "gap": float(candidate.gap),
         "overlap": float(candidate.overlap),
         "contact": on_surface(child.box, parent.patches[candidate.patch].hull, candidate.height),
     }
     if candidate.relation == "contains":
-        found["inside"] = share_inside(child.box, parent.box)
-    return relation.model_copy(update=found)
+        measured["inside"] = share_inside(child.box, parent.box)
+    return relation.model_copy(update=measured)
 
 
 def on_surface(child: Box, hull: np.ndarray, height: float) -> Vector3 | None:
@@ -111,10 +111,10 @@ def _on_wall(relation: Relation, candidate: Candidate, child: Entity, wall: Enti
         share, middle = rectangle_share(child.box, patch)
         if share > 0.0 and (best is None or distance < best[0]):
             best = (distance, k, share, middle)
-    found: dict[str, object] = {"gap": float(candidate.gap)}
+    measured: dict[str, object] = {"gap": float(candidate.gap)}
     if best is not None:
-        found |= {"plane": best[1], "overlap": best[2], "contact": as_vector(best[3])}
-    return relation.model_copy(update=found)
+        measured |= {"plane": best[1], "overlap": best[2], "contact": as_vector(best[3])}
+    return relation.model_copy(update=measured)
 
 
 def _from_above(relation: Relation, candidate: Candidate, child: Entity, ceiling: Entity) -> Relation:
@@ -128,13 +128,13 @@ def _from_above(relation: Relation, candidate: Candidate, child: Entity, ceiling
     highest = child.points[child.points[:, 2] >= child.top - CONTACT_DEPTH, :2]
     middle = highest.mean(axis=0) if len(highest) else middle_of_child
     contact = np.array([*middle, child.top + candidate.gap])
-    found: dict[str, object] = {"gap": float(candidate.gap), "contact": as_vector(contact)}
+    measured: dict[str, object] = {"gap": float(candidate.gap), "contact": as_vector(contact)}
     if level:
         k = min(level)[1]
         own = footprint(child.box)
         shared = clip_polygon(convex_hull(ceiling.patches[k].points[:, :2]), own)
-        found |= {"plane": k, "overlap": float(min(1.0, polygon_area(shared) / max(polygon_area(own), 1e-12)))}
-    return relation.model_copy(update=found)
+        measured |= {"plane": k, "overlap": float(min(1.0, polygon_area(shared) / max(polygon_area(own), 1e-12)))}
+    return relation.model_copy(update=measured)
 
 
 def with_leaning_contact(relation: Relation, child: Entity, other: Entity) -> Relation:

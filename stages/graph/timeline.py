@@ -33,10 +33,10 @@ def build_timeline(stands: list[Stand]) -> TimelineFile:
     """Follow every node through the graphs, earliest first, and say what changed from each to the next."""
     tracks = Tracks()
     followed = [tracks.follow(stand.entities) for stand in stands]
-    names = lasting_ids([{track: name for name, track in found.of_node.items()} for found in followed])
+    names = lasting_ids([{track: name for name, track in step.of_node.items()} for step in followed])
     snapshots: list[GraphSnapshot] = []
-    for stand, found in zip(stands, followed, strict=True):
-        renaming = {SCENE_NODE: SCENE_NODE, **{name: names[track] for name, track in found.of_node.items()}}
+    for stand, step in zip(stands, followed, strict=True):
+        renaming = {SCENE_NODE: SCENE_NODE, **{name: names[track] for name, track in step.of_node.items()}}
         nodes = tuple(
             node.model_copy(update={"id": renaming[node.id], "planes": (), "mesh": None}) for node in stand.graph.nodes
         )
@@ -44,7 +44,7 @@ def build_timeline(stands: list[Stand]) -> TimelineFile:
             link.model_copy(update={"source": renaming[link.source], "target": renaming[link.target]})
             for link in stand.graph.links
         )
-        merged = {names[gone]: names[into] for gone, into in found.merged.items()}
+        merged = {names[gone]: names[into] for gone, into in step.merged.items()}
         before = snapshots[-1] if snapshots else None
         changes = changes_between(before, nodes, links, merged)
         snapshots.append(GraphSnapshot(frames=stand.frames, nodes=nodes, links=links, changes=changes))
@@ -113,11 +113,11 @@ def _parents(links: tuple[Relation, ...]) -> dict[str, tuple[str, str]]:
 
 def _beside(links: tuple[Relation, ...]) -> set[tuple[str, str, str]]:
     """Relations beside the tree; the ends of undirected ones in alphabetical order."""
-    found: set[tuple[str, str, str]] = set()
+    shared: set[tuple[str, str, str]] = set()
     for link in links:
         if link.relation not in TREE_RELATIONS:
             source, target = link.source, link.target
             if link.relation == "proximal" and target < source:
                 source, target = target, source
-            found.add((source, target, link.relation))
-    return found
+            shared.add((source, target, link.relation))
+    return shared

@@ -46,9 +46,9 @@ class Tracks:
         """Give every node of the next map a track: assignment with the most shared cells; new ones for the rest."""
         own = [cells_of(entity.points) for entity in entities]
         kinds = [entity.class_name if entity.node_type == "layout" else "" for entity in entities]
-        known = sorted(self.cells)
-        shared = np.zeros((len(known), len(entities)))
-        for i, track in enumerate(known):
+        tracks = sorted(self.cells)
+        shared = np.zeros((len(tracks), len(entities)))
+        for i, track in enumerate(tracks):
             for j, cells in enumerate(own):
                 if self.layout.get(track, "") == kinds[j]:
                     common = len(np.intersect1d(self.cells[track], cells, assume_unique=True))
@@ -57,13 +57,13 @@ class Tracks:
         of_node: dict[str, int] = {}
         for i, j in zip(*linear_sum_assignment(-shared), strict=True):
             if shared[i, j] > 0.0:
-                of_node[entities[j].name] = known[i]
+                of_node[entities[j].name] = tracks[i]
         fresh = count(len(self.cells))
         for entity in entities:
             if entity.name not in of_node:
                 of_node[entity.name] = next(fresh)
         merged: dict[int, int] = {}
-        for i, track in enumerate(known):
+        for i, track in enumerate(tracks):
             if track in self.alive and track not in of_node.values() and shared[i].any():
                 merged[track] = of_node[entities[int(shared[i].argmax())].name]
         for entity, cells, kind in zip(entities, own, kinds, strict=True):

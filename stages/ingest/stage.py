@@ -228,6 +228,7 @@ def _finish(
         "dropped": sum(count for reason, count in drops.items() if reason != NOT_SELECTED),
         "gravity": gravity.method,
         "median_depth": round(written.median_depth, 3),
+        "posed_frames": len(written.posed_times),
     }
     if len(source.cameras) > 1:
         summary["cameras"] = len(source.cameras)

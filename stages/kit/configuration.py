@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from schemas.errors import UsageError
+from schemas.outside import file_toml
 from stages.kit.stage import NOT_SHOWN, Parameters, Stage
 
 LARGEST_TOML = 16 * 2**20
@@ -23,17 +23,7 @@ def read_config(path: Path) -> dict[str, Any]:
 
 def read_toml(path: Path, *, hint: str) -> dict[str, Any]:
     """Return what a TOML file says. Raises UsageError, with `hint`, when it is missing, malformed or too large."""
-    try:
-        if Path(path).stat().st_size > LARGEST_TOML:
-            raise UsageError(f"{path}: larger than {LARGEST_TOML} bytes", hint=hint)
-        with Path(path).open("rb") as file:
-            return tomllib.load(file)
-    except OSError as error:
-        raise UsageError(f"{path}: {error.strerror}", hint=hint) from None
-    except RecursionError:
-        raise UsageError(f"{path}: nested too deeply", hint=hint) from None
-    except ValueError as error:  # malformed, no text, a number that Python does not convert
-        raise UsageError(f"{path}: {error}", hint=hint) from None
+    return file_toml(path, LARGEST_TOML, error=UsageError, hint=hint)
 
 
 def parameters_for(

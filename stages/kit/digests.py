@@ -9,12 +9,13 @@ from pathlib import Path
 from schemas.base import canonical_json
 from schemas.errors import BadInput
 from schemas.manifest import LARGEST_MANIFEST, MANIFEST_NAME, Manifest
+from schemas.outside import opened
 
 
 def sha256_of_file(path: Path) -> str:
     """Return the hexadecimal sha256 of a file's bytes. Raises BadInput when it cannot be read."""
     try:
-        with Path(path).open("rb") as file:
+        with opened(path, hint="check the file and its permissions") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         if error.errno == errno.EIO:
@@ -62,11 +63,8 @@ def external_files(path: Path) -> list[Path]:
 
 
 def _bookkeeping(folder: Path) -> set[str]:
-    path = folder / MANIFEST_NAME
     try:
-        if path.stat().st_size > LARGEST_MANIFEST:
-            return set()
-        manifest = Manifest.read(path)
-    except (OSError, BadInput):
+        manifest = Manifest.read(folder / MANIFEST_NAME, largest=LARGEST_MANIFEST)
+    except BadInput:
         return set()  # there is none, or it is not one of ours
     return {MANIFEST_NAME, *(record.path for record in manifest.files if not record.digested)}

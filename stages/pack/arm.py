@@ -111,15 +111,15 @@ class FixedArm:
         azimuth = atan2(pose.y, pose.x)
         canonical = self._planar(radius, pose.z)
         if self._outside(canonical)[1] > 0:
-            found = self._search(radius, pose.z)
-            if found is None:
+            planar = self._search(radius, pose.z)
+            if planar is None:
                 joint, outside = self._outside(canonical)
                 raise MotionFailed(
                     "joint_limit",
                     f"joint {joint + 1} would be {outside:.3f} rad outside its limits at ({pose.x:.3f}, {pose.y:.3f})",
                     numbers={"joint": joint + 1, "value": float(canonical[joint]), "outside": outside},
                 )
-            canonical = found
+            canonical = planar
         arm = canonical.copy()
         arm[0] = self._turn(0, canonical[0] + azimuth, near[0])
         arm[6] = self._turn(6, canonical[6] + azimuth - pose.yaw, near[6])
@@ -203,10 +203,10 @@ def panda_lengths(chain: ArmChain) -> np.ndarray | None:
 
 def _measures(chain: ArmChain) -> _Lengths:
     """Read the planar arm's measures out of the chain; raises ValueError when it is no arm of this shape."""
-    found = panda_lengths(chain)
-    if found is None or found[1:].min() <= 0:
+    lengths = panda_lengths(chain)
+    if lengths is None or lengths[1:].min() <= 0:
         raise ValueError("not an arm of the Franka's shape")
-    shoulder, upper, elbow, forearm, wrist = found.tolist()
+    shoulder, upper, elbow, forearm, wrist = lengths.tolist()
     hand, yaw_offset = float(chain.tool[2, 3]), float(np.arctan2(chain.tool[0, 1], chain.tool[0, 0]))
     return _Lengths(shoulder, upper, forearm, elbow, wrist, hand, yaw_offset)
 

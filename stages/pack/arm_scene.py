@@ -25,9 +25,11 @@ class ArmScene:
         description = arm.description
         with native_output_to_stderr():
             self._robot = engine.loadURDF(
-                str(description.urdf), useFixedBase=True, physicsClientId=self.client,
+                str(description.urdf),
+                useFixedBase=True,
+                physicsClientId=self.client,
                 flags=engine.URDF_USE_SELF_COLLISION | engine.URDF_USE_INERTIA_FROM_FILE,
-            )  # fmt: skip
+            )
         names = {}
         self._links = {-1: description.arm_base}
         for index in range(engine.getNumJoints(self._robot, physicsClientId=self.client)):

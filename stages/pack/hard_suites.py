@@ -157,9 +157,11 @@ def _draw(
 
 
 def _certify(
-    instance: Instance, places: tuple[tuple[float, float, float], ...], planner: MotionPlanner,
+    instance: Instance,
+    places: tuple[tuple[float, float, float], ...],
+    planner: MotionPlanner,
     random: np.random.Generator,
-) -> tuple[Action, ...] | None:  # fmt: skip
+) -> tuple[Action, ...] | None:
     """Return a plan over the places that reaches the goal, None when none of some orders does."""
     farthest_first = sorted(
         range(len(places)), key=lambda k: (instance.boxes[k].height, -hypot(places[k][0], places[k][1]))

@@ -111,13 +111,13 @@ def action_text(action: Action) -> str:
 def failure_text(failure: Failure) -> str:
     """Return the cause in the words of the three published categories; other kinds by their own message."""
     what = ", ".join(quoted(name) for name in failure.objects)
-    known = {
+    texts = {
         "goal_in_collision": f"the goal configuration is in collision with {what or 'something'}",
         "no_inverse_kinematics": "the goal configuration has no inverse kinematics solution",
         "no_path": "no collision-free trajectory was found",
         "unknown_object": f"there is no box {what}",
     }
-    return known.get(failure.kind) or " ".join(failure.message.split())
+    return texts.get(failure.kind) or " ".join(failure.message.split())
 
 
 def refused_order_text(order: Sequence[str], failure: Failure, *, reasons: bool) -> str:
@@ -142,8 +142,8 @@ def _box(box: BoxState) -> str:
 def _attempt(number: int, attempt: Attempt, reasons: bool) -> str:
     lines = [f"{ATTEMPT} {number}:"]
     for k, action in enumerate(attempt.actions):
-        said = attempt.feedback[k] if k < len(attempt.feedback) else None
-        lines.append(f"  {k + 1}. {action_text(action)}: {_outcome(said, reasons)}")
+        feedback = attempt.feedback[k] if k < len(attempt.feedback) else None
+        lines.append(f"  {k + 1}. {action_text(action)}: {_outcome(feedback, reasons)}")
     if not attempt.actions:
         lines.append("  (no plan could be read from the reply)")
     if attempt.task is not None:
@@ -151,9 +151,9 @@ def _attempt(number: int, attempt: Attempt, reasons: bool) -> str:
     return "\n".join(lines)
 
 
-def _outcome(said: StepFeedback | None, reasons: bool) -> str:
-    if said is None:
+def _outcome(feedback: StepFeedback | None, reasons: bool) -> str:
+    if feedback is None:
         return NOT_TRIED
-    if said.failure is None:
+    if feedback.failure is None:
         return FEASIBLE
-    return f"{FAILS}; {failure_text(said.failure)}" if reasons else FAILS
+    return f"{FAILS}; {failure_text(feedback.failure)}" if reasons else FAILS

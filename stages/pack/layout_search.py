@@ -17,12 +17,11 @@ BOX, X, Y, TURN, HALF_SIDE = 0, 1, 2, 3, 4
 """Columns of placements: number of the box, its centre [m], quarter turns (0 or 1); half side [m] of the square around
 a refused one."""
 PLACED_X, PLACED_Y, PLACED_TURN = 0, 1, 2
-"""Columns of the places (B, 3) of all boxes; a turn of UNPLACED: none yet."""
+"""Columns of the places (B, 3) of all boxes; a turn below 0: none yet."""
 SCORE, ROW_X, ROW_Y, ROW_TURN = 0, 1, 2, 3
 """Columns of the positions that are tried of a box, the least score first."""
 LOW_X, LOW_Y, HIGH_X, HIGH_Y = 0, 1, 2, 3
 """Columns of rectangles."""
-UNPLACED = -1
 NODES = 500
 RESTARTS = 16
 HAND_GAP, TOUCH_GAP = 0.001, 0.0011
@@ -94,13 +93,13 @@ class _Rectangle(NamedTuple):
 
 
 @njit(cache=True)
-def _apart(one, other, gap):  # type: ignore[no-untyped-def]
+def _apart(first, second, gap):  # type: ignore[no-untyped-def]
     """Whether rectangles are at least `gap` apart along an axis."""
     return (
-        one.high_x + gap <= other.low_x + 1e-9
-        or other.high_x + gap <= one.low_x + 1e-9
-        or one.high_y + gap <= other.low_y + 1e-9
-        or other.high_y + gap <= one.low_y + 1e-9
+        first.high_x + gap <= second.low_x + 1e-9
+        or second.high_x + gap <= first.low_x + 1e-9
+        or first.high_y + gap <= second.low_y + 1e-9
+        or second.high_y + gap <= first.low_y + 1e-9
     )
 
 

@@ -83,9 +83,13 @@ def _refuse(
 
 
 def _collision(
-    limits: LearnedLimits, action: Action, objects: tuple[str, ...], depth: float, boxes: dict[str, BoxState],
+    limits: LearnedLimits,
+    action: Action,
+    objects: tuple[str, ...],
+    depth: float,
+    boxes: dict[str, BoxState],
     obstacles: dict[str, Rectangle],
-) -> None:  # fmt: skip
+) -> None:
     offender = objects[0]
     by_hand = "hand" in objects[1:]
     if action.name == "pick":

@@ -186,11 +186,16 @@ class MotionPlanner:
         space = SearchSpace(self.arm.chain.lower, self.arm.chain.upper, resolution)
         if path is not None:
             space = _narrowed(space, whole_range=np.concatenate([path, start.arm[None]]))
-        found = rrt_connect(
-            start.arm, end.arm, scene.check, space, np.random.default_rng([self._seed, 3]), samples=SAMPLES,
+        planned = rrt_connect(
+            start.arm,
+            end.arm,
+            scene.check,
+            space,
+            np.random.default_rng([self._seed, 3]),
+            samples=SAMPLES,
             smoothing=20,
-        )  # fmt: skip
-        return Motion(lambda: found, end, True)
+        )
+        return Motion(lambda: planned, end, True)
 
 
 def _height_over(start: Stance, end: Stance, held: BoxState | None, tops: float) -> float:

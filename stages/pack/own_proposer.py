@@ -67,8 +67,8 @@ def placement_solver(
 
     Returns the pick/place plan, or a Failure (`no_placement`, `unknown_object`) that says why there is none.
     """
-    known = {box.name for box in observation.boxes}
-    unknown = tuple(name for name in order if name not in known)
+    names = {box.name for box in observation.boxes}
+    unknown = tuple(name for name in order if name not in names)
     if unknown:
         return Failure(kind="unknown_object", message=f"there is no {unknown[0]}", objects=unknown)
     limits = learn(observation, trace, True)
@@ -111,9 +111,14 @@ def kept_spots(trace: Sequence[Attempt], limits: LearnedLimits) -> tuple[Spot, .
 
 
 def solve_layout(
-    observation: Observation, order: tuple[str, ...], limits: LearnedLimits, kept: tuple[Spot, ...], seed: int,
-    *, reorder: bool = True,
-) -> tuple[Spot, ...] | None:  # fmt: skip
+    observation: Observation,
+    order: tuple[str, ...],
+    limits: LearnedLimits,
+    kept: tuple[Spot, ...],
+    seed: int,
+    *,
+    reorder: bool = True,
+) -> tuple[Spot, ...] | None:
     """Return a spot for each box of `order`, in the order of execution, as many as can be from `kept` first.
 
     `reorder`: boxes of one height may change places, the farthest first. None when no layout was found.
@@ -132,11 +137,11 @@ def solve_layout(
         for (gap, out), restarts in zip(SPACING, RESTARTS, strict=True):
             problem = _problem(observation, problem_boxes, limits, held, out - limits.inward)
             random = np.random.default_rng([seed, count])
-            found = find_layout(problem, gap + limits.wider, random, restarts=min(restarts, 3) if held else restarts)
-            if found is not None:
+            layout = find_layout(problem, gap + limits.wider, random, restarts=min(restarts, 3) if held else restarts)
+            if layout is not None:
                 spots = [
                     Spot(box.name, float(row[0]), float(row[1]), int(row[2]))
-                    for box, row in zip(problem_boxes, found, strict=True)
+                    for box, row in zip(problem_boxes, layout, strict=True)
                 ]
                 return (*held, *_far_first(spots[count:], boxes, limits, reorder))
     return None
@@ -180,7 +185,8 @@ def _problem(
 
 def _hand_footprints(boxes: list[BoxState]) -> tuple[np.ndarray, np.ndarray]:
     """Return (2, K, 4) footprints about the tool at both turns, and (B, K) the world z of their bottoms [m]."""
-    footprints = np.array([[part.bounds for part in hand_blocks(place_tool_pose(boxes[0], 0.0, 0.0, turn * QUARTER))]
-                           for turn in (0, 1)])  # fmt: skip
+    footprints = np.array(
+        [[part.bounds for part in hand_blocks(place_tool_pose(boxes[0], 0.0, 0.0, turn * QUARTER))] for turn in (0, 1)]
+    )
     bottoms = np.array([[part.bottom for part in hand_blocks(place_tool_pose(box, 0.0, 0.0, 0.0))] for box in boxes])
     return footprints, bottoms

@@ -13,14 +13,30 @@ from stages.kit.language.options import LanguageParameters
 from stages.kit.stage import External, Optionally, Stage
 
 Suite = Literal[
-    "published/easy", "published/medium", "published/hard", "published/hard_medium_basket",
-    "published/hard_large_basket", "hard/fill", "hard/unreachable", "hard/obstacles", "hard/mixed_heights",
-    "hard/boxes_6", "hard/boxes_8", "hard/boxes_10",
-]  # fmt: skip
+    "published/easy",
+    "published/medium",
+    "published/hard",
+    "published/hard_medium_basket",
+    "published/hard_large_basket",
+    "hard/fill",
+    "hard/unreachable",
+    "hard/obstacles",
+    "hard/mixed_heights",
+    "hard/boxes_6",
+    "hard/boxes_8",
+    "hard/boxes_10",
+]
 ProposerName = Literal[
-    "ours", "backtrack", "scratch", "symbolic", "random", "random_restarts", "backtracking", "backtracking_corners",
+    "ours",
+    "backtrack",
+    "scratch",
+    "symbolic",
+    "random",
+    "random_restarts",
+    "backtracking",
+    "backtracking_corners",
     "fixed_layout",
-]  # fmt: skip
+]
 LANGUAGE_PROPOSERS = ("backtrack", "scratch", "symbolic")
 
 

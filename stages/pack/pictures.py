@@ -19,9 +19,17 @@ from stages.pack.records import Action, Attempt, BoxState
 from stages.pack.scene_picture import render_scene
 
 BOX_COLORS = {
-    "red": "#c8553d", "blue": "#3d6cb9", "green": "#5b9a5f", "tan": "#cdb18a", "cyan": "#5fb8c4", "yellow": "#dfc04e",
-    "purple": "#8a6bb1", "orange": "#dd8a45", "white": "#dddddd", "brown": "#8a6a52",
-}  # fmt: skip
+    "red": "#c8553d",
+    "blue": "#3d6cb9",
+    "green": "#5b9a5f",
+    "tan": "#cdb18a",
+    "cyan": "#5fb8c4",
+    "yellow": "#dfc04e",
+    "purple": "#8a6bb1",
+    "orange": "#dd8a45",
+    "white": "#dddddd",
+    "brown": "#8a6a52",
+}
 OTHER = "#9aa5ad"
 REFUSED = CUT
 MOST_REFUSED = 60
@@ -56,8 +64,15 @@ def draw_layout(path: Path, world: PackingWorld, run: PackingRun, width: int) ->
         axes.add_patch(
             Rectangle(corner, end[0] - corner[0], end[1] - corner[1], facecolor="#555555", hatch="//", edgecolor="w")
         )
-        axes.text((corner[0] + end[0]) / 2, (corner[1] + end[1]) / 2, f"{1000 * obstacle.top:.0f} mm", ha="center",
-                  va="center", fontsize=7, color="w")  # fmt: skip
+        axes.text(
+            (corner[0] + end[0]) / 2,
+            (corner[1] + end[1]) / 2,
+            f"{1000 * obstacle.top:.0f} mm",
+            ha="center",
+            va="center",
+            fontsize=7,
+            color="w",
+        )
     boxes = {box.name: box for box in instance.boxes}
     for box in instance.boxes:
         axes.add_patch(Polygon(_corners(box, box.x, box.y, box.yaw), fill=False, linestyle=":", edgecolor="#777777"))
@@ -74,8 +89,9 @@ def draw_layout(path: Path, world: PackingWorld, run: PackingRun, width: int) ->
         box = world.box(run.states[-1], name)
         patch = Polygon(_corners(box, box.x, box.y, box.yaw), facecolor=box_color(name), edgecolor="k", alpha=0.9)
         axes.add_patch(patch)
-        axes.text(box.x, box.y, f"{name.removesuffix('_box')}\n{1000 * box.height:.0f}", ha="center", va="center",
-                  fontsize=7)  # fmt: skip
+        axes.text(
+            box.x, box.y, f"{name.removesuffix('_box')}\n{1000 * box.height:.0f}", ha="center", va="center", fontsize=7
+        )
     lowest = min(place_tool_pose(box, 0.0, 0.0, 0.0).z for box in instance.boxes)
     reach = world.planner.arm.reach(lowest)
     angles = np.linspace(-0.5, 0.5, 100)
@@ -88,8 +104,9 @@ def draw_layout(path: Path, world: PackingWorld, run: PackingRun, width: int) ->
     axes.set_ylabel("y [m]")
     axes.set_title(
         f"{instance.name}: {'packed' if run.success else 'not packed'}, {run.proposer_calls} proposals, "
-        f"{run.motion_calls} motion-planner calls", fontsize=10,
-    )  # fmt: skip
+        f"{run.motion_calls} motion-planner calls",
+        fontsize=10,
+    )
     _save(figure, path)
 
 

@@ -27,15 +27,15 @@ def read_problem(path: Path, limits: Limits) -> Instance:
     return instance
 
 
-def from_file(told: PackingInstanceFile, name: str) -> Instance:
+def from_file(file: PackingInstanceFile, name: str) -> Instance:
     """Return the instance that a file tells."""
     boxes = tuple(
-        BoxState(box.name, box.width, box.length, box.height, box.x, box.y, box.yaw, False) for box in told.boxes
+        BoxState(box.name, box.width, box.length, box.height, box.x, box.y, box.yaw, False) for box in file.boxes
     )
     obstacles = tuple(
-        Obstacle(Rectangle(obstacle.name, obstacle.low, obstacle.high), obstacle.top) for obstacle in told.obstacles
+        Obstacle(Rectangle(obstacle.name, obstacle.low, obstacle.high), obstacle.top) for obstacle in file.obstacles
     )
-    return Instance(name, boxes, Rectangle("basket", told.basket.low, told.basket.high), obstacles)
+    return Instance(name, boxes, Rectangle("basket", file.basket.low, file.basket.high), obstacles)
 
 
 def to_file(instance: Instance) -> PackingInstanceFile:

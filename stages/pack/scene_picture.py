@@ -18,9 +18,13 @@ FACTOR = 2
 
 
 def render_scene(
-    arm: FixedArm, joints: np.ndarray, blocks: list[tuple[str, Block]], colors: dict[str, str], basket: Rectangle,
+    arm: FixedArm,
+    joints: np.ndarray,
+    blocks: list[tuple[str, Block]],
+    colors: dict[str, str],
+    basket: Rectangle,
     width: int,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Return (H, W, 3) uint8 of the arm at joint values (7,) among blocks, with each block's name -> colour."""
     client = engine.connect(engine.DIRECT)
     try:
@@ -56,9 +60,15 @@ def _render(client: int, width: int) -> np.ndarray:
     view = engine.computeViewMatrix([1.55, -0.75, 0.95], [0.42, 0.02, 0.12], [0, 0, 1])
     projection = engine.computeProjectionMatrixFOV(42, width / height, 0.05, 5.0)
     image = engine.getCameraImage(
-        FACTOR * width, FACTOR * height, view, projection, lightDirection=[0.6, -0.9, 1.6], shadow=1,
-        renderer=engine.ER_TINY_RENDERER, physicsClientId=client,
-    )[2]  # fmt: skip
+        FACTOR * width,
+        FACTOR * height,
+        view,
+        projection,
+        lightDirection=[0.6, -0.9, 1.6],
+        shadow=1,
+        renderer=engine.ER_TINY_RENDERER,
+        physicsClientId=client,
+    )[2]
     pixels = np.asarray(image, dtype=np.uint8).reshape(FACTOR * height, FACTOR * width, 4)[:, :, :3]
     blocks = pixels.reshape(height, FACTOR, width, FACTOR, 3).astype(np.uint16)
     return ((blocks.sum(axis=(1, 3)) + FACTOR**2 // 2) // FACTOR**2).astype(np.uint8)

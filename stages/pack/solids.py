@@ -49,10 +49,10 @@ def flat_depth(first: Block, second: Block) -> float:
     dx, dy = second.x - first.x, second.y - first.y
     depth = inf
     cosine, sine = abs(cos(second.yaw - first.yaw)), abs(sin(second.yaw - first.yaw))
-    for one, other in ((first, second), (second, first)):
-        c, s = cos(one.yaw), sin(one.yaw)
-        along = one.half_width + other.half_width * cosine + other.half_length * sine - abs(c * dx + s * dy)
-        across = one.half_length + other.half_width * sine + other.half_length * cosine - abs(c * dy - s * dx)
+    for block, other in ((first, second), (second, first)):
+        c, s = cos(block.yaw), sin(block.yaw)
+        along = block.half_width + other.half_width * cosine + other.half_length * sine - abs(c * dx + s * dy)
+        across = block.half_length + other.half_width * sine + other.half_length * cosine - abs(c * dy - s * dx)
         depth = min(depth, along, across)
     return depth
 

@@ -87,9 +87,11 @@ def _instance(problem: Path | None, parameters: PackParameters) -> Instance:
 def _proposer(parameters: PackParameters, transcript: Path | None, context: Context) -> Proposer:
     def chat(variant: Variant) -> Chat:
         return open_chat(
-            parameters, scripted=scripted_backend(variant, context.seed), transcript=transcript,
+            parameters,
+            scripted=scripted_backend(variant, context.seed),
+            transcript=transcript,
             record=context.output / "transcript.jsonl",
-        )  # fmt: skip
+        )
 
     setting = Setting(context.seed, parameters.reasons, parameters.trace_length, chat)
     return PROPOSERS[parameters.proposer](setting)
@@ -101,10 +103,15 @@ def _attempt(attempt: Attempt) -> PackingAttempt:
         tried = number < len(attempt.feedback)
         steps.append(
             PackingStep(
-                name=action.name, box=action.box, x=action.x, y=action.y, yaw=action.yaw, tried=tried,
+                name=action.name,
+                box=action.box,
+                x=action.x,
+                y=action.y,
+                yaw=action.yaw,
+                tried=tried,
                 failure=attempt.feedback[number].failure if tried else None,
             )
-        )  # fmt: skip
+        )
     return PackingAttempt(steps=tuple(steps), task=attempt.task)
 
 
@@ -120,20 +127,20 @@ def _told(instance: Instance, proposer: Proposer, result: PackingRun) -> Packing
     )
 
 
-def _write(output: Path, told: PackingFile, instance: Instance, result: PackingRun) -> None:
-    told.write(output / "packing.json")
+def _write(output: Path, file: PackingFile, instance: Instance, result: PackingRun) -> None:
+    file.write(output / "packing.json")
     to_file(instance).write(output / "instance.json")
-    output.joinpath("plan.txt").write_text(plan_text(told), encoding="utf-8")
+    output.joinpath("plan.txt").write_text(plan_text(file), encoding="utf-8")
     paths = [motion.path for motion in result.motions] if result.success else []
     joints = np.concatenate(paths) if paths else np.zeros((0, 7))
     action = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
     np.savez(output / "trajectory.npz", joints=joints, action=action.astype(np.int64))
 
 
-def plan_text(told: PackingFile) -> str:
+def plan_text(file: PackingFile) -> str:
     """Return the attempts as people read them: each action with what motion planning said."""
-    lines = [f"{told.name}, proposed by {told.proposer}"]
-    for number, attempt in enumerate(told.attempts, start=1):
+    lines = [f"{file.name}, proposed by {file.proposer}"]
+    for number, attempt in enumerate(file.attempts, start=1):
         lines.append(f"\nattempt {number}")
         for step in attempt.steps:
             where = "" if step.x is None else f" at ({step.x:.3f}, {step.y:.3f}), yaw {step.yaw:.2f}"
@@ -141,8 +148,8 @@ def plan_text(told: PackingFile) -> str:
             lines.append(f"  {step.name} {step.box}{where}: {outcome}")
         if attempt.task is not None:
             lines.append(f"  {attempt.task.message}")
-    end = "packed" if told.success else "not packed"
-    if told.stopped is not None:
-        end += f": {told.stopped.message}"
-    calls = f"{told.proposer_calls} proposer calls, {told.motion_planner_calls} motion-planner calls"
+    end = "packed" if file.success else "not packed"
+    if file.stopped is not None:
+        end += f": {file.stopped.message}"
+    calls = f"{file.proposer_calls} proposer calls, {file.motion_planner_calls} motion-planner calls"
     return "\n".join([*lines, f"\n{end}; {calls}"]) + "\n"

@@ -129,9 +129,9 @@ class ArmPlanner:
             tally.nearest = min(tally.nearest, failed.failure.numbers["distance"])
             return None
         path = np.concatenate([start[None], arms])
-        found = first_collision(densify(path, ARM_RESOLUTION), lambda arm: self._check(base, arm))
-        if found is not None:
-            tally.collided(found[1])
+        collision_at = first_collision(densify(path, ARM_RESOLUTION), lambda arm: self._check(base, arm))
+        if collision_at is not None:
+            tally.collided(collision_at[1])
             return None
         return path
 

@@ -54,7 +54,7 @@ def parse_priors(priors: tuple[str, ...], model: WorldModel) -> list[Belief]:
         _, kind, container = match.groups()
         if kind not in USUAL:
             raise UsageError(f"assumption {prior!r}: no usual size of {kind!r}", hint=f"known: {', '.join(USUAL)}")
-        if container not in model.records or model.records[container].movable:
+        if container not in model.records or model.records[container].carriable:
             raise UsageError(f"assumption {prior!r}: the scene has no furniture {container!r}", hint="see scene.json")
         width, height, _ = USUAL[kind]
         words = (
@@ -128,18 +128,18 @@ def match_beliefs(
     That is a thing of its class, not taken for anything else, whose centre lies within the box of what its container
     was taken for; the one nearest to where it was believed. Without one it is nowhere.
     """
-    found = {name: match for name, match in matches.items() if name not in {belief.name for belief in beliefs}}
+    with_beliefs = {name: match for name, match in matches.items() if name not in {belief.name for belief in beliefs}}
     for belief in beliefs:
-        container = found[belief.container].matched
-        taken = {match.matched for match in found.values()}
+        container = with_beliefs[belief.container].matched
+        taken = {match.matched for match in with_beliefs.values()}
         best: tuple[float, str] | None = None
         for name, record in room.items():
-            if container is None or name in taken or record.class_name != belief.class_name or not record.movable:
+            if container is None or name in taken or record.class_name != belief.class_name or not record.carriable:
                 continue
             box = room[container].box
             away = np.linalg.norm(np.subtract(record.box.center, box.center))
             inside = record.parent == container or bool(away < 0.5 * np.linalg.norm(box.size))
             if inside and (best is None or away < best[0]):
                 best = (float(away), name)
-        found[belief.name] = BodyMatch(body=belief.name, matched=None if best is None else best[1])
-    return found
+        with_beliefs[belief.name] = BodyMatch(body=belief.name, matched=None if best is None else best[1])
+    return with_beliefs

@@ -188,7 +188,9 @@ class Conduct:
         record = true_record(self.physical.world, here, self.room.records[here])
         names = {there: planned for planned, there in self.joint_names.items() if planned.startswith(f"{body}__")}
         record, text = renamed(record, self.room.texts[here], body, names)
-        record = record.model_copy(update={"parent": parent, "movable": self.model.records[body].movable})
+        believed = self.model.records[body]
+        kept = {"parent": parent, "movable": believed.movable, "furniture": believed.furniture}
+        record = record.model_copy(update=kept)
         self.model.see(body, record, text, self.room.planes[here])
 
     def look_around(self) -> None:
@@ -202,7 +204,7 @@ class Conduct:
                 continue
             if match.matched == self.physical.held:
                 self.model.world.set_pose(body, self.physical.world.pose(match.matched))
-            elif record.movable or record.joints:
+            elif record.carriable or record.joints:
                 self._see(body, match.matched)
 
     def _anchor(self, step: Step) -> np.ndarray | None:
@@ -332,9 +334,7 @@ def _by_action(steps: list[Step]) -> list[list[Step]]:
     """Group steps so that each group ends with the last manipulation of one action."""
     groups: list[list[Step]] = []
     for step in steps:
-        same = (
-            groups and groups[-1][-1].name == step.name and groups[-1][-1].arguments == step.arguments
-        )  # fmt: skip
+        same = groups and groups[-1][-1].name == step.name and groups[-1][-1].arguments == step.arguments
         if groups and (groups[-1][-1].name == DRIVE or same):
             groups[-1].append(step)
         else:

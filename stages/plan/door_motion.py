@@ -30,8 +30,6 @@ ARC_STEP = 0.05
 SLOW = 0.3
 TILTS = (0.0, 0.5, -0.5, 0.9, -0.9, 1.2, -1.2)
 GRIP_SLACK = 0.012
-SHUT = 0.06
-"""Share of a joint's range below which it counts as shut."""
 OPEN = 0.5
 """Share of a joint's range above which it counts as open."""
 
@@ -195,9 +193,9 @@ def _push(search: JointSearch, start: float, end: float) -> Manipulation | None:
     gap = model.description.tip_overhang - PRESS
     planner = ArmPlanner(model, random, budgets.path_samples)
     for contact in contacts:
-        route = np.array([
-            apply(world_from_body @ body_from_moved(joint, float(value)), contact.point) for value in values
-        ])  # fmt: skip
+        route = np.array(
+            [apply(world_from_body @ body_from_moved(joint, float(value)), contact.point) for value in values]
+        )
         bases = _candidate_bases(model, state, route, budgets, random, tally)
         for tilt in _tilts(len(values)):
             for roll in (0.0, np.pi / 2):
@@ -214,9 +212,7 @@ def _drag(search: JointSearch, contact: ContactPoint, roll: float, start: float,
     budgets, random = search.budgets, search.random
     world_from_body = model.pose(body)
     values = _values(start, end)
-    route = np.array([
-        apply(world_from_body @ body_from_moved(joint, float(value)), contact.point) for value in values
-    ])  # fmt: skip
+    route = np.array([apply(world_from_body @ body_from_moved(joint, float(value)), contact.point) for value in values])
     bases = _candidate_bases(model, state, route, budgets, random, tally)
     opening = model.description.opening
     planner = ArmPlanner(model, random, budgets.path_samples)

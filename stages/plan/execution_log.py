@@ -42,15 +42,15 @@ def write_execution(
             schema = writer.register_schema(kind.DESCRIPTOR.full_name, "protobuf", data)
             channels[topic] = writer.register_channel(topic, "protobuf", schema)
         last = -1
-        said: dict[str, np.ndarray] = {}
+        logged: dict[str, np.ndarray] = {}
         for index, snapshot in enumerate(snapshots):
             stamp = foxglove.nanoseconds(snapshot.time)
             if stamp <= last:
                 continue
             last = stamp
             poses = {**snapshot.links, "camera": world_from_camera}
-            changed = [name for name in sorted(poses) if name not in said or _differs(said[name], poses[name])]
-            said.update({name: poses[name] for name in changed})
+            changed = [name for name in sorted(poses) if name not in logged or _differs(logged[name], poses[name])]
+            logged.update({name: poses[name] for name in changed})
             message = FrameTransforms()
             for name in changed:
                 message.transforms.extend(foxglove.transforms_message(stamp, "world", name, poses[name]).transforms)

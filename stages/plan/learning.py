@@ -47,7 +47,7 @@ class Lessons:
 
     def learn(
         self, action: GroundAction, failure: Failure, actions: list[GroundAction], state: frozenset[Atom]
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Take in that an action has no motion in a state. `actions` are all of the task, unchanged."""
         key = (action.name, action.arguments)
         further = self._instead(action, failure, actions, state)
@@ -62,7 +62,7 @@ class Lessons:
 
     def _instead(
         self, action: GroundAction, failure: Failure, actions: list[GroundAction], state: frozenset[Atom]
-    ) -> Atom | None:  # fmt: skip
+    ) -> Atom | None:
         """Return what should be true first so that the cause goes away, None when nothing would do that."""
         if failure.kind not in ("goal_in_collision", "no_path", "start_in_collision") or not failure.objects:
             return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -136,9 +137,7 @@ def plan_pick(
         else []
     )
     if not grasps:
-        grasps = sample_grasps(
-            points, normals, world_from_item, opening=widest, random=random, pitches=PITCHES[style]
-        )  # fmt: skip
+        grasps = sample_grasps(points, normals, world_from_item, opening=widest, random=random, pitches=PITCHES[style])
     if not grasps:
         grasps = rim_grasps(points, world_from_item, random, uncertainty=budgets.size_uncertainty)
     if not grasps:
@@ -153,15 +152,16 @@ def plan_pick(
     tally = Tally()
     checker = model.checker
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
-    paths = budgets.paths
     bases = _bases_around(model, state, world_from_item[:3, 3], budgets, random, tally, None)
     queue = [(bases[i], grasps[j]) for i, j in _pairs(bases, len(grasps), random, budgets.pairs)]
     if model.laden(item):
         moments = load_moments(model, item, np.array([world_from_item @ grasp.body_from_tool for _, grasp in queue]))
         queue = [queue[index] for index in np.argsort(moments.round(1), kind="stable")]
     lowest = float(apply(world_from_item, points)[:, 2].min())
-    over = {id(grasp): palm_bottom(world_from_item @ grasp.body_from_tool, model.description.palm) > lowest
-            for grasp in grasps}  # fmt: skip
+    over = {
+        id(grasp): palm_bottom(world_from_item @ grasp.body_from_tool, model.description.palm) > lowest
+        for grasp in grasps
+    }
     sideways = style == "rather_level"
     # A hand that reaches below the item's foot, over an edge, cannot put it down but over an edge.
     queue.sort(key=lambda entry: (not over[id(entry[1])], sideways and entry[1].pitch > max(PITCHES["level"])))
@@ -169,19 +169,27 @@ def plan_pick(
         queue.insert(0, (preferred[0], Grasp(preferred[1], 0.0, 0.0)))
     checker.allow(touch=model.links(item))
     try:
-        for base, grasp in queue:
-            found = _try_pick(model, state, item, source, base, grasp, arm_planner, tally)
-            if isinstance(found, Manipulation):
-                return found
-            if found is not None:
-                paths -= 1
-                if paths == 0:
-                    break
+        attempts = (_try_pick(model, state, item, source, base, grasp, arm_planner, tally) for base, grasp in queue)
+        motion = _first_motion(attempts, budgets.paths)
+        if motion is not None:
+            return motion
     finally:
         checker.put_down(world_from_item)
         checker.allow()
     tally.raise_for(f"pick({item}, {source})", (item, source))
     raise AssertionError("unreachable")
+
+
+def _first_motion(attempts: Iterator[Manipulation | MotionFailed | None], searches: int) -> Manipulation | None:
+    """Return the first of the attempts that is a motion, made one by one until `searches` for a path have failed."""
+    for attempt in attempts:
+        if isinstance(attempt, Manipulation):
+            return attempt
+        if attempt is not None:
+            searches -= 1
+            if searches == 0:
+                break
+    return None
 
 
 def _try_pick(
@@ -295,7 +303,7 @@ def plan_place(
     free place there carries the item's footprint, otherwise what ended most attempts.
     """
     assert state.tool_from_item is not None
-    on_tray = model.records[target].movable
+    on_tray = model.records[target].carriable
     places = sample_placements(model, item, target, door, random, 2 * PLACES if on_tray else PLACES)
     if not places and preferred is None:
         regions = place_regions(model, item, target, door)
@@ -308,12 +316,11 @@ def plan_place(
     if on_tray and places:
         left = lifts_left(
             model, target, item, np.array([place.world_from_item for place in places]), budgets.size_uncertainty
-        )  # fmt: skip
+        )
         order = sorted(range(len(places)), key=lambda index: (not places[index].roomy, -left[index]))
         places = [places[index] for index in order if left[index] or not left.any()]
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
-    paths = budgets.paths
     checker = model.checker
     queue: list[tuple[np.ndarray, Placement]] = []
     if preferred is not None:
@@ -326,14 +333,13 @@ def plan_place(
         bases = free_bases(bases, state.arm, checker, tally.blockers, 4)
         queue += [(base, place) for base in bases]
     try:
-        for base, place in queue[: budgets.pairs]:
-            found = _try_place(model, state, item, target, base, place, arm_planner, tally)
-            if isinstance(found, Manipulation):
-                return found
-            if found is not None:
-                paths -= 1
-                if paths == 0:
-                    break
+        attempts = (
+            _try_place(model, state, item, target, base, place, arm_planner, tally)
+            for base, place in queue[: budgets.pairs]
+        )
+        motion = _first_motion(attempts, budgets.paths)
+        if motion is not None:
+            return motion
     finally:
         checker.carry(item, state.tool_from_item)
         checker.allow()

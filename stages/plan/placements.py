@@ -36,12 +36,12 @@ class Placement:
 def place_regions(model: WorldModel, item: str, target: str, door: str | None) -> list[Region]:
     """Return the regions of `target` with room for `item`: behind `door` (it, at least, is open), or behind none."""
     radius, height = model.footprint(item)
-    found = []
+    regions = []
     for region in model.regions(target):
         if not region.takes(radius, height) or (door not in region.doors if door else region.doors):
             continue
-        found.append(region)
-    return found
+        regions.append(region)
+    return regions
 
 
 def sample_placements(
@@ -103,11 +103,11 @@ def placement_style(
 def nearest_level(model: WorldModel, body: str, place: np.ndarray, height: float) -> float:
     """Return the height [m] of the region of a body over which a place (2,) lies that is nearest to `height`; `height`
     itself when there is none."""
-    found = [height + 1.0]
+    levels = [height + 1.0]
     for region in model.regions(body):
         world_from_closed = model.world_from_region(region)
         spot = apply(inverse(world_from_closed), np.array([*place, height]))
         if np.all(spot[:2] > region.low) and np.all(spot[:2] < region.high):
-            found.append(height + region.level - float(spot[2]))
-    best = min(found, key=lambda level: abs(level - height))
+            levels.append(height + region.level - float(spot[2]))
+    best = min(levels, key=lambda level: abs(level - height))
     return best if abs(best - height) < NEAR_LEVEL else height

@@ -98,9 +98,7 @@ class _Shape:
         places, ray, faces = self.mesh.ray.intersects_location(start, rays, multiple_hits=True)
         met: list[list[tuple[float, int]]] = [[] for _ in start]
         distances = np.linalg.norm(places - start[ray], axis=1)
-        for index, distance, owner in zip(
-            ray.tolist(), distances.tolist(), self.owner[faces].tolist(), strict=True
-        ):  # fmt: skip
+        for index, distance, owner in zip(ray.tolist(), distances.tolist(), self.owner[faces].tolist(), strict=True):
             met[index].append((distance, owner))
         return met
 

@@ -41,9 +41,7 @@ class Replanning:
     places: list[int] = field(default_factory=list)
     """Index of the first step of each plan made here."""
 
-    def plan(
-        self, state: RobotState, start: TreeState, observed: TreeState, number: int
-    ) -> list[Step] | None:  # fmt: skip
+    def plan(self, state: RobotState, start: TreeState, observed: TreeState, number: int) -> list[Step] | None:
         """Return steps from an observed state on, None when there are none; failures are collected.
 
         `start` is what was observed before the first action, `number` the index that the first new step will have. The

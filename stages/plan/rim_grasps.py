@@ -54,7 +54,7 @@ def rim_grasps(
     middle = (low + high)[:2] / 2
     yaw = float(np.arctan2(world_from_body[1, 0], world_from_body[0, 0]))
     even = yaw + 2 * np.pi * np.arange(headings) / headings
-    found: list[Grasp] = []
+    grasps: list[Grasp] = []
     square: list[bool] = []
     beside = [(heading, offset) for heading in even[:: headings // 4] for offset in OFFSETS]
     for heading, offset in [*((heading, 0.0) for heading in even), *beside]:
@@ -78,9 +78,9 @@ def rim_grasps(
         pose[2, 3] = rim - depth
         is_square = askew(relative @ across - offset, relative @ outward) < MOST_ASKEW
         for turned in (pose, pose @ np.diag([-1.0, -1.0, 1.0, 1.0])):
-            found.append(Grasp(inverse(world_from_body) @ turned, thickness, np.pi / 2))
+            grasps.append(Grasp(inverse(world_from_body) @ turned, thickness, np.pi / 2))
             square.append(is_square)
-    return [found[index] for index in random.permutation(len(found)).tolist() if square[index] or not any(square)]
+    return [grasps[index] for index in random.permutation(len(grasps)).tolist() if square[index] or not any(square)]
 
 
 def askew(across: np.ndarray, outward: np.ndarray) -> float:

@@ -105,9 +105,7 @@ def execute(
     root = order.scene.root if order.ground_truth is None else order.ground_truth.path("room")
     room = _read_room(root, order)
     planned = dict(model.records)
-    matches = match_beliefs(
-        order.beliefs, match_bodies(planned, room.records, parameters.match_radius), room.records
-    )  # fmt: skip
+    matches = match_beliefs(order.beliefs, match_bodies(planned, room.records, parameters.match_radius), room.records)
     joint_names = joint_pairs(planned, room.records, matches)
     believed = start_state(model)
     replanning = Replanning(model, order.graph, believed, order.literals, search)
@@ -153,8 +151,9 @@ def execute(
             draw(RoomPictures(world, room.records, room.texts, model.description), physical, parameters, context)
     graphs = {
         number: graph_of_state(order.graph, observed[START], state, believed, model)
-        for number, state in observed.items() if number >= 0
-    }  # fmt: skip
+        for number, state in observed.items()
+        if number >= 0
+    }
     used = (LOOK, PROPRIOCEPTION, GRIP) if parameters.relocalize else ("the planned motion was replayed", GRIP)
     return Outcome(
         conduct.steps,
@@ -181,9 +180,9 @@ def _read_room(root: Path, order: Order) -> Room:
     texts = {name: text for name, (_, text) in bodies.items()}
     planes = {}
     for name, record in records.items():
-        known = nodes[name].planes if name in nodes else ()
-        flat = any(plane.horizontal and len(plane.corners) == 4 for plane in known)
-        planes[name] = known if flat else known + body_planes(record, texts[name])
+        seen_planes = nodes[name].planes if name in nodes else ()
+        flat = any(plane.horizontal and len(plane.corners) == 4 for plane in seen_planes)
+        planes[name] = seen_planes if flat else seen_planes + body_planes(record, texts[name])
     return Room(records, texts, planes)
 
 
@@ -207,7 +206,7 @@ def _differences(
     anew: dict[int, TreeState],
 ) -> tuple[TreeDifference, ...]:  # fmt: skip
     """Return where the tree was not as the steps say; what was planned anew began with the tree as it was then."""
-    found: list[TreeDifference] = []
+    differences: list[TreeDifference] = []
     expected = replace(believed, parents={**believed.parents, **observed[START].parents})
     for number, step in enumerate(steps):
         if number in anew:
@@ -218,8 +217,8 @@ def _differences(
             )  # fmt: skip
         expected = after_step(expected, step)
         if number in observed:
-            found += tree_differences(number, expected, observed[number], model)
-    return tuple(found)
+            differences += tree_differences(number, expected, observed[number], model)
+    return tuple(differences)
 
 
 def draw(pictures: RoomPictures, physical: PhysicalRobot, parameters: PlanParameters, context: Context) -> None:

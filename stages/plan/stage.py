@@ -69,12 +69,12 @@ def run(
         graph = believe(model, scene.graph, beliefs)
         objects, initial = symbolic_state(model, graph, parameters.size_uncertainty)
         with context.progress.step("plan"):
-            state, found = _find(model, graph, objects, initial, budgets, parameters, context)
-        problem = task_problem(objects, initial, found.goal)
+            state, planning = _find(model, graph, objects, initial, budgets, parameters, context)
+        problem = task_problem(objects, initial, planning.goal)
         context.output.joinpath("domain.pddl").write_text(domain_text(DOMAIN), encoding="utf-8")
         context.output.joinpath("problem.pddl").write_text(problem_text(problem, DOMAIN.name), encoding="utf-8")
-        if found.steps is not None and parameters.execute:
-            order = Order(scene, ground_truth, graph, beliefs, found.literals, state, found.steps)
+        if planning.steps is not None and parameters.execute:
+            order = Order(scene, ground_truth, graph, beliefs, planning.literals, state, planning.steps)
             anew = partial(
                 plan_and_refine, model, domain=DOMAIN, budgets=replace(budgets, size_uncertainty=0.0),
                 random=context.random(REPLANNING), settings=_search_settings(parameters),
@@ -85,8 +85,8 @@ def run(
                     context, context.random(EXECUTION),
                 )  # fmt: skip
         else:
-            outcome = only_planned(model, graph, found.steps)
-        return _write(parameters, context, found, outcome, graph, [belief.words for belief in beliefs], robot)
+            outcome = only_planned(model, graph, planning.steps)
+        return _write(parameters, context, planning, outcome, graph, [belief.words for belief in beliefs], robot)
     finally:
         model.close()
 
@@ -102,30 +102,30 @@ def _find(
     parameters: PlanParameters, context: Context,
 ) -> tuple[RobotState, Found]:  # fmt: skip
     """Return where the robot starts, and the plan of the first goal that has one (or the first goal, without)."""
-    found = Found()
+    planning = Found()
     carry = model.description.carry
-    goals = [parse_goal(literals, objects) for literals in _candidates(model, initial, parameters, found.failures)]
-    if not goals and not found.failures:
-        found.failures.append(_nothing_to_do(model, graph, initial))
+    goals = [parse_goal(literals, objects) for literals in _candidates(model, initial, parameters, planning.failures)]
+    if not goals and not planning.failures:
+        planning.failures.append(_nothing_to_do(model, graph, initial))
     if goals:
-        found.goal, found.literals = goals[0]
+        planning.goal, planning.literals = goals[0]
     try:
         state = RobotState(start_base(model, carry, context.random(START)), carry)
     except MotionFailed as failed:
-        found.failures.append(failed.failure)
-        return RobotState(np.zeros(3), carry), found
+        planning.failures.append(failed.failure)
+        return RobotState(np.zeros(3), carry), planning
     for number, (goal, literals) in enumerate(goals):
         attempt = plan_and_refine(
             model, state, DOMAIN, task_problem(objects, initial, goal), budgets, context.random(SEARCH, number),
             _search_settings(parameters),
         )  # fmt: skip
-        found.failures += attempt.failures
-        found.learned += attempt.learned
-        found.tried += attempt.tried
+        planning.failures += attempt.failures
+        planning.learned += attempt.learned
+        planning.tried += attempt.tried
         if attempt.steps is not None:
-            found.goal, found.literals, found.steps = goal, literals, attempt.steps
+            planning.goal, planning.literals, planning.steps = goal, literals, attempt.steps
             break
-    return state, found
+    return state, planning
 
 
 def _candidates(
@@ -162,7 +162,7 @@ def _nothing_to_do(model: WorldModel, graph: ContactGraphFile, initial: frozense
 
 
 def _write(
-    parameters: PlanParameters, context: Context, found: Found, outcome: Outcome, graph: ContactGraphFile,
+    parameters: PlanParameters, context: Context, planning: Found, outcome: Outcome, graph: ContactGraphFile,
     beliefs: list[str], robot: RobotDescription,
 ) -> Plan:  # fmt: skip
     steps = outcome.steps
@@ -187,11 +187,11 @@ def _write(
         for check in outcome.checks if not check.holds
     )  # fmt: skip
     plan = PlanFile(
-        goal=found.literals, planned_in="reconstructed", executed_in=outcome.executed_in, actions=actions,
-        failures=(*found.failures, *outcome.failures, *unmet), checks=outcome.checks, status=status,
+        goal=planning.literals, planned_in="reconstructed", executed_in=outcome.executed_in, actions=actions,
+        failures=(*planning.failures, *outcome.failures, *unmet), checks=outcome.checks, status=status,
         matches=outcome.matches, assumptions=(*beliefs, *outcome.assumptions), bumps=outcome.bumps,
-        task=parameters.task or None, planner=parameters.planner, learned=(*found.learned, *outcome.learned),
-        tried=(*found.tried, *outcome.tried), replanned=outcome.replanned, tree_differences=outcome.differences,
+        task=parameters.task or None, planner=parameters.planner, learned=(*planning.learned, *outcome.learned),
+        tried=(*planning.tried, *outcome.tried), replanned=outcome.replanned, tree_differences=outcome.differences,
     )  # fmt: skip
     plan.write(context.output / "plan.json")
     (outcome.graph or graph).write(context.output / "graph.json")
@@ -203,7 +203,7 @@ def _write(
     context.output.joinpath("plan.txt").write_text(plan_text(plan, steps or []), encoding="utf-8")
     ok = status in ("executed", "planned")
     summary = {
-        "goal": " ".join(found.literals), "status": status, "actions": len(actions),
+        "goal": " ".join(planning.literals), "status": status, "actions": len(actions),
         "checks": f"{sum(check.holds for check in outcome.checks)}/{len(outcome.checks)}",
         "failures": len(plan.failures),
     }  # fmt: skip

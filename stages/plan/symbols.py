@@ -70,7 +70,7 @@ def symbolic_state(
     objects = {START: "spot"}
     atoms: set[Atom] = {("near", START), ("hand_empty",)}
     for name, record in model.records.items():
-        if record.movable:
+        if record.carriable:
             objects[name] = "item"
         elif record.joints:
             objects[name] = "container"

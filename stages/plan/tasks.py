@@ -36,8 +36,8 @@ class SceneFacts:
 
     def bodies(self, *classes: str) -> list[str]:
         """Return the bodies of some classes that the arm reaches, by name."""
-        found = (name for name, record in self.model.records.items() if record.class_name in classes)
-        return sorted(name for name in found if self.holds("reachable", name))
+        of_classes = (name for name, record in self.model.records.items() if record.class_name in classes)
+        return sorted(name for name in of_classes if self.holds("reachable", name))
 
     def small(self, names: list[str]) -> list[str]:
         """Return those that can be picked up on their own: graspable, within reach, nothing on them, no carrier."""

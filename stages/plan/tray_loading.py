@@ -53,10 +53,10 @@ def lifts_left(model: WorldModel, tray: str, item: str, places: np.ndarray, unce
     others = [name for name in model.load(tray) if name != item]
     feet = [[*model.pose(name)[:2, 3], model.footprint(name)[0]] for name in others]
     masses = np.array([model.records[name].mass for name in (tray, *others, item)])
-    found = []
+    lifts = []
     for place in places:
         standing = np.array([*feet, [*place[:2, 3], model.footprint(item)[0]]])
         free = free_lanes(poses, standing, model.description.palm)
         moments = holding_moments(poses, np.concatenate([world_from_tray[None, :2, 3], standing[:, :2]]), masses)
-        found.append(int((free & (moments < model.description.holding_moment)).sum()))
-    return np.array(found)
+        lifts.append(int((free & (moments < model.description.holding_moment)).sum()))
+    return np.array(lifts)

@@ -21,7 +21,7 @@ MOVED = 0.05
 
 def start_state(model: WorldModel) -> TreeState:
     """Return what is believed at the beginning."""
-    movable = [name for name, record in model.records.items() if record.movable]
+    movable = [name for name, record in model.records.items() if record.carriable]
     joints = {joint.name: model.joint_value(name, joint.name)
               for name, record in model.records.items() for joint in record.joints}  # fmt: skip
     parents = {name: model.records[name].parent or SCENE_NODE for name in movable}
@@ -46,7 +46,7 @@ def observed_state(
     planned = {match.matched: name for name, match in matches.items() if match.matched is not None}
     parents, poses = {}, {}
     for name, match in matches.items():
-        if match.matched is None or not world.bodies[match.matched].record.movable:
+        if match.matched is None or not world.bodies[match.matched].record.carriable:
             continue
         poses[name] = world.pose(match.matched)
         below = carrier(world, match.matched)
@@ -62,7 +62,7 @@ def observed_state(
 
 def tree_differences(
     action: int, expected: TreeState, observed: TreeState, model: WorldModel
-) -> tuple[TreeDifference, ...]:  # fmt: skip
+) -> tuple[TreeDifference, ...]:
     """Return where an observed state is not as expected: carriers of things, doors that are open or shut."""
     differences = []
     for name, parent in sorted(observed.parents.items()):
@@ -100,7 +100,7 @@ def graph_of_state(
             moved[name] = (believed.poses[name], change @ believed.poses[name])
         parent = SCENE_NODE if state.parents[name] == HAND else state.parents[name]
         if state.parents[name] != start.parents[name] and parent in nodes:
-            parents[name] = (parent, _relation(model, name, parent))
+            parents[name] = (parent, _relation(model, parent))
     joints: dict[str, dict[str, float]] = {}
     for name, record in model.records.items():
         values = {
@@ -115,7 +115,7 @@ def graph_of_state(
     return updated.model_copy(update={"graph": {**updated.graph, "held": state.held}})
 
 
-def _relation(model: WorldModel, item: str, parent: str) -> str:
+def _relation(model: WorldModel, parent: str) -> str:
     """`contains` for furniture that hides what stands on its regions behind doors, else `supports`."""
     record = model.records.get(parent)
     return "contains" if record is not None and record.contains and record.joints else "supports"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -157,15 +157,15 @@ class WorldModel:
 
     def load(self, item: str) -> tuple[str, ...]:
         """Return the movable bodies that stand on a body, and on those, in turn: what goes along when it is carried."""
-        found: list[str] = []
+        loaded: list[str] = []
         waiting = [item]
         while waiting:
             carrier = waiting.pop()
             above = [name for name, record in self.records.items() if record.movable and record.parent == carrier]
-            fresh = [name for name in above if name not in found and name != item]
-            found += fresh
+            fresh = [name for name in above if name not in loaded and name != item]
+            loaded += fresh
             waiting += fresh
-        return tuple(found)
+        return tuple(loaded)
 
     def take_aboard(self, carrier: str) -> None:
         """Make one rigid body of a carrier and what stands on it, so that its load counts in collision checks."""
@@ -295,15 +295,6 @@ class WorldModel:
             for joint, value in before.items():
                 self.world.set_joint(name, joint, value)
 
-    def extent_up(self, name: str, world_from_body: np.ndarray) -> tuple[float, float]:
-        """Return the lowest and highest z [m] of a rigid body put at a pose (4, 4)."""
-        heights = apply(world_from_body, self.points(name))[:, 2]
-        return float(heights.min()), float(heights.max())
-
-    def opening_for(self, grip: float) -> float:
-        """Return a finger distance [m] a little wider than `grip`, within what the gripper can."""
-        return float(min(self.description.opening, grip))
-
 
 def body_planes(record: SceneBody, text: str) -> tuple[SurfacePlane, ...]:
     """Return the horizontal planes on top of a body's base link at its pose, world frame, from its shapes."""
@@ -323,11 +314,6 @@ def moved_record(record: SceneBody, world_from_body: np.ndarray, joint_values: d
     return record.model_copy(
         update={"world_from_body": as_transform(world_from_body), "joint_values": joint_values, "box": box}
     )
-
-
-def with_state(state: RobotState, **changes: object) -> RobotState:
-    """Return the state with some fields changed."""
-    return replace(state, **changes)  # type: ignore[arg-type]
 
 
 def hold_for_checks(model: WorldModel, state: RobotState) -> None:

@@ -9,6 +9,7 @@ same bits; Open3D's parallel sums do not.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -36,6 +37,10 @@ SYSTEMATIC_DEPTH = 0.005
 keeps near surfaces, whose noise is a millimetre, from outweighing everything else. Chosen: docs/POSES.md."""
 SMALLEST_STEP = 2e-5
 """Steps below this end a level [rad and m]."""
+SUMS = 8
+SAMPLES, ON_SURFACE, FLOATING, HIDDEN, PLANES, PLANE_SQUARES, COLORS, COLOR_SQUARES = range(SUMS)
+"""What is summed over the pixels of the source beside the equations: how many were compared, lie on the target's
+surface, before it and behind it; how many gave an equation by distance and by brightness, and the squares of those."""
 _FIRST, _SECOND = np.triu_indices(PARAMETERS)
 
 
@@ -65,40 +70,36 @@ class Alignment:
         return float(least**-0.5) if least > 0 else float("inf")
 
 
+class _Comparison(NamedTuple):
+    """How two frames are compared on a level; see STRIDES, GATES and TOLERANCES."""
+
+    stride: int
+    gate: float
+    tolerance: float
+    use_color: bool
+
+
 @numba.njit(cache=True, fastmath=False)
 def _accumulate(
-    target_points: np.ndarray,
-    target_normals: np.ndarray,
-    target_brightness: np.ndarray,
-    target_gradient: np.ndarray,
-    intrinsics: np.ndarray,
-    source_points: np.ndarray,
-    source_normals: np.ndarray,
-    source_brightness: np.ndarray,
-    motion: np.ndarray,
-    gain: float,
-    bias: float,
-    stride: int,
-    gate: float,
-    tolerance: float,
-    use_color: bool,
-    brightness_noise: float,
-    brightness_gate: float,
-    systematic: float,
+    target: Level, source: Level, motion: np.ndarray, gain: float, bias: float, comparison: _Comparison
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the upper triangle of the normal matrix (36,), the right side (8,), and the sums behind the figures."""
-    fx, fy, cx, cy = intrinsics
+    """Return the upper triangle of the normal matrix (36,), the right side (8,), and the sums (SUMS,)."""
+    target_points, target_normals = target.points, target.normals
+    target_brightness, target_gradient = target.brightness, target.gradient
+    source_points, source_normals, source_brightness = source.points, source.normals, source.brightness
+    stride, gate, tolerance, use_color = comparison
+    fx, fy, cx, cy = target.intrinsics
     height, width = target_points.shape[:2]
-    matrix = np.zeros(36)
-    right = np.zeros(8)
-    sums = np.zeros(8)  # samples, on surface, floating, hidden, plane count, plane squares, colour count, squares
-    row = np.zeros(8)
+    matrix = np.zeros(PARAMETERS * (PARAMETERS + 1) // 2)
+    right = np.zeros(PARAMETERS)
+    sums = np.zeros(SUMS)
+    row = np.zeros(PARAMETERS)
     for v in range(0, source_points.shape[0], stride):
         for u in range(0, source_points.shape[1], stride):
             z_source = source_points[v, u, 2]
             if z_source <= 0:
                 continue
-            sums[0] += 1
+            sums[SAMPLES] += 1
             x, y = source_points[v, u, 0], source_points[v, u, 1]
             q0 = motion[0, 0] * x + motion[0, 1] * y + motion[0, 2] * z_source + motion[0, 3]
             q1 = motion[1, 0] * x + motion[1, 1] * y + motion[1, 2] * z_source + motion[1, 3]
@@ -112,15 +113,15 @@ def _accumulate(
             z_target = target_points[vt, ut, 2]
             if z_target <= 0:
                 continue
-            noise = np.hypot(0.0012 + 0.0019 * (q2 - 0.4) ** 2, systematic * q2)
+            noise = np.hypot(0.0012 + 0.0019 * (q2 - 0.4) ** 2, SYSTEMATIC_DEPTH * q2)
             reach = gate + 2 * noise
             if q2 - z_target > reach:
-                sums[3] += 1
+                sums[HIDDEN] += 1
                 continue
             if z_target - q2 > reach:
-                sums[2] += 1
+                sums[FLOATING] += 1
                 continue
-            sums[1] += 1
+            sums[ON_SURFACE] += 1
             n0, n1, n2 = target_normals[vt, ut, 0], target_normals[vt, ut, 1], target_normals[vt, ut, 2]
             if n0 != 0 or n1 != 0 or n2 != 0:
                 s0, s1, s2 = source_normals[v, u, 0], source_normals[v, u, 1], source_normals[v, u, 2]
@@ -145,38 +146,38 @@ def _accumulate(
                             matrix[k] += weight * row[i] * row[j]
                             k += 1
                         k += 2
-                    sums[4] += 1
-                    sums[5] += distance * distance
+                    sums[PLANES] += 1
+                    sums[PLANE_SQUARES] += distance * distance
             own = source_brightness[v, u]
             if not use_color or own < 0:
                 continue
             left, top = int(np.floor(column)), int(np.floor(line))
             a, b = column - left, line - top
-            value, along_u, along_v, known = 0.0, 0.0, 0.0, True
+            value, along_u, along_v, measured = 0.0, 0.0, 0.0, True
             for k in range(4):
                 i, j = top + k // 2, left + k % 2
-                known = known and target_brightness[i, j] >= 0
+                measured = measured and target_brightness[i, j] >= 0
                 share = (b if k // 2 else 1.0 - b) * (a if k % 2 else 1.0 - a)
                 value += share * target_brightness[i, j]
                 along_u += share * target_gradient[i, j, 0]
                 along_v += share * target_gradient[i, j, 1]
-            if not known:
+            if not measured:
                 continue
             difference = value - gain * own - bias
-            sums[6] += 1
-            sums[7] += min(difference * difference, brightness_gate * brightness_gate)
-            if abs(difference) > brightness_gate:
+            sums[COLORS] += 1
+            sums[COLOR_SQUARES] += min(difference * difference, BRIGHTNESS_GATE * BRIGHTNESS_GATE)
+            if abs(difference) > BRIGHTNESS_GATE:
                 continue
-            scaled = difference / (tolerance * brightness_noise)
-            weight = 1.0 / (brightness_noise * brightness_noise * (1.0 + scaled * scaled) ** 2)
+            scaled = difference / (tolerance * BRIGHTNESS_NOISE)
+            weight = 1.0 / (BRIGHTNESS_NOISE * BRIGHTNESS_NOISE * (1.0 + scaled * scaled) ** 2)
             g0, g1 = along_u * fx / q2, along_v * fy / q2
             g2 = -(g0 * q0 + g1 * q1) / q2
             row[0], row[1], row[2] = q1 * g2 - q2 * g1, q2 * g0 - q0 * g2, q0 * g1 - q1 * g0
             row[3], row[4], row[5], row[6], row[7] = g0, g1, g2, -own, -1.0
             k = 0
-            for i in range(8):
+            for i in range(PARAMETERS):
                 right[i] -= weight * row[i] * difference
-                for j in range(i, 8):
+                for j in range(i, PARAMETERS):
                     matrix[k] += weight * row[i] * row[j]
                     k += 1
     return matrix, right, sums
@@ -200,13 +201,13 @@ def align(
     motion, gain, bias = orthonormal(np.asarray(guess, dtype=float)), 1.0, 0.0
     last = min(len(target.levels), len(source.levels)) - 1
     first = last if coarsest is None else min(coarsest, last)
-    matrix, sums = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(8)
+    matrix, sums = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(SUMS)
     for number in range(first, -1, -1):
         for _ in range(iterations[number]):
             matrix, right, sums = _normal_equations(
                 target.levels[number], source.levels[number], motion, gain, bias, number, use_color
             )
-            if sums[4] < 100:
+            if sums[PLANES] < 100:
                 break
             step = np.linalg.solve(matrix + _damping(matrix), right)
             motion = orthonormal(exponential(step[:6]) @ motion)
@@ -220,21 +221,17 @@ def align(
 def judge(target: Pyramid, source: Pyramid, target_from_source: np.ndarray, level: int = 0) -> Alignment:
     """Return the figures of a pose as it is, by depth alone."""
     number = min(level, len(target.levels) - 1, len(source.levels) - 1)
-    found = _normal_equations(
+    matrix, _, sums = _normal_equations(
         target.levels[number], source.levels[number], np.asarray(target_from_source, dtype=float), 1, 0, number, False
     )
-    return _described(np.asarray(target_from_source, dtype=float), found[0], found[2])
+    return _described(np.asarray(target_from_source, dtype=float), matrix, sums)
 
 
 def _normal_equations(
     target: Level, source: Level, motion: np.ndarray, gain: float, bias: float, number: int, use_color: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    packed, right, sums = _accumulate(
-        target.points, target.normals, target.brightness, target.gradient, target.intrinsics,
-        source.points, source.normals, source.brightness, motion, float(gain), float(bias),
-        STRIDES[number], GATES[number], TOLERANCES[number], use_color, BRIGHTNESS_NOISE, BRIGHTNESS_GATE,
-        SYSTEMATIC_DEPTH,
-    )  # fmt: skip
+    comparison = _Comparison(STRIDES[number], GATES[number], TOLERANCES[number], use_color)
+    packed, right, sums = _accumulate(target, source, motion, float(gain), float(bias), comparison)
     matrix = np.zeros((PARAMETERS, PARAMETERS))
     matrix[_FIRST, _SECOND] = packed
     matrix[_SECOND, _FIRST] = packed

@@ -112,17 +112,17 @@ def overlap_candidates(
     keys: list[KeyFrame],
     world_from_key: np.ndarray,
     camera: Camera,
-    known: Iterable[tuple[int, int]],
+    linked: Iterable[tuple[int, int]],
     *,
     per_key: int,
     least_overlap: float = 0.35,
 ) -> list[tuple[int, int]]:
-    """Return pairs (earlier, later), not `known` yet, that should see the same surface where they stand.
+    """Return pairs (earlier, later), not yet `linked`, that should see the same surface where they stand.
 
     `world_from_key` is (N, 4, 4). Pairs of different parts of the graph must not be asked for. For each later key
     frame the candidates are spread: the best ones that are no neighbours of one that was taken.
     """
-    taken = set(known)
+    taken = set(linked)
     pairs = []
     for later in range(2, len(keys)):
         shares = []

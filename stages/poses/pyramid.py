@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numba
@@ -16,9 +17,8 @@ STEEPEST = 0.6
 """A surface along which the depth changes by more than this share within a normal's reach has no normal."""
 
 
-@dataclass(frozen=True)
-class Level:
-    """One resolution of a frame."""
+class Level(NamedTuple):
+    """One resolution of a frame. Compiled functions take it as it is."""
 
     intrinsics: np.ndarray
     """fx, fy, cx, cy [pixels] of this level."""
@@ -153,9 +153,9 @@ def _smoothed(gray: np.ndarray | None, shape: tuple[int, ...]) -> tuple[np.ndarr
     smooth = np.asarray(cv2.GaussianBlur(gray, (3, 3), 0))
     along_u = cv2.Scharr(smooth, cv2.CV_32F, 1, 0, scale=1 / 32)
     along_v = cv2.Scharr(smooth, cv2.CV_32F, 0, 1, scale=1 / 32)
-    known = cv2.erode((gray > 0).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-    gradient = np.where(known[..., None], np.stack([along_u, along_v], axis=-1), np.float32(0))
-    return np.where(known, smooth, np.float32(-1)), gradient
+    covered = cv2.erode((gray > 0).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    gradient = np.where(covered[..., None], np.stack([along_u, along_v], axis=-1), np.float32(0))
+    return np.where(covered, smooth, np.float32(-1)), gradient
 
 
 def _half(
@@ -166,9 +166,9 @@ def _half(
     height, width = smaller.shape
     if gray is not None:
         # The mean of the pixels that are not black.
-        known = (gray > 0).astype(np.float32)
+        covered = (gray > 0).astype(np.float32)
         size, area = (width, height), (slice(2 * height), slice(2 * width))
-        share = np.asarray(cv2.resize(known[area], size, interpolation=cv2.INTER_AREA))
+        share = np.asarray(cv2.resize(covered[area], size, interpolation=cv2.INTER_AREA))
         mean = np.asarray(cv2.resize(gray[area], size, interpolation=cv2.INTER_AREA))
         gray = np.where(share > 0, mean / np.maximum(share, np.float32(0.25)), np.float32(0)).astype(np.float32)
     return smaller, gray, np.array([fx / 2, fy / 2, (cx + 0.5) / 2 - 0.5, (cy + 0.5) / 2 - 0.5])

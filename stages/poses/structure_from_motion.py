@@ -97,8 +97,8 @@ def _write_images(reader: FrameReader, frames: list[int], folder: Path) -> dict[
         name = f"{frame:06d}.png"
         cv2.imwrite(str(folder / "images" / name), gray)
         # Colour that was resampled into the depth camera is black where the depth has holes.
-        known = cv2.erode((gray > 0).astype(np.uint8) * 255, np.ones((9, 9), np.uint8))
-        cv2.imwrite(str(folder / "masks" / f"{name}.png"), known)
+        mask = cv2.erode((gray > 0).astype(np.uint8) * 255, np.ones((9, 9), np.uint8))
+        cv2.imwrite(str(folder / "masks" / f"{name}.png"), mask)
         names[name] = frame
     return names
 
@@ -142,8 +142,8 @@ def _map(folder: Path, names: list[str], camera: Camera, parameters: PosesParame
     options.mapper.abs_pose_refine_focal_length = options.mapper.abs_pose_refine_extra_params = False
     options.mapper.init_min_tri_angle = 6.0
     (folder / "models").mkdir()
-    found = pycolmap.incremental_mapping(database, folder / "images", folder / "models", options)
-    return [model for _, model in sorted(found.items())]
+    models = pycolmap.incremental_mapping(database, folder / "images", folder / "models", options)
+    return [model for _, model in sorted(models.items())]
 
 
 def _scale(model: Any, names: dict[str, int], reader: FrameReader, maximum_depth: float) -> float | None:

@@ -136,33 +136,33 @@ class Tracker:
         if self._key is None:
             self._begin_part(seen, "")
             return
-        found = self._locate(seen)
-        if found is None:
+        alignment = self._locate(seen)
+        if alignment is None:
             self._begin_part(seen, "lost")
             return
         limits, key = self._limits, self.track.keys[-1]
-        self._motion = inverse(self._key_from_previous) @ found.target_from_source
-        self._key_from_previous, self._previous = found.target_from_source, seen
+        self._motion = inverse(self._key_from_previous) @ alignment.target_from_source
+        self._key_from_previous, self._previous = alignment.target_from_source, seen
         due = (
-            found.overlap < limits.key_overlap
-            or angle_of(found.target_from_source) > limits.key_angle
-            or distance_of(found.target_from_source) > limits.key_distance * key.median_depth
+            alignment.overlap < limits.key_overlap
+            or angle_of(alignment.target_from_source) > limits.key_angle
+            or distance_of(alignment.target_from_source) > limits.key_distance * key.median_depth
         )
         if due:
-            self.track.frames.append(self._continue_part(seen, found))
+            self.track.frames.append(self._continue_part(seen, alignment))
         else:
             number = len(self.track.keys) - 1
-            self.track.frames.append(TrackedFrame(seen.frame, number, found.target_from_source, found))
+            self.track.frames.append(TrackedFrame(seen.frame, number, alignment.target_from_source, alignment))
 
     def _locate(self, seen: Seen) -> Alignment | None:
         """Return where a frame is in the key frame, trying one guess after the other; None when it is lost."""
         assert self._key is not None and self._previous is not None
         expected = self._key_from_previous @ self._motion
-        found = self._try(self._key, seen, expected)
-        if found is None:
-            found = self._try(self._key, seen, self._key_from_previous)
-            self._note(found, "no_motion")
-        if found is None and self._previous.frame != self._key.frame:
+        alignment = self._try(self._key, seen, expected)
+        if alignment is None:
+            alignment = self._try(self._key, seen, self._key_from_previous)
+            self._note(alignment, "no_motion")
+        if alignment is None and self._previous.frame != self._key.frame:
             step = self._try(self._previous, seen, self._motion) or self._try(self._previous, seen, np.eye(4))
             self._note(step, "from_previous")
             if step is None:
@@ -171,16 +171,16 @@ class Tracker:
                 # The frame before becomes the key frame: it sees more of this one than the old one does.
                 self._promote_previous()
                 return step
-        return found if found is not None else self._search(self._key, seen)
+        return alignment if alignment is not None else self._search(self._key, seen)
 
     def _search(self, target: Seen, seen: Seen) -> Alignment | None:
         """Look for a frame by features, then by turning it about."""
         match = ransac_motion(self._features_of(target), seen.describe(), self._random)
         if match is not None:
-            found = self._try(target, seen, match.target_from_source)
-            self._note(found, "features")
-            if found is not None:
-                return found
+            alignment = self._try(target, seen, match.target_from_source)
+            self._note(alignment, "features")
+            if alignment is not None:
+                return alignment
         best = None
         for twist in _turns():
             trial = align(target.pyramid, seen.pyramid, exponential(twist), use_color=self._use_color)
@@ -190,11 +190,11 @@ class Tracker:
         return best[1] if best is not None else None
 
     def _try(self, target: Seen, seen: Seen, guess: np.ndarray) -> Alignment | None:
-        found = align(target.pyramid, seen.pyramid, guess, use_color=self._use_color)
-        return found if self._limits.good(found) else None
+        alignment = align(target.pyramid, seen.pyramid, guess, use_color=self._use_color)
+        return alignment if self._limits.good(alignment) else None
 
-    def _note(self, found: object, how: str) -> None:
-        if found is not None:
+    def _note(self, alignment: object, how: str) -> None:
+        if alignment is not None:
             self.track.rescues[how] = self.track.rescues.get(how, 0) + 1
 
     def _features_of(self, seen: Seen) -> Features:
@@ -215,13 +215,13 @@ class Tracker:
         part = self.track.keys[-1].part + 1 if self.track.keys else 0
         self.track.frames.append(self._add_key(seen, part, np.eye(4), fault))
 
-    def _continue_part(self, seen: Seen, found: Alignment) -> TrackedFrame:
+    def _continue_part(self, seen: Seen, alignment: Alignment) -> TrackedFrame:
         """Make a key frame of a frame of the current part; return its entry."""
         key = self.track.keys[-1]
         number = len(self.track.keys)
-        self.track.links.append(KeyLink(number - 1, number, found))
+        self.track.links.append(KeyLink(number - 1, number, alignment))
         motion = self._motion
-        entry = self._add_key(seen, key.part, key.part_from_key @ found.target_from_source, "")
+        entry = self._add_key(seen, key.part, key.part_from_key @ alignment.target_from_source, "")
         self._motion = motion
         return entry
 

@@ -63,5 +63,5 @@ def choose_world(
 
 
 def _given_poses(reader: FrameReader, frames: list[int]) -> dict[int, np.ndarray]:
-    found = ((frame, reader.read(frame, ()).world_from_camera) for frame in frames)
-    return {frame: pose for frame, pose in found if pose is not None}
+    poses = ((frame, reader.read(frame, ()).world_from_camera) for frame in frames)
+    return {frame: pose for frame, pose in poses if pose is not None}

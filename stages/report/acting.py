@@ -135,7 +135,7 @@ def _times(plan: Plan) -> np.ndarray | None:
     path = plan.path("trajectory.npz")
     if not path.is_file():
         return None
-    (times,) = read_arrays(path, "time")
+    (times,) = read_arrays(path, "time", shapes=("N",))
     return times.astype(float)
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from schemas.errors import BadInput
 from schemas.evaluation import Evaluation
+from schemas.outside import LARGEST_SHOWN, file_text
 from stages.report.images import Picture, plot
 
 MISSING = "–"
@@ -222,17 +225,19 @@ def _interval(measure: Measure, metrics: dict[str, float | None]) -> str:
 
 
 def read_tables(evaluation: Evaluation) -> list[DataTable]:
-    """Read every table of the evaluation for display (numbers rounded)."""
+    """Read every table of the evaluation for display (numbers rounded). Raises BadInput for one that is none."""
     tables = []
     for path in sorted((evaluation.root / "tables").glob("*.csv")):
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.reader(file))
+        try:
+            rows = list(csv.reader(io.StringIO(file_text(path, LARGEST_SHOWN), newline="")))
+        except csv.Error as error:
+            raise BadInput(f"{path}: no table: {error}", hint="evaluate again") from None
         if not rows:
             continue
         title = path.stem.replace("_", " ")
         markdown = path.with_suffix(".md")
         if markdown.is_file():
-            title = markdown.read_text(encoding="utf-8").split("\n", 1)[0].removeprefix("### ")
+            title = file_text(markdown, LARGEST_SHOWN).split("\n", 1)[0].removeprefix("### ")
         tables.append(DataTable(title, tuple(rows[0]), tuple(tuple(_rounded(c) for c in row) for row in rows[1:])))
     return tables
 

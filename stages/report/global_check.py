@@ -40,14 +40,16 @@ def checked_scenes(cad_scene: CadScene, shelf: ModelShelf) -> list[CheckedScene]
     steps: list[tuple[str, Callable[[Replacement], CadCandidate | None]]] = [("After the global check", after_check)]
     if any(r.best_single is not None for r in scene.replacements):
         steps.insert(0, ("Before the global check, every object by itself", before_check))
-    found = []
+    scenes = []
     for title, choose in steps:
         candidates = {r.node: choose(r) for r in scene.replacements if r.decision != "layout"}
         model = cad_model(cad_scene, shelf, candidates)
         if model is not None:
             conflicts = conflicts_of(cad_scene, shelf, candidates)
-            found.append(CheckedScene(_painted(model, cad_scene, conflicts), conflicts, _caption(title, conflicts)))
-    return found
+            models = sum(candidate is not None for candidate in candidates.values())
+            caption = _caption(title, conflicts, models)
+            scenes.append(CheckedScene(_painted(model, cad_scene, conflicts), conflicts, caption))
+    return scenes
 
 
 def conflicts_of(
@@ -59,7 +61,7 @@ def conflicts_of(
     return [pair for pair in room_penetrations(pieces, layout) if pair.collides]
 
 
-def _painted(model: Model, cad_scene: CadScene, conflicts: list[Penetration]) -> Model:
+def _painted(model: Model, conflicts: list[Penetration]) -> Model:
     """The model with objects in conflict in red and everything else pale."""
     guilty = {pair.first for pair in conflicts} | {pair.second for pair in conflicts if not pair.layout}
     numbers = [
@@ -74,9 +76,12 @@ def _painted(model: Model, cad_scene: CadScene, conflicts: list[Penetration]) ->
     return replace(model, soup=replace(model.soup, corner_colors=colors.astype(np.float32)), names=names)
 
 
-def _caption(title: str, conflicts: list[Penetration]) -> str:
+def _caption(title: str, conflicts: list[Penetration], models: int) -> str:
+    """Say what was compared: CAD models with each other and with the room. Scanned meshes take no part."""
+    if not models:
+        return f"{title}: there is no CAD model to compare"
     if not conflicts:
-        return f"{title}: nothing stands more than 5 mm in anything else"
+        return f"{title}: none of {models} CAD models stands more than 5 mm in another, or in floor, walls or ceiling"
     pairs = [f"{pair.first} in {pair.second} ({1000 * pair.depth:.0f} mm)" for pair in conflicts[:NAMED_PAIRS]]
     more = f" and {len(conflicts) - NAMED_PAIRS} more" if len(conflicts) > NAMED_PAIRS else ""
     return f"{title}: {len(conflicts)} conflict{'s' if len(conflicts) > 1 else ''}, red: {', '.join(pairs)}{more}"

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from schemas.contact_graph import ContactGraphFile, GraphNode
+from schemas.errors import BadInput
+from schemas.outside import LARGEST_SHOWN, file_text
 from schemas.scene_parts import TREE_RELATIONS, Relation
 from stages.kit.drawing.palette import entity_color, hex_color
 from stages.kit.drawing.tree_layout import tree_layout
@@ -106,19 +109,26 @@ def draw_graph(
 
 
 def marks_from_evaluation(evaluation: Path) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Read which nodes the evaluation found wrong, and which true nodes are missing. Empty without its table."""
+    """Read which nodes the evaluation found wrong, and which true nodes are missing. Empty without its table.
+
+    Raises BadInput for a table that is none.
+    """
     path = evaluation / "tables" / "graph_edit_distance.csv"
     if not path.is_file():
         return {}, ()
     marks: dict[str, str] = {}
     missing: list[str] = []
-    with path.open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            error, predicted, true = row.get("error") or "", row.get("predicted") or "", row.get("true") or ""
-            if predicted:
-                marks[predicted] = error + (f", truly on {row['true parent']}" if error == "wrong support" else "")
-            elif true:
-                missing.append(true)
+    try:
+        rows = list(csv.DictReader(io.StringIO(file_text(path, LARGEST_SHOWN), newline="")))
+    except csv.Error as error:
+        raise BadInput(f"{path}: no table: {error}", hint="evaluate again") from None
+    for row in rows:
+        wrong, predicted, true = row.get("error") or "", row.get("predicted") or "", row.get("true") or ""
+        if predicted:
+            parent = row.get("true parent") or "nothing"
+            marks[predicted] = wrong + (f", truly on {parent}" if wrong == "wrong support" else "")
+        elif true:
+            missing.append(true)
     return marks, tuple(missing)
 
 

@@ -81,8 +81,11 @@ def _limits(limit: Element) -> str:
 def corresponding_trees(graph: ContactGraphFile, links: list[str], joints: list[UrdfJoint]) -> Corresponding:
     """Lay both trees out. Rows: the tree of the graph, with the moving parts of each body below it as its children.
 
-    `links`, `joints`: of the URDF, its root link stands for the scene. Raises ValueError when the graph has a circle.
+    `links`, `joints`: of the URDF, its root link stands for the scene. Raises ValueError when the graph has a circle or
+    no root.
     """
+    if SCENE_NODE not in {node.id for node in graph.nodes}:
+        raise ValueError(f"no node {SCENE_NODE!r}")
     children = {joint.child for joint in joints}
     root = next((link for link in links if link not in children), "")
     bodies = {node.id for node in graph.nodes if node.id != SCENE_NODE}

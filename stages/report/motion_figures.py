@@ -38,7 +38,9 @@ def _short(action: str) -> str:
 
 def motion_figure(plan: Plan) -> Figure:
     """Return base pose and joint values over time, the actions shaded in turn. Raises BadInput for a torn file."""
-    time, joints, base = read_arrays(plan.path("trajectory.npz"), "time", "joints", "world_from_base")
+    time, joints, base = read_arrays(
+        plan.path("trajectory.npz"), "time", "joints", "world_from_base", shapes=("N", "N J", "N 4 4")
+    )
     figure = Figure(figsize=(WIDTH, HEIGHT), dpi=110, layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2))
     yaw = np.unwrap(np.arctan2(base[:, 1, 0], base[:, 0, 0]))

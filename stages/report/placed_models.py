@@ -52,5 +52,5 @@ class ModelShelf:
             return []
         pieces = posed_collision(folder, self._model(folder), candidate.joints, candidate.scale)
         pose = np.array(candidate.world_from_model)
-        found = [convex_piece(np.asarray(piece.vertices)) for piece in pieces]
-        return [piece.placed(pose) for piece in found if piece is not None]
+        in_model = [convex_piece(np.asarray(piece.vertices)) for piece in pieces]
+        return [piece.placed(pose) for piece in in_model if piece is not None]

@@ -40,11 +40,11 @@ class Section:
 def all_sections() -> tuple[Section, ...]:
     """Return every section by its place on the page. Imports declarations only."""
     names = [entry.name for entry in pkgutil.iter_modules(stages.report.sections.__path__)]
-    found = [importlib.import_module(f"stages.report.sections.{name}.section").SECTION for name in names]
-    for name, section in zip(names, found, strict=True):
+    sections = [importlib.import_module(f"stages.report.sections.{name}.section").SECTION for name in names]
+    for name, section in zip(names, sections, strict=True):
         if section.name != name:
             raise RuntimeError(f"section {section.name!r} is declared in the folder {name!r}")
-    return tuple(sorted(found, key=lambda section: (section.order, section.name)))
+    return tuple(sorted(sections, key=lambda section: (section.order, section.name)))
 
 
 def all_roles() -> dict[str, type[Artifact]]:

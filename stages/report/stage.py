@@ -90,7 +90,13 @@ def _lead(page: Page) -> str:
 def _write(
     page: str, title: str, sections: tuple[str, ...], artifacts: dict[str, Artifact], context: Context
 ) -> Report:
-    size = len(page.encode("utf-8"))
+    try:
+        size = len(page.encode("utf-8"))
+    except UnicodeEncodeError as error:
+        raise BadInput(
+            f"the page would name {page[max(0, error.start - 40) : error.end]!r}, which is no UTF-8",
+            hint="make the artifact again, without files of others in it",
+        ) from None
     if size > MAXIMUM_BYTES:
         raise BadInput(
             f"the report would have {size / 1e6:.0f} MB", hint="use smaller --frame-width, --view-width or --frames"

@@ -95,7 +95,7 @@ def map_model(panoptic_map: PanopticMap) -> Model | None:
     mesh = _load(panoptic_map, "mesh.ply")
     if mesh is None:
         return None
-    (labels,) = read_arrays(panoptic_map.path("mesh_labels.npz"), "instance", hint="make the map again")
+    (labels,) = read_arrays(panoptic_map.path("mesh_labels.npz"), "instance", shapes=("V",), hint="make the map again")
     labels = labels.astype(np.int64)
     if len(labels) != len(mesh.vertices):
         raise BadInput(f"{panoptic_map.root.name}: {len(labels)} labels for {len(mesh.vertices)} vertices")

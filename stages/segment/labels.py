@@ -17,6 +17,7 @@ from pydantic import ValidationError
 
 from schemas.base import Model
 from schemas.errors import BadInput
+from schemas.outside import file_text, file_toml
 from schemas.vocabulary import Vocabulary, load_vocabulary
 
 LABELS_FOLDER = Path(__file__).resolve().parents[2] / "data" / "labels"
@@ -139,7 +140,7 @@ def read_label_table(path: Path) -> LabelSet:
     """
     hint = "write it as data/labels/coco_panoptic.toml is written"
     try:
-        rows = tomllib.loads(_text(path))
+        rows = file_toml(path, LARGEST_FILE, hint=hint)
         labels = tuple(
             Label(**{("class_name" if k == "class" else k): v for k, v in r.items()}) for r in rows["labels"]
         )
@@ -204,14 +205,7 @@ def match_labels(names: Mapping[int, str], given: LabelSet | None = None, *, whe
 
 
 def _text(path: Path) -> str:
-    try:
-        if Path(path).stat().st_size > LARGEST_FILE:
-            raise BadInput(f"{path}: larger than {LARGEST_FILE} bytes", hint="a label file is short")
-        return Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}", hint="check the path") from None
-    except ValueError:
-        raise BadInput(f"{path}: no UTF-8 text", hint="write one word a line, or a TOML table") from None
+    return file_text(path, LARGEST_FILE, hint="write one word a line, or a TOML table")
 
 
 def _check(labels: tuple[Label, ...], where: str) -> None:

@@ -43,17 +43,19 @@ def run(
         file = trials.info
         figures.update(trial_figures.metrics(file.runs))
         parts.append(trial_figures.table(file.runs).rstrip())
-        notes += [f"{one.arm} sees by {one.model}: ASSUMED figures" for one in file.perception if not one.measured]
+        notes += [
+            f"{sight.arm} sees by {sight.model}: ASSUMED figures" for sight in file.perception if not sight.measured
+        ]
         with context.progress.step("histogram"):
             plots.histogram(context.output / "plots" / "sutures.png", file.runs)
     if scene is not None:
         truth = scene.truth
-        poses = [one for one in (needle_thesis, needle) if one is not None]
-        groups = _groups([record for one in poses for record in judge(one, truth)])
+        poses = [estimated for estimated in (needle_thesis, needle) if estimated is not None]
+        groups = _groups([record for estimated in poses for record in judge(estimated, truth)])
         if groups:
             figures.update(needle_figures.metrics(groups))
             parts.append("\n".join(["# The needle's pose", "", *needle_figures.rows("case", groups)]))
-            notes += [f"needle: masks are {one.info.masks_from}" for one in poses[:1]]
+            notes += [f"needle: masks are {estimated.info.masks_from}" for estimated in poses[:1]]
             with context.progress.step("errors"):
                 plots.pose_errors(context.output / "plots" / "needle.png", groups)
         if thread is not None:
@@ -81,9 +83,11 @@ def judge(needle: SutureNeedle, truth: SutureSceneFile) -> list[Estimate]:
     if not same_rig(file.rig, truth.rig):
         raise BadInput(f"{needle.root}: its rig is not the scene's", hint="give the scene that the needle was seen in")
     records = []
-    for one in file.frames:
-        view = _view(truth, one.frame, needle)
-        records.append(judged(file.estimator, "frames", view.seed, _true(truth, one.frame), as_estimate(one.estimate)))
+    for record in file.frames:
+        view = _view(truth, record.frame, needle)
+        records.append(
+            judged(file.estimator, "frames", view.seed, _true(truth, record.frame), as_estimate(record.estimate))
+        )
     if file.filtered is not None:
         last = file.frames[-1].frame
         records.append(judged(file.estimator, "filtered", truth.seed, _true(truth, last), as_estimate(file.filtered)))
@@ -121,12 +125,14 @@ def thread_errors(thread: SutureThread, scene: SutureScene) -> list[ThreadError]
     """Return every frame's error of the thread. Raises BadInput for another scene's, or arrays that are not there."""
     file = thread.info
     errors = []
-    for one in file.frames:
-        if one.frame >= len(scene.truth.views):
-            raise BadInput(f"{thread.root}: frame {one.frame} is not in the scene", hint="give the thread's own scene")
-        (true,) = read_arrays(scene.path("threads.npz"), f"thread_{one.frame:06d}")
+    for record in file.frames:
+        if record.frame >= len(scene.truth.views):
+            raise BadInput(
+                f"{thread.root}: frame {record.frame} is not in the scene", hint="give the thread's own scene"
+            )
+        (true,) = read_arrays(scene.path("threads.npz"), f"thread_{record.frame:06d}", shapes=("N 3",))
         points = np.zeros((0, 3))
-        if one.points:
-            (points,) = read_arrays(thread.path("threads.npz"), f"points_{one.frame:06d}")
-        errors.append(thread_error(points, one.length, true))
+        if record.points:
+            (points,) = read_arrays(thread.path("threads.npz"), f"points_{record.frame:06d}", shapes=("N 3",))
+        errors.append(thread_error(points, record.length, true))
     return errors

@@ -17,7 +17,7 @@ from stages.kit.formats.disparity_file import DisparityReader
 from stages.kit.stage import Context
 from stages.suture.masks import EyeMasks, MaskMaker, open_masks
 from stages.suture.motion_reports import motions_to_last
-from stages.suture.needle.drawing import draw_eyes, said
+from stages.suture.needle.drawing import draw_eyes, estimate_text
 from stages.suture.needle.estimators import ESTIMATORS
 from stages.suture.needle.observation import NeedleEstimate
 from stages.suture.needle.records import as_estimate_record
@@ -182,9 +182,9 @@ def _filtered(
 
 def _statement(answers: list[NeedleEstimate], fused: NeedleEstimate | None) -> str:
     if fused is not None:
-        return f"filtered over {len(answers)} frames: {said(fused)}"
+        return f"filtered over {len(answers)} frames: {estimate_text(fused)}"
     if len(answers) == 1:
-        return said(answers[0])
+        return estimate_text(answers[0])
     answered = [answer for answer in answers if not answer.abstained]
     if answered:
         return f"the needle is known in {len(answered)} of {len(answers)} frames"

@@ -113,13 +113,13 @@ def _view(index: int, scene: NeedleScene, view: StereoView, motion: np.ndarray |
 
 
 def _sequence(parameters: SceneParameters, camera: Camera, rig: StereoRig, times: list[float]) -> SequenceFile:
-    known = SequenceCamera(name=CAMERA_NAME, camera=camera, baseline=rig.baseline, frame_count=len(times))
+    left_camera = SequenceCamera(name=CAMERA_NAME, camera=camera, baseline=rig.baseline, frame_count=len(times))
     return SequenceFile(
         source_format="rendered",
         rule="suture scene",
         notes=(f"rendered needle world, {parameters.arrangement}, rig {parameters.rig}",),
         camera=camera,
-        cameras=(known,),
+        cameras=(left_camera,),
         streams=("color", "right", "pose"),
         frame_count=len(times),
         frames_in_log=len(times),

@@ -15,9 +15,10 @@ from stages.suture.motion.constants import THROWS
 from stages.suture.parameters import SimulateParameters
 from stages.suture.trials.machine import run_trial
 from stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
+from stages.suture.trials.policies import POLICIES
 from stages.suture.trials.recording import Recorder
 from stages.suture.trials.records import run_of
-from stages.suture.trials.settings import POLICIES, World
+from stages.suture.trials.settings import World
 
 if TYPE_CHECKING:
     from stages.suture.trials.sight import LookingEyes
@@ -63,9 +64,9 @@ def run(perception: Path | None, *, parameters: SimulateParameters, context: Con
     summary: dict[str, object] = {
         "trials": len(runs),
         "arms": " ".join(parameters.arms),
-        "sutures": sum(one.sutures for one in runs),
-        "attempts": sum(one.attempts for one in runs),
-        "errors": "".join(one.errors for one in runs)[:40],
+        "sutures": sum(run.sutures for run in runs),
+        "attempts": sum(run.attempts for run in runs),
+        "errors": "".join(run.errors for run in runs)[:40],
     }
     failed = len(runs) == 1 and runs[0].sutures < THROWS
     if failed:
@@ -104,12 +105,12 @@ def _perception(arm: str, model: PerceptionModel, sight: str) -> SuturePerceptio
 
 def _statement(runs: list[SutureRun]) -> str:
     if len(runs) > 1:
-        thrown = sum(one.sutures for one in runs)
-        closed = sum(one.sutures >= THROWS for one in runs)
+        thrown = sum(run.sutures for run in runs)
+        closed = sum(run.sutures >= THROWS for run in runs)
         return f"{len(runs)} trials threw {thrown} sutures; {closed} closed the wound"
-    (one,) = runs
-    text = f"{one.arm}, seed {one.seed}: {one.sutures} of {THROWS} sutures in {one.seconds:.0f} s"
-    return text + (f"; ended by {failure_of(one)}" if one.sutures < THROWS and one.errors else "")
+    (run,) = runs
+    text = f"{run.arm}, seed {run.seed}: {run.sutures} of {THROWS} sutures in {run.seconds:.0f} s"
+    return text + (f"; ended by {failure_of(run)}" if run.sutures < THROWS and run.errors else "")
 
 
 def failure_of(run: SutureRun) -> str:
@@ -131,8 +132,8 @@ def trial_text(
     """Return the trials as people read them; `recorded` are seed and arm of the recorded one."""
     lines = [statement, ""]
     lines += [
-        f"{arm} sees by {said.model} ({'measured' if said.measured else 'ASSUMED'})"
-        for arm, said in ((arm, _perception(arm, model, sight)) for arm, model in models.items())
+        f"{arm} sees by {sight_record.model} ({'measured' if sight_record.measured else 'ASSUMED'})"
+        for arm, sight_record in ((arm, _perception(arm, model, sight)) for arm, model in models.items())
     ]
     lines += ["", f"recorded: {recorded[1]}, seed {recorded[0]}"]
     lines += [
@@ -141,8 +142,8 @@ def trial_text(
     ]
     lines += ["", "arm                seed  sutures  seconds  errors  ended by"]
     lines += [
-        f"{one.arm:18} {one.seed:4}  {one.sutures:7}  {one.seconds:7.0f}  {one.errors or '-':6}  "
-        f"{failure_of(one) or ('the wound is closed' if one.sutures >= THROWS else '-')}"
-        for one in runs
+        f"{run.arm:18} {run.seed:4}  {run.sutures:7}  {run.seconds:7.0f}  {run.errors or '-':6}  "
+        f"{failure_of(run) or ('the wound is closed' if run.sutures >= THROWS else '-')}"
+        for run in runs
     ]
     return "\n".join(lines) + "\n"

@@ -44,7 +44,7 @@ def run(
     frames: list[ThreadFrame] = []
     curves: dict[str, np.ndarray] = {}
     with StereoPairs(sequence) as pairs:
-        make, source, told = open_masks(
+        make, source, words = open_masks(
             sequence, masks, segmenter, parameters, (pairs.camera.height, pairs.camera.width)
         )
         for pair in context.progress.track(pairs, total=len(pairs), description="threads"):
@@ -80,9 +80,13 @@ def run(
     np.savez_compressed(context.output / "threads.npz", allow_pickle=False, **curves)
     statement = _statement(frames)
     SutureThreadFile(
-        statement=statement, masks=source, masks_from=told, rig=record, started_at_needle=bool(starts),
+        statement=statement,
+        masks=source,
+        masks_from=words,
+        rig=record,
+        started_at_needle=bool(starts),
         frames=tuple(frames),
-    ).write(context.output / "thread.json")  # fmt: skip
+    ).write(context.output / "thread.json")
     traced = sum(frame.points > 0 for frame in frames)
     summary: dict[str, object] = {"frames": len(frames), "traced": traced, "masks": source}
     if not traced:

@@ -70,11 +70,11 @@ def lamps(room: Room, shell: Shell) -> tuple[AreaLight, ...]:
     width, depth, height = room.size
     axis = np.array([1.0, 0.0, 0.0]) if width >= depth else np.array([0.0, 1.0, 0.0])
     red, green, blue = (9.0 * c for c in shell.lamp_color)
-    found = []
+    lights = []
     for side in (-1.0, 1.0):
         x, y, z = axis * side * 0.24 * max(width, depth) + np.array([0.0, 0.0, height - 0.03])
-        found.append(AreaLight((float(x), float(y), float(z)), (0.9, 0, 0), (0, -0.9, 0), (red, green, blue)))
-    return tuple(found)
+        lights.append(AreaLight((float(x), float(y), float(z)), (0.9, 0, 0), (0, -0.9, 0), (red, green, blue)))
+    return tuple(lights)
 
 
 def gloss_table(arrangement: Arrangement) -> np.ndarray:

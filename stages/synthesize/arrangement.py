@@ -242,10 +242,10 @@ class _Arranger:
         if not targets:
             return None
         target = targets[int(self.random.integers(len(targets)))]
-        found = sample_stand(target, furnishing, place, self.random)
-        if found is None:
+        stand = sample_stand(target, furnishing, place, self.random)
+        if stand is None:
             return None
-        pose, plane, inside = found
+        pose, plane, inside = stand
         relation: Hanging = "contains" if inside and target.furnishing.model.contains else "supports"
         return Pose(pose, target.name, relation, plane, at=target.name)
 

@@ -94,7 +94,7 @@ class Furnishing:
     @cached_property
     def drawer_floors(self) -> tuple[SurfacePlane, ...]:
         """Horizontal planes of the drawers that stand open, in the model frame, scaled."""
-        found = []
+        floors = []
         for joint in self.model.joints:
             value = self.joints.get(joint.name, 0.0)
             if joint.type != "prismatic" or abs(value) < 1e-9:
@@ -107,8 +107,8 @@ class Furnishing:
                 moved = _shifted(plane, travel)
                 went_along = any(_same_plane(moved, other) for other in state.planes)
                 if plane.horizontal and went_along and not any(_same_plane(plane, other) for other in state.planes):
-                    found.append(_scaled(_shifted(plane, value * axis), self.scale))
-        return tuple(found)
+                    floors.append(_scaled(_shifted(plane, value * axis), self.scale))
+        return tuple(floors)
 
     @property
     def surfaces(self) -> tuple[SurfacePlane, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -13,24 +15,36 @@ _BITS = 16
 _OFFSET = 1 << (_BITS - 1)
 
 
+class _Table(NamedTuple):
+    """An open-addressing table of cells (key 0: free), and the points that its rows name."""
+
+    keys: np.ndarray
+    """(4 P,) uint64"""
+    rows: np.ndarray
+    """(4 P,) int32"""
+    points: np.ndarray
+    """(P, 3) float32 [m]"""
+    labels: np.ndarray
+    """(P,) int32"""
+
+
+class _View(NamedTuple):
+    """Camera [px] of a frame, its pose (4, 4), and the depths between which it counts [m]."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    world_from_camera: np.ndarray
+    nearest: float
+    farthest: float
+
+
 @njit(cache=True)
-def _insert(
-    keys: np.ndarray,
-    rows: np.ndarray,
-    points: np.ndarray,
-    labels: np.ndarray,
-    count: int,
-    depth: np.ndarray,
-    instance: np.ndarray,
-    pose: np.ndarray,
-    fx: float,
-    fy: float,
-    cx: float,
-    cy: float,
-    nearest: float,
-    farthest: float,
-) -> int:
-    """Add the points of a frame to an open-addressing table; returns the new count."""
+def _insert(table: _Table, count: int, depth: np.ndarray, instance: np.ndarray, view: _View) -> int:
+    """Add the points of a frame to a table that holds `count`; returns the new count."""
+    keys, rows, points, labels = table
+    fx, fy, cx, cy, pose, nearest, farthest = view
     mask = np.uint64(len(keys) - 1)
     height, width = depth.shape
     for v in range(height):
@@ -69,46 +83,35 @@ class SeenSurface:
         self._allocate(1 << 18)
 
     def _allocate(self, capacity: int) -> None:
-        self._keys = np.zeros(4 * capacity, dtype=np.uint64)
-        self._rows = np.zeros(4 * capacity, dtype=np.int32)
-        self._points = np.zeros((capacity, 3), dtype=np.float32)
-        self._labels = np.zeros(capacity, dtype=np.int32)
+        self._table = _Table(
+            keys=np.zeros(4 * capacity, dtype=np.uint64),
+            rows=np.zeros(4 * capacity, dtype=np.int32),
+            points=np.zeros((capacity, 3), dtype=np.float32),
+            labels=np.zeros(capacity, dtype=np.int32),
+        )
 
     def _grow(self) -> None:
-        old_points, old_keys, old_rows, old_labels = self._points, self._keys, self._rows, self._labels
-        filled = self.count
-        self._allocate(2 * len(old_points))
-        self._points[:filled], self._labels[:filled] = old_points[:filled], old_labels[:filled]
-        _rehash(self._keys, self._rows, old_keys, old_rows)
+        old, filled = self._table, self.count
+        self._allocate(2 * len(old.points))
+        self._table.points[:filled], self._table.labels[:filled] = old.points[:filled], old.labels[:filled]
+        _rehash(self._table.keys, self._table.rows, old.keys, old.rows)
 
     def add(self, depth: np.ndarray, instance: np.ndarray, world_from_camera: np.ndarray, camera: Camera) -> None:
         """Add a frame: exact `depth` (H, W) [m], `instance` (H, W) int32, pose (4, 4)."""
         # A frame can bring a new point with every pixel: make room before.
-        while self.count + depth.size > len(self._points):
+        while self.count + depth.size > len(self._table.points):
             self._grow()
-        self.count = _insert(
-            self._keys,
-            self._rows,
-            self._points,
-            self._labels,
-            self.count,
-            depth,
-            instance,
-            np.ascontiguousarray(world_from_camera, dtype=np.float64),
-            camera.fx,
-            camera.fy,
-            camera.cx,
-            camera.cy,
-            self.nearest,
-            self.farthest,
-        )
+        pose = np.ascontiguousarray(world_from_camera, dtype=np.float64)
+        view = _View(camera.fx, camera.fy, camera.cx, camera.cy, pose, self.nearest, self.farthest)
+        self.count = _insert(self._table, self.count, depth, instance, view)
 
     def result(self) -> tuple[np.ndarray, np.ndarray]:
         """Return points (N, 3) float32 [m] and instance (N,) int32, sorted by instance and cell."""
-        used = self._keys != 0
-        order = np.argsort(self._keys[used], kind="stable")
-        rows = self._rows[used][order]
-        return self._points[rows], self._labels[rows]
+        table = self._table
+        used = table.keys != 0
+        order = np.argsort(table.keys[used], kind="stable")
+        rows = table.rows[used][order]
+        return table.points[rows], table.labels[rows]
 
 
 @njit(cache=True)

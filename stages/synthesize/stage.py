@@ -15,6 +15,7 @@ from stages.kit.formats.scene_bundle import write_scene_bundle
 from stages.kit.formats.trajectories import write_tum
 from stages.kit.geometry.transforms import transform_from
 from stages.kit.rendering.depth_noise import DepthCamera, disturb_depth
+from stages.kit.rendering.light_map import SoftLight
 from stages.kit.rendering.ray_casting import SceneRenderer
 from stages.kit.stage import Context
 from stages.synthesize.appearance import AMBIENT, SKY, gloss_table, lamps, layout_materials, object_material
@@ -91,10 +92,8 @@ def make_renderer(arrangement: Arrangement, recipe: Recipe, texel: float = 0.05)
         world_meshes(arrangement),
         lights=lamps(arrangement.room, recipe.shell),
         ambient=AMBIENT,
-        sky=SKY,
         materials=materials,
-        light_map=True,
-        texel=texel,
+        soft_light=SoftLight(SKY, texel),
     )
 
 

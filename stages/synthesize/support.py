@@ -36,7 +36,7 @@ def sample_stand(
     choices = [
         k
         for k, plane in enumerate(surfaces)
-        if (k >= first_drawer) == (place.surface == "drawer") and _allowed(plane, base, top, item, place)
+        if (k >= first_drawer) == (place.surface == "drawer") and _allowed(plane, base, top, place)
     ]
     if not choices:
         return None
@@ -63,7 +63,7 @@ def sample_stand(
     return target.world_from_model @ local, index, height < top - INSIDE_DEPTH
 
 
-def _allowed(plane: SurfacePlane, base: float, top: float, item: Furnishing, place: Place) -> bool:
+def _allowed(plane: SurfacePlane, base: float, top: float, place: Place) -> bool:
     if not plane.horizontal or plane.hidden or len(plane.corners) != 4:
         return False
     level = -plane.offset / plane.normal[2]

@@ -197,14 +197,14 @@ def _proximal(arrangement: Arrangement, boxes: dict[str, Box], links: list[Relat
     linked = {(link.source, link.target) for link in links}
     layout = {layout_name(k, entry) for k, entry in enumerate(arrangement.room.layouts, start=1)}
     names = list(boxes)
-    found = []
+    relations = []
     for k, a in enumerate(names):
         for b in names[k + 1 :]:
             if (a in layout and b in layout) or (a, b) in linked or (b, a) in linked:
                 continue
             if boxes_overlap_volume(boxes[a], boxes[b]) > LEAST_SHARED_VOLUME:
-                found.append(Relation(source=a, target=b, relation="proximal", confidence=1.0))
-    return found
+                relations.append(Relation(source=a, target=b, relation="proximal", confidence=1.0))
+    return relations
 
 
 def scene_bodies(arrangement: Arrangement, boxes: dict[str, Box], graph: ContactGraphFile) -> list[BundleBody]:

@@ -16,9 +16,10 @@ class DetectParameters(Parameters):
     """Options of `tableware detect`."""
 
     sizes: Literal["known", "estimated"] = Field(
-        "known", description="Dishes of the known sizes with their stacks and utensils, or dishes of any size, "
-        "estimated from depth (no stacks, no utensils)"
-    )  # fmt: skip
+        "known",
+        description="Dishes of the known sizes with their stacks and utensils, or dishes of any size, "
+        "estimated from depth (no stacks, no utensils)",
+    )
     depth_scale: float | None = Field(
         None, gt=0, le=1, description="Metres a unit of the depth file; 0.001 for 16-bit images, 1 for arrays of metres"
     )
@@ -35,9 +36,10 @@ class DetectParameters(Parameters):
     workspace_x: float = Field(0.78, ge=0.2, le=1.4, description="Side of the workspace along x [m], of a known pose")
     workspace_y: float = Field(0.61, ge=0.2, le=0.82, description="Side of the workspace along y [m], of a known pose")
     photograph: bool = Field(
-        False, description="There is no depth: round outlines in colour alone, with unknown heights; nothing can be "
-        "planned from them"
-    )  # fmt: skip
+        False,
+        description="There is no depth: round outlines in colour alone, with unknown heights; nothing can be "
+        "planned from them",
+    )
     picture_width: float | None = Field(
         None, gt=0.1, le=10, description="How much of the table a photograph's width shows [m]; without it no kinds"
     )

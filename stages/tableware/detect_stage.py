@@ -33,18 +33,18 @@ def run(
         sight = see(read.color, read.depth, view, sides, sizes=parameters.sizes, seed=context.seed)
     for note in sight.notes:
         context.logger.warning("%s", note)
-    told = to_file(sight, parameters.sizes)
-    told.write(context.output / "detections.json")
+    payload = to_file(sight, parameters.sizes)
+    payload.write(context.output / "detections.json")
     with context.progress.step("pictures"):
         _save(context.output / "overlay.png", draw_sight(read.color, sight))
         if sight.rectified:
             _save(context.output / "above.png", sight.heights.color)
-    kinds = [one.kind for one in sight.detections]
+    kinds = [detection.kind for detection in sight.detections]
     summary = {
-        "statement": told.statement,
+        "statement": payload.statement,
         "items": sum(kind is not None for kind in kinds),
         "unknown": kinds.count(None),
-        "in_doubt": sum(bool(one.unsure) for one in sight.detections),
+        "in_doubt": sum(bool(detection.unsure) for detection in sight.detections),
         "rectified": sight.rectified,
     }
     return TablewareDetections(root=context.output, outcome="ok" if kinds else "nothing_found", summary=summary)
@@ -74,16 +74,16 @@ def _photograph(read: TableImage, parameters: DetectParameters, context: Context
     statement += "can be planned from this"
     if parameters.picture_width is None:
         statement += "; sizes and kinds are unknown too (--picture-width)"
-    told = TablewareDetectionsFile(
+    payload = TablewareDetectionsFile(
         statement=statement,
         notes=("without depth neither heights, stacks nor utensils are looked for",),
         heights_known=False,
         outlines=tuple(
-            TablewareOutline(kind=one.kind, box=one.box, confidence=one.confidence, unsure=one.unsure)  # type: ignore[arg-type]
-            for one in outlines
+            TablewareOutline(kind=outline.kind, box=outline.box, confidence=outline.confidence, unsure=outline.unsure)  # type: ignore[arg-type]
+            for outline in outlines
         ),
     )
-    told.write(context.output / "detections.json")
+    payload.write(context.output / "detections.json")
     _save(context.output / "overlay.png", draw_outlines(read.color, outlines, statement))
     summary = {"statement": statement, "items": 0, "unknown": count, "in_doubt": count, "rectified": False}
     return TablewareDetections(root=context.output, outcome="no_depth", summary=summary)

@@ -16,7 +16,8 @@ from stages.tableware.planning.choice import chances_of, declared_policy, time_m
 from stages.tableware.planning.policy import Policy
 from stages.tableware.planning.time_model import Chances, TimeModel
 from stages.tableware.sight import Eyes
-from stages.tableware.simulation.fast import FastWorld, Trial, World, run_in, truth
+from stages.tableware.simulation.fast import FastWorld
+from stages.tableware.simulation.trial import Trial, World, run_in, truth
 from stages.tableware.world.items import Table
 from stages.tableware.world.scenes import make_table
 
@@ -46,9 +47,13 @@ def run(*, parameters: EvaluateParameters, context: Context) -> TablewareEvaluat
             rows.append(_on_table(table, policy, seed, model, chances, parameters))
     results = tuple(_row(policy, rows, by_policy, parameters) for policy, rows in by_policy.items())
     file = TablewareEvaluationFile(
-        chances=parameters.chances, sight=parameters.sight, delay=parameters.delay, draws=parameters.draws,
-        first_scene=parameters.first_scene, rows=results,
-    )  # fmt: skip
+        chances=parameters.chances,
+        sight=parameters.sight,
+        delay=parameters.delay,
+        draws=parameters.draws,
+        first_scene=parameters.first_scene,
+        rows=results,
+    )
     file.write(context.output / "results.json")
     context.output.joinpath("table.md").write_text(as_markdown(file), encoding="utf-8")
     summary = {"tier": parameters.tier, "scenes": parameters.scenes, "policies": len(results)}
@@ -95,16 +100,23 @@ def _row(
         better = np.min([[row.seconds for row in by_policy[rival]] for rival in rivals], axis=0)
         share = float(np.mean(seconds <= better + SAME))
     return EvaluatedPolicy(
-        policy=policy, tier=parameters.tier, tables=len(rows), trials=len(failures), time=time.value,
-        time_interval=(time.low, time.high), objects_per_trip=per_trip.value,
+        policy=policy,
+        tier=parameters.tier,
+        tables=len(rows),
+        trials=len(failures),
+        time=time.value,
+        time_interval=(time.low, time.high),
+        objects_per_trip=per_trip.value,
         objects_per_trip_interval=(per_trip.low, per_trip.high),
         time_ratio=None if baseline is None else float(np.mean([row.seconds for row in baseline]) / seconds.mean()),
-        objects_per_trip_ratio=None if baseline is None
+        objects_per_trip_ratio=None
+        if baseline is None
         else float(objects.mean() / np.mean([row.objects_per_trip for row in baseline])),
         failure_rate=float(np.mean([failure != "" for failure in failures])),
-        failures_policy=failures.count("policy"), failures_perception=failures.count("perception"),
+        failures_policy=failures.count("policy"),
+        failures_perception=failures.count("perception"),
         no_slower_share=share,
-    )  # fmt: skip
+    )
 
 
 def as_markdown(file: TablewareEvaluationFile) -> str:

@@ -21,7 +21,8 @@ from stages.tableware.planning.rules import Rules
 from stages.tableware.planning.time_model import EXACT, Chances, TimeModel
 from stages.tableware.scene_files import read_image
 from stages.tableware.sight import look, understood
-from stages.tableware.simulation.fast import Done, FastWorld, Trial, run_in, run_trial
+from stages.tableware.simulation.fast import FastWorld, run_trial
+from stages.tableware.simulation.trial import Done, Trial, run_in
 from stages.tableware.table_pictures import Panel, draw_strip
 from stages.tableware.vision.detections_file import from_file
 from stages.tableware.vision.overlay import draw_sight
@@ -44,7 +45,7 @@ def run(
     with context.progress.step("plan"):
         done: list[Done] = []
         policy = make_policy(parameters.policy, model, chances, context.seed)
-        nominal = run_in(FastWorld(table, model, EXACT, context.seed), policy, told=done.append)
+        nominal = run_in(FastWorld(table, model, EXACT, context.seed), policy, hear=done.append)
         expected = _expected(table, model, chances, parameters, context.seed)
     file = TablewarePlanFile(
         policy=parameters.policy,
@@ -53,8 +54,8 @@ def run(
         chances=parameters.chances,
         items=as_records(table),
         steps=tuple(
-            TablewareStep(action=as_record(one.action, one.before, model, chances), before=as_records(one.before))
-            for one in done
+            TablewareStep(action=as_record(step.action, step.before, model, chances), before=as_records(step.before))
+            for step in done
         ),
         seconds=nominal.seconds,
         trips=nominal.trips,
@@ -95,8 +96,8 @@ def _accepted(
     """Return what is planned for, and what vision did not handle. Raises BadInput for what cannot be planned from."""
     least, rules = parameters.least_confidence, Rules()
     if detections is not None:
-        told = detections.info
-        return understood(from_file(told), least, rules), told.notes
+        payload = detections.info
+        return understood(from_file(payload), least, rules), payload.notes
     if scene is None:
         raise BadInput("tableware plan: nothing to plan from", hint="give --detections, or --scene")
     if parameters.source == "truth":
@@ -141,8 +142,8 @@ def _expected(table: Table, model: TimeModel, chances: Chances, parameters: Plan
 def panels(done: list[Done], table: Table) -> list[Panel]:
     """Return the table before each action, and at the end."""
     rows: list[Panel] = [
-        (one.before, one.action, f"{number}. {one.action.words} ({one.end - one.start:.1f} s)")
-        for number, one in enumerate(done, start=1)
+        (step.before, step.action, f"{number}. {step.action.words} ({step.end - step.start:.1f} s)")
+        for number, step in enumerate(done, start=1)
     ]
     last = done[-1] if done else None
     end = f"after {last.end:.0f} s" if last is not None else "nothing to clear"
@@ -153,7 +154,7 @@ def plan_text(file: TablewarePlanFile, done: list[Done]) -> str:
     """Return a plan as people read it."""
     lines = [file.statement, f"policy {file.policy}, items from {file.source}", ""]
     lines += [
-        f"{number:3}. {one.action.words}, {one.end - one.start:.1f} s" for number, one in enumerate(done, start=1)
+        f"{number:3}. {step.action.words}, {step.end - step.start:.1f} s" for number, step in enumerate(done, start=1)
     ]
     lines += [
         "",
@@ -163,5 +164,5 @@ def plan_text(file: TablewarePlanFile, done: list[Done]) -> str:
     ]
     if file.impossible:
         lines += ["", "not possible as things stand:"]
-        lines += [f"  {one.primitive.replace('_', ' ')}: {one.message}" for one in file.impossible]
+        lines += [f"  {pair.primitive.replace('_', ' ')}: {pair.message}" for pair in file.impossible]
     return "\n".join(lines) + "\n"

@@ -27,5 +27,5 @@ def read_image(scene: TablewareScene) -> tuple[np.ndarray, np.ndarray, OverheadC
             color = np.asarray(opened.convert("RGB"))
     except (OSError, SyntaxError, Image.DecompressionBombError) as error:
         raise BadInput(f"{path}: {error}", hint="make the scene again") from None
-    (depth,) = read_arrays(scene.path("depth.npz"), "depth", hint="make the scene again")
+    (depth,) = read_arrays(scene.path("depth.npz"), "depth", shapes=("H W",), hint="make the scene again")
     return color, depth.astype(np.float32), OverheadCamera(file.camera, np.array(file.world_from_camera))

@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.tableware.planning.refusals import Accepted, Doubt, Unknown, accept
 from stages.tableware.planning.rules import Rules
-from stages.tableware.simulation.fast import World
+from stages.tableware.simulation.trial import World
 from stages.tableware.vision.detections import Detection, as_table
 from stages.tableware.vision.seeing import Sight, see
 from stages.tableware.world.items import Table
@@ -35,12 +35,14 @@ def look(color: np.ndarray, depth: np.ndarray, view: OverheadCamera, least: floa
 
 def understood(detections: tuple[Detection, ...], least: float, rules: Rules) -> Accepted:
     """Return what of some detections is planned for; items are named by their kind and their row."""
-    names = {row: f"{found.kind}_{row + 1}" for row, found in enumerate(detections) if found.kind is not None}
+    names = {
+        row: f"{detection.kind}_{row + 1}" for row, detection in enumerate(detections) if detection.kind is not None
+    }
     doubts = {name: Doubt(detections[row].confidence, detections[row].unsure) for row, name in names.items()}
     unknown = tuple(
-        Unknown(f"unknown_{row + 1}", found.position[0], found.position[1], max(found.extent, 0.01))
-        for row, found in enumerate(detections)
-        if found.kind is None
+        Unknown(f"unknown_{row + 1}", detection.position[0], detection.position[1], max(detection.extent, 0.01))
+        for row, detection in enumerate(detections)
+        if detection.kind is None
     )
     return accept(as_table(detections), doubts, unknown, least, rules)
 
@@ -55,7 +57,7 @@ class Eyes:
         self._rules = Rules()
         self.images = 0
         self.last: Seen | None = None
-        self._told = Table(())
+        self._believed = Table(())
         self._nothing: list[tuple[float, float]] = []
 
     def __call__(self, world: World) -> Table:
@@ -64,10 +66,10 @@ class Eyes:
         self.images += 1
         self.last = look(color, depth, view, self._least, self._rules)
         for name in getattr(world, "vain", ()):
-            if name in self._told.by_name:
-                self._nothing.append(self._told.by_name[name].position[:2])
-        self._told = named_as(without_places(self.last.accepted.table, self._nothing), world.table)
-        return self._told
+            if name in self._believed.by_name:
+                self._nothing.append(self._believed.by_name[name].position[:2])
+        self._believed = named_as(without_places(self.last.accepted.table, self._nothing), world.table)
+        return self._believed
 
     def _image(self, world: World) -> tuple[np.ndarray, np.ndarray, OverheadCamera]:
         seed = 1000 * self._seed + self.images
@@ -80,25 +82,25 @@ class Eyes:
         return color, depth, view
 
 
-def named_as(seen: Table, known: Table, reach: float = SAME_PLACE) -> Table:
+def named_as(seen: Table, truth: Table, reach: float = SAME_PLACE) -> Table:
     """Return a table whose items have the names of those of another that they are: of the same kind (forks and spoons
     are one), nearest first, no farther than `reach` [m]. The others are called `stray_1` and so on."""
     pairs = sorted(
-        (hypot(*(a - b for a, b in zip(one.position, other.position, strict=True))), one.name, other.name)
-        for one in seen.items
-        for other in known.items
-        if one.kind == other.kind or not (one.is_dish or other.is_dish)
+        (hypot(*(a - b for a, b in zip(item.position, other.position, strict=True))), item.name, other.name)
+        for item in seen.items
+        for other in truth.items
+        if item.kind == other.kind or not (item.is_dish or other.is_dish)
     )
     names: dict[str, str] = {}
     taken: set[str] = set()
-    for apart, one, other in pairs:
-        if apart <= reach and one not in names and other not in taken:
-            names[one] = other
-            taken.add(other)
+    for apart, name, true_name in pairs:
+        if apart <= reach and name not in names and true_name not in taken:
+            names[name] = true_name
+            taken.add(true_name)
     for item in seen.items:  # what lies on something is met there, wherever exactly it was seen
         if item.name in names:
             continue
-        for on_it in known.carried.get(names.get(item.on or "", ""), ()):
+        for on_it in truth.carried.get(names.get(item.on or "", ""), ()):
             if on_it.name not in taken and (item.kind == on_it.kind or not (item.is_dish or on_it.is_dish)):
                 names[item.name] = on_it.name
                 taken.add(on_it.name)

@@ -16,7 +16,7 @@ from stages.tableware.planning.choice import chances_of, make_policy
 from stages.tableware.planning.records import as_action, as_record
 from stages.tableware.planning.time_model import Chances, TimeModel
 from stages.tableware.sight import Eyes, named_as
-from stages.tableware.simulation.fast import Done, Trial, World, do_in, run_in, truth
+from stages.tableware.simulation.trial import Done, Trial, World, do_in, run_in, truth
 from stages.tableware.simulators import SIMULATORS
 from stages.tableware.table_pictures import draw_strip
 from stages.tableware.world.items import Table
@@ -32,7 +32,7 @@ def run(
     table = as_table(file.items)
     simulator = SIMULATORS[parameters.simulator](parameters)
     eyes = Eyes(context.seed, file.light, file.colors, parameters.least_confidence)
-    policy = make_policy(parameters.policy, simulator.times, simulator.told, context.seed)
+    policy = make_policy(parameters.policy, simulator.times, simulator.chances, context.seed)
     planned = None if plan is None else planned_actions(plan, table)
     done: list[Done] = []
     try:
@@ -80,7 +80,7 @@ def planned_actions(plan: TablewarePlan, table: Table) -> list[tuple[Action, Tab
     file = plan.info
     seen = as_table(file.items)
     renamed = named_as(seen, table)
-    names = {one.name: other.name for one, other in zip(seen.items, renamed.items, strict=True)}
+    names = {item.name: true_item.name for item, true_item in zip(seen.items, renamed.items, strict=True)}
     if seen.items and all(name.startswith("stray_") for name in names.values()):
         raise BadInput(
             f"{plan.root}: none of its {len(seen.items)} items stands where one of the scene stands",
@@ -88,9 +88,15 @@ def planned_actions(plan: TablewarePlan, table: Table) -> list[tuple[Action, Tab
         )
     actions = []
     for step in file.steps:
-        before = as_table(one.model_copy(update={"name": names.get(one.name, one.name),
-                                                 "on": None if one.on is None else names.get(one.on, one.on)})
-                          for one in step.before)  # fmt: skip
+        before = as_table(
+            item.model_copy(
+                update={
+                    "name": names.get(item.name, item.name),
+                    "on": None if item.on is None else names.get(item.on, item.on),
+                }
+            )
+            for item in step.before
+        )
         actions.append((as_action(step.action).renamed(names), before))
     return actions
 
@@ -104,24 +110,31 @@ def carry_out(world: World, planned: Iterable[tuple[Action, Table]], done: list[
 
 def _counts(trial: Trial) -> TrialCounts:
     return TrialCounts(
-        seconds=trial.seconds, trips=trial.trips, moved=trial.moved, pulls=trial.pulls, stacks=trial.stacks,
-        dropped=trial.dropped, left=trial.left, objects_per_trip=trial.objects_per_trip, failure=trial.failure,
-    )  # fmt: skip
+        seconds=trial.seconds,
+        trips=trial.trips,
+        moved=trial.moved,
+        pulls=trial.pulls,
+        stacks=trial.stacks,
+        dropped=trial.dropped,
+        left=trial.left,
+        objects_per_trip=trial.objects_per_trip,
+        failure=trial.failure,
+    )
 
 
 def _steps(done: list[Done], model: TimeModel, chances: Chances) -> Iterable[TrialStep]:
-    for one in done:
-        gone = tuple(name for name in one.before.by_name if name not in one.after.by_name)
-        dropped = tuple(name for name in gone if name in one.dropped)
+    for step in done:
+        gone = tuple(name for name in step.before.by_name if name not in step.after.by_name)
+        dropped = tuple(name for name in gone if name in step.dropped)
         yield TrialStep(
-            action=as_record(one.action, one.before, model, chances),
-            start=one.start,
-            end=one.end,
-            before=as_records(one.before),
-            after=as_records(one.after),
+            action=as_record(step.action, step.before, model, chances),
+            start=step.start,
+            end=step.end,
+            before=as_records(step.before),
+            after=as_records(step.after),
             binned=tuple(name for name in gone if name not in dropped),
             dropped=dropped,
-            troubles=one.troubles,
+            troubles=step.troubles,
         )
 
 
@@ -134,10 +147,10 @@ def _statement(trial: Trial, items: int) -> str:
 
 def _text(done: list[Done], statement: str) -> str:
     lines = [statement, ""]
-    for one in done:
-        lines.append(f"{one.start:7.1f} s  {one.action.words}")
-        gone = [name for name in one.before.by_name if name not in one.after.by_name and name not in one.dropped]
+    for step in done:
+        lines.append(f"{step.start:7.1f} s  {step.action.words}")
+        gone = [name for name in step.before.by_name if name not in step.after.by_name and name not in step.dropped]
         lines += [f"           binned: {', '.join(gone)}"] if gone else []
-        lines += [f"           dropped: {', '.join(one.dropped)}"] if one.dropped else []
-        lines += [f"           {trouble}" for trouble in one.troubles]
+        lines += [f"           dropped: {', '.join(step.dropped)}"] if step.dropped else []
+        lines += [f"           {trouble}" for trouble in step.troubles]
     return "\n".join(lines) + "\n"

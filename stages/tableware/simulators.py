@@ -17,7 +17,8 @@ from stages.tableware.planning.action import Action
 from stages.tableware.planning.choice import as_times, chances_of, time_model
 from stages.tableware.planning.time_model import Chances, TimeModel
 from stages.tableware.simulation.arm_times import arm_times
-from stages.tableware.simulation.fast import Done, FastWorld, World
+from stages.tableware.simulation.fast import FastWorld
+from stages.tableware.simulation.trial import Done, World
 from stages.tableware.table_pictures import write_animation
 from stages.tableware.world.items import Table
 
@@ -25,7 +26,7 @@ ANIMATION_WIDTH = 560
 SIMULATION = "stages.tableware.simulation"
 """Its modules of physics are loaded only when they are asked for."""
 Again = Callable[[Table, Done, int], Action]
-"""Decides in the policy's place after actions that changed nothing (fast.run_in)."""
+"""Decides in the policy's place after actions that changed nothing (trial.run_in)."""
 
 
 class Simulator(Protocol):
@@ -33,7 +34,7 @@ class Simulator(Protocol):
 
     times: TimeModel
     """By which the policy plans."""
-    told: Chances
+    chances: Chances
     """What the policy is told of what goes wrong."""
     again: Again | None
     recorded_times: TimesOfActions | None
@@ -59,13 +60,13 @@ class FastSimulator:
     again: Again | None = None
 
     def __init__(self, parameters: SimulateParameters) -> None:
-        self.times, self.told = time_model(parameters), chances_of(parameters.chances)
+        self.times, self.chances = time_model(parameters), chances_of(parameters.chances)
         self.recorded_times: TimesOfActions | None = as_times(self.times)
         self.recorded_chances: str = parameters.chances
 
     def open(self, table: Table, seed: int) -> World:
         """Return the fast world."""
-        return FastWorld(table, self.times, self.told, seed)
+        return FastWorld(table, self.times, self.chances, seed)
 
     def close(self) -> None:
         """Nothing is held."""
@@ -87,7 +88,7 @@ class PhysicsSimulator:
         given = {"trip": parameters.trip_seconds, "stack": parameters.stack_seconds, "pull": parameters.pull_seconds}
         arm = arm_times(parameters.delay)
         self.times = replace(arm, **{name: value for name, value in given.items() if value is not None})
-        self.told = replace(chances_of(parameters.chances), spills=True)
+        self.chances = replace(chances_of(parameters.chances), spills=True)
         self.again: Again | None = physics_part("physics_trial").alone
         self._recording = physics_part("recording").Recording()
         self._world: Any = None

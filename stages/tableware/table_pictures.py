@@ -22,8 +22,12 @@ SUPERSAMPLING = 2
 MARGIN = 0.03
 """Around the table [m]."""
 COLORS: dict[Kind, str] = {
-    "bowl": "#5b8fc9", "cup": "#e0904a", "plate": "#9aa5b1", "fork": "#4b5563", "spoon": "#7c5ca8",
-}  # fmt: skip
+    "bowl": "#5b8fc9",
+    "cup": "#e0904a",
+    "plate": "#9aa5b1",
+    "fork": "#4b5563",
+    "spoon": "#7c5ca8",
+}
 GROUND, CLOTH, EDGE, INK = "#e5e7eb", "#ffffff", "#9ca3af", "#1f2937"
 PULL_INK, STACK_INK, GRASP_INK, REFUSED_INK = "#15803d", "#7c3aed", "#b91c1c", "#dc2626"
 
@@ -146,8 +150,10 @@ def _draw_jaws(sheet: _Sheet, action: Grasp) -> None:
 
 
 _PAINTERS: dict[type[Primitive], Callable[[_Sheet, Any], None]] = {
-    Grasp: _draw_jaws, Pull: _draw_pull, Stack: _draw_stacking
-}  # fmt: skip
+    Grasp: _draw_jaws,
+    Pull: _draw_pull,
+    Stack: _draw_stacking,
+}
 
 
 def _lighter(color: str, share: float) -> str:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from schemas.errors import BadInput
+from schemas.outside import file_content
 from stages.kit.formats.xml_files import parse_xml
 
 LARGEST_FILE = 64 * 2**20
@@ -37,13 +38,7 @@ def read_annotation(path: Path) -> dict[int, AnnotatedLabel]:
     Raises BadInput when the file is missing, too large, no XML, declares entities, is no annotation, holds no label, or
     has an id that is no positive number or occurs twice.
     """
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise BadInput(f"{path}: larger than {LARGEST_FILE} bytes", hint=HINT)
-        data = path.read_bytes()
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}", hint=HINT) from None
-    root = parse_xml(data, str(path))
+    root = parse_xml(file_content(path, LARGEST_FILE, hint=HINT), str(path))
     if root.tag != "annotation":
         raise BadInput(f"{path}: the root is <{root.tag[:40]}>, expected <annotation>", hint=HINT)
     labels: dict[int, AnnotatedLabel] = {}

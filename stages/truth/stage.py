@@ -70,9 +70,9 @@ def run(
     write_ply(context.output / "mesh.ply", colored(vertices, scan.faces, instances))
     if unlisted:
         context.logger.warning("%d vertices carry a label that %s does not list; void", unlisted, annotation.name)
-    found: dict[str, int] = {}
+    counts: dict[str, int] = {}
     for entry in objects:
-        found[entry.class_name] = found.get(entry.class_name, 0) + 1
+        counts[entry.class_name] = counts.get(entry.class_name, 0) + 1
     return GroundTruth(
         context.output,
         summary={
@@ -82,7 +82,7 @@ def run(
             "unlisted_vertices": unlisted,
             "points": len(points),
             "labelled_share": round(float((point_instances > 0).mean()), 3),
-            **{f"true_{name}": count for name, count in sorted(found.items())},
+            **{f"true_{name}": count for name, count in sorted(counts.items())},
         },
     )
 

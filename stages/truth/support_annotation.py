@@ -132,9 +132,9 @@ def contradictions(annotation: SupportAnnotation) -> Iterator[str]:
     yield from ("a node may not be called scene, the root is" for name in names if name == SCENE_NODE)
     labels = [label for node in annotation.nodes for label in node.find.labels]
     yield from (f"label {label} is of two nodes" for label in _repeated(labels))
-    known = {entry.name: entry for entry in load_vocabulary().classes}
+    classes = {entry.name: entry for entry in load_vocabulary().classes}
     for node in annotation.nodes:
-        if node.class_name not in known:
+        if node.class_name not in classes:
             yield f"node {node.name}: class {node.class_name!r:.60} is not in data/vocabulary.toml"
         if sum((bool(node.find.labels), node.find.box is not None, node.find.point is not None)) != 1:
             yield f"node {node.name}: find takes exactly one of labels, box and point"
@@ -149,7 +149,9 @@ def contradictions(annotation: SupportAnnotation) -> Iterator[str]:
         if relation.child in others:
             yield f"{relation.child} is said to carry itself"
         yield from (f"relation of {relation.child}: {name} is named twice" for name in _repeated(others))
-    layout = {node.name for node in annotation.nodes if node.class_name in known and known[node.class_name].is_layout}
+    layout = {
+        node.name for node in annotation.nodes if node.class_name in classes and classes[node.class_name].is_layout
+    }
     children = {relation.child for relation in annotation.relations}
     yield from (f"nothing is said to carry {name}" for name in names if name not in children | layout)
     circle = _circle({relation.child: relation.carriers() for relation in annotation.relations})

@@ -44,41 +44,42 @@ def run(
     Raises BadInput when the annotation is broken, when it takes label images or a map that are not there, or when
     nothing of its nodes was seen.
     """
-    told = read_support_annotation(annotation)
-    by_labels = any(node.find.labels for node in told.nodes)
+    annotation_file = read_support_annotation(annotation)
+    by_labels = any(node.find.labels for node in annotation_file.nodes)
     with context.progress.step("surface of the frames"):
         points, labels = seen_points(
             sequence, every=parameters.every, maximum_depth=parameters.maximum_depth, with_labels=by_labels
         )
     with context.progress.step("find the nodes"):
         try:
-            points, owner = instances_of(told, points, labels, panoptic_map, parameters.point_reach)
+            points, owner = instances_of(annotation_file, points, labels, panoptic_map, parameters.point_reach)
         except BadInput as error:
             raise BadInput(f"{annotation}: {error.message}", hint=error.hint) from None
     if not owner.any():
         raise BadInput(f"{annotation}: nothing of its nodes is seen in {sequence.root}", hint="is it this recording?")
-    objects = annotated_objects(told, points, owner)
-    optional = sum(node.optional for node in told.nodes)
+    objects = annotated_objects(annotation_file, points, owner)
+    optional = sum(node.optional for node in annotation_file.nodes)
     info = sequence.info
     low, high = points[owner > 0].min(axis=0), points[owner > 0].max(axis=0)
     GroundTruthFile(
-        source="scan", seed=context.seed, recipe=told.scene, camera=info.camera, frame_count=info.frame_count,
+        source="scan", seed=context.seed, recipe=annotation_file.scene, camera=info.camera,
+        frame_count=info.frame_count,
         room_size=(float(high[0] - low[0]), float(high[1] - low[1]), float(high[2] - low[2])),
         depth_noise=True, objects=objects,
     ).write(context.output / "ground_truth.json")  # fmt: skip
-    graph = annotated_graph(told, objects)
+    graph = annotated_graph(annotation_file, objects)
     graph.write(context.output / "graph.json")
     np.savez(context.output / "visible.npz", points=points.astype(np.float32), instance=owner.astype(np.int32))
     write_ply(context.output / "mesh.ply", flakes(points, owner))
-    counts = np.bincount(owner, minlength=len(told.nodes) + 1)
-    unseen = [node.name for k, node in enumerate(told.nodes, 1) if not counts[k] and not node.optional]
+    counts = np.bincount(owner, minlength=len(annotation_file.nodes) + 1)
+    unseen = [node.name for k, node in enumerate(annotation_file.nodes, 1) if not counts[k] and not node.optional]
     for name in unseen:
         context.logger.warning("no point of %s is seen; it counts neither way", name)
     return GroundTruth(
         context.output,
         summary={
-            "scene": told.scene,
-            "nodes": len(told.nodes),
+            "scene": annotation_file.scene,
+            "nodes": len(annotation_file.nodes),
             "unseen": len(unseen),
             "optional": optional,
             "relations": len(graph.links),
@@ -89,13 +90,13 @@ def run(
     )
 
 
-def annotated_objects(told: SupportAnnotation, points: np.ndarray, owner: np.ndarray) -> tuple[TrueObject, ...]:
+def annotated_objects(annotation: SupportAnnotation, points: np.ndarray, owner: np.ndarray) -> tuple[TrueObject, ...]:
     """Return the nodes as true objects, numbered 1, 2, ...: each with its annotated box, or that of its points.
 
     points (N, 3) [m] in the sequence's world, owner (N,) node of each or 0.
     """
     result = []
-    for k, node in enumerate(told.nodes, 1):
+    for k, node in enumerate(annotation.nodes, 1):
         own = points[owner == k]
         where = node.find.box
         box = where.box() if where is not None else (minimum_box(own) if len(own) else NOT_SEEN)
@@ -113,7 +114,7 @@ def annotated_objects(told: SupportAnnotation, points: np.ndarray, owner: np.nda
     return tuple(result)
 
 
-def annotated_graph(told: SupportAnnotation, objects: tuple[TrueObject, ...]) -> ContactGraphFile:
+def annotated_graph(annotation: SupportAnnotation, objects: tuple[TrueObject, ...]) -> ContactGraphFile:
     """Return the contact graph of the annotation. Layout that no relation carries hangs on the scene."""
     vocabulary = load_vocabulary()
     nodes = [GraphNode(id=SCENE_NODE, instance=0, class_name=SCENE_NODE, node_type="scene")]
@@ -125,7 +126,7 @@ def annotated_graph(told: SupportAnnotation, objects: tuple[TrueObject, ...]) ->
                 id=entry.name, instance=entry.instance, class_name=entry.class_name, node_type=kind, box=entry.box
             )
         )
-        relation = told.relation_of(entry.name)
+        relation = annotation.relation_of(entry.name)
         if relation is None:
             links.append(Relation(source=SCENE_NODE, target=entry.name, relation="supports", confidence=1.0))
             continue

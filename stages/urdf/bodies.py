@@ -16,20 +16,23 @@ from stages.kit.formats.cad_models import read_model
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.scene_bundle import BundleBody
 from stages.kit.geometry.boxes import box_from_bounds
-
-NAMELESS = "object"
-"""Class of what has no name."""
+from stages.urdf.mobility import NAMELESS, Mobility, mobility
 
 
-def scene_bodies(cad_scene: CadScene, graph: ContactGraphFile, movable: Collection[str]) -> list[BundleBody]:
+def scene_bodies(
+    cad_scene: CadScene, graph: ContactGraphFile, movable: Collection[str], fixed: Collection[str] = ()
+) -> list[BundleBody]:
     """Return one body for every node but the root (its CAD model, else its mesh, else its box), and one for
     the surroundings: what was mapped and has no name.
 
-    `movable`: names of the classes that hang on floating joints. Raises BadInput for a missing model or mesh.
+    `movable`: classes that an arm carries; `fixed`: classes that stay where they are (`mobility`).
+    Raises BadInput for a missing model or mesh.
     """
     colors = {entry.node: entry.part_colors for entry in cad_scene.info.replacements if entry.decision == "cad"}
     bodies = [
-        _body(cad_scene, graph, node, movable, colors.get(node.id, {})) for node in graph.nodes if node.id != SCENE_NODE
+        _body(cad_scene, graph, node, mobility(graph, node, movable, fixed), colors.get(node.id, {}))
+        for node in graph.nodes
+        if node.id != SCENE_NODE
     ]
     nameless = cad_scene.path("meshes") / f"{SURROUNDINGS}.ply"
     return [*bodies, _surroundings(nameless)] if nameless.is_file() else bodies
@@ -39,14 +42,12 @@ def _body(
     cad_scene: CadScene,
     graph: ContactGraphFile,
     node: GraphNode,
-    movable: Collection[str],
+    mobile: Mobility,
     colors: Mapping[str, tuple[int, int, int]],
 ) -> BundleBody:
     link = graph.parent_link(node.id)
     relation = "supports" if link is None else link.relation
     parent = None if link is None or link.source == SCENE_NODE else link.source
-    stands = relation in ("supports", "contains")  # what hangs would fall
-    carried = node.class_name in movable and node.node_type != "layout" and stands
     if node.model_id is not None:
         if node.world_from_model is None or node.scale is None:
             raise BadInput(f"{cad_scene.path('graph.json')}: node {node.id} has a model but no pose or scale")
@@ -60,7 +61,8 @@ def _body(
             parent=parent,
             relation=relation,
             world_from_body=np.array(node.world_from_model),
-            movable=carried,
+            movable=mobile.movable,
+            furniture=mobile.furniture,
             box=_box(node, None, cad_scene),
             model=model,
             model_folder=folder,
@@ -79,7 +81,8 @@ def _body(
         parent=parent,
         relation=relation,
         world_from_body=origin,
-        movable=carried,
+        movable=mobile.movable,
+        furniture=mobile.furniture,
         box=bounds,
         mesh=mesh,
     )

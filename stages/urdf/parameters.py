@@ -14,9 +14,11 @@ class UrdfParameters(Parameters):
     """Options of `urdf`."""
 
     movable_classes: tuple[str, ...] = Field(
-        (), description="Further classes to put on floating joints (default: vocabulary)"
+        (), description="Further classes that an arm carries (default: vocabulary); furniture is free too"
     )
-    fixed_classes: tuple[str, ...] = Field((), description="Classes to fix although the vocabulary calls them movable")
+    fixed_classes: tuple[str, ...] = Field(
+        (), description="Classes that stay where they are, although an arm carries them or they are furniture"
+    )
     rest: bool = Field(True, description="Lay movable bodies down that come to rest within 1 cm and 5 degrees")
     settle_seconds: float = Field(3.0, ge=0, le=30, description="Simulated time of the settle test, 0 for none [s]")
     settle_distance: float = Field(0.01, gt=0, description="A movable body that moves further does not stay [m]")
@@ -25,7 +27,7 @@ class UrdfParameters(Parameters):
 
 STAGE = Stage(
     name="urdf",
-    version=4,
+    version=5,
     summary="Convert the CAD scene into a kinematic tree: URDF for simulators and robots; MJCF, SRDF, GLB, MCAP",
     parameters=UrdfParameters,
     reads={"cad_scene": CadScene},

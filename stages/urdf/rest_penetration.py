@@ -73,7 +73,7 @@ def _measure(body: int, joined: set[frozenset[str]], limit: float, client: int) 
             engine.resetJointState(body, index, min(max(0.0, lower), upper), physicsClientId=client)
     engine.performCollisionDetection(physicsClientId=client)
     bounds = {index: engine.getAABB(body, index, physicsClientId=client) for index in names}
-    found = []
+    penetrations = []
     indices = sorted(names)
     for place, first in enumerate(indices):
         for second in indices[place + 1 :]:
@@ -83,8 +83,8 @@ def _measure(body: int, joined: set[frozenset[str]], limit: float, client: int) 
             depth = max((-point[8] for point in points), default=0.0)
             depth -= link_padding(client, body, first) + link_padding(client, body, second)
             if depth > limit:
-                found.append(Penetration(names[first], names[second], float(depth)))
-    return sorted(found, key=lambda p: (-p.depth, p.first, p.second))
+                penetrations.append(Penetration(names[first], names[second], float(depth)))
+    return sorted(penetrations, key=lambda p: (-p.depth, p.first, p.second))
 
 
 def _bounds_meet(

@@ -35,19 +35,21 @@ def resting_overlaps(world: PhysicsWorld, smallest: float = 0.0) -> list[Overlap
     vocabulary = load_vocabulary()
     bodies = list(world.bodies.values())
     layout = {body.name for body in bodies if vocabulary.by_name(body.record.class_name).is_layout}
-    found = []
+    overlaps = []
     for first, second in combinations(bodies, 2):
         if (first.name in layout and second.name in layout) or not _bounds_meet(world, first.name, second.name):
             continue
         pairs = [(a, b) for a in sorted(first.links.values()) for b in sorted(second.links.values())]
-        found += _deepest(world, first, second, pairs, smallest)
+        overlaps += _deepest(world, first, second, pairs, smallest)
     for body in bodies:
         links = sorted(body.links.values())
         joined = {
             (engine.getJointInfo(body.body_id, link, physicsClientId=world.client)[16], link) for link in links[1:]
         }
-        found += _deepest(world, body, body, [pair for pair in combinations(links, 2) if pair not in joined], smallest)
-    return sorted(found, key=lambda overlap: (-overlap.depth, overlap.first_link, overlap.second_link))
+        overlaps += _deepest(
+            world, body, body, [pair for pair in combinations(links, 2) if pair not in joined], smallest
+        )
+    return sorted(overlaps, key=lambda overlap: (-overlap.depth, overlap.first_link, overlap.second_link))
 
 
 def link_depth(world: PhysicsWorld, first: int, first_link: int, second: int, second_link: int) -> float:

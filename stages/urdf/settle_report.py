@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,6 +15,8 @@ from stages.kit.simulation.world import PhysicsWorld, load_scene
 from stages.urdf.joint_sweep import JointRange, sweep_joints
 from stages.urdf.scene_penetration import Overlap, resting_overlaps
 
+Verdict = Literal["ok", "unsettled", "penetrating", "nothing_movable"]
+"""Outcome of a scene that was let go."""
 SECONDS = 3.0
 MOVED_LIMIT = 0.01
 """A movable body that moves further has not stayed [m]."""
@@ -67,9 +69,44 @@ class SettleReport:
         return tuple(joint for joint in self.joints if not joint.free_at_start)
 
     @property
+    def verdict(self) -> Verdict:
+        """What is gravest: something does not stay or a joint is blocked at the start, bodies lie in each other, or
+        there is nothing that could move, so that to stay means nothing."""
+        if self.unsettled or self.blocked:
+            return "unsettled"
+        if self.collisions:
+            return "penetrating"
+        return "ok" if self.bodies or self.joints else "nothing_movable"
+
+    @property
     def settled(self) -> bool:
-        """Whether every movable body stays, nothing falls through, and no joint is blocked at the start."""
-        return not self.unsettled and not self.blocked
+        """Whether something can move, every movable body stays, no joint is blocked at the start, and no two bodies
+        lie more than 5 mm in each other."""
+        return self.verdict == "ok"
+
+    @property
+    def reason(self) -> str:
+        """Say the verdict in one sentence."""
+        if self.verdict == "nothing_movable":
+            return "no body is free to move and no joint moves, so that staying says nothing"
+        if self.verdict == "ok":
+            return f"{len(self.bodies)} movable bodies stay, {len(self.joints)} joints are free"
+        parts = []
+        if self.unsettled:
+            worst = max(self.unsettled, key=lambda body: (body.fell_through, body.moved))
+            fate = "falls through the floor" if worst.fell_through else f"moves {1000 * worst.moved:.0f} mm"
+            parts.append(
+                f"{len(self.unsettled)} of {len(self.bodies)} movable bodies do not stay ({worst.name} {fate})"
+            )
+        if self.blocked:
+            parts.append(f"{len(self.blocked)} of {len(self.joints)} joints are blocked ({self.blocked[0].joint})")
+        if self.collisions:
+            pair = self.collisions[0]
+            parts.append(
+                f"{len(self.collisions)} pairs lie more than {1000 * COLLISION_DEPTH:.0f} mm in each other "
+                f"({pair.first} {1000 * pair.depth:.0f} mm in {pair.second})"
+            )
+        return ", ".join(parts)
 
     @property
     def max_penetration_mm(self) -> float:
@@ -84,6 +121,8 @@ class SettleReport:
     def as_json(self) -> dict[str, Any]:
         """Return everything as plain values for JSON."""
         return {
+            "verdict": self.verdict,
+            "reason": self.reason,
             "settled": self.settled,
             "seconds": self.seconds,
             "max_penetration_mm": self.max_penetration_mm,

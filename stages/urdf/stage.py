@@ -15,7 +15,7 @@ from stages.urdf.bodies import scene_bodies
 from stages.urdf.exports import write_exports
 from stages.urdf.parameters import UrdfParameters
 from stages.urdf.resting import rested_bodies
-from stages.urdf.settle_report import settle_report
+from stages.urdf.settle_report import SettleReport, settle_report
 
 
 def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) -> InteractiveScene:
@@ -26,7 +26,7 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
     movable = _movable_classes(parameters)
     with context.progress.step("read the CAD scene"):
         graph = cad_scene.graph
-        bodies = scene_bodies(cad_scene, graph, movable)
+        bodies = scene_bodies(cad_scene, graph, movable, parameters.fixed_classes)
     with context.progress.step("write and check the kinematic tree"):
         scene = write_scene_bundle(context.output, bodies, graph)
     rested = 0
@@ -39,21 +39,25 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
                 scene = write_scene_bundle(context.output, written, graph)
     with context.progress.step("write what stands beside it"):
         write_exports(context.output, scene)
-    summary: dict[str, float] = {
+    summary: dict[str, float | str] = {
         "bodies": len(scene.bodies),
         "movable": sum(body.movable for body in scene.bodies),
         "joints": sum(len(body.joints) for body in scene.bodies),
         "cad_models": sum(body.model is not None for body in bodies),
         "rested": rested,
     }
+    outcome = "ok" if scene.bodies else "empty"
     if parameters.settle_seconds:
         with context.progress.step("settle in physics"):
-            summary |= _settle(context, parameters)
-    return InteractiveScene(context.output, outcome="ok" if scene.bodies else "empty", summary=summary)
+            report = _settle(context, parameters)
+        summary |= _measures(report)
+        if scene.bodies and not report.settled:
+            outcome, summary["reason"] = report.verdict, report.reason
+    return InteractiveScene(context.output, outcome=outcome, summary=summary)
 
 
-def _settle(context: Context, parameters: UrdfParameters) -> dict[str, float]:
-    """Run the settle test on the scene just written, warn of what it finds, and return its measures."""
+def _settle(context: Context, parameters: UrdfParameters) -> SettleReport:
+    """Run the settle test on the scene just written and warn of what it finds."""
     report = settle_report(
         context.output,
         parameters.settle_seconds,
@@ -71,6 +75,10 @@ def _settle(context: Context, parameters: UrdfParameters) -> dict[str, float]:
         )
     for joint in report.blocked:
         context.logger.warning("%s meets %s at the start of its motion", joint.joint, joint.hit_link)
+    return report
+
+
+def _measures(report: SettleReport) -> dict[str, float | str]:
     return {
         "settled": float(report.settled),
         "unstable": len(report.unsettled),

@@ -245,5 +245,5 @@ def test_a_bare_array_is_read_and_refused_alike(tmp_path: Path) -> None:
     np.save(path, np.array([{}], dtype=object), allow_pickle=True)
     with pytest.raises(BadInput, match="holds object"):
         read_array(path)
-    with pytest.raises(BadInput, match="No such file"):
+    with pytest.raises(BadInput, match="file is missing"):
         read_array(tmp_path / "none.npy")

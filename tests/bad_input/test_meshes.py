@@ -141,7 +141,7 @@ def test_missing_and_not_a_file(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="missing"):
         read_mesh(tmp_path / "none.ply")
     (tmp_path / "folder.ply").mkdir()
-    with pytest.raises(BadInput, match="Is a directory"):
+    with pytest.raises(BadInput, match="a folder, not a regular file"):
         read_mesh(tmp_path / "folder.ply")
     with pytest.raises(BadInput, match="null"):
         read_mesh(tmp_path / "a\0b.ply")

@@ -70,9 +70,29 @@ def test_a_nondeterministic_step_is_reported(tmp_path: Path, caplog: pytest.LogC
     assert make(tmp_path / "a", behaviour="random", force=True).nondeterministic
 
 
+def test_what_runs_share_is_made_once_and_is_the_same(tmp_path: Path) -> None:
+    def run(name: str, **values) -> RunResult:
+        return run_stage(PROBE, {}, tmp_path / name, ProbeParameters(**values), shared=tmp_path / ".shared")
+
+    first, second = run("a"), run("b")
+    assert (first.status, second.status) == ("made", "taken")
+    assert second.manifest.content_digest == first.manifest.content_digest and second.key == first.key
+    assert_sound(tmp_path / "b")
+    assert run("b").status == "up to date"
+    assert run("c", text="other").status == "made"  # another key
+    (kept,) = [path for path in (tmp_path / ".shared").glob("probe*") if path.name.endswith(first.key[:16])]
+    payload = next(path for path in kept.iterdir() if path.name.startswith("file-"))
+    payload.write_bytes(b"z" * payload.stat().st_size)  # the same size
+    assert run("d").status == "made"  # what is damaged is not taken, and mended
+    assert_sound(tmp_path / "d")
+    assert run("e").status == "taken"
+    with pytest.raises(UsageError, match="without inputs"):
+        run_stage(PROBE, {"upstream": tmp_path / "a"}, tmp_path / "f", ProbeParameters(), shared=tmp_path / ".shared")
+
+
 def test_dry_run_writes_nothing(tmp_path: Path) -> None:
     result = make(tmp_path / "a", dry_run=True)
-    assert result.status == "would run" and "does not exist" in result.reason
+    assert result.status == "would run" and result.reason == "nothing is made yet"
     assert list(tmp_path.iterdir()) == []
     make(tmp_path / "a")
     before = snapshot(tmp_path)
@@ -182,7 +202,7 @@ def test_interrupted_replacement_is_completed(tmp_path: Path, stop_after: str) -
     out = tmp_path / "a"
     make(out, text="old")
     make(tmp_path / "new", text="new")
-    partial, old = tmp_path / ".a.partial-1-x", tmp_path / ".a.old-x"
+    partial, old = tmp_path / ".a.partial-1-0123abcd", tmp_path / ".a.old-0123abcd"
     shutil.move(tmp_path / "new", partial)
     (tmp_path / ".a.journal").write_text(json.dumps({"partial": partial.name, "old": old.name}))
     if stop_after != "journal":

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from schemas.errors import UsageError
+from schemas.errors import BadInput, MissingDependency, UsageError
 from stages.engine.batch import read_batch, worst_exit_code
-from stages.engine.chain import run_pipeline
+from stages.engine.chain import StepReport, run_pipeline
+from stages.engine.given_inputs import check_given_inputs
 from stages.engine.make_rules import makefile_for
 from stages.engine.pipelines import (
     PIPELINES_FOLDER,
@@ -86,6 +87,7 @@ inputs = { log = "$log" }
         (BASE.replace('inputs = { log = "$log" }', ""), "missing"),
         (BASE + BASE[BASE.index("[[step]]") :], "two steps"),
         (BASE.replace('name = "sequence"', 'name = "../x"'), "not a name"),
+        (BASE.replace("inputs = ", "shared = true\ninputs = "), "shared step has no inputs"),
         (BASE.replace("summary", "nonsense"), "summary: Field required"),
         ("not toml", "TOML"),
     ],
@@ -109,6 +111,49 @@ def test_a_chain_stops_at_the_first_failure(tmp_path: Path) -> None:
     assert [report.name for report in reports] == ["cad_library", "sequence", "segments"]
     assert reports[-1].exit_code == 4 and len(calls) == 3
     assert "--weights" not in calls[2]
+
+
+def test_what_is_given_is_looked_at_before_anything_runs(tmp_path: Path) -> None:
+    pipeline = read_pipeline(pipeline_path("reconstruct"))
+    values = resolve_variables(pipeline, {"log": str(tmp_path / "nowhere")})
+    with pytest.raises(BadInput, match=r"log = .*nowhere: no such file or folder"):
+        check_given_inputs(pipeline, values)
+    check_given_inputs(pipeline, values, only=("cad_library",))  # which does not read it
+    with pytest.raises(MissingDependency, match=r"https://github.com/.*yolox_nano.onnx"):
+        check_given_inputs(pipeline, {**values, "log": str(tmp_path), "weights": "models/yolox_nano.onnx"})
+    check_given_inputs(pipeline, {**values, "log": str(tmp_path)})
+
+
+def test_make_looks_at_the_log_before_it_builds_a_library(tmp_path: Path) -> None:
+    words = ["make", "-n", "-f", "data/pipelines/reconstruct.mk", f"OUTPUTS={tmp_path}", f"LOG={tmp_path}/nowhere"]
+    done = subprocess.run(words, cwd=REPOSITORY, capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and "nowhere: no such file or folder" in done.stderr and done.stdout == ""
+    words[-1] = f"LOG={tmp_path}"
+    named = subprocess.run([*words, "WEIGHTS=yolox_nano"], cwd=REPOSITORY, capture_output=True, text=True, check=False)
+    assert named.returncode == 0 and "--weights 'yolox_nano'" in named.stdout  # one of the cache has no path
+
+
+def test_a_run_ends_with_the_gravest_code_of_its_steps() -> None:
+    went_on = StepReport("interactive_scene", 0, {"outcome": "unsettled"})
+    assert went_on.code() == 4 and went_on.code(("unsettled",)) == 0
+    assert StepReport("report", 0, {"outcome": "ok"}).code() == 0
+    assert StepReport("plan", 0, {"status": "would run", "outcome": "unknown"}).code() == 0
+    assert StepReport("fuse", 6, {}).code(("empty",)) == 6
+
+
+def test_a_log_without_poses_is_noticed_before_it_is_segmented(tmp_path: Path) -> None:
+    def execute(arguments: list[str]) -> tuple[int, str]:
+        return 0, '{"summary": {"posed_frames": 0}}' if "ingest" in arguments else "{}"
+
+    pipeline = read_pipeline(pipeline_path("reconstruct"))
+    with pytest.raises(BadInput, match="run reconstruct-without-poses"):
+        run_pipeline(pipeline, tmp_path, {"log": "x"}, execute=execute)
+
+
+def test_the_library_is_shared_by_runs_beside_each_other() -> None:
+    pipeline = read_pipeline(pipeline_path("reconstruct"))
+    words = step_arguments(pipeline.step[0], "outputs/a", {})
+    assert words[words.index("--shared") + 1] == "outputs/a/../.shared"
 
 
 def test_batch_file_is_checked_and_gives_the_gravest_code(tmp_path: Path) -> None:

@@ -4,18 +4,28 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stages.suture.trials.settings import POLICIES
+from stages.suture.trials.ours.pose_correction import BySeenEnds, latest
+from stages.suture.trials.policies import OURS, POLICIES, THESIS
+from stages.suture.trials.thesis.extraction import NoSweep
+from stages.suture.trials.thesis.handover import NormalUnchanged
 
 ARMS = {
     **POLICIES,
-    "ours_thesis_eyes": replace(POLICIES["ours"], perception="thesis"),
-    "ours_one_at_a_time": replace(POLICIES["ours"], moves_both=False),
-    "thesis_other_test": replace(POLICIES["thesis"], retries_when_unchanged=False),
+    "ours_thesis_eyes": replace(OURS, perception="thesis"),
+    "ours_one_at_a_time": replace(OURS, coordination=THESIS.coordination),
+    "thesis_other_test": replace(THESIS, handover_test=NormalUnchanged()),
 }
 """By the names that metrics keep."""
-MECHANISMS = (
-    "servoes_ends", "keeps_books", "cinches_before_handover", "checks_place", "centres_jaws", "expects",
-    "watches_slack", "fuses_looks", "checks_turn", "sweeps",
-)  # fmt: skip
-WITHOUT = {f"ours_without_{name}": replace(POLICIES["ours"], **{name: False}) for name in MECHANISMS}
+WITHOUT = {
+    "ours_without_servoes_ends": replace(OURS, pose_correction=THESIS.pose_correction),
+    "ours_without_keeps_books": replace(OURS, cinch=THESIS.cinch),
+    "ours_without_cinches_before_handover": replace(OURS, handover_thread=THESIS.handover_thread),
+    "ours_without_checks_place": replace(OURS, trust=THESIS.trust),
+    "ours_without_centres_jaws": replace(OURS, grasp=THESIS.grasp),
+    "ours_without_expects": replace(OURS, expectation=THESIS.expectation),
+    "ours_without_watches_slack": replace(OURS, slack_watch=THESIS.slack_watch),
+    "ours_without_fuses_looks": replace(OURS, pose_correction=BySeenEnds(combined=latest)),
+    "ours_without_checks_turn": replace(OURS, handover_test=THESIS.handover_test),
+    "ours_without_sweeps": replace(OURS, sweep=NoSweep()),
+}
 """Ours, one mechanism at a time as in the thesis (or left out)."""

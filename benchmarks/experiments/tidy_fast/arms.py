@@ -27,7 +27,8 @@ from stages.tableware.policies.pull import PullPolicy
 from stages.tableware.policies.random import RandomOne
 from stages.tableware.policies.random_piles import RandomPile
 from stages.tableware.policies.stack import StackPolicy
-from stages.tableware.simulation.fast import Trial, run_trial
+from stages.tableware.simulation.fast import run_trial
+from stages.tableware.simulation.trial import Trial
 from stages.tableware.world.items import Table
 from stages.tableware.world.scenes import make_table
 

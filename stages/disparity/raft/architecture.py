@@ -52,7 +52,7 @@ class Architecture:
 
 SMALL = Architecture(
     widths=(8, 24, 32), hidden=(32, 32, 8), scales=2, features=48, motion=(24, 32), head=32, mask=32, shared=True
-)  # fmt: skip
+)
 """Of the network that is trained here, on our own renderings."""
 
 
@@ -62,7 +62,7 @@ def architecture_of(shapes: Shapes, where: str) -> Architecture:
         planes = shapes["update_block.encoder.convc1.weight"][1]
         factor = math.isqrt(shapes["update_block.mask.2.weight"][0] // 9)
         shared = not any(name.startswith("fnet.") for name in shapes)
-        found = Architecture(
+        architecture = Architecture(
             widths=tuple(shapes[f"cnet.{name}.weight"][0] for name in ("conv1", "layer2.0.conv1", "layer3.0.conv1")),  # type: ignore[arg-type]
             hidden=tuple(shapes[f"update_block.gru{name}.convz.weight"][0] for name in ("08", "16", "32")),
             scales=sum(name.startswith("context_zqr_convs.") and name.endswith(".weight") for name in shapes),
@@ -77,10 +77,21 @@ def architecture_of(shapes: Shapes, where: str) -> Architecture:
         )
     except (KeyError, IndexError):
         raise BadInput(f"{where}: no checkpoint of RAFT-Stereo", hint=OTHER_FILE) from None
-    widths = (*found.widths, *found.hidden, found.features, *found.motion, found.head, found.mask)
-    if not (1 <= found.scales <= 3 and all(1 <= width <= LARGEST_WIDTH for width in widths) and found.radius >= 1):
+    widths = (
+        *architecture.widths,
+        *architecture.hidden,
+        architecture.features,
+        *architecture.motion,
+        architecture.head,
+        architecture.mask,
+    )
+    if not (
+        1 <= architecture.scales <= 3
+        and all(1 <= width <= LARGEST_WIDTH for width in widths)
+        and architecture.radius >= 1
+    ):
         raise BadInput(f"{where}: its tensors are of no RAFT-Stereo network", hint=OTHER_FILE)
-    return found
+    return architecture
 
 
 def planes_out(shapes: Shapes, name: str) -> int:

@@ -39,18 +39,18 @@ def read_tensors(path: Path) -> dict[str, np.ndarray]:
     if path.suffix == ".safetensors":
         return read_safetensors(path)[0]
     try:
-        found = torch.load(path, map_location="cpu", weights_only=True)
+        content = torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:  # the reader has errors of its own for every way in which a file is none
         reason = (str(error).splitlines() or [type(error).__name__])[0][:160]
         raise BadInput(f"{path}: no checkpoint that can be read: {reason}", hint=OTHER_FILE) from None
-    if isinstance(found, dict) and isinstance(found.get("state_dict"), dict):
-        found = found["state_dict"]
-    whole = isinstance(found, dict) and all(
-        isinstance(name, str) and isinstance(tensor, torch.Tensor) for name, tensor in found.items()
+    if isinstance(content, dict) and isinstance(content.get("state_dict"), dict):
+        content = content["state_dict"]
+    whole = isinstance(content, dict) and all(
+        isinstance(name, str) and isinstance(tensor, torch.Tensor) for name, tensor in content.items()
     )
     if not whole:
         raise BadInput(f"{path}: holds no table of tensors", hint=OTHER_FILE)
-    return {name.removeprefix(PREFIX): tensor.detach().numpy() for name, tensor in found.items()}
+    return {name.removeprefix(PREFIX): tensor.detach().numpy() for name, tensor in content.items()}
 
 
 def convert(source: Path, target: Path) -> None:

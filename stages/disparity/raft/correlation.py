@@ -26,11 +26,11 @@ class RowCorrelation:
         """Return correlations (N, levels * (2 radius + 1), h, w) around columns (N, h, w) of the right map [px],
         finest level first, between pixels by linear interpolation; outside of the row they are zero."""
         around = torch.arange(-self.radius, self.radius + 1, dtype=column.dtype, device=column.device)
-        found = []
+        levels = []
         for level, volume in enumerate(self.pyramid):
             wanted = column.reshape(-1, 1) / 2**level + around
-            found.append(sampled(volume[:, 0], wanted))
-        return torch.cat(found, dim=1).reshape(*self.size, -1).permute(0, 3, 1, 2)
+            levels.append(sampled(volume[:, 0], wanted))
+        return torch.cat(levels, dim=1).reshape(*self.size, -1).permute(0, 3, 1, 2)
 
 
 def sampled(rows: torch.Tensor, places: torch.Tensor) -> torch.Tensor:

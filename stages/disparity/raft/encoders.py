@@ -90,9 +90,9 @@ class ContextEncoder(Trunk):
         """(N, C, h, w) of the trunk -> (state, told) of the `count` finest scales."""
         heads = (self.outputs08, self.outputs16, self.outputs32)
         shrink = (self.layer4, self.layer5)
-        found, given = [], finest
+        states, given = [], finest
         for k in range(count):
             given = shrink[k - 1](given) if k else given
-            state, told = (head(given) for head in heads[k])
-            found.append((torch.tanh(state), torch.relu(told)))
-        return found
+            state, context = (head(given) for head in heads[k])
+            states.append((torch.tanh(state), torch.relu(context)))
+        return states

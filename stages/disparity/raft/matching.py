@@ -48,9 +48,9 @@ def match_within_reach(
     is moved by the least disparity, and both are made smaller where the range is larger still."""
     lowest, shrink = start_of(left, right)
     eyes = [smaller(picture, shrink) for picture in (left, right)]
-    found = match(network, eyes[0], eyes[1], iterations, agreement, device, lowest)
+    shrunk = match(network, eyes[0], eyes[1], iterations, agreement, device, lowest)
     return DisparityMap(
-        *(larger(one, left.shape, by) for one, by in ((found.disparity, shrink), (found.confidence, 1)))
+        *(larger(values, left.shape, by) for values, by in ((shrunk.disparity, shrink), (shrunk.confidence, 1)))
     )
 
 
@@ -111,5 +111,5 @@ def moved_right(picture: np.ndarray, columns: int) -> np.ndarray:
 
 def estimated(network: RaftStereo, left: np.ndarray, right: np.ndarray, iterations: int, device: str) -> np.ndarray:
     """Return what the network makes of a pair: disparities (H, W) float32 [px]."""
-    pictures = [torch.from_numpy(np.ascontiguousarray(one)).permute(2, 0, 1).float() for one in (left, right)]
-    return network(*(one.to(device) for one in pictures), iterations).cpu().numpy()
+    pictures = [torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1).float() for picture in (left, right)]
+    return network(*(picture.to(device) for picture in pictures), iterations).cpu().numpy()

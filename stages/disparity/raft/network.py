@@ -49,15 +49,15 @@ class RaftStereo(nn.Module):
         features, scales = self._encode(torch.cat([left, right]) * (2 / 255.0) - 1.0)
         states = [state for state, _ in scales]
         context = [
-            list(convolution(told).chunk(3, dim=1))
-            for convolution, (_, told) in zip(self.context_zqr_convs, scales, strict=True)
+            list(convolution(scale_context).chunk(3, dim=1))
+            for convolution, (_, scale_context) in zip(self.context_zqr_convs, scales, strict=True)
         ]
         first, second = features.float().chunk(2)
         with torch.autocast(features.device.type, enabled=False):
             correlation = RowCorrelation(first, second, self.sizes.levels, self.sizes.radius)
         start = torch.arange(first.shape[3], dtype=first.dtype, device=first.device)
         start = start.expand(first.shape[0], *first.shape[2:])
-        column, found = start, []
+        column, disparities = start, []
         for _ in range(iterations):
             column = column.detach()
             flow = torch.stack([column - start, torch.zeros_like(start)], dim=1)
@@ -67,9 +67,9 @@ class RaftStereo(nn.Module):
             self.update_block.coarse_step(states, context)
             change = self.update_block.fine_step(states, context, flow, correlation.at(column))
             column = column + change[:, 0].float()
-            found.append(start - column)
+            disparities.append(start - column)
         weights = self.update_block.upsampling_weights(states).float()
-        return upsampled(found[-1][:, None], weights, 2**self.sizes.downsample), found
+        return upsampled(disparities[-1][:, None], weights, 2**self.sizes.downsample), disparities
 
     def _encode(self, pictures: torch.Tensor) -> tuple[torch.Tensor, list[tuple[torch.Tensor, torch.Tensor]]]:
         count = len(pictures) // 2

@@ -14,19 +14,19 @@ from stages.disparity.raft.architecture import Architecture
 class RecurrentUnit(nn.Module):
     """A gated recurrent unit of 3x3 convolutions."""
 
-    def __init__(self, hidden: int, told: int) -> None:
+    def __init__(self, hidden: int, inputs: int) -> None:
         super().__init__()
-        self.convz, self.convr, self.convq = (nn.Conv2d(hidden + told, hidden, 3, 1, 1) for _ in range(3))
+        self.convz, self.convr, self.convq = (nn.Conv2d(hidden + inputs, hidden, 3, 1, 1) for _ in range(3))
 
     def forward(
-        self, state: torch.Tensor, context: Sequence[torch.Tensor], told: Sequence[torch.Tensor]
+        self, state: torch.Tensor, context: Sequence[torch.Tensor], inputs: Sequence[torch.Tensor]
     ) -> torch.Tensor:
         """Return the next state; `context` biases the update gate, the reset gate and the candidate."""
         update, reset = (
-            torch.sigmoid(gate(torch.cat([state, *told], dim=1)) + bias)
+            torch.sigmoid(gate(torch.cat([state, *inputs], dim=1)) + bias)
             for gate, bias in zip((self.convz, self.convr), context, strict=False)
         )
-        candidate = torch.tanh(self.convq(torch.cat([reset * state, *told], dim=1)) + context[2])
+        candidate = torch.tanh(self.convq(torch.cat([reset * state, *inputs], dim=1)) + context[2])
         return torch.lerp(state, candidate, update)
 
 

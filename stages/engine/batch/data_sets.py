@@ -7,18 +7,22 @@ import os
 from pathlib import Path, PurePath
 
 from schemas.errors import UsageError
+from schemas.outside import file_text
 from stages.engine.batch.names import distinct, matched_part, names_from_paths
 from stages.engine.batch.spec import DataSpec
 
+LARGEST_LIST = 64 * 2**20
+"""Bytes of a list of paths."""
+
 
 def _absolute(text: str, base: Path) -> Path:
-    return Path(os.path.abspath(base / Path(text).expanduser()))
+    return Path(os.path.abspath(base / os.path.expanduser(text)))
 
 
 def _listed(file: Path, where: str) -> list[str]:
     try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+        lines = file_text(file, LARGEST_LIST, error=UsageError).splitlines()
+    except UsageError as error:
         raise UsageError(f"{where}: list: {error}", hint="a text file with one path a line") from None
     found = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith("#")]
     if not found:
@@ -47,7 +51,7 @@ def find_scenes(data: DataSpec, base: Path, where: str) -> list[tuple[str, Path]
             named.append(path)
     found: dict[Path, str] = {}
     if data.glob is not None:
-        pattern = str(Path(data.glob).expanduser())
+        pattern = str(Path(os.path.expanduser(data.glob)))
         matches = sorted(glob.glob(pattern, root_dir=base, recursive=True))
         if not matches:
             raise UsageError(f"{where}: data: glob {data.glob}: no match in {base}", hint="check the pattern")

@@ -12,9 +12,12 @@ from pydantic import Field, ValidationError
 
 from schemas.base import Model, canonical_json
 from schemas.errors import BadInput, MachineFailure
+from schemas.outside import file_content
 from stages.engine.batch.outcomes import Outcome
 
 RESULTS_NAME = "results.jsonl"
+LARGEST_RESULTS = 2**30
+"""Bytes: a million scenes."""
 FORMAT = 1
 
 
@@ -71,12 +74,9 @@ def read_results(path: Path) -> list[SceneResult]:
     A last line without its end is what a kill tore: it is left out, and `ResultsFile` cuts it off. Raises BadInput for
     a damaged line elsewhere.
     """
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
+    if not os.path.lexists(path):
         return []
-    except OSError as error:
-        raise MachineFailure(f"{path}: {error.strerror}", hint="check the folder") from None
+    content = file_content(path, LARGEST_RESULTS, hint="check the folder")
     lines = content.split(b"\n")[:-1]
     return [parse_line(line, f"{path}, line {number}") for number, line in enumerate(lines, start=1) if line.strip()]
 

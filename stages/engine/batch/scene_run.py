@@ -23,6 +23,8 @@ from pathlib import Path
 
 import psutil
 
+from schemas.errors import BadInput
+from schemas.outside import file_json
 from stages.engine.batch.artifacts import manifests, measures
 from stages.engine.batch.job import Job
 from stages.engine.batch.outcomes import MACHINE_FAILED, Outcome, classify, signal_name, signal_of
@@ -43,6 +45,10 @@ MEMORY_GRACE = 1.0
 """A scene over its memory limit endangers the others: it has this long to stop [s]."""
 
 
+LARGEST_RECORD = 64 * 2**10
+"""Bytes of what a scene notes about its process."""
+
+
 def this_host() -> str:
     """Return the name of this machine."""
     return socket.gethostname()
@@ -61,9 +67,11 @@ def end_leftover(folder: Path, grace: float) -> None:
     """End the scene that a killed batch has left running in `folder` on this machine, if there is one."""
     record = folder / PROCESS_NAME
     try:
-        facts = json.loads(record.read_text())
+        facts = file_json(record, LARGEST_RECORD)
         group, created, host = int(facts["group"]), float(facts["created"]), str(facts["host"])
-    except (OSError, ValueError, KeyError, TypeError):
+        if not 0 < group < 2**31:
+            return
+    except (BadInput, ValueError, KeyError, TypeError):
         return
     # The leader may be gone and its step not; while a member lives, no new process gets the number of the group.
     if host == this_host() and created_at(group) in (created, None) and group_is_alive(group):
@@ -238,12 +246,15 @@ def run_scene(job: Job, cancelled: Callable[[], bool] = lambda: False, host: str
         reached = steps.index(follower.step) if follower.step is not None else 0
         steps = steps[: reached + (outcome == "not ok")]
     made = manifests(folder, steps)
+    failed_step = None if outcome == "done" else follower.step
+    if outcome == "not ok":  # the chain may have gone on after it
+        failed_step = next((step for step, manifest in made.items() if manifest.outcome != "ok"), failed_step)
     return SceneResult.model_validate(
         identity
         | {
             "outcome": outcome,
             "exit_code": code,
-            "failed_step": None if outcome == "done" else follower.step,
+            "failed_step": failed_step,
             "reason": reason,
             "seconds": round(time.monotonic() - begun, 3),
             "peak_memory_bytes": found.peak_memory,

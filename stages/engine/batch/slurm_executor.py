@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from schemas.errors import MachineFailure, UsageError
+from schemas.outside import file_text
 from stages.engine.batch.job import Job
 from stages.engine.batch.results import RESULTS_NAME, ResultsFile, read_results
 from stages.engine.batch.spec import SlurmOptions
@@ -49,6 +50,10 @@ def part_of(names: Sequence[str], index: int, count: int) -> list[str]:
     return list(names[index::count])
 
 
+LARGEST_LIST = 64 * 2**20
+"""Bytes of the list of jobs."""
+
+
 def parse_task(text: str) -> tuple[int, int]:
     """Return index and count of `3/20`. Raises UsageError."""
     index, _, count = text.partition("/")
@@ -65,10 +70,7 @@ def part_path(out: Path, index: int) -> Path:
 def read_job_list(out: Path) -> list[str]:
     """Return the names of the jobs that the scripts were written for. Raises UsageError."""
     path = out / FOLDER_NAME / LIST_NAME
-    try:
-        return path.read_text(encoding="utf-8").splitlines()
-    except OSError as error:
-        raise UsageError(f"{path}: {error.strerror}", hint="run the batch without --task first") from None
+    return file_text(path, LARGEST_LIST, error=UsageError, hint="run the batch without --task first").splitlines()
 
 
 def _directive(name: str, value: str) -> str:

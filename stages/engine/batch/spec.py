@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,6 +10,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from schemas.errors import UsageError
 from stages.engine.batch.quantities import parse_bytes, parse_seconds, parse_seed_range
+from stages.kit.configuration import read_toml
 
 HINT = "see docs/BATCH.md"
 
@@ -153,13 +153,7 @@ class BatchSpec(_Strict):
 
 def read_spec(path: Path) -> BatchSpec:
     """Read a batch file. Raises UsageError naming the file and the first wrong field."""
-    try:
-        with Path(path).open("rb") as file:
-            values = tomllib.load(file)
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: {error}", hint="a batch is a TOML file") from None
-    except RecursionError:
-        raise UsageError(f"{path}: nested too deeply", hint=HINT) from None
+    values = read_toml(path, hint="a batch is a TOML file, see docs/BATCH.md")
     return check_spec(values, str(path))
 
 

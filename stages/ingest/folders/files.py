@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import os
 import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from schemas.errors import BadInput, UsageError
+from schemas.outside import file_content, json_of
 from schemas.scene_parts import Camera
 from stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
 from stages.ingest.images import decode_image, usable_color, usable_depth
@@ -99,24 +100,19 @@ def named_file(root: Path, name: Any, where: str) -> Path:
 
 def read_json(path: Path) -> Any:
     """Return the document in a JSON file. Raises BadInput."""
-    text = read_text(path)
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise BadInput(f"{path}: no JSON ({type(error).__name__}: {error})"[:300]) from None
+    return json_of(read_text(path), str(path))
 
 
 def file_bytes(path: Path, stream: str) -> bytes:
     """Return the bytes of an image file. Raises Unusable naming the `stream` when it is missing or cannot be read."""
+    if not os.path.exists(path):
+        raise Unusable(f"missing_{stream}", path.name)
+    if (size := path.stat().st_size) > LARGEST_IMAGE_FILE:
+        raise Unusable(f"undecodable_{stream}", f"file of {size} bytes")
     try:
-        size = path.stat().st_size
-        if size > LARGEST_IMAGE_FILE:
-            raise Unusable(f"undecodable_{stream}", f"file of {size} bytes")
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise Unusable(f"missing_{stream}", path.name) from None
-    except OSError as error:
-        raise Unusable(f"unreadable_{stream}", f"{path.name}: {error.strerror}") from None
+        return file_content(path, LARGEST_IMAGE_FILE)
+    except BadInput as error:
+        raise Unusable(f"unreadable_{stream}", f"{path.name}: {error.message.rpartition(': ')[2]}") from None
 
 
 def image_loader(

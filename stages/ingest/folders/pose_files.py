@@ -1,23 +1,33 @@
 """Poses beside plain images: a file with a pose an image, a stamped trajectory, or a file of 4x4 numbers an image.
 
 Poses are taken to be world_from_camera. What a row holds is told by its columns: 7 is tx ty tz qx qy qz qw, 8 has a
-stamp before these (TUM), 12 is a 3x4 matrix row by row (KITTI), 16 a 4x4 matrix.
+stamp before these (TUM), 12 is a 3x4 matrix row by row (KITTI), 16 a 4x4 matrix. A first column that is no number is
+the name of the row's image, with or without folder and ending; such rows may stand in any order and leave images out.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
 from schemas.errors import BadInput
+from schemas.outside import opened
 from stages.ingest.folders.files import files_of, images_by_number
 from stages.ingest.folders.stamped_poses import StampedPoses, read_stamped_poses
-from stages.kit.formats.trajectories import number_rows, read_matrix, read_open3d_log, read_text, transform_from_numbers
+from stages.kit.formats.trajectories import (
+    named_rows,
+    number_rows,
+    read_matrix,
+    read_open3d_log,
+    read_text,
+    transform_from_numbers,
+)
 
 FILES = ("pose.txt", "poses.txt", "groundtruth.txt", "trajectory.txt", "trajectory.tum", "traj.txt", "trajectory.log")
 FOLDERS = ("pose", "poses")
-COLUMNS = (7, 8, 12, 16)
+WITHOUT_STAMP = (7, 12, 16)
+COLUMNS = (8, *WITHOUT_STAMP)
 Pose = tuple[np.ndarray | None, str | None]
 """world_from_camera (4, 4), or the reason why there is none."""
 
@@ -32,10 +42,24 @@ def pose_file(root: Path) -> Path | None:
 
 def columns_of(path: Path) -> int:
     """Return the number of columns in the first row of a text file, 0 when it has none. Raises BadInput."""
-    with path.open("rb") as file:
+    return len(_first_row(path))
+
+
+def has_names(path: Path) -> bool:
+    """Whether the first column of a text file holds no number in its first row."""
+    row = _first_row(path)
+    try:
+        float(row[0]) if row else None
+    except ValueError:
+        return True
+    return False
+
+
+def _first_row(path: Path) -> list[str]:
+    with opened(path) as file:
         start = file.read(4096).decode("utf-8", "replace")
     rows = (line.split("#", 1)[0].split() for line in start.splitlines())
-    return next((len(row) for row in rows if row), 0)
+    return next((row for row in rows if row), [])
 
 
 def read_pose_list(path: Path, names: list[str]) -> list[Pose] | StampedPoses:
@@ -49,12 +73,34 @@ def read_pose_list(path: Path, names: list[str]) -> list[Pose] | StampedPoses:
         matrices: list[Pose] = [(matrix, None) for matrix in read_open3d_log(path)]
         return _counted(matrices, names, path)
     columns = columns_of(path)
+    if columns - 1 in WITHOUT_STAMP and has_names(path):
+        return _named(path, columns, names)
     if columns == 8:
         return read_stamped_poses(path)
     if columns not in COLUMNS:
         read_text(path)
-        raise BadInput(f"{path}: {columns} columns are no pose", hint="7, 8 (with a stamp), 12 or 16 numbers a line")
+        raise BadInput(
+            f"{path}: {columns} columns are no pose",
+            hint="7, 8 (with a stamp), 12 or 16 numbers a line, after the image's name or not",
+        )
     return _counted([_pose(row, f"{path}: line {line}") for line, row in number_rows(path, columns)], names, path)
+
+
+def _named(path: Path, columns: int, names: list[str]) -> list[Pose]:
+    """Return the pose of each image by the name in the first column; none for images without a row.
+
+    Raises BadInput when no name is that of an image, and when one is there twice.
+    """
+    by_stem: dict[str, Pose] = {}
+    for line, name, row in named_rows(path, columns):
+        stem = PurePosixPath(name).stem if PurePosixPath(name).suffix else PurePosixPath(name).name
+        if stem in by_stem:
+            raise BadInput(f"{path}: line {line}: a second pose for {stem!r:.60}", hint="one pose an image")
+        by_stem[stem] = _pose(row, f"{path}: line {line}")
+    if not by_stem.keys() & set(names):
+        first = next(iter(by_stem), "")
+        raise BadInput(f"{path}: {first!r:.60} and the rest name no image of the log", hint="name the image files")
+    return [by_stem.get(name, (None, None)) for name in names]
 
 
 def _pose(row: np.ndarray, where: str) -> Pose:

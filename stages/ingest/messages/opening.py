@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from schemas.errors import BadInput
+from schemas.outside import opened
 from stages.ingest.messages.container import MessageLog
 from stages.ingest.messages.mcap_container import open_mcap
 from stages.ingest.messages.mcap_records import MAGIC as MCAP_MAGIC
@@ -46,7 +47,7 @@ def open_message_log(path: Path, *, salvage: bool) -> MessageLog:
 def _file_container(path: Path) -> str | None:
     if not path.is_file():
         return None
-    with path.open("rb") as file:
+    with opened(path) as file:
         head = file.read(len(SQLITE_MAGIC))
     if head.startswith(MCAP_MAGIC):
         return "mcap"
@@ -60,7 +61,7 @@ def _file_container(path: Path) -> str | None:
 def _folder_container(path: Path) -> str | None:
     metadata = path / NAME
     if metadata.is_file():
-        with metadata.open("rb") as file:
+        with opened(metadata) as file:
             if KEY.encode() in file.read(_METADATA_HEAD):
                 return "rosbag2"
     if any(entry.is_dir() for entry in path.iterdir()):

@@ -19,6 +19,7 @@ from ruamel.yaml.events import (
 )
 
 from schemas.errors import BadInput
+from schemas.outside import file_text
 
 NAME = "metadata.yaml"
 KEY = "rosbag2_bagfile_information"
@@ -45,14 +46,11 @@ def read_bag_metadata(folder: Path) -> BagMetadata:
     """Return what metadata.yaml says. Raises BadInput when it is missing, damaged, or leads out of the folder."""
     path = folder / NAME
     try:
-        size = path.stat().st_size
-        if size > LARGEST:
-            raise ValueError(f"{size} bytes, more than the {LARGEST} that are accepted")
-        tree = _tree(path.read_text(encoding="utf-8"))
+        tree = _tree(file_text(path, LARGEST))
         if not isinstance(tree, dict) or not isinstance(tree.get(KEY), dict):
             raise ValueError("it does not describe a bag")
         return _described(folder, tree[KEY])
-    except (OSError, ValueError, YAMLError) as error:
+    except (BadInput, OSError, ValueError, YAMLError) as error:
         reason = " ".join(str(error).split())
         raise BadInput(f"{path}: cannot be read: {reason:.200}", hint="`ros2 bag reindex` writes it anew") from None
 

@@ -308,3 +308,5 @@ class InspectionReport(Model):
     other_cameras: tuple[str, ...] = ()
     gravity: GravityReport
     steps: tuple[StepReport, ...]
+    command: str = ""
+    """The command line that reconstructs this log as it was looked at, empty where a chain on it would be wasted."""

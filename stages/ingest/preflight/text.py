@@ -56,6 +56,9 @@ def _lines(report: InspectionReport) -> Iterator[str]:
     for note in report.notes:
         yield _row("assumed", note)
     yield ""
+    if report.command:
+        yield _row("run it", report.command)
+        yield ""
     for step in report.steps:
         state = "ready" if step.ready else "needs " + ", ".join(step.missing) if step.missing else "not in this version"
         yield _row("step", f"{step.step:32} {state}")

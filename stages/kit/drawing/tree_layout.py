@@ -22,20 +22,18 @@ def tree_layout(
         children.setdefault(above if above in parents else None, []).append(name)
     positions: dict[str, tuple[float, float]] = {}
     next_row = 0
-
-    def place(name: str, depth: int) -> float:
-        nonlocal next_row
-        below = [place(child, depth + 1) for child in children.get(name, [])]
-        if below:
-            row = (below[0] + below[-1]) / 2.0
+    waiting = [(root, 0, False) for root in reversed(children.get(None, []))]
+    while waiting:  # no recursion: a tower may be higher than Python calls deep
+        name, depth, placed_below = waiting.pop()
+        below = children.get(name, [])
+        if below and not placed_below:
+            waiting.append((name, depth, True))
+            waiting += [(child, depth + 1, False) for child in reversed(below)]
+        elif below:
+            positions[name] = (float(depth), (positions[below[0]][1] + positions[below[-1]][1]) / 2.0)
         else:
-            row = float(next_row)
+            positions[name] = (float(depth), float(next_row))
             next_row += 1
-        positions[name] = (float(depth), row)
-        return row
-
-    for root in children.get(None, []):
-        place(root, 0)
     if len(positions) != len(parents):
         raise ValueError("the parents form a circle")
     return positions

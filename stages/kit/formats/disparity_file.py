@@ -56,10 +56,13 @@ class DisparityWriter:
             self._writer.finish()
         self._file.close()
 
-    def write(self, stamp: int, camera_name: str, found: DisparityMap) -> None:
+    def write(self, stamp: int, camera_name: str, disparity_map: DisparityMap) -> None:
         """Append the map of the frame at `stamp` [ns] of a camera."""
-        bytes_of_confidence = np.rint(255 * np.clip(found.confidence, 0, 1)).astype(np.uint8)
-        for stream, pixels in (("disparity", found.disparity.astype(np.float32)), ("confidence", bytes_of_confidence)):
+        bytes_of_confidence = np.rint(255 * np.clip(disparity_map.confidence, 0, 1)).astype(np.uint8)
+        for stream, pixels in (
+            ("disparity", disparity_map.disparity.astype(np.float32)),
+            ("confidence", bytes_of_confidence),
+        ):
             message = foxglove.raw_message(stamp, pixels, ENCODINGS[stream], camera_name)
             data = message.SerializeToString(deterministic=True)
             channel = self._channels[camera_name, stream]

@@ -111,8 +111,8 @@ class FrameWriter:
                 self._register(f"/{name}/right", CompressedImage)
                 self._register(f"/{name}/right_calibration", CameraCalibration)
         self._register(TRANSFORMS, FrameTransforms)
-        known = {"world_frame": WORLD_FRAME, "world_up": world_up, "registered": "yes" if registered else "no"}
-        self._writer.add_metadata(WORLD_METADATA, known)
+        metadata = {"world_frame": WORLD_FRAME, "world_up": world_up, "registered": "yes" if registered else "no"}
+        self._writer.add_metadata(WORLD_METADATA, metadata)
         table = {str(entry.instance): entry.class_name for entry in sorted(label_table, key=lambda e: e.instance)}
         if table:
             self._writer.add_metadata(LABELS_METADATA, table)
@@ -259,13 +259,13 @@ class FrameReader:
     def cameras(self) -> dict[str, Camera]:
         """Every camera by name, in order of first appearance. Raises BadInput when the file holds no calibration."""
         if self._cameras is None:
-            found: dict[str, Camera] = {}
+            cameras: dict[str, Camera] = {}
             for _, name, places in self._index:
-                if name not in found and "calibration" in places:
-                    found[name] = _camera_of(self._decode("calibration", places["calibration"]), self.path)
-            if not found:
+                if name not in cameras and "calibration" in places:
+                    cameras[name] = _camera_of(self._decode("calibration", places["calibration"]), self.path)
+            if not cameras:
                 raise BadInput(f"{self.path}: holds no camera calibration")
-            self._cameras = found
+            self._cameras = cameras
         return self._cameras
 
     @property
@@ -294,8 +294,8 @@ class FrameReader:
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return indices (K,) and world_from_camera (K, 4, 4) of the frames that have a pose."""
-        found = [(frame.index, frame.world_from_camera) for frame in self.frames(streams=())]
-        kept = [(index, pose) for index, pose in found if pose is not None]
+        poses = [(frame.index, frame.world_from_camera) for frame in self.frames(streams=())]
+        kept = [(index, pose) for index, pose in poses if pose is not None]
         return np.array([i for i, _ in kept], dtype=int), np.array([p for _, p in kept]).reshape(-1, 4, 4)
 
     def read(self, index: int, streams: Iterable[str] = ("color", "depth", "labels")) -> Frame:
@@ -344,19 +344,19 @@ class FrameReader:
 
     def _find_topics(self) -> dict[int, tuple[str, str]]:
         """Return channel -> (camera, stream); the camera of `/tf` is empty."""
-        found: dict[int, tuple[str, str]] = {}
+        topics: dict[int, tuple[str, str]] = {}
         for channel in self._log.channels.values():
             match = _TOPIC.fullmatch(channel.topic)
             if match is None and channel.topic != TRANSFORMS:
                 continue
-            found[channel.id] = (match[1], match[2]) if match else ("", "pose")
+            topics[channel.id] = (match[1], match[2]) if match else ("", "pose")
             schema = self._log.schemas.get(channel.schema_id)
             expected = (MESSAGE_TYPES[match[2]] if match else FrameTransforms).DESCRIPTOR.full_name
             if schema is None or schema.name != expected:
                 raise BadInput(
                     f"{self.path}: topic {channel.topic} is not {expected}", hint="run `scenewright ingest` first"
                 )
-        return found
+        return topics
 
     def _build_index(self) -> list[tuple[int, str, dict[str, Location]]]:
         """Return (stamp [ns], camera, stream -> place) of every frame, in time order."""

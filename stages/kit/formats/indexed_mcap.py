@@ -20,6 +20,7 @@ from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, ChunkIndex, MessageIndex, Schema
 
 from schemas.errors import BadInput
+from schemas.outside import opened
 from stages.kit.formats.bounded_unpacking import unpacked
 from stages.kit.formats.chunk_cache import ChunkCache
 
@@ -50,10 +51,7 @@ class IndexedMcap:
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
-        try:
-            self._file = self.path.open("rb")
-        except OSError as error:
-            raise BadInput(f"{self.path}: {error.strerror}", hint=HINT) from None
+        self._file = opened(self.path, hint=HINT)
         try:
             reader = SeekingReader(self._file, record_size_limit=LARGEST_CHUNK)
             summary = reader.get_summary()

@@ -110,8 +110,8 @@ class PanopticReader:
 
     def frame_indices(self) -> list[int]:
         """Return the indices of the frames that have an image, ascending."""
-        found = {FRAME_NAME.fullmatch(name) for name in self._archive.namelist()}
-        return sorted(int(match[1]) for match in found if match)
+        matches = {FRAME_NAME.fullmatch(name) for name in self._archive.namelist()}
+        return sorted(int(match[1]) for match in matches if match)
 
     def read(self, frame_index: int) -> np.ndarray:
         """Return the ids (H, W) int32 of a frame; 0 is void.

@@ -20,6 +20,7 @@ import numpy as np
 import trimesh
 
 from schemas.errors import BadInput
+from schemas.outside import file_content
 
 LARGEST_FILE = 4 * 2**30
 """Bytes."""
@@ -38,14 +39,7 @@ def read_mesh(path: Path, *, may_be_empty: bool = False, hint: str = "make the a
     check = _CHECKS.get(path.suffix.lower())
     if check is None:
         raise BadInput(f"{path}: not a mesh format that is read", hint=f"known: {', '.join(sorted(_CHECKS))}")
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise BadInput(f"{path}: larger than {LARGEST_FILE} bytes", hint=hint)
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise BadInput(f"{path}: file is missing", hint=hint) from None
-    except (OSError, ValueError) as error:
-        raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}", hint=hint) from None
+    data = file_content(path, LARGEST_FILE, hint=hint)
     return mesh_of_bytes(data, path.suffix.lower(), str(path), may_be_empty=may_be_empty, hint=hint)
 
 

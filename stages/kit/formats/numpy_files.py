@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import zipfile
 from pathlib import Path
 from typing import IO
@@ -10,6 +11,7 @@ from typing import IO
 import numpy as np
 
 from schemas.errors import BadInput
+from schemas.outside import opened
 from stages.kit.formats.zip_files import find_entry, zip_errors
 
 LARGEST_ARRAY = 8 * 2**30
@@ -19,35 +21,59 @@ PIECE = 1 << 24
 PLAIN_KINDS = "biufUS"
 
 
-def read_arrays(path: Path, *names: str, hint: str = "make the artifact again") -> tuple[np.ndarray, ...]:
-    """Return the named arrays of an NPZ file.
+def read_arrays(
+    path: Path, *names: str, shapes: tuple[str, ...] = (), hint: str = "make the artifact again"
+) -> tuple[np.ndarray, ...]:
+    """Return the named arrays of an NPZ file. `shapes`, one for each, say what is expected of numbers: `B 3`, `B 512`
+    are arrays with the same, whatever, number of rows.
 
-    Raises BadInput when the file is missing, is no NPZ, lacks an array or has it twice, or when an entry is encrypted,
-    damaged, holds objects, or declares another size than it has (numpy would reserve memory for it first).
+    Raises BadInput when the file is missing, is no NPZ, lacks an array, has it twice or in another shape, or when an
+    entry is encrypted, damaged, holds objects, or declares another size than it has (numpy would reserve memory for it
+    first).
     """
     path = Path(path)
-    with zip_errors(path, hint), zipfile.ZipFile(path) as archive:
-        return tuple(_read_entry(archive, f"{name}.npy") for name in names)
+    with opened(path, hint=hint) as file, zip_errors(path, hint), zipfile.ZipFile(file) as archive:
+        arrays = tuple(_read_entry(archive, f"{name}.npy") for name in names)
+        _check_shapes(names, arrays, shapes)
+    return arrays
 
 
 def read_all_arrays(path: Path, hint: str = "make the artifact again") -> dict[str, np.ndarray]:
     """Return every array of an NPZ file by name. Raises BadInput as `read_arrays` does."""
     path = Path(path)
-    with zip_errors(path, hint), zipfile.ZipFile(path) as archive:
+    with opened(path, hint=hint) as file, zip_errors(path, hint), zipfile.ZipFile(file) as archive:
         return {name.removesuffix(".npy"): _read_entry(archive, name) for name in archive.namelist()}
 
 
 def read_array(path: Path, hint: str = "make the artifact again") -> np.ndarray:
     """Return the array of an NPY file. Raises BadInput as `read_arrays` does."""
     path = Path(path)
-    try:
-        size = path.stat().st_size
-        with path.open("rb") as file:
+    with opened(path, hint=hint) as file:
+        size = os.fstat(file.fileno()).st_size
+        try:
             return _read_stream(file, path.name, min(size, LARGEST_ARRAY))
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror or error}", hint=hint) from None
-    except BadInput as error:
-        raise BadInput(f"{path}: {error}", hint=hint) from None
+        except OSError as error:
+            raise BadInput(f"{path}: {error.strerror or error}", hint=hint) from None
+        except BadInput as error:
+            raise BadInput(f"{path}: {error}", hint=hint) from None
+
+
+def _check_shapes(names: tuple[str, ...], arrays: tuple[np.ndarray, ...], shapes: tuple[str, ...]) -> None:
+    """Raise BadInput for the first array that has another shape, or holds no numbers."""
+    sizes: dict[str, int] = {}
+    for name, array, shape in zip(names, arrays, shapes, strict=bool(shapes)):
+        axes = shape.split()
+        fits = (
+            array.ndim == len(axes)
+            and array.dtype.kind in "biuf"
+            and all(
+                length == (int(axis) if axis.isdigit() else sizes.setdefault(axis, length))
+                for axis, length in zip(axes, array.shape, strict=True)
+            )
+        )
+        if not fits:
+            wanted = ", ".join(f"{axis} = {sizes[axis]}" if axis in sizes else axis for axis in axes)
+            raise BadInput(f"{name}: shape {array.shape} of {array.dtype}, expected ({wanted}) numbers")
 
 
 def _read_entry(archive: zipfile.ZipFile, name: str) -> np.ndarray:

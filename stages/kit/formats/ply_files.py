@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from schemas.errors import BadInput
+from schemas.outside import file_content
 
 _VERTEX = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")])
 _FACE = np.dtype([("count", "u1"), ("indices", "<i4", (3,))])
@@ -18,6 +19,10 @@ _HEADER = (
     "property uchar red\nproperty uchar green\nproperty uchar blue\n"
     "element face {faces}\nproperty list uchar int vertex_indices\nend_header\n"
 )
+
+
+LARGEST_FILE = 4 * 2**30
+"""Bytes: a map of over a hundred million triangles."""
 
 
 @dataclass(frozen=True)
@@ -71,10 +76,7 @@ def write_ply(path: Path, mesh: ColoredMesh) -> None:
 
 def read_ply(path: Path) -> ColoredMesh:
     """Read a mesh that write_ply wrote. Raises BadInput when it is missing, torn or of another layout."""
-    try:
-        data = Path(path).read_bytes()
-    except (FileNotFoundError, IsADirectoryError):
-        raise BadInput(f"{path}: file is missing") from None
+    data = file_content(path, LARGEST_FILE)
     lines = io.BytesIO(data)
     header = b""
     counts = {}

@@ -15,12 +15,15 @@ from typing import Any
 import numpy as np
 
 from schemas.errors import BadInput
+from schemas.outside import file_content, json_of
 
 TYPES: dict[str, str] = {
     "F64": "<f8", "F32": "<f4", "F16": "<f2", "I64": "<i8", "I32": "<i4", "I16": "<i2", "I8": "<i1",
     "U64": "<u8", "U32": "<u4", "U16": "<u2", "U8": "|u1", "BOOL": "|b1",
 }  # fmt: skip
 """Types that are read; bfloat16 has no numpy type."""
+LARGEST_FILE = 64 * 2**30
+"""Bytes: more than any network that is read here."""
 LARGEST_HEADER = 100_000_000
 """Bytes; the format's own limit."""
 METADATA = "__metadata__"
@@ -54,17 +57,11 @@ def write_safetensors(path: Path, tensors: Mapping[str, np.ndarray], metadata: M
 def read_safetensors(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Return (arrays, metadata) of a file. Raises BadInput for one that is not whole or not of this format."""
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror or error}", hint="give a .safetensors file") from None
+    data = file_content(path, LARGEST_FILE, hint="give a .safetensors file")
     length = int.from_bytes(data[:8], "little")
     if len(data) < 8 or length > min(len(data) - 8, LARGEST_HEADER):
         raise BadInput(f"{path}: the header is not whole ({len(data)} bytes in the file)", hint=_BROKEN)
-    try:
-        header = json.loads(data[8 : 8 + length].decode())
-    except (ValueError, RecursionError):
-        raise BadInput(f"{path}: the header is not JSON", hint=_BROKEN) from None
+    header = json_of(data[8 : 8 + length], f"{path}: the header", hint=_BROKEN)
     if not isinstance(header, dict):
         raise BadInput(f"{path}: the header is not a table of tensors", hint=_BROKEN)
     metadata = header.pop(METADATA, {})

@@ -20,6 +20,7 @@ from stages.kit.formats.mjcf_file import write_mjcf
 from stages.kit.formats.scene_links import (
     BodyLinks,
     box_links,
+    furniture_links,
     layout_links,
     mesh_links,
     model_links,
@@ -67,6 +68,8 @@ class BundleBody:
     """Whether `mesh` lies in the folder already, from an earlier writing of the same scene."""
     mass: float | None = None
     """[kg]; from the model or the volume when None."""
+    furniture: bool = False
+    """Movable, but nothing that an arm carries."""
 
 
 def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraphFile) -> InteractiveSceneFile:
@@ -186,6 +189,8 @@ def _mesh_links(
         height = resting_height(graph, nodes, body.name)
         before = pose if body.reconstructed is None else body.reconstructed
         rests_at = None if height is None else height - float(before[2, 3])
+        if body.furniture:
+            return furniture_links(root, body.name, mesh, visual, density, rests_at=rests_at)
         return mesh_links(root, body.name, mesh, visual, density, rests_at=rests_at)
     yaw = float(box_yaw(body.box) - np.arctan2(pose[1, 0], pose[0, 0]))
     return still_mesh_links(body.name, mesh, visual, density, pose, yaw, carried_by(graph, nodes, body.name))
@@ -258,6 +263,7 @@ def _record(body: BundleBody, own: BodyLinks) -> SceneBody:
         name=body.name,
         class_name=body.class_name,
         movable=body.movable,
+        furniture=body.furniture,
         file=f"bodies/{body.name}.urdf" if body.movable else None,
         parent=None if body.parent == SCENE_NODE else body.parent,
         relation=body.relation,

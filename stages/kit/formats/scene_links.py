@@ -20,11 +20,14 @@ from stages.kit.formats.part_colors import recolored_shapes, vertex_colors
 from stages.kit.formats.scene_supports import Carried, levelled, pads, standing_points
 from stages.kit.formats.urdf_file import Link, Shape, UrdfJoint, parse_urdf
 from stages.kit.geometry.box_cover import cover_with_boxes
+from stages.kit.geometry.convex_pieces import convex_pieces
 from stages.kit.geometry.layout_slabs import Slab
 from stages.kit.geometry.solids import MassProperties, Solid, box, hull, mass_properties
 from stages.kit.geometry.transforms import inverse, transform_from_quaternion, transform_from_yaw
 
 LAYOUT_DENSITY = 1000.0
+FOOT_REACH, FOOT_THICKNESS = 0.10, 0.01
+"""What of furniture counts as its feet above the floor, and how thick they are made [m]."""
 GREY = (0.6, 0.6, 0.6, 1.0)
 URDF_MESHES = (".obj", ".stl")
 """What every loader of URDF reads; pybullet refuses a whole file that names a GLB."""
@@ -179,6 +182,35 @@ def mesh_links(
     solid, properties = _hull(points if rests_at is None else standing_points(points, rests_at), density)
     write_obj(root / "meshes" / name / "collision_0.obj", solid.vertices, solid.faces)
     return BodyLinks((Link(name, properties, (visual,), (Shape(f"meshes/{name}/collision_0.obj"),)),))
+
+
+def furniture_links(
+    root: Path, name: str, mesh: trimesh.Trimesh, visual: Shape, density: float, *, rests_at: float | None
+) -> BodyLinks:
+    """Return the link of furniture without CAD model: `visual` to look at, convex pieces of its mesh (body frame) to
+    collide with, weighing what the hull of it all weighs at `density` [kg/m^3].
+
+    It stands on one foot more at the height `rests_at` [m] of the body frame: the hull of what reaches down there, as
+    far as 10 cm above, 1 cm thick, so that legs of which the camera missed the ends carry it all the same.
+    """
+    points = np.asarray(mesh.vertices, dtype=float)
+    whole = _hull(points, density)[1]
+    pieces = convex_pieces(points, np.asarray(mesh.faces))
+    if rests_at is not None:
+        for piece in pieces:
+            piece[:, 2] = np.maximum(piece[:, 2], rests_at)
+        low = points[points[:, 2] < rests_at + FOOT_REACH]
+        if len(low):
+            foot = np.concatenate([low, low])
+            foot[:, 2] = np.repeat([rests_at, rests_at + FOOT_THICKNESS], len(low))
+            pieces.append(foot)
+    solids = [_hull(piece, density)[0] for piece in pieces]
+    collisions = []
+    for number, solid in enumerate(solids):
+        write_obj(root / "meshes" / name / f"collision_{number}.obj", solid.vertices, solid.faces)
+        collisions.append(Shape(f"meshes/{name}/collision_{number}.obj"))
+    links = BodyLinks((Link(name, mass_properties(solids, [density] * len(solids)), (visual,), tuple(collisions)),))
+    return links.with_mass(whole.mass)
 
 
 def still_mesh_links(

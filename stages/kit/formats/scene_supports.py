@@ -107,12 +107,12 @@ def levelled(
 def pads(carried: Sequence[Carried]) -> list[tuple[np.ndarray, np.ndarray, float]]:
     """Return a flat box (centre in the world frame, size, yaw) below each carried thing, its top in the plane: the
     camera did not see what a thing stands on."""
-    found = []
+    pads = []
     for thing in carried:
         x, y = thing.box.center[:2]
         size = np.array([thing.box.size[0], thing.box.size[1], PAD_THICKNESS])
-        found.append((np.array([x, y, thing.height - 0.5 * PAD_THICKNESS]), size, box_yaw(thing.box)))
-    return found
+        pads.append((np.array([x, y, thing.height - 0.5 * PAD_THICKNESS]), size, box_yaw(thing.box)))
+    return pads
 
 
 def standing_points(vertices: np.ndarray, height: float) -> np.ndarray:

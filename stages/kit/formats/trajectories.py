@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from schemas.errors import BadInput
+from schemas.outside import file_text
 from stages.kit.geometry.transforms import is_rigid
 
 INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
@@ -90,6 +91,21 @@ def number_rows(path: Path, columns: int) -> list[tuple[int, np.ndarray]]:
     return rows
 
 
+def named_rows(path: Path, columns: int) -> list[tuple[int, str, np.ndarray]]:
+    """Return (line number, name, (columns - 1,) numbers) of every line of a table whose first column holds names.
+
+    Blank lines and # comments are skipped. Raises BadInput as `number_rows` does.
+    """
+    rows = []
+    for line, text in enumerate(read_text(path).splitlines(), start=1):
+        fields = text.split("#", 1)[0].split()
+        if fields and len(fields) != columns:
+            raise BadInput(f"{path}: line {line}: {len(fields)} columns, expected {columns}")
+        if fields:
+            rows.append((line, fields[0], _numbers(fields[1:], f"{path}: line {line}")))
+    return rows
+
+
 def read_matrix(path: Path, rows: int = 4, columns: int = 4) -> np.ndarray:
     """Return the (rows, columns) matrix in a text file, whatever the line breaks. Raises BadInput."""
     fields = read_text(path).split()
@@ -139,18 +155,7 @@ def write_open3d_log(path: Path, world_from_camera: np.ndarray) -> None:
 
 def read_text(path: Path) -> str:
     """Return the text of a file. Raises BadInput when it is missing, no text, or larger than LARGEST_TEXT bytes."""
-    try:
-        with Path(path).open("rb") as file:
-            data = file.read(LARGEST_TEXT + 1)
-        if len(data) > LARGEST_TEXT:
-            raise BadInput(f"{path}: text file of more than {LARGEST_TEXT // 1_000_000} MB")
-        return data.decode("utf-8-sig")
-    except FileNotFoundError:
-        raise BadInput(f"{path}: file is missing") from None
-    except PermissionError:
-        raise BadInput(f"{path}: file may not be read", hint="check its permissions") from None
-    except (UnicodeDecodeError, IsADirectoryError, NotADirectoryError):
-        raise BadInput(f"{path}: not a text file") from None
+    return file_text(path, LARGEST_TEXT)
 
 
 def _numbers(fields: list[str], where: str) -> np.ndarray:

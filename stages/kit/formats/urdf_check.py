@@ -173,12 +173,12 @@ def _check_shape(link: str, shape: Shape, folder: Path, root: Path) -> list[Prob
     try:
         root = root.resolve()
         target = (folder / name).resolve()
-        found = target.is_file()
+        exists = target.is_file()
     except (OSError, ValueError, RuntimeError) as error:  # too long, with a zero byte, links in a circle
         return [Problem("mesh_outside", element, f"mesh {name!r:.80}: {getattr(error, 'strerror', None) or error}")]
     if "://" in name or PurePosixPath(name).is_absolute() or not target.is_relative_to(root) or target == root:
         return [Problem("mesh_outside", element, f"mesh {name!r} is not a path inside the folder of the model")]
-    if not found:
+    if not exists:
         return [Problem("mesh_missing", element, f"mesh {name!r} does not exist")]
     return []
 

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from schemas.errors import BadInput
+from schemas.outside import file_content
 from stages.kit.formats.xml_files import parse_xml
 from stages.kit.geometry.solids import MassProperties
 from stages.kit.geometry.substances import ROLLING_FRICTION, SPINNING_FRICTION
@@ -181,15 +182,7 @@ def parse_urdf(path: Path) -> Urdf:
     What is well-formed but wrong (a cycle, a negative mass) is left to `check_urdf`.
     """
     path = Path(path)
-    try:
-        if path.stat().st_size > MAXIMUM_BYTES:
-            raise BadInput(f"{path}: larger than {MAXIMUM_BYTES} bytes")
-        text = path.read_bytes()
-    except FileNotFoundError:
-        raise BadInput(f"{path}: file is missing") from None
-    except (OSError, ValueError) as error:
-        raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}") from None
-    robot = parse_xml(text, str(path))
+    robot = parse_xml(file_content(path, MAXIMUM_BYTES), str(path))
     if robot.tag != "robot":
         raise BadInput(f"{path}: root element is <{robot.tag}>, expected <robot>")
     links = tuple(_parse_link(element, path) for element in robot.findall("link"))

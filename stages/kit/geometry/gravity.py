@@ -93,9 +93,9 @@ def find_floor(points: np.ndarray, normals: np.ndarray, up: np.ndarray, random: 
 def _horizontal_planes(
     points: np.ndarray, normals: np.ndarray, up: np.ndarray, least: float, random: np.random.Generator
 ) -> list[PlaneFit]:
-    found: list[PlaneFit] = []
+    planes: list[PlaneFit] = []
     remaining = np.arange(len(points))
-    while len(found) < MAXIMUM_PLANES and len(remaining) > least:
+    while len(planes) < MAXIMUM_PLANES and len(remaining) > least:
         plane = ransac_plane(
             points[remaining],
             distance_threshold=DISTANCE_THRESHOLD,
@@ -109,11 +109,11 @@ def _horizontal_planes(
         if plane is None or len(plane.inliers) < max(least, 20):
             break
         sign = 1.0 if plane.normal @ up > 0 else -1.0
-        found.append(PlaneFit(sign * plane.normal, sign * plane.offset, remaining[plane.inliers]))
+        planes.append(PlaneFit(sign * plane.normal, sign * plane.offset, remaining[plane.inliers]))
         keep = np.ones(len(remaining), dtype=bool)
         keep[plane.inliers] = False
         remaining = remaining[keep]
-    return found
+    return planes
 
 
 def wall_yaw(normals: np.ndarray) -> float | None:

@@ -127,8 +127,8 @@ def ransac_planes(
     points = np.asarray(points, dtype=float)
     remaining = np.arange(len(points))
     least = max(3.0, minimum_share * len(points))
-    found: list[PlaneFit] = []
-    while len(remaining) >= least and len(found) < maximum_planes:
+    planes: list[PlaneFit] = []
+    while len(remaining) >= least and len(planes) < maximum_planes:
         plane = ransac_plane(
             points[remaining],
             distance_threshold=distance_threshold,
@@ -139,11 +139,11 @@ def ransac_planes(
         )
         if plane is None or len(plane.inliers) <= minimum_share * len(points) or len(plane.inliers) < 3:
             break
-        found.append(PlaneFit(plane.normal, plane.offset, remaining[plane.inliers]))
+        planes.append(PlaneFit(plane.normal, plane.offset, remaining[plane.inliers]))
         keep = np.ones(len(remaining), dtype=bool)
         keep[plane.inliers] = False
         remaining = remaining[keep]
-    return sorted(found, key=lambda plane: -len(plane.inliers))
+    return sorted(planes, key=lambda plane: -len(plane.inliers))
 
 
 def plane_axes(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -50,14 +50,14 @@ def hull(points: np.ndarray, *, curved: bool = False) -> Solid:
     Coplanar hull facets keep whatever triangulation qhull chooses; `curved` marks all of them.
     """
     points = np.asarray(points, dtype=float)
-    found = ConvexHull(points)
-    used = np.sort(found.vertices)
+    convex = ConvexHull(points)
+    used = np.sort(convex.vertices)
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
-    corners = points[found.simplices]
+    corners = points[convex.simplices]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = np.einsum("ij,ij->i", normals, found.equations[:, :3]) < 0
-    simplices = found.simplices.copy()
+    inward = np.einsum("ij,ij->i", normals, convex.equations[:, :3]) < 0
+    simplices = convex.simplices.copy()
     simplices[inward] = simplices[inward][:, ::-1]
     faces = number[simplices]
     start = np.argmin(faces, axis=1)
@@ -164,11 +164,11 @@ def cushion(x: tuple[float, float], y: tuple[float, float], z: tuple[float, floa
             if other != axis:
                 slab[other] += (bevel, -bevel)
         points.extend([(a, b, c) for a in slab[0] for b in slab[1] for c in slab[2]])
-    found = hull(np.array(points))
-    corners = found.vertices[found.faces]
+    solid = hull(np.array(points))
+    corners = solid.vertices[solid.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return replace(found, curved=np.abs(normals).max(axis=1) < 0.999)
+    return replace(solid, curved=np.abs(normals).max(axis=1) < 0.999)
 
 
 def shell(

@@ -79,20 +79,20 @@ class Finding:
 
 def check_calls(calls: Sequence[ActionCall], language: ActionLanguage) -> tuple[Finding, ...]:
     """Return what is wrong with each call, the first reason only; none: all may be handed to a planner."""
-    found = []
+    findings = []
     for index, call in enumerate(calls):
         failure = check_call(call, language)
         if failure is not None:
-            found.append(Finding(index, failure))
-    return tuple(found)
+            findings.append(Finding(index, failure))
+    return tuple(findings)
 
 
 def check_call(call: ActionCall, language: ActionLanguage) -> Failure | None:
     """Return what is wrong with a call, or None."""
     action = language.action(call.action)
     if action is None:
-        known = ", ".join(item.name for item in language.actions)
-        return _failure("unknown_action", call, f"there is no action {quoted(call.action)}; there are {known}")
+        names = ", ".join(item.name for item in language.actions)
+        return _failure("unknown_action", call, f"there is no action {quoted(call.action)}; there are {names}")
     if len(call.objects) != len(action.objects):
         message = f"{action.name} takes {len(action.objects)} objects, not {len(call.objects)}"
         return _failure("wrong_arguments", call, message, {"wanted": len(action.objects), "given": len(call.objects)})
@@ -125,9 +125,9 @@ def _check_numbers(call: ActionCall, action: ActionType) -> Failure | None:
     return None
 
 
-def _meant(name: str, known: frozenset[str]) -> str:
-    close = get_close_matches(name[:LONGEST_NAME], sorted(known), n=1)
-    return f"; did you mean {quoted(close[0])}?" if close else f"; there are {len(known)} others" if known else ""
+def _meant(name: str, names: frozenset[str]) -> str:
+    close = get_close_matches(name[:LONGEST_NAME], sorted(names), n=1)
+    return f"; did you mean {quoted(close[0])}?" if close else f"; there are {len(names)} others" if names else ""
 
 
 def _failure(kind: str, call: ActionCall, message: str, numbers: Mapping[str, float] | None = None) -> Failure:

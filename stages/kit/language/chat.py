@@ -53,19 +53,23 @@ class Chat:
         An unreadable one is answered with what is wrong with it, up to `re_prompts` times; the next question starts
         afresh. Raises LanguageFailed: `unreadable_reply`, `declined`, a budget, or what the backend raises.
         """
-        said = tuple(messages)
+        conversation = tuple(messages)
         for attempt in range(self.settings.re_prompts + 1):
             self._keep_to_budget()
             self.calls += attempt == 0
             self.re_prompts += attempt > 0
-            raw = self._asked(said, schema)
+            raw = self._asked(conversation, schema)
             try:
                 return read_reply(raw, schema)
             except (Unreadable, DoesNotFollow) as error:
                 reason = str(error)
             numbers = {"attempt": float(attempt + 1), "characters": float(len(raw.text))}
             self.failures.append(Failure(kind="unreadable_reply", message=reason, numbers=numbers))
-            said = (*messages, say("assistant", raw.text[:LONGEST_QUOTE] or "(nothing)"), _asked_again(reason, schema))
+            conversation = (
+                *messages,
+                say("assistant", raw.text[:LONGEST_QUOTE] or "(nothing)"),
+                _asked_again(reason, schema),
+            )
         raise self._failed(
             "unreadable_reply",
             f"{self.backend.label}: no reply followed the schema {schema.name} in {attempt + 1} tries; last: {reason}",
@@ -136,9 +140,9 @@ def read_reply(raw: RawReply, schema: ReplySchema[T]) -> T:
     """
     if raw.finish == "length":
         raise Unreadable(f"the reply was cut after {raw.usage.completion_tokens} tokens; be briefer")
-    found = objects_in(raw.text)
+    objects = objects_in(raw.text)
     read: list[T] = []
-    for value in found:
+    for value in objects:
         try:
             read.append(schema.read(value))
         except DoesNotFollow as error:

@@ -55,7 +55,7 @@ class OpenAICompatibleBackend:
             try:
                 answer = self._connection.post(PATH, body, "application/json", judge=_judge)
             except Refused as error:
-                if error.status in NOT_UNDERSTOOD and self._give_way(error.said):
+                if error.status in NOT_UNDERSTOOD and self._give_way(error.excerpt):
                     continue
                 numbers = {"status": float(error.status)}
                 self.form = form  # it was something else that the server did not like
@@ -74,12 +74,12 @@ class OpenAICompatibleBackend:
                 self.form = form
             return self._raw(answer, request, self._connection.repeats - before)
 
-    def _give_way(self, said: str) -> bool:
+    def _give_way(self, excerpt: str) -> bool:
         """Ask for less after a refusal; False when nothing is left to give."""
-        if self._limit_name == "max_tokens" and "max_completion_tokens" in said:
+        if self._limit_name == "max_tokens" and "max_completion_tokens" in excerpt:
             self._limit_name = "max_completion_tokens"
             return True
-        return "temperature" not in said and self._lower_form()
+        return "temperature" not in excerpt and self._lower_form()
 
     def _lower_form(self) -> bool:
         at = FORMS.index(self.form)
@@ -121,8 +121,8 @@ def encode_request(request: Request, form: Form, limit_name: str) -> dict[str, A
     else:
         # Without constrained decoding the model has to be told.
         document = json.dumps(schema.document, sort_keys=True)
-        told = f"Reply with one JSON object that follows this JSON schema, and nothing else:\n{document}"
-        messages.append(_encoded(say("user", told)))
+        instruction = f"Reply with one JSON object that follows this JSON schema, and nothing else:\n{document}"
+        messages.append(_encoded(say("user", instruction)))
         if form == "json_object":
             body["response_format"] = {"type": "json_object"}
     return {**body, "messages": messages}
@@ -167,9 +167,9 @@ def _text(content: Any) -> str:
     return "".join(text for text in texts if isinstance(text, str))
 
 
-def _usage(said: Any, request: Request, text: str) -> Usage:
+def _usage(counted: Any, request: Request, text: str) -> Usage:
     """Return the tokens that the server counted, or an estimate when it says none or nonsense."""
-    counts: dict[str, Any] = said if isinstance(said, dict) else {}
+    counts: dict[str, Any] = counted if isinstance(counted, dict) else {}
     prompt, completion = counts.get("prompt_tokens"), counts.get("completion_tokens")
     if _is_count(prompt) and _is_count(completion):
         return Usage(prompt, completion, estimated=False)

@@ -35,10 +35,12 @@ def open_chat(
     UsageError for options that do not go together, MissingDependency when the variable of the key is empty, BadInput
     for a bad transcript.
     """
-    known = read_transcript(transcript) if transcript is not None else None
-    backend, model = _backend(parameters, scripted, known, os.environ if environment is None else environment, sleep)
+    earlier = read_transcript(transcript) if transcript is not None else None
+    backend, model = _backend(parameters, scripted, earlier, os.environ if environment is None else environment, sleep)
     if record is not None:
-        backend = RecordingBackend(backend, TranscriptFile(record), known if parameters.language == "openai" else None)
+        backend = RecordingBackend(
+            backend, TranscriptFile(record), earlier if parameters.language == "openai" else None
+        )
     settings = ChatSettings(
         model=model,
         temperature=parameters.temperature,

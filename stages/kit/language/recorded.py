@@ -28,19 +28,19 @@ class RecordedBackend:
     def ask(self, request: Request) -> RawReply:
         """Return the recorded reply. Raises LanguageFailed (`not_recorded`) saying which prompt and how to record."""
         digest, occurrence = request.digest, self._asked[request.digest]
-        found = self._transcript.find(digest, occurrence)
-        if found is None:
+        exchange = self._transcript.find(digest, occurrence)
+        if exchange is None:
             raise _missing(self._transcript, request, occurrence)
         self._asked[digest] += 1
-        return found.raw
+        return exchange.raw
 
 
 class RecordingBackend:
     """Asks another backend and writes down what it replies, at once. What the file holds already, or an earlier
-    transcript (`known`), is not asked again: a recording that broke off goes on, and nothing is paid twice."""
+    transcript (`earlier`), is not asked again: a recording that broke off goes on, and nothing is paid twice."""
 
-    def __init__(self, asked: Backend, file: TranscriptFile, known: Transcript | None = None) -> None:
-        self._backend, self._file, self._known = asked, file, known
+    def __init__(self, asked: Backend, file: TranscriptFile, earlier: Transcript | None = None) -> None:
+        self._backend, self._file, self._earlier = asked, file, earlier
         self._asked: Counter[str] = Counter()
 
     @property
@@ -60,7 +60,7 @@ class RecordingBackend:
         kept = self._file.transcript.find(digest, occurrence)
         if kept is not None:
             return kept.raw
-        kept = self._known.find(digest, occurrence) if self._known is not None else None
+        kept = self._earlier.find(digest, occurrence) if self._earlier is not None else None
         raw = kept.raw if kept is not None else self._backend.ask(request)
         self._file.append(kept if kept is not None else exchange_of(request, raw, self._backend.label))
         return raw
@@ -84,9 +84,9 @@ def _missing(transcript: Transcript, request: Request, occurrence: int) -> Langu
 
 
 def _differences(request: Request, model: str, temperature: float) -> str:
-    found = []
+    differences = []
     if model != request.model:
-        found.append(f"model {model!r} instead of {request.model!r}")
+        differences.append(f"model {model!r} instead of {request.model!r}")
     if temperature != request.temperature:
-        found.append(f"temperature {temperature:g} instead of {request.temperature:g}")
-    return " and ".join(found) or "another schema"
+        differences.append(f"temperature {temperature:g} instead of {request.temperature:g}")
+    return " and ".join(differences) or "another schema"

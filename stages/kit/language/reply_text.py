@@ -37,18 +37,18 @@ def objects_in(text: str) -> list[dict[str, Any]]:
     text = THOUGHTS.sub("", text).strip()
     if not text:
         raise Unreadable("the reply is empty")
-    found: list[dict[str, Any]] = []
+    objects: list[dict[str, Any]] = []
     start = START.search(text)
     while start is not None:
         value, end = _object_at(text, start.start())
-        if value not in found:
-            found.append(value)
-        if len(found) > MOST_OBJECTS:
+        if value not in objects:
+            objects.append(value)
+        if len(objects) > MOST_OBJECTS:
             raise Unreadable(f"the reply holds more than {MOST_OBJECTS} JSON objects; one is wanted")
         start = START.search(text, end)
-    if not found:
+    if not objects:
         raise Unreadable("there is no JSON object in the reply")
-    return found
+    return objects
 
 
 def _object_at(text: str, place: int) -> tuple[dict[str, Any], int]:

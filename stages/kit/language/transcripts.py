@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from schemas.base import Model
 from schemas.errors import BadInput, MachineFailure
+from schemas.outside import check_integers, file_content
 from stages.kit.language.backend import RawReply, Request, Usage, request_digest
 from stages.kit.language.messages import described
 
@@ -84,11 +85,11 @@ class Transcript:
 
     def find(self, digest: str, occurrence: int) -> Exchange | None:
         """Return what was replied when this request was made for the `occurrence`-th time (0 first), or None."""
-        found = self._by_digest.get(digest, [])
-        return found[occurrence] if occurrence < len(found) else None
+        exchanges = self._by_digest.get(digest, [])
+        return exchanges[occurrence] if occurrence < len(exchanges) else None
 
     def __iter__(self) -> Iterator[Exchange]:
-        return (exchange for found in self._by_digest.values() for exchange in found)
+        return (exchange for exchanges in self._by_digest.values() for exchange in exchanges)
 
     def __len__(self) -> int:
         return sum(map(len, self._by_digest.values()))
@@ -102,12 +103,7 @@ class Transcript:
 def read_transcript(path: Path) -> Transcript:
     """Read a transcript. Raises BadInput naming the line that is no exchange, or whose prompt was changed."""
     hint = "record it again (docs/LANGUAGE.md)"
-    try:
-        if path.stat().st_size > LARGEST_TRANSCRIPT:
-            raise BadInput(f"{path}: larger than {LARGEST_TRANSCRIPT} bytes", hint=hint)
-        lines = path.read_bytes().split(b"\n")
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}", hint=hint) from None
+    lines = file_content(path, LARGEST_TRANSCRIPT, hint=hint).split(b"\n")
     exchanges = []
     for number, line in enumerate(lines, 1):
         if line.strip():
@@ -116,6 +112,7 @@ def read_transcript(path: Path) -> Transcript:
 
 
 def _exchange(line: bytes, where: str, hint: str) -> Exchange:
+    check_integers(line, where, hint=hint)
     try:
         exchange = Exchange.model_validate_json(line)
     except ValidationError as error:
@@ -139,6 +136,7 @@ class TranscriptFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         if path.exists():
+            file_content(path, LARGEST_TRANSCRIPT, hint="give another file")
             self._drop_torn_line()
         self.transcript = read_transcript(path) if path.exists() else Transcript(str(path))
 

@@ -52,11 +52,11 @@ def precision_recall(
     """Return the precision-recall curve of one class. `iou` (P, T), `confidence` (P,)."""
     matched = match_greedily(np.asarray(iou, dtype=float).reshape(len(confidence), true_count), confidence, match_iou)
     hits = np.array([truth is not None for _, truth in matched], dtype=float)
-    found = np.cumsum(hits)
+    hits_so_far = np.cumsum(hits)
     seen = np.arange(1, len(hits) + 1)
-    recall = found / true_count if true_count else np.zeros(len(hits))
+    recall = hits_so_far / true_count if true_count else np.zeros(len(hits))
     pairs = tuple((row, truth) for row, truth in matched if truth is not None)
-    return PrecisionRecall(found / seen if len(hits) else found, recall, true_count, pairs)
+    return PrecisionRecall(hits_so_far / seen if len(hits) else hits_so_far, recall, true_count, pairs)
 
 
 def average_precision(curve: PrecisionRecall) -> float | None:

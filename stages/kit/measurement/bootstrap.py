@@ -59,7 +59,7 @@ def figure_interval(
     if value is None:
         return None
     drawn = [figure([samples[k] for k in rows]) for rows in _draws(len(samples), random, resamples)]
-    return _around(value, [found for found in drawn if found is not None])
+    return _around(value, [drawn_value for drawn_value in drawn if drawn_value is not None])
 
 
 def paired_interval(

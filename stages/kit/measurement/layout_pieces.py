@@ -22,15 +22,15 @@ def layout_pieces(graph: ContactGraphFile, layout_folder: Path) -> dict[str, lis
         return {}
     centers = np.array([box.center for box in boxes])
     middle = 0.5 * (centers.min(axis=0) + centers.max(axis=0))
-    found: dict[str, list[ConvexPiece]] = {}
+    pieces_of: dict[str, list[ConvexPiece]] = {}
     for node in graph.nodes:
         if node.node_type != "layout" or node.box is None:
             continue
         file = layout_folder / f"{node.id}.ply"
         mesh = read_mesh(file, may_be_empty=True) if file.is_file() else None
         slabs = slabs_of_layout(node.id, node.class_name, node.planes, node.box, mesh, graph, middle)
-        found[node.id] = [piece for slab in slabs if (piece := _slab_piece(slab)) is not None]
-    return found
+        pieces_of[node.id] = [piece for slab in slabs if (piece := _slab_piece(slab)) is not None]
+    return pieces_of
 
 
 def _slab_piece(slab: Slab) -> ConvexPiece | None:

@@ -45,15 +45,15 @@ def room_penetrations(
     pairs = [(a, b, objects[a], objects[b], False) for a, b in combinations(sorted(objects), 2)]
     pairs += [(a, b, objects[a], (layout or {})[b], True) for a in sorted(objects) for b in sorted(layout or {})]
     bounds = {name: _bounds(pieces) for name, pieces in (*objects.items(), *(layout or {}).items())}
-    found = []
+    penetrations = []
     for first, second, pieces, others, fixed in pairs:
         (low, high), (other_low, other_high) = bounds[first], bounds[second]
         if np.any(low >= other_high) or np.any(other_low >= high):
             continue
         depth = penetration_depth(pieces, others)
         if depth > TOUCHING:
-            found.append(Penetration(first, second, depth, shared_volume(pieces, others), fixed))
-    return sorted(found, key=lambda p: (-p.depth, p.first, p.second))
+            penetrations.append(Penetration(first, second, depth, shared_volume(pieces, others), fixed))
+    return sorted(penetrations, key=lambda p: (-p.depth, p.first, p.second))
 
 
 def _bounds(pieces: Sequence[ConvexPiece]) -> tuple[np.ndarray, np.ndarray]:

@@ -27,14 +27,14 @@ NO_SYMMETRY = Symmetry()
 
 def cube_rotations() -> list[np.ndarray]:
     """Return the 24 rotations (3, 3) that map the coordinate axes onto themselves, the identity first."""
-    found = []
+    rotations = []
     for order in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):
             rotation = np.zeros((3, 3))
             rotation[range(3), order] = signs
             if np.linalg.det(rotation) > 0:
-                found.append(rotation)
-    return found
+                rotations.append(rotation)
+    return rotations
 
 
 def shape_symmetry(points: np.ndarray, tolerance: float = TOLERANCE) -> Symmetry:

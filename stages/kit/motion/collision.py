@@ -107,14 +107,14 @@ class CollisionChecker:
         for index in body.links.values():
             self._group(body.body_id, index, _CARRIED, _SCENE)
         engine.performCollisionDetection(physicsClientId=self.world.client)
-        found: dict[str, float] = {}
+        depths: dict[str, float] = {}
         for contact in self.world.contacts(body.body_id):
             if contact.other_body not in (body.body_id, self.robot.body_id) and contact.depth > -self.clearance:
                 other = self.world.link_name(contact.other_body, contact.other_link)
-                found[other] = max(contact.depth, found.get(other, -np.inf))
+                depths[other] = max(contact.depth, depths.get(other, -np.inf))
         for index in body.links.values():
             self._group(body.body_id, index, _SCENE, _ROBOT | _CARRIED)
-        return found
+        return depths
 
     # --- queries ----------------------------------------------------------------------------------------------
 

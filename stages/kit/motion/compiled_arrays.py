@@ -10,6 +10,12 @@ CHECK, SKIP, RESTING = 0, 1, 2
 """Of a pair of a robot part and a scene link: looked at, may touch, may sink in a little (the mesh checker decides)."""
 
 
+RADIUS = 3
+"""Column of balls (N, 4), behind their centre."""
+BASE_X, BASE_Y, BASE_YAW, ARM = range(4)
+"""Places in a configuration (3 + J,): the base [m, rad], and where the arm's joints begin."""
+
+
 class RobotArrays(NamedTuple):
     """Convex pieces of the robot, each fixed to a frame: 0 is the arm's mount on the pedestal, j the j-th arm joint.
 

@@ -10,8 +10,18 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from stages.kit.motion.compiled_arrays import RESTING, SKIP, RobotArrays, SceneArrays
-from stages.kit.motion.convex_distance import convex_distance
+from stages.kit.motion.compiled_arrays import (
+    ARM,
+    BASE_X,
+    BASE_Y,
+    BASE_YAW,
+    RADIUS,
+    RESTING,
+    SKIP,
+    RobotArrays,
+    SceneArrays,
+)
+from stages.kit.motion.convex_distance import Hull, convex_distance
 
 FREE, UNCERTAIN, HIT = 0, 1, 2
 UNSURE = 0.004
@@ -24,15 +34,15 @@ def link_frames(chain: np.ndarray, mount_height: float, body: np.ndarray, frames
 
     `chain` (J, 4, 4) and `mount_height` [m] are `fixed` and `mount_height` of RobotArrays.
     """
-    cosine, sine = np.cos(body[2]), np.sin(body[2])
+    cosine, sine = np.cos(body[BASE_YAW]), np.sin(body[BASE_YAW])
     frames[0] = 0.0
     frames[0, 0, 0], frames[0, 0, 1] = cosine, -sine
     frames[0, 1, 0], frames[0, 1, 1] = sine, cosine
     frames[0, 2, 2] = 1.0
-    frames[0, 0, 3], frames[0, 1, 3], frames[0, 2, 3] = body[0], body[1], mount_height
+    frames[0, 0, 3], frames[0, 1, 3], frames[0, 2, 3] = body[BASE_X], body[BASE_Y], mount_height
     for joint in range(chain.shape[0]):
         parent, fixed, child = frames[joint], chain[joint], frames[joint + 1]
-        cosine, sine = np.cos(body[3 + joint]), np.sin(body[3 + joint])
+        cosine, sine = np.cos(body[ARM + joint]), np.sin(body[ARM + joint])
         for row in range(3):
             x = parent[row, 0] * fixed[0, 0] + parent[row, 1] * fixed[1, 0] + parent[row, 2] * fixed[2, 0]
             y = parent[row, 0] * fixed[0, 1] + parent[row, 1] * fixed[1, 1] + parent[row, 2] * fixed[2, 1]
@@ -64,6 +74,11 @@ def _square_to_box(point: np.ndarray, box: np.ndarray, half: np.ndarray) -> floa
     return total
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _hull(robot: RobotArrays, frames: np.ndarray, piece: int) -> Hull:
+    return Hull(robot.vertices, robot.vertex_begin[piece], robot.vertex_begin[piece + 1], frames[robot.frame[piece]])
+
+
 @njit(cache=True, error_model="numpy")
 def _piece_meets(
     robot: RobotArrays, scene: SceneArrays, frames: np.ndarray, piece: int, other: int, centers: np.ndarray
@@ -71,17 +86,14 @@ def _piece_meets(
     """Return FREE, UNCERTAIN or HIT for a piece of the robot and one of the scene."""
     near = False
     for ball in range(robot.sphere_begin[piece], robot.sphere_begin[piece + 1]):
-        reach = robot.spheres[ball, 3] + scene.distance
+        reach = robot.spheres[ball, RADIUS] + scene.distance
         if _square_to_box(centers[ball], scene.box[other], scene.half[other]) < reach * reach:
             near = True
             break
     if not near:
         return FREE
-    lower, upper = convex_distance(
-        robot.vertices, robot.vertex_begin[piece], robot.vertex_begin[piece + 1], frames[robot.frame[piece]],
-        scene.vertices, scene.vertex_begin[other], scene.vertex_begin[other + 1], scene.pose[other],
-        scene.distance, scene.distance - UNSURE,
-    )  # fmt: skip
+    standing = Hull(scene.vertices, scene.vertex_begin[other], scene.vertex_begin[other + 1], scene.pose[other])
+    lower, upper = convex_distance(_hull(robot, frames, piece), standing, scene.distance, scene.distance - UNSURE)
     if lower > scene.distance:
         return FREE
     return UNCERTAIN if upper >= scene.distance - UNSURE else HIT
@@ -95,7 +107,7 @@ def _pieces_meet(robot: RobotArrays, frames: np.ndarray, pair: int, centers: np.
     near = False
     for i in range(robot.sphere_begin[first], robot.sphere_begin[first + 1]):
         for j in range(robot.sphere_begin[second], robot.sphere_begin[second + 1]):
-            reach = robot.spheres[i, 3] + robot.spheres[j, 3] + apart
+            reach = robot.spheres[i, RADIUS] + robot.spheres[j, RADIUS] + apart
             x = centers[i, 0] - centers[j, 0]
             y = centers[i, 1] - centers[j, 1]
             z = centers[i, 2] - centers[j, 2]
@@ -104,11 +116,7 @@ def _pieces_meet(robot: RobotArrays, frames: np.ndarray, pair: int, centers: np.
             break
     if not near:
         return FREE
-    lower, upper = convex_distance(
-        robot.vertices, robot.vertex_begin[first], robot.vertex_begin[first + 1], frames[robot.frame[first]],
-        robot.vertices, robot.vertex_begin[second], robot.vertex_begin[second + 1], frames[robot.frame[second]],
-        apart, apart - UNSURE,
-    )  # fmt: skip
+    lower, upper = convex_distance(_hull(robot, frames, first), _hull(robot, frames, second), apart, apart - UNSURE)
     if lower > apart:
         return FREE
     return UNCERTAIN if upper >= apart - UNSURE else HIT
@@ -134,7 +142,7 @@ def find_collision(robot: RobotArrays, scene: SceneArrays, body: np.ndarray, fir
     uncertain_part, uncertain_other = -1, 0
     for pair in range(robot.pairs.shape[0]):
         first, second = robot.pairs[pair, 0], robot.pairs[pair, 1]
-        reach = robot.bound[first, 3] + robot.bound[second, 3] + robot.pair_distance[pair]
+        reach = robot.bound[first, RADIUS] + robot.bound[second, RADIUS] + robot.pair_distance[pair]
         x = middles[first, 0] - middles[second, 0]
         y = middles[first, 1] - middles[second, 1]
         z = middles[first, 2] - middles[second, 2]
@@ -148,7 +156,7 @@ def find_collision(robot: RobotArrays, scene: SceneArrays, body: np.ndarray, fir
         if robot.frame[piece] < first_frame:
             continue
         part = robot.part[piece]
-        reach = robot.bound[piece, 3] + scene.distance
+        reach = robot.bound[piece, RADIUS] + scene.distance
         middle = middles[piece]
         for group in range(scene.low.shape[0]):
             allowed = scene.allowed[part, group]

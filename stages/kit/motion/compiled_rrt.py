@@ -6,6 +6,8 @@ values that move; they are looked at in steps in which no value changes by more 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -16,6 +18,23 @@ UNCERTAIN_COUNT = 0
 """Place in the counts of refusals that the mesh checker might not share; the others follow."""
 WHOLE_WAY = 1_000_000
 """As `most` of `last_free`: more steps than any way has."""
+
+
+class Moving(NamedTuple):
+    """What moves in which scene, and how finely its motions are looked at."""
+
+    robot: RobotArrays
+    scene: SceneArrays
+    body: np.ndarray
+    """(3 + J,) scratch: the values that do not move are read from it."""
+    moving: np.ndarray
+    """(D,) indices of the values that move."""
+    first_frame: int
+    """The first frame of the robot that moves."""
+    resolution: np.ndarray
+    """(D,) no step changes a value by more."""
+    counts: np.ndarray
+    """(1 + parts + groups,) what refused is added, see `count_refusal`."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -35,14 +54,12 @@ def _step_count(begin: np.ndarray, end: np.ndarray, resolution: np.ndarray) -> i
 
 
 @njit(cache=True, error_model="numpy")
-def last_free(
-    robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, begin: np.ndarray,
-    end: np.ndarray, resolution: np.ndarray, most: int, counts: np.ndarray,
-) -> tuple[int, int]:  # fmt: skip
+def last_free(motion: Moving, begin: np.ndarray, end: np.ndarray, most: int) -> tuple[int, int]:
     """Return how many steps from `begin` (D,) towards `end` are free, and how many the whole way has.
 
-    No more than `most` steps are looked at. `body` is scratch: the values that do not move are read from it.
+    No more than `most` steps are looked at.
     """
+    robot, scene, body, moving, first_frame, resolution, counts = motion
     steps = _step_count(begin, end, resolution)
     for number in range(1, min(steps, most) + 1):
         share = number / steps
@@ -56,12 +73,10 @@ def last_free(
 
 
 @njit(cache=True, error_model="numpy")
-def way_is_free(
-    robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, begin: np.ndarray,
-    end: np.ndarray, resolution: np.ndarray, counts: np.ndarray,
-) -> bool:  # fmt: skip
+def way_is_free(motion: Moving, begin: np.ndarray, end: np.ndarray) -> bool:
     """Return whether all steps of `last_free` are free, looked at from coarse to fine: a way that is blocked is
     mostly blocked in its middle, and then few looks tell."""
+    robot, scene, body, moving, first_frame, resolution, counts = motion
     steps = _step_count(begin, end, resolution)
     stride = 1
     while stride < steps:
@@ -108,15 +123,16 @@ def _grown(points: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 @njit(cache=True, error_model="numpy")
 def search(
-    robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, start: np.ndarray,
-    goals: np.ndarray, lower: np.ndarray, upper: np.ndarray, resolution: np.ndarray, samples: int, step: int,
-    random: np.random.Generator, counts: np.ndarray,
+    motion: Moving, start: np.ndarray, goals: np.ndarray, lower: np.ndarray, upper: np.ndarray, samples: int, step: int,
+    random: np.random.Generator,
 ) -> tuple[np.ndarray, int]:  # fmt: skip
-    """Return a free path (N, D) from `start` (D,) to one of `goals` (G, D), and the samples used.
+    """Return a free path (N, D) from `start` (D,) to one of `goals` (G, D) within `lower` and `upper` (D,), and the
+    samples used.
 
     The path is empty when `samples` did not suffice. `step` is the longest extension in resolutions. All goals are
-    roots of the second tree. What refused is added to `counts`.
+    roots of the second tree.
     """
+    resolution = motion.resolution
     dimension = start.shape[0]
     points_a, parents_a = np.empty((256, dimension)), np.empty(256, dtype=np.int64)
     points_b, parents_b = np.empty((256 + goals.shape[0], dimension)), np.empty(256 + goals.shape[0], dtype=np.int64)
@@ -125,9 +141,7 @@ def search(
         points_b[number], parents_b[number] = goals[number], -1
     count_a, count_b = 1, goals.shape[0]
     for number in range(goals.shape[0]):
-        free, steps = last_free(
-            robot, scene, body, moving, first_frame, start, goals[number], resolution, WHOLE_WAY, counts
-        )
+        free, steps = last_free(motion, start, goals[number], WHOLE_WAY)
         if free == steps:
             path = np.empty((2, dimension))
             path[0], path[1] = start, goals[number]
@@ -138,9 +152,7 @@ def search(
         for k in range(dimension):
             sample[k] = lower[k] + (upper[k] - lower[k]) * random.random()
         near = _nearest(points_a, count_a, sample, resolution)
-        free, steps = last_free(
-            robot, scene, body, moving, first_frame, points_a[near], sample, resolution, step, counts
-        )
+        free, steps = last_free(motion, points_a[near], sample, step)
         if free > 0:
             if count_a + 1 >= points_a.shape[0]:
                 points_a, parents_a = _grown(points_a, parents_a)
@@ -150,9 +162,7 @@ def search(
             target = points_a[count_a - 1].copy()
             near = _nearest(points_b, count_b, target, resolution)
             origin = points_b[near].copy()
-            free, steps = last_free(
-                robot, scene, body, moving, first_frame, origin, target, resolution, WHOLE_WAY, counts
-            )
+            free, steps = last_free(motion, origin, target, WHOLE_WAY)
             parent = near
             done = 0
             while done < free:
@@ -203,14 +213,13 @@ def _joined(
 
 @njit(cache=True, error_model="numpy")
 def shorten(
-    robot: RobotArrays, scene: SceneArrays, body: np.ndarray, moving: np.ndarray, first_frame: int, path: np.ndarray,
-    resolution: np.ndarray, attempts: int, random: np.random.Generator,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    motion: Moving, path: np.ndarray, attempts: int, random: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """Return a shorter path (M, D): pairs of random points on it are joined by straight pieces where those are free.
 
     Returned too: which of its pieces (M - 1,) are such, or parts of such, and thus free at this resolution.
     """
-    counts = np.zeros(1 + scene.allowed.shape[0] + scene.low.shape[0], dtype=np.int64)
+    resolution = motion.resolution
     rows = path.copy()
     count = path.shape[0]
     looked_at = np.zeros(count - 1, dtype=np.bool_)
@@ -234,16 +243,16 @@ def shorten(
         second[:] = rows[j] + (rows[j + 1] - rows[j]) * along
         if np.max(np.abs(second - first) / resolution) > high - low - 0.5:
             continue  # hardly shorter
-        if not way_is_free(robot, scene, body, moving, first_frame, first, second, resolution, counts):
+        if not way_is_free(motion, first, second):
             continue
         fresh = np.empty((count - (j - i) + 2, path.shape[1]))
         fresh[: i + 1] = rows[: i + 1]
         fresh[i + 1], fresh[i + 2] = first, second
         fresh[i + 3 :] = rows[j + 1 : count]
-        known = np.empty(fresh.shape[0] - 1, dtype=np.bool_)
-        known[: i + 1] = looked_at[: i + 1]
-        known[i + 1] = True
-        known[i + 2 :] = looked_at[j:]
-        rows, looked_at = fresh, known
+        free = np.empty(fresh.shape[0] - 1, dtype=np.bool_)
+        free[: i + 1] = looked_at[: i + 1]
+        free[i + 1] = True
+        free[i + 2 :] = looked_at[j:]
+        rows, looked_at = fresh, free
         count = rows.shape[0]
     return rows, looked_at

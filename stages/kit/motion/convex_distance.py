@@ -5,6 +5,8 @@ The closest point of a simplex to the origin follows Ericson, "Real-Time Collisi
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -13,9 +15,19 @@ PRECISION = 1e-5
 """The two bounds of a distance are this near to each other [m] when nothing ends the search earlier."""
 
 
+class Hull(NamedTuple):
+    """The convex hull of the vertices `begin` to `end` of an array (V, 3) [m], put at a pose (3, 4)."""
+
+    vertices: np.ndarray
+    begin: int
+    end: int
+    pose: np.ndarray
+
+
 @njit(cache=True, error_model="numpy", inline="always")
-def _extreme(vertices: np.ndarray, begin: int, end: int, pose: np.ndarray, direction: np.ndarray, sign: float) -> int:
-    """Return the index of the vertex, of those begin to end, that lies farthest along sign * direction (world)."""
+def _extreme(hull: Hull, direction: np.ndarray, sign: float) -> int:
+    """Return the index of the vertex that lies farthest along sign * direction (world)."""
+    vertices, begin, end, pose = hull
     x = sign * (pose[0, 0] * direction[0] + pose[1, 0] * direction[1] + pose[2, 0] * direction[2])
     y = sign * (pose[0, 1] * direction[0] + pose[1, 1] * direction[1] + pose[2, 1] * direction[2])
     z = sign * (pose[0, 2] * direction[0] + pose[1, 2] * direction[1] + pose[2, 2] * direction[2])
@@ -123,24 +135,21 @@ def _nearest_on_tetrahedron(simplex: np.ndarray, weights: np.ndarray) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def convex_distance(
-    first: np.ndarray, first_begin: int, first_end: int, first_pose: np.ndarray,
-    second: np.ndarray, second_begin: int, second_end: int, second_pose: np.ndarray,
-    enough: float, too_near: float,
-) -> tuple[float, float]:  # fmt: skip
+def convex_distance(first: Hull, second: Hull, enough: float, too_near: float) -> tuple[float, float]:
     """Return a lower and an upper bound [m] of the distance of two convex hulls; 0, 0 when they overlap.
 
-    A hull is the vertices begin to end of an array (V, 3), put at a pose (3, 4). The search ends as soon as the lower
-    bound exceeds `enough` or the upper one is below `too_near`, otherwise when both agree to PRECISION.
+    The search ends as soon as the lower bound exceeds `enough` or the upper one is below `too_near`, otherwise when
+    both agree to PRECISION.
     """
+    first_pose, second_pose = first.pose, second.pose
     simplex = np.zeros((4, 3))
     weights = np.zeros(4)
     nearest = np.zeros(3)
     for k in range(3):
         nearest[k] = first_pose[k, 3] - second_pose[k, 3]
         for axis in range(3):
-            nearest[k] += first_pose[k, axis] * first[first_begin, axis]
-            nearest[k] -= second_pose[k, axis] * second[second_begin, axis]
+            nearest[k] += first_pose[k, axis] * first.vertices[first.begin, axis]
+            nearest[k] -= second_pose[k, axis] * second.vertices[second.begin, axis]
     count = 0
     lower = 0.0
     length = np.sqrt(nearest[0] ** 2 + nearest[1] ** 2 + nearest[2] ** 2)
@@ -150,13 +159,13 @@ def convex_distance(
             return 0.0, 0.0
         if upper < too_near:
             return lower, upper
-        i = _extreme(first, first_begin, first_end, first_pose, nearest, -1.0)
-        j = _extreme(second, second_begin, second_end, second_pose, nearest, 1.0)
+        i = _extreme(first, nearest, -1.0)
+        j = _extreme(second, nearest, 1.0)
         along = 0.0
         for k in range(3):
             value = first_pose[k, 3] - second_pose[k, 3]
             for axis in range(3):
-                value += first_pose[k, axis] * first[i, axis] - second_pose[k, axis] * second[j, axis]
+                value += first_pose[k, axis] * first.vertices[i, axis] - second_pose[k, axis] * second.vertices[j, axis]
             simplex[count, k] = value
             along += value * nearest[k]
         lower = max(lower, along / length)

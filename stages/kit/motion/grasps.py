@@ -55,7 +55,7 @@ def sample_grasps(
     low, high = world_points.min(axis=0), world_points.max(axis=0)
     offset = random.uniform(0, 2 * np.pi / angles)
     headings = np.concatenate([_aligned_headings(world_from_body), offset + 2 * np.pi * np.arange(angles) / angles])
-    found: list[Grasp] = []
+    grasps: list[Grasp] = []
     for pitch in pitches:
         for height in heights if pitch < 1.2 else heights[:1]:
             tried = [
@@ -67,8 +67,8 @@ def sample_grasps(
             for pose, width in fitting:
                 if width < narrowest + ALIGNED:
                     for turned in (pose, pose @ np.diag([-1.0, -1.0, 1.0, 1.0])):
-                        found.append(Grasp(inverse(world_from_body) @ turned, width, pitch))
-    return [found[index] for index in random.permutation(len(found)).tolist()]
+                        grasps.append(Grasp(inverse(world_from_body) @ turned, width, pitch))
+    return [grasps[index] for index in random.permutation(len(grasps)).tolist()]
 
 
 def _square(facing: np.ndarray) -> bool:

@@ -241,8 +241,8 @@ def inverse_kinematics(
         chain.fixed, chain.tool, chain.lower, chain.upper, np.ascontiguousarray(base_from_tool, dtype=float),
         np.ascontiguousarray(np.atleast_2d(starts), dtype=float), iterations,
     )  # fmt: skip
-    found = position < POSITION_TOLERANCE and rotation < ROTATION_TOLERANCE
-    return InverseSolution(arm, float(position), float(rotation), bool(found))
+    within = position < POSITION_TOLERANCE and rotation < ROTATION_TOLERANCE
+    return InverseSolution(arm, float(position), float(rotation), bool(within))
 
 
 def random_starts(chain: ArmChain, count: int, random: np.random.Generator) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 
 from stages.kit.motion.collision import Collision, CollisionChecker
 from stages.kit.motion.compiled_check import FREE, find_collision
-from stages.kit.motion.compiled_rrt import UNCERTAIN_COUNT, shorten, way_is_free
+from stages.kit.motion.compiled_rrt import UNCERTAIN_COUNT, Moving, shorten, way_is_free
 from stages.kit.motion.failures import end_in_collision, joint_limit
 from stages.kit.motion.rrt_connect import FINER, SearchSpace, densify, first_collision
 
@@ -79,10 +79,10 @@ def check_ends(query: Query, checker: CollisionChecker) -> np.ndarray:
     inside = [goal for goal in query.goals if space.holds(goal)]
     if not inside:
         raise joint_limit("goal", query.goals[0], space.outside(query.goals[0]))
-    found = [checker.check(query.whole(goal)) for goal in inside]
-    free = [goal for goal, collision in zip(inside, found, strict=True) if collision is None]
+    collisions = [checker.check(query.whole(goal)) for goal in inside]
+    free = [goal for goal, collision in zip(inside, collisions, strict=True) if collision is None]
     if not free:
-        shallowest = min((entry for entry in found if entry is not None), key=lambda entry: entry.depth)
+        shallowest = min((entry for entry in collisions if entry is not None), key=lambda entry: entry.depth)
         raise end_in_collision("goal", shallowest.part, shallowest.other, shallowest.depth)
     return np.array(free)
 
@@ -103,6 +103,12 @@ def blockers(counts: np.ndarray, checker: CollisionChecker) -> Counter[str]:
     return result
 
 
+def moving_arrays(query: Query, resolution: np.ndarray, checker: CollisionChecker, counts: np.ndarray) -> Moving:
+    """Return what the compiled search reads of a query, at a resolution (D,); refusals are added to `counts`."""
+    robot, scene = checker.arrays()
+    return Moving(robot, scene, query.body.copy(), query.moving, query.first_frame, resolution, counts)
+
+
 def compiled_free(query: Query, values: np.ndarray, checker: CollisionChecker) -> bool:
     """Whether moving values (D,) are free for the compiled check."""
     robot, scene = checker.arrays()
@@ -110,18 +116,15 @@ def compiled_free(query: Query, values: np.ndarray, checker: CollisionChecker) -
 
 
 def is_free(
-    query: Query, path: np.ndarray, checker: CollisionChecker, counts: np.ndarray, known: np.ndarray | None = None
+    query: Query, path: np.ndarray, checker: CollisionChecker, counts: np.ndarray, looked_at: np.ndarray | None = None
 ) -> bool:
-    """Whether a path (N, D) is free for the compiled check at FINER times the resolution. Pieces `known` (N - 1,) to be
-    so are not looked at again."""
-    robot, scene = checker.arrays()
-    body = query.body.copy()
+    """Whether a path (N, D) is free for the compiled check at FINER times the resolution. Pieces `looked_at` (N - 1,),
+    which are, are not looked at again."""
+    motion = moving_arrays(query, query.space.resolution / FINER, checker, counts)
     for number, (begin, end) in enumerate(zip(path[:-1], path[1:], strict=True)):
-        if known is not None and known[number]:
+        if looked_at is not None and looked_at[number]:
             continue
-        if not way_is_free(
-            robot, scene, body, query.moving, query.first_frame, begin, end, query.space.resolution / FINER, counts
-        ):  # fmt: skip
+        if not way_is_free(motion, begin, end):
             return False
     return True
 
@@ -131,11 +134,8 @@ def shorten_path(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return a shorter path (M, D) and which of its pieces (M - 1,) are new, which are free for the compiled check at
     FINER times the resolution."""
-    robot, scene = checker.arrays()
-    return shorten(
-        robot, scene, query.body.copy(), query.moving, query.first_frame, path, query.space.resolution / FINER,
-        attempts, random,
-    )  # fmt: skip
+    motion = moving_arrays(query, query.space.resolution / FINER, checker, refusal_counts(checker))
+    return shorten(motion, path, attempts, random)
 
 
 def may_differ(query: Query, goals: np.ndarray, checker: CollisionChecker, counts: np.ndarray) -> bool:
@@ -151,5 +151,5 @@ def confirm(query: Query, path: np.ndarray, checker: CollisionChecker, effort: E
     """Return the first collision that the mesh checker sees on a path (N, D) in steps of the resolution, or None."""
     points = densify(path, query.space.resolution)
     with effort.counting(checker):
-        found = first_collision(points, lambda values: checker.check_meshes(query.whole(values)))
-    return None if found is None else found[1]
+        collision_at = first_collision(points, lambda values: checker.check_meshes(query.whole(values)))
+    return None if collision_at is None else collision_at[1]

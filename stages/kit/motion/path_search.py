@@ -22,6 +22,7 @@ from stages.kit.motion.path_query import (
     confirm,
     is_free,
     may_differ,
+    moving_arrays,
     refusal_counts,
     shorten_path,
 )
@@ -101,24 +102,21 @@ def _compiled_path(
     smoothing: int, counts: np.ndarray, effort: Effort,
 ) -> np.ndarray | None:  # fmt: skip
     """Return a smoothed path that is free for the compiled check at a finer resolution, or None."""
-    robot, scene = checker.arrays()
     space = query.space
     used = 0
     finer = 1
     while used < samples:
-        path, spent = search(
-            robot, scene, query.body.copy(), query.moving, query.first_frame, query.start, goals, space.lower,
-            space.upper, space.resolution / finer, samples - used, STEP * finer, random, counts,
-        )  # fmt: skip
+        motion = moving_arrays(query, space.resolution / finer, checker, counts)
+        path, spent = search(motion, query.start, goals, space.lower, space.upper, samples - used, STEP * finer, random)
         used += spent
         effort.samples += spent
         if len(path) == 0:
             return None
         path = without_repeats(path)
-        known = None
+        looked_at = None
         if len(path) > 2:
-            path, known = shorten_path(query, path, checker, random, smoothing)
-        if is_free(query, path, checker, counts, known):
+            path, looked_at = shorten_path(query, path, checker, random, smoothing)
+        if is_free(query, path, checker, counts, looked_at):
             return path
         finer = FINER  # something thin lay between two checks; it will again
         used += 1

@@ -9,7 +9,7 @@ their shape follows Mallick, Das & Majumdar 2014, section III).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -17,9 +17,8 @@ from numba import njit, prange
 from schemas.scene_parts import Camera
 
 
-@dataclass(frozen=True)
-class DepthCamera:
-    """Constants of the sensor."""
+class DepthCamera(NamedTuple):
+    """Constants of the sensor. Compiled functions take it as it is."""
 
     minimum_range: float = 0.3
     """[m]"""
@@ -61,12 +60,6 @@ def lateral_sigma(incidence: float) -> float:
 
 
 @njit(cache=True)
-def quantisation_step(z: float, focal_length: float, baseline: float, levels: float) -> float:
-    """Return the distance of neighbouring depth values at z [m]: z^2 / (f b levels)."""
-    return z * z / (focal_length * baseline * levels)
-
-
-@njit(cache=True)
 def quantise(z: float, focal_length: float, baseline: float, levels: float) -> float:
     """Round z [m] to the nearest disparity level."""
     disparity = np.floor(focal_length * baseline / z * levels + 0.5) / levels
@@ -74,26 +67,17 @@ def quantise(z: float, focal_length: float, baseline: float, levels: float) -> f
 
 
 @njit(cache=True)
-def loss_probability(
-    z: float,
-    incidence: float,
-    reflectance: float,
-    gloss: float,
-    grazing_start: float,
-    grazing_end: float,
-    dark_signal: float,
-    shine_loss: float,
-) -> float:
+def loss_probability(z: float, incidence: float, reflectance: float, gloss: float, sensor: DepthCamera) -> float:
     """Return the probability in 0..1 that a pixel gets no depth. The causes are independent.
 
     Grazing: smooth step between the two angles. Dark: 1 / (1 + (signal / dark_signal)^4). Shiny: gloss * shine_loss *
     sin^2(incidence).
     """
-    step = min(1.0, max(0.0, (incidence - grazing_start) / (grazing_end - grazing_start)))
+    step = min(1.0, max(0.0, (incidence - sensor.grazing_start) / (sensor.grazing_end - sensor.grazing_start)))
     grazing = step * step * (3.0 - 2.0 * step)
     signal = reflectance * np.cos(incidence) / (z * z)
-    dark = dark_signal**4 / (dark_signal**4 + signal**4 + 1e-30)
-    shiny = gloss * shine_loss * np.sin(incidence) ** 2
+    dark = sensor.dark_signal**4 / (sensor.dark_signal**4 + signal**4 + 1e-30)
+    shiny = gloss * sensor.shine_loss * np.sin(incidence) ** 2
     return 1.0 - (1.0 - grazing) * (1.0 - dark) * (1.0 - shiny)
 
 
@@ -120,29 +104,35 @@ def _projector_shadow(depth: np.ndarray, focal_length: float, baseline: float) -
     return shadow
 
 
+class _Seen(NamedTuple):
+    """What disturb_depth is given, and where the projector does not reach: (H, W) each."""
+
+    depth: np.ndarray
+    incidence_cosine: np.ndarray
+    reflectance: np.ndarray
+    gloss: np.ndarray
+    shadow: np.ndarray
+
+
+class _Draws(NamedTuple):
+    """The random values of an image: of each pixel (H, W) a normal one along the ray, two sideways (H, W, 2) and a
+    uniform one; a uniform one for each block of lost pixels, and by how many pixels the blocks are moved (2,)."""
+
+    normal: np.ndarray
+    jump: np.ndarray
+    chance: np.ndarray
+    loss: np.ndarray
+    shift: np.ndarray
+
+
 @njit(cache=True, parallel=True)
-def _disturb(
-    depth: np.ndarray,
-    incidence_cosine: np.ndarray,
-    reflectance: np.ndarray,
-    gloss: np.ndarray,
-    shadow: np.ndarray,
-    normal: np.ndarray,
-    jump: np.ndarray,
-    chance: np.ndarray,
-    loss: np.ndarray,
-    shift: np.ndarray,
-    block: int,
-    focal_length: float,
-    constants: np.ndarray,
-) -> np.ndarray:
-    minimum, maximum, baseline, levels, jump_share = (
-        constants[0],
-        constants[1],
-        constants[2],
-        constants[3],
-        constants[4],
-    )
+def _disturb(seen: _Seen, draws: _Draws, focal_length: float, sensor: DepthCamera) -> np.ndarray:
+    depth, incidence_cosine, reflectance, gloss, shadow = seen
+    normal, jump, chance, loss, shift = draws
+    minimum, maximum, baseline, levels = (
+        sensor.minimum_range, sensor.maximum_range, sensor.baseline, sensor.disparity_levels
+    )  # fmt: skip
+    jump_share, block = sensor.jump_share, sensor.block
     height, width = depth.shape
     result = np.zeros((height, width), dtype=np.float32)
     for v in prange(height):
@@ -169,16 +159,7 @@ def _disturb(
                     continue
             if z < minimum or z > maximum:
                 continue
-            lost = loss_probability(
-                z,
-                incidence,
-                float(reflectance[v, u]),
-                float(gloss[v, u]),
-                constants[5],
-                constants[6],
-                constants[7],
-                constants[8],
-            )
+            lost = loss_probability(z, incidence, float(reflectance[v, u]), float(gloss[v, u]), sensor)
             if loss[(v + shift[0]) // block, (u + shift[1]) // block] < lost:
                 continue
             z += axial_sigma(z, incidence) * normal[v, u]
@@ -212,31 +193,5 @@ def disturb_depth(
     loss = random.random((height // block + 2, width // block + 2), dtype=np.float32)
     shift = random.integers(0, block, 2)
     shadow = _projector_shadow(depth, camera.fx, sensor.baseline)
-    constants = np.array(
-        [
-            sensor.minimum_range,
-            sensor.maximum_range,
-            sensor.baseline,
-            sensor.disparity_levels,
-            sensor.jump_share,
-            sensor.grazing_start,
-            sensor.grazing_end,
-            sensor.dark_signal,
-            sensor.shine_loss,
-        ]
-    )
-    return _disturb(
-        depth,
-        incidence_cosine,
-        reflectance,
-        gloss,
-        shadow,
-        normal,
-        jump,
-        chance,
-        loss,
-        shift,
-        block,
-        camera.fx,
-        constants,
-    )
+    seen = _Seen(depth, incidence_cosine, reflectance, gloss, shadow)
+    return _disturb(seen, _Draws(normal, jump, chance, loss, shift), camera.fx, sensor)

@@ -7,6 +7,7 @@ gathering in the sense of Immel et al. 1986 / Ward 1988 with one diffuse bounce.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import open3d as o3d
@@ -14,6 +15,13 @@ from numba import njit, prange
 
 from stages.kit.rendering.surfaces import TriangleSoup
 
+LIGHT_POINTS = 4
+"""Every lamp is sampled at so many points squared."""
+DIRECTIONS = 48
+"""So many look for light over every sample: a Vogel disk lifted to the hemisphere (Malley's method)."""
+MOST_SUBDIVISIONS = 128
+RAY_DIRECTION = 3
+"""Rays (N, 6): the origin, and from this column on the direction."""
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 BURIED_SHARE = 0.5
 """A sample from which this share of directions meets back faces lies inside a solid."""
@@ -53,8 +61,18 @@ class AreaLight:
 
 
 @dataclass(frozen=True)
-class LightMap:
-    """Irradiance over pi (the radiance of a white matt surface) at the grid points of every triangle."""
+class SoftLight:
+    """How a light map is made."""
+
+    sky: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Radiance that a ray meets when it leaves the scene, linear RGB."""
+    texel: float = 0.05
+    """Distance of samples [m]."""
+
+
+class LightMap(NamedTuple):
+    """Irradiance over pi (the radiance of a white matt surface) at the grid points of every triangle. Compiled
+    functions take it as it is."""
 
     offset: np.ndarray
     """(T,) int64, first sample of a triangle."""
@@ -153,7 +171,7 @@ def _rays_to(positions: np.ndarray, rows: np.ndarray, target: np.ndarray) -> np.
     for k in prange(len(rows)):
         for axis in range(3):
             rays[k, axis] = positions[rows[k], axis]
-            rays[k, 3 + axis] = target[axis] - positions[rows[k], axis]
+            rays[k, RAY_DIRECTION + axis] = target[axis] - positions[rows[k], axis]
     return rays
 
 
@@ -189,37 +207,49 @@ def _gather_rays(positions: np.ndarray, normals: np.ndarray, start: int, end: in
         b = nx * ny * a
         for axis in range(3):
             rays[k, axis] = positions[row, axis]
-        rays[k, 3] = x * (1.0 + sign * nx * nx * a) + y * b + z * nx
-        rays[k, 4] = x * sign * b + y * (sign + ny * ny * a) + z * ny
-        rays[k, 5] = x * (-sign * nx) + y * (-ny) + z * nz
+        rays[k, RAY_DIRECTION] = x * (1.0 + sign * nx * nx * a) + y * b + z * nx
+        rays[k, RAY_DIRECTION + 1] = x * sign * b + y * (sign + ny * ny * a) + z * ny
+        rays[k, RAY_DIRECTION + 2] = x * (-sign * nx) + y * (-ny) + z * nz
     return rays
+
+
+class _Radiant(NamedTuple):
+    """What a gathering ray may meet: triangles with their direct light, or the sky; float32."""
+
+    direct: LightMap
+    face_normals: np.ndarray
+    """(T, 3)"""
+    albedo: np.ndarray
+    """(T, 3)"""
+    sky: np.ndarray
+    """(3,)"""
+    ambient: np.ndarray
+    """(3,)"""
+
+
+class _Gathered(NamedTuple):
+    """Rays (R, 6) from neighbouring samples, and the triangles (R,) and places on them (R, 2) that they meet."""
+
+    rays: np.ndarray
+    primitive: np.ndarray
+    uvs: np.ndarray
 
 
 @njit(cache=True, parallel=True)
 def _add_bounce(
-    total: np.ndarray,
-    inside: np.ndarray,
-    start: int,
-    rays: np.ndarray,
-    primitive: np.ndarray,
-    uvs: np.ndarray,
-    direct: np.ndarray,
-    offset: np.ndarray,
-    subdivisions: np.ndarray,
-    face_normals: np.ndarray,
-    albedo: np.ndarray,
-    sky: np.ndarray,
-    ambient: np.ndarray,
-    weight: float,
+    total: np.ndarray, inside: np.ndarray, start: int, gathered: _Gathered, radiant: _Radiant, weight: float
 ) -> None:
-    """Add one gathered direction to `total` in place; `inside` (S,) sums the weight of rays that met a back face."""
+    """Add one gathered direction, from sample `start` on, to `total` (S, 3) in place; `inside` (S,) sums the weight of
+    rays that met a back face."""
+    rays, primitive, uvs = gathered
+    (offset, subdivisions, direct), face_normals, albedo, sky, ambient = radiant
     triangles = len(offset)
     for k in prange(len(primitive)):
         t = np.int64(primitive[k])
         if t < triangles:
             along = 0.0
             for axis in range(3):
-                along += rays[k, 3 + axis] * face_normals[t, axis]
+                along += rays[k, RAY_DIRECTION + axis] * face_normals[t, axis]
             if along > 0.0:
                 inside[start + k] += weight
                 continue
@@ -272,21 +302,14 @@ def bake(
     scene: o3d.t.geometry.RaycastingScene,
     soup: TriangleSoup,
     lights: tuple[AreaLight, ...],
-    *,
-    sky: tuple[float, float, float],
-    ambient: tuple[float, float, float],
-    texel: float = 0.05,
-    light_points: int = 4,
-    directions: int = 48,
-    most_subdivisions: int = 128,
+    ambient: np.ndarray,
+    soft_light: SoftLight,
 ) -> LightMap:
     """Compute the light map of a soup that is the one geometry of `scene`.
 
-    `sky` is the radiance that a ray meets when it leaves the scene, `ambient` stands for the bounces after the first.
-    `texel` [m] is the distance of samples; every lamp is sampled at `light_points`^2 points and the half space over a
-    sample in `directions` cosine-distributed directions (a Vogel disk lifted to the hemisphere, Malley's method).
+    `ambient` (3,) float32 stands for the bounces after the first.
     """
-    subdivisions = _subdivisions(soup.corners, texel, most_subdivisions)
+    subdivisions = _subdivisions(soup.corners, soft_light.texel, MOST_SUBDIVISIONS)
     counts = (subdivisions.astype(np.int64) + 1) * (subdivisions + 2) // 2
     offset = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
     total = int(counts.sum())
@@ -295,40 +318,29 @@ def bake(
     )
     direct = np.zeros((total, 3), dtype=np.float32)
     for light in lights:
-        patch = light.area / light_points**2
-        for point in light.points(light_points).astype(np.float32):
+        patch = light.area / LIGHT_POINTS**2
+        for point in light.points(LIGHT_POINTS).astype(np.float32):
             factor = _form_factor(positions, normals, point, light.normal.astype(np.float32), patch)
             rows = np.flatnonzero(factor)
             rays = _rays_to(positions, rows, point)
             blocked = scene.test_occlusions(o3d.core.Tensor.from_numpy(rays), 1e-4, 0.999).numpy() != 0
             lit = rows[~blocked]
             direct[lit] += factor[lit, None] * np.asarray(light.color, dtype=np.float32)
-    albedo = soup.corner_colors.mean(axis=1)
+    radiant = _Radiant(
+        LightMap(offset, subdivisions, direct), soup.face_normals, soup.corner_colors.mean(axis=1),
+        np.asarray(soft_light.sky, dtype=np.float32), ambient,
+    )  # fmt: skip
     light_map = direct.copy()
     inside = np.zeros(total, dtype=np.float32)
     chunk = 1 << 19
-    for k in range(directions):
-        radius, angle = np.sqrt((k + 0.5) / directions), k * GOLDEN_ANGLE
+    for k in range(DIRECTIONS):
+        radius, angle = np.sqrt((k + 0.5) / DIRECTIONS), k * GOLDEN_ANGLE
         x, y = float(radius * np.cos(angle)), float(radius * np.sin(angle))
         for start in range(0, total, chunk):
             end = min(total, start + chunk)
             rays = _gather_rays(positions, normals, start, end, x, y)
             hits = scene.cast_rays(o3d.core.Tensor.from_numpy(rays))
-            _add_bounce(
-                light_map,
-                inside,
-                start,
-                rays,
-                hits["primitive_ids"].numpy(),
-                hits["primitive_uvs"].numpy(),
-                direct,
-                offset,
-                subdivisions,
-                soup.face_normals,
-                albedo,
-                np.asarray(sky, dtype=np.float32),
-                np.asarray(ambient, dtype=np.float32),
-                1.0 / directions,
-            )
+            gathered = _Gathered(rays, hits["primitive_ids"].numpy(), hits["primitive_uvs"].numpy())
+            _add_bounce(light_map, inside, start, gathered, radiant, 1.0 / DIRECTIONS)
     _fill_buried(light_map, inside > BURIED_SHARE, offset, subdivisions)
     return LightMap(offset, subdivisions, light_map)

@@ -15,8 +15,12 @@ from numba import njit
 
 PatternName = Literal["plain", "planks", "tiles", "carpet", "plaster", "wood", "fabric", "speckle"]
 PATTERNS: tuple[PatternName, ...] = ("plain", "planks", "tiles", "carpet", "plaster", "wood", "fabric", "speckle")
-ROW = 20
-"""Columns of the material table: pattern, strength, period, gloss, sharpness, seed, 12 of the transform, 2 spare."""
+_PLAIN, _PLANKS, _TILES, _CARPET, _PLASTER, _WOOD, _FABRIC, _SPECKLE = range(len(PATTERNS))
+PATTERN, STRENGTH, PERIOD, GLOSS, SHARPNESS, SEED, TRANSFORM = range(7)
+"""Columns of the material table (M, ROW), as in Material; the 12 of pattern_from_world begin at TRANSFORM."""
+SKIRTING = TRANSFORM + 12
+ROW = SKIRTING + 2
+"""One column is spare."""
 
 
 @dataclass(frozen=True)
@@ -115,12 +119,12 @@ def pattern_factor(row: np.ndarray, x: float, y: float, z: float, footprint: flo
     `footprint` is the width that a pixel covers there [m]. The colour is multiplied by the factor; warmth in -1..1
     shifts it from blue towards red.
     """
-    kind, strength, period, seed = int(row[0]), row[1], row[2], int(row[5])
-    px = row[6] * x + row[7] * y + row[8] * z + row[9]
-    py = row[10] * x + row[11] * y + row[12] * z + row[13]
-    pz = row[14] * x + row[15] * y + row[16] * z + row[17]
+    kind, strength, period, seed = int(row[PATTERN]), row[STRENGTH], row[PERIOD], int(row[SEED])
+    px = row[TRANSFORM] * x + row[TRANSFORM + 1] * y + row[TRANSFORM + 2] * z + row[TRANSFORM + 3]
+    py = row[TRANSFORM + 4] * x + row[TRANSFORM + 5] * y + row[TRANSFORM + 6] * z + row[TRANSFORM + 7]
+    pz = row[TRANSFORM + 8] * x + row[TRANSFORM + 9] * y + row[TRANSFORM + 10] * z + row[TRANSFORM + 11]
     factor, warmth = 0.0, 0.0
-    if kind == 1:  # planks along x, `period` wide, staggered joints, each with its own tone
+    if kind == _PLANKS:  # along x, `period` wide, staggered joints, each with its own tone
         lane = int(np.floor(py / period))
         length = 6.0 * period
         shifted = px + length * _hash(lane, 7, 3, seed)
@@ -135,7 +139,7 @@ def pattern_factor(row: np.ndarray, x: float, y: float, z: float, footprint: flo
         gap = min(across, 1.0 - across) * period
         seam = min(along, 1.0 - along) * length
         factor -= 0.5 * pattern_line(min(gap, seam), 0.004, footprint)
-    elif kind == 2:  # square tiles with grout
+    elif kind == _TILES:  # square, with grout
         across, along = px / period, py / period
         i, j = int(np.floor(across)), int(np.floor(along))
         tone = _hash(i, j, 2, seed) - 0.5
@@ -143,27 +147,27 @@ def pattern_factor(row: np.ndarray, x: float, y: float, z: float, footprint: flo
         factor = 0.10 * tone + 0.05 * blotch
         fx, fy = across - i, along - j
         factor -= 0.35 * pattern_line(min(min(fx, 1.0 - fx), min(fy, 1.0 - fy)) * period, 0.006, footprint)
-    elif kind == 3:  # carpet
+    elif kind == _CARPET:
         fine = value_noise(px * 220.0, py * 220.0, pz * 220.0, seed) * _visible_detail(0.005, footprint)
         broad = value_noise(px * 6.0, py * 6.0, pz * 6.0, seed + 1)
         middle = value_noise(px * 45.0, py * 45.0, pz * 45.0, seed + 2) * _visible_detail(0.022, footprint)
         factor = 0.20 * fine + 0.05 * broad + 0.09 * middle
-    elif kind == 4:  # painted plaster: faint unevenness, roller marks
+    elif kind == _PLASTER:  # painted: faint unevenness, roller marks
         broad = value_noise(px * 1.1, py * 1.1, pz * 1.1, seed)
         marks = value_noise(px * 28.0, py * 28.0, pz * 9.0, seed + 1) * _visible_detail(0.036, footprint)
         fine = value_noise(px * 150.0, py * 150.0, pz * 150.0, seed + 2) * _visible_detail(0.007, footprint)
         factor = 0.035 * broad + 0.02 * marks + 0.03 * fine
-    elif kind == 5:  # wood: rings seen along x
+    elif kind == _WOOD:  # rings seen along x
         bend = value_noise(px * 1.3, py * 4.0, pz * 4.0, seed)
         ring = np.sin(6.2831853 * ((py + 0.6 * pz) / period + 2.6 * bend))
         grain = value_noise(px * 5.0, py * 130.0, pz * 130.0, seed + 1) * _visible_detail(0.008, footprint)
         factor = 0.07 * ring * _visible_detail(0.5 * period, footprint) + 0.10 * grain + 0.06 * bend
         warmth = 0.06 * ring
-    elif kind == 6:  # woven fabric
+    elif kind == _FABRIC:  # woven
         weave = np.sin(6.2831853 * px / period) * np.sin(6.2831853 * (py + pz) / period)
         broad = value_noise(px * 8.0, py * 8.0, pz * 8.0, seed)
         factor = 0.16 * weave * _visible_detail(0.3 * period, footprint) + 0.06 * broad
-    elif kind == 7:  # cardboard, stone: speckle
+    elif kind == _SPECKLE:  # cardboard, stone
         fine = value_noise(px / period, py / period, pz / period, seed) * _visible_detail(period, footprint)
         broad = value_noise(px * 7.0, py * 7.0, pz * 7.0, seed + 1)
         factor = 0.10 * fine + 0.06 * broad

@@ -4,8 +4,8 @@
     picture = renderer.render(camera, look_at(eye, target))
 
 By default the scene is lit by two lamps with hard shadows and an even ambient term, which needs no preparation: right
-for single pictures of scenes that move. `light_map=True` computes soft light with one bounce once (seconds) and then
-renders faster: right for many pictures of a scene that stands still.
+for single pictures of scenes that move. `soft_light=SoftLight()` computes soft light with one bounce once (seconds) and
+then renders faster: right for many pictures of a scene that stands still.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ import trimesh
 
 from schemas.scene_parts import Camera
 from stages.kit.rendering import shading
-from stages.kit.rendering.light_map import AreaLight, LightMap, bake
-from stages.kit.rendering.patterns import Material
+from stages.kit.rendering.light_map import AreaLight, LightMap, SoftLight, bake
+from stages.kit.rendering.patterns import GLOSS, Material
+from stages.kit.rendering.shading import Hits, Surfaces
 from stages.kit.rendering.surfaces import TriangleSoup, build_soup, linear_to_srgb
 
 BACKGROUND = (0.86, 0.89, 0.92)
@@ -74,12 +75,10 @@ class SceneRenderer:
         *,
         lights: Sequence[AreaLight] | None = None,
         ambient: tuple[float, float, float] = (0.34, 0.35, 0.37),
-        sky: tuple[float, float, float] = (1.0, 1.0, 1.0),
         shadows: bool = True,
         materials: dict[int, Material] | None = None,
         background: tuple[float, float, float] = BACKGROUND,
-        light_map: bool = False,
-        texel: float = 0.05,
+        soft_light: SoftLight | None = None,
         antialias: bool = True,
     ) -> None:
         self.soup = meshes if isinstance(meshes, TriangleSoup) else build_soup(meshes, materials)
@@ -97,8 +96,8 @@ class SceneRenderer:
         self.antialias = antialias
         self.exposure = 1.0
         self.light_map: LightMap | None = None
-        if light_map:
-            self.light_map = bake(self.scene, self.soup, self.lights, sky=sky, ambient=ambient, texel=texel)
+        if soft_light is not None:
+            self.light_map = bake(self.scene, self.soup, self.lights, self.ambient, soft_light)
             self.exposure = self._exposure()
             self.usual_light = np.maximum(np.median(self.light_map.light, axis=0), 1e-6)
 
@@ -107,15 +106,17 @@ class SceneRenderer:
         height, width = camera.height, camera.width
         v, u = np.divmod(np.arange(height * width), width)
         hits = self._cast(camera, world_from_camera, np.stack([u, v], axis=1).astype(np.float32))
-        depth = np.where(hits.found, hits.t, 0.0).astype(np.float32).reshape(height, width)
-        instance = np.where(hits.found, self.soup.instance[hits.safe], 0).astype(np.int32).reshape(height, width)
+        hit = hits.primitive != shading.MISS
+        depth = np.where(hit, hits.t, 0.0).astype(np.float32).reshape(height, width)
+        instance = np.where(hit, self.soup.instance[np.where(hit, hits.primitive, 0).astype(np.int64)], 0)
+        instance = instance.astype(np.int32).reshape(height, width)
         albedo, light = self._shade(hits, camera)
         if self.antialias:
             edges = np.flatnonzero(_edge_pixels(instance, hits.normals.reshape(height, width, 3), depth))
             self._refine(light, edges, camera, world_from_camera)
         color = shading.tone_map(light, self.exposure, _SRGB_TABLE)
         if not self.antialias:
-            color[~hits.found] = np.round(self.background * 255.0).astype(np.uint8)
+            color[~hit] = np.round(self.background * 255.0).astype(np.uint8)
         return Rendering(
             color=color.reshape(height, width, 3),
             depth=depth,
@@ -136,33 +137,24 @@ class SceneRenderer:
         rays = np.concatenate([origins, targets - origins], axis=1).astype(np.float32)
         return self.scene.test_occlusions(o3d.core.Tensor.from_numpy(rays), 1e-4, 0.995).numpy() != 0
 
-    def _cast(self, camera: Camera, world_from_camera: np.ndarray, pixels: np.ndarray) -> _Hits:
+    def _cast(self, camera: Camera, world_from_camera: np.ndarray, pixels: np.ndarray) -> Hits:
         pose = np.ascontiguousarray(world_from_camera, dtype=np.float64)
         rays = shading.camera_rays(pixels, camera.fx, camera.fy, camera.cx, camera.cy, pose)
         answer = self.scene.cast_rays(o3d.core.Tensor.from_numpy(rays))
         primitive = answer["primitive_ids"].numpy()
         uvs = answer["primitive_uvs"].numpy()
         normals, cosine = shading.surface_at(rays, primitive, uvs, self.soup.corner_normals, self.soup.face_normals)
-        return _Hits(rays, primitive, uvs, answer["t_hit"].numpy(), normals, cosine)
+        return Hits(rays, primitive, uvs, answer["t_hit"].numpy(), normals, cosine)
 
-    def _shade(self, hits: _Hits, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+    def _surfaces(self) -> Surfaces:
+        return Surfaces(self.soup.corner_colors, self.soup.material, self.soup.material_table)
+
+    def _shade(self, hits: Hits, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
         """Return (albedo (N, 3), outgoing linear light (N, 3), background included)."""
-        soup = self.soup
-        albedo = shading.surface_color(
-            hits.rays,
-            hits.primitive,
-            hits.uvs,
-            hits.t,
-            hits.cosine,
-            soup.corner_colors,
-            soup.material,
-            soup.material_table,
-            1.0 / camera.fx,
-        )
+        albedo = shading.surface_color(hits, self._surfaces(), 1.0 / camera.fx)
         highlight = np.zeros_like(albedo)
         if self.light_map is not None:
-            m = self.light_map
-            light = shading.light_from_map(hits.primitive, hits.uvs, m.light, m.offset, m.subdivisions)
+            light = shading.light_from_map(hits, self.light_map)
         else:
             light = np.broadcast_to(self.ambient, albedo.shape).copy()
         for lamp in self.lights:
@@ -171,7 +163,7 @@ class SceneRenderer:
             # The map already knows what lies in shadow: dark places get no highlight.
             highlight *= np.minimum(1.0, light / self.usual_light)
         result = albedo * light + highlight
-        missed = ~hits.found
+        missed = hits.primitive == shading.MISS
         if missed.any():
             # The background passes through the tone curve: give what comes out as the wanted colour.
             wanted = np.where(
@@ -183,37 +175,24 @@ class SceneRenderer:
             )
         return albedo, result
 
-    def _add_lamp(self, light: np.ndarray, highlight: np.ndarray, hits: _Hits, lamp: AreaLight) -> None:
+    def _add_lamp(self, light: np.ndarray, highlight: np.ndarray, hits: Hits, lamp: AreaLight) -> None:
         """Add one lamp in place; with a light map its highlight alone."""
         color = np.asarray(lamp.color, dtype=np.float32)
         point = np.asarray(lamp.center, dtype=np.float32)
         if self.light_map is not None:
-            if self.soup.material_table[:, 3].max() <= 0.0:
+            if self.soup.material_table[:, GLOSS].max() <= 0.0:
                 return
             # A highlight mirrors the lamp; its solid angle from mid-room stands in for the exact reflection.
             color = color * np.float32(lamp.area / 6.0)
             blocked = np.zeros(len(light), dtype=np.bool_)
         else:
             blocked = self._blocked(hits, point)
-        shading.add_light(
-            light,
-            highlight,
-            hits.rays,
-            hits.t,
-            hits.normals,
-            hits.primitive,
-            self.soup.material,
-            self.soup.material_table,
-            blocked,
-            point,
-            color,
-            self.light_map is None,
-        )
+        shading.add_light(light, highlight, hits, self._surfaces(), blocked, point, color, self.light_map is None)
 
-    def _blocked(self, hits: _Hits, point: np.ndarray) -> np.ndarray:
+    def _blocked(self, hits: Hits, point: np.ndarray) -> np.ndarray:
         if not self.shadows:
             return np.zeros(len(hits.t), dtype=np.bool_)
-        t = np.where(hits.found, hits.t, 0.0)[:, None]
+        t = np.where(hits.primitive != shading.MISS, hits.t, 0.0)[:, None]
         origin = hits.rays[:, :3] + t * hits.rays[:, 3:] + 2e-3 * hits.normals
         rays = np.concatenate([origin, point - origin], axis=1).astype(np.float32)
         return self.scene.test_occlusions(o3d.core.Tensor.from_numpy(rays), 1e-4, 1.0).numpy() != 0
@@ -243,24 +222,6 @@ class SceneRenderer:
         cumulated = np.cumsum(area[order])
         median = radiance[order][np.searchsorted(cumulated, 0.5 * cumulated[-1])]
         return float(0.38 / max(float(median), 1e-6))
-
-
-class _Hits:
-    """What a batch of rays met."""
-
-    def __init__(
-        self,
-        rays: np.ndarray,
-        primitive: np.ndarray,
-        uvs: np.ndarray,
-        t: np.ndarray,
-        normals: np.ndarray,
-        cosine: np.ndarray,
-    ) -> None:
-        self.rays, self.primitive, self.uvs, self.t = rays, primitive, uvs, t
-        self.normals, self.cosine = normals, cosine
-        self.found = primitive != shading.MISS
-        self.safe = np.where(self.found, primitive, 0).astype(np.int64)
 
 
 def _edge_pixels(instance: np.ndarray, normals: np.ndarray, depth: np.ndarray) -> np.ndarray:

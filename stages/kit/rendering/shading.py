@@ -2,13 +2,40 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit, prange
 
-from stages.kit.rendering.light_map import lookup
-from stages.kit.rendering.patterns import pattern_factor, pattern_line
+from stages.kit.rendering.light_map import RAY_DIRECTION, LightMap, lookup
+from stages.kit.rendering.patterns import GLOSS, PATTERN, SHARPNESS, SKIRTING, pattern_factor, pattern_line
 
 MISS = np.uint32(0xFFFFFFFF)
+
+
+class Hits(NamedTuple):
+    """What N rays met."""
+
+    rays: np.ndarray
+    """(N, 6) float32 origin and direction [m]."""
+    primitive: np.ndarray
+    """(N,) uint32 triangle, MISS for none."""
+    uvs: np.ndarray
+    """(N, 2) float32 barycentric."""
+    t: np.ndarray
+    """(N,) float32, in lengths of the direction."""
+    normals: np.ndarray
+    """(N, 3) as surface_at."""
+    cosine: np.ndarray
+    """(N,) as surface_at."""
+
+
+class Surfaces(NamedTuple):
+    """Colours and materials of triangles, as in TriangleSoup."""
+
+    corner_colors: np.ndarray
+    material: np.ndarray
+    material_table: np.ndarray
 
 
 @njit(cache=True, parallel=True)
@@ -23,7 +50,7 @@ def camera_rays(
         y = (pixels[k, 1] - cy) / fy
         for axis in range(3):
             rays[k, axis] = world_from_camera[axis, 3]
-            rays[k, 3 + axis] = (
+            rays[k, RAY_DIRECTION + axis] = (
                 world_from_camera[axis, 0] * x + world_from_camera[axis, 1] * y + world_from_camera[axis, 2]
             )
     return rays
@@ -51,8 +78,8 @@ def surface_at(
             value = w * corner_normals[t, 0, axis] + u * corner_normals[t, 1, axis] + v * corner_normals[t, 2, axis]
             normals[k, axis] = value
             length += value * value
-            ray += rays[k, 3 + axis] * rays[k, 3 + axis]
-            along += rays[k, 3 + axis] * face_normals[t, axis]
+            ray += rays[k, RAY_DIRECTION + axis] * rays[k, RAY_DIRECTION + axis]
+            along += rays[k, RAY_DIRECTION + axis] * face_normals[t, axis]
         side = -1.0 if along > 0.0 else 1.0
         length = np.sqrt(length)
         for axis in range(3):
@@ -62,18 +89,10 @@ def surface_at(
 
 
 @njit(cache=True, parallel=True)
-def surface_color(
-    rays: np.ndarray,
-    primitive: np.ndarray,
-    uvs: np.ndarray,
-    t_hit: np.ndarray,
-    cosine: np.ndarray,
-    corner_colors: np.ndarray,
-    material: np.ndarray,
-    table: np.ndarray,
-    pixel_angle: float,
-) -> np.ndarray:
+def surface_color(hits: Hits, surfaces: Surfaces, pixel_angle: float) -> np.ndarray:
     """Return the diffuse albedo (N, 3), linear, with patterns. `pixel_angle` is the width of a pixel at depth 1."""
+    rays, primitive, uvs, t_hit, _, cosine = hits
+    corner_colors, material, table = surfaces
     albedo = np.zeros((len(rays), 3), dtype=np.float32)
     for k in prange(len(rays)):
         if primitive[k] == MISS:
@@ -83,32 +102,32 @@ def surface_color(
         w = 1.0 - u - v
         row = table[material[t]]
         factor, warmth = 1.0, 0.0
-        x = rays[k, 0] + t_hit[k] * rays[k, 3]
-        y = rays[k, 1] + t_hit[k] * rays[k, 4]
-        z = rays[k, 2] + t_hit[k] * rays[k, 5]
+        x = rays[k, 0] + t_hit[k] * rays[k, RAY_DIRECTION]
+        y = rays[k, 1] + t_hit[k] * rays[k, RAY_DIRECTION + 1]
+        z = rays[k, 2] + t_hit[k] * rays[k, RAY_DIRECTION + 2]
         # The geometric mean of a pixel's two extents on the slanted surface.
         footprint = t_hit[k] * pixel_angle / np.sqrt(max(float(cosine[k]), 0.05))
-        if row[0] > 0.5:
+        if row[PATTERN] > 0.5:
             factor, warmth = pattern_factor(row, x, y, z, footprint)
         for channel in range(3):
             value = (
                 w * corner_colors[t, 0, channel] + u * corner_colors[t, 1, channel] + v * corner_colors[t, 2, channel]
             )
             albedo[k, channel] = min(1.0, value * factor * (1.0 + 0.3 * warmth * (1.0 - channel)))
-        if row[18] > 0.0 and z < row[18] + 0.01:
+        if row[SKIRTING] > 0.0 and z < row[SKIRTING] + 0.01:
             # A painted board, its upper edge box-filtered over the pixel.
-            below = min(1.0, max(0.0, (row[18] - z) / max(footprint, 1e-4) + 0.5))
-            rim = pattern_line(abs(row[18] - 0.004 - z), 0.004, footprint)
+            below = min(1.0, max(0.0, (row[SKIRTING] - z) / max(footprint, 1e-4) + 0.5))
+            rim = pattern_line(abs(row[SKIRTING] - 0.004 - z), 0.004, footprint)
             for channel in range(3):
                 albedo[k, channel] = below * 0.70 * (1.0 - 0.35 * rim) + (1.0 - below) * albedo[k, channel]
     return albedo
 
 
 @njit(cache=True, parallel=True)
-def light_from_map(
-    primitive: np.ndarray, uvs: np.ndarray, light: np.ndarray, offset: np.ndarray, subdivisions: np.ndarray
-) -> np.ndarray:
+def light_from_map(hits: Hits, light_map: LightMap) -> np.ndarray:
     """Return the light (N, 3) on matt white at the hits, from the light map."""
+    primitive, uvs = hits.primitive, hits.uvs
+    offset, subdivisions, light = light_map
     result = np.zeros((len(primitive), 3), dtype=np.float32)
     for k in prange(len(primitive)):
         if primitive[k] == MISS:
@@ -123,12 +142,8 @@ def light_from_map(
 def add_light(
     total: np.ndarray,
     highlight: np.ndarray,
-    rays: np.ndarray,
-    t_hit: np.ndarray,
-    normals: np.ndarray,
-    primitive: np.ndarray,
-    material: np.ndarray,
-    table: np.ndarray,
+    hits: Hits,
+    surfaces: Surfaces,
     blocked: np.ndarray,
     point: np.ndarray,
     color: np.ndarray,
@@ -136,29 +151,31 @@ def add_light(
 ) -> None:
     """Add one point-like light in place: its diffuse part to `total` (N, 3) when `diffuse`, and its highlight
     (Blinn 1977) to `highlight` (N, 3), where it is not blocked. `color` is the intensity at any distance."""
+    rays, primitive, _, t_hit, normals, _ = hits
+    _, material, table = surfaces
     for k in prange(len(primitive)):
         if primitive[k] == MISS or blocked[k]:
             continue
         t = np.int64(primitive[k])
         row = table[material[t]]
-        if not diffuse and row[3] <= 0.0:
+        if not diffuse and row[GLOSS] <= 0.0:
             continue
         length, view, cosine = 0.0, 0.0, 0.0
         for axis in range(3):
-            d = point[axis] - (rays[k, axis] + t_hit[k] * rays[k, 3 + axis])
+            d = point[axis] - (rays[k, axis] + t_hit[k] * rays[k, RAY_DIRECTION + axis])
             length += d * d
-            view += rays[k, 3 + axis] * rays[k, 3 + axis]
+            view += rays[k, RAY_DIRECTION + axis] * rays[k, RAY_DIRECTION + axis]
         length, view = np.sqrt(length), np.sqrt(view)
         half, square = 0.0, 0.0
         for axis in range(3):
-            d = (point[axis] - (rays[k, axis] + t_hit[k] * rays[k, 3 + axis])) / length
-            h = d - rays[k, 3 + axis] / view
+            d = (point[axis] - (rays[k, axis] + t_hit[k] * rays[k, RAY_DIRECTION + axis])) / length
+            h = d - rays[k, RAY_DIRECTION + axis] / view
             cosine += d * normals[k, axis]
             half += h * normals[k, axis]
             square += h * h
         if cosine <= 0.0:
             continue
-        shine = row[3] * max(0.0, half / np.sqrt(square)) ** row[4] if row[3] > 0.0 else 0.0
+        shine = row[GLOSS] * max(0.0, half / np.sqrt(square)) ** row[SHARPNESS] if row[GLOSS] > 0.0 else 0.0
         for channel in range(3):
             if diffuse:
                 total[k, channel] += cosine * color[channel]

@@ -57,11 +57,11 @@ class GivenUp(MachineFailure):
 
 
 class Refused(BadInput):
-    """A service understood and said no: `status`, and what it `said` (an excerpt)."""
+    """A service understood and said no: `status`, and an `excerpt` of what it said."""
 
-    def __init__(self, message: str, *, status: int, said: str, hint: str = "") -> None:
+    def __init__(self, message: str, *, status: int, excerpt: str, hint: str = "") -> None:
         super().__init__(message, hint=hint)
-        self.status, self.said = status, said
+        self.status, self.excerpt = status, excerpt
 
 
 class Connection:
@@ -182,18 +182,18 @@ class Connection:
         if len(self._key) >= SHORTEST_SECRET:
             data = data.replace(self._key.encode(), HIDDEN.encode())
         # Hidden once more, as escapes may have hidden the key among the bytes; before the words are cut.
-        said = _printable(self.hide(_own_words(data))) or _printable(self.hide(response.reason))
+        excerpt = _printable(self.hide(_own_words(data))) or _printable(self.hide(response.reason))
         if response.status in RETRIED:
             raise TryAgain(
-                f"status {response.status} ({said})",
+                f"status {response.status} ({excerpt})",
                 self._asked_wait(response.getheader("Retry-After", "")),
                 response.status,
             )
         if response.status != 200:
             raise Refused(
-                f"{self.address}{path}: status {response.status} ({said})",
+                f"{self.address}{path}: status {response.status} ({excerpt})",
                 status=response.status,
-                said=said,
+                excerpt=excerpt,
                 hint=self._refused_hint,
             )
         return Answer(data, self.hide(response.getheader("Content-Type", "")))
@@ -251,10 +251,10 @@ def _own_words(data: bytes) -> str:
     """Return what a service says is wrong: the `error` of a JSON object (its `message`), other JSON without escapes,
     else how the body begins."""
     try:
-        said = json.loads(data)
+        reason = json.loads(data)
         for key in ("error", "message"):
-            said = said.get(key, said) if isinstance(said, dict) else said
-        return said if isinstance(said, str) else json.dumps(said, ensure_ascii=False)
+            reason = reason.get(key, reason) if isinstance(reason, dict) else reason
+        return reason if isinstance(reason, str) else json.dumps(reason, ensure_ascii=False)
     except (ValueError, RecursionError):
         return data[:4096].decode("utf-8", "replace")
 

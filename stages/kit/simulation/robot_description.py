@@ -60,8 +60,8 @@ def load_robot(name: str) -> RobotDescription:
     """
     path = FOLDER / f"{name}.toml"
     if not path.is_file():
-        known = ", ".join(sorted(entry.stem for entry in FOLDER.glob("*.toml")))
-        raise UsageError(f"no robot is called {name!r}", hint=f"known: {known}")
+        names = ", ".join(sorted(entry.stem for entry in FOLDER.glob("*.toml")))
+        raise UsageError(f"no robot is called {name!r}", hint=f"known: {names}")
     values = tomllib.loads(path.read_text(encoding="utf-8"))
     urdf = FOLDER / values.pop("urdf")
     if not urdf.is_file():

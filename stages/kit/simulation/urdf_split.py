@@ -6,6 +6,8 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 from schemas.errors import BadInput
+from schemas.outside import file_content
+from stages.kit.formats.urdf_file import MAXIMUM_BYTES
 from stages.kit.formats.xml_files import parse_xml
 
 PART_SEPARATOR = "__"
@@ -13,13 +15,7 @@ PART_SEPARATOR = "__"
 
 def read_urdf(path: Path) -> ElementTree.Element:
     """Parse a URDF file. Raises BadInput when it is missing or no URDF."""
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise BadInput(f"{path}: file is missing", hint="make the scene again") from None
-    except (OSError, ValueError) as error:
-        raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}", hint="make the scene again") from None
-    root = parse_xml(data, str(path))
+    root = parse_xml(file_content(path, MAXIMUM_BYTES, hint="make the scene again"), str(path))
     if root.tag != "robot":
         raise BadInput(f"{path}: root element is <{root.tag}>, expected <robot>", hint="make the scene again")
     return root

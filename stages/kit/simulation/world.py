@@ -258,10 +258,10 @@ class PhysicsWorld:
     def contacts(self, body_id: int, other_id: int | None = None) -> list[Contact]:
         """Return the contacts of a body found by the last step or collision detection."""
         arguments = {"bodyA": body_id} if other_id is None else {"bodyA": body_id, "bodyB": other_id}
-        found = engine.getContactPoints(physicsClientId=self.client, **arguments) or ()
+        entries = engine.getContactPoints(physicsClientId=self.client, **arguments) or ()
         return [
             Contact(entry[3], entry[2], entry[4], -entry[8], np.array(entry[6]), np.array(entry[7]), entry[9])
-            for entry in found
+            for entry in entries
         ]
 
     def name_of(self, body_id: int) -> str | None:

@@ -14,13 +14,13 @@ def disparity_colors(disparity: np.ndarray, limits: tuple[float, float] | None =
 
     `limits` [px] are those of the colours; None: the first and the 99th percentile of what is known.
     """
-    known = np.isfinite(disparity)
+    matched = np.isfinite(disparity)
     if limits is None:
-        limits = tuple(np.percentile(disparity[known], [1, 99])) if known.any() else (0.0, 1.0)  # type: ignore[assignment]
+        limits = tuple(np.percentile(disparity[matched], [1, 99])) if matched.any() else (0.0, 1.0)  # type: ignore[assignment]
     low, high = limits
-    scaled = np.clip((np.where(known, disparity, low) - low) / max(high - low, 1e-6), 0, 1)
+    scaled = np.clip((np.where(matched, disparity, low) - low) / max(high - low, 1e-6), 0, 1)
     colors = cv2.applyColorMap(np.rint(255 * scaled).astype(np.uint8), cv2.COLORMAP_TURBO)[..., ::-1].copy()
-    colors[~known] = UNKNOWN
+    colors[~matched] = UNKNOWN
     return colors
 
 

@@ -25,10 +25,7 @@ class Estimator:
     def __call__(self, state: np.ndarray) -> int:
         """Return the estimate, FAR when the goal is out of reach even if nothing is ever deleted."""
         task = self.task
-        costs(
-            state, task.pre_at, task.add, task.add_at, task.user, task.user_at, -1, self.heuristic == "max", self.cost,
-            self._by,
-        )  # fmt: skip
+        costs(state, task.effects, -1, self.heuristic == "max", self.cost, self._by)
         values = self.cost[task.goal]
         if len(values) == 0 or values.max() >= FAR:
             return FAR if len(values) else 0

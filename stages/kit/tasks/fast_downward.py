@@ -30,8 +30,8 @@ INSTEAD = "take --planner builtin"
 
 def driver() -> Path:
     """Return the path of the planner's driver. Raises MissingDependency."""
-    found = importlib.util.find_spec(PACKAGE)
-    folders = list(found.submodule_search_locations or ()) if found is not None else []
+    spec = importlib.util.find_spec(PACKAGE)
+    folders = list(spec.submodule_search_locations or ()) if spec is not None else []
     for folder in folders:
         path = Path(folder) / "downward" / "fast-downward.py"
         if path.is_file():

@@ -53,27 +53,25 @@ def find_landmarks(task: Relaxed) -> Landmarks:
         state = task.initial.copy()
         if without >= 0:
             state[without] = 0
-        costs(
-            state, task.pre_at, task.add, task.add_at, task.user, task.user_at, without, True, cost, by
-        )  # fmt: skip
+        costs(state, task.effects, without, True, cost, by)
         return cost
 
     usual = explore(-1).copy()
-    found: list[int] = []
+    landmarks: list[int] = []
     possible: list[np.ndarray] = []  # for each, what (A,) can be true before it is for the first time
     for atom in range(len(task.atoms) - 1):
         if usual[atom] < FAR and (explore(atom)[task.goal] >= FAR).any():
-            found.append(atom)
+            landmarks.append(atom)
             possible.append(cost < FAR)
-    atoms = np.array(found, dtype=np.int32)
-    place = {atom: k for k, atom in enumerate(found)}
-    needed = np.zeros((len(found), len(found)), dtype=bool)
-    achievers: list[list[int]] = [[] for _ in found]
+    atoms = np.array(landmarks, dtype=np.int32)
+    place = {atom: k for k, atom in enumerate(landmarks)}
+    needed = np.zeros((len(landmarks), len(landmarks)), dtype=bool)
+    achievers: list[list[int]] = [[] for _ in landmarks]
     for action in range(len(task.actions)):
         for added in task.add[task.add_at[action] : task.add_at[action + 1]]:
             if int(added) in place:
                 achievers[place[int(added)]].append(action)
-    for k, atom in enumerate(found):
+    for k, atom in enumerate(landmarks):
         if task.initial[atom]:
             continue
         common: set[int] | None = None
@@ -110,15 +108,15 @@ def _reasonable(
         if (longer == chain).all():
             break
         chain = longer
-    found = np.zeros((count, count), dtype=bool)
+    reasonable = np.zeros((count, count), dtype=bool)
     closure = chain.copy()
     for k in np.flatnonzero(goal).tolist():
         for m in np.flatnonzero(goal).tolist():
             if k == m or closure[m, k]:
                 continue
             if any(int(atoms[x]) in deleted[k] for x in np.flatnonzero(chain[m])):
-                found[k, m] = True
+                reasonable[k, m] = True
                 reach_k = closure[:, k] | (np.arange(count) == k)
                 reach_m = closure[m] | (np.arange(count) == m)
                 closure |= reach_k[:, None] & reach_m[None, :]
-    return found
+    return reasonable

@@ -123,8 +123,8 @@ class LazySearch:
                 return None
             state = successor(task, before.state, action)
         key = state.tobytes()
-        known = seen.get(key)
-        if known is not None and (bound is None or nodes[known].cost <= cost):
+        earlier = seen.get(key)
+        if earlier is not None and (bound is None or nodes[earlier].cost <= cost):
             return None
         if parent >= 0:
             accepted = self.landmarks.accept(nodes[parent].accepted, state)

@@ -9,14 +9,29 @@ ignores deletions reaches the goal: an atom is one when the goal becomes unreach
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from stages.kit.tasks.strips import Atom, GroundAction, Problem
 
 FAR = 1 << 30
 """Cost of what cannot be reached."""
+
+
+class Effects(NamedTuple):
+    """What compiled loops read of a grounded task, see Relaxed."""
+
+    pre_at: np.ndarray
+    add: np.ndarray
+    add_at: np.ndarray
+    user: np.ndarray
+    user_at: np.ndarray
+
+
+_EFFECTS = types.NamedUniTuple(types.int32[::1], len(Effects._fields), Effects)
 
 
 @dataclass(frozen=True)
@@ -39,6 +54,11 @@ class Relaxed:
     user: np.ndarray
     user_at: np.ndarray
     """Actions that need an atom."""
+
+    @cached_property
+    def effects(self) -> Effects:
+        """What `costs` reads."""
+        return Effects(self.pre_at, self.add, self.add_at, self.user, self.user_at)
 
 
 def _rows(rows: list[list[int]]) -> tuple[np.ndarray, np.ndarray]:
@@ -69,9 +89,7 @@ def relax(problem: Problem, actions: list[GroundAction]) -> Relaxed:
     initial = np.zeros(len(atoms), dtype=np.uint8)
     initial[[number[atom] for atom in problem.initial if atom in number] + [always]] = 1
     goal = np.array(sorted(number[atom] for atom in problem.goal), dtype=np.int32)
-    return Relaxed(
-        tuple(atoms), tuple(usable), initial, goal, *_rows(pre), *_rows(add), *_rows(delete), *_rows(users)
-    )  # fmt: skip
+    return Relaxed(tuple(atoms), tuple(usable), initial, goal, *_rows(pre), *_rows(add), *_rows(delete), *_rows(users))
 
 
 def successor(task: Relaxed, state: np.ndarray, action: int) -> np.ndarray:
@@ -85,7 +103,7 @@ def successor(task: Relaxed, state: np.ndarray, action: int) -> np.ndarray:
 @njit("int32[::1](uint8[::1], int32[::1], int32[::1])", cache=True)
 def applicable(state, pre, pre_at):  # type: ignore[no-untyped-def]
     """Return the actions whose preconditions hold in a state (A,)."""
-    found = np.empty(len(pre_at) - 1, dtype=np.int32)
+    actions = np.empty(len(pre_at) - 1, dtype=np.int32)
     count = 0
     for action in range(len(pre_at) - 1):
         holds = True
@@ -94,22 +112,21 @@ def applicable(state, pre, pre_at):  # type: ignore[no-untyped-def]
                 holds = False
                 break
         if holds:
-            found[count] = action
+            actions[count] = action
             count += 1
-    return found[:count]
+    return actions[:count]
 
 
 @njit(
-    "void(uint8[::1], int32[::1], int32[::1], int32[::1], int32[::1], int32[::1], int64, boolean, int64[::1], "
-    "int32[::1])",
-    cache=True,
+    types.void(types.uint8[::1], _EFFECTS, types.int64, types.boolean, types.int64[::1], types.int32[::1]), cache=True
 )
-def costs(state, pre_at, add, add_at, user, user_at, without, use_max, cost, by):  # type: ignore[no-untyped-def]
+def costs(state, effects, without, use_max, cost, by):  # type: ignore[no-untyped-def]
     """Write the cost of every atom when nothing is ever deleted, and the action that gives it so (-1: none).
 
     Sums of precondition costs, or maxima with `use_max`. Actions that add the atom `without` are left out (-1: none).
     Dijkstra with a list of atoms for every whole cost, so that no heap is needed.
     """
+    pre_at, add, add_at, user, user_at = effects
     atoms, actions = len(state), len(pre_at) - 1
     waiting = np.empty(actions, dtype=np.int32)
     total = np.zeros(actions, dtype=np.int64)

@@ -50,8 +50,12 @@ def pose_errors(path: Path, groups: Mapping[str, list[Estimate]]) -> None:
                 axes.plot(
                     [max(record.centre_error_mm, 1e-2) for record in chosen],
                     [max(record.normal_error_deg, 1e-2) for record in chosen],
-                    marker, color=color, markersize=4.5, alpha=0.8, label=f"{name} ({len(chosen)})",
-                )  # fmt: skip
+                    marker,
+                    color=color,
+                    markersize=4.5,
+                    alpha=0.8,
+                    label=f"{name} ({len(chosen)})",
+                )
         axes.plot([1e-2, 1.0, 1.0], [10.0, 10.0, 1e-2], color="#555555", linewidth=0.9, label="grasp tolerance")
         axes.set_xscale("log")
         axes.set_yscale("log")

@@ -23,7 +23,7 @@ class ThreadError:
     p95: float
     length: float
     true_length: float
-    found: float
+    covered: float
 
 
 def resampled(points: np.ndarray, step: float = STEP) -> np.ndarray:
@@ -57,7 +57,7 @@ def thread_metrics(errors: Sequence[ThreadError]) -> dict[str, float]:
     figures = {
         "ours/thread/frames": float(len(errors)),
         "ours/thread/traced": len(traced) / max(1, len(errors)),
-        "ours/thread/found_share": float(np.mean([error.found for error in errors])) if errors else 0.0,
+        "ours/thread/found_share": float(np.mean([error.covered for error in errors])) if errors else 0.0,
     }
     if traced:
         figures["ours/thread/distance_mm"] = 1000 * float(np.median([error.median for error in traced]))
@@ -77,6 +77,6 @@ def thread_rows(errors: Sequence[ThreadError]) -> list[str]:
     for index, error in enumerate(errors):
         lines.append(
             f"| {index} | {1000 * error.median:.2f} / {1000 * error.p95:.2f} | {1000 * error.length:.0f} "
-            f"| {1000 * error.true_length:.0f} | {100 * error.found:.0f} |"
+            f"| {1000 * error.true_length:.0f} | {100 * error.covered:.0f} |"
         )
     return lines

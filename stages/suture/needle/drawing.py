@@ -58,7 +58,7 @@ def _window(
     """Return first pixel (column, row) and size of the part of the image to show, in the panel's form."""
     rows, columns = np.nonzero(mask)
     places = [np.stack([columns, rows], axis=1).astype(float)]
-    places += [_pixels(rig, known, ARC, eye) for known in (pose, truth) if known is not None]
+    places += [_pixels(rig, drawn, ARC, eye) for drawn in (pose, truth) if drawn is not None]
     points = np.concatenate(places)
     points = points[np.isfinite(points).all(axis=1)]
     limits = np.array([rig.width, rig.height], dtype=float)
@@ -75,7 +75,7 @@ def _window(
 
 def _foot(answer: NeedleEstimate, width: int) -> np.ndarray:
     """Return the line below both eyes: how sure the pose is, or why it is not answered."""
-    text, colour = said(answer), RED if answer.abstained else WHITE
+    text, colour = estimate_text(answer), RED if answer.abstained else WHITE
     foot = np.full((FOOT, width, 3), 25, np.uint8)
     cv2.putText(
         foot,
@@ -90,7 +90,7 @@ def _foot(answer: NeedleEstimate, width: int) -> np.ndarray:
     return foot
 
 
-def said(answer: NeedleEstimate) -> str:
+def estimate_text(answer: NeedleEstimate) -> str:
     """Return an estimate in one line: where the centre is, how sure that is, how sure the tip; or the abstention."""
     if answer.abstained or answer.pose is None:
         return answer.abstained or "no pose"

@@ -157,9 +157,9 @@ def _fine(rig: StereoRig, sheets: tuple[Sheet, Sheet], finalists: list[Outline])
     """Return every finalist fitted closely, and again with tip and swage exchanged; none like another."""
     outlines: list[Outline] = []
     for finalist in finalists:
-        one = fit_outline(rig, sheets, finalist.pose, finalist.shift, NARROW_LEVELS, POLISH)
-        other = fit_outline(rig, sheets, one.pose.swapped(), one.shift, NARROW_LEVELS, POLISH)
-        for outline in (one, other):
+        fitted = fit_outline(rig, sheets, finalist.pose, finalist.shift, NARROW_LEVELS, POLISH)
+        exchanged = fit_outline(rig, sheets, fitted.pose.swapped(), fitted.shift, NARROW_LEVELS, POLISH)
+        for outline in (fitted, exchanged):
             if not any(_near(difference(outline.pose, rival.pose), ALIKE) for rival in outlines):
                 outlines.append(outline)
     return outlines

@@ -12,10 +12,10 @@ from stages.suture.rig import NeedlePose
 
 def as_estimate_record(answer: NeedleEstimate) -> NeedleEstimateRecord:
     """Return the record of an estimate; an infinite covariance becomes None."""
-    known = bool(np.isfinite(answer.covariance).all())
+    bounded = bool(np.isfinite(answer.covariance).all())
     return NeedleEstimateRecord(
         camera_from_needle=None if answer.pose is None else as_transform(answer.pose.camera_from_needle),
-        covariance=tuple(tuple(float(x) for x in row) for row in answer.covariance) if known else None,
+        covariance=tuple(tuple(float(x) for x in row) for row in answer.covariance) if bounded else None,
         tip_probability=float(answer.tip_probability),
         abstained=answer.abstained,
     )

@@ -57,9 +57,9 @@ def thesis_estimate(observation: NeedleObservation, seed: int = 0) -> NeedleEsti
 def thesis_average(estimates: Sequence[NeedleEstimate], motions: Sequence[np.ndarray]) -> NeedleEstimate:
     """Return the mean of the thesis's estimates carried to the last frame: the thesis averages ten normals."""
     poses = [
-        NeedlePose(motion @ one.pose.camera_from_needle)
-        for one, motion in zip(estimates, motions, strict=True)
-        if one.pose is not None
+        NeedlePose(motion @ estimate.pose.camera_from_needle)
+        for estimate, motion in zip(estimates, motions, strict=True)
+        if estimate.pose is not None
     ]
     if not poses:
         return NeedleEstimate.none("No frame shows the needle.")

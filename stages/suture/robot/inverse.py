@@ -21,7 +21,6 @@ from stages.suture.robot.psm import (
     within_limits,
 )
 
-BRANCHES = 8
 SMALLEST = 1e-9
 
 
@@ -48,7 +47,7 @@ def branches(base_from_tip: np.ndarray, flips: tuple[bool, ...] = (False, True))
     length = np.linalg.norm(across, axis=-1, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):
         across = np.where(length > SMALLEST, across / length, np.nan)
-        found = []
+        branches = []
         for side in (1.0, -1.0):
             link = side * across
             pitch_point = yaw_point - PITCH_TO_YAW * link
@@ -57,8 +56,8 @@ def branches(base_from_tip: np.ndarray, flips: tuple[bool, ...] = (False, True))
             for way in (1.0, -1.0):
                 shaft = way * pitch_point / reach[..., None]
                 for flip in flips:
-                    found.append(_branch(wrist, link, yaw_axis, shaft, way * reach, flip))
-    return np.stack(found, axis=-2)
+                    branches.append(_branch(wrist, link, yaw_axis, shaft, way * reach, flip))
+    return np.stack(branches, axis=-2)
 
 
 def _branch(

@@ -101,15 +101,15 @@ def matched(
         costs = np.concatenate([arrived, costs[carried] + UNSEEN_COST])
         costs = costs - costs.min()
     state = int(np.argmin(costs))
-    found = []
+    matches = []
     for index in range(len(at) - 1, -1, -1):
         if chosen[index][state] >= 0:
-            found.append((int(at[index]), float(disparities[index][state]), int(chosen[index][state])))
+            matches.append((int(at[index]), float(disparities[index][state]), int(chosen[index][state])))
         state = int(back[index][state])
-    found.reverse()
-    if not found:
+    matches.reverse()
+    if not matches:
         return np.empty(0, dtype=int), np.empty(0), np.empty(0)
-    indices, values, numbers = (np.array(column) for column in zip(*found, strict=True))
+    indices, values, numbers = (np.array(column) for column in zip(*matches, strict=True))
     return indices, values, np.abs(places.directions[numbers, 1])
 
 

@@ -48,10 +48,10 @@ class Path:
     left_over: float
 
 
-def followed(found: Sequence[Strand], start: np.ndarray | None) -> Path | None:
+def followed(strands: Sequence[Strand], start: np.ndarray | None) -> Path | None:
     """Return the thread's path from `start` (2,) [px] on, or, without one, of the longest strand and what continues it
     on both sides; None where no strand is long enough, or none begins near the start."""
-    free = [strand for strand in found if strand.length >= SHORTEST]
+    free = [strand for strand in strands if strand.length >= SHORTEST]
     if not free:
         return None
     if start is None:
@@ -99,7 +99,7 @@ def _beginnings(free: list[Strand], start: np.ndarray) -> list[tuple[Strand, lis
         if MARGIN < middle < last - MARGIN:
             places += [(float(distances[middle]) + CUT, index, middle, way) for way in (1, -1)]
     nearest = min(place[0] for place in places)
-    found = []
+    beginnings = []
     for distance, index, place, way in sorted(places):
         if distance > min(nearest + MARGIN, FIRST_GAP):
             break
@@ -110,8 +110,8 @@ def _beginnings(free: list[Strand], start: np.ndarray) -> list[tuple[Strand, lis
         else:
             first = Strand(strand.points[: place + 1], tuple(d for d in strand.doubts if d <= place)).reversed()
         if first.length >= SHORTEST:
-            found.append((first, [other for k, other in enumerate(free) if k != index], distance))
-    return found
+            beginnings.append((first, [other for k, other in enumerate(free) if k != index], distance))
+    return beginnings
 
 
 def _continued(first: Strand, free: list[Strand]) -> tuple[list[Strand], list[float], int]:
@@ -158,8 +158,8 @@ def _cost(before: np.ndarray, after: np.ndarray) -> float:
     return min(distance / GAP_UNIT + _angle(leaving, along) + _angle(along, arriving), fold)
 
 
-def _angle(one: np.ndarray, other: np.ndarray) -> float:
-    return float(np.arccos(np.clip(one @ other, -1.0, 1.0)))
+def _angle(leaving: np.ndarray, arriving: np.ndarray) -> float:
+    return float(np.arccos(np.clip(leaving @ arriving, -1.0, 1.0)))
 
 
 def _bridge(before: np.ndarray, after: np.ndarray) -> np.ndarray:

@@ -49,9 +49,7 @@ def thinned(mask: np.ndarray) -> np.ndarray:
         changed = False
         for odd in (False, True):
             n, ne, e, se, s, sw, w, nw = (flat[pixels + step] for step in steps)
-            crossings = (
-                (~n & (ne | e)).astype(int) + (~e & (se | s)) + (~s & (sw | w)) + (~w & (nw | n))
-            )  # fmt: skip
+            crossings = (~n & (ne | e)).astype(int) + (~e & (se | s)) + (~s & (sw | w)) + (~w & (nw | n))
             first = (nw | n).astype(int) + (ne | e) + (se | s) + (sw | w)
             second = (n | ne).astype(int) + (e | se) + (s | sw) + (w | nw)
             neighbours = np.minimum(first, second)
@@ -142,16 +140,20 @@ def _joined(chains: list[list[int]]) -> list[list[int]]:
             for end in {chain[0], chain[-1]}:
                 at.setdefault(end, []).append(index)
         pair = next(
-            (found for found in at.values() if len(found) == 2 and all(chains[k][0] != chains[k][-1] for k in found)),
+            (
+                meeting
+                for meeting in at.values()
+                if len(meeting) == 2 and all(chains[k][0] != chains[k][-1] for k in meeting)
+            ),
             None,
         )
         if pair is None:
             return chains
-        one, other = chains[pair[0]], chains[pair[1]]
-        shared = ({one[0], one[-1]} & {other[0], other[-1]}).pop()
-        one = one if one[-1] == shared else one[::-1]
-        other = other if other[0] == shared else other[::-1]
-        chains = [chain for index, chain in enumerate(chains) if index not in pair] + [one + other[1:]]
+        before, after = chains[pair[0]], chains[pair[1]]
+        shared = ({before[0], before[-1]} & {after[0], after[-1]}).pop()
+        before = before if before[-1] == shared else before[::-1]
+        after = after if after[0] == shared else after[::-1]
+        chains = [chain for index, chain in enumerate(chains) if index not in pair] + [before + after[1:]]
 
 
 def _centred(mask: np.ndarray, line: np.ndarray, pixels: np.ndarray) -> np.ndarray:

@@ -73,9 +73,9 @@ def strands(stretches: list[Stretch]) -> list[Strand]:
     onward: dict[End, tuple[End, bool, np.ndarray]] = {}
     for name, ends in branches.items():
         via = next((stretches[k].points for k, names in shared.items() if name in names), np.empty((0, 2)))
-        for one, other, doubtful in _paired(stretches, ends):
-            onward[one] = (other, doubtful, _toward(via, stretches, one))
-            onward[other] = (one, doubtful, _toward(via, stretches, other))
+        for incoming, outgoing, doubtful in _paired(stretches, ends):
+            onward[incoming] = (outgoing, doubtful, _toward(via, stretches, incoming))
+            onward[outgoing] = (incoming, doubtful, _toward(via, stretches, outgoing))
     outer = [index for index in range(len(stretches)) if index not in inner and index not in shared]
     return sorted(_walks(stretches, outer, onward), key=lambda strand: -strand.length)
 
@@ -106,7 +106,7 @@ def _shared(stretches: list[Stretch], crossing: dict[int, int], inner: set[int])
             for end, node in enumerate((stretch.first, stretch.last)):
                 if node >= 0:
                     ends.setdefault(crossing[node], []).append((index, end))
-    found: dict[int, tuple[int, int]] = {}
+    shared: dict[int, tuple[int, int]] = {}
     taken: set[int] = set()
     for index, stretch in enumerate(stretches):
         if index in inner or stretch.first < 0 or stretch.last < 0 or stretch.length > LONGEST_SHARED:
@@ -115,13 +115,13 @@ def _shared(stretches: list[Stretch], crossing: dict[int, int], inner: set[int])
         if first == last or first in taken or last in taken:
             continue
         if all(_is_fork(stretches, ends[name], index) for name in (first, last)):
-            found[index] = (first, last)
+            shared[index] = (first, last)
             taken |= {first, last}
-    for first, last in found.values():
+    for first, last in shared.values():
         for node, name in crossing.items():
             if name == last:
                 crossing[node] = first
-    return found
+    return shared
 
 
 def _is_fork(stretches: list[Stretch], ends: list[End], stem: int) -> bool:
@@ -135,15 +135,15 @@ def _is_fork(stretches: list[Stretch], ends: list[End], stem: int) -> bool:
     return all(_turn(directions[stem], arm) < LARGEST_TURN for arm in arms) and _turn(*arms) > np.radians(100.0)
 
 
-def _turn(one: np.ndarray, other: np.ndarray) -> float:
+def _turn(incoming: np.ndarray, outgoing: np.ndarray) -> float:
     """Return the angle [rad] by which a line turns that comes in along one branch and leaves along another."""
-    return float(np.arccos(np.clip(-(one @ other), -1.0, 1.0)))
+    return float(np.arccos(np.clip(-(incoming @ outgoing), -1.0, 1.0)))
 
 
 def _paired(stretches: list[Stretch], ends: list[End]) -> Iterator[tuple[End, End, bool]]:
     """Yield pairs of branches that are one thread, and whether that is in doubt."""
     directions = [outward(stretches[index].points, end) for index, end in ends]
-    turns = np.array([[_turn(one, other) for other in directions] for one in directions])
+    turns = np.array([[_turn(incoming, outgoing) for outgoing in directions] for incoming in directions])
     # a thread has two ends: it does not run in a ring, and a ring's two branches are not left alone
     stretch = np.array([index for index, _ in ends])
     same = stretch[:, None] == stretch[None]
@@ -159,9 +159,7 @@ def _paired(stretches: list[Stretch], ends: list[End]) -> Iterator[tuple[End, En
         return
     costs = sorted(_matchings(tuple(range(len(ends))), turns, alone), key=lambda matching: matching[0])
     best = costs[0][1]
-    doubtful = {
-        pair for pair in best for cost, other in costs[1:] if cost - costs[0][0] < CLOSE and pair not in other
-    }  # fmt: skip
+    doubtful = {pair for pair in best for cost, other in costs[1:] if cost - costs[0][0] < CLOSE and pair not in other}
     for i, j in best:
         yield ends[i], ends[j], (i, j) in doubtful
 

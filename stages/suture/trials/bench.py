@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stages.kit.geometry.transforms import inverse, transform_from
-from stages.suture.motion.needle import ARC_POINTS, SWAGE, about, point_at, turned, upright
+from stages.suture.motion.needle import SWAGE, about, point_at, turned, upright
 from stages.suture.motion.primitives import jaws, straight
 from stages.suture.robot.arms import ARMS
 from stages.suture.trials.perception import Looking, Seen
 from stages.suture.trials.recording import Recorder
 from stages.suture.trials.rope import PARTICLES, drape, winding
-from stages.suture.trials.settings import Policy, World
+from stages.suture.trials.settings import World
 from stages.suture.trials.thread import Drawn, Thread, draw
 from stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT
 
@@ -26,9 +26,6 @@ CORNER = transform_from(jaws(np.array([1.0, 0.0, 0.0])), np.array([-0.045, -0.03
 SHAFT, SHAFT_RADIUS = 0.06, 0.004
 TURNING_RADIUS = 0.02
 SETTLING = 30
-PASSES = 0.010
-"""A needle seen farther than this [m] from where it must be is not believed: jaws are 12 mm deep, and thread that pulls
-turns a needle about their middle."""
 CHECKED_EVERY = 5
 """Every so many poses of a path the arm is asked whether it reaches them, and at the last."""
 
@@ -54,7 +51,6 @@ class Hold:
 class Bench:
     """A trial's world. Every length in metres, world frame of stages/suture/robot/arms.py."""
 
-    policy: Policy
     world: World
     eyes: Looking
     random: np.random.Generator
@@ -114,36 +110,13 @@ class Bench:
         """Move a driver straight to a pose (4, 4)."""
         self.move(arm, straight(self.tools[arm], pose), bar)
 
-    def withdraw(self, arm: str, pose: np.ndarray) -> None:
-        """Take an empty driver away, while the other one goes on where the policy moves both at once."""
-        self.move(arm, straight(self.tools[arm], pose), aside=self.policy.moves_both)
-
-    def wait_at(self, arm: str, pose: np.ndarray) -> None:
-        """Send an empty driver to where it will be wanted, if the policy moves both drivers at once."""
-        if self.policy.moves_both:
-            self.withdraw(arm, pose)
-
-    def look(self, place: str, where: np.ndarray | None = None) -> Seen | None:
-        """Return one estimate of the needle in the robot's frame as it believes it (with the hand-eye error).
-
-        `where` (K, 3) [m]: points of which one must lie on the needle, else a policy that checks does not believe it.
-        """
+    def look(self, place: str) -> Seen | None:
+        """Return one estimate of the needle in the robot's frame as it believes it (with the hand-eye error)."""
         self.seconds += self.eyes.model.seconds_an_estimate
         seen = self.eyes.look(self.needle, place)
         if seen is None:
             return None
-        seen = Seen(seen.normal, seen.tip + self.hand_eye, seen.swage + self.hand_eye, seen.right)
-        if where is not None and self.policy.checks_place and not passes(seen, where):
-            return None
-        return seen
-
-    def look_until(self, place: str, most: int = 10, where: np.ndarray | None = None) -> Seen | None:
-        """Look again while the needle cannot be known, at most `most` times; None then."""
-        for _ in range(most):
-            seen = self.look(place, where)
-            if seen is not None:
-                return seen
-        return None
+        return Seen(seen.normal, seen.tip + self.hand_eye, seen.swage + self.hand_eye, seen.right)
 
     def jaws(self, arm: str) -> np.ndarray:
         """Return the point (1, 3) [m] between a driver's jaws."""
@@ -240,16 +213,15 @@ class Bench:
         first = swages if self.anchor is None else np.repeat(self.anchor[None], steps, axis=0)
         rest = np.full(steps, self.thread.working)
         drape(
-            self.rope, rest, np.ascontiguousarray(first), np.ascontiguousarray(swages), self.anchor is not None,
-            capsules, RIDGE_HALF_WIDTH, RIDGE_HEIGHT,
-        )  # fmt: skip
-
-
-def passes(seen: Seen, where: np.ndarray) -> bool:
-    """Whether a seen needle goes through one of the points (K, 3) [m]."""
-    pose = seen.pose
-    arc = ARC_POINTS @ pose[:3, :3].T + pose[:3, 3]
-    return bool(np.linalg.norm(arc[:, None] - where[None], axis=2).min() < PASSES)
+            self.rope,
+            rest,
+            np.ascontiguousarray(first),
+            np.ascontiguousarray(swages),
+            self.anchor is not None,
+            capsules,
+            RIDGE_HALF_WIDTH,
+            RIDGE_HEIGHT,
+        )
 
 
 def travel_time(path: np.ndarray, speed: float) -> float:

@@ -21,9 +21,14 @@ from stages.suture.trials.recording import ARM_ORDER  # noqa: E402
 from stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT, SUTURES, entry, exit_  # noqa: E402
 
 COLORS = {
-    "right driver": "#2f6fb3", "left driver": "#4d9a6a", "needle": "#b0413e", "tip": "#e08a2e", "thread": "#7a4fb0",
-    "wound": "#e8c9b5", "holes": "#8a5a44",
-}  # fmt: skip
+    "right driver": "#2f6fb3",
+    "left driver": "#4d9a6a",
+    "needle": "#b0413e",
+    "tip": "#e08a2e",
+    "thread": "#7a4fb0",
+    "wound": "#e8c9b5",
+    "holes": "#8a5a44",
+}
 MILLIMETRES = np.array([-1000.0, -1000.0, 1000.0])
 """Seen as by one who stands at the cameras, which look along -y: x runs to the left, away is up."""
 VIEWS = ((0, 2, "from the cameras"), (0, 1, "from above"))
@@ -63,10 +68,18 @@ def draw_strip(path: Path, frames: Mapping[str, np.ndarray], suture: int | None 
             f"{frames['panel'][row]}\n{float(frames['seconds'][row]):.0f} s", fontsize=8, loc="left"
         )
     handles = [
-        Line2D([], [], color=color, marker="o" if name in ("tip", "holes") else None, markersize=3,
-               linestyle="none" if name in ("tip", "holes") else "-", linewidth=5 if name == "wound" else 2, label=name)
+        Line2D(
+            [],
+            [],
+            color=color,
+            marker="o" if name in ("tip", "holes") else None,
+            markersize=3,
+            linestyle="none" if name in ("tip", "holes") else "-",
+            linewidth=5 if name == "wound" else 2,
+            label=name,
+        )
         for name, color in COLORS.items()
-    ]  # fmt: skip
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(COLORS), 2 * columns), fontsize=7)
     figure.savefig(path, dpi=110, metadata={"Software": None})
     plt.close(figure)

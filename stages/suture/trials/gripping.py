@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.kit.geometry.transforms import inverse, transform_from
-from stages.suture.motion.needle import ARC, ARC_POINTS, ARC_TANGENTS, about
+from stages.suture.motion.needle import ARC_POINTS, ARC_TANGENTS, about
 from stages.suture.rig import NEEDLE_RADIUS
 from stages.suture.trials.settings import World
 
@@ -19,7 +19,6 @@ class Closing:
 
     caught: np.ndarray | None
     quality: float
-    arc_angle: float
     shift: float
     touched: bool
 
@@ -39,7 +38,7 @@ def close(tool: np.ndarray, needle: np.ndarray, world: World, random: np.random.
     between = np.abs(points[:, 1]) <= opening
     if not (level & deep & between).any():
         near = np.abs(points[:, 1]) <= opening + 0.002
-        return Closing(None, 0.0, 0.0, 0.0, bool((level & deep & near).any()))
+        return Closing(None, 0.0, 0.0, bool((level & deep & near).any()))
     rows = np.flatnonzero(level & deep & between)
     row = int(rows[np.argmin(np.abs(points[rows, 2]) + np.abs(points[rows, 0]))])
     point, tangent = points[row], tool_from_needle[:3, :3] @ ARC_TANGENTS[row]
@@ -58,7 +57,7 @@ def close(tool: np.ndarray, needle: np.ndarray, world: World, random: np.random.
     flatness = abs(float(flat[0]))
     quality = (1.0 - 0.5 * abs(point[0]) / world.jaw_half_width) * (1.0 - 0.4 * abs(point[2]) / world.jaw_half_depth)
     shift = abs(float(point[1])) + NEEDLE_RADIUS * sine
-    return Closing(tool @ held, quality * (0.6 + 0.4 * flatness), float(ARC[row]), shift, True)
+    return Closing(tool @ held, quality * (0.6 + 0.4 * flatness), shift, True)
 
 
 def thread_between(tool: np.ndarray, rope: np.ndarray, world: World) -> bool:

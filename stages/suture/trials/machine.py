@@ -9,12 +9,13 @@ import numpy as np
 
 from stages.suture.motion.constants import THROWS, cinch_length
 from stages.suture.trials.bench import CORNER, HOME, Bench, Failed, loaded
-from stages.suture.trials.extraction import cinch, extract, sweep
+from stages.suture.trials.extraction import cinch, extract
 from stages.suture.trials.handover import hand_over
-from stages.suture.trials.insertion import corrected, insert, uncorrected
+from stages.suture.trials.insertion import insert
 from stages.suture.trials.perception import FOLDER, Eyes, Looking, PerceptionModel, perception_model
+from stages.suture.trials.policy import Policy
 from stages.suture.trials.recording import Recorder
-from stages.suture.trials.settings import Policy, World
+from stages.suture.trials.settings import World
 from stages.suture.trials.thread import LEFT_IN_FIRST_HOLE, Thread
 from stages.suture.trials.wound import exit_
 
@@ -71,9 +72,15 @@ def run_trial(
     hand_eye = world.hand_eye * given.standard_normal(3)
     needle, hold = loaded(world, given)
     bench = Bench(
-        policy, world, eyes or Eyes(model, np.random.default_rng([seed, 2])), np.random.default_rng([seed, 1]),
-        hand_eye, Thread(length), needle, hold, recorder,
-    )  # fmt: skip
+        world=world,
+        eyes=eyes or Eyes(model, np.random.default_rng([seed, 2])),
+        random=np.random.default_rng([seed, 1]),
+        hand_eye=hand_eye,
+        thread=Thread(length),
+        needle=needle,
+        hold=hold,
+        recorder=recorder,
+    )
     if eyes is not None:
         eyes.watch(bench)
     bench.tools["right"] = CORNER.copy()
@@ -83,7 +90,7 @@ def run_trial(
         outcome.attempts += 1
         thrown = bench.suture
         try:
-            throw(bench, outcome)
+            throw(bench, policy, outcome)
         except Failed as failure:
             outcome.errors.append((failure.kind, failure.reason))
             outcome.error_places.append((thrown, bench.seconds))
@@ -91,7 +98,7 @@ def run_trial(
             if outcome.interventions >= policy.interventions:
                 break
             outcome.interventions += 1
-            recover(bench, given, thrown)
+            recover(bench, policy, given, thrown)
             bench.record("supervisor")
     outcome.seconds = bench.seconds
     outcome.looks, outcome.right, outcome.abstained = bench.eyes.looks, bench.eyes.right, bench.eyes.abstained
@@ -101,25 +108,25 @@ def run_trial(
     return outcome
 
 
-def throw(bench: Bench, outcome: Outcome) -> None:
+def throw(bench: Bench, policy: Policy, outcome: Outcome) -> None:
     """One suture: insertion, sweep and extraction with cinching, handover; then the pose correction of the next.
 
     The state machine enters at pose correction, where the needle is first seen.
     """
-    insert(bench, corrected(bench) if bench.policy.corrects else uncorrected(bench))
-    if bench.policy.sweeps:
-        sweep(bench)
-    extract(bench)
-    cinch(bench)
+    belief = policy.pose_correction.believed(bench, policy.trust)
+    insert(bench, belief, policy.coordination)
+    policy.sweep.sweep(bench, policy.coordination)
+    extract(bench, policy)
+    cinch(bench, policy)
     outcome.sutures += 1
     bench.suture += 1
-    hand_over(bench)
+    hand_over(bench, policy)
     if bench.tangled("right"):
         raise Failed("T", "thread is wound about the right driver")
     outcome.sutures_neutral += 1
 
 
-def recover(bench: Bench, random: np.random.Generator, thrown: int) -> None:
+def recover(bench: Bench, policy: Policy, random: np.random.Generator, thrown: int) -> None:
     """The scripted supervisor: one motion that puts the needle back into the right driver in the corner, clears the
     thread, and draws it to the cinch length of the stitch before where there is any. A stitch that was made stays;
     one that was not is made anew.
@@ -132,7 +139,7 @@ def recover(bench: Bench, random: np.random.Generator, thrown: int) -> None:
     thread = bench.thread
     thread.through = made + 1
     if made >= 0:
-        wanted = cinch_length(made, bench.policy.constants)
+        wanted = cinch_length(made, policy.constants)
         more = min(max(0.0, wanted - thread.working), max(0.0, thread.tail - LEFT_IN_FIRST_HOLE))
         thread.working, thread.tail = thread.working + more, thread.tail - more
         bench.tail_reckoned -= more

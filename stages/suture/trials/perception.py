@@ -6,7 +6,6 @@ often, their fate: a highlight or a thread in front of the needle does not go aw
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -16,6 +15,7 @@ from pydantic import Field, ValidationError
 
 from schemas.base import Model
 from schemas.errors import BadInput
+from schemas.outside import file_toml
 from stages.suture.motion.needle import SWAGE, TIP, from_ends
 
 FOLDER = Path(__file__).resolve().parents[3] / "data" / "stitch"
@@ -64,8 +64,8 @@ class PerceptionModel(Model):
 def perception_model(path: Path) -> PerceptionModel:
     """Read an error model (TOML). Raises BadInput when the file is not one."""
     try:
-        return PerceptionModel.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, tomllib.TOMLDecodeError, ValidationError) as error:
+        return PerceptionModel.model_validate(file_toml(path))
+    except (BadInput, ValidationError) as error:
         reason = " ".join(str(error).split())[:200]
         if isinstance(error, ValidationError):
             first = error.errors()[0]
@@ -86,6 +86,16 @@ class Seen:
     def pose(self) -> np.ndarray:
         """The needle's pose (4, 4) that the estimate amounts to."""
         return from_ends(self.normal, self.tip, self.swage)
+
+
+def nearer_end(seen: Seen, driver: np.ndarray) -> np.ndarray:
+    """Return the end (3,) of a seen needle that is nearer to a driver at (3,)."""
+    return min((seen.tip, seen.swage), key=lambda end: float(np.linalg.norm(end - driver)))
+
+
+def farther_end(seen: Seen, driver: np.ndarray) -> np.ndarray:
+    """Return the end (3,) of a seen needle that is farther from a driver at (3,)."""
+    return max((seen.tip, seen.swage), key=lambda end: float(np.linalg.norm(end - driver)))
 
 
 class Looking(Protocol):

@@ -1,10 +1,8 @@
-"""What a trial runs with: the arm's policy, the world's free parameters."""
+"""The world's free parameters."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-
-from stages.suture.motion.constants import OpenConstants
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
@@ -63,64 +61,3 @@ class World:
     """Tool speed [m/s]; a turn of the tool counts by its arc at 20 mm."""
     overhead: float = 4.0
     """Seconds that every primitive takes besides moving and seeing (planning, settling, jaws)."""
-
-
-@dataclass(frozen=True)
-class Policy:
-    """One arm of the experiment."""
-
-    name: str
-    perception: str = "thesis"
-    sweeps: bool = True
-    cinches: bool = True
-    corrects: bool = True
-    interventions: int = 0
-    servoes_ends: bool = False
-    """The last turn of pose correction goes by the seen ends, not by 90 degrees."""
-    keeps_books: bool = False
-    """Cinch lengths come from the thread's seen length, not from constants."""
-    cinches_before_handover: bool = False
-    moves_both: bool = False
-    """A driver that has nothing to hold goes where it will be wanted while the other one works, instead of before or
-    after it; each has its own clock."""
-    checks_place: bool = False
-    """An estimate that does not lie in the jaws that hold the needle, or at the hole it passes, is not believed."""
-    centres_jaws: bool = False
-    """The left jaws close on the wire beside the seen end in their middle, not 5 mm beyond the end; a turn that was
-    cut short is finished, not made again."""
-    expects: bool = False
-    """A needle in tissue that cannot be known is taken to lie as its insertion was planned, at the first try."""
-    watches_slack: bool = False
-    """Looks at the stitch after cinching and pulls on by what is seen to be loose."""
-    fuses_looks: bool = False
-    """Looks from several poses of the driver count together, in its frame."""
-    checks_turn: bool = False
-    """The handover test goes by how far normal and far end turned about the holding driver, over several looks."""
-    retries_when_unchanged: bool = True
-    """The handover test: True retries where the normal did not change (the handover section), False where it did."""
-    constants: OpenConstants = field(default_factory=OpenConstants)
-
-
-OURS = Policy(
-    "ours",
-    perception="ours",
-    servoes_ends=True,
-    keeps_books=True,
-    cinches_before_handover=True,
-    moves_both=True,
-    checks_place=True,
-    centres_jaws=True,
-    expects=True,
-    watches_slack=True,
-    fuses_looks=True,
-    checks_turn=True,
-)
-
-POLICIES = {
-    "sensing_only": Policy("sensing_only", sweeps=False, cinches=False, corrects=False),
-    "thread_handling": Policy("thread_handling", corrects=False),
-    "thesis": Policy("thesis"),
-    "thesis_supervised": Policy("thesis_supervised", interventions=2),
-    "ours": OURS,
-    "ours_supervised": replace(OURS, name="ours_supervised", interventions=2),
-}

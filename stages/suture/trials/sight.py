@@ -127,10 +127,14 @@ def pictured(world: NeedleScene, bench: Bench, needle: np.ndarray, frame: int) -
     pose = NeedlePose(world.camera_from_world @ PICTURED_FROM_TRIAL @ needle)
     held = bench.hold.arm if bench.hold is not None else None
     parts = [
-        driver(PICTURED_FROM_TRIAL @ tool, apply(PICTURED_FROM_TRIAL, REMOTE_CENTRES[name]),
-               HELD_OPEN if name == held else OPEN, BODIES[name])
+        driver(
+            PICTURED_FROM_TRIAL @ tool,
+            apply(PICTURED_FROM_TRIAL, REMOTE_CENTRES[name]),
+            HELD_OPEN if name == held else OPEN,
+            BODIES[name],
+        )
         for name, tool in bench.tools.items()
-    ]  # fmt: skip
+    ]
     fields = {name: getattr(world, name) for name in NeedleScene.__dataclass_fields__}
     scene = TrialScene(**fields, drivers=joined(parts))
     return replace(

@@ -21,7 +21,7 @@ from stages.suture.world.raster import (
     shade,
 )
 from stages.suture.world.scene import NeedleScene
-from stages.suture.world.tubes import LEFT_DRIVER, NEEDLE, RIGHT_DRIVER, THREAD, Tubes
+from stages.suture.world.tubes import NEEDLE, Tubes
 
 SHADOW_SIZE, SHADOW_SCALE, SHADOW_ORIGIN = 800, 2000.0, -0.20
 NEAR = 70
@@ -62,14 +62,6 @@ class StereoView:
     def seen(self) -> float:
         """The smaller of the two eyes' shares of the arc that is seen, 0..1."""
         return float(min(self.left.sees.mean(), self.right.sees.mean()))
-
-    def driver_masks(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return where the left and where the right eye see a driver."""
-        return self.left.mask(LEFT_DRIVER, RIGHT_DRIVER), self.right.mask(LEFT_DRIVER, RIGHT_DRIVER)
-
-    def thread_masks(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return where the left and where the right eye see thread."""
-        return self.left.mask(THREAD), self.right.mask(THREAD)
 
 
 def render(scene: NeedleScene, pictures: bool = True) -> StereoView:

@@ -79,9 +79,9 @@ def grasp(table: Table, name: str, angle: float = 0.0) -> Grasp:
 
 def grasp_two(table: Table, first: str, second: str) -> Grasp:
     """Return the grasp of two things that stand side by side, with their loads."""
-    one, other = table.by_name[first], table.by_name[second]
-    x, y, angle = grasp_centre(one, other)
-    z = min(one.lip, other.lip) - BITE if one.is_dish else 0.0
+    base, beside = table.by_name[first], table.by_name[second]
+    x, y, angle = grasp_centre(base, beside)
+    z = min(base.lip, beside.lip) - BITE if base.is_dish else 0.0
     return Grasp((first, second), (x, y, z), angle)
 
 

@@ -70,12 +70,14 @@ ACTION = Pull
 
 def pull(table: Table, item: str, target: str, rules: Rules) -> Pull:
     """Return the pull of a thing to another."""
-    one = table.by_name[item]
-    x, y, yaw = pull_end(one, table.by_name[target], rules)
-    z = one.position[2] + (one.measures.wall + 0.01 if one.is_dish else 0.0)  # a finger's breadth above the floor
-    angle = atan2(y - one.position[1], x - one.position[0])
-    start, end = (angle, angle) if one.is_dish else (one.yaw + pi / 2, yaw + pi / 2)
-    return Pull(item, target, (one.position[0], one.position[1], z), start, (x, y, z), end)
+    pulled = table.by_name[item]
+    x, y, yaw = pull_end(pulled, table.by_name[target], rules)
+    z = pulled.position[2] + (
+        pulled.measures.wall + 0.01 if pulled.is_dish else 0.0
+    )  # a finger's breadth above the floor
+    angle = atan2(y - pulled.position[1], x - pulled.position[0])
+    start, end = (angle, angle) if pulled.is_dish else (pulled.yaw + pi / 2, yaw + pi / 2)
+    return Pull(item, target, (pulled.position[0], pulled.position[1], z), start, (x, y, z), end)
 
 
 def after_pull(table: Table, action: Pull, error: tuple[float, float] = (0.0, 0.0)) -> Table:

@@ -91,7 +91,7 @@ def plan(
         if _cost(other, worth) > limit:
             break
         plans.append(other)
-    return min(plans, key=lambda one: (round(one.expected_trips, 6), _cost(one, worth)))
+    return min(plans, key=lambda plan: (round(plan.expected_trips, 6), _cost(plan, worth)))
 
 
 def _alone(policy: Policy, table: Table, model: TimeModel, chances: Chances, likely: float = 1.0) -> float:

@@ -24,22 +24,22 @@ from stages.tableware.world.items import Item, Table
 def impossible_pairs(table: Table, rules: Rules) -> tuple[ImpossiblePair, ...]:
     """Return for every two piles of a table which primitive is not possible as they stand, and why. A pull and a
     stacking are named for the pile that would move first; a multi-object grasp once."""
-    found = []
-    for row, one in enumerate(table.stacks):
+    reasons = []
+    for row, pile in enumerate(table.stacks):
         for column, other in enumerate(table.stacks):
-            if one is other:
+            if pile is other:
                 continue
             if row < column:
-                found.append(_multi_grasp(table, one, other, rules))
-            found.append(_pull(table, one, other, rules))
-            found.append(_stack(one, other, rules))
-    return tuple(reason for reason in found if reason is not None)
+                reasons.append(_multi_grasp(table, pile, other, rules))
+            reasons.append(_pull(table, pile, other, rules))
+            reasons.append(_stack(pile, other, rules))
+    return tuple(reason for reason in reasons if reason is not None)
 
 
-def _two_piles(one: tuple[Item, ...], other: tuple[Item, ...], rules: Rules) -> tuple[str, str] | None:
+def _two_piles(pile: tuple[Item, ...], other: tuple[Item, ...], rules: Rules) -> tuple[str, str] | None:
     """Return kind and words of why one grasp does not hold two piles that stand side by side."""
-    first, second = letters(one), letters(other)
-    if one[0].is_dish != other[0].is_dish:
+    first, second = letters(pile), letters(other)
+    if pile[0].is_dish != other[0].is_dish:
         return "unlike", "a dish and a utensil are not grasped side by side"
     if not (can_hold(first, rules) and can_hold(second, rules)):
         return "too_tall", f"a pile of them is higher than jaws of {1e3 * rules.jaw_height:.0f} mm hold"
@@ -60,9 +60,9 @@ def _blocked(covers: tuple[Footprint, ...], table: Table, names: set[str]) -> tu
     return None
 
 
-def _multi_grasp(table: Table, one: tuple[Item, ...], other: tuple[Item, ...], rules: Rules) -> ImpossiblePair | None:
-    first, second = one[0], other[0]
-    why: tuple[str, str] | tuple[str, str, tuple[str, ...]] | None = _two_piles(one, other, rules)
+def _multi_grasp(table: Table, pile: tuple[Item, ...], other: tuple[Item, ...], rules: Rules) -> ImpossiblePair | None:
+    first, second = pile[0], other[0]
+    why: tuple[str, str] | tuple[str, str, tuple[str, ...]] | None = _two_piles(pile, other, rules)
     if why is None and not within_jaws(first, second, rules):
         between = 1e3 * gap(footprint(first), footprint(second))
         why = (
@@ -76,10 +76,10 @@ def _multi_grasp(table: Table, one: tuple[Item, ...], other: tuple[Item, ...], r
     return _pair("multi_grasp", first, second, why)
 
 
-def _pull(table: Table, one: tuple[Item, ...], other: tuple[Item, ...], rules: Rules) -> ImpossiblePair | None:
-    first, second = one[0], other[0]
-    why: tuple[str, str] | tuple[str, str, tuple[str, ...]] | None = _two_piles(one, other, rules)
-    if why is None and len(one) > 1 and not rules.loaded_pulls:
+def _pull(table: Table, pile: tuple[Item, ...], other: tuple[Item, ...], rules: Rules) -> ImpossiblePair | None:
+    first, second = pile[0], other[0]
+    why: tuple[str, str] | tuple[str, str, tuple[str, ...]] | None = _two_piles(pile, other, rules)
+    if why is None and len(pile) > 1 and not rules.loaded_pulls:
         why = "loaded", f"{first.name} carries others and loaded pulls are off"
     if why is None and not footprint(first, *pull_end(first, second, rules)).on_table:
         why = "off_table", f"beside {second.name} it would hang over the table's edge"
@@ -88,9 +88,9 @@ def _pull(table: Table, one: tuple[Item, ...], other: tuple[Item, ...], rules: R
     return _pair("pull", first, second, why)
 
 
-def _stack(one: tuple[Item, ...], other: tuple[Item, ...], rules: Rules) -> ImpossiblePair | None:
-    first, top = one[0], other[-1]
-    upper, lower = letters(one), letters(other)
+def _stack(pile: tuple[Item, ...], other: tuple[Item, ...], rules: Rules) -> ImpossiblePair | None:
+    first, top = pile[0], other[-1]
+    upper, lower = letters(pile), letters(other)
     if can_stack(upper, lower, rules):
         return None
     why = "too_tall", f"the pile would be higher than jaws of {1e3 * rules.jaw_height:.0f} mm hold"
@@ -112,6 +112,10 @@ def _pair(
         return None
     objects = why[2] if len(why) == 3 else ()
     return ImpossiblePair(
-        primitive=primitive, first=first.name, second=second.name, kind=why[0], objects=objects,  # type: ignore[arg-type]
+        primitive=primitive,  # type: ignore[arg-type]
+        first=first.name,
+        second=second.name,
+        kind=why[0],
+        objects=objects,
         message=f"{first.name} and {second.name}: {why[1]}",
-    )  # fmt: skip
+    )

@@ -56,27 +56,30 @@ def accept(
         )
     refused = [
         RefusedItem(
-            name=one.name, position=(one.x, one.y, 0.0), radius=one.radius, reason="unknown_object",
-            message=f"{one.name}: no tableware of known size, {1e3 * one.radius:.0f} mm around",
+            name=thing.name,
+            position=(thing.x, thing.y, 0.0),
+            radius=thing.radius,
+            reason="unknown_object",
+            message=f"{thing.name}: no tableware of known size, {1e3 * thing.radius:.0f} mm around",
         )
-        for one in unknown
-    ]  # fmt: skip
+        for thing in unknown
+    ]
     kept: list[Item] = []
     for pile in table.stacks:
-        wrong = [found for item in pile if (found := _wrong(item, doubts.get(item.name), least)) is not None]
+        wrong = [refusal for item in pile if (refusal := _wrong(item, doubts.get(item.name), least)) is not None]
         if not wrong and not can_hold(letters(pile[-1:]), rules):
             wrong = [_refusal(pile[-1], "too_tall_to_lift", "the jaws do not hold it")]
         if not wrong:
             kept.extend(pile)
             continue
-        names = {one.name for one in wrong}
+        names = {refusal.name for refusal in wrong}
         refused.extend(wrong)
         refused.extend(
             _refusal(item, "in_a_refused_pile", f"stands in a pile with {wrong[0].name}")
             for item in pile
             if item.name not in names
         )
-    circles = tuple((one.position[0], one.position[1], one.radius) for one in refused)
+    circles = tuple((refusal.position[0], refusal.position[1], refusal.radius) for refusal in refused)
     order = {item.name: number for number, item in enumerate(table.items)}
     return Accepted(Table(tuple(sorted(kept, key=lambda item: order[item.name])), circles), tuple(refused))
 
@@ -86,8 +89,8 @@ def _wrong(item: Item, doubt: Doubt | None, least: float) -> RefusedItem | None:
     if item.on is None and not Footprint(place.start, place.end, place.radius - EDGE).on_table:
         where = f"at ({item.position[0]:.3f}, {item.position[1]:.3f}) m"
         return _refusal(item, "outside_workspace", f"{where}, hangs over the edge of the workspace")
-    known = MEASURES[item.kind]
-    if abs(item.measures.rim_radius - known.rim_radius) > SIZE or abs(item.measures.height - known.height) > SIZE:
+    usual = MEASURES[item.kind]
+    if abs(item.measures.rim_radius - usual.rim_radius) > SIZE or abs(item.measures.height - usual.height) > SIZE:
         return _refusal(item, "other_size", f"not of the size that a {item.kind} has here: it may not fit the jaws")
     if doubt is not None and doubt.confidence < least:
         why = f" ({', '.join(doubt.reasons)})" if doubt.reasons else ""
@@ -98,8 +101,12 @@ def _wrong(item: Item, doubt: Doubt | None, least: float) -> RefusedItem | None:
 def _refusal(item: Item, reason: str, message: str) -> RefusedItem:
     size = item.measures.rim_radius if item.is_dish else item.measures.length / 2
     return RefusedItem(
-        name=item.name, position=item.position, radius=size, reason=reason, message=f"{item.name}: {message}"  # type: ignore[arg-type]
-    )  # fmt: skip
+        name=item.name,
+        position=item.position,
+        radius=size,
+        reason=reason,  # type: ignore[arg-type]
+        message=f"{item.name}: {message}",
+    )
 
 
 def statement(accepted: Accepted, notes: tuple[str, ...] = ()) -> str:
@@ -108,4 +115,4 @@ def statement(accepted: Accepted, notes: tuple[str, ...] = ()) -> str:
     text = f"{count} item{'s' * (count != 1)} to clear" if count else "nothing to clear"
     if not accepted.refused and not notes:
         return text if count else "the table is empty: nothing to clear"
-    return f"{text}; not handled: " + "; ".join([*(one.message for one in accepted.refused), *notes])
+    return f"{text}; not handled: " + "; ".join([*(refusal.message for refusal in accepted.refused), *notes])

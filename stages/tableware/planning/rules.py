@@ -18,8 +18,11 @@ from stages.tableware.world.items import MEASURES, Item, Kind, Measures, Table, 
 
 LETTERS: dict[Kind, str] = {"plate": "p", "bowl": "b", "cup": "c", "fork": "u", "spoon": "u"}
 _MEASURES: dict[str, Measures] = {
-    "p": MEASURES["plate"], "b": MEASURES["bowl"], "c": MEASURES["cup"], "u": MEASURES["fork"],
-}  # fmt: skip
+    "p": MEASURES["plate"],
+    "b": MEASURES["bowl"],
+    "c": MEASURES["cup"],
+    "u": MEASURES["fork"],
+}
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ class Rules:
     """Whether dishes that carry utensils are lifted beside others as they stand (ours)."""
 
     def __post_init__(self) -> None:
-        values = tuple(getattr(self, one.name) for one in fields(self))
+        values = tuple(getattr(self, field.name) for field in fields(self))
         object.__setattr__(self, "_hash", hash(values))
 
     def __hash__(self) -> int:
@@ -71,13 +74,13 @@ def letters(items: Iterable[Item]) -> str:
 @lru_cache(maxsize=4096)
 def lips(pile: str) -> tuple[float, ...]:
     """Return the heights [m] of the dishes' lips over the lowest one's foot."""
-    foot, found = 0.0, []
+    foot, heights = 0.0, []
     for number, kind in enumerate(pile):
         if number:
             foot += rise(_MEASURES[kind], _MEASURES[pile[number - 1]])
         if kind != "u":
-            found.append(foot + _MEASURES[kind].height)
-    return tuple(found)
+            heights.append(foot + _MEASURES[kind].height)
+    return tuple(heights)
 
 
 @lru_cache(maxsize=65536)
@@ -101,11 +104,13 @@ def can_hold_two(first: str, second: str, rules: Rules) -> bool:
             return False
     elif rules.beside is not None and (min(first, second), max(first, second)) not in rules.beside:
         return False
-    one, other = lips(first), lips(second)
-    if not one or not other:
-        return not one and not other
-    heights = (*one, *other)
-    return abs(one[0] - other[0]) <= rules.similar and max(heights) - min(heights) <= rules.jaw_height
+    lips_of_first, lips_of_second = lips(first), lips(second)
+    if not lips_of_first or not lips_of_second:
+        return not lips_of_first and not lips_of_second
+    heights = (*lips_of_first, *lips_of_second)
+    return (
+        abs(lips_of_first[0] - lips_of_second[0]) <= rules.similar and max(heights) - min(heights) <= rules.jaw_height
+    )
 
 
 @lru_cache(maxsize=65536)
@@ -262,11 +267,11 @@ def obstructed(covers: Iterable[Footprint], table: Table) -> bool:
 
 def can_grasp_two(table: Table, first: str, second: str, rules: Rules) -> bool:
     """Return whether one grasp takes two things that stand on the table, with their loads, as they are now."""
-    one, other = table.by_name[first], table.by_name[second]
-    if first == second or one.on is not None or other.on is not None or not within_jaws(one, other, rules):
+    base, beside = table.by_name[first], table.by_name[second]
+    if first == second or base.on is not None or beside.on is not None or not within_jaws(base, beside, rules):
         return False
-    piles = letters((one, *table.load(first))), letters((other, *table.load(second)))
-    covers = (jaws(one, other, rules),)
+    piles = letters((base, *table.load(first))), letters((beside, *table.load(second)))
+    covers = (jaws(base, beside, rules),)
     if not can_hold_two(*piles, rules) or obstructed(covers, table):
         return False
     return not in_the_way(covers, table, {first, second})
@@ -274,18 +279,18 @@ def can_grasp_two(table: Table, first: str, second: str, rules: Rules) -> bool:
 
 def can_pull(table: Table, item: str, target: str, rules: Rules) -> bool:
     """Return whether a thing may be pulled to another: one grasp could take both there, and nothing lies between."""
-    one, other = table.by_name[item], table.by_name[target]
-    if item == target or one.on is not None or other.on is not None or one.is_dish != other.is_dish:
+    pulled, aim = table.by_name[item], table.by_name[target]
+    if item == target or pulled.on is not None or aim.on is not None or pulled.is_dish != aim.is_dish:
         return False
     load = table.load(item)
     if load and not rules.loaded_pulls:
         return False
-    if not can_hold_two(letters((one, *load)), letters((other, *table.load(target))), rules):
+    if not can_hold_two(letters((pulled, *load)), letters((aim, *table.load(target))), rules):
         return False
-    x, y, yaw = pull_end(one, other, rules)
-    if not footprint(one, x, y, yaw).on_table:
+    x, y, yaw = pull_end(pulled, aim, rules)
+    if not footprint(pulled, x, y, yaw).on_table:
         return False
-    covers = sweep(one, other, rules)
+    covers = sweep(pulled, aim, rules)
     return not obstructed(covers, table) and not in_the_way(covers, table, {item, target})
 
 

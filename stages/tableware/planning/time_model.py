@@ -138,9 +138,13 @@ def with_thesis_failures() -> Chances:
     """Return the thesis's world, dropping as often as its trials failed."""
     drops = thesis_fit().drops
     return replace(
-        measured(), drop_single=drops.grasp, drop_two=drops.grasp, drop_stack=drops.stack, drop_pull=drops.pull,
+        measured(),
+        drop_single=drops.grasp,
+        drop_two=drops.grasp,
+        drop_stack=drops.stack,
+        drop_pull=drops.pull,
         drop_loaded_pull=drops.pull,
-    )  # fmt: skip
+    )
 
 
 def with_spills() -> Chances:

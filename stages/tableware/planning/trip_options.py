@@ -87,17 +87,25 @@ def trip_options(table: Table, rules: Rules, model: TimeModel, chances: Chances,
     for number, (base, pairs) in enumerate(ways_of_signature):
         if base is not None:
             bases[number] = types.get((base, True), types.get((base, False), -1))
-        for one, other in pairs:
-            two[number, types[one, True], types[other, True]] = True
+        for upper, lower in pairs:
+            two[number, types[upper, True], types[lower, True]] = True
     costs = _Costs(
-        float(model.whole_trip), float(model.stack), float(chances.drop_stack), float(chances.drop_single),
-        float(chances.drop_two), float(chances.drop_loaded_pull), float(worth), rules.loaded_pulls,
-    )  # fmt: skip
+        float(model.whole_trip),
+        float(model.stack),
+        float(chances.drop_stack),
+        float(chances.drop_single),
+        float(chances.drop_two),
+        float(chances.drop_loaded_pull),
+        float(worth),
+        rules.loaded_pulls,
+    )
     columns = _Parts(
-        np.array([part.lowest for part in parts], np.int64), np.array([part.whole for part in parts], np.bool_),
-        np.array([len(part.items) for part in parts], np.int64), np.array([part.mask for part in parts], np.int64),
+        np.array([part.lowest for part in parts], np.int64),
+        np.array([part.whole for part in parts], np.bool_),
+        np.array([len(part.items) for part in parts], np.int64),
+        np.array([part.mask for part in parts], np.int64),
         type_of,
-    )  # fmt: skip
+    )
     choices = _Choices(rows, masks, signatures)
     ways = _ways_of(choices, _Signatures(bases, two), columns, _pairs(table, rules, model, chances, worth), costs)
     return TripOptions(parts, tuple(chosen), masks, *ways)
@@ -196,21 +204,21 @@ def _pairs(table: Table, rules: Rules, model: TimeModel, chances: Chances, worth
     pairs: list[_Pair] = []
     covers: list[Footprint] = []
     owners: list[int] = []
-    for one in bases:
+    for base in bases:
         for other in bases:
-            if one is other or one.is_dish != other.is_dish:
+            if base is other or base.is_dish != other.is_dish:
                 continue
-            slips = 1.0 - chances.holds(letters((one,)), letters((other,)))
-            first, second = row[one.name], row[other.name]
-            if within_jaws(one, other, rules):
+            slips = 1.0 - chances.holds(letters((base,)), letters((other,)))
+            first, second = row[base.name], row[other.name]
+            if within_jaws(base, other, rules):
                 if first > second:
                     continue
-                places: tuple[Footprint, ...] = (jaws(one, other, rules),)
+                places: tuple[Footprint, ...] = (jaws(base, other, rules),)
                 pulled, cost, lost = False, 0.0, 0.0
             else:
-                if not footprint(one, *pull_end(one, other, rules)).on_table:
+                if not footprint(base, *pull_end(base, other, rules)).on_table:
                     continue
-                places, pulled, cost, lost = sweep(one, other, rules), True, model.pull, chances.drop_pull
+                places, pulled, cost, lost = sweep(base, other, rules), True, model.pull, chances.drop_pull
             if obstructed(places, table):
                 continue
             owners.extend([len(pairs)] * len(places))
@@ -365,16 +373,20 @@ def _ways_of(choices, kinds, parts, pairs, costs):  # type: ignore[no-untyped-de
                 both = 1 << pair_first[pair] | 1 << pair_second[pair]
                 if both & ~mask:
                     continue
-                one = other = -1
+                pulled_part = waiting_part = -1
                 for k in range(count):
                     part = rows[choice, k]
                     if whole[part] and lowest[part] == pair_first[pair]:
-                        one = part
+                        pulled_part = part
                     if whole[part] and lowest[part] == pair_second[pair]:
-                        other = part
-                if one < 0 or other < 0 or not two[signature, type_of[one], type_of[other]]:
+                        waiting_part = part
+                if (
+                    pulled_part < 0
+                    or waiting_part < 0
+                    or not two[signature, type_of[pulled_part], type_of[waiting_part]]
+                ):
                     continue
-                loaded = length[one] > 1
+                loaded = length[pulled_part] > 1
                 if pair_pulled[pair] and (pair_blockers[pair] & mask or (loaded and not loaded_pulls)):
                     continue
                 block = pair_blockers[pair] & ~mask
@@ -395,13 +407,20 @@ def _ways_of(choices, kinds, parts, pairs, costs):  # type: ignore[no-untyped-de
                 seconds.append(time)
                 lost.append(chance)
                 slips.append(pair_slips[pair])
-                stays.append(part_mask[other])
+                stays.append(part_mask[waiting_part])
                 blockers.append(block)
-                first.append(one)
-                second.append(other)
+                first.append(pulled_part)
+                second.append(waiting_part)
                 pulled.append(pair_pulled[pair])
         starts[choice + 1] = len(seconds) - 1
     return (
-        starts, np.array(seconds[1:]), np.array(lost[1:]), np.array(slips[1:]), np.array(stays[1:]),
-        np.array(blockers[1:]), np.array(first[1:]), np.array(second[1:]), np.array(pulled[1:]),
-    )  # fmt: skip
+        starts,
+        np.array(seconds[1:]),
+        np.array(lost[1:]),
+        np.array(slips[1:]),
+        np.array(stays[1:]),
+        np.array(blockers[1:]),
+        np.array(first[1:]),
+        np.array(second[1:]),
+        np.array(pulled[1:]),
+    )

@@ -10,7 +10,7 @@ RIVALS = ("pull", "stack")
 _BOWLS = ("b", "bb", "bc", "bcc", "bbc")
 _PAIRS = frozenset(
     {("u", "u"), ("c", "c"), ("c", "cc"), ("cc", "cc"), ("b", "bbb"), ("bb", "bbb"), ("bbb", "bc")}
-    | {(one, other) for one in _BOWLS for other in _BOWLS if one <= other}
+    | {(lower, higher) for lower in _BOWLS for higher in _BOWLS if lower <= higher}
 )
 RULES = Rules(most_utensils=2, plates_alone=True, beside=_PAIRS)
 """What physics bears (docs/TIDY.md): two utensils a pile, plates alone, and side by side the pairs of piles

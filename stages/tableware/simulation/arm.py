@@ -68,9 +68,16 @@ class Arm:
             )
         self.touch_with(PAD_FRICTION)
         gear = engine.createConstraint(
-            self.body_id, self.fingers[0], self.body_id, self.fingers[1], engine.JOINT_GEAR, [0, 1, 0], [0, 0, 0],
-            [0, 0, 0], physicsClientId=client,
-        )  # fmt: skip
+            self.body_id,
+            self.fingers[0],
+            self.body_id,
+            self.fingers[1],
+            engine.JOINT_GEAR,
+            [0, 1, 0],
+            [0, 0, 0],
+            [0, 0, 0],
+            physicsClientId=client,
+        )
         engine.changeConstraint(gear, gearRatio=-1, erp=0.2, maxForce=500, physicsClientId=client)
         self.opening = self.description.opening
         self.target = self.description.carry.copy()
@@ -118,7 +125,7 @@ class Arm:
         half a turn will do as well, as the fingers are alike: the answer that moves the joints least is taken, of those
         that leave the last joint room for half a turn either way."""
         near = self.target
-        found = []
+        solutions = []
         for half_turn in (False,) if held else (False, True):
             wanted = pose.copy()
             if half_turn:
@@ -136,10 +143,12 @@ class Arm:
                     arm = solution.arm.copy()
                     arm[5] += turns
                     if abs(arm[5]) < 2 * pi:
-                        found.append(arm)
-        if not found:
+                        solutions.append(arm)
+        if not solutions:
             return None
-        return min(found, key=lambda arm: (not held and abs(arm[5]) > ROOM_TO_TURN, float(np.abs(arm - near).max())))
+        return min(
+            solutions, key=lambda arm: (not held and abs(arm[5]) > ROOM_TO_TURN, float(np.abs(arm - near).max()))
+        )
 
     # --- motion -----------------------------------------------------------------------------------------------
 
@@ -222,18 +231,28 @@ class Arm:
         self.opening = opening
         for index in self.fingers:
             engine.setJointMotorControl2(
-                self.body_id, index, engine.POSITION_CONTROL, targetPosition=opening / 2, force=200.0,
-                maxVelocity=1.5 * CLOSING_SPEED, positionGain=0.3, velocityGain=1.0,
+                self.body_id,
+                index,
+                engine.POSITION_CONTROL,
+                targetPosition=opening / 2,
+                force=200.0,
+                maxVelocity=1.5 * CLOSING_SPEED,
+                positionGain=0.3,
+                velocityGain=1.0,
                 physicsClientId=self.world.client,
-            )  # fmt: skip
+            )
 
     def close(self, force: float) -> None:
         """Close the fingers with a force [N] each until they stand still; they go on pressing."""
         for index in self.fingers:
             engine.setJointMotorControl2(
-                self.body_id, index, engine.VELOCITY_CONTROL, targetVelocity=-CLOSING_SPEED, force=force,
+                self.body_id,
+                index,
+                engine.VELOCITY_CONTROL,
+                targetVelocity=-CLOSING_SPEED,
+                force=force,
                 physicsClientId=self.world.client,
-            )  # fmt: skip
+            )
         still, before = 0, self.finger_gap()
         for _ in range(60):
             self.wait(5 * self.world.time_step)
@@ -266,10 +285,16 @@ class Arm:
 
     def _command(self, arm: np.ndarray, velocity: np.ndarray) -> None:
         engine.setJointMotorControlArray(
-            self.body_id, self.joints, engine.POSITION_CONTROL, targetPositions=arm.tolist(),
-            targetVelocities=velocity.tolist(), positionGains=[0.3] * 6, velocityGains=[1.0] * 6,
-            forces=JOINT_EFFORTS.tolist(), physicsClientId=self.world.client,
-        )  # fmt: skip
+            self.body_id,
+            self.joints,
+            engine.POSITION_CONTROL,
+            targetPositions=arm.tolist(),
+            targetVelocities=velocity.tolist(),
+            positionGains=[0.3] * 6,
+            velocityGains=[1.0] * 6,
+            forces=JOINT_EFFORTS.tolist(),
+            physicsClientId=self.world.client,
+        )
 
 
 __all__ = ["BASE", "Arm", "MotionFailed"]

@@ -152,15 +152,15 @@ def jaw_clearance(pose: np.ndarray, opening: float, others: list[Item], own: lis
 
 def pair_hold(table: Table, first: str, second: str, point: tuple[float, float, float], closing: float) -> Hold:
     """Return how two piles side by side are taken by the walls that face each other, or two utensils across."""
-    one, other = table.by_name[first], table.by_name[second]
+    base, beside = table.by_name[first], table.by_name[second]
     others = [i for p in table.stacks for i in p if not {first, second} & {o.name for o in p}]
-    if not one.is_dish:
-        turned = (other.yaw - one.yaw + pi / 2) % pi - pi / 2
-        yaw = one.yaw + turned / 2
+    if not base.is_dish:
+        turned = (beside.yaw - base.yaw + pi / 2) % pi - pi / 2
+        yaw = base.yaw + turned / 2
         across = np.array([-sin(yaw), cos(yaw)])
-        apart = abs(float(across @ (np.array(other.position[:2]) - np.array(one.position[:2]))))
-        opening = min(0.085, apart + one.measures.width + 0.014)
-        tip = min(one.position[2], other.position[2]) + ABOVE
+        apart = abs(float(across @ (np.array(beside.position[:2]) - np.array(base.position[:2]))))
+        opening = min(0.085, apart + base.measures.width + 0.014)
+        tip = min(base.position[2], beside.position[2]) + ABOVE
         best: Hold | None = None
         for along in PAIR_SHIFTS:  # held away from their middles they would hang and swing
             place = np.array([point[0] + along * cos(yaw), point[1] + along * sin(yaw), tip])
@@ -185,9 +185,14 @@ def pair_hold(table: Table, first: str, second: str, point: tuple[float, float, 
 
 
 def _dish_pair(
-    table: Table, names: tuple[str, str], point: tuple[float, float, float], closing: float, depth: float, room: float,
+    table: Table,
+    names: tuple[str, str],
+    point: tuple[float, float, float],
+    closing: float,
+    depth: float,
+    room: float,
     others: list[Item],
-) -> Hold:  # fmt: skip
+) -> Hold:
     """Return how two dishes are taken at most `depth` [m] below the lower lip, with `room` [m] between open pads and
     walls."""
     families = [walls(table, name) for name in names]

@@ -19,7 +19,6 @@ from stages.tableware.actions.pull import Pull
 from stages.tableware.actions.stack import Stack
 from stages.tableware.planning.action import Action, Primitive
 from stages.tableware.simulation.arm import BACK_FRICTION, PAD_FRICTION, Arm
-from stages.tableware.simulation.fast import Trial
 from stages.tableware.simulation.holds import (
     FREE,
     JAW_HEIGHT,
@@ -35,6 +34,7 @@ from stages.tableware.simulation.holds import (
     walls,
 )
 from stages.tableware.simulation.tabletop import BIN_CENTER, Tabletop
+from stages.tableware.simulation.trial import Trial
 from stages.tableware.world.items import Item, Table, rise
 from stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_camera, render_overhead
 
@@ -96,8 +96,10 @@ class PhysicsTable:
         self.fallen: list[str] = []
         """Everything that fell off the table or over, in order."""
         self._motions: dict[type[Primitive], Callable[[Any, Table], None]] = {
-            Grasp: self._grasp, Pull: self._pull, Stack: self._stack
-        }  # fmt: skip
+            Grasp: self._grasp,
+            Pull: self._pull,
+            Stack: self._stack,
+        }
         self._key("start")
 
     def close(self) -> None:

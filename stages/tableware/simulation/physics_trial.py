@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot, pi
 from typing import Literal
@@ -12,8 +11,8 @@ from stages.tableware.planning.action import Action
 from stages.tableware.planning.policy import Policy, liftable
 from stages.tableware.planning.rules import Rules
 from stages.tableware.sight import Eyes
-from stages.tableware.simulation.fast import Done, Trial, most_actions, run_in, truth
-from stages.tableware.simulation.physics import PhysicsTable, Speeds
+from stages.tableware.simulation.physics import PhysicsTable
+from stages.tableware.simulation.trial import Done, Trial, most_actions, run_in, truth
 from stages.tableware.world.items import Item, Table
 
 NEAR = 0.015
@@ -50,16 +49,13 @@ class Outcome:
             self.perception += len(done.dropped)
 
 
-def run_physics_trial(
-    table: Table, policy: Policy, seed: int, sight: Sight, *, speeds: Speeds | None = None,
-    record: Callable[[PhysicsTable, str], None] | None = None,
-) -> Outcome:  # fmt: skip
+def run_physics_trial(table: Table, policy: Policy, seed: int, sight: Sight) -> Outcome:
     """Clear a table in physics, looking before each action, until nothing is seen or 3 actions an item are spent.
 
     What the eyes doubt is refused as in the command. After an action that changed nothing comes `alone`, whatever the
     policy.
     """
-    world = PhysicsTable(table, speeds=speeds, record=record)
+    world = PhysicsTable(table)
     eyes = Eyes(seed, "usual", "dark_on_white", LEAST_CONFIDENCE)
     try:
         outcome = Outcome(world.trial)

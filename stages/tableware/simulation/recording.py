@@ -10,7 +10,7 @@ from stages.tableware.simulation.physics import PhysicsTable
 
 
 class Recording:
-    """Give it to PhysicsTable or run_physics_trial as `record`; what left the table has NaN for a pose."""
+    """Give it to PhysicsTable as `record`; what left the table has NaN for a pose."""
 
     def __init__(self) -> None:
         self.labels: list[str] = []

@@ -67,13 +67,22 @@ class Tabletop:
     def _load(self, path: str) -> int:
         with native_output_to_stderr():
             body = engine.loadURDF(
-                path, flags=engine.URDF_USE_INERTIA_FROM_FILE | engine.URDF_ENABLE_SLEEPING, useMaximalCoordinates=1,
+                path,
+                flags=engine.URDF_USE_INERTIA_FROM_FILE | engine.URDF_ENABLE_SLEEPING,
+                useMaximalCoordinates=1,
                 physicsClientId=self.world.client,
-            )  # fmt: skip
+            )
         engine.changeDynamics(
-            body, -1, lateralFriction=ITEM_FRICTION, spinningFriction=0.0005, rollingFriction=0.0,
-            linearDamping=0.02, angularDamping=0.05, frictionAnchor=1, physicsClientId=self.world.client,
-        )  # fmt: skip
+            body,
+            -1,
+            lateralFriction=ITEM_FRICTION,
+            spinningFriction=0.0005,
+            rollingFriction=0.0,
+            linearDamping=0.02,
+            angularDamping=0.05,
+            frictionAnchor=1,
+            physicsClientId=self.world.client,
+        )
         return int(body)
 
     # --- poses ------------------------------------------------------------------------------------------------
@@ -82,9 +91,11 @@ class Tabletop:
         """Put an item's frame (foot centre, or middle of the underside) at a pose (4, 4), at rest."""
         center = world_from_item[:3, :3] @ self._solid(name).center + world_from_item[:3, 3]
         engine.resetBasePositionAndOrientation(
-            self.bodies[name], center.tolist(), quaternion_of(world_from_item).tolist(),
+            self.bodies[name],
+            center.tolist(),
+            quaternion_of(world_from_item).tolist(),
             physicsClientId=self.world.client,
-        )  # fmt: skip
+        )
 
     def pose(self, name: str) -> np.ndarray:
         """Return world_from_item (4, 4)."""
@@ -150,13 +161,6 @@ class Tabletop:
             engine.removeBody(self.bodies.pop(name), physicsClientId=self.world.client)
 
     # --- reading ----------------------------------------------------------------------------------------------
-
-    def tipped(self) -> tuple[str, ...]:
-        """Return the dishes that have fallen over on the table: they lean, and stand in no other dish."""
-        table = self.read(everything=True)
-        return tuple(
-            item.name for item in table.items if item.is_dish and item.on is None and self.lean(item.name) > TIPPED
-        )
 
     def lean(self, name: str) -> float:
         """Return the angle [rad] of an item's axis against the vertical."""

@@ -55,14 +55,14 @@ def items_in(heights: HeightMap) -> tuple[Detection, ...]:
     covered = np.zeros(heights.smooth.shape, dtype=np.uint8)
     for index, stack in enumerate(stacks):
         cover_stack(covered, heights, stack, index + 1)
-    found: list[Detection] = []
+    detections: list[Detection] = []
     for index, stack in enumerate(stacks):
-        carrier = len(found) + len(stack.kinds) - 1
-        found.extend(dishes_of(stack, heights, crossed, len(found)))
+        carrier = len(detections) + len(stack.kinds) - 1
+        detections.extend(dishes_of(stack, heights, crossed, len(detections)))
         for level, seen in enumerate(utensils_on_dish(heights, stack, covered, index + 1)):
             z = stack.top + level * MEASURES[seen.bar.kind].height
-            found.append(as_detection(seen, heights, z, carrier))
-            carrier = len(found) - 1
+            detections.append(as_detection(seen, heights, z, carrier))
+            carrier = len(detections) - 1
             _cover_bar(covered, heights, seen.bar, z)
     hidden = covered > 0
     near = cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0
@@ -70,13 +70,16 @@ def items_in(heights: HeightMap) -> tuple[Detection, ...]:
     lying, strange = utensils_on_table(heights, unlike, hidden)
     for seen in lying:
         here = np.array(heights.world(np.float64(seen.bar.u), np.float64(seen.bar.v), 0.0))
-        below = [k for k, other in enumerate(found) if other.on is None and other.kind in UTENSILS
-                 and np.hypot(*(here - other.position[:2])) < SAME_PLACE]  # fmt: skip
+        below = [
+            k
+            for k, other in enumerate(detections)
+            if other.on is None and other.kind in UTENSILS and np.hypot(*(here - other.position[:2])) < SAME_PLACE
+        ]
         z = MEASURES[seen.bar.kind].height if below else 0.0
-        found.append(as_detection(seen, heights, z, below[0] if below else None))
+        detections.append(as_detection(seen, heights, z, below[0] if below else None))
         _cover_bar(covered, heights, seen.bar, z)
-    found.extend(_unknown(heights, covered, strange))
-    return tuple(_outside(one, heights.sides) for one in found)
+    detections.extend(_unknown(heights, covered, strange))
+    return tuple(_outside(detection, heights.sides) for detection in detections)
 
 
 def _cover_bar(covered: np.ndarray, heights: HeightMap, bar: Bar, z: float) -> None:
@@ -109,17 +112,23 @@ def _unknown(heights: HeightMap, covered: np.ndarray, strange: np.ndarray) -> li
         x, y = heights.world(np.float64(left + 0.5 * width), np.float64(top + 0.5 * height), tall)
         result.append(
             Detection(
-                kind=None, position=(float(x), float(y), 0.0), lip=max(0.0, tall), confidence=0.0,
-                extent=0.5 * float(np.hypot(width, height)) / scale, unsure=(reason,),
+                kind=None,
+                position=(float(x), float(y), 0.0),
+                lip=max(0.0, tall),
+                confidence=0.0,
+                extent=0.5 * float(np.hypot(width, height)) / scale,
+                unsure=(reason,),
             )
-        )  # fmt: skip
+        )
     return result
 
 
-def _outside(one: Detection, sides: tuple[float, float]) -> Detection:
+def _outside(detection: Detection, sides: tuple[float, float]) -> Detection:
     """Return a detection with the doubt that its middle, or a dish's rim, is not over the workspace."""
-    reach = MEASURES[one.kind].rim_radius if one.kind is not None else 0.0
-    over = [abs(one.position[axis]) + reach - 0.5 * sides[axis] for axis in (0, 1)]
+    reach = MEASURES[detection.kind].rim_radius if detection.kind is not None else 0.0
+    over = [abs(detection.position[axis]) + reach - 0.5 * sides[axis] for axis in (0, 1)]
     if max(over) > 0.006:
-        return replace(one, unsure=(*one.unsure, "outside of the workspace"), confidence=0.5 * one.confidence)
-    return one
+        return replace(
+            detection, unsure=(*detection.unsure, "outside of the workspace"), confidence=0.5 * detection.confidence
+        )
+    return detection

@@ -36,24 +36,34 @@ class Detection:
 
 def as_table(detections: tuple[Detection, ...]) -> Table:
     """Return the table that detections describe; things that are no tableware are left out."""
-    names = {index: f"{found.kind}_{index + 1}" for index, found in enumerate(detections) if found.kind is not None}
+    names = {
+        index: f"{detection.kind}_{index + 1}"
+        for index, detection in enumerate(detections)
+        if detection.kind is not None
+    }
     return Table(
         tuple(
-            Item(names[index], found.kind, found.position, found.yaw,
-                 None if found.on is None else names[found.on], found.size or MEASURES[found.kind])
-            for index, found in enumerate(detections)
-            if found.kind is not None
+            Item(
+                names[index],
+                detection.kind,
+                detection.position,
+                detection.yaw,
+                None if detection.on is None else names[detection.on],
+                detection.size or MEASURES[detection.kind],
+            )
+            for index, detection in enumerate(detections)
+            if detection.kind is not None
         )
-    )  # fmt: skip
+    )
 
 
 def statement(detections: tuple[Detection, ...]) -> str:
     """Return in one line what is on the table and what is in doubt; an empty table is a statement too."""
-    known = sum(found.kind is not None for found in detections)
-    unknown = len(detections) - known
-    doubts = sorted({reason for found in detections for reason in found.unsure})
+    count = sum(detection.kind is not None for detection in detections)
+    unknown = len(detections) - count
+    doubts = sorted({reason for detection in detections for reason in detection.unsure})
     if not detections:
         return "the table is empty: there is nothing to clear"
-    text = f"{known} item{'s' * (known != 1)} of tableware"
+    text = f"{count} item{'s' * (count != 1)} of tableware"
     text += f", {unknown} thing{'s' * (unknown != 1)} of unknown kind" if unknown else ""
     return text + (f"; unsure: {', '.join(doubts)}" if doubts else "")

@@ -15,7 +15,7 @@ def to_file(sight: Sight, sizes: Sizes) -> TablewareDetectionsFile:
     return TablewareDetectionsFile(
         statement=sight.statement,
         notes=sight.notes,
-        items=tuple(_item(one) for one in sight.detections),
+        items=tuple(_item(detection) for detection in sight.detections),
         camera=sight.camera,
         world_from_camera=as_transform(sight.world_from_camera),
         table=TablePlane(normal=sight.plane[0], offset=sight.plane[1]),
@@ -25,30 +25,49 @@ def to_file(sight: Sight, sizes: Sizes) -> TablewareDetectionsFile:
     )
 
 
-def from_file(told: TablewareDetectionsFile) -> tuple[Detection, ...]:
+def from_file(file: TablewareDetectionsFile) -> tuple[Detection, ...]:
     """Return the detections of a payload. Raises BadInput where heights are not known: nothing can be planned then."""
-    if not told.heights_known:
-        raise BadInput("the detections are of a photograph without depth: heights are unknown",
-                       hint="detect on an RGB-D image")  # fmt: skip
+    if not file.heights_known:
+        raise BadInput(
+            "the detections are of a photograph without depth: heights are unknown", hint="detect on an RGB-D image"
+        )
     return tuple(
         Detection(
-            kind=item.kind, position=item.position, yaw=item.yaw, lip=item.lip, on=item.on, hidden=item.hidden,
-            grasp=item.grasp, extent=item.extent, confidence=item.confidence, unsure=item.unsure,
-            size=None if item.size is None else Measures(
-                height=item.size.height, rim_radius=item.size.rim_radius, foot_radius=item.size.foot_radius,
-                wall=item.size.wall,
-            ),
+            kind=item.kind,
+            position=item.position,
+            yaw=item.yaw,
+            lip=item.lip,
+            on=item.on,
+            hidden=item.hidden,
+            grasp=item.grasp,
+            extent=item.extent,
+            confidence=item.confidence,
+            unsure=item.unsure,
+            size=None if item.size is None else Measures(**item.size.model_dump()),
         )
-        for item in told.items
-    )  # fmt: skip
+        for item in file.items
+    )
 
 
-def _item(one: Detection) -> TablewareDetection:
+def _item(detection: Detection) -> TablewareDetection:
     size = None
-    if one.size is not None:
-        size = DetectedSize(height=one.size.height, rim_radius=one.size.rim_radius, foot_radius=one.size.foot_radius,
-                            wall=one.size.wall)  # fmt: skip
+    if detection.size is not None:
+        size = DetectedSize(
+            height=detection.size.height,
+            rim_radius=detection.size.rim_radius,
+            foot_radius=detection.size.foot_radius,
+            wall=detection.size.wall,
+        )
     return TablewareDetection(
-        kind=one.kind, position=one.position, yaw=one.yaw, lip=max(0.0, one.lip), on=one.on, hidden=one.hidden,
-        grasp=one.grasp, extent=one.extent, size=size, confidence=min(1.0, max(0.0, one.confidence)), unsure=one.unsure,
-    )  # fmt: skip
+        kind=detection.kind,
+        position=detection.position,
+        yaw=detection.yaw,
+        lip=max(0.0, detection.lip),
+        on=detection.on,
+        hidden=detection.hidden,
+        grasp=detection.grasp,
+        extent=detection.extent,
+        size=size,
+        confidence=min(1.0, max(0.0, detection.confidence)),
+        unsure=detection.unsure,
+    )

@@ -44,11 +44,15 @@ def dishes_of(stack: Stack, heights: HeightMap, crossed: set[int], first: int) -
         at = (stack.x, stack.y) if hidden else (rim.x, rim.y)
         result.append(
             Detection(
-                kind=kind, position=(*at, foot), lip=foot + MEASURES[kind].height, hidden=hidden,
-                on=first + level - 1 if level else None, confidence=confidence,
+                kind=kind,
+                position=(*at, foot),
+                lip=foot + MEASURES[kind].height,
+                hidden=hidden,
+                on=first + level - 1 if level else None,
+                confidence=confidence,
                 unsure=reasons,
             )
-        )  # fmt: skip
+        )
     return result
 
 

@@ -68,7 +68,7 @@ def sampled_detections(
     measured images; errors of items are independent, which they need not be.
     """
     model = model or error_model()
-    found: list[Detection] = []
+    detections: list[Detection] = []
     index: dict[str, int | None] = {}
     for item in sorted(table.items, key=lambda item: item.position[2]):
         below = None if item.on is None else index[item.on]
@@ -83,20 +83,20 @@ def sampled_detections(
         if item.kind in UTENSILS:
             yaw = item.yaw + random.normal(0.0, errors.yaw_sigma) + np.pi * (random.random() < errors.turned_rate)
             yaw = float(np.arctan2(np.sin(yaw), np.cos(yaw)))
-        one = Detection(kind=kind, position=(x + float(dx), y + float(dy), z), yaw=yaw, lip=item.lip, on=below)
+        detection = Detection(kind=kind, position=(x + float(dx), y + float(dy), z), yaw=yaw, lip=item.lip, on=below)
         if kind in UTENSILS:
-            one = replace(one, grasp=(one.position[0], one.position[1], item.lip))
-        index[item.name] = len(found)
-        found.append(one)
+            detection = replace(detection, grasp=(detection.position[0], detection.position[1], item.lip))
+        index[item.name] = len(detections)
+        detections.append(detection)
     for kind, errors in model.kinds.items():
         for _ in range(int(random.poisson(errors.false_rate))):
             x, y = (float(random.uniform(-0.4 * side, 0.4 * side)) for side in TABLE_SIDES)
-            found.append(Detection(kind=kind, position=(x, y, 0.0), confidence=0.9))
+            detections.append(Detection(kind=kind, position=(x, y, 0.0), confidence=0.9))
     for _ in range(int(random.poisson(model.unknown_rate))):
         x, y = (float(random.uniform(-0.4 * side, 0.4 * side)) for side in TABLE_SIDES)
         unknown = Detection(kind=None, position=(x, y, 0.0), lip=0.02, extent=0.03, confidence=0.0)
-        found.append(replace(unknown, unsure=("unknown object",)))
-    return tuple(found)
+        detections.append(replace(unknown, unsure=("unknown object",)))
+    return tuple(detections)
 
 
 def _taken_for(kind: Kind, errors: KindErrors, random: np.random.Generator) -> Kind:

@@ -76,18 +76,31 @@ class HeightMap:
         return 1.4826 * float(np.median(np.abs(values - np.median(values)))) if len(values) > 100 else 0.0
 
 
+def check_color(color: np.ndarray, shape: tuple[int, int]) -> None:
+    """Raise BadInput for what is no (H, W, 3) uint8 image of this (H, W)."""
+    if color.dtype != np.uint8 or color.shape != (*shape, 3):
+        raise BadInput(
+            f"the colour image is {color.shape} {color.dtype}, not {(*shape, 3)} uint8",
+            hint="give the image and the camera that belong together",
+        )
+
+
+def check_depth(depth: np.ndarray, shape: tuple[int, int]) -> None:
+    """Raise BadInput for a depth image of another (H, W)."""
+    if depth.shape != shape:
+        raise BadInput(f"the depth image is {depth.shape}, not {shape}", hint="align depth to colour first")
+
+
 def check_images(color: np.ndarray, depth: np.ndarray, view: OverheadCamera) -> None:
     """Raise BadInput in one line when the images cannot be what the camera saw of the table."""
     shape = (view.camera.height, view.camera.width)
-    if color.dtype != np.uint8 or color.shape != (*shape, 3):
-        raise BadInput(f"the colour image is {color.shape} {color.dtype}, not {(*shape, 3)} uint8",
-                       hint="give the image and the camera that belong together")  # fmt: skip
-    if depth.shape != shape:
-        raise BadInput(f"the depth image is {depth.shape}, not {shape}", hint="align depth to colour first")
+    check_color(color, shape)
+    check_depth(depth, shape)
     down = view.world_from_camera[:3, 2]
     if down[2] > -0.9995:
-        raise BadInput("the camera does not look straight down on the table",
-                       hint="rectify the frame to the table plane first")  # fmt: skip
+        raise BadInput(
+            "the camera does not look straight down on the table", hint="rectify the frame to the table plane first"
+        )
     if not np.isfinite(depth).all():
         raise BadInput("the depth image holds values that are no numbers", hint="use 0 where there is no depth")
 
@@ -111,22 +124,35 @@ def height_map(
         raise BadInput(f"{share:.0%} of the pixels over the table have depth", hint="detection needs an RGB-D image")
     middle = float(np.median(part[::4, ::4][valid[::4, ::4]]))
     if not 0.5 * above < middle < 2.2 * above:
-        raise BadInput(f"the depth image says {middle:.4g} where the table is {above:.3g} m away",
-                       hint="depth must be in metres" if middle > 50 else "check the camera's height")  # fmt: skip
+        raise BadInput(
+            f"the depth image says {middle:.4g} where the table is {above:.3g} m away",
+            hint="depth must be in metres" if middle > 50 else "check the camera's height",
+        )
     plane = _table_plane(part, (camera.cx - left, camera.cy - top), (camera.fx, camera.fy), above, sides)
     raw, valid, tall = _heights(part, float(plane[0]), float(plane[1]), float(plane[2]))
     weight = cv2.boxFilter(valid.astype(np.float32), -1, (7, 7))
     filled = _filled(raw, valid, cv2.boxFilter(raw, -1, (7, 7)), weight)
     return HeightMap(
-        raw, valid, tall, cv2.medianBlur(filled, 5), color[top:bottom, left:right], (camera.fx, camera.fy),
-        (camera.cx - left, camera.cy - top), above, (left, top), sides,
-    )  # fmt: skip
+        raw=raw,
+        valid=valid,
+        tall=tall,
+        smooth=cv2.medianBlur(filled, 5),
+        color=color[top:bottom, left:right],
+        focal=(camera.fx, camera.fy),
+        center=(camera.cx - left, camera.cy - top),
+        camera_height=above,
+        corner=(left, top),
+        sides=sides,
+    )
 
 
 def _table_plane(
-    part: np.ndarray, center: tuple[float, float], focal: tuple[float, float], above: float,
+    part: np.ndarray,
+    center: tuple[float, float],
+    focal: tuple[float, float],
+    above: float,
     sides: tuple[float, float],
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Return (a, b, c) of the table's depth a u + b v + c [m] on every sixth pixel, by least squares that leave out
     more and more."""
     v, u = np.mgrid[0 : part.shape[0] : 6, 0 : part.shape[1] : 6]

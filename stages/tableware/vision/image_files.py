@@ -9,7 +9,6 @@ camera.json | scene.json            {"camera": {width, height, fx, fy, cx, cy}, 
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from pydantic import ValidationError
 
 from schemas.base import Model, Transform
 from schemas.errors import BadInput
+from schemas.outside import file_json
 from schemas.scene_parts import Camera
 from stages.kit.formats.numpy_files import read_array, read_arrays
 
@@ -61,29 +61,22 @@ def read_image(
         image = _one_of(folder, COLORS) or _refuse(f"{folder}: no colour image", f"one of {', '.join(COLORS)}")
         depth = depth or _one_of(folder, DEPTHS)
         camera = camera or _one_of(folder, CAMERAS)
-    told = None if camera is None else read_camera(camera)
+    intrinsics = None if camera is None else read_camera(camera)
     color = _picture(image, cv2.IMREAD_COLOR)
     if depth is None:
-        return TableImage(cv2.cvtColor(color, cv2.COLOR_BGR2RGB), None, told)
-    scale = depth_scale if depth_scale is not None else None if told is None else told.depth_scale
-    return TableImage(cv2.cvtColor(color, cv2.COLOR_BGR2RGB), _depth(depth, scale), told)
+        return TableImage(cv2.cvtColor(color, cv2.COLOR_BGR2RGB), None, intrinsics)
+    scale = depth_scale if depth_scale is not None else None if intrinsics is None else intrinsics.depth_scale
+    return TableImage(cv2.cvtColor(color, cv2.COLOR_BGR2RGB), _depth(depth, scale), intrinsics)
 
 
 def read_camera(path: Path) -> CameraFile:
     """Return the camera of a camera.json, or of a scene.json that says more. Raises BadInput."""
     hint = 'it needs {"camera": {"width", "height", "fx", "fy", "cx", "cy"}}; docs/TIDY.md has an example'
-    try:
-        if path.stat().st_size > LARGEST_JSON:
-            raise BadInput(f"{path}: larger than {LARGEST_JSON} bytes", hint=hint)
-        told = json.loads(path.read_bytes())
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}", hint=hint) from None
-    except ValueError:
-        raise BadInput(f"{path}: no JSON", hint=hint) from None
-    if not isinstance(told, dict):
+    document = file_json(path, LARGEST_JSON, hint=hint)
+    if not isinstance(document, dict):
         raise BadInput(f"{path}: no JSON object", hint=hint)
     try:
-        return CameraFile.model_validate({key: told[key] for key in CameraFile.model_fields if key in told})
+        return CameraFile.model_validate({key: document[key] for key in CameraFile.model_fields if key in document})
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "document"
@@ -120,7 +113,9 @@ def _depth(path: Path, scale: float | None) -> np.ndarray:
     else:
         array = _picture(path, cv2.IMREAD_UNCHANGED)
         if array.ndim != 2 or array.dtype != np.uint16:
-            raise BadInput(f"{path}: the depth image is {array.shape} {array.dtype}, not 16 bits in one channel",
-                           hint="8-bit pictures of depth hold no distances")  # fmt: skip
+            raise BadInput(
+                f"{path}: the depth image is {array.shape} {array.dtype}, not 16 bits in one channel",
+                hint="8-bit pictures of depth hold no distances",
+            )
         usual = MILLIMETRE
     return np.asarray(array, dtype=np.float32) * np.float32(usual if scale is None else scale)

@@ -13,8 +13,14 @@ from stages.tableware.vision.photographs import Outline
 from stages.tableware.vision.seeing import Sight
 from stages.tableware.world.items import MEASURES
 
-COLORS = {"cup": (235, 70, 60), "bowl": (40, 180, 70), "plate": (60, 120, 240), "fork": (245, 160, 30),
-          "spoon": (20, 190, 200), None: (220, 60, 220)}  # fmt: skip
+COLORS = {
+    "cup": (235, 70, 60),
+    "bowl": (40, 180, 70),
+    "plate": (60, 120, 240),
+    "fork": (245, 160, 30),
+    "spoon": (20, 190, 200),
+    None: (220, 60, 220),
+}
 """sRGB by kind; None is unknown."""
 SURE = 0.9
 FONT, LINE = cv2.FONT_HERSHEY_SIMPLEX, 20
@@ -27,19 +33,19 @@ def draw_sight(color: np.ndarray, sight: Sight) -> np.ndarray:
     picture = np.ascontiguousarray(color).copy()
     camera_from_world = np.linalg.inv(sight.world_from_camera)
     labels: list[tuple[tuple[int, int], str, tuple[int, int, int]]] = []
-    for number, one in enumerate(sight.detections):
-        points = _projected(_outline(one), camera_from_world, sight)
+    for number, detection in enumerate(sight.detections):
+        points = _projected(_outline(detection), camera_from_world, sight)
         if points is None:
             continue
-        tone = COLORS[one.kind]
-        sure = one.kind is not None and not one.unsure and one.confidence >= SURE
-        _line(picture, points, tone, dashed=not sure, thin=one.hidden)
-        if one.kind in ("fork", "spoon"):
+        tone = COLORS[detection.kind]
+        sure = detection.kind is not None and not detection.unsure and detection.confidence >= SURE
+        _line(picture, points, tone, dashed=not sure, thin=detection.hidden)
+        if detection.kind in ("fork", "spoon"):
             cv2.circle(picture, (int(points[-1, 0]), int(points[-1, 1])), 4, tone, -1, cv2.LINE_AA)
-        name = one.kind or "unknown"
-        said = f"{number} {name} {one.confidence:.2f}" if one.kind else f"{number} {name}"
-        middle = points.mean(axis=0) if one.kind in ("fork", "spoon") else points[np.argmin(points[:, 1])]
-        labels.append(((int(middle[0]), int(middle[1])), said, tone))
+        name = detection.kind or "unknown"
+        label = f"{number} {name} {detection.confidence:.2f}" if detection.kind else f"{number} {name}"
+        middle = points.mean(axis=0) if detection.kind in ("fork", "spoon") else points[np.argmin(points[:, 1])]
+        labels.append(((int(middle[0]), int(middle[1])), label, tone))
     _write(picture, labels)
     return _with_text(picture, sight.statement)
 
@@ -48,25 +54,29 @@ def draw_outlines(color: np.ndarray, outlines: tuple[Outline, ...], statement: s
     """Return a photograph (H, W, 3) uint8 with its outlines' boxes, and the statement below."""
     picture = np.ascontiguousarray(color).copy()
     labels = []
-    for number, one in enumerate(outlines):
-        left, top, right, bottom = (int(round(value)) for value in one.box)
+    for number, outline in enumerate(outlines):
+        left, top, right, bottom = (int(round(value)) for value in outline.box)
         corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom], [left, top]], dtype=float)
-        _line(picture, corners, COLORS[one.kind], dashed=True, thin=False)
-        labels.append(((left, top), f"{number} {one.kind or 'round'} {one.confidence:.2f}", COLORS[one.kind]))
+        _line(picture, corners, COLORS[outline.kind], dashed=True, thin=False)
+        labels.append(
+            ((left, top), f"{number} {outline.kind or 'round'} {outline.confidence:.2f}", COLORS[outline.kind])
+        )
     _write(picture, labels)
     return _with_text(picture, statement)
 
 
-def _outline(one: Detection) -> np.ndarray:
+def _outline(detection: Detection) -> np.ndarray:
     """Return world points (N, 3) [m] of a detection's outline at the height of its lip."""
-    x, y, _ = one.position
-    if one.kind in ("fork", "spoon"):
-        half = 0.5 * MEASURES[one.kind].length
+    x, y, _ = detection.position
+    if detection.kind in ("fork", "spoon"):
+        half = 0.5 * MEASURES[detection.kind].length
         along = np.linspace(-half, half, 24)
-        return np.column_stack([x + along * np.cos(one.yaw), y + along * np.sin(one.yaw), np.full(24, one.lip)])
-    radius = one.extent if one.kind is None else (one.size or MEASURES[one.kind]).rim_radius
+        return np.column_stack(
+            [x + along * np.cos(detection.yaw), y + along * np.sin(detection.yaw), np.full(24, detection.lip)]
+        )
+    radius = detection.extent if detection.kind is None else (detection.size or MEASURES[detection.kind]).rim_radius
     angles = np.linspace(0.0, 2.0 * np.pi, 73)
-    return np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles), np.full(73, one.lip)])
+    return np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles), np.full(73, detection.lip)])
 
 
 def _projected(points: np.ndarray, camera_from_world: np.ndarray, sight: Sight) -> np.ndarray | None:
@@ -112,8 +122,9 @@ def _write(picture: np.ndarray, labels: list[tuple[tuple[int, int], str, tuple[i
 
 
 def _with_text(picture: np.ndarray, text: str) -> np.ndarray:
-    lines = textwrap.wrap(text + ". Full lines: sure; dashed: in doubt; thin: hidden in a stack.",
-                          max(20, picture.shape[1] // 8))  # fmt: skip
+    lines = textwrap.wrap(
+        text + ". Full lines: sure; dashed: in doubt; thin: hidden in a stack.", max(20, picture.shape[1] // 8)
+    )
     foot = np.full((LINE * len(lines) + 10, picture.shape[1], 3), 255, dtype=np.uint8)
     for number, line in enumerate(lines):
         cv2.putText(foot, line, (6, LINE * (number + 1) - 3), FONT, 0.45, (20, 20, 20), 1, cv2.LINE_AA)

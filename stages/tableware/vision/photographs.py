@@ -50,7 +50,7 @@ def find_outlines(color: np.ndarray, picture_width: float | None = None) -> tupl
     slopes = np.stack([cv2.Sobel(smooth, cv2.CV_32F, *axis, scale=0.25) for axis in ((1, 0), (0, 1))], axis=2)
     closed = cv2.morphologyEx(edges, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     contours, _ = cv2.findContours(closed, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-    found: list[Outline] = []
+    outlines: list[Outline] = []
     for contour in contours:
         if len(contour) < LEAST_POINTS:
             continue
@@ -65,8 +65,8 @@ def find_outlines(color: np.ndarray, picture_width: float | None = None) -> tupl
             if support >= LEAST_SUPPORT:
                 kind, reasons = _kind(great, picture_width)
                 left, top, right, bottom = (float(value / factor) for value in box)
-                found.append(Outline(kind, (left, top, right, bottom), 0.5 * support, reasons))
-    return tuple(_apart(found))
+                outlines.append(Outline(kind, (left, top, right, bottom), 0.5 * support, reasons))
+    return tuple(_apart(outlines))
 
 
 def _support(
@@ -101,11 +101,11 @@ def _kind(great: float, picture_width: float | None) -> tuple[Kind | None, tuple
     return kind, ("heights unknown", "size from the picture's width")
 
 
-def _apart(found: list[Outline]) -> list[Outline]:
+def _apart(outlines: list[Outline]) -> list[Outline]:
     kept: list[Outline] = []
-    for one in sorted(found, key=lambda one: (-round(one.confidence, 2), -_area(one.box))):
-        if all(_overlap(one.box, other.box) < SAME for other in kept):
-            kept.append(one)
+    for outline in sorted(outlines, key=lambda outline: (-round(outline.confidence, 2), -_area(outline.box))):
+        if all(_overlap(outline.box, other.box) < SAME for other in kept):
+            kept.append(outline)
     return kept
 
 

@@ -74,17 +74,23 @@ def table_plane(
     points = back_projected(depth, camera).reshape(-1, 3)
     points = points[(points[:, 2] > NEAREST) & (points[:, 2] < FARTHEST)]
     if len(points) < 500:
-        raise BadInput(f"{len(points)} pixels have a depth between {NEAREST} and {FARTHEST} m",
-                       hint="check the depth image and its scale (--depth-scale)")  # fmt: skip
+        raise BadInput(
+            f"{len(points)} pixels have a depth between {NEAREST} and {FARTHEST} m",
+            hint="check the depth image and its scale (--depth-scale)",
+        )
     random = np.random.default_rng([seed, 73])
     points = points[random.permutation(len(points))[:POINTS]]
     total, left, planes = len(points), points, []
     direction = up
     for _ in range(3):
         fit = ransac_plane(
-            left, distance_threshold=THICKNESS, iterations=400, random=random, direction=direction,
+            left,
+            distance_threshold=THICKNESS,
+            iterations=400,
+            random=random,
+            direction=direction,
             maximum_angle=None if direction is None else np.deg2rad(12.0),
-        )  # fmt: skip
+        )
         if fit is None or len(fit.inliers) < LEAST_SHARE * total:
             break
         sign = 1.0 if fit.offset > 0.0 else -1.0  # the camera, at the origin, is above
@@ -94,14 +100,18 @@ def table_plane(
         if len(left) < 500:
             break
     if not planes:
-        raise BadInput("no plane large enough for a table is in the depth image",
-                       hint="show more of the table, or give the camera's pose")  # fmt: skip
+        raise BadInput(
+            "no plane large enough for a table is in the depth image",
+            hint="show more of the table, or give the camera's pose",
+        )
     rivals = [plane for plane in planes if plane[0] >= RIVAL * planes[0][0]]
     _, normal, offset = min(rivals, key=lambda plane: plane[2])
     normal, offset = _refined(points, normal, offset)
     if abs(normal[2]) < np.cos(STEEPEST):
-        raise BadInput(f"the table is seen at {np.rad2deg(np.arccos(abs(normal[2]))):.0f} degrees off its normal",
-                       hint="look down on it at 75 degrees or less")  # fmt: skip
+        raise BadInput(
+            f"the table is seen at {np.rad2deg(np.arccos(abs(normal[2]))):.0f} degrees off its normal",
+            hint="look down on it at 75 degrees or less",
+        )
     return normal, offset
 
 
@@ -122,9 +132,13 @@ def _refined(points: np.ndarray, normal: np.ndarray, offset: float) -> tuple[np.
 
 
 def rectify(
-    color: np.ndarray, depth: np.ndarray, camera: Camera, plane: tuple[np.ndarray, float],
-    world_from_camera: np.ndarray | None = None, sides: tuple[float, float] | None = None,
-) -> Rectified:  # fmt: skip
+    color: np.ndarray,
+    depth: np.ndarray,
+    camera: Camera,
+    plane: tuple[np.ndarray, float],
+    world_from_camera: np.ndarray | None = None,
+    sides: tuple[float, float] | None = None,
+) -> Rectified:
     """Return the view from straight above the workspace.
 
     `plane` is the table's in the camera frame. Without `world_from_camera` (4, 4) the workspace is the largest
@@ -133,14 +147,16 @@ def rectify(
     notes: list[str] = []
     depth = np.where(depth < FARTHEST, depth, 0.0)
     points = back_projected(depth, camera)
-    known = depth > 0.0
+    measured = depth > 0.0
     if world_from_camera is None:
         frame = _table_frame(plane)
-        flat = points[known] @ frame[:3, :3].T + frame[:3, 3]
+        flat = points[measured] @ frame[:3, :3].T + frame[:3, 3]
         frame, sides, cut = _workspace_frame(frame, flat)
         if cut:
-            notes.append(f"the table is larger than what can be looked at together: {sides[0]:.2f} x {sides[1]:.2f} m "
-                         "of it were searched")  # fmt: skip
+            notes.append(
+                f"the table is larger than what can be looked at together: {sides[0]:.2f} x {sides[1]:.2f} m "
+                "of it were searched"
+            )
     else:
         frame = world_from_camera
     assert sides is not None
@@ -151,10 +167,14 @@ def rectify(
         depth.astype(np.float64),
         color,
         _LooksDown(
-            view.camera.fx, view.camera.cx, view.camera.cy, float(view.world_from_camera[2, 3]), view.camera.height,
+            view.camera.fx,
+            view.camera.cx,
+            view.camera.cy,
+            float(view.world_from_camera[2, 3]),
+            view.camera.height,
             view.camera.width,
         ),
-    )  # fmt: skip
+    )
     seen = top > 0.0
     ground = seen & (np.abs(float(view.world_from_camera[2, 3]) - top) < THICKNESS)
     tone = np.median(picture[ground], axis=0) if ground.any() else np.median(picture[seen], axis=0)

@@ -40,34 +40,40 @@ def find_rims(heights: HeightMap) -> list[Rim]:
     """Return the rims of all kinds, surest first, none twice."""
     low, high = (np.array([LIPS[kind][end] for kind in DISHES]) for end in (0, 1))
     votes = cast_votes(
-        cv2.GaussianBlur(heights.smooth, (0, 0), 2.0), heights.smooth,
-        np.array([MEASURES[kind].rim_radius for kind in DISHES]), low, high,
-        heights.focal[0], heights.camera_height, LEAST_SLOPE,
-    )  # fmt: skip
-    found: list[Rim] = []
+        cv2.GaussianBlur(heights.smooth, (0, 0), 2.0),
+        heights.smooth,
+        np.array([MEASURES[kind].rim_radius for kind in DISHES]),
+        low,
+        high,
+        heights.focal[0],
+        heights.camera_height,
+        LEAST_SLOPE,
+    )
+    kept: list[Rim] = []
     for kind, own in zip(DISHES, votes, strict=True):
-        rims = [fitted for u0, v0 in _peaks(own, heights, kind)
-                if (fitted := fit_rim(heights, kind, u0, v0)) is not None]  # fmt: skip
+        rims = [
+            fitted for u0, v0 in _peaks(own, heights, kind) if (fitted := fit_rim(heights, kind, u0, v0)) is not None
+        ]
         for rim in sorted(rims, key=lambda rim: -rim.support):
             apart = 1.2 * MEASURES[kind].rim_radius
-            if all(rim.kind != other.kind or np.hypot(rim.x - other.x, rim.y - other.y) > apart for other in found):
-                found.append(rim)
-    return found
+            if all(rim.kind != other.kind or np.hypot(rim.x - other.x, rim.y - other.y) > apart for other in kept):
+                kept.append(rim)
+    return kept
 
 
 def _peaks(votes: np.ndarray, heights: HeightMap, kind: Kind) -> list[tuple[float, float]]:
     """Return places [px] where votes (at half resolution) gather, most votes first. A pixel of edge votes once."""
     gathered = np.asarray(cv2.boxFilter(votes, -1, (7, 7), normalize=False), dtype=np.float32)
     circumference = 2.0 * np.pi * float(heights.scale(0.05)) * MEASURES[kind].rim_radius
-    found = []
+    peaks = []
     apart = int(0.5 * MEASURES[kind].rim_radius * float(heights.scale(0.05)) * 0.6)
     for _ in range(16):
         _, most, _, (column, row) = cv2.minMaxLoc(gathered)
         if most < LEAST_VOTES * circumference:
             break
-        found.append((2.0 * column + 0.5, 2.0 * row + 0.5))
+        peaks.append((2.0 * column + 0.5, 2.0 * row + 0.5))
         cv2.circle(gathered, (column, row), apart, 0.0, -1)
-    return found
+    return peaks
 
 
 def fit_rim(heights: HeightMap, kind: Kind, u: float, v: float) -> Rim | None:

@@ -35,19 +35,19 @@ def _profiles(smooth: np.ndarray, u: float, v: float, radius: float, rays: np.nd
 
 
 @njit(cache=True)
-def _outer_edges(profile: np.ndarray, lip: float, found: np.ndarray, edge: np.ndarray) -> int:
+def _outer_edges(profile: np.ndarray, lip: float, falls: np.ndarray, edge: np.ndarray) -> int:
     """Write per direction whether a fall from the lip is there, and its offset from the circle [px]: the outermost
     one. Returns how many."""
     level = lip - LEAST_STEP
     count = 0
     for k in range(len(profile)):
-        found[k] = False
+        falls[k] = False
         for step in range(profile.shape[1] - 2, -1, -1):
             here, there = profile[k, step], profile[k, step + 1]
             if here >= level > there:
                 crest = max(here, profile[k, step - 1]) if step > 0 else here
                 if abs(crest - lip) < CREST:
-                    found[k] = True
+                    falls[k] = True
                     edge[k] = step - WINDOW + min(1.0, (here - level) / max(here - there, 1e-6))
                     count += 1
                     break
@@ -108,7 +108,7 @@ def fit_circle(
     rim_radius, low, high, focal, camera_height = sought
     count = len(rays)
     profile = np.empty((count, 2 * WINDOW + 1))
-    found, kept = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    falls, kept = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     edge, crests = np.zeros(count), np.empty(count)
     lip, support, radius = 0.5 * (low + high), 0.0, 0.0
     nothing = (u, v, lip, 0.0, 0.0)
@@ -127,9 +127,9 @@ def fit_circle(
             lip = float(np.median(crests[:usable]))
             if turn == 0:
                 continue
-        if _outer_edges(profile, lip, found, edge) < 0.3 * count:
+        if _outer_edges(profile, lip, falls, edge) < 0.3 * count:
             return nothing
-        kept[:] = found
+        kept[:] = falls
         shift = np.zeros(3)
         limit = 6.0 if turn < 2 else 2.5
         for _ in range(4):
@@ -137,7 +137,7 @@ def fit_circle(
             total = 0
             for k in range(count):
                 residual = edge[k] - rays[k, 0] * shift[0] - rays[k, 1] * shift[1] - shift[2]
-                kept[k] = found[k] and abs(residual) < limit
+                kept[k] = falls[k] and abs(residual) < limit
                 total += kept[k]
             if total < 0.25 * count:
                 return nothing

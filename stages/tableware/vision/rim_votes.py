@@ -8,9 +8,15 @@ from numba import njit
 
 @njit(cache=True)
 def cast_votes(
-    blurred: np.ndarray, smooth: np.ndarray, radii: np.ndarray, low: np.ndarray, high: np.ndarray, focal: float,
-    camera_height: float, steepest: float,
-) -> np.ndarray:  # fmt: skip
+    blurred: np.ndarray,
+    smooth: np.ndarray,
+    radii: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    focal: float,
+    camera_height: float,
+    steepest: float,
+) -> np.ndarray:
     """Return (K, h // 2 + 1, w // 2 + 1) votes for centres of circles of K radii [m] with lips between heights `low`
     and `high` [m], at half resolution.
 

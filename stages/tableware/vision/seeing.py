@@ -19,7 +19,7 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from stages.tableware.vision.detection import items_in
 from stages.tableware.vision.detections import Detection, statement
-from stages.tableware.vision.height_map import HeightMap, height_map
+from stages.tableware.vision.height_map import HeightMap, check_color, check_depth, height_map
 from stages.tableware.vision.rectifying import rectify, table_plane
 from stages.tableware.vision.size_estimation import estimated_dishes
 from stages.tableware.world.items import TABLE_SIDES
@@ -72,18 +72,27 @@ class Sight:
 
 
 def see_image(
-    color: np.ndarray, depth: np.ndarray, camera: OverheadCamera | Camera, sides: tuple[float, float] = TABLE_SIDES,
-    *, sizes: Sizes = "known",
-) -> tuple[Detection, ...]:  # fmt: skip
+    color: np.ndarray,
+    depth: np.ndarray,
+    camera: OverheadCamera | Camera,
+    sides: tuple[float, float] = TABLE_SIDES,
+    *,
+    sizes: Sizes = "known",
+) -> tuple[Detection, ...]:
     """Return the items that an RGB-D image shows; what carries another comes before it. Arguments and errors are those
     of `see`, which also says what was not handled."""
     return see(color, depth, camera, sides, sizes=sizes).detections
 
 
 def see(
-    color: np.ndarray, depth: np.ndarray | None, camera: OverheadCamera | Camera,
-    sides: tuple[float, float] = TABLE_SIDES, *, sizes: Sizes = "known", seed: int = 0,
-) -> Sight:  # fmt: skip
+    color: np.ndarray,
+    depth: np.ndarray | None,
+    camera: OverheadCamera | Camera,
+    sides: tuple[float, float] = TABLE_SIDES,
+    *,
+    sizes: Sizes = "known",
+    seed: int = 0,
+) -> Sight:
     """Return what an RGB-D image shows of a table.
 
     `color` (H, W, 3) uint8, `depth` (H, W) z-depth [m], 0 or NaN where unknown. `camera` with its pose over the middle
@@ -98,8 +107,10 @@ def see(
     some = depth[::4, ::4]
     middle = float(np.median(some[some > 0.0])) if (some > 0.0).any() else 0.0
     if middle > MILLIMETRES:
-        raise BadInput(f"the median depth is {middle:.4g}: that is no table in metres",
-                       hint="depth must be in metres: give the file's scale (--depth-scale 0.001 for mm)")  # fmt: skip
+        raise BadInput(
+            f"the median depth is {middle:.4g}: that is no table in metres",
+            hint="depth must be in metres: give the file's scale (--depth-scale 0.001 for mm)",
+        )
     pose = None if isinstance(camera, Camera) else np.asarray(camera.world_from_camera, dtype=float)
     if pose is not None and _is_usual(intrinsics, pose):
         view, world = OverheadCamera(intrinsics, pose), pose
@@ -112,23 +123,25 @@ def see(
         made = rectify(color, depth, intrinsics, (normal, offset), pose, None if pose is None else sides)
         color, depth, view, sides = made.color, made.depth, made.view, made.sides
         world, rectified = made.world_from_camera, True
-        notes += ["the view was rectified to the table's plane: what others hide from the camera is not seen",
-                  *made.notes]  # fmt: skip
+        notes += [
+            "the view was rectified to the table's plane: what others hide from the camera is not seen",
+            *made.notes,
+        ]
         if min(intrinsics.fx, intrinsics.fy) / max(middle, 0.1) < COARSE:
             notes.append(f"{intrinsics.fx / max(middle, 0.1):.0f} pixels per metre are too few to see utensils")
     heights = height_map(color, depth, view, sides)
     if rectified:
         heights = replace(heights, roughness=heights.measured_roughness())
     if sizes == "known":
-        found = items_in(heights)
+        detections = items_in(heights)
     else:
-        found = estimated_dishes(heights, seed)
+        detections = estimated_dishes(heights, seed)
         notes.append("sizes are estimated: utensils and what stacks hold were not looked for")
     if rectified and -normal[2] < np.cos(OBLIQUE):
-        found = tuple(_doubted(one) for one in found)
+        detections = tuple(_doubted(detection) for detection in detections)
     notes += _unhandled(heights)
     plane = ((float(normal[0]), float(normal[1]), float(normal[2])), float(offset))
-    return Sight(found, tuple(notes), intrinsics, world, plane, sides, rectified, heights)
+    return Sight(detections, tuple(notes), intrinsics, world, plane, sides, rectified, heights)
 
 
 def _check(color: np.ndarray, depth: np.ndarray | None, camera: Camera) -> None:
@@ -137,14 +150,13 @@ def _check(color: np.ndarray, depth: np.ndarray | None, camera: Camera) -> None:
         raise BadInput(
             "there is no depth image", hint="detection needs RGB-D; --photograph finds outlines in colour alone"
         )
-    if color.dtype != np.uint8 or color.ndim != 3 or color.shape != (*shape, 3):
-        raise BadInput(f"the colour image is {color.shape} {color.dtype}, not {(*shape, 3)} uint8",
-                       hint="give the image and the camera that belong together")  # fmt: skip
+    check_color(color, shape)
     if camera.width < LEAST_SIZE[0] or camera.height < LEAST_SIZE[1]:
-        raise BadInput(f"an image of {camera.width} x {camera.height} pixels is too small to see tableware in",
-                       hint=f"at least {LEAST_SIZE[0]} x {LEAST_SIZE[1]}")  # fmt: skip
-    if depth.shape != shape:
-        raise BadInput(f"the depth image is {depth.shape}, not {shape}", hint="align depth to colour first")
+        raise BadInput(
+            f"an image of {camera.width} x {camera.height} pixels is too small to see tableware in",
+            hint=f"at least {LEAST_SIZE[0]} x {LEAST_SIZE[1]}",
+        )
+    check_depth(depth, shape)
     if min(camera.fx, camera.fy) <= 0.0:
         raise BadInput(
             f"the camera's focal lengths are {camera.fx:g}, {camera.fy:g}", hint="they are positive, in pixels"
@@ -178,16 +190,21 @@ def _check_pose(pose: np.ndarray, normal: np.ndarray, offset: float) -> None:
     """Raise BadInput where the plane that is seen is not the table that the pose says."""
     angle = float(np.rad2deg(np.arccos(np.clip(normal @ pose[2, :3], -1.0, 1.0))))
     if angle > 5.0 or abs(offset - float(pose[2, 3])) > 0.05:
-        raise BadInput(f"the table is seen {offset:.3f} m away where the pose says {float(pose[2, 3]):.3f} m, "
-                       f"{angle:.1f} degrees off it", hint="correct the pose, or leave it out")  # fmt: skip
+        raise BadInput(
+            f"the table is seen {offset:.3f} m away where the pose says {float(pose[2, 3]):.3f} m, "
+            f"{angle:.1f} degrees off it",
+            hint="correct the pose, or leave it out",
+        )
 
 
-def _doubted(one: Detection) -> Detection:
+def _doubted(detection: Detection) -> Detection:
     """Return a detection of an oblique view: confidences are calibrated from above, and a tall cup seen from the side
     passes for two."""
-    if one.kind is None:
-        return one
-    return replace(one, confidence=OBLIQUE_TRUST * one.confidence, unsure=(*one.unsure, "oblique view"))
+    if detection.kind is None:
+        return detection
+    return replace(
+        detection, confidence=OBLIQUE_TRUST * detection.confidence, unsure=(*detection.unsure, "oblique view")
+    )
 
 
 def _unhandled(heights: HeightMap) -> list[str]:
@@ -200,8 +217,9 @@ def _unhandled(heights: HeightMap) -> list[str]:
     glare = cv2.morphologyEx((white & blind).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
     lost = float(np.count_nonzero(cv2.morphologyEx(glare, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)))) * area
     if lost > GLARE_AREA:
-        notes.append(f"glare: {1e4 * lost:.0f} cm2 of the workspace are full white without depth, what is there was "
-                     "not seen")  # fmt: skip
+        notes.append(
+            f"glare: {1e4 * lost:.0f} cm2 of the workspace are full white without depth, what is there was not seen"
+        )
     solid = cv2.morphologyEx(blind.astype(np.uint8), cv2.MORPH_OPEN, np.ones((9, 9), np.uint8))
     hole = float(np.count_nonzero(solid)) * area
     if hole > HOLE_AREA:

@@ -45,24 +45,24 @@ def estimated_dishes(heights: HeightMap, seed: int = 0) -> tuple[Detection, ...]
     are told apart: a stack is one thing."""
     random = np.random.default_rng([seed, 74])
     inside = heights.workspace()
-    known = inside & heights.valid
+    measured = inside & heights.valid
     result: list[Detection] = []
     taken = np.zeros(inside.shape, dtype=np.uint8)
     # What is joined low down, by what hides between things, comes apart higher up: levels from the top down, and what
     # is a dish at one is left out of the lower ones.
     for level in LEVELS:
-        high = (known & (heights.smooth > max(level, ROUGH * heights.roughness)) & (taken == 0)).astype(np.uint8)
+        high = (measured & (heights.smooth > max(level, ROUGH * heights.roughness)) & (taken == 0)).astype(np.uint8)
         for window, own in _pieces(high, heights):
-            found = _dish(heights, window, own, level, random)
-            if found is not None:
-                result.append(found)
-                assert found.size is not None
-                u, v = heights.pixel(found.position[0], found.position[1], found.lip)
-                reach = (found.size.rim_radius + AROUND) * float(heights.scale(found.lip))
+            dish = _dish(heights, window, own, level, random)
+            if dish is not None:
+                result.append(dish)
+                assert dish.size is not None
+                u, v = heights.pixel(dish.position[0], dish.position[1], dish.lip)
+                reach = (dish.size.rim_radius + AROUND) * float(heights.scale(dish.lip))
                 cv2.circle(taken, (int(u), int(v)), int(reach), 1, -1)
     result = _apart(result)
     low = max(LEAST_HEIGHT, ROUGH * heights.roughness)
-    rest = (((known & (heights.smooth > low)) | (heights.tall & inside)) & (taken == 0)).astype(np.uint8)
+    rest = (((measured & (heights.smooth > low)) | (heights.tall & inside)) & (taken == 0)).astype(np.uint8)
     for window, own in _pieces(rest, heights):
         tall = heights.tall[window][own].mean() > 0.05
         known_heights = heights.smooth[window][own & heights.valid[window]]
@@ -73,16 +73,16 @@ def estimated_dishes(heights: HeightMap, seed: int = 0) -> tuple[Detection, ...]
     return tuple(result)
 
 
-def _apart(found: list[Detection]) -> list[Detection]:
+def _apart(dishes: list[Detection]) -> list[Detection]:
     """Return dishes less those whose middle is within one that is surer."""
     kept: list[Detection] = []
-    for one in sorted(found, key=lambda one: -one.confidence):
-        (x, y, _), apart = one.position, True
+    for dish in sorted(dishes, key=lambda dish: -dish.confidence):
+        (x, y, _), apart = dish.position, True
         for other in kept:
             reach = other.size.rim_radius if other.size is not None else 0.0
             apart &= bool(np.hypot(x - other.position[0], y - other.position[1]) > reach)
         if apart:
-            kept.append(one)
+            kept.append(dish)
     return kept
 
 
@@ -135,8 +135,14 @@ def _dish(
         reasons.append("partly hidden")
     confidence = 0.5 + 0.4 * min(1.0, (share - LEAST_ROUND) / (SURE_ROUND - LEAST_ROUND))
     size = Measures(height=greatest, rim_radius=rim, foot_radius=FOOT_SHARE * rim, wall=WALL)
-    return Detection(kind=kind, position=(float(x), float(y), 0.0), lip=greatest, confidence=confidence,
-                     unsure=tuple(reasons), size=size)  # fmt: skip
+    return Detection(
+        kind=kind,
+        position=(float(x), float(y), 0.0),
+        lip=greatest,
+        confidence=confidence,
+        unsure=tuple(reasons),
+        size=size,
+    )
 
 
 def _unknown(heights: HeightMap, window: tuple[slice, slice], own: np.ndarray, height: float, reason: str) -> Detection:

@@ -62,8 +62,11 @@ def read_stacks(rims: list[Rim]) -> list[Stack]:
         base = left.pop(0)
         members = [base]
         for kind in DISHES:
-            near = [rim for rim in left if rim.kind == kind != base.kind
-                    and np.hypot(rim.x - base.x, rim.y - base.y) < CONCENTRIC]  # fmt: skip
+            near = [
+                rim
+                for rim in left
+                if rim.kind == kind != base.kind and np.hypot(rim.x - base.x, rim.y - base.y) < CONCENTRIC
+            ]
             if near:
                 member = min(near, key=lambda rim: np.hypot(rim.x - base.x, rim.y - base.y))
                 members.append(member)

@@ -39,27 +39,33 @@ def detect_thesis(color: np.ndarray, depth: np.ndarray, camera: OverheadCamera) 
     kinds: tuple[Kind, ...] = ("bowl", "cup")
     for kind in kinds:
         rims.extend(_circles(gray, heights, kind))
-    found: list[Detection] = []
+    detections: list[Detection] = []
     covered = np.zeros(gray.shape, dtype=np.uint8)
     for stack in read_stacks(rims):
-        first = len(found)
+        first = len(detections)
         for level, (kind, foot) in enumerate(zip(stack.kinds, stack.feet, strict=True)):
             on = first + level - 1 if level else None
             lip = foot + MEASURES[kind].height
-            found.append(Detection(kind=kind, position=(stack.x, stack.y, foot), lip=lip, on=on))
+            detections.append(Detection(kind=kind, position=(stack.x, stack.y, foot), lip=lip, on=on))
         radius = 1.12 * MEASURES[stack.kinds[0]].rim_radius * float(heights.scale(stack.top))
         u, v = heights.pixel(np.float64(stack.x), np.float64(stack.y), stack.top)
         cv2.circle(covered, (int(u), int(v)), int(radius), 1, -1)
-    found.extend(_bars(gray, heights, covered > 0))
-    return tuple(found)
+    detections.extend(_bars(gray, heights, covered > 0))
+    return tuple(detections)
 
 
 def _circles(gray: np.ndarray, heights: HeightMap, kind: Kind) -> list[Rim]:
     expected = MEASURES[kind].rim_radius * float(heights.scale(0.0))
     circles = cv2.HoughCircles(
-        gray, cv2.HOUGH_GRADIENT, 1.5, 0.3 * expected, param1=CANNY[1], param2=VOTES,
-        minRadius=int(expected), maxRadius=int(np.ceil((1.0 + RADIUS_TOLERANCE) * expected)),
-    )  # fmt: skip
+        gray,
+        cv2.HOUGH_GRADIENT,
+        1.5,
+        0.3 * expected,
+        param1=CANNY[1],
+        param2=VOTES,
+        minRadius=int(expected),
+        maxRadius=int(np.ceil((1.0 + RADIUS_TOLERANCE) * expected)),
+    )
     rims: list[Rim] = []
     for u, v, radius in [] if circles is None else circles.reshape(-1, circles.shape[-1])[:, :3]:
         angles = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
@@ -81,7 +87,7 @@ def _bars(gray: np.ndarray, heights: HeightMap, covered: np.ndarray) -> list[Det
     closed = cv2.morphologyEx(edges, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
     contours, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     scale = float(heights.scale(0.003))
-    found = []
+    bars = []
     for contour in contours:
         (u, v), (width, height), degrees = cv2.minAreaRect(contour)
         long, short = max(width, height), min(width, height)
@@ -95,8 +101,13 @@ def _bars(gray: np.ndarray, heights: HeightMap, covered: np.ndarray) -> list[Det
         k = int(np.argmax(line))
         x, y = heights.world(np.float64(u), np.float64(v), 0.003)
         gx, gy = heights.world(np.float64(columns[k]), np.float64(rows[k]), 0.003)
-        found.append(
-            Detection(kind="fork", position=(float(x), float(y), 0.0), yaw=float(-angle), lip=MEASURES["fork"].height,
-                      grasp=(float(gx), float(gy), float(line[k])))
-        )  # fmt: skip
-    return found
+        bars.append(
+            Detection(
+                kind="fork",
+                position=(float(x), float(y), 0.0),
+                yaw=float(-angle),
+                lip=MEASURES["fork"].height,
+                grasp=(float(gx), float(gy), float(line[k])),
+            )
+        )
+    return bars

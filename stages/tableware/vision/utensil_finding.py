@@ -74,9 +74,14 @@ def outline(kind: Kind) -> tuple[np.ndarray, np.ndarray]:
 
 @njit(cache=True)
 def _scores(
-    map_: np.ndarray, inside: np.ndarray, border: np.ndarray, scale: float, u: np.ndarray, v: np.ndarray,
+    map_: np.ndarray,
+    inside: np.ndarray,
+    border: np.ndarray,
+    scale: float,
+    u: np.ndarray,
+    v: np.ndarray,
     angle: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """Return (N,) scores of an outline at N poses, half the difference of the mean map in it and around it, and (N,)
     shares of the outline that are known.
 
@@ -87,25 +92,29 @@ def _scores(
         cos, sin = scale * np.cos(angle[k]), scale * np.sin(angle[k])
         for part in range(2):
             points = inside if part == 0 else border
-            total, known = 0, 0
+            total, measured = 0, 0
             for i in range(len(points)):
                 column = int(u[k] + points[i, 0] * cos + points[i, 1] * sin + 0.5)
                 row = int(v[k] + points[i, 0] * sin - points[i, 1] * cos + 0.5)
                 if 0 <= column < map_.shape[1] and 0 <= row < map_.shape[0]:
                     value = map_[row, column]
                     total += value
-                    known += value != 0
-            mean = total / max(known + UNKNOWN_WEIGHT * (len(points) - known), 1.0)
+                    measured += value != 0
+            mean = total / max(measured + UNKNOWN_WEIGHT * (len(points) - measured), 1.0)
             result[k] += 0.5 * mean if part == 0 else -0.5 * mean
             if part == 0:
-                visible[k] = known / len(points)
+                visible[k] = measured / len(points)
     return result, visible
 
 
 def _best_pose(
-    map_: np.ndarray, kind: Kind, scale: float, start: tuple[float, float, float], steps: tuple[float, float, float],
+    map_: np.ndarray,
+    kind: Kind,
+    scale: float,
+    start: tuple[float, float, float],
+    steps: tuple[float, float, float],
     far: int = 2,
-) -> Pose:  # fmt: skip
+) -> Pose:
     """Return the best of 9 (2 far + 1) poses around a start; steps along, across [px], turn [rad]."""
     along, across, turn = (step * grid for step, grid in zip(steps, _grid(far), strict=True))
     cos, sin = np.cos(start[2]), np.sin(start[2])
@@ -123,7 +132,7 @@ def _grid(far: int) -> tuple[np.ndarray, ...]:
 
 def fit_utensil(map_: np.ndarray, scale: float, u: float, v: float, angle: float) -> Bar:
     """Return the best outline near a bar's centre [px] and direction [rad]; `scale` in pixels per metre."""
-    found: list[tuple[Pose, Kind]] = []
+    fitted: list[tuple[Pose, Kind]] = []
     part = _scores(map_, *outline("spoon"), scale, np.array([u]), np.array([v]), np.array([angle]))[1][0] < 0.9
     for kind in UTENSILS:
         pose = max(
@@ -132,10 +141,10 @@ def fit_utensil(map_: np.ndarray, scale: float, u: float, v: float, angle: float
         )
         for steps in ((2.0, 1.0, 0.02), (1.0, 0.5, 0.008)):
             pose = _best_pose(map_, kind, scale, pose[1:4], steps)
-        found.append((pose, kind))
-    found.sort(reverse=True)
-    (score, u, v, angle, visible), kind = found[0]
-    return Bar(kind, u, v, angle, score, visible, {kind: pose for pose, kind in found})
+        fitted.append((pose, kind))
+    fitted.sort(reverse=True)
+    (score, u, v, angle, visible), kind = fitted[0]
+    return Bar(kind, u, v, angle, score, visible, {kind: pose for pose, kind in fitted})
 
 
 def search_bars(map_: np.ndarray, scale: float, most: int) -> list[Bar]:

@@ -55,8 +55,8 @@ def kind_features(bar: Bar, heights: HeightMap, z: float, hidden: np.ndarray) ->
 
 
 def _most(values: list[float]) -> float:
-    known = [value for value in values if not np.isnan(value)]
-    return max(known) if known else float("nan")
+    measured = [value for value in values if not np.isnan(value)]
+    return max(measured) if measured else float("nan")
 
 
 def _sampled(image: np.ndarray, points: np.ndarray) -> np.ndarray:

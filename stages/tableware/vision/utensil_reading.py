@@ -99,7 +99,7 @@ def utensils_on_dish(heights: HeightMap, stack: Stack, covered: np.ndarray, labe
     bars = [_shifted(bar, left, up) for bar in search_bars(map_, scale, 2)]
     nothing = np.zeros(heights.smooth.shape, dtype=bool)
     seen = [_seen(bar, heights, stack.top, "dish", nothing) for bar in bars]
-    return sorted(seen, key=lambda one: _middle_height(heights, one.bar, z))
+    return sorted(seen, key=lambda utensil: _middle_height(heights, utensil.bar, z))
 
 
 def _square(center: float, half: float, scale: float) -> slice:
@@ -173,22 +173,22 @@ def utensils_on_table(
         own = labels[window] == label
         map_ = np.where(own, 1, -1).astype(np.int8)
         map_[hidden[window] | ((labels[window] > 0) & ~own)] = 0
-        found = _lone_bar(map_, own, scale, area, whole)
-        if not found:
-            found = search_bars(map_, scale, min(5, int(area / whole + 1.5)))
-        found = [_shifted(bar, window[1].start, window[0].start) for bar in found]
+        bars = _lone_bar(map_, own, scale, area, whole)
+        if not bars:
+            bars = search_bars(map_, scale, min(5, int(area / whole + 1.5)))
+        bars = [_shifted(bar, window[1].start, window[0].start) for bar in bars]
         if (
-            not found
+            not bars
             and area > UNKNOWN_AREA * scale**2
             and heights.smooth[window][own].mean() > max(FLAT, ROUGH * heights.roughness)
         ):
             strange[window] |= own
-        seen.extend(_that_rise(found, heights, hidden, rest, scale))
+        seen.extend(_that_rise(bars, heights, hidden, rest, scale))
     # What a dish cuts in two is found by its parts together.
     if np.count_nonzero(rest > 0) > LEAST_VISIBLE * 0.5 * whole:
         seen.extend(_that_rise(search_bars(rest, scale, MOST_CUT), heights, hidden, rest, scale))
     strange &= rest > 0
-    return sorted(seen, key=lambda one: 0.0 if np.isnan(one.relief) else one.relief), strange
+    return sorted(seen, key=lambda utensil: 0.0 if np.isnan(utensil.relief) else utensil.relief), strange
 
 
 def _that_rise(
@@ -197,9 +197,9 @@ def _that_rise(
     """Return the bars that rise over the table, which the rim of a shadow as slender as a utensil does not, and set
     `rest` (h, w) to unknown where they lie, in place."""
     seen = [_seen(bar, heights, 0.0, "table", hidden) for bar in bars]
-    kept = [one for one in seen if not one.relief < max(LEAST_RELIEF, ROUGH * heights.roughness)]
-    for one in kept:
-        erase_bar(rest, one.bar, scale)
+    kept = [utensil for utensil in seen if not utensil.relief < max(LEAST_RELIEF, ROUGH * heights.roughness)]
+    for utensil in kept:
+        erase_bar(rest, utensil.bar, scale)
     return kept
 
 
@@ -214,9 +214,9 @@ def _lone_bar(map_: np.ndarray, own: np.ndarray, scale: float, area: int, whole:
     return [bar] if bar.score >= LEAST_SCORE and bar.visible >= LEAST_VISIBLE else []
 
 
-def as_detection(one: SeenUtensil, heights: HeightMap, z: float, on: int | None) -> Detection:
+def as_detection(utensil: SeenUtensil, heights: HeightMap, z: float, on: int | None) -> Detection:
     """Return a utensil whose underside is at height z [m]; its grasp is the highest place along its axis."""
-    bar = one.bar
+    bar = utensil.bar
     thick = MEASURES[bar.kind].height
     x, y = heights.world(np.float64(bar.u), np.float64(bar.v), z + thick)
     columns, rows = axis_pixels(heights, bar, z)
@@ -224,20 +224,25 @@ def as_detection(one: SeenUtensil, heights: HeightMap, z: float, on: int | None)
     k = int(np.argmax(along)) + 4
     grasp = heights.world(np.float64(columns[k]), np.float64(rows[k]), z + thick)
     reasons = []
-    if one.depth_share < LEAST_DEPTH:
+    if utensil.depth_share < LEAST_DEPTH:
         reasons.append("no depth")
-    if one.chance < SURE_OF_KIND:
+    if utensil.chance < SURE_OF_KIND:
         reasons.append("fork or spoon")
     if bar.visible < MOSTLY_SEEN:
         reasons.append("partly hidden")
     return Detection(
-        kind=bar.kind, position=(float(x), float(y), z), yaw=float(np.arctan2(np.sin(-bar.angle), np.cos(-bar.angle))),
-        lip=z + thick, on=on, grasp=(float(grasp[0]), float(grasp[1]), float(along.max())),
-        confidence=1.0 - WEAK_LOOK * (1.0 - one.chance * _there(one)), unsure=tuple(reasons),
-    )  # fmt: skip
+        kind=bar.kind,
+        position=(float(x), float(y), z),
+        yaw=float(np.arctan2(np.sin(-bar.angle), np.cos(-bar.angle))),
+        lip=z + thick,
+        on=on,
+        grasp=(float(grasp[0]), float(grasp[1]), float(along.max())),
+        confidence=1.0 - WEAK_LOOK * (1.0 - utensil.chance * _there(utensil)),
+        unsure=tuple(reasons),
+    )
 
 
-def _there(one: SeenUtensil) -> float:
+def _there(utensil: SeenUtensil) -> float:
     """Return the chance 0..1 that there is a utensil at all, as it looks."""
-    relief = 0.0 if np.isnan(one.relief) else 1e3 * one.relief - 2.0
-    return 1.0 / (1.0 + exp(-(4.0 + 12.0 * (one.bar.score - 0.8) + relief + 3.0 * (one.bar.visible - 0.9))))
+    relief = 0.0 if np.isnan(utensil.relief) else 1e3 * utensil.relief - 2.0
+    return 1.0 / (1.0 + exp(-(4.0 + 12.0 * (utensil.bar.score - 0.8) + relief + 3.0 * (utensil.bar.visible - 0.9))))

@@ -43,22 +43,6 @@ def shell_mesh(shell: Measures, sides: int = SIDES) -> trimesh.Trimesh:
     return trimesh.Trimesh(np.concatenate(points), np.concatenate(faces), process=False)
 
 
-def shell_volume(shell: Measures, sides: int | None = None) -> float:
-    """Return the volume [m^3] of a shell: outer minus inner frustum; of its mesh with `sides` sides, or of revolution.
-
-    A frustum of height h and radii a, b has the volume pi h (a^2 + a b + b^2) / 3; a regular polygon's area is that of
-    its circle times n sin(2 pi / n) / (2 pi).
-    """
-    inner = (shell.inner_radius(shell.wall), shell.inner_radius(shell.height))
-
-    def frustum(height: float, a: float, b: float) -> float:
-        return height * (a * a + a * b + b * b) / 3.0
-
-    volume = frustum(shell.height, shell.foot_radius, shell.rim_radius)
-    volume -= frustum(shell.height - shell.wall, *inner)
-    return volume * (np.pi if sides is None else 0.5 * sides * np.sin(2.0 * np.pi / sides))
-
-
 def spine_height(share: float | np.ndarray, arch: float) -> float | np.ndarray:
     """Return the height [m] of a utensil's underside at a share 0..1 of its length from the handle's end.
 
@@ -110,8 +94,11 @@ def utensil_parts(strip: Measures, fork: bool, stations: int = 48) -> list[tuple
     neck, root = 1.0 - HEAD_SHARE, 1.0 - 0.6 * HEAD_SHARE
     share = np.linspace(0.0, root, stations)
     opening = np.clip((share - neck) / (root - neck), 0.0, 1.0)
-    half = np.where(share < neck, spoon_half_width(strip, np.minimum(share, neck - 1e-9)),
-                    0.5 * strip.width * (NECK_SHARE + (1.0 - NECK_SHARE) * np.sin(0.5 * np.pi * opening)))  # fmt: skip
+    half = np.where(
+        share < neck,
+        spoon_half_width(strip, np.minimum(share, neck - 1e-9)),
+        0.5 * strip.width * (NECK_SHARE + (1.0 - NECK_SHARE) * np.sin(0.5 * np.pi * opening)),
+    )
     parts = [((share - 0.5) * strip.length, -half, half)]
     tine = strip.width * (1.0 - GAP_SHARE) / TINES
     pitch = (strip.width - tine) / (TINES - 1)
@@ -132,12 +119,6 @@ def utensil_mesh(strip: Measures, fork: bool, arch: float = 0.0) -> trimesh.Trim
         faces.append(triangles + first)
         first += len(points)
     return trimesh.Trimesh(np.concatenate(vertices), np.concatenate(faces), process=False)
-
-
-def utensil_volume(strip: Measures, fork: bool) -> float:
-    """Return the volume [m^3]: plan area (trapezia between stations) times the thickness, whatever the arch."""
-    area = sum(float(np.trapezoid(high - low, x)) for x, low, high in utensil_parts(strip, fork))
-    return area * strip.height
 
 
 def item_mesh(item: Item, arch: float = 0.0) -> trimesh.Trimesh:

@@ -57,7 +57,7 @@ def overlapped(places: Sequence[Footprint], others: Sequence[Footprint]) -> np.n
 
 
 def _as_rows(prints: Sequence[Footprint]) -> np.ndarray:
-    return np.array([(*one.start, *one.end, one.radius) for one in prints], dtype=np.float64).reshape(-1, 5)
+    return np.array([(*print_.start, *print_.end, print_.radius) for print_ in prints], dtype=np.float64).reshape(-1, 5)
 
 
 @njit(cache=True)
@@ -71,18 +71,20 @@ def _overlapped(places, others):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _square_distance(one, other):  # type: ignore[no-untyped-def]
+def _square_distance(first, second):  # type: ignore[no-untyped-def]
     """Square of the distance of two segments (x, y, x, y, ...)."""
-    ax, ay, bx, by = one[0], one[1], one[2], one[3]
-    cx, cy, dx, dy = other[0], other[1], other[2], other[3]
+    ax, ay, bx, by = first[0], first[1], first[2], first[3]
+    cx, cy, dx, dy = second[0], second[1], second[2], second[3]
     c_side, d_side = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax), (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
     a_side, b_side = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx), (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
     if c_side * d_side < 0.0 and a_side * b_side < 0.0:
         return 0.0
     return min(
-        _square_to_segment(ax, ay, cx, cy, dx, dy), _square_to_segment(bx, by, cx, cy, dx, dy),
-        _square_to_segment(cx, cy, ax, ay, bx, by), _square_to_segment(dx, dy, ax, ay, bx, by),
-    )  # fmt: skip
+        _square_to_segment(ax, ay, cx, cy, dx, dy),
+        _square_to_segment(bx, by, cx, cy, dx, dy),
+        _square_to_segment(cx, cy, ax, ay, bx, by),
+        _square_to_segment(dx, dy, ax, ay, bx, by),
+    )
 
 
 @njit(cache=True)

@@ -152,13 +152,13 @@ class Table:
 
     def load(self, name: str) -> tuple[Item, ...]:
         """Return everything above an item, lower things first."""
-        found: list[Item] = []
+        carried: list[Item] = []
         waiting = [name]
         while waiting:
             above = self.carried[waiting.pop(0)]
-            found.extend(above)
+            carried.extend(above)
             waiting.extend(item.name for item in above)
-        return tuple(found)
+        return tuple(carried)
 
     @cached_property
     def stacks(self) -> tuple[tuple[Item, ...], ...]:

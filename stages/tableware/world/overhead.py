@@ -83,10 +83,16 @@ def _slab(width: float, depth: float, top: float) -> trimesh.Trimesh:
 
 
 def render_overhead(
-    table: Table, seed: int, level: str = "usual", scheme: Scheme = "dark_on_white", *,
-    noise: bool = True, view: OverheadCamera | None = None, others: tuple[trimesh.Trimesh, ...] = (),
+    table: Table,
+    seed: int,
+    level: str = "usual",
+    scheme: Scheme = "dark_on_white",
+    *,
+    noise: bool = True,
+    view: OverheadCamera | None = None,
+    others: tuple[trimesh.Trimesh, ...] = (),
     poses: Mapping[str, np.ndarray] | None = None,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """Return (color (H, W, 3) uint8 sRGB, depth (H, W) float32 [m], 0 where the sensor reports none).
 
     The lamp's place, the dishes' tones and the noise follow from `seed`. `others` are meshes that are no tableware.

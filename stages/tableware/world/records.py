@@ -18,4 +18,6 @@ def as_records(table: Table) -> tuple[TablewareItem, ...]:
 
 def as_table(records: Iterable[TablewareItem]) -> Table:
     """Return the table of an artifact, with the standard measures of each kind."""
-    return Table(tuple(Item(one.name, one.kind, one.position, one.yaw, one.on, MEASURES[one.kind]) for one in records))
+    return Table(
+        tuple(Item(item.name, item.kind, item.position, item.yaw, item.on, MEASURES[item.kind]) for item in records)
+    )

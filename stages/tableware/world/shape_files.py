@@ -11,9 +11,12 @@ from stages.tableware.world.dish_shapes import item_mesh
 from stages.tableware.world.items import MEASURES, Kind, make_item
 
 COLORS: dict[Kind, tuple[int, int, int]] = {
-    "bowl": (91, 143, 201), "cup": (224, 144, 74), "plate": (154, 165, 177), "fork": (75, 85, 99),
+    "bowl": (91, 143, 201),
+    "cup": (224, 144, 74),
+    "plate": (154, 165, 177),
+    "fork": (75, 85, 99),
     "spoon": (124, 92, 168),
-}  # fmt: skip
+}
 
 
 def write_shapes(folder: Path) -> None:

@@ -137,7 +137,7 @@ def test_options_that_do_not_go_together(transcript: Path, tmp_path: Path) -> No
     with pytest.raises(UsageError, match="no replies of model 'other'") as caught:
         recorded(transcript, model="other")
     assert "stub" in caught.value.hint
-    with pytest.raises(BadInput, match="No such file"):
+    with pytest.raises(BadInput, match="file is missing"):
         recorded(tmp_path / "none.jsonl")
 
 

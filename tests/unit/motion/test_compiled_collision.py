@@ -7,7 +7,7 @@ from scipy.optimize import minimize
 
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.compiled_check import FREE, HIT, find_collision
-from stages.kit.motion.convex_distance import convex_distance
+from stages.kit.motion.convex_distance import Hull, convex_distance
 from stages.kit.motion.convex_pieces import link_pieces
 from stages.kit.motion.sphere_cover import enclosing_ball, hull_vertices, sphere_cover
 from stages.kit.simulation.robot_description import load_robot, mobile_robot_urdf
@@ -53,12 +53,16 @@ def _distance_by_optimiser(first: np.ndarray, second: np.ndarray) -> float:
     return float(np.sqrt(found.fun))
 
 
+def hull(vertices: np.ndarray, pose: np.ndarray = UNIT) -> Hull:
+    return Hull(vertices, 0, len(vertices), pose)
+
+
 def test_distance_of_hulls_agrees_with_an_optimiser() -> None:
     random = np.random.default_rng(3)
     for _ in range(6):
         first = hull_vertices(random.normal(size=(9, 3)) * 0.2)
         second = hull_vertices(random.normal(size=(8, 3)) * 0.2 + random.uniform(-0.7, 0.7, 3))
-        lower, upper = convex_distance(first, 0, len(first), UNIT, second, 0, len(second), UNIT, np.inf, 0.0)
+        lower, upper = convex_distance(hull(first), hull(second), np.inf, 0.0)
         assert lower <= upper + 1e-12
         assert abs(upper - _distance_by_optimiser(first, second)) < 1e-3
 
@@ -67,12 +71,12 @@ def test_distance_of_boxes_in_closed_form_and_early_ends() -> None:
     box = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
     away = UNIT.copy()
     away[:, 3] = [5.0, 6.0, 0.3]
-    lower, upper = convex_distance(box, 0, 8, UNIT, box, 0, 8, away, np.inf, 0.0)
+    lower, upper = convex_distance(hull(box), hull(box, away), np.inf, 0.0)
     assert abs(lower - 5.0) < 1e-4
     assert abs(upper - 5.0) < 1e-4
-    assert 1.0 < convex_distance(box, 0, 8, UNIT, box, 0, 8, away, 1.0, 0.0)[0] <= 5.0
+    assert 1.0 < convex_distance(hull(box), hull(box, away), 1.0, 0.0)[0] <= 5.0
     away[:, 3] = [1.5, 0.2, 0.1]
-    assert convex_distance(box, 0, 8, UNIT, box, 0, 8, away, np.inf, 0.0) == (0.0, 0.0)
+    assert convex_distance(hull(box), hull(box, away), np.inf, 0.0) == (0.0, 0.0)
 
 
 def _walk(count: int, seed: int) -> np.ndarray:

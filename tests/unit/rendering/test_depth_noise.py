@@ -12,13 +12,17 @@ from stages.kit.rendering.depth_noise import (
     disturb_depth,
     lateral_sigma,
     loss_probability,
-    quantisation_step,
     quantise,
 )
 
 CAMERA = Camera(width=320, height=240, fx=525.0, fy=525.0, cx=159.5, cy=119.5)
 SENSOR = DepthCamera()
 PERFECT = DepthCamera(disparity_levels=1e6, dark_signal=0.0, shine_loss=0.0)
+
+
+def quantisation_step(z: float) -> float:
+    """Distance of neighbouring depth values at z [m]: z^2 / (f b levels)."""
+    return z * z / (CAMERA.fx * SENSOR.baseline * SENSOR.disparity_levels)
 
 
 def wall(depth: float, angle: float = 0.0, reflectance: float = 0.6, gloss: float = 0.0) -> list[np.ndarray]:
@@ -29,16 +33,7 @@ def wall(depth: float, angle: float = 0.0, reflectance: float = 0.6, gloss: floa
 
 
 def losses(depth: float, angle: float, reflectance: float, gloss: float) -> float:
-    return loss_probability(
-        depth,
-        angle,
-        reflectance,
-        gloss,
-        SENSOR.grazing_start,
-        SENSOR.grazing_end,
-        SENSOR.dark_signal,
-        SENSOR.shine_loss,
-    )
+    return loss_probability(depth, angle, reflectance, gloss, SENSOR)
 
 
 def test_published_values() -> None:
@@ -70,7 +65,7 @@ def test_quantisation_lies_on_the_disparity_grid(depth: float) -> None:
     steps = np.diff(np.unique(np.round(levels).astype(int)))
     assert steps.min() == 1
     neighbours = np.abs(np.diff(np.unique(values.astype(np.float32))))
-    step = quantisation_step(depth, CAMERA.fx, SENSOR.baseline, SENSOR.disparity_levels)
+    step = quantisation_step(depth)
     assert np.median(neighbours) == pytest.approx(step, rel=0.15)
     variance = axial_sigma(depth, 0.0) ** 2 + step**2 / 12
     assert values.std() == pytest.approx(np.sqrt(variance), rel=0.05)
@@ -80,7 +75,7 @@ def test_quantise_is_idempotent_and_within_half_a_step() -> None:
     for z in np.linspace(0.4, 4.9, 200):
         once = quantise(z, 525.0, 0.075, 16.0)
         assert quantise(once, 525.0, 0.075, 16.0) == pytest.approx(once, abs=1e-12)
-        assert abs(once - z) <= 0.51 * quantisation_step(max(z, once), 525.0, 0.075, 16.0)
+        assert abs(once - z) <= 0.51 * max(z, once) ** 2 / (525.0 * 0.075 * 16.0)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import apply, look_at
-from stages.kit.rendering.light_map import AreaLight
+from stages.kit.rendering.light_map import AreaLight, SoftLight
 from stages.kit.rendering.patterns import PATTERNS, Material, is_wood, pattern_factor
 from stages.kit.rendering.ray_casting import SceneRenderer
 from stages.kit.rendering.surfaces import corner_normals, linear_to_srgb, srgb_to_linear
@@ -102,9 +102,7 @@ def test_light_map_follows_the_inverse_square_of_a_small_lamp() -> None:
     """E = L A cos cos' / r^2; the map holds E / pi. Without bounce and ambient light on an open floor."""
     height, radiance, edge = 2.0, 50.0, 0.1
     lamp = AreaLight((0.0, 0.0, height), (edge, 0, 0), (0, -edge, 0), (radiance,) * 3)
-    renderer = SceneRenderer(
-        [(1, floor())], lights=[lamp], ambient=(0.0,) * 3, sky=(0.0,) * 3, light_map=True, texel=0.1
-    )
+    renderer = SceneRenderer([(1, floor())], lights=[lamp], ambient=(0.0,) * 3, soft_light=SoftLight((0.0,) * 3, 0.1))
     assert renderer.light_map is not None
     soup, light = renderer.soup, renderer.light_map
     up = np.flatnonzero(soup.face_normals[:, 2] > 0.9)
@@ -127,7 +125,7 @@ def test_color_reflects_between_surfaces() -> None:
     red = painted_box((0.5, -2, 0.0), (0.6, 2, 2.0), (255, 0, 0))
     lamp = AreaLight((-1.0, 0.0, 1.5), (0, 0.5, 0), (0, 0, 0.5), (20.0,) * 3)  # shines along +x
     renderer = SceneRenderer(
-        [(1, floor()), (2, red)], lights=[lamp], ambient=(0.0,) * 3, sky=(0.0,) * 3, light_map=True
+        [(1, floor()), (2, red)], lights=[lamp], ambient=(0.0,) * 3, soft_light=SoftLight((0.0,) * 3)
     )
     assert renderer.light_map is not None
     soup, light = renderer.soup, renderer.light_map
@@ -151,8 +149,8 @@ def test_rendering_is_repeatable() -> None:
     pose = look_at(np.array([0.3, -1.0, 1.4]), np.array([0.0, 0.8, 0.0]))
     materials = {1: Material("planks", gloss=0.2)}
     meshes = [(1, floor()), (2, painted_box((0, 0.5, 0), (0.3, 0.8, 0.4), (90, 60, 40)))]
-    first = SceneRenderer(meshes, light_map=True, materials=materials).render(CAMERA, pose)
-    second = SceneRenderer(meshes, light_map=True, materials=materials).render(CAMERA, pose)
+    first = SceneRenderer(meshes, soft_light=SoftLight(), materials=materials).render(CAMERA, pose)
+    second = SceneRenderer(meshes, soft_light=SoftLight(), materials=materials).render(CAMERA, pose)
     assert np.array_equal(first.color, second.color) and np.array_equal(first.depth, second.depth)
 
 

@@ -85,7 +85,7 @@ def test_conflicts_before_and_after_are_red(tmp_path):
     assert [(p.first, p.second) for p in before.conflicts] == [(CHAIR.name, TABLE.name)]
     assert before.conflicts[0].depth == pytest.approx(0.4)  # the chair's side reaches from -0.1 to 0.4
     assert "1 conflict, red: chair_5 in table_3 (400 mm)" in before.caption
-    assert after.conflicts == [] and "nothing stands more than 5 mm" in after.caption
+    assert after.conflicts == [] and "CAD models stands more than 5 mm" in after.caption
     red = np.all(np.isclose(before.model.soup.corner_colors[:, 0], np.array(CONFLICT) ** 2.2, atol=0.05), axis=1)
     assert {before.model.nodes[int(k)] for k in np.unique(before.model.soup.instance[red])} == {"chair_5", "table_3"}
     assert set(before.model.names.values()) == {"chair 5", "table 3"} and after.model.names == {}

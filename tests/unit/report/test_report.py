@@ -137,7 +137,7 @@ def test_every_section_is_there_and_the_page_is_sound(whole):
     page = (folder / "report" / "report.html").read_text()
     tags = parse(page)
     ids = {attributes.get("id") for tag, attributes in tags.seen if tag == "section"}
-    assert ids == {"frames", "map", "graph", "cad", "scene", "plan", "figures", "cost", "made"}
+    assert ids == {"outlook", "frames", "map", "graph", "cad", "scene", "plan", "figures", "cost", "made"}
     links = {attributes["href"] for tag, attributes in tags.seen if tag == "a" and attributes["href"].startswith("#")}
     assert links == {f"#{name}" for name in ids}
     for text in ("62.3 %", "10.1 %", "40.0 % to 60.0 %", "geometric segments", "cup_4", "Missing altogether: sofa_8",

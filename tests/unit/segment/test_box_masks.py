@@ -202,3 +202,14 @@ def test_duplicates_are_merged_and_small_things_painted_on_top() -> None:
     names = {VOCABULARY.by_id(mask.category_id).name: number for number, mask in frame.masks.items()}
     assert frame.ids[25, 25] == names["cup"] and frame.ids[5, 5] == names["table"]
     assert frame.ids[60, 20] == names["table"] and frame.ids[110, 150] == names["floor"] and frame.ids[10, 150] == 0
+
+
+def test_a_table_without_foreground_in_its_box_gives_no_mask() -> None:
+    """Its pixels have depth, but all of them belong to a segment that reaches far out of the box."""
+    height, width = 40, 60
+    labels = np.ones((height, width), dtype=np.int32)
+    points = np.dstack([*np.meshgrid(np.arange(width) * 0.01, np.arange(height) * 0.01), np.full((height, width), 2.0)])
+    normals = np.tile([0.0, 0.0, -1.0], (height, width, 1))
+    geometry = frame_geometry(labels, points, normals, np.ones((height, width), dtype=bool), np.eye(4))
+    box = np.array([20.0, 10.0, 40.0, 30.0])
+    assert not box_mask(box, geometry, flat_topped=True).any()

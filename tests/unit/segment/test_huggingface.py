@@ -194,7 +194,7 @@ def test_what_folders_can_lack(folders: dict[str, Path], tmp_path: Path) -> None
     for folder, text in (
         (pickled, "no .safetensors"), (torn, "cannot be loaded"), (wrong, "parameters are missing or of another shape"),
         (other, "type 'bert'"), (garbled, "no JSON"), (blind, "preprocessor_config"), (nameless, "no table"),
-        (tmp_path, "No such file"),
+        (tmp_path, "file is missing"),
     ):  # fmt: skip
         with pytest.raises(BadInput, match=text) as caught:
             backend(folder)

@@ -43,6 +43,20 @@ def test_a_kitchen_settles_and_its_fridge_opens(tmp_path: Path) -> None:
     assert report.max_penetration_mm < 0.1 and not report.collisions
 
 
+def test_a_scene_in_which_nothing_can_move_has_not_settled(tmp_path: Path) -> None:
+    report = report_of(tmp_path, [floor(), table(0.0, 0.0)])
+    assert report.verdict == "nothing_movable" and not report.settled
+    assert run(["urdf", "settle", str(tmp_path)]) == 4
+    assert report_of(tmp_path / "door", [floor(), fridge(0.0, 0.0)]).verdict == "ok"  # a joint moves
+
+
+def test_what_lies_in_something_has_not_settled(tmp_path: Path) -> None:
+    blocks = [block("block_4", (3.0, 0.0, 0.5), (1, 1, 1)), block("block_5", (3.98, 0.0, 0.5), (1, 1, 1))]
+    report = report_of(tmp_path, [*kitchen(door_value=0.0), *blocks])
+    assert report.verdict == "penetrating" and not report.unsettled and not report.settled
+    assert "20 mm in block" in report.reason
+
+
 def test_what_hangs_in_the_air_moves_by_its_height(tmp_path: Path) -> None:
     report = report_of(tmp_path, [floor(), bottle(0.0, 0.0, 0.03, "floor_1")])
     assert not report.settled
@@ -120,7 +134,7 @@ def test_pairs_are_as_deep_as_their_boxes_overlap(tmp_path: Path) -> None:
 
 def test_the_command_prints_a_line_a_finding(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     write_scene(tmp_path, [floor(), bottle(0.0, 0.0, 0.03, "floor_1")])
-    assert run(["urdf", "settle", str(tmp_path), "--seconds", "1"]) == 3
+    assert run(["urdf", "settle", str(tmp_path), "--seconds", "1"]) == 4
     lines = capfd.readouterr().out.splitlines()
     assert len(lines) == 1 and "bottle_7: does not stay: moves" in lines[0]
     assert run(["urdf", "settle", str(tmp_path), "--seconds", "1", "--moved", "0.05", "--json"]) == 0

@@ -175,7 +175,7 @@ def test_a_thread_that_is_off_by_a_shift_is_off_by_it() -> None:
     true = np.stack([np.linspace(0, 0.1, 200), np.zeros(200), np.full(200, 0.3)], axis=1)
     error = thread_error(true[:100] + [0, 0.001, 0], 0.05, true)
     assert error.median == pytest.approx(0.001, rel=0.01) and error.true_length == pytest.approx(0.1)
-    assert error.found == pytest.approx(0.515, abs=0.02)
+    assert error.covered == pytest.approx(0.515, abs=0.02)
     assert np.isnan(thread_error(np.zeros((0, 3)), 0.0, true).median)
 
 

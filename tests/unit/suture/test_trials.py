@@ -16,19 +16,33 @@ from stages.suture.motion.constants import OpenConstants, cinch_length
 from stages.suture.motion.needle import SWAGE, TIP, from_ends, point_at, turned, upright
 from stages.suture.rig import NEEDLE_RADIUS
 from stages.suture.robot.arms import ARMS
+from stages.suture.trials.belief import START_ANGLE, as_planned, believed
 from stages.suture.trials.bench import CORNER, HOME, Bench, loaded
 from stages.suture.trials.drawing import draw_strip, whole_suture
-from stages.suture.trials.extraction import GRASPING, grasp_point, left_to_turn, nearer_end
 from stages.suture.trials.gripping import close
-from stages.suture.trials.handover import farther_end, handed_over, middle, turned_about
-from stages.suture.trials.insertion import as_planned, believed, fused, in_driver, nominal_needle
 from stages.suture.trials.machine import Outcome, run_trial
-from stages.suture.trials.perception import FOLDER, Errors, Eyes, PerceptionModel, Seen, Shares, perception_model
+from stages.suture.trials.ours.extraction import grasp_point, left_to_turn
+from stages.suture.trials.ours.handover import middle, turned_about
+from stages.suture.trials.ours.pose_correction import fused, in_driver
+from stages.suture.trials.perception import (
+    FOLDER,
+    Errors,
+    Eyes,
+    PerceptionModel,
+    Seen,
+    Shares,
+    farther_end,
+    nearer_end,
+    perception_model,
+)
+from stages.suture.trials.places import GRASPING
+from stages.suture.trials.policies import POLICIES, THESIS
 from stages.suture.trials.recording import Recorder
 from stages.suture.trials.rope import PARTICLES, drape, line, winding
-from stages.suture.trials.settings import POLICIES, Policy, World
+from stages.suture.trials.settings import World
+from stages.suture.trials.thesis.handover import NormalUnchanged
 from stages.suture.trials.thread import Thread, draw, pull_on, pull_through
-from stages.suture.trials.wound import CHORD, entry, exit_, passage
+from stages.suture.trials.wound import CHORD, HOLE_HEIGHT, entry, exit_, passage
 
 STILL_WORLD = World(
     thread_shortest=0.30, thread_longest=0.30, loading_normal=0, loading_in_plane=0, hand_eye=0, closing_normal=0,
@@ -46,6 +60,14 @@ def perfect(name: str = "ours") -> PerceptionModel:
             "thread_length_error": 0.0,
         }
     )
+
+
+def nominal_needle(suture: int) -> np.ndarray:
+    """Return the pose (4, 4) of a needle that is ready for insertion as planned, its tip at the entry."""
+    centre = (entry(suture) + exit_(suture)) / 2.0
+    centre = np.array([centre[0] - CHORD, centre[1], HOLE_HEIGHT + NEEDLE_RADIUS * np.cos(START_ANGLE)])
+    needle = upright(centre, START_ANGLE)
+    return needle
 
 
 def insertion_of(needle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -253,13 +275,11 @@ def test_without_errors_six_sutures_close_the_wound(arm: str, length: float) -> 
     assert outcome.stopped_short == 0
 
 
-def bench_of(policy: Policy, recorder: Recorder | None = None) -> Bench:
+def bench_holding(recorder: Recorder | None = None) -> Bench:
     """A bench whose right driver holds the needle in the corner."""
     needle, hold = loaded(STILL_WORLD, np.random.default_rng(0))
-    bench = Bench(
-        policy, STILL_WORLD, Eyes(perfect(), np.random.default_rng(1)), np.random.default_rng(2), np.zeros(3),
-        Thread(0.3), needle, hold, recorder,
-    )  # fmt: skip
+    eyes = Eyes(perfect(), np.random.default_rng(1))
+    bench = Bench(STILL_WORLD, eyes, np.random.default_rng(2), np.zeros(3), Thread(0.3), needle, hold, recorder)
     bench.tools["right"] = CORNER.copy()
     return bench
 
@@ -272,8 +292,9 @@ def shifted(pose: np.ndarray, *metres: float) -> np.ndarray:
 
 def test_each_driver_has_its_clock() -> None:
     recorder = Recorder()
-    bench = bench_of(POLICIES["ours"], recorder)
-    bench.wait_at("left", shifted(HOME["left"], 0.0, 0.0, -0.014))
+    ours, thesis = POLICIES["ours"].coordination, POLICIES["thesis"].coordination
+    bench = bench_holding(recorder)
+    ours.wait_at(bench, "left", shifted(HOME["left"], 0.0, 0.0, -0.014))
     assert bench.seconds == 0.0
     bench.record("under way")
     bench.go("right", shifted(CORNER, 0.007, 0.0, 0.0))
@@ -285,19 +306,19 @@ def test_each_driver_has_its_clock() -> None:
     swages = motions["world_from_needle"][:, :3, 3]
     assert (np.diff(swages[:, 0]) >= -1e-12).all() and np.isclose(np.ptp(swages[:, 0]), 0.007)
     assert np.linalg.norm(recorder.tools[0][1][:3, 3] - HOME["left"][:3, 3]) < 0.004
-    other = bench_of(POLICIES["thesis"])
-    other.wait_at("left", shifted(HOME["left"], 0.0, 0.0, -0.014))
+    other = bench_holding()
+    thesis.wait_at(other, "left", shifted(HOME["left"], 0.0, 0.0, -0.014))
     assert np.allclose(other.tools["left"], HOME["left"])
-    other.withdraw("left", shifted(HOME["left"], 0.0, 0.0, -0.014))
+    thesis.withdraw(other, "left", shifted(HOME["left"], 0.0, 0.0, -0.014))
     assert np.isclose(other.seconds, 2.0)
 
 
 def test_a_needle_seen_where_it_cannot_be_is_not_believed() -> None:
     away = np.array([[0.05, 0.05, 0.05]])
     for arm, trusted in (("ours", False), ("thesis", True)):
-        bench = bench_of(POLICIES[arm])
-        assert (bench.look("corner_right", away) is not None) is trusted
-        assert bench.look("corner_right", bench.jaws("right")) is not None
+        bench, trust = bench_holding(), POLICIES[arm].trust
+        assert (trust.look(bench, "corner_right", away) is not None) is trusted
+        assert trust.look(bench, "corner_right", bench.jaws("right")) is not None
 
 
 def test_a_turn_that_was_cut_short_is_finished() -> None:
@@ -364,11 +385,11 @@ def test_both_readings_of_the_handover_test() -> None:
     still = Seen(np.array([0.0, 1.0, 0.0]), *ends, True)
     turned_by_30 = Seen(np.array([0.5, np.sqrt(0.75), 0.0]), *ends, True)
     flipped = Seen(np.array([0.0, -1.0, 0.0]), *ends, True)
-    used = POLICIES["thesis"]
-    other = replace(used, retries_when_unchanged=False)
+    used, other = THESIS.handover_test, NormalUnchanged()
+    holder, constants = np.zeros(3), THESIS.constants
     for after, changed in ((still, False), (flipped, False), (turned_by_30, True)):
-        assert handed_over(used, still, after) is changed
-        assert handed_over(other, still, after) is not changed
+        assert used.passed(still, after, holder, constants) is changed
+        assert other.passed(still, after, holder, constants) is not changed
 
 
 def test_a_trial_is_its_seed_and_ends_with_an_error_or_a_closed_wound() -> None:

@@ -12,7 +12,7 @@ from stages.suture.motion.needle import point_at
 from stages.suture.robot.arms import REMOTE_CENTRES
 from stages.suture.trials.bench import CORNER, Bench, loaded
 from stages.suture.trials.perception import FOLDER, perception_model
-from stages.suture.trials.settings import POLICIES, World
+from stages.suture.trials.settings import World
 from stages.suture.trials.sight import PICTURED_FROM_TRIAL, LookingEyes, driver, pictured
 from stages.suture.trials.thread import Thread
 from stages.suture.world.scene import make_scene
@@ -23,9 +23,7 @@ MODEL = perception_model(FOLDER / "perception_ours.toml")
 def watched(seed: int) -> tuple[Bench, LookingEyes]:
     eyes = LookingEyes(MODEL, seed, pictures=False)
     needle, hold = loaded(World(), np.random.default_rng(seed))
-    bench = Bench(
-        POLICIES["ours"], World(), eyes, np.random.default_rng(1), np.zeros(3), Thread(0.2), needle, hold
-    )  # fmt: skip
+    bench = Bench(World(), eyes, np.random.default_rng(1), np.zeros(3), Thread(0.2), needle, hold)
     bench.tools["right"] = CORNER.copy()
     bench.lay_thread()
     eyes.watch(bench)
@@ -58,7 +56,7 @@ def test_what_is_seen_of_a_rendered_trial_is_where_the_needle_is() -> None:
     found = 0
     for seed in range(3):
         bench, eyes = watched(seed)
-        seen = bench.look("corner_right", bench.jaws("right"))
+        seen = bench.look("corner_right")
         assert eyes.looks == 1 and sum(eyes.places["corner_right"].values()) == 1
         if seen is None:
             continue

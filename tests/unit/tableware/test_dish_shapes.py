@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from stages.tableware.world.dish_shapes import item_mesh, shell_mesh, shell_volume, utensil_mesh, utensil_volume
+from stages.tableware.world.dish_shapes import item_mesh, shell_mesh, utensil_mesh
 from stages.tableware.world.items import DISHES, MEASURES, UTENSILS, Measures, make_item, rise
+from tests.unit.tableware.volumes import shell_volume, utensil_volume
 
 
 @pytest.mark.parametrize("kind", DISHES)

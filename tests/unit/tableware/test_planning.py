@@ -38,7 +38,8 @@ from stages.tableware.planning.time_model import (
 from stages.tableware.policies.pull import PullPolicy
 from stages.tableware.policies.stack import StackPolicy
 from stages.tableware.sight import named_as, understood, without_places
-from stages.tableware.simulation.fast import FastWorld, run_in, run_trial
+from stages.tableware.simulation.fast import FastWorld, run_trial
+from stages.tableware.simulation.trial import run_in
 from stages.tableware.table_pictures import draw_strip, draw_table
 from stages.tableware.vision.detections import Detection
 from stages.tableware.world.footprints import Footprint, footprint, gap, overlapped

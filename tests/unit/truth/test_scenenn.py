@@ -191,7 +191,7 @@ def test_bad_annotations_are_told(tmp_path, xml, message):
 
 
 def test_a_missing_annotation_is_told(tmp_path):
-    with pytest.raises(BadInput, match="No such file"):
+    with pytest.raises(BadInput, match="file is missing"):
         read_annotation(tmp_path / "011.xml")
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from schemas.errors import BadInput
+from schemas.outside import opened
 from stages.ingest.folders.camera_groups import grouped
 from stages.ingest.folders.files import (
     COLOR_SUFFIXES,
@@ -152,7 +153,7 @@ def _transforms(path: Path) -> Path | None:
     if path.is_dir():
         return next((path / name for name in NAMES if (path / name).is_file()), None)
     if path.suffix.lower() == ".json" and path.is_file():
-        with path.open("rb") as file:
+        with opened(path) as file:
             start = file.read(1_000_000)
         return path if b'"frames"' in start and b'"transform_matrix"' in start else None
     return None

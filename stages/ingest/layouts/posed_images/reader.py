@@ -40,7 +40,7 @@ def matches(root: Path) -> str | None:
     poses = next((name for name in POSES if (root / name).is_file()), None)
     if color is None or poses is None or not (root / "depth").is_dir():
         return None
-    if calibration_file(root) is not None or columns_of(root / poses) in (8, 12, 16):
+    if calibration_file(root) is not None or columns_of(root / poses) in (8, 12, 13, 16, 17):
         return None
     return f"folder with {color.name}/, depth/ and {poses}: posed images"
 

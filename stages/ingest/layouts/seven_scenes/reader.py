@@ -26,6 +26,9 @@ so that depth jumps fall on colour edges (focal length, principal point and base
 colour gradient under the jumps rises from 0.24 unregistered to 1.03, and is 0.71 with a calibration in circulation."""
 REGISTERED_NOTE = "colour resampled into the depth camera (7-Scenes does not register them; calibration fitted by us)"
 
+UNREGISTERED_NOTE = "colour and depth of 7-Scenes are not registered (other lens, 3 cm apart)"
+OTHER_CAMERA_NOTE = "not the camera of 7-Scenes: colour and depth taken to be registered, as in other layouts"
+
 
 def matches(root: Path) -> str | None:
     """Return the rule that matched, or None."""
@@ -45,7 +48,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     camera, notes = _camera(root, size)
     camera, given = overridden(camera, parameters)
     units, unit_note = depth_units(parameters, 1000.0)
-    register = parameters.register_color and _is_seven_scenes_kinect(camera)
+    theirs = _is_seven_scenes_kinect(camera)  # other people record in this layout too
+    register = parameters.register_color and theirs
     entries = []
     for number in sorted(files):
         images = files[number]
@@ -67,9 +71,9 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         *given,
         unit_note,
         f"times assumed: frame number / {parameters.frame_rate:g} per second",
-        REGISTERED_NOTE if register else "colour and depth of 7-Scenes are not registered (other lens, 3 cm apart)",
+        REGISTERED_NOTE if register else UNREGISTERED_NOTE if theirs else OTHER_CAMERA_NOTE,
     )
-    cameras = (SourceCamera("camera", camera, registered=register),)
+    cameras = (SourceCamera("camera", camera, registered=register or not theirs),)
     streams = (
         stream("*.color", "color", [images["color"] for images in files.values() if "color" in images]),
         stream("*.depth", "depth", [images["depth"] for images in files.values() if "depth" in images]),

@@ -28,9 +28,18 @@ def view(page: Page) -> dict[str, Any] | None:
         "fixed_bodies": [row for row in rows if row not in shown],
         "scene_text": f"{len(scene.bodies)} bodies, {movable} of them free to move, {joints} joints. "
         f"{scene.combined_file} is the whole kinematic tree; {scene.static_file} and one file per free body are for "
-        "engines without floating joints.",
+        "engines without floating joints." + _verdict(interactive_scene),
         "trees": _trees(interactive_scene),
     }
+
+
+def _verdict(scene: InteractiveScene) -> str:
+    """Return a sentence on what became of the scene when it was let go; empty where that was not tried."""
+    if "settled" not in scene.summary:
+        return ""
+    if scene.outcome == "ok":
+        return f" Let go for a few seconds, all {scene.summary.get('movable', 0)} free bodies stay where they are."
+    return f" It is {scene.outcome.replace('_', ' ')}: {scene.summary.get('reason', 'see its summary')}."
 
 
 def _trees(interactive_scene: InteractiveScene) -> Corresponding | None:

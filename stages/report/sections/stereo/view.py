@@ -51,15 +51,15 @@ def stereo_view(disparity: Disparity, wanted: int, width: int) -> StereoView:
     ):
         stamps = reader.stamps
         for index in choose_frames(len(reader), min(wanted, MOST_FRAMES)):
-            frame, found = reader.read(index, ("color",)), maps.read(int(stamps[index]))
+            frame, disparity_map = reader.read(index, ("color",)), maps.read(int(stamps[index]))
             drawn = [] if frame.color is None else [jpeg(frame.color, f"left eye of frame {index}", width)]
-            drawn.append(jpeg(disparity_colors(found.disparity), f"disparity of frame {index}", width))
-            drawn.append(jpeg(confidence_colors(found.confidence), f"confidence of frame {index}", width))
-            told = file.frames[index]
-            frames.append(StereoFrame(index, tuple(drawn), 100 * told.known, 100 * told.trusted))
+            drawn.append(jpeg(disparity_colors(disparity_map.disparity), f"disparity of frame {index}", width))
+            drawn.append(jpeg(confidence_colors(disparity_map.confidence), f"confidence of frame {index}", width))
+            shares_of = file.frames[index]
+            frames.append(StereoFrame(index, tuple(drawn), 100 * shares_of.known, 100 * shares_of.trusted))
     shares = np.array([[frame.known, frame.trusted] for frame in file.frames]).reshape(-1, 2)
-    known, trusted = 100 * shares.mean(axis=0) if len(shares) else (0.0, 0.0)
-    return StereoView(file.detail, file.rows, tuple(frames), float(known), float(trusted), file.minimum_confidence)
+    matched, trusted = 100 * shares.mean(axis=0) if len(shares) else (0.0, 0.0)
+    return StereoView(file.detail, file.rows, tuple(frames), float(matched), float(trusted), file.minimum_confidence)
 
 
 def view(page: Page) -> dict[str, Any] | None:

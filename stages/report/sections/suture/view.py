@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from schemas.artifact import Artifact
+from schemas.outside import LARGEST_SHOWN, file_text
 from schemas.suture_needle import NeedleFrame, SutureNeedle, SutureThread
 from schemas.suture_trial import SutureEvaluation, SutureRun, SutureTrial
 from stages.report.images import Picture, from_file
@@ -82,7 +83,7 @@ def suture_view(
     curves = thread.info if thread is not None else None
     file = trial.info if trial is not None else None
     metrics = evaluation.info if evaluation is not None else None
-    rows = () if poses is None else tuple(_needle_row(one) for one in poses.frames)
+    rows = () if poses is None else tuple(_needle_row(frame) for frame in poses.frames)
     if poses is not None and poses.filtered is not None:
         text = poses.filtered.abstained or "one pose from all frames"
         rows = (*rows, NeedleRow("filtered", not poses.filtered.abstained, text))
@@ -100,19 +101,19 @@ def suture_view(
         strip=strip,
         strip_text="" if file is None else f"{file.recorded_arm}, seed {file.recorded_seed}: a suture's motions, a "
         "to k of the thesis's figure 3.2, from the cameras and from above",
-        runs=() if file is None else tuple(_run_row(one) for one in file.runs[:MOST_RUNS]),
+        runs=() if file is None else tuple(_run_row(run) for run in file.runs[:MOST_RUNS]),
         runs_left_out=0 if file is None else max(0, len(file.runs) - MOST_RUNS),
-        assumed=() if file is None else tuple(one.arm for one in file.perception if not one.measured),
+        assumed=() if file is None else tuple(source.arm for source in file.perception if not source.measured),
         plots=_plots(evaluation, width),
-        tables=() if evaluation is None else tables_of(evaluation.path("table.md").read_text(encoding="utf-8")),
+        tables=() if evaluation is None else tables_of(file_text(evaluation.path("table.md"), LARGEST_SHOWN)),
         notes=() if metrics is None else (metrics.label, *metrics.notes),
     )  # fmt: skip
 
 
-def _needle_row(one: NeedleFrame) -> NeedleRow:
-    estimate = one.estimate
+def _needle_row(frame: NeedleFrame) -> NeedleRow:
+    estimate = frame.estimate
     if estimate.abstained:
-        return NeedleRow(str(one.frame), False, estimate.abstained)
+        return NeedleRow(str(frame.frame), False, estimate.abstained)
     text = f"tip and swage {100 * estimate.tip_probability:.0f} % sure"
     if estimate.covariance is not None:
         covariance = np.array(estimate.covariance)
@@ -120,15 +121,15 @@ def _needle_row(one: NeedleFrame) -> NeedleRow:
             float(np.sqrt(np.linalg.eigvalsh(part)[-1])) for part in (covariance[:3, :3], covariance[3:, 3:])
         )
         text = f"known to {1000 * shift:.2f} mm and {np.degrees(turn):.1f} degrees (1 sigma), {text}"
-    return NeedleRow(str(one.frame), True, text)
+    return NeedleRow(str(frame.frame), True, text)
 
 
-def _run_row(one: SutureRun) -> RunRow:
-    closed = one.sutures >= THROWS
+def _run_row(run: SutureRun) -> RunRow:
+    closed = run.sutures >= THROWS
     ended = "the wound is closed" if closed else ""
-    if one.errors and not closed:
-        ended = f"{CLASSES[one.errors[-1]]}: {one.reasons[-1]}"
-    return RunRow(one.arm, one.seed, one.sutures, f"{one.seconds:.0f}", one.errors or "none", ended, closed)
+    if run.errors and not closed:
+        ended = f"{CLASSES[run.errors[-1]]}: {run.reasons[-1]}"
+    return RunRow(run.arm, run.seed, run.sutures, f"{run.seconds:.0f}", run.errors or "none", ended, closed)
 
 
 def _pictures(artifact: Artifact | None, what: str, width: int) -> tuple[tuple[Picture, str], ...]:
@@ -143,13 +144,13 @@ def _pictures(artifact: Artifact | None, what: str, width: int) -> tuple[tuple[P
 def _plots(evaluation: SutureEvaluation | None, width: int) -> tuple[tuple[Picture, str], ...]:
     if evaluation is None:
         return ()
-    found: list[Path] = [path for name in CAPTIONS if (path := evaluation.path(f"plots/{name}.png")).is_file()]
-    return tuple((from_file(path, CAPTIONS[path.stem], width), CAPTIONS[path.stem]) for path in found)
+    paths: list[Path] = [path for name in CAPTIONS if (path := evaluation.path(f"plots/{name}.png")).is_file()]
+    return tuple((from_file(path, CAPTIONS[path.stem], width), CAPTIONS[path.stem]) for path in paths)
 
 
 def tables_of(markdown: str) -> tuple[tuple[str, tuple[tuple[str, ...], ...]], ...]:
     """Return the tables of a Markdown text with the heading above each; emphasis marks are taken off."""
-    title, rows, found = "", [], []
+    title, rows, tables = "", [], []
     for line in [*markdown.splitlines(), ""]:
         if line.startswith("|"):
             cells = tuple(cell.strip().strip("*") for cell in line.strip().strip("|").split("|"))
@@ -157,20 +158,20 @@ def tables_of(markdown: str) -> tuple[tuple[str, tuple[tuple[str, ...], ...]], .
                 rows.append(cells)
             continue
         if rows:
-            found.append((title, tuple(rows)))
+            tables.append((title, tuple(rows)))
             rows = []
         if line.startswith("#"):
             title = line.lstrip("# ").strip()
-    return tuple(found)
+    return tuple(tables)
 
 
 def view(page: Page) -> dict[str, Any]:
     """Return what there is of suturing: needle, thread, trial, figures."""
-    found = suture_view(
+    shown = suture_view(
         page.given("suture_needle", SutureNeedle),
         page.given("suture_thread", SutureThread),
         page.given("suture_trial", SutureTrial),
         page.given("suture_evaluation", SutureEvaluation),
         WIDTH,
     )
-    return {"suture": found}
+    return {"suture": shown}

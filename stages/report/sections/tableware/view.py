@@ -11,6 +11,7 @@ from typing import Any
 from PIL import Image
 
 from schemas.errors import BadInput
+from schemas.outside import file_content
 from schemas.tableware_detections import TablewareDetections
 from schemas.tableware_plan import TablewarePlan
 from schemas.tableware_trial import EvaluatedPolicy, TablewareEvaluation, TablewareTrial
@@ -87,9 +88,9 @@ def tableware_view(
     file = plan.info if plan is not None else None
     done = trial.info if trial is not None else None
     results = evaluation.info if evaluation is not None else None
-    said = compared = ""
+    statement = compared = ""
     if done is not None:
-        said = f"{done.policy.replace('_', ' ')} in the {done.simulator} simulator: {done.statement}."
+        statement = f"{done.policy.replace('_', ' ')} in the {done.simulator} simulator: {done.statement}."
     if results is not None:
         compared = (
             f"{results.draws} draws a table, chances: {results.chances.replace('_', ' ')}, the policies see the "
@@ -98,14 +99,16 @@ def tableware_view(
     return TablewareView(
         seen="" if detections is None else detections.info.statement,
         plan=_plan_text(plan),
-        refused=tuple(one.message for one in file.refused) if file is not None else (),
+        refused=tuple(refusal.message for refusal in file.refused) if file is not None else (),
         impossible=tuple(
-            Counter(f"{one.primitive}: {one.kind}".replace("_", " ") for one in file.impossible).most_common()
+            Counter(f"{action.primitive}: {action.kind}".replace("_", " ") for action in file.impossible).most_common()
         )
         if file is not None
         else (),
-        reasons=tuple(f"{one.primitive.replace('_', ' ')}: {one.message}" for one in file.impossible) if file else (),
-        trial=said,
+        reasons=tuple(f"{action.primitive.replace('_', ' ')}: {action.message}" for action in file.impossible)
+        if file
+        else (),
+        trial=statement,
         cleared=done is not None and not done.counts.failure,
         rows=_rows(trial),
         compared=compared,
@@ -142,21 +145,19 @@ def animation(path: Path, alt: str) -> Picture:
     try:
         with Image.open(path) as opened:
             width, height = opened.size
-        data = path.read_bytes()
+        data = file_content(path, LARGEST_ANIMATION)
     except (OSError, SyntaxError, Image.DecompressionBombError) as error:
         raise BadInput(f"{path}: {error}", hint="make the artifact again") from None
-    if len(data) > LARGEST_ANIMATION:
-        raise BadInput(f"{path}: {len(data)} bytes are too large an animation", hint="make the artifact again")
     return Picture(f"data:image/gif;base64,{base64.b64encode(data).decode('ascii')}", width, height, alt)
 
 
 def view(page: Page) -> dict[str, Any]:
     """Return what there is of a table: what was seen, planned, tried, compared."""
-    found = tableware_view(
+    shown = tableware_view(
         page.given("tableware_detections", TablewareDetections),
         page.given("tableware_plan", TablewarePlan),
         page.given("tableware_trial", TablewareTrial),
         page.given("tableware_evaluation", TablewareEvaluation),
         WIDTH,
     )
-    return {"tableware": found}
+    return {"tableware": shown}

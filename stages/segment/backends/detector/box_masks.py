@@ -136,7 +136,7 @@ def _not_of_table(foreground: np.ndarray, window: tuple[slice, slice], geometry:
     world, up = geometry.world_points[window], geometry.upwardness[window]
     heights = world[..., 2]
     level = foreground & (up > 0.9)
-    if level.sum() < 0.1 * foreground.sum():
+    if not level.any() or level.sum() < 0.1 * foreground.sum():
         return np.zeros_like(foreground)
     values = heights[level]
     bins = np.floor((values - values.min()) / 0.02).astype(int)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import importlib
-import json
 import os
 from pathlib import Path
 from typing import Any
 
 from schemas.errors import BadInput, MissingDependency
+from schemas.outside import file_json
 
 LARGEST_CONFIG = 16 * 2**20
 """Bytes."""
@@ -49,14 +49,7 @@ def read_config(folder: Path) -> dict[str, Any]:
     """Return a model's config.json. Raises BadInput when the folder is no model's."""
     path = Path(folder) / "config.json"
     hint = "give a model folder or hub id: config.json, preprocessor_config.json, model.safetensors"
-    try:
-        if path.stat().st_size > LARGEST_CONFIG:
-            raise BadInput(f"{path}: larger than {LARGEST_CONFIG} bytes", hint=hint)
-        config = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}", hint=hint) from None
-    except (ValueError, RecursionError) as error:
-        raise BadInput(f"{path}: no JSON ({str(error).splitlines()[0]:.80})", hint=hint) from None
+    config = file_json(path, LARGEST_CONFIG, hint=hint)
     if not isinstance(config, dict) or not isinstance(config.get("model_type"), str):
         raise BadInput(f"{path}: names no model_type", hint=hint)
     return config

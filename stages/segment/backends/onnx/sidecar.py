@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
@@ -11,6 +10,7 @@ from pydantic import ValidationError
 
 from schemas.base import Model
 from schemas.errors import BadInput
+from schemas.outside import file_toml
 
 Layout = Literal["yolo-seg", "instances", "panoptic"]
 LARGEST_FILE = 2**20
@@ -59,12 +59,8 @@ def read_sidecar(path: Path) -> Sidecar:
     """Read a TOML sidecar. Raises BadInput when it is none, or does not name the outputs of its layout."""
     hint = "see docs/SEGMENTATION.md"
     try:
-        if Path(path).stat().st_size > LARGEST_FILE:
-            raise BadInput(f"{path}: larger than {LARGEST_FILE} bytes", hint=hint)
-        values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        values = file_toml(path, LARGEST_FILE, hint=hint)
         sidecar = Sidecar.model_validate({k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}", hint=hint) from None
     except ValidationError as error:
         first = error.errors()[0]
         raise BadInput(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}", hint=hint) from None

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cli.main import run
+from stages.engine.given_inputs import check_given_inputs
+from stages.engine.pipelines import pipeline_path, read_pipeline, resolve_variables
 from stages.ingest.preflight.report import InspectionReport
 from tests.unit.ingest import tiny_room
 from tests.unit.ingest.preflight.textured_room import CAMERA, painted, walk
@@ -17,6 +20,7 @@ from tests.unit.ingest.tiny_room import jpeg, millimetres, png, room_depth
 KEYS = {
     "schema_version", "path", "format", "rule", "verdict", "reason", "fix", "findings", "frames", "damage", "notes",
     "streams", "clocks", "cameras", "other_cameras", "gravity", "steps",
+    "command",
 }  # fmt: skip
 CAMERA_KEYS = {
     "name", "camera", "registered", "frames", "streams", "calibration", "depth", "poses", "registration", "pictures",
@@ -57,6 +61,19 @@ def test_ready_log(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = inspect(capsys, good, "--quiet")
     assert code == 0 and out.startswith("verdict      ready") and "error" not in err
     assert "step         run reconstruct                  ready" in out
+
+
+def test_the_command_to_run_is_ready_to_paste(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ("--fx", CAMERA.fx, "--fy", CAMERA.fy, "--cx", CAMERA.cx, "--cy", CAMERA.cy)
+    code, out, _ = inspect(capsys, good, "--quiet", *map(str, options))
+    (line,) = [line for line in out.splitlines() if line.startswith("run it")]
+    words = shlex.split(line.removeprefix("run it"))
+    start = words.index("run")
+    assert code == 0 and words[start : start + 4] == ["run", "reconstruct", "--set", f"log={good}"]
+    given = dict(pair.split("=", 1) for pair in words if "=" in pair)
+    assert float(given["fx"]) == CAMERA.fx and float(given["cy"]) == CAMERA.cy
+    pipeline = read_pipeline(pipeline_path("reconstruct"))
+    check_given_inputs(pipeline, resolve_variables(pipeline, given))  # it would be taken
 
 
 def test_json_has_stable_keys(good: Path, capsys: pytest.CaptureFixture[str]) -> None:

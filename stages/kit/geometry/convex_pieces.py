@@ -1,0 +1,73 @@
+"""A mesh as a few convex pieces: the set of its triangles is halved where the hulls of the halves are smallest.
+
+For scans, which are open and have no inside: what is compared are convex hulls of surfaces, never volumes of meshes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+MOST_PIECES = 8
+GAIN = 0.12
+"""A cut must save this share of the volume of the hull that it cuts."""
+PLACES = (0.15, 0.25, 0.35, 0.5, 0.65, 0.75, 0.85)
+"""Where cuts are tried, as shares of the extent along an axis."""
+LEAST_TRIANGLES = 8
+MOST_TRIANGLES = 20_000
+
+
+def convex_pieces(vertices: np.ndarray, faces: np.ndarray, most: int = MOST_PIECES) -> list[np.ndarray]:
+    """Return the corner points (N, 3) of each piece, at most `most`; all points of the mesh are in some piece.
+
+    `vertices` (V, 3) [m], `faces` (F, 3). Every how many-th triangle of a large mesh decides where to cut.
+    """
+    corners = np.asarray(vertices, dtype=float)[np.asarray(faces)]
+    pieces = [corners]
+    cuts = [_best_cut(corners)]
+    while len(pieces) < most:
+        place = int(np.argmax([0.0 if cut is None else cut[0] for cut in cuts]))
+        cut = cuts[place]
+        if cut is None:
+            break
+        halves = [pieces[place][cut[1]], pieces[place][~cut[1]]]
+        pieces[place : place + 1] = halves
+        cuts[place : place + 1] = [_best_cut(half) for half in halves]
+    return [np.unique(piece.reshape(-1, 3), axis=0) for piece in pieces]
+
+
+def _best_cut(corners: np.ndarray) -> tuple[float, np.ndarray] | None:
+    """Return the volume [m^3] that the best cut of triangles (F, 3, 3) saves and the one side (F,); None without any
+    that is worth it."""
+    if len(corners) < 2 * LEAST_TRIANGLES:
+        return None
+    few = corners[:: max(1, len(corners) // MOST_TRIANGLES)]
+    whole = _hull_volume(few)
+    best: tuple[float, np.ndarray] | None = None
+    for axis in _axes(few):
+        along, along_few = corners.mean(axis=1) @ axis, few.mean(axis=1) @ axis
+        low, high = along_few.min(), along_few.max()
+        for place in PLACES:
+            limit = low + place * (high - low)
+            side = along_few < limit
+            if min(side.sum(), (~side).sum()) < LEAST_TRIANGLES:
+                continue
+            saved = whole - _hull_volume(few[side]) - _hull_volume(few[~side])
+            if saved > GAIN * whole and (best is None or saved > best[0]):
+                best = (saved, along < limit)
+    return best
+
+
+def _axes(corners: np.ndarray) -> np.ndarray:
+    """Return upright and the two level principal axes, as rows."""
+    level = corners.reshape(-1, 3)[:, :2]
+    level = level - level.mean(axis=0)
+    turned = np.linalg.eigh(level.T @ level)[1]
+    return np.array([[0.0, 0.0, 1.0], [*turned[:, 0], 0.0], [*turned[:, 1], 0.0]])
+
+
+def _hull_volume(corners: np.ndarray) -> float:
+    try:
+        return float(ConvexHull(corners.reshape(-1, 3)).volume)
+    except (QhullError, ValueError):
+        return 0.0  # flat

@@ -1,0 +1,1 @@
+"""Our mechanisms; each can be exchanged for the thesis's."""

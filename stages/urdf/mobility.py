@@ -1,0 +1,61 @@
+"""What of a scene is free to move: what an arm carries, and furniture that stands by its own weight.
+
+Free is what stands on something (what hangs would fall) and is either of a class that an arm carries, or furniture: a
+rigid thing, not built in, on which nothing stands, and which the contact graph puts on a level plane within 4 cm of
+its bottom. What carries other things stays where it is, so that these have something to stand on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from stages.kit.formats.scene_supports import resting_height
+
+STANDS = ("supports", "contains")
+BUILT_IN = frozenset(
+    (
+        "wall_cabinet", "wall_shelf", "cabinet", "drawer_unit", "wardrobe", "chest", "shelf", "fridge", "oven",
+        "dishwasher", "washing_machine", "hob", "sink", "toilet", "bed", "person", "pendant_lamp", "board", "door",
+        "window", "curtain",
+    )
+)  # fmt: skip
+"""Part of the building, fastened to it, or too heavy to be pushed."""
+NAMELESS = "object"
+LARGEST_NAMELESS = 0.5
+"""Longest edge of a thing without a name [m]: more may be a piece of the building or a heap of things."""
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """Whether a body is free, and whether as furniture (which no arm carries)."""
+
+    movable: bool
+    furniture: bool = False
+
+
+def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str], fixed: Collection[str]) -> Mobility:
+    """Return what is free to move about a node.
+
+    `carriable`: classes that an arm carries; `fixed`: classes that stay although they would be furniture.
+    """
+    link = graph.parent_link(node.id)
+    stands = link is None or link.relation in STANDS
+    if node.node_type == "layout" or not stands:
+        return Mobility(False)
+    if node.class_name in carriable:
+        return Mobility(True)
+    if link is None or link.source == SCENE_NODE or node.node_type == "articulated" or node.joints:
+        return Mobility(False)
+    if node.class_name in BUILT_IN or node.class_name in fixed or _carries(graph, node.id):
+        return Mobility(False)
+    if node.class_name == NAMELESS and (node.box is None or max(node.box.size) > LARGEST_NAMELESS):
+        return Mobility(False)
+    if resting_height(graph, {entry.id: entry for entry in graph.nodes}, node.id) is None:
+        return Mobility(False)
+    return Mobility(True, furniture=True)
+
+
+def _carries(graph: ContactGraphFile, name: str) -> bool:
+    return any(link.source == name and link.relation != "proximal" for link in graph.links)

@@ -1,0 +1,115 @@
+"""What is free to move: what an arm carries, and furniture that stands on a plane and carries nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from schemas.cad_scene import CadScene, CadSceneFile
+from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
+from schemas.scene_parts import Box, Relation, SurfacePlane
+from stages.kit.formats.urdf_file import parse_urdf
+from stages.kit.geometry.convex_pieces import convex_pieces
+from stages.urdf.mobility import Mobility, mobility
+from stages.urdf.parameters import UrdfParameters
+from stages.urdf.stage import run
+from tests.unit.urdf.small_room import context
+
+FLOOR = SurfacePlane(normal=(0, 0, 1), offset=0.0, area=36.0, center=(0, 0, 0), horizontal=True)
+CARRIABLE = frozenset({"cup"})
+FREE = Mobility(True, furniture=True)
+
+
+def graph_with(
+    class_name: str, *, gap: float = 0.0, relation: str = "supports", on_top: bool = False, size: float = 0.5
+):
+    """A floor and one thing on it, `gap` [m] above; a cup on that when `on_top`."""
+    box = Box(center=(0.0, 0.0, gap + 0.4), size=(size, size, 0.8 if size < 1 else size))
+    box = box.model_copy(update={"center": (0.0, 0.0, gap + 0.5 * box.size[2])})
+    top = Box(center=(0.0, 0.0, gap + 0.85), size=(0.1, 0.1, 0.1))
+    nodes = [
+        GraphNode(id=SCENE_NODE, instance=0, class_name=SCENE_NODE, node_type="scene"),
+        GraphNode(
+            id="floor_1", instance=1, class_name="floor", node_type="layout", planes=(FLOOR,),
+            box=Box(center=(0, 0, 0), size=(6, 6, 0.02)),
+        ),
+        GraphNode(id="thing_2", instance=2, class_name=class_name, node_type="rigid", box=box),
+        GraphNode(id="cup_3", instance=3, class_name="cup", node_type="rigid", box=top),
+    ]  # fmt: skip
+    links = [
+        Relation(source=SCENE_NODE, target="floor_1", relation="supports", confidence=1.0),
+        Relation(source="floor_1", target="thing_2", relation=relation, confidence=1.0, plane=0),  # type: ignore[arg-type]
+        Relation(source="thing_2" if on_top else "floor_1", target="cup_3", relation="supports", confidence=1.0),
+    ]
+    return ContactGraphFile(nodes=tuple(nodes), links=tuple(links))
+
+
+@pytest.mark.parametrize(
+    ("graph", "expected"),
+    [
+        (graph_with("chair"), FREE),
+        (graph_with("chair", gap=0.03), FREE),
+        (graph_with("chair", gap=0.3), Mobility(False)),  # it stands on nothing that is known
+        (graph_with("chair", on_top=True), Mobility(False)),
+        (graph_with("chair", relation="hangs_from"), Mobility(False)),
+        (graph_with("cabinet"), Mobility(False)),
+        (graph_with("sink"), Mobility(False)),
+        (graph_with("cup", gap=0.3), Mobility(True)),
+        (graph_with("object", size=0.3), Mobility(False)),  # 0.8 m high
+        (graph_with("sofa", size=1.8), FREE),
+    ],
+)  # fmt: skip
+def test_what_is_free(graph: ContactGraphFile, expected: Mobility) -> None:
+    node = next(node for node in graph.nodes if node.id == "thing_2")
+    assert mobility(graph, node, CARRIABLE, ()) == expected
+    assert mobility(graph, node, (), (node.class_name,)) == Mobility(False)
+
+
+def chair_mesh() -> trimesh.Trimesh:
+    """Seat, back and four legs, 0.8 m high, as surfaces."""
+    parts = [trimesh.creation.box((0.5, 0.5, 0.06)), trimesh.creation.box((0.5, 0.06, 0.4))]
+    parts[0].apply_translation([0, 0, 0.42])
+    parts[1].apply_translation([0, 0.22, 0.6])
+    for x in (-0.21, 0.21):
+        for y in (-0.21, 0.21):
+            leg = trimesh.creation.box((0.05, 0.05, 0.39))
+            leg.apply_translation([x, y, 0.195])
+            parts.append(leg)
+    return trimesh.util.concatenate([part.subdivide().subdivide() for part in parts])
+
+
+def test_a_chair_without_a_model_is_a_body_of_pieces_that_stands(tmp_path: Path) -> None:
+    root = tmp_path / "cad_scene"
+    for folder in ("models", "meshes", "layout"):
+        (root / folder).mkdir(parents=True)
+    trimesh.creation.box((6, 6, 0.02)).apply_translation([0, 0, -0.01]).export(root / "layout" / "floor_1.ply")
+    chair_mesh().export(root / "meshes" / "thing_2.ply")
+    trimesh.creation.box((0.1, 0.1, 0.1)).apply_translation([2, 0, 0.05]).export(root / "meshes" / "cup_3.ply")
+    graph = graph_with("chair")
+    box = Box(center=(2.0, 0.0, 0.05), size=(0.1, 0.1, 0.1))
+    moved = tuple(node.model_copy(update={"box": box}) if node.id == "cup_3" else node for node in graph.nodes)
+    graph.model_copy(update={"nodes": moved}).write(root / "graph.json")
+    CadSceneFile(replacements=(), conflicts_before=0, conflicts_after=0, iterations=0).write(root / "scene.json")
+    made = run(CadScene(root), parameters=UrdfParameters(), context=context(tmp_path / "out"))
+    assert made.outcome == "ok" and made.summary["movable"] == 2
+    chair = next(body for body in made.info.bodies if body.name == "thing_2")
+    assert chair.movable and chair.furniture and not chair.carriable and 1.0 < chair.mass < 10.0
+    (link,) = [link for link in parse_urdf(made.path("scene.urdf")).links if link.name == "thing_2"]
+    assert 3 <= len(link.collisions) <= 9
+    for shape in link.collisions:
+        piece = trimesh.load(made.root / str(shape.mesh), force="mesh")
+        assert piece.is_watertight and piece.volume > 0
+    under_seat = np.array([0.0, 0.0, 0.2]) - np.array(chair.world_from_body)[:3, 3]
+    pieces = [trimesh.load(made.root / str(shape.mesh), force="mesh") for shape in link.collisions]
+    assert not any(piece.contains([under_seat])[0] for piece in pieces), "a hull would fill what is under the seat"
+
+
+def test_pieces_hold_all_of_a_mesh_and_a_convex_one_is_one() -> None:
+    mesh = chair_mesh()
+    pieces = convex_pieces(mesh.vertices, mesh.faces)
+    assert set(map(tuple, np.concatenate(pieces))) == set(map(tuple, np.asarray(mesh.vertices)[np.unique(mesh.faces)]))
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    assert len(convex_pieces(ball.vertices, ball.faces)) == 1
