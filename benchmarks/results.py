@@ -37,11 +37,11 @@ def figures_of(results: Results) -> dict[str, Figure]:
                 if measure.interval and (found := results.interval(arm, case, name)) is not None:
                     low, high = found.low, found.high
                 figures[f"{arm}/{case}/{name}"] = Figure(value, low, high, cases, measure.unit)
-    for key, value in (results.experiment.more_figures(results) if results.experiment.more_figures else {}).items():
-        if isinstance(value, Interval):
-            figures[key] = Figure(value.value, value.low, value.high, None, "")
-        elif value is not None and math.isfinite(value):
-            figures[key] = Figure(float(value), None, None, None, "")
+    for key, more in (results.experiment.more_figures(results) if results.experiment.more_figures else {}).items():
+        if isinstance(more, Interval):
+            figures[key] = Figure(more.value, more.low, more.high, None, "")
+        elif more is not None and math.isfinite(more):
+            figures[key] = Figure(float(more), None, None, None, "")
     return figures
 
 

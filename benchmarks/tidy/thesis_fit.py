@@ -30,7 +30,7 @@ class Row:
 
 PILES = {"tier0_cups": 6, "tier0_bowls": 6, "tier0_utensils": 6, "tier1": 12}
 TABLE_7_2 = {
-    tier: Row(*((row[0], row[2]) for row in rows.values()), piles=PILES.get(tier))  # type: ignore[misc]
+    tier: Row(*((row[0], row[2]) for row in rows.values()), piles=PILES.get(tier))  # type: ignore[misc, arg-type]
     for tier, rows in PRINTED.items()
 }
 
