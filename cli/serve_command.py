@@ -55,6 +55,11 @@ def serve(
     )
     with server:
         sys.stderr.write(f"serving {server.info.identity}; Ctrl-C ends it\n")
+        if server.exposed:
+            sys.stderr.write(
+                f"warning: {server.address} is open to the network, without password or encryption: whoever reaches"
+                " it can use it\n"
+            )
         sys.stdout.write(server.address + "\n")
         sys.stdout.flush()
         server.serve_forever(poll_interval=0.2)

@@ -49,7 +49,8 @@ class PanopticMap(Artifact):
     count: `segment`, `class_id`, `instance`, `count`, each (K,)), `volume.npz` (`block_coordinates` (B, 3) int32,
     blocks sorted by z, y, x; over the 8^3 voxels of a block, x fastest: `tsdf` (B, 512) float16 in truncation
     distances, `weight` (B, 512) float16, `segment` (B, 512) int32, `color` (B, 512, 3) uint8). With `--snapshot-every`
-    also `snapshots/<frames>/`, the map as it was after so many frames: entities.json, entities/ and mesh.ply."""
+    also `snapshots/<frames>/`, the map as it was after so many frames: entities.json, entities/ and mesh.ply. Of an
+    annotated scan (`--from-mesh`) there are no counts and no volume."""
 
     kind: ClassVar[str] = "panoptic_map"
     description: ClassVar[str] = "labelled TSDF map: whole mesh, a mesh per entity, counts"

@@ -35,7 +35,7 @@ class SegmentsFile(Model):
     """segments.json: COCO-panoptic-like annotations for every frame, and the label source."""
 
     backend: str
-    """Name of the backend (a folder of stages/segment/backends), or `service`."""
+    """Name of the backend (a folder of stages/segment/backends); `masks` also when a service gave them."""
     label: str
     """Name to print beside every figure, e.g. `ground-truth masks, corruption 0.2`."""
     corruption: float = 0.0

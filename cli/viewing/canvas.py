@@ -12,6 +12,7 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from cli.viewing.arrangement import Arrangement
+from cli.viewing.viewer_process import viewer_address
 from schemas.errors import BadInput, MissingDependency
 from schemas.scene_parts import Box, Camera
 from stages.kit.formats.foxglove import PNG_START
@@ -55,7 +56,7 @@ class Canvas:
         self._static = True
         self._arrangement = Arrangement(WORLD)
         if save is None:
-            self._recording.spawn()
+            self._recording.connect_grpc(viewer_address())
         else:
             try:
                 save.parent.mkdir(parents=True, exist_ok=True)

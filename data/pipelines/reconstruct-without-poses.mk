@@ -12,6 +12,8 @@ FORMAT ?= auto
 POSES_METHOD ?= rgbd
 SEED ?= 0
 $(if $(LOG),$(if $(wildcard $(LOG)),,$(error LOG=$(LOG): no such file or folder)))
+$(if $(MASKS),$(if $(wildcard $(MASKS)),,$(error MASKS=$(MASKS): no such file or folder)))
+$(if $(LABELS),$(if $(wildcard $(LABELS)),,$(error LABELS=$(LABELS): no such file or folder)))
 .PHONY: all
 all: $(FOLDER)/cad_library/manifest.json $(FOLDER)/sequence/manifest.json $(FOLDER)/trajectory/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
 
@@ -24,8 +26,8 @@ $(FOLDER)/sequence/manifest.json: data/pipelines/reconstruct-without-poses.toml 
 $(FOLDER)/trajectory/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json
 	$(PYTHON) -m cli poses --sequence $(FOLDER)/sequence --method '$(POSES_METHOD)' --seed '$(SEED)' --accept tracking_lost --out $(FOLDER)/trajectory
 
-$(FOLDER)/segments/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(wildcard $(WEIGHTS))
-	$(PYTHON) -m cli segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments
+$(FOLDER)/segments/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(wildcard $(WEIGHTS)) $(MASKS) $(LABELS)
+	$(PYTHON) -m cli segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') $(if $(MASKS),--masks '$(MASKS)') $(if $(LABELS),--labels '$(LABELS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments
 
 $(FOLDER)/panoptic_map/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/trajectory/manifest.json
 	$(PYTHON) -m cli fuse --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --trajectory $(FOLDER)/trajectory --voxel-size '$(VOXEL_SIZE)' --out $(FOLDER)/panoptic_map

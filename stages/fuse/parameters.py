@@ -13,7 +13,7 @@ from schemas.segments import Segments
 from schemas.sequence import Sequence
 from schemas.trajectory import Trajectory
 from stages.kit.estimates import Estimate, Inputs
-from stages.kit.stage import Optionally, Parameters, Stage
+from stages.kit.stage import External, Optionally, Parameters, Stage
 
 
 class FuseParameters(Parameters):
@@ -107,7 +107,15 @@ class FuseParameters(Parameters):
 
 
 def check(parameters: FuseParameters, inputs: Mapping[str, Any]) -> None:
-    """Raise UsageError unless the depth range holds something."""
+    """Raise UsageError unless the depth range holds something, and for frames beside an annotated scan."""
+    frames = [role for role in ("sequence", "segments", "trajectory") if role in inputs]
+    if "from_mesh" in inputs and frames:
+        raise UsageError(f"--from-mesh is a whole scan and takes no --{frames[0]}", hint="leave out one of the two")
+    missing = [role for role in ("sequence", "segments") if role not in inputs and "from_mesh" not in inputs]
+    if missing:
+        raise UsageError(f"fuse: --{missing[0]} is missing", hint="see --help")
+    if "labels" in inputs and "from_mesh" not in inputs:
+        raise UsageError("--labels names the labels of --from-mesh", hint="give the scan too")
     if parameters.minimum_depth >= parameters.maximum_depth:
         raise UsageError(
             f"--minimum-depth {parameters.minimum_depth} is not below --maximum-depth {parameters.maximum_depth}"
@@ -115,6 +123,9 @@ def check(parameters: FuseParameters, inputs: Mapping[str, Any]) -> None:
 
 
 def _estimate(parameters: FuseParameters, inputs: Inputs) -> Estimate:
+    if "from_mesh" in inputs:
+        held = inputs["from_mesh"].megabytes
+        return Estimate(1.5 * held, 0.05 * held, 250 + 20 * held)
     # A room of 30 m2: 1 cm voxels give 134 MB, 2 cm 30 MB, 4 cm 5.6 MB.
     blocks = 1 / parameters.voxel_size**2
     expected = 0.0127 * blocks
@@ -126,7 +137,15 @@ STAGE = Stage(
     version=3,
     summary="Integrate posed frames and their segments into one labelled map with a mesh per entity",
     parameters=FuseParameters,
-    reads={"sequence": Sequence, "segments": Segments, "trajectory": Optionally(Trajectory)},
+    reads={
+        "sequence": Optionally(Sequence),
+        "segments": Optionally(Segments),
+        "trajectory": Optionally(Trajectory),
+        "from_mesh": Optionally(
+            External("Mesh or points that others annotated, instead of a sequence and its segments (docs/MASKS.md)")
+        ),
+        "labels": Optionally(External("What the labels of that scan are (TOML as in data/labels, or words)")),
+    },
     writes=PanopticMap,
     libraries=("numpy", "numba", "scipy"),
     check=check,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 from schemas.panoptic_map import SNAPSHOTS, PanopticMap
 from schemas.segments import Segments
@@ -11,6 +12,7 @@ from schemas.sequence import Sequence
 from schemas.trajectory import Trajectory
 from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.fuse.closing import close_map
+from stages.fuse.from_mesh import run_from_mesh
 from stages.fuse.inputs import check_origin, check_segments, poses_at
 from stages.fuse.listings import Listings
 from stages.fuse.mapping import PanopticMapper
@@ -34,9 +36,11 @@ MERGING: dict[str, Callable[[FuseParameters, frozenset[int]], Merging]] = {
 
 
 def run(
-    sequence: Sequence,
-    segments: Segments,
+    sequence: Sequence | None = None,
+    segments: Segments | None = None,
     trajectory: Trajectory | None = None,
+    from_mesh: Path | None = None,
+    labels: Path | None = None,
     *,
     parameters: FuseParameters,
     context: Context,
@@ -45,7 +49,11 @@ def run(
 
     Frames without depth or pose are skipped and counted; frames without segments add geometry only. With nothing to
     integrate the outcome is `empty`. Raises BadInput when the segments do not belong to the sequence.
+    With `from_mesh` the map is that of a scan which others annotated, and there are no frames.
     """
+    if from_mesh is not None:
+        return run_from_mesh(from_mesh, labels, parameters=parameters, context=context)
+    assert sequence is not None and segments is not None  # fuse.parameters.check
     check_origin(sequence, segments)
     vocabulary = load_vocabulary()
     with context.progress.step("integrate frames"):

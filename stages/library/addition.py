@@ -21,6 +21,7 @@ from stages.library.importing.discovery import Unread, find_models
 from stages.library.importing.frames import AXES, UNITS, Choice, axis_name, choose, model_rotation, upright_rotation
 from stages.library.importing.fronts import told_front
 from stages.library.importing.grouping import grouped, source_points
+from stages.library.importing.limits import few_findings, plain_text, told_refusals
 from stages.library.importing.mapping import SKIP, Entry, Mapping, read_mapping
 from stages.library.importing.placing import centered, placed_parts, plain_name, turned
 from stages.library.importing.report import table_lines
@@ -74,21 +75,23 @@ def run(
     said = read_mapping(mapping) if mapping is not None else Mapping()
     taken, records, seed = _kept_models(library, context)
     uses = {} if library is None else {entry.model: entry for entry in library.info.affordances}
-    names = {model.id.lower() for model in taken}
+    names = {model.id.lower(): 1 for model in taken}
     folder = SourceFolder(models)
     imported = 0
     for source in context.progress.track(find_models(folder), description="importing models"):
         if isinstance(source, Unread):
             records.append(_left_out(source.source, source.source, "", (source.reason.replace(f"{folder.root}/", ""),)))
             continue
+        source = replace(source, name=plain_text(source.name), source=plain_text(source.source))
         try:
-            record, result = _import(source, Said(said.entry(source), parameters), names, decompose)
+            with told_refusals(source.name):
+                record, result = _import(source, Said(said.entry(source), parameters), names, decompose)
         except BadInput as error:
             reason = str(error).replace(f"{folder.root}/", "")
             record, result = _left_out(source.name, source.source, source.format, (reason, *source.findings)), None
         records.append(record)
         if result is not None:
-            names.add(result.model.id.lower())
+            names.setdefault(result.model.id.lower(), 1)
             write_model_folder(context.output / "models" / result.model.id, result.model, result.parts)
             taken.append(result.model)
             uses[result.model.id] = result.affordances
@@ -96,7 +99,7 @@ def run(
     for line in table_lines(records):
         context.logger.info(line)
     if imported == 0:
-        why = records[-1].findings[0] if records and records[-1].findings else "it holds no model files"
+        why = _why(records[-1]) if records else "it holds no model files"
         raise BadInput(f"{models}: nothing was imported: {why}", hint="see docs/LIBRARY.md; --class-name, --mapping")
     known = tuple(uses[model.id] for model in taken if model.id in uses)
     LibraryFile(seed=seed, models=tuple(taken), affordances=known).write(context.output / "library.json")
@@ -112,6 +115,12 @@ def run(
     return CadLibrary(context.output, summary=summary)
 
 
+def _why(record: ImportedModel) -> str:
+    """Return why a model was left out, with its name."""
+    reason = record.findings[0] if record.findings else "it was left out"
+    return reason if record.name in reason or record.source in reason else f"{record.name}: {reason}"
+
+
 def _check_options(models: Path, parameters: AdditionParameters) -> None:
     if not Path(models).is_dir():
         raise BadInput(f"{models}: no folder", hint="give the folder that holds the models")
@@ -124,16 +133,27 @@ def _kept_models(library: CadLibrary | None, context: Context) -> tuple[list[Cad
     """Copy the models of an existing library; return them, what was said when they were imported, and its seed."""
     if library is None:
         return [], [], context.seed
-    for model in library.info.models:
-        shutil.copytree(model_folder(library, model.id), context.output / "models" / model.id)
+    for model in context.progress.track(library.info.models, description="copying models"):
+        _copy_folder(model_folder(library, model.id), context.output / "models" / model.id)
     records: list[ImportedModel] = []
     if (path := library.path(IMPORTS_FILE)).is_file():
         records = list(ImportFile.read(path).models)
     return list(library.info.models), records, library.info.seed
 
 
+def _copy_folder(source: Path, target: Path) -> None:
+    """Copy the files of a model; links and devices beside them are none of its. Raises BadInput."""
+    for path in sorted(source.rglob("*")):
+        if path.is_symlink() or not (path.is_file() or path.is_dir()):
+            raise BadInput(f"{path}: a link or a device in a model's folder", hint="make the library again")
+        if path.is_file():
+            place = target / path.relative_to(source)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, place)
+
+
 def _import(
-    source: SourceModel, said: Said, names: set[str], decompose: bool
+    source: SourceModel, said: Said, names: dict[str, int], decompose: bool
 ) -> tuple[ImportedModel, Assembled | None]:
     """Return what was found out about a model, and the model; None in its place when it is left out."""
     parameters = said.parameters
@@ -183,15 +203,18 @@ def _import(
         recipe={"source": source.source, "format": source.format},
     )
     findings = [*choice.findings, *source.findings, *findings, *more, *result.findings]
-    result = replace(result, findings=tuple(dict.fromkeys(findings)))
+    result = replace(result, findings=few_findings([plain_text(finding) for finding in findings]))
     return _record(source, result, choice, front_name, front_from), result
 
 
-def _free_id(name: str, names: set[str]) -> str:
-    found, number = name, 1
+def _free_id(name: str, names: dict[str, int]) -> str:
+    """Return an id that is not taken: name, name_2, ...; `names` (lower case) holds the last number of each."""
+    found, number = name, names.get(name.lower(), 1)
     while found.lower() in names:
         number += 1
         found = f"{name}_{number}"
+    if number > 1:
+        names[name.lower()] = number
     return found
 
 
@@ -225,8 +248,8 @@ def _record(source: SourceModel, result: Assembled, choice: Choice, front: str, 
 def _left_out(name: str, source: str, kind: str, findings: tuple[str, ...]) -> ImportedModel:
     return ImportedModel(
         id="",
-        name=name,
-        source=source,
+        name=plain_text(name),
+        source=plain_text(source),
         format=kind,
         class_name="",
         size=None,
@@ -243,5 +266,5 @@ def _left_out(name: str, source: str, kind: str, findings: tuple[str, ...]) -> I
         can_contain=False,
         can_support=False,
         has_handle=False,
-        findings=findings,
+        findings=few_findings([plain_text(finding) for finding in findings]),
     )

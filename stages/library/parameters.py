@@ -64,7 +64,7 @@ BUILD = Stage(
 
 ADD = Stage(
     name="library add",
-    version=3,
+    version=4,
     summary="Import models of other people into a CAD library: URDF, MJCF, SDF, meshes, PartNet, ShapeNetSem",
     parameters=AdditionParameters,
     reads={

@@ -13,6 +13,7 @@ import shapely
 from shapely.geometry import MultiPoint, Polygon
 
 from schemas.base import as_vector
+from schemas.errors import BadInput
 from schemas.scene_parts import SurfacePlane
 from stages.kit.geometry.solids import Solid
 
@@ -22,21 +23,44 @@ CLEARANCES = (0.008, 0.02, 0.04)
 """What hangs this little over a surface that looks up leaves no room to put things there [m]."""
 JOIN_GAP = 0.004
 """Regions of one horizontal plane closer than this are one support surface [m]."""
+TOO_INTRICATE = "give it fewer, or simpler, collision shapes and joints"
 MINIMUM_FILL = 0.6
 """A support region fills at least this share of its rectangle (a disc 0.79)."""
 UPRIGHT = 0.9
 """-a_th of equation 2.1: a plane supports when its normal's z exceeds this."""
 
 
+class Sections:
+    """Counts the facets and the cross-sections of solids that are looked at, whose number may grow with the square of
+    that of the solids."""
+
+    def __init__(self, most: int, where: str) -> None:
+        self.most, self.taken, self._where = most, 0, where
+
+    def take(self, count: int) -> None:
+        """Count some. Raises BadInput beyond the bound."""
+        self.taken += count
+        if self.taken > self.most:
+            raise BadInput(f"{self._where}: its surfaces take more than {self.most} cross-sections", hint=TOO_INTRICATE)
+
+
 def surface_planes(
-    solids: Sequence[Solid], *, minimum_share: float = 0.02, support_share: float = 0.004, support_width: float = 0.06
+    solids: Sequence[Solid],
+    *,
+    minimum_share: float = 0.02,
+    support_share: float = 0.004,
+    support_width: float = 0.06,
+    sections: Sections | None = None,
 ) -> tuple[SurfacePlane, ...]:
     """Return the planes of flat facets, largest first.
 
     A plane is kept when its exposed area is at least `minimum_share` of the surface of the bounding box. Planes that
     look up are supports: they are split into connected regions, strips narrower than `support_width` [m] (0.35 of the
-    smaller horizontal extent on small things) are cut off, and `support_share` is enough.
+    smaller horizontal extent on small things) are cut off, and `support_share` is enough. Raises BadInput when that
+    takes more than `sections`.
     """
+    if sections is not None:
+        sections.take(sum(int((~solid.curved).sum()) for solid in solids) // 4)
     points = np.concatenate([solid.vertices for solid in solids])
     size = points.max(axis=0) - points.min(axis=0)
     surface = 2 * float(size[0] * size[1] + size[1] * size[2] + size[0] * size[2])
@@ -57,6 +81,8 @@ def surface_planes(
         cover = []
         for height in (offset - gap for gap in gaps):
             near = np.flatnonzero(_bounds_reach(bounds, normal, height))
+            if sections is not None:
+                sections.take(len(near))
             cover += [_section(solids[k].vertices, edges[k], normal, height, basis) for k in near.tolist()]
         exposed = union.difference(shapely.union_all([c for c in cover if c is not None]))
         regions = _regions(exposed, width) if up else [exposed]

@@ -46,6 +46,8 @@ class BackendRequest:
     labels: Path | None = None
     """Label table or list of words."""
     sidecar: Path | None = None
+    masks: Path | None = None
+    """Folder of masks."""
     device: str = "cpu"
     sequence: Sequence | None = None
     """The log, for backends that look at all of it; None when single frames are served (`models serve`)."""

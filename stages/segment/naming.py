@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from schemas.vocabulary import Vocabulary
-from stages.segment.labels import Label
+from stages.kit.labels import Label
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
 KEPT_SHARE = 0.5

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, create_model, field_validator
 from pydantic_core import PydanticCustomError
 
+from schemas.errors import UsageError
 from schemas.segments import Segments
 from schemas.sequence import Sequence
 from stages.kit.estimates import USUAL_FRAME, Estimate, Inputs
@@ -94,6 +96,14 @@ else:
     """Options of `segment`: the common ones and those of every backend."""
 
 
+def check(parameters: SegmentParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError for masks that no backend asked for, and for a backend that asks for masks and has none."""
+    if parameters.backend == "masks" and "masks" not in inputs:
+        raise UsageError("--backend masks needs a folder of masks", hint="--masks FOLDER (docs/MASKS.md)")
+    if parameters.backend != "masks" and "masks" in inputs:
+        raise UsageError("--masks is for --backend masks alone", hint="add --backend masks, or leave --masks out")
+
+
 def _estimate(parameters: SegmentParameters, inputs: Inputs) -> Estimate:
     sequence = inputs["sequence"]
     megapixels = sequence.megapixels if sequence.megapixels is not None else sequence.megabytes
@@ -120,11 +130,15 @@ STAGE = Stage(
             External("The network's labels and their classes (TOML as in data/labels), or a list of words, one a line")
         ),
         "sidecar": Optionally(External("TOML that says what goes into an ONNX network and what comes out")),
+        "masks": Optionally(
+            External("Masks made elsewhere, for --backend masks: COCO, SAM, PNG or NPZ files (docs/MASKS.md)")
+        ),
     },
     writes=Segments,
     libraries=("numpy", "opencv-python-headless", "numba", "scipy"),
     versions="registry",
     data_files=data_files,
+    check=check,
     extras=tuple(extra for declared in all_backends() for extra in declared.extras),
     example="scenewright segment --sequence outputs/demo/sequence --out outputs/demo/segments",
     estimate=_estimate,

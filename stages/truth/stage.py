@@ -20,10 +20,15 @@ from schemas.sequence import Sequence
 from schemas.vocabulary import VOCABULARY_FILE, load_vocabulary
 from stages.kit.drawing.palette import instance_color
 from stages.kit.formats.ply_files import ColoredMesh, write_ply
+from stages.kit.formats.scenenn_annotation import (
+    AnnotatedLabel,
+    class_by_last_word,
+    class_by_substring,
+    read_annotation,
+)
 from stages.kit.geometry.boxes import is_round, minimum_box
 from stages.kit.geometry.transforms import apply
 from stages.kit.stage import Context
-from stages.truth.annotation import AnnotatedLabel, class_by_last_word, class_by_substring, read_annotation
 from stages.truth.labelled_mesh import LabelledMesh, read_labelled_mesh
 from stages.truth.parameters import WORDS, SceneNNParameters
 from stages.truth.surface import surface_points

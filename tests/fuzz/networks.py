@@ -12,6 +12,7 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from stages.kit.formats.frames import Frame
 from stages.kit.formats.masks import encode_panoptic_png
+from stages.kit.labels import LABEL_FILES, LABELS_FOLDER, read_label_file
 from stages.segment.backends.onnx.sidecar import read_sidecar
 from stages.segment.backends.service.protocol import (
     Category,
@@ -26,7 +27,6 @@ from stages.segment.backends.service.protocol import (
     parse_reply,
     parse_request,
 )
-from stages.segment.labels import LABEL_FILES, LABELS_FOLDER, read_label_file
 from tests.fuzz.harness import Harness, as_file
 
 CATEGORIES = {3: Category(id=3, name="chair"), 7: Category(id=7, name="wall", isthing=0)}

@@ -25,7 +25,7 @@ MODULES = {
 NAMES = tuple(name for names in MODULES.values() for name in names)
 INSTRUMENTED = [
     "stages.ingest",
-    "stages.segment.labels",
+    "stages.kit.labels",
     "stages.segment.backends.onnx",
     "stages.segment.backends.service",
     "stages.kit.formats",

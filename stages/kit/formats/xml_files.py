@@ -9,6 +9,11 @@ from schemas.errors import BadInput
 
 DEEPEST = 200
 """Levels of nesting; deeper trees would exhaust Python's stack when they are written."""
+MOST_ELEMENTS = 1_000_000
+"""Elements and attributes: a few bytes of each take some hundred in memory."""
+PIECE = 1 << 20
+LONGEST_TAG = 4 << 20
+"""Bytes of a tag, with all its attributes."""
 
 
 def parse_xml(data: bytes, where: str) -> ElementTree.Element:
@@ -16,14 +21,17 @@ def parse_xml(data: bytes, where: str) -> ElementTree.Element:
 
     The document is read once by expat itself, as a search for `<!DOCTYPE` in the bytes misses other encodings.
     """
-    depth = 0
+    depth = elements = 0
 
     def refuse(*_: object) -> None:
         raise BadInput(f"{where}: declares a document type or entities", hint="it needs none; remove the DOCTYPE")
 
-    def enter(*_: object) -> None:
-        nonlocal depth
+    def enter(_: str, attributes: dict[str, str]) -> None:
+        nonlocal depth, elements
         depth += 1
+        elements += 1 + len(attributes)
+        if elements > MOST_ELEMENTS:
+            raise BadInput(f"{where}: more than {MOST_ELEMENTS} elements and attributes", hint="split it")
         if depth > DEEPEST:
             raise BadInput(f"{where}: nested deeper than {DEEPEST} levels")
 
@@ -37,7 +45,11 @@ def parse_xml(data: bytes, where: str) -> ElementTree.Element:
     guard.StartElementHandler = enter
     guard.EndElementHandler = leave
     try:
-        guard.Parse(data, True)
+        for start in range(0, len(data), PIECE):
+            guard.Parse(data[start : start + PIECE], False)
+            if start + PIECE - guard.CurrentByteIndex > LONGEST_TAG:
+                raise BadInput(f"{where}: a tag of more than {LONGEST_TAG} bytes")
+        guard.Parse(b"", True)
         return ElementTree.fromstring(data)
     # LookupError: an encoding that Python does not know; ValueError: one of more than one byte a character.
     except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:

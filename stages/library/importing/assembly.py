@@ -9,6 +9,7 @@ import numpy as np
 
 from schemas.base import as_vector
 from schemas.cad_library import Affordances, CadModel, ModelState
+from schemas.errors import BadInput
 from schemas.scene_parts import Joint
 from schemas.vocabulary import load_vocabulary
 from stages.kit.formats.model_writer import PartGeometry
@@ -18,7 +19,7 @@ from stages.library.affordances import affordances
 from stages.library.importing.painting import painted
 from stages.library.importing.placing import Part
 from stages.library.modelling import joint_values, motion
-from stages.library.surfaces import surface_planes
+from stages.library.surfaces import TOO_INTRICATE, Sections, surface_planes
 
 KNOB_SHARE = 0.2
 """Moving parts smaller than this share of the model's diagonal get no states of their own."""
@@ -42,10 +43,16 @@ WIDEST_GRASP = 0.08
 """Opening of a two-finger gripper [m]."""
 LARGEST_MASS = 1000.0
 """[kg]; larger ones are questioned, and none is assumed to be larger."""
+HEAVIEST_MODEL = 1e9
+"""[kg]; nothing is taken that says it is heavier."""
 LIGHTEST, HEAVIEST = 5.0, 12000.0
 """Mean density over the collision pieces [kg/m^3]."""
 MOST_STATES_OF = 12
 """Joints that get states of their own."""
+MOST_PIECES = 1500
+"""Collision pieces of all parts."""
+MOST_SECTIONS, MOST_SECTIONS_CLOSED = 100_000, 30_000
+"""Of pieces with planes, in all states and in the closed one. An oven of 48 pieces and 20 states takes 20,000."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +75,9 @@ def assembled(
     density: float,
     recipe: dict[str, float | int | str],
 ) -> Assembled:
-    """Return the library's record and geometry of centred parts."""
+    """Return the library's record and geometry of centred parts. Raises BadInput for more pieces than can be judged."""
+    if (count := sum(len(part.pieces) for part in parts)) > MOST_PIECES:
+        raise BadInput(f"{count} collision pieces, more than {MOST_PIECES}", hint=TOO_INTRICATE)
     findings: list[str] = []
     movable = load_vocabulary().by_name(class_name).movable
     parts = [replace(part, joint=None if part.joint is None else _rounded(part.joint)) for part in parts]
@@ -83,7 +92,14 @@ def assembled(
         for joint, part in zip(joints, parts[1:], strict=True)
         if np.linalg.norm(np.ptp(np.concatenate([s.vertices for s in part.surfaces]), axis=0)) > KNOB_SHARE * diagonal
     )[:MOST_STATES_OF]
-    states = tuple(_state(parts, joints, values) for values in joint_values(joints, opened))
+    sections = Sections(MOST_SECTIONS_CLOSED, model_id)
+    closed = _state(parts, joints, {joint.name: 0.0 for joint in joints}, sections)
+    affordable = max(0, (MOST_SECTIONS // max(sections.taken, 1) - 2) // 2)
+    if affordable < len(opened):
+        findings.append(f"states of {affordable} of {len(opened)} joints: it has too many collision pieces for more")
+        opened = opened[:affordable]
+    sections = Sections(2 * MOST_SECTIONS, model_id)  # what opens may cross more than what is closed
+    states = (closed, *(_state(parts, joints, values, sections) for values in joint_values(joints, opened)[1:]))
     width = float(min(size[0], size[1]))
     model = CadModel(
         id=model_id,
@@ -122,14 +138,14 @@ def _rounded(joint: Joint) -> Joint:
 
 
 def _unique_names(joints: Sequence[Joint]) -> list[Joint]:
-    found: list[Joint] = []
+    found: dict[str, Joint] = {}
     for joint in joints:
         name, number = joint.name, 1
-        while name in {other.name for other in found}:
+        while name in found:
             number += 1
             name = f"{joint.name}_{number}"
-        found.append(joint.model_copy(update={"name": name}))
-    return found
+        found[name] = joint.model_copy(update={"name": name})
+    return list(found.values())
 
 
 def _geometries(parts: Sequence[Part], density: float, findings: list[str]) -> list[PartGeometry]:
@@ -138,6 +154,8 @@ def _geometries(parts: Sequence[Part], density: float, findings: list[str]) -> l
     if any(mass is not None for mass in given):
         known = sum(mass for mass in given if mass is not None)
         covered = sum(v for v, mass in zip(volumes, given, strict=True) if mass is not None)
+        if not 0 < known < HEAVIEST_MODEL:
+            raise BadInput(f"mass of {known:.3g} kg")
         mean = known / covered
         masses = [mean * v if mass is None else mass for v, mass in zip(volumes, given, strict=True)]
     else:
@@ -158,7 +176,7 @@ def _geometries(parts: Sequence[Part], density: float, findings: list[str]) -> l
     return result
 
 
-def _state(parts: Sequence[Part], joints: Sequence[Joint], values: dict[str, float]) -> ModelState:
+def _state(parts: Sequence[Part], joints: Sequence[Joint], values: dict[str, float], sections: Sections) -> ModelState:
     solids, points = list(parts[0].pieces), [surface.vertices for surface in parts[0].surfaces]
     for part, joint in zip(parts[1:], joints, strict=True):
         moved = motion(joint, values[joint.name])
@@ -169,5 +187,5 @@ def _state(parts: Sequence[Part], joints: Sequence[Joint], values: dict[str, flo
         joints=values,
         box_minimum=as_vector(np.round(every.min(axis=0), 9) + 0.0),
         box_maximum=as_vector(np.round(every.max(axis=0), 9) + 0.0),
-        planes=surface_planes(solids),
+        planes=surface_planes(solids, sections=sections),
     )

@@ -16,6 +16,8 @@ from schemas.vocabulary import load_vocabulary
 DATA = Path(__file__).resolve().parents[3] / "data"
 TABLE_FILE, WORDS_FILE = "imported_models.toml", "labels/words.toml"
 LONGEST_PHRASE = 4
+LONGEST_NAME = 400
+"""Characters of a name that are looked at: its end, where English puts the thing."""
 SHORTEST_ENDING = 3
 FILLERS = re.compile(r"(?:root|body|link|main|model|mesh|base)$")
 SPLIT = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
@@ -81,6 +83,7 @@ def class_of(names: tuple[str, ...]) -> str | None:
     no word is known, the ending of one counts (`hingecabinet`).
     """
     known = phrases()
+    names = tuple(name[-LONGEST_NAME:] for name in names)
     for name in names:
         words = words_of(name)
         for length in range(min(LONGEST_PHRASE, len(words)), 0, -1):

@@ -16,9 +16,13 @@ from scipy.spatial.transform import Rotation
 
 from schemas.errors import BadInput
 from stages.kit.formats.xml_files import parse_xml
+from stages.library.importing.limits import MOST_VERTICES, Allowance
+from stages.library.importing.source_folder import long_row
 
 MOST_INDICES = 30_000_000
 MOST_INSTANCES = 20_000
+MOST_STEPS = 2_000_000
+"""Elements that are looked at, those of an instance each time that it is instanced."""
 DEEPEST_NODES = 60
 UP_AXES = {"X_UP": (1.0, 0.0, 0.0), "Y_UP": (0.0, 1.0, 0.0), "Z_UP": (0.0, 0.0, 1.0)}
 
@@ -74,7 +78,13 @@ class _Reader:
                 self.by_id.setdefault((element.tag, element.get("id", "")), element)
         self.left_out: set[str] = set()
         self.budget = MOST_INDICES
-        self.instances = 0
+        self.instances = self.steps = 0
+        self.allowance = Allowance(where)
+        # What a node or a geometry says is read once, however often it is instanced.
+        self.transforms: dict[int, np.ndarray] = {}
+        self.sources: dict[str, np.ndarray] = {}
+        self.corners: dict[int, np.ndarray] = {}
+        self.materials: dict[str, tuple[tuple[float, float, float], str | None]] = {}
 
     def content(self) -> Collada:
         unit, axis = self.root.find("asset/unit"), self.root.findtext("asset/up_axis", "").strip()
@@ -102,12 +112,17 @@ class _Reader:
 
     def _numbers(self, text: str | None, what: str) -> np.ndarray:
         try:
-            values = np.array((text or "").split(), dtype=float)
+            values = long_row(text or "", np.float64, MOST_INDICES, f"{self.where}: {what}")
         except ValueError:
             raise BadInput(f"{self.where}: {what} holds what is no number") from None
         if values.size == 0:
             raise BadInput(f"{self.where}: {what} is empty")
         return values
+
+    def _step(self, count: int) -> None:
+        self.steps += count
+        if self.steps > MOST_STEPS:
+            raise BadInput(f"{self.where}: its nodes repeat too much", hint="split it, or leave out what is hidden")
 
     def _count(self, text: str) -> int:
         if not (text.isascii() and text.isdigit() and len(text) < 4):
@@ -115,6 +130,8 @@ class _Reader:
         return int(text)
 
     def _transform(self, node: ElementTree.Element) -> np.ndarray:
+        if id(node) in self.transforms:
+            return self.transforms[id(node)]
         whole = np.eye(4)
         for element in node:
             step = np.eye(4)
@@ -138,16 +155,19 @@ class _Reader:
             elif element.tag in ("lookat", "skew"):
                 self.left_out.add(element.tag)
             whole = whole @ step
+        self.transforms[id(node)] = whole
         return whole
 
     def _node(self, node: ElementTree.Element, outer: np.ndarray, depth: int) -> Iterator[ColladaPatch]:
         self.instances += 1
         if depth > DEEPEST_NODES or self.instances > MOST_INSTANCES:
             raise BadInput(f"{self.where}: nodes are nested too deeply, or there are too many")
+        self._step(len(node))
         pose = outer @ self._transform(node)
         name = node.get("name") or node.get("id") or ""
         for child in node:
             if child.tag == "instance_geometry" and (geometry := self._target(child, "geometry")) is not None:
+                self._step(sum(1 for _ in child.iter()))
                 bound = {
                     material.get("symbol", ""): material.get("target", "").removeprefix("#")
                     for material in child.iter("instance_material")
@@ -167,6 +187,7 @@ class _Reader:
         if mesh is None:
             self.left_out.add("geometry that is no mesh")
             return
+        self._step(len(mesh))
         for element in mesh:
             if element.tag in ("triangles", "polylist", "polygons"):
                 patch = self._patch(element, pose, name, bound)
@@ -176,6 +197,13 @@ class _Reader:
                 self.left_out.add(element.tag)
 
     def _source(self, reference: str) -> np.ndarray:
+        if reference not in self.sources:
+            self.sources[reference] = self._read_source(reference)
+            if sum(table.size for table in self.sources.values()) > 4 * MOST_VERTICES:
+                raise BadInput(f"{self.where}: more than {4 * MOST_VERTICES} numbers", hint="simplify it, or split it")
+        return self.sources[reference]
+
+    def _read_source(self, reference: str) -> np.ndarray:
         name = reference.removeprefix("#")
         if (vertices := self.by_id.get(("vertices", name))) is not None:
             inner = [i for i in vertices.findall("input") if i.get("semantic") == "POSITION"]
@@ -199,7 +227,9 @@ class _Reader:
             for i in element.findall("input")
         ]
         width = 1 + max((entry[2] for entry in inputs), default=0)
-        corners = self._corners(element, width)
+        if id(element) not in self.corners:
+            self.corners[id(element)] = self._corners(element, width)
+        corners = self.corners[id(element)]
         if len(corners) == 0:
             return None
         positions = next((entry for entry in inputs if entry[0] == "VERTEX"), None)
@@ -211,6 +241,10 @@ class _Reader:
         faces = corners[:, :, positions[2]]
         if faces.min() < 0 or faces.max() >= len(vertices):
             raise BadInput(f"{self.where}: a face names a vertex outside of 0..{len(vertices) - 1}")
+        if len(vertices) > 3 * len(faces):  # a source that many patches share: each keeps what it uses of it
+            used, faces = np.unique(faces, return_inverse=True)
+            vertices, faces = vertices[used], faces.reshape(-1, 3)
+        self.allowance.take_counts(len(faces), len(vertices))
         color, texture = self._material(bound.get(element.get("material", ""), element.get("material", "")))
         texture_points = None
         mapped = next((entry for entry in inputs if entry[0] == "TEXCOORD"), None)
@@ -233,30 +267,35 @@ class _Reader:
         if self.budget < 0:
             raise BadInput(f"{self.where}: more than {MOST_INDICES} indices")
         try:
-            lists = [np.array(text.split(), dtype=np.int64) for text in texts]
+            lists = [long_row(text, np.int64, MOST_INDICES, self.where) for text in texts]
             if any(len(entry) % width for entry in lists):
                 raise BadInput(f"{self.where}: {element.tag}: indices are no multiple of {width}")
             rows = [entry.reshape(-1, width) for entry in lists]
             if element.tag == "triangles":
                 joined = np.concatenate(rows) if rows else np.zeros((0, width), np.int64)
                 return joined[: len(joined) // 3 * 3].reshape(-1, 3, width)
-            counts = [len(row) for row in rows]
+            counts = np.array([len(row) for row in rows], dtype=np.int64)
             if element.tag == "polylist":
-                counts = np.array((element.findtext("vcount") or "").split(), dtype=np.int64).tolist()
+                counts = long_row(element.findtext("vcount") or "", np.int64, MOST_INDICES, self.where)
         except (ValueError, OverflowError):  # an index of more than 64 bits
             raise BadInput(f"{self.where}: {element.tag}: indices are no numbers") from None
         joined = np.concatenate(rows) if rows else np.zeros((0, width), np.int64)
-        if any(count < 0 for count in counts) or sum(counts) > len(joined):
+        if len(counts) and (
+            counts.min() < 0 or counts.max() > len(joined) or float(counts.astype(float).sum()) > len(joined)
+        ):
             raise BadInput(f"{self.where}: {element.tag} counts more corners than it has")
-        triangles, start = [], 0
-        for count in counts:
-            polygon = joined[start : start + count]
-            triangles += [polygon[[0, k, k + 1]] for k in range(1, count - 1)]
-            start += count
-        return np.array(triangles, dtype=np.int64).reshape(-1, 3, width)
+        fans = np.maximum(counts - 2, 0)
+        start = np.repeat(np.cumsum(counts) - counts, fans)
+        step = np.arange(len(start)) - np.repeat(np.cumsum(fans) - fans, fans)
+        return joined[np.stack([start, start + step + 1, start + step + 2], axis=1)]
 
     def _material(self, name: str) -> tuple[tuple[float, float, float], str | None]:
         """Return the diffuse colour and the texture's file name of a material."""
+        if name not in self.materials:
+            self.materials[name] = self._read_material(name)
+        return self.materials[name]
+
+    def _read_material(self, name: str) -> tuple[tuple[float, float, float], str | None]:
         plain = (0.7, 0.7, 0.7)
         material = self.by_id.get(("material", name))
         effect = self._target(material.find("instance_effect"), "effect") if material is not None else None

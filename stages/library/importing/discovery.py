@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
 from schemas.errors import BadInput
+from stages.library.importing.limits import told_refusals
 from stages.library.importing.loose_models import (
     is_shapenet_table,
     read_loose_model,
@@ -22,6 +23,7 @@ from stages.library.importing.source_folder import SourceFolder
 from stages.library.importing.source_model import SourceModel
 from stages.library.importing.urdf_models import read_partnet_model, read_urdf_model
 
+DESCRIPTIONS = (".urdf", ".sdf", ".world", ".xml", ".mjcf")
 PARTNET_FILE, SHAPENET_FILE = "mobility.urdf", "metadata.csv"
 SHELVES = {"meshes", "mesh", "visual", "collision", "textured_objs", "materials", "textures"}
 """Folders that hold parts of models."""
@@ -44,15 +46,21 @@ def find_models(folder: SourceFolder) -> Iterator[SourceModel | Unread]:
     """
     files = folder.files()
     count = 0
-    claimed: set[Path] = set()
+    claimed = _Claimed()
     for path in files:
+        if not _is_text(path):
+            if path.suffix.lower() in (*MESH_SUFFIXES, *DESCRIPTIONS):
+                yield Unread(folder.relative(path), "its name is no UTF-8 (rename it)")
+            continue
         for model in _described(folder, path, claimed):
             count += 1
             if count > MOST_MODELS:
                 raise BadInput(f"{folder.root}: more than {MOST_MODELS} models", hint="import its parts one by one")
             yield model
-    used = {path.resolve() for path in claimed} | set(folder.read_bytes_of)
+    used = {path.resolve() for path in claimed.files} | set(folder.read_bytes_of)
     for path in files:
+        if not _is_text(path) or not claimed.folders.isdisjoint(path.parents):
+            continue
         shelves = {part.lower() for part in path.relative_to(folder.root).parts[:-1]}
         if path.suffix.lower() not in MESH_SUFFIXES or path.resolve() in used or shelves & SHELVES:
             continue
@@ -64,24 +72,43 @@ def find_models(folder: SourceFolder) -> Iterator[SourceModel | Unread]:
         yield _tried(folder, path, partial(read_loose_model, folder, path))
 
 
-def _described(folder: SourceFolder, path: Path, claimed: set[Path]) -> Iterator[SourceModel | Unread]:
+@dataclass(frozen=True)
+class _Claimed:
+    """What belongs to a description."""
+
+    files: set[Path] = field(default_factory=set)
+    folders: set[Path] = field(default_factory=set)
+
+
+def _is_text(path: Path) -> bool:
+    try:
+        str(path).encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _described(folder: SourceFolder, path: Path, claimed: _Claimed) -> Iterator[SourceModel | Unread]:
     suffix = path.suffix.lower()
     if path.name == PARTNET_FILE:
-        claimed.update(path.parent.rglob("*"))
+        claimed.folders.add(path.parent)
         yield _tried(folder, path, lambda: read_partnet_model(folder, path))
     elif suffix == ".urdf":
         yield _tried(folder, path, lambda: read_urdf_model(folder, path))
     elif suffix in (".sdf", ".world"):
         yield from _several(folder, path, lambda: read_sdf_models(folder, path))
     elif suffix in (".xml", ".mjcf"):
-        yield from _several(folder, path, lambda: read_mjcf_models(folder, path) if _whole_mjcf(folder, path) else [])
+        yield from _several(
+            folder, path, lambda: read_mjcf_models(folder, path) if _whole_mjcf(folder, path) else iter(())
+        )
     elif path.name == SHAPENET_FILE and is_shapenet_table(folder, path):
         try:
-            rows = shapenet_rows(folder, path)
+            with told_refusals(folder.relative(path)):
+                rows = shapenet_rows(folder, path)
         except BadInput as error:
             yield Unread(folder.relative(path), str(error))
             return
-        claimed.update(mesh for mesh, _ in rows)
+        claimed.files.update(mesh for mesh, _ in rows)
         for mesh, row in rows:
             yield _tried(folder, mesh, partial(read_shapenet_model, folder, mesh, row))
 
@@ -98,13 +125,24 @@ def _whole_mjcf(folder: SourceFolder, path: Path) -> bool:
 
 def _tried(folder: SourceFolder, path: Path, read: Callable[[], SourceModel]) -> SourceModel | Unread:
     try:
-        return read()
+        with told_refusals(folder.relative(path)):
+            return read()
     except BadInput as error:
         return Unread(folder.relative(path), str(error))
 
 
-def _several(folder: SourceFolder, path: Path, read: Callable[[], list[SourceModel]]) -> Iterator[SourceModel | Unread]:
-    try:
-        yield from read()
-    except BadInput as error:
-        yield Unread(folder.relative(path), str(error))
+def _several(
+    folder: SourceFolder, path: Path, read: Callable[[], Iterator[SourceModel]]
+) -> Iterator[SourceModel | Unread]:
+    models: Iterator[SourceModel] | None = None
+    while True:
+        try:
+            with told_refusals(folder.relative(path)):
+                models = read() if models is None else models
+                model = next(models, None)
+        except BadInput as error:
+            yield Unread(folder.relative(path), str(error))
+            return
+        if model is None:
+            return
+        yield model

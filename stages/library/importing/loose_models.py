@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,10 @@ from stages.library.importing.mesh_reading import read_mesh_file
 from stages.library.importing.source_folder import SourceFolder, numbers
 from stages.library.importing.source_model import Declared, Direction, SourceLink, SourceModel
 
-LARGEST_TABLE = 256 * 2**20
+LARGEST_TABLE = 64 * 2**20
+LARGEST_HEADER = 64 * 2**10
 SHAPENET_COLUMNS = {"fullId", "category", "up", "front", "unit"}
+SHAPENET_READ = SHAPENET_COLUMNS | {"name", "isContainerLike"}
 SHAPENET_UP: Direction = (0.0, 0.0, 1.0)
 SHAPENET_FRONT: Direction = (0.0, -1.0, 0.0)
 """What an empty cell of metadata.csv means (ShapeNetSem's README)."""
@@ -41,22 +44,40 @@ def read_loose_model(folder: SourceFolder, path: Path) -> SourceModel:
 
 def is_shapenet_table(folder: SourceFolder, path: Path) -> bool:
     """Whether a metadata.csv has ShapeNetSem's columns."""
-    with path.open("rb") as file:
-        first = file.readline(64 * 2**10).decode("utf-8", "replace")
-    return set(next(csv.reader([first.lstrip("\ufeff")]), [])) >= SHAPENET_COLUMNS
+    try:
+        with path.open("rb") as file:
+            head = file.read(LARGEST_HEADER)
+        return set(next(_table(head), [])) >= SHAPENET_COLUMNS
+    except (OSError, csv.Error):
+        return False
+
+
+def _table(data: bytes) -> Iterator[list[str]]:
+    """Return the rows of a CSV file, whatever ends its lines."""
+    text = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8", errors="replace")
+    return csv.reader(line.lstrip("\ufeff") if number == 0 else line for number, line in enumerate(text))
 
 
 def shapenet_rows(folder: SourceFolder, table: Path) -> list[tuple[Path, dict[str, str]]]:
-    """Return (mesh file, row) of every row whose mesh is there, in the table's order. Raises BadInput."""
-    text = folder.read(table, LARGEST_TABLE).decode("utf-8", "replace").lstrip("\ufeff")
+    """Return (mesh file, row) of every row whose mesh is there, in the table's order; of rows of one mesh the first.
+
+    Raises BadInput.
+    """
     rows = []
+    seen: set[str] = set()
     try:
-        for row in csv.DictReader(io.StringIO(text)):
-            identity = (row.get("fullId") or "").rpartition(".")[2]
+        lines = _table(folder.read(table, LARGEST_TABLE))
+        names = next(lines, [])
+        for cells in lines:
+            row = {key: value for key, value in zip(names, cells, strict=False) if key in SHAPENET_READ}
+            identity = row.get("fullId", "").rpartition(".")[2]
+            if identity in seen:
+                continue
+            seen.add(identity)
             for name in (f"models/{identity}.obj", f"models-OBJ/models/{identity}.obj", f"{identity}.obj"):
                 path = table.parent / name
                 if identity and path.is_file() and (found := folder.find(name, table.parent)) is not None:
-                    rows.append((found, {key: value or "" for key, value in row.items() if isinstance(key, str)}))
+                    rows.append((found, row))
                     break
     except csv.Error as error:
         raise BadInput(f"{table}: no table: {error}") from None

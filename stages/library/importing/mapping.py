@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
+import re
 import tomllib
 from fnmatch import fnmatchcase
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -15,6 +18,11 @@ from schemas.vocabulary import load_vocabulary
 from stages.library.importing.source_model import SourceModel
 
 LARGEST_FILE = 4 * 2**20
+MOST_PATTERNS = 1000
+"""Each of them is held against each model; names without * and ? may be many."""
+LONGEST_NAME = 1000
+"""Characters of a name that are held against a pattern."""
+WILD = re.compile(r"[*?\[]")
 SKIP = "skip"
 
 
@@ -34,12 +42,26 @@ class Mapping(Model):
 
     models: dict[str, Entry | str] = {}
 
+    @cached_property
+    def patterns(self) -> list[tuple[int, str]]:
+        """Return (place, pattern) of those that are more than a name."""
+        return [(k, pattern) for k, pattern in enumerate(self.models) if WILD.search(pattern)]
+
+    @cached_property
+    def _names(self) -> dict[str, int]:
+        return {pattern: k for k, pattern in enumerate(self.models) if not WILD.search(pattern)}
+
     def entry(self, source: SourceModel) -> Entry:
         """Return what is said about a model."""
-        for pattern, entry in self.models.items():
-            if fnmatchcase(source.name, pattern) or fnmatchcase(source.source, pattern):
-                return Entry(class_name=entry) if isinstance(entry, str) else entry
-        return Entry()
+        of_model = (source.name[:LONGEST_NAME], source.source[:LONGEST_NAME])
+        found = min((self._names[name] for name in of_model if name in self._names), default=len(self.models))
+        for place, pattern in self.patterns:
+            if place >= found:
+                break
+            if any(fnmatchcase(name, pattern) for name in of_model):
+                found = place
+        entry = next(itertools.islice(self.models.values(), found, None), "")
+        return Entry(class_name=entry) if isinstance(entry, str) else entry
 
 
 def read_mapping(path: Path) -> Mapping:
@@ -50,13 +72,19 @@ def read_mapping(path: Path) -> Mapping:
     try:
         if path.stat().st_size > LARGEST_FILE:
             raise BadInput(f"{path}: larger than {LARGEST_FILE} bytes")
+        if not path.is_file():
+            raise BadInput(f"{path}: no regular file")
         mapping = Mapping.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         raise BadInput(f"{path}: {where}: {first['msg']}", hint="see docs/LIBRARY.md") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except RecursionError:
+        raise BadInput(f"{path}: nested too deeply", hint="see docs/LIBRARY.md") from None
+    except (OSError, ValueError) as error:  # malformed, no UTF-8, or a number that Python does not convert
         raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}", hint="see docs/LIBRARY.md") from None
+    if len(mapping.patterns) > MOST_PATTERNS:
+        raise BadInput(f"{path}: more than {MOST_PATTERNS} patterns with * or ?", hint="see docs/LIBRARY.md")
     names = {entry.name for entry in load_vocabulary().classes} | {SKIP, ""}
     for pattern, entry in mapping.models.items():
         name = entry if isinstance(entry, str) else entry.class_name

@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 import base64
-import binascii
+import io
 import json
 import struct
+from array import array
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
 
 from schemas.errors import BadInput
-from stages.kit.formats.mesh_files import mesh_of_bytes, meshes_of_glb
+from stages.kit.formats.mesh_files import gltf_pixels, gltf_tree, mesh_of_bytes, meshes_of_glb, whole_number
 from stages.library.importing.collada_file import parse_collada
-from stages.library.importing.pictures import face_colors, read_picture
-from stages.library.importing.source_folder import SourceFolder
+from stages.library.importing.limits import MOST_SHAPES, MOST_TRIANGLES, MOST_VERTICES, SIMPLIFY
+from stages.library.importing.pictures import MOST_PIXELS, Pictures, face_colors
+from stages.library.importing.source_folder import LARGEST_FILE, LARGEST_TEXT, SourceFolder
 from stages.library.importing.source_model import Declared, Surface, painted_faces
 
 MESH_SUFFIXES = (".obj", ".stl", ".dae", ".glb", ".gltf", ".ply")
-MOST_TRIANGLES = 2_000_000
-LARGEST_GLTF = 64 * 2**20
+LARGEST_MATERIALS = 16 * 2**20
+MOST_MATERIAL_FILES = 100
+MOST_KEPT_FILES = 1000
+MOST_LINES = 20_000_000
+LONGEST_LINE = 1 << 20
+"""Characters of a line of an OBJ file."""
 Y_UP = (0.0, 1.0, 0.0)
 HINT = "export it again"
 
@@ -36,9 +44,37 @@ class MeshContent:
     up: Declared
     findings: tuple[str, ...] = ()
 
+    @property
+    def triangles(self) -> int:
+        """How many there are."""
+        return sum(len(surface.faces) for surface in self.surfaces)
+
 
 def read_mesh_file(folder: SourceFolder, path: Path) -> MeshContent:
-    """Return what a mesh file holds. Raises BadInput when it is torn, too large or of no known format."""
+    """Return what a mesh file holds. Raises BadInput when it is torn, too large or of no known format.
+
+    The last files are kept, as descriptions name the same file again and again.
+    """
+    kept = folder.kept_meshes
+    if path not in kept:
+        try:
+            found: MeshContent | BadInput = _read_mesh_file(folder, path)
+        except BadInput as error:
+            found = error
+        size = 0 if isinstance(found, BadInput) else found.triangles
+        while kept and size + sum(c.triangles for c in kept.values() if isinstance(c, MeshContent)) > MOST_TRIANGLES:
+            del kept[next(iter(kept))]
+        if len(kept) > MOST_KEPT_FILES:
+            kept.clear()
+        kept[path] = found
+    content = kept[path]
+    if isinstance(content, BadInput):
+        raise BadInput(content.message, hint=content.hint)
+    assert isinstance(content, MeshContent)
+    return content
+
+
+def _read_mesh_file(folder: SourceFolder, path: Path) -> MeshContent:
     kind = path.suffix.lower()
     if kind == ".dae":
         content = _read_collada(folder, path)
@@ -47,15 +83,16 @@ def read_mesh_file(folder: SourceFolder, path: Path) -> MeshContent:
     elif kind in (".glb", ".gltf"):
         content = _read_gltf(folder, path)
     elif kind in (".stl", ".ply"):
-        mesh = mesh_of_bytes(folder.read(path), kind, str(path), hint=HINT)
+        mesh = mesh_of_bytes(
+            folder.read(path), kind, str(path), hint=HINT, most_triangles=MOST_TRIANGLES, most_vertices=MOST_VERTICES
+        )
         content = MeshContent((_surface_of(mesh, path.stem),), Declared(None, "assumed"), Declared(None, "assumed"))
     else:
         raise BadInput(f"{path}: not a mesh format that is read", hint=f"known: {', '.join(MESH_SUFFIXES)}")
-    triangles = sum(len(surface.faces) for surface in content.surfaces)
-    if triangles == 0:
+    if content.triangles == 0:
         raise BadInput(f"{path}: holds no triangles")
-    if triangles > MOST_TRIANGLES:
-        raise BadInput(f"{path}: {triangles} triangles", hint=f"simplify it to at most {MOST_TRIANGLES}")
+    if content.triangles > MOST_TRIANGLES or len(content.surfaces) > MOST_SHAPES:
+        raise BadInput(f"{path}: {content.triangles} triangles in {len(content.surfaces)} pieces", hint=SIMPLIFY)
     if any(not np.isfinite(surface.vertices).all() for surface in content.surfaces):
         raise BadInput(f"{path}: vertices are not finite")
     return content
@@ -78,16 +115,16 @@ def _surface_of(mesh: trimesh.Trimesh, name: str) -> Surface:
 
 
 def _read_collada(folder: SourceFolder, path: Path) -> MeshContent:
-    content = parse_collada(folder.read(path), str(path))
+    content = parse_collada(folder.read(path, LARGEST_TEXT), str(path))
     surfaces: list[Surface] = []
     findings: list[str] = []
     if content.left_out:
         findings.append(f"{path.name}: left out: {', '.join(content.left_out)}")
-    pictures: dict[str, np.ndarray | None] = {}
+    pictures = Pictures(folder, path, findings)
     for patch in content.patches:
         colors = painted_faces(len(patch.faces), None if patch.texture else patch.color)
         if patch.texture is not None and patch.texture_points is not None:
-            picture = _picture(folder, path, patch.texture, pictures, findings)
+            picture = pictures.picture(patch.texture)
             if picture is not None:
                 colors = face_colors(picture, patch.texture_points)
         surfaces.append(Surface(patch.vertices, patch.faces, colors, patch.name))
@@ -96,65 +133,85 @@ def _read_collada(folder: SourceFolder, path: Path) -> MeshContent:
     return MeshContent(tuple(surfaces), unit, up, tuple(findings))
 
 
-def _picture(
-    folder: SourceFolder, path: Path, name: str, pictures: dict[str, np.ndarray | None], findings: list[str]
-) -> np.ndarray | None:
-    if name not in pictures:
-        found = folder.find(name, path.parent)
-        pictures[name] = None if found is None else read_picture(folder, found)
-        if pictures[name] is None:
-            findings.append(f"{path.name}: picture {Path(name.replace(chr(92), '/')).name!r:.60} is not there")
-    return pictures[name]
+def _lines(data: bytes, path: Path) -> Iterator[str]:
+    """Yield the lines of a text, whatever ends them. Raises BadInput for one that does not end."""
+    text = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8", errors="replace")
+    count = 0
+    while line := text.readline(LONGEST_LINE):
+        count += 1
+        if len(line) == LONGEST_LINE:
+            raise BadInput(f"{path}: a line of {LONGEST_LINE} characters or more", hint=HINT)
+        if count > MOST_LINES:
+            raise BadInput(f"{path}: more than {MOST_LINES} lines", hint=HINT)
+        yield line
+
+
+@dataclass
+class _Block:
+    """Triangles of one material and group while they are gathered: three numbers each."""
+
+    corners: array[int]
+    mapped: array[int]
 
 
 def _read_obj(folder: SourceFolder, path: Path) -> MeshContent:
     """Read vertices, texture points, faces and materials; groups and objects give the surfaces their names."""
-    text = folder.read(path).decode("utf-8", "replace")
-    if "\0" in text:
+    data = folder.read(path, LARGEST_TEXT)
+    if b"\0" in data:
         raise BadInput(f"{path}: no OBJ: holds zero bytes")
-    vertices: list[list[float]] = []
-    texture: list[list[float]] = []
-    blocks: dict[tuple[str, str], tuple[list[tuple[int, int, int]], list[tuple[int, int, int]]]] = {}
-    libraries: list[str] = []
+    vertices, texture = array("d"), array("d")
+    blocks: dict[tuple[str, str], _Block] = {}
+    libraries: dict[str, None] = {}
     material = group = ""
+    triangle_count = 0
     try:
-        for line in text.splitlines():
+        for line in _lines(data, path):
             word, _, rest = line.strip().partition(" ")
             if word == "v":
-                vertices.append([float(x) for x in rest.split()[:3]])
+                x, y, z = (float(number) for number in rest.split()[:3])
+                vertices.extend((x, y, z))
             elif word == "vt":
-                texture.append([float(x) for x in (rest.split() + ["0"])[:2]])
+                u, v = (float(number) for number in (rest.split() + ["0"])[:2])
+                texture.extend((u, v))
             elif word == "f":
                 corners = [part.split("/") for part in rest.split()]
-                at = [_index(corner[0], len(vertices)) for corner in corners]
-                mapped = [_index(c[1], len(texture)) if len(c) > 1 and c[1] else -1 for c in corners]
-                entry = blocks.setdefault((material, group), ([], []))
+                at = [_index(corner[0], len(vertices) // 3) for corner in corners]
+                mapped = [_index(c[1], len(texture) // 2) if len(c) > 1 and c[1] else -1 for c in corners]
+                block = blocks.setdefault((material, group), _Block(array("q"), array("q")))
                 for k in range(1, len(at) - 1):
-                    entry[0].append((at[0], at[k], at[k + 1]))
-                    entry[1].append((mapped[0], mapped[k], mapped[k + 1]))
+                    block.corners.extend((at[0], at[k], at[k + 1]))
+                    block.mapped.extend((mapped[0], mapped[k], mapped[k + 1]))
+                triangle_count += max(len(at) - 2, 0)
+                if triangle_count > MOST_TRIANGLES or len(blocks) > MOST_SHAPES:
+                    most = f"{MOST_TRIANGLES} triangles or {MOST_SHAPES} groups"
+                    raise BadInput(f"{path}: more than {most}", hint=SIMPLIFY)
             elif word == "usemtl":
                 material = rest.strip()
             elif word in ("g", "o"):
                 group = rest.strip()
             elif word == "mtllib":
-                libraries.append(rest.strip())
+                libraries[rest.strip()] = None
+            if len(vertices) > 3 * MOST_VERTICES or len(texture) > 2 * MOST_VERTICES:
+                raise BadInput(f"{path}: more than {MOST_VERTICES} vertices", hint=SIMPLIFY)
     except (ValueError, IndexError) as error:
         raise BadInput(f"{path}: cannot be read as OBJ: {error}"[:200]) from None
-    blocks = {key: block for key, block in blocks.items() if block[0]}  # faces of two corners hold no triangle
-    if not vertices or not blocks or any(len(vertex) != 3 for vertex in vertices):
+    blocks = {key: block for key, block in blocks.items() if block.corners}  # faces of two corners hold no triangle
+    if not vertices or not blocks:
         raise BadInput(f"{path}: holds no triangles")
-    materials = _read_materials(folder, path, libraries)
-    points = np.array(vertices, dtype=float)
+    materials = _read_materials(folder, path, list(libraries))
+    points = np.array(vertices, dtype=float).reshape(-1, 3)
     findings: list[str] = []
+    if len(libraries) > MOST_MATERIAL_FILES:
+        findings.append(f"{path.name}: {MOST_MATERIAL_FILES} of {len(libraries)} material files are looked at")
     uv = np.array(texture, dtype=float).reshape(-1, 2)
-    pictures: dict[str, np.ndarray | None] = {}
+    pictures = Pictures(folder, path, findings)
     surfaces = []
-    for (name, group_name), (triangles, mapped_triangles) in blocks.items():
-        faces, chosen = np.array(triangles), np.array(mapped_triangles)
+    for (name, group_name), block in blocks.items():
+        faces, chosen = np.array(block.corners).reshape(-1, 3), np.array(block.mapped).reshape(-1, 3)
         color, picture_name = materials.get(name, (None, None))
         colors = painted_faces(len(faces), color)
         if picture_name is not None and len(uv) and chosen.min() >= 0:
-            picture = _picture(folder, path, picture_name, pictures, findings)
+            picture = pictures.picture(picture_name)
             if picture is not None:
                 colors = face_colors(picture, uv[chosen])
         used, inverse = np.unique(faces, return_inverse=True)
@@ -175,12 +232,15 @@ def _read_materials(
 ) -> dict[str, tuple[tuple[float, float, float] | None, str | None]]:
     """Return material -> (diffuse colour, name of its picture) of the MTL files that can be found."""
     materials: dict[str, tuple[tuple[float, float, float] | None, str | None]] = {}
-    for library in libraries:
-        found = folder.find(library, path.parent)
+    found_files = dict.fromkeys(folder.find(name, path.parent) for name in libraries[:MOST_MATERIAL_FILES])
+    left = LARGEST_MATERIALS
+    for found in found_files:
         if found is None:
             continue
         current = ""
-        for line in folder.read(found, LARGEST_GLTF).decode("utf-8", "replace").splitlines():
+        data = folder.read(found, left)
+        left -= len(data)
+        for line in _lines(data, found):
             word, _, rest = line.strip().partition(" ")
             if word == "newmtl":
                 current = rest.strip()
@@ -203,9 +263,11 @@ def _read_gltf(folder: SourceFolder, path: Path) -> MeshContent:
     findings: list[str] = []
     if path.suffix.lower() == ".gltf":
         data, findings = _packed(folder, path, data)
-    surfaces = tuple(
-        _surface_of(mesh, str(mesh.metadata.get("name", ""))) for mesh in meshes_of_glb(data, str(path), hint=HINT)
-    )
+    elif gltf_pixels(data, str(path), hint=HINT) > MOST_PIXELS:
+        data = _without_pictures(data)
+        findings.append(f"{path.name}: its pictures are too large, colours are those of the materials")
+    meshes = meshes_of_glb(data, str(path), hint=HINT, most_triangles=MOST_TRIANGLES, most_vertices=MOST_VERTICES)
+    surfaces = tuple(_surface_of(mesh, str(mesh.metadata.get("name", ""))) for mesh in meshes)
     return MeshContent(surfaces, Declared(1.0, "format"), Declared(Y_UP, "format"), tuple(findings))
 
 
@@ -213,37 +275,58 @@ def _packed(folder: SourceFolder, path: Path, data: bytes) -> tuple[bytes, list[
     """Return a .gltf with its buffers as one GLB, pictures left out, and what has to be said about it."""
     findings: list[str] = []
     try:
-        tree = json.loads(data)
-        joined, starts = b"", []
+        tree = gltf_tree(data)
+        parts, starts, length = [], [], 0
         for buffer in tree.get("buffers", []):
-            starts.append(len(joined))
-            joined += _buffer(folder, path, str(buffer["uri"]))[: int(buffer["byteLength"])]
-            joined += b"\0" * (-len(joined) % 4)
+            starts.append(length)
+            part = _buffer(folder, path, str(buffer["uri"]))[: whole_number(buffer["byteLength"])]
+            parts += [part, b"\0" * (-len(part) % 4)]
+            length += len(part) + -len(part) % 4
+            if length > LARGEST_FILE:
+                raise BadInput(f"{path}: buffers of more than {LARGEST_FILE} bytes", hint=SIMPLIFY)
         for view in tree.get("bufferViews", []):
-            view["byteOffset"] = int(view.get("byteOffset", 0)) + starts[int(view["buffer"])]
+            view["byteOffset"] = whole_number(view.get("byteOffset", 0)) + starts[whole_number(view["buffer"])]
             view["buffer"] = 0
-        tree["buffers"] = [{"byteLength": len(joined)}]
-        if tree.pop("images", None):
+        tree["buffers"] = [{"byteLength": length}]
+        if _drop_pictures(tree):
             findings.append(f"{path.name}: pictures are left out, colours are those of the materials")
-        tree.pop("textures", None)
-        for material in tree.get("materials", []):
-            for owner in (material, material.get("pbrMetallicRoughness", {})):
-                for key in [key for key in owner if key.endswith("Texture")]:
-                    del owner[key]
-        text = json.dumps(tree).encode()
-    except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError) as error:
+    except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:
         raise BadInput(f"{path}: glTF description is broken: {type(error).__name__}: {error}"[:200]) from None
+    return _glb(tree, parts), findings
+
+
+def _drop_pictures(tree: dict[str, Any]) -> bool:
+    """Take pictures and what names them out of a glTF description; return whether there were any."""
+    had = bool(tree.pop("images", None))
+    tree.pop("textures", None)
+    for material in tree.get("materials", []):
+        for owner in (material, material.get("pbrMetallicRoughness", {})):
+            for key in [key for key in owner if key.endswith("Texture")]:
+                del owner[key]
+    return had
+
+
+def _without_pictures(data: bytes) -> bytes:
+    """Return a GLB that was looked through (`gltf_pixels`) without its pictures."""
+    (length,) = struct.unpack_from("<I", data, 12)
+    tree = gltf_tree(data[20 : 20 + length])
+    _drop_pictures(tree)
+    return _glb(tree, [data[28 + length :]])
+
+
+def _glb(tree: dict[str, Any], parts: list[bytes]) -> bytes:
+    text = json.dumps(tree).encode()
     text += b" " * (-len(text) % 4)
-    total = 12 + 8 + len(text) + 8 + len(joined)
-    head = struct.pack("<4sIII4s", b"glTF", 2, total, len(text), b"JSON")
-    return head + text + struct.pack("<I4s", len(joined), b"BIN\0") + joined, findings
+    binary = sum(len(part) for part in parts)
+    head = struct.pack("<4sIII4s", b"glTF", 2, 12 + 8 + len(text) + 8 + binary, len(text), b"JSON")
+    return b"".join([head, text, struct.pack("<I4s", binary, b"BIN\0"), *parts])
 
 
 def _buffer(folder: SourceFolder, path: Path, name: str) -> bytes:
     if name.startswith("data:"):
         try:
             return base64.b64decode(name.partition(",")[2], validate=True)
-        except binascii.Error:
+        except ValueError:  # binascii.Error, or letters that are none of ASCII
             raise BadInput(f"{path}: a buffer is no base64") from None
     found = folder.find(name, path.parent)
     if found is None:

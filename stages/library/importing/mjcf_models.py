@@ -6,6 +6,7 @@ hinge or slide make the world body one piece of furniture. Nothing is simulated,
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from schemas.errors import BadInput
 from stages.kit.geometry.solids import Solid, box, cylinder
 from stages.kit.geometry.transforms import transform_from
+from stages.library.importing.limits import MOST_TRIANGLES_OF_A_FILE, Allowance, few_findings
 from stages.library.importing.mesh_reading import read_mesh_file
 from stages.library.importing.primitives import ball, capsule
 from stages.library.importing.source_folder import SourceFolder, list_of_numbers, numbers
@@ -32,10 +34,19 @@ from stages.library.importing.source_model import (
 
 DEEPEST_INCLUDES = 10
 MOST_INCLUDES = 2000
+MOST_ELEMENTS = 500_000
+"""Of a model, those of a file each time that it is included."""
+DEEPEST_ELEMENTS = 300
+MOST_DEFAULTS = 200_000
+"""Attributes of all default classes, those that a class inherits counted again."""
+MOST_ATTRIBUTES = 200
+"""Attributes that a default class gives one kind of element."""
 DEEPEST_BODIES = 60
 LAST_VISIBLE_GROUP = 2
 """Geoms of groups 0 to 2 are drawn by default, those of 3 and up are not."""
 MAIN = "main"
+EULER_ORDER = re.compile(r"(?!.?(.)\1)(?:[xyz]{3}|[XYZ]{3})")
+"""Three axes, none twice in a row."""
 Attributes = dict[str, str]
 
 
@@ -44,9 +55,9 @@ def is_mjcf(root: ElementTree.Element) -> bool:
     return root.tag == "mujoco" and root.find("worldbody") is not None
 
 
-def read_mjcf_models(folder: SourceFolder, path: Path) -> list[SourceModel]:
-    """Return the models of an MJCF file. Raises BadInput."""
-    return _Reader(folder, path).models()
+def read_mjcf_models(folder: SourceFolder, path: Path) -> Iterator[SourceModel]:
+    """Yield the models of an MJCF file. Raises BadInput."""
+    yield from _Reader(folder, path).models()
 
 
 @dataclass
@@ -61,12 +72,17 @@ class _Reader:
     def __init__(self, folder: SourceFolder, path: Path) -> None:
         self.folder, self.path = folder, path
         self.findings: list[str] = []
-        self.included = 0
-        self.names: set[str] = set()
+        self.included = self.elements = self.default_attributes = 0
+        self.parsed: dict[Path, ElementTree.Element] = {}
+        self.names: dict[str, int] = {}
+        self.allowance = Allowance(str(path))
+        self.of_file = Allowance(
+            str(path), triangles=MOST_TRIANGLES_OF_A_FILE, vertices=3 * MOST_TRIANGLES_OF_A_FILE, shapes=MOST_ELEMENTS
+        )
         root = folder.read_xml(path)
         if root.tag != "mujoco":
             raise BadInput(f"{path}: root element is <{root.tag}>, expected <mujoco>")
-        self.root = self._expanded(root, path, 0)
+        self.root = self._expanded(root, path, 0, 0)
         self.compiler: Attributes = {}
         for element in self.root.iter("compiler"):
             self.compiler.update(element.attrib)
@@ -84,12 +100,19 @@ class _Reader:
     def _asset_name(self, element: ElementTree.Element) -> str:
         return element.get("name") or Path(element.get("file", "").replace("\\", "/")).stem
 
-    def _expanded(self, element: ElementTree.Element, path: Path, depth: int) -> ElementTree.Element:
-        """Return the element with every <include> replaced by what the file holds."""
+    def _expanded(self, element: ElementTree.Element, path: Path, depth: int, level: int) -> ElementTree.Element:
+        """Return the element, `level` elements and `depth` files down, with what its <include>s name in their place."""
+        self.elements += 1
+        if self.elements > MOST_ELEMENTS or level > DEEPEST_ELEMENTS:
+            raise BadInput(
+                f"{self.path}: more than {MOST_ELEMENTS} elements, or {DEEPEST_ELEMENTS} levels of them, with what it"
+                " includes",
+                hint="include every file once",
+            )
         children: list[ElementTree.Element] = []
         for child in element:
             if child.tag != "include":
-                children.append(self._expanded(child, path, depth))
+                children.append(self._expanded(child, path, depth, level + 1))
                 continue
             self.included += 1
             name = child.get("file", "")
@@ -100,16 +123,30 @@ class _Reader:
                 raise BadInput(f"{path}: includes are nested too deeply, or in a circle")
             if ".." in Path(name).parts:
                 self.findings.append("files are named elsewhere; those of the same path in the folder were taken")
-            children.extend(self._expanded(self.folder.read_xml(found), found, depth + 1))
+            children.extend(self._expanded(self._included(found), found, depth + 1, level))
         copy = ElementTree.Element(element.tag, dict(element.attrib))
         copy.extend(children)
         return copy
+
+    def _included(self, path: Path) -> ElementTree.Element:
+        if path not in self.parsed:
+            self.parsed[path] = self.folder.read_xml(path)
+            if sum(1 for root in self.parsed.values() for _ in root.iter()) > 2 * MOST_ELEMENTS:
+                raise BadInput(f"{self.path}: includes more than {2 * MOST_ELEMENTS} elements")
+        return self.parsed[path]
 
     def _gather_defaults(self, element: ElementTree.Element, name: str, inherited: dict[str, Attributes]) -> None:
         own = {tag: dict(values) for tag, values in inherited.items()}
         for child in element:
             if child.tag != "default":
                 own[child.tag] = {**own.get(child.tag, {}), **child.attrib}
+        counts = [len(values) for values in own.values()]
+        self.default_attributes += sum(counts) + len(counts)
+        if self.default_attributes > MOST_DEFAULTS or max(counts, default=0) > MOST_ATTRIBUTES:
+            raise BadInput(
+                f"{self.path}: default classes of more than {MOST_DEFAULTS} attributes in all, or ones of"
+                f" more than {MOST_ATTRIBUTES}"
+            )
         self.defaults[name] = own
         for child in element.findall("default"):
             self._gather_defaults(child, child.get("class", MAIN), own)
@@ -120,28 +157,33 @@ class _Reader:
             raise BadInput(f"{self.path}: class {name!r:.60} is not defined")
         return {**self.defaults[name].get(element.tag, {}), **element.attrib}
 
-    def models(self) -> list[SourceModel]:
+    def models(self) -> Iterator[SourceModel]:
+        """Yield the models one by one, as they may be many. Raises BadInput."""
         bodies = [body for world in self.root.findall("worldbody") for body in world.findall("body")]
         geoms = [geom for world in self.root.findall("worldbody") for geom in world.findall("geom")]
         if geoms:
             self.findings.append(f"{len(geoms)} geoms of the world body are left out")
         if any(_moves(body) for body in bodies):
-            return [self._model(bodies, self.path.stem, (self.path.stem, self.root.get("model", "")))]
+            yield self._model(bodies, self.path.stem, (self.path.stem, self.root.get("model", "")))
+            return
         things = [thing for body in bodies for thing in _things(body)]
         if len(things) == 1:
             names = (self.path.stem, self.root.get("model", ""), *_body_names(things[0]))
-            return [self._model(things, self.path.stem, names)]
-        models = []
+            yield self._model(things, self.path.stem, names)
+            return
         for number, thing in enumerate(things):
             names = tuple(_body_names(thing)) or (f"{self.path.stem}_{number}",)
-            models.append(self._model([thing], f"{self.path.stem}_{names[0]}", names))
-        return models
+            yield self._model([thing], f"{self.path.stem}_{names[0]}", names)
 
     def _model(self, bodies: list[ElementTree.Element], name: str, words: tuple[str, ...]) -> SourceModel:
-        tree, self.names = _Tree(), {"model"}
+        tree, self.names = _Tree(), {"model": 1}
+        self.allowance = Allowance(str(self.path))
+        of_file = len(self.findings)
         tree.links.append(SourceLink("model"))
         for body in bodies:
             self._body(tree, body, "model", np.eye(4), MAIN, 0)
+        findings = few_findings(self.findings)
+        del self.findings[of_file:]  # what was said of this model is not said of the next
         return SourceModel(
             name=name,
             source=self.folder.relative(self.path),
@@ -149,7 +191,7 @@ class _Reader:
             links=tuple(tree.links),
             joints=tuple(tree.joints),
             words=tuple(word for word in words if word),
-            findings=tuple(dict.fromkeys(self.findings)),
+            findings=findings,
         )
 
     def _body(
@@ -182,11 +224,12 @@ class _Reader:
             self._body(tree, child, name, np.eye(4), child_class, depth + 1)
 
     def _unique(self, name: str) -> str:
-        found, number = name, 1
+        found, number = name, self.names.get(name, 0)
         while found in self.names:
             number += 1
             found = f"{name}_{number}"
-        self.names.add(found)
+        self.names[found] = 1
+        self.names[name] = max(number, 1)
         return found
 
     def _joint(
@@ -243,14 +286,11 @@ class _Reader:
 
     def _rotation(self, attributes: Attributes, where: str) -> np.ndarray:
         if "quat" in attributes:
-            w, x, y, z = numbers(attributes["quat"], 4, f"{where}: quat")
-            if w * w + x * x + y * y + z * z < 1e-20:
-                raise BadInput(f"{where}: quat of length 0")
-            return Rotation.from_quat([x, y, z, w]).as_matrix()
+            return _turn_of(attributes["quat"], f"{where}: quat")
         if "euler" in attributes:
             angles = numbers(attributes["euler"], 3, f"{where}: euler") * self.angle
             order = self.compiler.get("eulerseq", "xyz")
-            if len(order) != 3 or set(order.lower()) - set("xyz") or order not in (order.lower(), order.upper()):
+            if EULER_ORDER.fullmatch(order) is None:
                 raise BadInput(f"{where}: eulerseq {order!r:.20}")
             # MuJoCo: small letters turn with the frame. SciPy: large letters do.
             return Rotation.from_euler(order.swapcase(), angles).as_matrix()
@@ -284,6 +324,8 @@ class _Reader:
         if solid is None:
             self.findings.append(f"geoms of type {kind!r:.20} are left out")
             return []
+        self.allowance.take_counts(len(solid.faces), len(solid.vertices))
+        self.of_file.take_counts(len(solid.faces), len(solid.vertices))
         return [solid_surface(solid, color, name).moved(pose)]
 
     def _color(self, attributes: Attributes, where: str) -> tuple[float, float, float] | None:
@@ -315,13 +357,16 @@ class _Reader:
         scale = np.diag([*numbers(attributes.get("scale", "1 1 1"), 3, f"{where}: mesh scale"), 1.0])
         shift = np.eye(4)
         if "refpos" in attributes or "refquat" in attributes:
-            w, x, y, z = numbers(attributes.get("refquat", "1 0 0 0"), 4, f"{where}: refquat")
             reference = transform_from(
-                Rotation.from_quat([x, y, z, w]).as_matrix(), numbers(attributes.get("refpos", "0 0 0"), 3, where)
+                _turn_of(attributes.get("refquat", "1 0 0 0"), f"{where}: refquat"),
+                numbers(attributes.get("refpos", "0 0 0"), 3, where),
             )
             shift = np.linalg.inv(reference)
         moved = []
-        for surface in read_mesh_file(self.folder, found).surfaces:
+        content = read_mesh_file(self.folder, found)
+        self.allowance.take(content.surfaces)
+        self.of_file.take(content.surfaces)
+        for surface in content.surfaces:
             colors = surface.colors if color is None else painted_faces(len(surface.faces), color)
             named = Surface(surface.vertices, surface.faces, colors, f"{label} {name} {surface.name}".strip())
             moved.append(named.moved(pose @ shift @ scale))
@@ -351,6 +396,15 @@ def _body_names(body: ElementTree.Element) -> Iterator[str]:
         if inner is None:
             return
         body = inner
+
+
+def _turn_of(text: str, where: str) -> np.ndarray:
+    """Return the rotation (3, 3) of a quaternion w x y z of any length but 0. Raises BadInput."""
+    w, x, y, z = numbers(text, 4, where)
+    length = float(np.linalg.norm([w, x, y, z]))
+    if length < 1e-10:
+        raise BadInput(f"{where} of length 0")
+    return Rotation.from_quat([x, y, z, w]).as_matrix()
 
 
 def _unit(vector: np.ndarray, where: str) -> np.ndarray:

@@ -2,30 +2,64 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from stages.kit.formats.image_headers import may_be_decoded
+from stages.kit.formats.image_headers import image_size, may_be_decoded
 from stages.library.importing.source_folder import SourceFolder
 
 LARGEST_PICTURE = 64 * 2**20
+MOST_PIXELS = 400_000_000
+"""Of all pictures of a mesh file, those that are decoded again counted again: two dozen of 4096 x 4096."""
+MOST_HELD = 400 * 2**20
+"""Bytes of decoded pictures."""
 SAMPLES = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]], dtype=float)
 """Where a triangle's colour is looked up: its centre and three points towards its corners (barycentric)."""
 PALETTE = 8
 """Colours of a part: the URDF names one mesh file for each."""
 
 
-def read_picture(folder: SourceFolder, path: Path) -> np.ndarray | None:
-    """Return a picture as (H, W, 3) uint8 RGB, or None when it is none or declares too much."""
-    if path.stat().st_size > LARGEST_PICTURE:
-        return None
-    data = folder.read(path, LARGEST_PICTURE)
-    if not may_be_decoded(data):
-        return None
-    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    return None if picture is None else np.ascontiguousarray(picture[:, :, ::-1])
+class Pictures:
+    """The pictures that a mesh file names, decoded when they are asked for; few are held at a time."""
+
+    def __init__(self, folder: SourceFolder, path: Path, findings: list[str]) -> None:
+        self._folder, self._path, self._findings = folder, path, findings
+        self._held: dict[str, np.ndarray | None] = {}
+        self._left = MOST_PIXELS
+
+    def picture(self, name: str) -> np.ndarray | None:
+        """Return a picture (H, W, 3) uint8 RGB, or None when it is not there, or none, or there are too many."""
+        if name not in self._held:
+            picture = self._read(name)
+            while picture is not None and self._held and picture.size + self._held_bytes() > MOST_HELD:
+                del self._held[next(iter(self._held))]
+            self._held[name] = picture
+        return self._held[name]
+
+    def _held_bytes(self) -> int:
+        return sum(picture.size for picture in self._held.values() if picture is not None)
+
+    def _read(self, name: str) -> np.ndarray | None:
+        shown = f"{self._path.name}: picture {Path(name.replace(chr(92), '/')).name!r:.60}"
+        found = self._folder.find(name, self._path.parent)
+        picture = None
+        if found is not None and found.stat().st_size <= LARGEST_PICTURE:
+            data = self._folder.read(found, LARGEST_PICTURE)
+            size = image_size(data)
+            if size is not None and may_be_decoded(data):
+                self._left -= size[0] * size[1]
+                if self._left < 0:
+                    self._findings.append(f"{shown} is left out: more than {MOST_PIXELS} pixels in all")
+                    return None
+                with suppress(cv2.error):  # a decoder that gives up
+                    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+        if picture is None:
+            self._findings.append(f"{shown} is not there")
+            return None
+        return np.ascontiguousarray(picture[:, :, ::-1])
 
 
 def face_colors(picture: np.ndarray, texture_points: np.ndarray) -> np.ndarray:

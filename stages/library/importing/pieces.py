@@ -44,6 +44,14 @@ MOST_CORNERS = 64
 """Corners of one convex piece; rounder ones are drawn by their extremes in this many directions, twice over."""
 MOST_PIECES = 48
 """Pieces of one part."""
+MOST_COMPONENTS = 1000
+"""Connected components and solids of one part of which pieces are made: the largest."""
+MOST_DECOMPOSED = 24
+"""Components of one part that are cut up: the largest."""
+MOST_HULL_POINTS = 50_000
+"""Points of which a hull is made: more are thinned to the outermost in so many directions."""
+MOST_DEPTHS = 50_000_000
+"""Distances of points from facets that are looked at to tell whether an open mesh is hollow."""
 CONCAVE = 0.75
 """A component that fills less than this share of its hull is concave."""
 ROUND_ANGLE, ROUND_SHARE = np.radians(35.0), 0.12
@@ -58,13 +66,18 @@ def convex_pieces(surfaces: Sequence[Surface], *, decompose: bool) -> tuple[list
     `decompose`, and is filled by its hull otherwise.
     """
     findings: list[str] = []
-    pieces = [surface.solid for surface in surfaces if surface.solid is not None]
-    meshes = [(surface.vertices, surface.faces) for surface in surfaces if surface.solid is None]
-    filled = 0
+    solids = [surface.solid for surface in surfaces if surface.solid is not None]
+    components = _components([(surface.vertices, surface.faces) for surface in surfaces if surface.solid is None])
+    if len(solids) + len(components) > MOST_COMPONENTS:
+        findings.append(f"of {len(solids) + len(components)} loose pieces the {MOST_COMPONENTS} largest collide")
+        solids, components = _largest(solids, components)
+    pieces = [piece for solid in solids if (piece := _with_volume(solid)) is not None]
+    filled = cut = 0
     large = WORTH * float(np.linalg.norm(np.ptp(np.concatenate([s.vertices for s in surfaces]), axis=0)))
-    for component in _components(meshes):
+    for component in components:
         if is_concave(component):
-            if decompose and np.linalg.norm(np.ptp(component[0], axis=0)) >= large:
+            if decompose and cut < MOST_DECOMPOSED and np.linalg.norm(np.ptp(component[0], axis=0)) >= large:
+                cut += 1
                 pieces += [piece for points in decomposed(component) if (piece := convex_piece(points)) is not None]
                 continue
             filled += 1
@@ -72,13 +85,58 @@ def convex_pieces(surfaces: Sequence[Surface], *, decompose: bool) -> tuple[list
         if piece is not None:
             pieces.append(piece)
     if filled:
-        why = "small" if decompose else "coacd is not used"
+        why = "small, or many" if cut == MOST_DECOMPOSED else "small" if decompose else "coacd is not used"
         findings.append(f"{filled} hollow pieces are filled by their hulls ({why})")
-    pieces = _without_covered(pieces)
-    if len(pieces) > MOST_PIECES:
-        findings.append(f"the {MOST_PIECES} largest of {len(pieces)} collision pieces are kept")
-        pieces = pieces[:MOST_PIECES]
+    pieces, more = _without_covered(pieces)
+    if more:
+        findings.append(f"the {MOST_PIECES} largest of {len(pieces) + more} collision pieces are kept")
     return pieces, findings
+
+
+def _largest(solids: list[Solid], components: list[Mesh]) -> tuple[list[Solid], list[Mesh]]:
+    """Return the MOST_COMPONENTS of both with the longest diagonals, in their order."""
+    every = [*(solid.vertices for solid in solids), *(mesh[0] for mesh in components)]
+    lengths = np.array([np.linalg.norm(np.ptp(vertices, axis=0)) for vertices in every])
+    kept = np.zeros(len(every), dtype=bool)
+    kept[np.lexsort((np.arange(len(every)), -lengths))[:MOST_COMPONENTS]] = True
+    shown = [solid for solid, keep in zip(solids, kept[: len(solids)], strict=True) if keep]
+    return shown, [mesh for mesh, keep in zip(components, kept[len(solids) :], strict=True) if keep]
+
+
+def _with_volume(solid: Solid) -> Solid | None:
+    """Return a solid of a description, thickened when it is as flat as a sheet; None for a line."""
+    return convex_piece(solid.vertices) if _hull(solid.vertices) is None else solid
+
+
+def _hull(points: np.ndarray) -> ConvexHull | None:
+    """Return the hull, None for points that Qhull refuses: flat ones, and ones too far away for their size."""
+    with suppress(QhullError, ValueError):
+        return ConvexHull(points)
+    return None
+
+
+def thinned(points: np.ndarray) -> np.ndarray:
+    """Return points (N, 3) with nearly the same hull: of more than MOST_HULL_POINTS those farthest out.
+
+    The hull of a million points on a ball takes gigabytes; the farthest in each of many directions from the middle, and
+    those at the ends of the axes, stand for them.
+    """
+    if len(points) <= MOST_HULL_POINTS:
+        return points
+    away = points - 0.5 * (points.min(axis=0) + points.max(axis=0))
+    reach = np.linalg.norm(away, axis=1)
+    cells = int(np.sqrt(MOST_HULL_POINTS / 6))
+    axis = np.argmax(np.abs(away), axis=1)
+    rows = np.arange(len(points))
+    longest = away[rows, axis]
+    scale = np.where(longest == 0, 1.0, np.abs(longest))
+    first, second = (away[rows, (axis + k) % 3] / scale for k in (1, 2))
+    place = [np.minimum((0.5 * (side + 1) * cells).astype(np.int64), cells - 1) for side in (first, second)]
+    cell = ((2 * axis + (longest > 0)) * cells + place[0]) * cells + place[1]
+    order = np.lexsort((-reach, cell))
+    outermost = order[np.flatnonzero(np.diff(cell[order], prepend=-1))]
+    ends = [int(end) for k in range(3) for end in (np.argmin(points[:, k]), np.argmax(points[:, k]))]
+    return points[np.unique(np.concatenate([outermost, ends]))]
 
 
 def _components(meshes: Sequence[Mesh]) -> list[Mesh]:
@@ -113,21 +171,29 @@ def is_concave(mesh: Mesh) -> bool:
     vertices, faces = mesh
     if len(vertices) < 5 or np.linalg.matrix_rank(vertices - vertices.mean(axis=0), tol=THINNEST) < 3:
         return False
-    try:
-        solid = ConvexHull(vertices)
-    except QhullError:
+    solid = _hull(thinned(vertices))
+    if solid is None:
         return False
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     closed = bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
     if closed:
         enclosed = abs(float(np.linalg.det(vertices[faces]).sum())) / 6.0
         return enclosed < CONCAVE * solid.volume
-    depth = -(vertices @ solid.equations[:, :3].T + solid.equations[:, 3]).max(axis=1)
+    step = 1 + len(vertices) * len(solid.equations) // MOST_DEPTHS
+    depth = _depth(vertices[::step], solid.equations)
     return bool(depth.max() > 0.1 * np.ptp(vertices, axis=0).min() + THINNEST)
+
+
+def _depth(points: np.ndarray, planes: np.ndarray) -> np.ndarray:
+    """Return (N,): how far inside the planes (F, 4) points (N, 3) lie, block by block."""
+    block = max(1, 2_000_000 // len(planes))
+    parts = [points[k : k + block] for k in range(0, len(points), block)]
+    return np.concatenate([-(part @ planes[:, :3].T + planes[:, 3]).max(axis=1) for part in parts])
 
 
 def convex_piece(points: np.ndarray) -> Solid | None:
     """Return the hull of points (N, 3) [m] of not too many corners, sheets thickened; None for a line."""
+    points = thinned(points)
     centered = points - points.mean(axis=0)
     _, _, directions = np.linalg.svd(centered, full_matrices=False) if len(points) >= 3 else (0, 0, np.zeros((0, 3)))
     if len(directions) < 3:
@@ -185,18 +251,24 @@ def _with_curves(solid: Solid) -> Solid:
     return Solid(solid.vertices, solid.faces, np.isin(group, sorted(curved_groups)))
 
 
-def _without_covered(pieces: list[Solid]) -> list[Solid]:
-    """Return the pieces, largest first, without those that lie wholly inside a larger one."""
+def _without_covered(pieces: list[Solid]) -> tuple[list[Solid], int]:
+    """Return the MOST_PIECES largest pieces, without those that lie wholly inside one of them, and how many more."""
     kept: list[Solid] = []
     planes: list[np.ndarray] = []
+    more = 0
     for piece in sorted(
         pieces, key=lambda solid: (-round(volume(solid), 12), *np.round(solid.vertices.min(axis=0), 9))
     ):
         if any((piece.vertices @ p[:, :3].T + p[:, 3] <= 1e-6).all() for p in planes):
             continue
-        kept.append(piece)
-        planes.append(ConvexHull(piece.vertices).equations)
-    return kept
+        if len(kept) == MOST_PIECES:
+            more += 1
+            continue
+        found = _hull(piece.vertices)
+        if found is not None:
+            kept.append(piece)
+            planes.append(found.equations)
+    return kept, more
 
 
 def decomposed(mesh: Mesh) -> list[np.ndarray]:

@@ -25,6 +25,13 @@ from stages.library.importing.pieces import convex_pieces
 from stages.library.importing.source_model import Direction, SourceModel, Surface
 from stages.library.modelling import BODY
 
+MOST_PARTS = 500
+"""Parts of a model that move."""
+FARTHEST = 1e5
+"""[m] from the origin of the model."""
+LONGEST_SLIDE = 1e4
+"""[m]."""
+
 
 @dataclass(frozen=True)
 class Part:
@@ -52,6 +59,8 @@ def placed_parts(
     """
     findings: list[str] = []
     parts: list[Part] = []
+    if len(groups) > MOST_PARTS:
+        raise BadInput(f"{source.source}: {len(groups)} moving parts, more than {MOST_PARTS}", hint="split it")
     whole = np.eye(4)
     whole[:3, :3] = unit * rotation
     names = {BODY}
@@ -72,6 +81,7 @@ def placed_parts(
                 raise BadInput(f"{source.source}: the root link has no shape")
             findings.append(f"part {group.name!r:.40} has no shape: left out")
             continue
+        _check_reach(source, given)
         pieces, said = convex_pieces(given if collision_given else visual, decompose=decompose)
         if not pieces:
             pieces, said = convex_pieces(visual, decompose=decompose)
@@ -87,6 +97,13 @@ def placed_parts(
     if not parts or parts[0].name != BODY:
         raise BadInput(f"{source.source}: no body with a shape")
     return parts, findings
+
+
+def _check_reach(source: SourceModel, surfaces: Sequence[Surface]) -> None:
+    """Refuse what reaches so far that no hull of it has a volume. Raises BadInput."""
+    for surface in surfaces:
+        if not (np.abs(surface.vertices) < FARTHEST).all():
+            raise BadInput(f"{source.source}: collision shapes are not finite, or far away", hint="--collision visual")
 
 
 def normal_limits(axis: np.ndarray, lower: float, upper: float) -> tuple[float, np.ndarray, float, float]:
@@ -117,6 +134,8 @@ def _library_joint(group: Group, rotation: np.ndarray, unit: float, taken: set[s
             turn = Rotation.from_rotvec(closed * axis).as_matrix()
             root_from_closed = transform_from(turn, origin - turn @ origin)
     length = unit if source.kind == "prismatic" else 1.0
+    if source.kind == "prismatic" and upper * length > LONGEST_SLIDE:
+        raise BadInput(f"joint {source.name!r:.60} slides by {upper * length:.3g} m, more than {LONGEST_SLIDE:g} m")
     part = plain_name(group.name) or "part"
     while part in taken:
         part += "_"

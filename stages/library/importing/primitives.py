@@ -16,9 +16,8 @@ def ball(radii: np.ndarray) -> Solid:
 
 def capsule(radius: float, half_length: float) -> Solid:
     """Return a capsule along z: a cylinder from -half_length to half_length with half balls on its ends."""
-    points = radius * _sphere()
-    shift = np.array([0.0, 0.0, half_length])
-    upper, lower = points[points[:, 2] > -1e-12] + shift, points[points[:, 2] < 1e-12] - shift
+    sphere, shift = _sphere(), np.array([0.0, 0.0, half_length])
+    upper, lower = radius * sphere[sphere[:, 2] > -1e-12] + shift, radius * sphere[sphere[:, 2] < 1e-12] - shift
     return hull(np.concatenate([lower, upper]), curved=True)
 
 

@@ -7,6 +7,7 @@ After the SDF specification 1.4 to 1.11: `<pose>` is relative to the model (link
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -16,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from schemas.errors import BadInput
 from stages.kit.geometry.solids import Solid, box, cylinder
 from stages.kit.geometry.transforms import inverse, transform_from
+from stages.library.importing.limits import MOST_SHAPES, MOST_TRIANGLES_OF_A_FILE, Allowance, few_findings
 from stages.library.importing.primitives import ball, capsule
 from stages.library.importing.source_folder import SourceFolder, numbers
 from stages.library.importing.source_model import (
@@ -26,7 +28,7 @@ from stages.library.importing.source_model import (
     Surface,
     solid_surface,
 )
-from stages.library.importing.urdf_models import mesh_surfaces
+from stages.library.importing.urdf_models import Naming, mesh_surfaces
 
 KINDS: dict[str, JointKind] = {
     "fixed": "fixed",
@@ -38,13 +40,20 @@ UNLIMITED = 1e3
 """Limits beyond this many radians or metres mean none (SDF's default is 1e16)."""
 
 
-def read_sdf_models(folder: SourceFolder, path: Path) -> list[SourceModel]:
-    """Return the models of an SDF file. Raises BadInput."""
+def read_sdf_models(folder: SourceFolder, path: Path) -> Iterator[SourceModel]:
+    """Yield the models of an SDF file. Raises BadInput."""
     root = folder.read_xml(path)
     if root.tag not in ("sdf", "gazebo"):
         raise BadInput(f"{path}: root element is <{root.tag}>, expected <sdf>")
     elements = [*root.findall("model"), *root.findall("world/model")]
-    return [_Reader(folder, path, element, alone=len(elements) == 1).model() for element in elements]
+    of_file = Allowance(
+        str(path), triangles=MOST_TRIANGLES_OF_A_FILE, vertices=3 * MOST_TRIANGLES_OF_A_FILE, shapes=5 * MOST_SHAPES
+    )
+    for element in elements:
+        model = _Reader(folder, path, element, alone=len(elements) == 1).model()
+        for link in model.links:
+            of_file.take((*link.visual, *link.collision))
+        yield model
 
 
 class _Reader:
@@ -52,6 +61,7 @@ class _Reader:
         self.folder, self.path, self.element, self.alone = folder, path, element, alone
         self.findings: list[str] = []
         self.units: set[float] = set()
+        self.allowance = Allowance(str(path))
         self.poses: dict[str, np.ndarray] = {}
         """Link -> (4, 4) model_from_link."""
 
@@ -82,7 +92,7 @@ class _Reader:
             joints=tuple(joints),
             words=tuple(word for word in (name, folder_name if self.alone else "") if word),
             mesh_unit=min(self.units) if len(self.units) == 1 else None,
-            findings=tuple(dict.fromkeys(self.findings)),
+            findings=few_findings(self.findings),
         )
 
     def _pose(self, element: ElementTree.Element, where: str) -> np.ndarray:
@@ -126,11 +136,13 @@ class _Reader:
         if mesh is not None:
             scale = np.diag([*numbers(mesh.findtext("scale") or "1 1 1", 3, f"{where}: scale"), 1.0])
             uri = (mesh.findtext("uri") or "").strip()
-            return mesh_surfaces(self.folder, self.path, uri, pose @ scale, color, name, self.findings, self.units)
+            named = Naming(self.folder, self.path, self.findings, self.units, self.allowance)
+            return mesh_surfaces(named, uri, pose @ scale, color, name)
         solid = _primitive(geometry, where)
         if solid is None:
             self.findings.append(f"a shape of link {name!r:.40} is of a kind that is left out")
             return []
+        self.allowance.take_counts(len(solid.faces), len(solid.vertices))
         return [solid_surface(solid, color, name).moved(pose)]
 
     def _joint(self, joint: ElementTree.Element) -> SourceJoint:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import re
+import stat
+from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,10 +15,22 @@ import numpy as np
 from schemas.errors import BadInput
 from stages.kit.formats.xml_files import parse_xml
 
-LARGEST_FILE = 512 * 2**20
+LARGEST_FILE = 256 * 2**20
 """Bytes of a mesh or a picture."""
+LARGEST_TEXT = 128 * 2**20
+"""Bytes of a mesh that is text, which takes several times as much while it is read."""
 LARGEST_XML = 64 * 2**20
 MOST_FILES = 200_000
+MOST_FOLDERS = 200_000
+MOST_NAME_PARTS = 40
+"""Folders in the name of a file: its end is looked for in many places."""
+MOST_KEPT_NAMES = 20_000
+PIECE = 1 << 20
+LONGEST_NUMBER = 4096
+"""Characters."""
+LONGEST_ROW = 100_000
+"""Characters of a row that is a size or a pose; what comes after them makes it the wrong number of numbers anyway."""
+BLANK = re.compile(r"\s")
 SCHEME = re.compile(r"^(?:model|package|file)://+", re.IGNORECASE)
 
 
@@ -23,20 +39,32 @@ class SourceFolder:
 
     def __init__(self, root: Path) -> None:
         self.root = Path(root).resolve()
+        self.kept_meshes: dict[Path, Any] = {}
+        """What mesh_reading.py keeps of files that are named again and again."""
+        self._found: dict[tuple[str, tuple[Path, ...]], Path | None] = {}
         self.read_bytes_of: set[Path] = set()
         """Files that were read; what no description names may be a model by itself."""
 
     def files(self) -> list[Path]:
         """Return the files, sorted by path; hidden ones and links out of the folder are left out. Raises BadInput."""
-        found = []
-        for path in sorted(self.root.rglob("*"), key=lambda p: p.relative_to(self.root).as_posix()):
-            parts = path.relative_to(self.root).parts
-            if any(part.startswith(".") for part in parts) or not path.is_file() or not self._inside(path):
-                continue
-            found.append(path)
-            if len(found) > MOST_FILES:
-                raise BadInput(f"{self.root}: more than {MOST_FILES} files", hint="import its parts one by one")
-        return found
+        found = [path for path in self._listed() if path.is_file() and self._inside(path)]
+        return sorted(found, key=lambda p: p.relative_to(self.root).as_posix())
+
+    def _listed(self) -> Iterator[Path]:
+        waiting, folders, files = [str(self.root)], 0, 0
+        while waiting:
+            try:
+                entries = list(_entries(waiting.pop()))
+            except OSError:
+                continue  # a folder that may not be read
+            for name, is_folder in entries:
+                folders, files = folders + is_folder, files + (not is_folder)
+                if folders > MOST_FOLDERS or files > MOST_FILES:
+                    raise BadInput(f"{self.root}: more than {MOST_FILES} files", hint="import its parts one by one")
+                if is_folder:
+                    waiting.append(name)
+                else:
+                    yield Path(name)
 
     def relative(self, path: Path) -> str:
         """Return the path below the folder, with /."""
@@ -45,9 +73,13 @@ class SourceFolder:
     def read(self, path: Path, largest: int = LARGEST_FILE) -> bytes:
         """Return a file's bytes. Raises BadInput when it is too large, or cannot be read."""
         try:
-            if path.stat().st_size > largest:
-                raise BadInput(f"{path}: larger than {largest} bytes")
-            data = path.read_bytes()
+            status = path.stat()
+            if not stat.S_ISREG(status.st_mode):
+                raise BadInput(f"{path}: no regular file")
+            if status.st_size > largest:
+                raise BadInput(f"{path}: larger than {largest} bytes", hint="simplify it, or leave it out")
+            with path.open("rb") as file:
+                data = file.read(status.st_size)
         except (OSError, ValueError) as error:
             raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}") from None
         self.read_bytes_of.add(path.resolve())
@@ -71,11 +103,20 @@ class SourceFolder:
         Tried are the name itself from each base; then its end, ever shorter, from each base, the folders above it up
         to the root: so `model://chair/meshes/a.dae` is found, and `../repository/b.stl` of a folder that was renamed.
         """
+        if len(name) > 1000 or "\0" in name:
+            return None
+        if len(self._found) > MOST_KEPT_NAMES:
+            self._found.clear()
+        if (name, bases) not in self._found:
+            self._found[name, bases] = self._searched(name, bases)
+        return self._found[name, bases]
+
+    def _searched(self, name: str, bases: tuple[Path, ...]) -> Path | None:
         plain = SCHEME.sub("", name.strip().replace("\\", "/"))
-        if not plain or "\0" in plain or len(plain) > 1000:
+        if not plain:
             return None
         parts = [part for part in PurePosixPath(plain).parts if part not in ("/", ".", "..")]
-        if not parts:
+        if not 0 < len(parts) <= MOST_NAME_PARTS:
             return None
         places: list[Path] = []
         for base in bases:
@@ -83,7 +124,7 @@ class SourceFolder:
         places = list(dict.fromkeys(places))
         exact = [base / plain for base in bases] if not PurePosixPath(plain).is_absolute() else []
         for candidate in [*exact, *(place.joinpath(*parts[k:]) for k in range(len(parts)) for place in places)]:
-            if self._inside(candidate) and candidate.is_file():
+            if candidate.is_file() and self._inside(candidate):
                 return candidate.resolve()
         return None
 
@@ -102,10 +143,36 @@ def numbers(text: str | None, count: int, where: str) -> np.ndarray:
     return values
 
 
+def _entries(folder: str) -> Iterator[tuple[str, bool]]:
+    """Yield (path, whether it is a folder) of what lies in a folder and is not hidden; links are no folders."""
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if not entry.name.startswith("."):
+                yield entry.path, entry.is_dir(follow_symlinks=False)
+
+
+def long_row(text: str, kind: type[np.float64] | type[np.int64], most: int, where: str) -> np.ndarray:
+    """Return up to `most` numbers separated by blanks, read piece by piece: a list of words takes 30 times the text.
+
+    Raises BadInput, beginning with `where`, for more; ValueError and OverflowError for what is no number.
+    """
+    rows, start, count = [np.zeros(0, dtype=kind)], 0, 0
+    while start < len(text):
+        blank = BLANK.search(text, start + PIECE, start + PIECE + LONGEST_NUMBER)
+        if blank is None and start + PIECE + LONGEST_NUMBER < len(text):
+            raise BadInput(f"{where}: a number of more than {LONGEST_NUMBER} characters")
+        end = len(text) if blank is None else blank.start()
+        rows.append(np.array(text[start:end].split(), dtype=kind))
+        start, count = end, count + len(rows[-1])
+        if count > most:
+            raise BadInput(f"{where}: more than {most} numbers", hint="simplify it, or split it")
+    return np.concatenate(rows)
+
+
 def list_of_numbers(text: str | None, where: str) -> np.ndarray:
     """Return finite numbers separated by blanks. Raises BadInput, beginning with `where`."""
     try:
-        values = np.array((text or "").split(), dtype=float)
+        values = np.array((text or "")[:LONGEST_ROW].split(), dtype=float)
     except ValueError:
         raise BadInput(f"{where}: {text!r:.80} is no row of numbers") from None
     if not np.isfinite(values).all() or (np.abs(values) > 1e30).any():

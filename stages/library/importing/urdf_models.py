@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -13,6 +14,7 @@ from schemas.errors import BadInput
 from stages.kit.formats.urdf_file import joint_ends
 from stages.kit.geometry.solids import Solid, box, cylinder
 from stages.kit.geometry.transforms import transform_from
+from stages.library.importing.limits import Allowance, few_findings
 from stages.library.importing.mesh_reading import read_mesh_file
 from stages.library.importing.primitives import ball
 from stages.library.importing.source_folder import SourceFolder, numbers
@@ -56,7 +58,7 @@ def read_partnet_model(folder: SourceFolder, path: Path) -> SourceModel:
         try:
             facts = json.loads(folder.read(meta, LARGEST_TEXT))
             words = [str(facts[key]) for key in ("model_cat", "model_category") if key in facts] + words
-        except (ValueError, TypeError, RecursionError):
+        except (ValueError, TypeError, KeyError, RecursionError):
             raise BadInput(f"{meta}: no JSON object", hint="copy the model again") from None
     semantics = path.parent / "semantics.txt"
     if semantics.is_file():
@@ -86,6 +88,7 @@ class _Reader:
         self.folder, self.path = folder, path
         self.findings: list[str] = []
         self.units: set[float] = set()
+        self.allowance = Allowance(str(path))
         self.materials: dict[str, tuple[float, float, float]] = {}
 
     def model(self) -> SourceModel:
@@ -108,7 +111,7 @@ class _Reader:
             joints=joints,
             words=(name, robot.get("name", ""), self.path.parent.name),
             mesh_unit=min(self.units) if len(self.units) == 1 else None,
-            findings=tuple(dict.fromkeys(self.findings)),
+            findings=few_findings(self.findings),
         )
 
     def _pose(self, element: ElementTree.Element, where: str) -> np.ndarray:
@@ -151,13 +154,15 @@ class _Reader:
             raise BadInput(f"{where}: no geometry")
         mesh, solid = geometry.find("mesh"), _primitive(geometry, where)
         if solid is not None:
+            self.allowance.take_counts(len(solid.faces), len(solid.vertices))
             return [solid_surface(solid, color, name).moved(pose)]
         if mesh is None:
             self.findings.append(f"a shape of link {element.get('name', '')!r:.40} is of no known kind")
             return []
         scale = np.diag([*numbers(mesh.get("scale", "1 1 1"), 3, f"{where}: scale"), 1.0])
         file = mesh.get("filename", "")
-        return mesh_surfaces(self.folder, self.path, file, pose @ scale, color, name, self.findings, self.units)
+        named = Naming(self.folder, self.path, self.findings, self.units, self.allowance)
+        return mesh_surfaces(named, file, pose @ scale, color, name)
 
     def _joint(self, element: ElementTree.Element) -> SourceJoint:
         name = element.get("name", "")
@@ -180,32 +185,38 @@ class _Reader:
         )
 
 
-def mesh_surfaces(
-    folder: SourceFolder,
-    path: Path,
-    name: str,
-    link_from_mesh: np.ndarray,
-    color: tuple[float, float, float] | None,
-    label: str,
-    findings: list[str],
-    units: set[float],
-) -> list[Surface]:
-    """Return the surfaces of a mesh file that a description at `path` names; `link_from_mesh` (4, 4) may scale.
+@dataclass(frozen=True)
+class Naming:
+    """The description that names meshes, and what is gathered about them."""
 
-    A COLLADA file's unit is applied and noted in `units`, its up axis is not: simulators read it so. Raises BadInput
-    for a missing file.
+    folder: SourceFolder
+    path: Path
+    findings: list[str]
+    units: set[float]
+    allowance: Allowance
+
+
+def mesh_surfaces(
+    by: Naming, name: str, link_from_mesh: np.ndarray, color: tuple[float, float, float] | None, label: str
+) -> list[Surface]:
+    """Return the surfaces of a mesh file that a description names; `link_from_mesh` (4, 4) may scale.
+
+    A COLLADA file's unit is applied and noted, its up axis is not: simulators read it so. Raises BadInput for a missing
+    file, and for more than the description's allowance.
     """
+    folder, path = by.folder, by.path
     found = folder.find(name, path.parent)
     if found is None:
         raise BadInput(f"{path}: mesh {name!r:.100} is not in the folder", hint="copy it beside the description")
     if not found.is_relative_to(path.parent) or ".." in Path(name).parts:
-        findings.append("meshes are named elsewhere; files of the same path were found in the folder")
+        by.findings.append("meshes are named elsewhere; files of the same path were found in the folder")
     content = read_mesh_file(folder, found)
     unit = 1.0
     if isinstance(content.unit.value, float) and content.unit.origin == "file":
         unit = content.unit.value
-        units.add(unit)
-    findings += content.findings
+        by.units.add(unit)
+    by.findings.extend(content.findings)
+    by.allowance.take(content.surfaces)
     whole = link_from_mesh @ np.diag([unit, unit, unit, 1.0])
     moved = []
     for surface in content.surfaces:

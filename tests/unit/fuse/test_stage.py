@@ -215,7 +215,7 @@ def test_depth_range_must_hold_something() -> None:
     assert STAGE.check is not None
     with pytest.raises(UsageError, match="minimum-depth 3.0 is not below"):
         STAGE.check(FuseParameters(minimum_depth=3.0, maximum_depth=2.0), {})
-    STAGE.check(FuseParameters(), {})
+    STAGE.check(FuseParameters(), {"sequence": Path("s"), "segments": Path("t")})
 
 
 def test_segments_of_another_sequence_are_refused(scene: tuple[Sequence, Segments]) -> None:

@@ -10,8 +10,7 @@ import pytest
 
 from schemas.errors import BadInput
 from schemas.vocabulary import VOCABULARY_FILE, load_vocabulary
-from stages.segment.coco import COCO_NAMES
-from stages.segment.labels import (
+from stages.kit.labels import (
     LABEL_FILES,
     LABELS_FOLDER,
     Label,
@@ -21,6 +20,7 @@ from stages.segment.labels import (
     parse_words,
     read_label_file,
 )
+from stages.segment.coco import COCO_NAMES
 from stages.segment.naming import InstanceMask, NamedSegment, name_instances, name_segments
 
 VOCABULARY = load_vocabulary()

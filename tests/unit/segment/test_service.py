@@ -164,8 +164,8 @@ def test_the_reference_server_equals_the_local_backend(room: Written, tmp_path: 
     ours, theirs = payload(local), payload(remote)
     assert ours[1] == theirs[1]  # every pixel of every frame
     assert [entry.segments for entry in local.info.frames] == [entry.segments for entry in remote.info.frames]
-    assert remote.info.backend == "service"
-    assert remote.info.label.startswith("service geometric segments, class-agnostic r1 labels ")
+    assert remote.info.backend == "masks"
+    assert remote.info.label.startswith("masks of geometric segments, class-agnostic r1 labels ")
 
 
 def test_foreign_categories_are_mapped_by_name(room: Written, tmp_path: Path) -> None:
@@ -491,7 +491,7 @@ def test_the_server_refuses_in_words(room: Written) -> None:
         host, port = address.removeprefix("http://").split(":")
         for head, status in ((b"", b" 411 "), (b"Content-Length: 99999999999\r\n", b" 413 ")):
             with socket.create_connection((host, int(port)), timeout=5) as raw:
-                raw.sendall(b"POST /v1/segment HTTP/1.1\r\nHost: x\r\n" + head + b"\r\n")
+                raw.sendall(b"POST /v1/segment HTTP/1.1\r\nHost: localhost\r\n" + head + b"\r\n")
                 assert status in raw.recv(1000)
         connection.close()
 

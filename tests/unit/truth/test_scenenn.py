@@ -25,9 +25,14 @@ from stages.ingest.parameters import IngestParameters
 from stages.ingest.stage import run as ingest
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.numpy_files import read_arrays
+from stages.kit.formats.scenenn_annotation import (
+    AnnotatedLabel,
+    class_by_last_word,
+    class_by_substring,
+    read_annotation,
+)
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
-from stages.truth.annotation import AnnotatedLabel, class_by_last_word, class_by_substring, read_annotation
 from stages.truth.labelled_mesh import read_labelled_mesh
 from stages.truth.parameters import SceneNNParameters
 from stages.truth.stage import read_words, run

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from stages.kit.labels import LABEL_TABLES
 from stages.kit.stage import Extra, Parameters
-from stages.segment.labels import LABEL_TABLES
 from stages.segment.registry import BackendDeclaration
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from schemas.errors import BadInput
+from stages.kit.labels import Label
 from stages.segment.backends.huggingface.loading import (
     load_model,
     load_processor,
@@ -17,7 +18,6 @@ from stages.segment.backends.huggingface.loading import (
     processor_class,
     short_name,
 )
-from stages.segment.labels import Label
 from stages.segment.naming import InstanceMask
 from stages.segment.suppression import suppress
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from schemas.errors import BadInput
+from stages.kit.labels import LabelSet, match_labels
 from stages.segment.backends.huggingface.loading import (
     load_model,
     load_processor,
@@ -19,7 +20,6 @@ from stages.segment.backends.huggingface.loading import (
     short_name,
     transformers_library,
 )
-from stages.segment.labels import LabelSet, match_labels
 from stages.segment.naming import NamedSegment
 
 OVERLAP_SHARE = 0.8

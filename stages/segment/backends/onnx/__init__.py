@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from stages.kit.labels import LABEL_TABLES
 from stages.kit.stage import Extra
-from stages.segment.labels import LABEL_TABLES
 from stages.segment.registry import BackendDeclaration
 
 BACKEND = BackendDeclaration(

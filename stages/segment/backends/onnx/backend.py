@@ -10,12 +10,12 @@ import numpy as np
 from schemas.errors import BadInput, MissingDependency
 from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame
+from stages.kit.labels import LabelMap, LabelSet, load_label_set, match_labels, read_label_file
 from stages.segment.backends.onnx import decoding
 from stages.segment.backends.onnx.network import HINT, Network, fit
 from stages.segment.backends.onnx.sidecar import read_sidecar
 from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame, pixels_at
-from stages.segment.labels import LabelMap, LabelSet, load_label_set, match_labels, read_label_file
 from stages.segment.naming import InstanceMask, NamedSegment, name_instances, name_segments
 from stages.segment.panoptic import PanopticFrame
 

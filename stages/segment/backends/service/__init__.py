@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from stages.kit.labels import LABEL_TABLES
 from stages.kit.stage import Parameters
-from stages.segment.labels import LABEL_TABLES
 from stages.segment.registry import BackendDeclaration
 
 
@@ -17,8 +17,8 @@ class ServiceParameters(Parameters):
     retry_wait: float = Field(0.5, ge=0, le=60, description="Wait before the first of these, doubled every time [s]")
     service_model: str = Field(
         "",
-        description="What a service has to say it is (the end of an artifact's label); empty: it is asked, and another "
-        "model behind the same address is another result",
+        description="What a service has to say it is (the end of an artifact's label, after `masks of`); empty: it is "
+        "asked, and another model behind the same address is another result",
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from schemas.errors import BadInput, MachineFailure, MissingDependency
 from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame
+from stages.kit.labels import Label, LabelSet, match_labels, read_label_file
 from stages.kit.services.connection import Connection
 from stages.segment.backends.service import ServiceParameters
 from stages.segment.backends.service.protocol import (
@@ -25,7 +26,6 @@ from stages.segment.backends.service.protocol import (
 from stages.segment.backends.service.reply_cache import ReplyCache, prune
 from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame
-from stages.segment.labels import Label, LabelSet, match_labels, read_label_file
 from stages.segment.naming import NamedSegment, name_segments
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 
@@ -41,7 +41,8 @@ class ServiceBackend:
     stream that the service needs, or it is another service than the one that was expected.
     """
 
-    name = "service"
+    name = "masks"
+    """As of those of a folder (backends/masks): the same masks are the same artifact, whichever way they came."""
 
     def __init__(self, request: BackendRequest) -> None:
         sequence, self._reader = request.log()
@@ -63,7 +64,7 @@ class ServiceBackend:
                 f"this sequence has no {missing[0]}, which {connection.address} needs",
                 hint="use another service, or --backend geometric",
             )
-        self.label = f"service {self.info.identity}"
+        self.label = f"masks of {self.info.identity}"
         self.streams: tuple[str, ...] = tuple(s for s in self.info.streams if s != "pose")
         self._categories = {category.id: category for category in self.info.categories}
         self._speaks_ours = _is_vocabulary(self._categories, vocabulary) and labels is None

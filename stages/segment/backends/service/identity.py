@@ -6,6 +6,9 @@ from stages.segment.backends.service import ServiceParameters
 from stages.segment.backends.service.backend import connect, read_info
 from stages.segment.parameters import SegmentParameters
 
+LABEL = "2"
+"""Of the words under which segments.json has a service's masks."""
+
 
 def versions(parameters: SegmentParameters) -> dict[str, str]:
     """Return what the service says of itself now, or what --service-model says it has to be.
@@ -14,7 +17,8 @@ def versions(parameters: SegmentParameters) -> dict[str, str]:
     """
     assert isinstance(parameters, ServiceParameters)
     address = parameters.backend
-    return {f"service {address}": parameters.service_model or _asked(address, parameters)}
+    model = parameters.service_model or _asked(address, parameters)
+    return {f"service {address}": model, "service label": LABEL}
 
 
 def _asked(address: str, own: ServiceParameters) -> str:

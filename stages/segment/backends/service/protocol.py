@@ -23,7 +23,7 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from stages.kit.formats import foxglove
 from stages.kit.formats.frames import Frame
-from stages.kit.formats.image_headers import PNG_START, image_size, may_be_decoded
+from stages.kit.formats.image_headers import LARGEST_IMAGE, PNG_START, image_size, may_be_decoded
 from stages.kit.formats.masks import LARGEST_ID, decode_panoptic_png, encode_panoptic_png
 
 PROTOCOL = "scenewright-segmentation/1"
@@ -35,6 +35,8 @@ MOST_SEGMENTS = 65536
 LONGEST_TEXT = 200
 """Characters of a name."""
 PART_HEADER_LIMIT = 4096
+LARGEST_PART = 64 * 2**10
+"""Bytes of the part `request`: JSON takes many times as much when it is read."""
 MOST_PARTS = 8
 
 
@@ -162,11 +164,13 @@ def encode_request(request: SegmentRequest, streams: tuple[str, ...], color: byt
     return _multipart(parts)
 
 
-def parse_request(body: bytes, content_type: str) -> SegmentRequest:
-    """Return what a client asks. Raises BadInput."""
+def parse_request(body: bytes, content_type: str, *, most_pixels: int = LARGEST_IMAGE) -> SegmentRequest:
+    """Return what a client asks, about a frame of at most `most_pixels`. Raises BadInput."""
     parts = split_multipart(body, content_type)
     if "request" not in parts:
         _refuse("the part `request` is missing")
+    if len(parts["request"]) > LARGEST_PART:
+        _refuse(f"the part `request` has more than {LARGEST_PART} bytes")
     description = _json_object(parts["request"], "application/json")
     _check_protocol(description)
     try:
@@ -178,6 +182,8 @@ def parse_request(body: bytes, content_type: str) -> SegmentRequest:
         _refuse(f"the part `request` is malformed ({str(error).splitlines()[0]})")
     if not (camera.width > 0 and camera.height > 0 and camera.fx > 0 and camera.fy > 0):
         _refuse("the intrinsics are no camera's")
+    if camera.width * camera.height > most_pixels:
+        _refuse(f"a frame of {camera.width}x{camera.height}, more than {most_pixels} pixels")
     if (
         index < 0
         or not 0 <= seed < 2**63
@@ -232,7 +238,7 @@ def split_multipart(body: bytes, content_type: str) -> dict[str, bytes]:
     boundary = boundaries[0].strip('"').encode("ascii", "replace") if boundaries else b""
     if kind.strip().lower() != "multipart/form-data" or not 0 < len(boundary) <= 70:
         _refuse(f"content type {content_type!r:.80} is no multipart/form-data with a boundary")
-    pieces = (b"\r\n" + body).split(b"\r\n--" + boundary)
+    pieces = (b"\r\n" + body).split(b"\r\n--" + boundary, MOST_PARTS + 2)
     if len(pieces) < 3 or not pieces[-1].startswith(b"--") or len(pieces) - 2 > MOST_PARTS:
         _refuse("its parts are torn, or too many")
     parts: dict[str, bytes] = {}

@@ -8,18 +8,16 @@ from __future__ import annotations
 import json
 import logging
 import threading
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import numpy as np
 
 from schemas.base import canonical_json
-from schemas.errors import MachineFailure, ScenewrightError
+from schemas.errors import ScenewrightError
 from schemas.vocabulary import load_vocabulary
 from stages.kit.digests import sha256_of_text
 from stages.segment.backends.service.protocol import (
     HEALTH_PATH,
     INFO_PATH,
-    LARGEST_BODY,
     PROTOCOL,
     SEGMENT_PATH,
     Category,
@@ -31,26 +29,23 @@ from stages.segment.backends.service.protocol import (
     encode_reply,
     parse_request,
 )
+from stages.segment.backends.service.receiving import BoundedHandler, BoundedServer
 from stages.segment.choice import Backend
 from stages.segment.geometric import GeometricSettings, segment_depth
 
-IDLE_SECONDS = 60.0
-"""A connection on which nothing comes for so long is closed."""
 MOST_WAITING = 16
 """Requests that may wait for the model; more are told to come back."""
-JSON = "application/json"
+MOST_PIXELS = 10_000_000
+"""Of a frame: what a small file says it unpacks to takes a hundred bytes a pixel until it is segmented."""
 
 logger = logging.getLogger("scenewright")
 
 
-class SegmentationServer(ThreadingHTTPServer):
+class SegmentationServer(BoundedServer):
     """Answers requests with the masks of one backend; one frame at a time, as networks want the whole machine.
 
-    `port` 0 takes a free one. Raises MachineFailure when the address cannot be had.
+    `port` 0 takes a free one. Raises MachineFailure when the address cannot be had, UsageError when it is none.
     """
-
-    daemon_threads = True
-    request_queue_size = 64
 
     def __init__(
         self,
@@ -76,25 +71,18 @@ class SegmentationServer(ThreadingHTTPServer):
         )
         self._model = threading.Lock()
         self._places = threading.BoundedSemaphore(MOST_WAITING)
-        try:
-            super().__init__((host, port), _Handler)
-        except (OSError, OverflowError) as error:
-            raise MachineFailure(
-                f"{host}:{port}: {getattr(error, 'strerror', None) or error}", hint="choose another --port"
-            ) from None
+        super().__init__(host, port, _Handler)
 
-    @property
-    def address(self) -> str:
-        """Where it answers."""
-        host, port = self.server_address[:2]
-        return f"http://{host if isinstance(host, str) else host.decode()}:{port}"
+    def segment(self, body: bytes, content_type: str) -> Reply | None:
+        """Return the masks of the frame in a request, or None when too many are waiting. Raises BadInput.
 
-    def segment(self, request: SegmentRequest) -> Reply | None:
-        """Return the masks of a frame, or None when too many are waiting."""
+        Pictures are unpacked when it is their turn, so that one frame is in memory at a time.
+        """
         if not self._places.acquire(blocking=False):
             return None
         try:
             with self._model:
+                request = parse_request(body, content_type, most_pixels=MOST_PIXELS)
                 return segment_request(request, self.backend, self.geometric)
         finally:
             self._places.release()
@@ -121,72 +109,37 @@ def revision_of(parts: dict[str, object]) -> str:
     return sha256_of_text(canonical_json(parts))[:16]
 
 
-class _Handler(BaseHTTPRequestHandler):
+class _Handler(BoundedHandler):
     server: SegmentationServer
-    protocol_version = "HTTP/1.1"
-    server_version = "scenewright"
-    sys_version = ""
-    timeout = IDLE_SECONDS
 
-    def do_GET(self) -> None:
-        if self.path == HEALTH_PATH:
-            self._answer(200, json.dumps({"status": "ok", "protocol": PROTOCOL}).encode())
-        elif self.path == INFO_PATH:
-            self._answer(200, encode_info(self.server.info))
-        else:
-            self._refuse(404, f"no {self.path:.80}; there are {HEALTH_PATH}, {INFO_PATH} and {SEGMENT_PATH}")
+    def health(self) -> None:
+        self.answer(200, json.dumps({"status": "ok", "protocol": PROTOCOL}).encode())
 
-    def do_POST(self) -> None:
-        body = self._body()
+    def info(self) -> None:
+        self.answer(200, encode_info(self.server.info))
+
+    def segment(self) -> None:
+        body = self.body()
         if body is None:
             return
-        if self.path != SEGMENT_PATH:
-            self._refuse(404, f"no {self.path:.80}; frames are posted to {SEGMENT_PATH}")
-            return
         try:
-            request = parse_request(body, self.headers.get("Content-Type", ""))
-            reply = self.server.segment(request)
+            reply = self.server.segment(body, self.headers.get("Content-Type", ""))
         except ScenewrightError as error:
-            self._refuse(400, str(error))
+            self.refuse(400, str(error))
         except Exception as error:
-            logger.exception("a frame could not be segmented")
-            self._refuse(500, f"{type(error).__name__} in the backend; see the server's output")
+            logger.error("a frame could not be segmented: %s: %s", type(error).__name__, error)
+            logger.debug("where", exc_info=True)
+            self.refuse(500, f"{type(error).__name__} in the backend; see the server's output")
         else:
             if reply is None:
-                self._refuse(503, f"more than {MOST_WAITING} frames are waiting", {"Retry-After": "1"})
+                self.refuse(503, f"more than {MOST_WAITING} frames are waiting", {"Retry-After": "1"})
             else:
-                self._answer(200, encode_reply(reply))
+                self.answer(200, encode_reply(reply))
+        finally:
+            self.done()
 
-    def _body(self) -> bytes | None:
-        declared = self.headers.get("Content-Length", "")
-        if not (declared.isascii() and declared.isdigit()):
-            self.close_connection = True
-            self._refuse(411, "a Content-Length is needed")
-            return None
-        length = int(declared[:20])
-        if length > LARGEST_BODY:
-            self.close_connection = True
-            self._refuse(413, f"more than {LARGEST_BODY} bytes")
-            return None
-        body = self.rfile.read(length)
-        if len(body) < length:
-            self.close_connection = True
-            return None  # the client is gone
-        return body
-
-    def _refuse(self, status: int, reason: str, headers: dict[str, str] | None = None) -> None:
-        self._answer(status, json.dumps({"error": reason}).encode(), headers)
-
-    def _answer(self, status: int, body: bytes, headers: dict[str, str] | None = None) -> None:
-        self.send_response(status)
-        self.send_header("Content-Type", JSON)
-        self.send_header("Content-Length", str(len(body)))
-        for name, value in (headers or {}).items():
-            self.send_header(name, value)
-        if self.close_connection:
-            self.send_header("Connection", "close")
-        self.end_headers()
-        self.wfile.write(body)
-
-    def log_message(self, format: str, *arguments: object) -> None:
-        logger.debug("%s %s", self.address_string(), format % arguments)
+    routes = {
+        HEALTH_PATH: {"GET": health, "HEAD": health},
+        INFO_PATH: {"GET": info, "HEAD": info},
+        SEGMENT_PATH: {"POST": segment},
+    }

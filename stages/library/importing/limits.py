@@ -1,0 +1,94 @@
+"""What a model may grow to while it is read, and how a geometry library's refusal is told.
+
+Every bound is on what a file expands to, not on what it says: a few kilobytes name gigabytes by repeating themselves.
+The bounds together keep `library add` below 2 GB, and its work linear in what it reads.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+import struct
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import cv2
+import numpy as np
+from scipy.spatial import QhullError
+from shapely.errors import ShapelyError
+
+from schemas.errors import BadInput
+from stages.library.importing.source_model import Surface
+
+MOST_TRIANGLES = 1_000_000
+"""Of a model, repeated meshes counted each time, and of a mesh file."""
+MOST_VERTICES = 3 * MOST_TRIANGLES
+MOST_SHAPES = 20_000
+"""Boxes, meshes and groups of meshes of a model."""
+MOST_TRIANGLES_OF_A_FILE = 5 * MOST_TRIANGLES
+"""Of all models that one description holds."""
+MOST_FINDINGS = 40
+"""What is said of one model."""
+LONGEST_TEXT = 300
+"""Characters of a name or a finding."""
+UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+SIMPLIFY = f"simplify it to at most {MOST_TRIANGLES} triangles and {MOST_SHAPES} shapes, or split it"
+REFUSALS = (
+    *(ArithmeticError, RecursionError, ValueError, QhullError, ShapelyError),
+    *(cv2.error, csv.Error, struct.error),
+)
+"""What geometry libraries and parsers raise for numbers that they cannot take (LinAlgError and UnicodeError are
+ValueErrors). IndexError, KeyError, TypeError are not among them: those are bugs of ours."""
+
+
+@contextmanager
+def told_refusals(where: str) -> Iterator[None]:
+    """Turn what a library raises for a model into BadInput, beginning with `where`; numpy warns of nothing in it."""
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except BadInput:
+        raise
+    except REFUSALS as error:
+        reason = (str(error).strip().splitlines() or [""])[0]
+        raise BadInput(
+            f"{where}: its geometry cannot be used: {type(error).__name__}: {reason:.120}",
+            hint="mend it, or leave it out (--mapping)",
+        ) from None
+
+
+class Allowance:
+    """Counts what a description expands to, and refuses what is beyond its bounds."""
+
+    def __init__(
+        self, where: str, *, triangles: int = MOST_TRIANGLES, vertices: int = MOST_VERTICES, shapes: int = MOST_SHAPES
+    ) -> None:
+        self._where, self._bounds = where, (triangles, vertices, shapes)
+        self._left = list(self._bounds)
+
+    def take(self, surfaces: Sequence[Surface]) -> None:
+        """Count surfaces. Raises BadInput."""
+        for surface in surfaces:
+            self.take_counts(len(surface.faces), len(surface.vertices))
+
+    def take_counts(self, triangles: int, vertices: int, shapes: int = 1) -> None:
+        """Count triangles and vertices of shapes before they are made. Raises BadInput."""
+        for k, count in enumerate((triangles, vertices, shapes)):
+            self._left[k] -= count
+            if self._left[k] < 0:
+                what = ("triangles", "vertices", "shapes")[k]
+                raise BadInput(f"{self._where}: more than {self._bounds[k]} {what} in all", hint=SIMPLIFY)
+
+
+def plain_text(text: str, longest: int = LONGEST_TEXT) -> str:
+    """Return a name or a reason fit for a table and for JSON: control characters, and halves of them, written out."""
+    text = text if len(text) <= longest else f"{text[:longest]}..."
+    return UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def few_findings(findings: Sequence[str]) -> tuple[str, ...]:
+    """Return the findings without repetitions, at most MOST_FINDINGS of them and how many more there are."""
+    distinct = tuple(dict.fromkeys(findings))
+    if len(distinct) <= MOST_FINDINGS:
+        return distinct
+    return (*distinct[:MOST_FINDINGS], f"and {len(distinct) - MOST_FINDINGS} more")

@@ -1,0 +1,163 @@
+"""Backend `masks`: which folder of masks this is, which frame each belongs to, and their classes."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.vocabulary import load_vocabulary
+from stages.kit.declared import declared_in
+from stages.kit.formats.frames import Frame
+from stages.kit.labels import ANYTHING, Label, LabelSet, match_labels, read_label_file
+from stages.segment.backends.masks import MasksParameters
+from stages.segment.backends.masks.given import GivenFrame, MaskFormat, MaskSource, ReadSettings
+from stages.segment.backends.masks.listing import HINT, Listing
+from stages.segment.backends.masks.matching import WAYS, match_pictures
+from stages.segment.choice import BackendRequest
+from stages.segment.geometric import GeometricFrame, pixels_at
+from stages.segment.naming import NamedSegment, name_segments
+from stages.segment.panoptic import PanopticFrame
+
+UNCLASSED = Label(name=ANYTHING, class_name=ANYTHING)
+
+logger = logging.getLogger("scenewright")
+
+
+@dataclass
+class Tally:
+    """What was left out or changed on the way, over all frames."""
+
+    overlapping: int = 0
+    frames: int = 0
+    """In which masks overlapped."""
+    faint: int = 0
+
+
+class MasksBackend:
+    """Masks of a folder. Raises BadInput when it is of no known format, its masks are of frames
+    that are not there, or nothing says what its categories are."""
+
+    name = "masks"
+    streams: tuple[str, ...] = ("depth",)
+
+    def __init__(self, request: BackendRequest) -> None:
+        _, reader = request.log()
+        assert request.masks is not None  # segment.parameters.check
+        own = request.own(MasksParameters)
+        self._root = request.masks
+        listing = Listing(request.masks)
+        form, self._source = open_folder(listing)
+        times = reader.times
+        self._places, ways = match_pictures(self._source.pictures, times, own.masks_tolerance, self._root)
+        told = ", ".join(f"{ways[way]} by {way}" for way in WAYS)
+        logger.info("%s: %s, masks of %d of %d frames: %s", self._root, form.name, len(self._places), len(times), told)
+        if not self._places:
+            raise BadInput(f"{self._root}: holds masks of no frame", hint=HINT)
+        if len(self._places) < len(times):
+            first = next(index for index in range(len(times)) if index not in self._places)
+            logger.warning(
+                "%s: %d of %d frames have no masks, the first is %d; they add geometry alone",
+                self._root, len(times) - len(self._places), len(times), first,
+            )  # fmt: skip
+        if self._source.lacks:
+            lost = " and ".join(self._source.lacks)
+            logger.info("%s: holds no %s: what the network said of them is lost", self._root, lost)
+        given = read_label_file(request.labels) if request.labels else None
+        self._labels = _labels(self._source, given, str(self._root))
+        self._vocabulary = load_vocabulary()
+        self._settings = request.parameters.score_threshold, request.parameters.small_object_pixels
+        self._tally, self._last = Tally(), max(self._places)
+        self.label = f"masks of {own.masks_model or self._root.resolve().stem}"
+
+    def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
+        """Return the masks of a frame; a frame that the folder has none for has none. Raises BadInput."""
+        height, width = geometric.labels.shape
+        place = self._places.get(frame.index)
+        if place is None:
+            return PanopticFrame(np.zeros((height, width), dtype=np.int32))
+        least = pixels_at(self._settings[1], (height, width))
+        try:
+            given = self._source.read(place, (height, width), ReadSettings(self._settings[0], least))
+            named = {number: segment for number, segment in self._named(given)}
+        except BadInput as error:
+            raise BadInput(f"frame {frame.index}: {error.message}", hint=error.hint) from None
+        self._count(given)
+        if frame.index == self._last:
+            self._report()
+        # Small numbers in the same order, as those of a service: tables over ids stay small.
+        numbers = sorted(set(np.unique(given.ids).tolist()) - {0})
+        ids = np.searchsorted(np.array([0, *numbers]), given.ids).astype(np.int32)
+        listed = {k: named[number] for k, number in enumerate(numbers, start=1) if number in named}
+        return name_segments(ids, listed, self._vocabulary, minimum_pixels=least)
+
+    def _named(self, given: GivenFrame) -> list[tuple[int, NamedSegment]]:
+        named = []
+        for number, mask in given.masks.items():
+            if mask.category is None:
+                named.append((number, NamedSegment(UNCLASSED, mask.score)))
+                continue
+            if mask.category not in self._source.categories and mask.category not in self._labels:
+                raise BadInput(
+                    f"{self._root}: nothing says what category {mask.category} is",
+                    hint="list it among the categories, in classes.json, or with its id in --labels FILE.toml",
+                )
+            if mask.category in self._labels:
+                named.append((number, NamedSegment(self._labels[mask.category], mask.score)))
+        return named
+
+    def _count(self, given: GivenFrame) -> None:
+        self._tally.overlapping += given.overlapping
+        self._tally.frames += given.overlapping > 0
+        self._tally.faint += given.faint
+
+    def _report(self) -> None:
+        if self._tally.overlapping:
+            logger.warning(
+                "%s: masks overlap in %d frames: of equal ones the best scored was kept, smaller ones lie over larger "
+                "ones; %d masks lost pixels or all of them",
+                self._root, self._tally.frames, self._tally.overlapping,
+            )  # fmt: skip
+        if self._tally.faint:
+            logger.info(
+                "%s: %d masks score under --score-threshold %g and were left out",
+                self._root, self._tally.faint, self._settings[0],
+            )  # fmt: skip
+
+
+def open_folder(listing: Listing) -> tuple[MaskFormat, MaskSource]:
+    """Return the format of a folder and its masks. Raises BadInput when it is of none, or broken."""
+    formats = declared_in("stages.segment.backends.masks.formats", MaskFormat, "FORMAT")
+    for form in formats:
+        source = form.open(listing)
+        if source is not None:
+            return form, source
+    known = "; ".join(f"{form.name} ({form.summary})" for form in formats)
+    raise BadInput(f"{listing.root}: holds no masks that are read here", hint=f"formats: {known}")
+
+
+def _labels(source: MaskSource, given: LabelSet | None, where: str) -> dict[int, Label]:
+    """Return number -> label. Where the folder names nothing, the ids of the given labels are its numbers."""
+    if not source.categories:
+        return {label.id: label for label in given.labels if label.id is not None} if given else {}
+    matched = match_labels(
+        {number: category.name for number, category in source.categories.items()}, given, where=where
+    )
+    if matched.unknown:
+        logger.warning(
+            "%s: %d of its categories are in no table and stay void: %s",
+            where, len(matched.unknown), ", ".join(matched.unknown[:10]),
+        )  # fmt: skip
+    labels = {}
+    for number, label in matched.labels.items():
+        thing = source.categories[number].is_thing
+        kind = label.kind if thing is None else "thing" if thing else "stuff"
+        labels[number] = label.model_copy(update={"kind": kind})
+    return labels
+
+
+def open_backend(request: BackendRequest) -> MasksBackend:
+    """Return the backend that the request asks for. Raises as the class does, and BadInput for damaged labels."""
+    return MasksBackend(request)

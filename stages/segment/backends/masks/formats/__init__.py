@@ -1,0 +1,1 @@
+"""Formats of masks: a file here that declares FORMAT is one more."""

@@ -1,0 +1,101 @@
+"""Which frame the masks of a picture belong to: by its name, its number or its time stamp."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import BadInput
+from stages.segment.backends.masks.given import Picture
+
+NAME = re.compile(r"\d{6,9}", re.ASCII)
+"""A frame's name in artifacts: its number in the sequence with six digits."""
+SECONDS = re.compile(r"\d{1,10}\.\d+", re.ASCII)
+TICKS = re.compile(r"\d{13,19}", re.ASCII)
+"""Milliseconds to nanoseconds since 1970, by their number of digits."""
+WAYS = ("name", "number", "time stamp")
+SHOWN = 3
+
+
+def match_pictures(
+    pictures: Sequence[Picture], times: np.ndarray, tolerance: float, where: Path
+) -> tuple[dict[int, int], Counter[str]]:
+    """Return frame -> place of its picture, and how many were found in each of WAYS. times (N,) of the frames [s].
+
+    A name of six to nine digits is that of a frame in every artifact (`000012`); `1305031102.175304` is a time [s],
+    thirteen digits and more milli-, micro- or nanoseconds. Else the number that a picture is given, or the one in its
+    name that differs from picture to picture, counts the frames of the sequence from 0. Raises BadInput when a picture
+    belongs to no frame, or two to one.
+    """
+    varying = numbers_in_names([picture.name for picture in pictures])
+    found: dict[int, int] = {}
+    ways: Counter[str] = Counter()
+    astray: list[str] = []
+    for place, picture in enumerate(pictures):
+        frame, way = _frame_of(picture, varying[place], times, tolerance)
+        if frame is None:
+            astray.append(f"{picture.name or 'image'} ({way} {_told(picture, varying[place])})")
+            continue
+        if frame in found:
+            first = pictures[found[frame]].name
+            raise BadInput(
+                f"{where}: masks of {first!r} and {picture.name!r} are both of frame {frame}", hint="keep one of them"
+            )
+        found[frame] = place
+        ways[way] += 1
+    if astray:
+        shown = ", ".join(astray[:SHOWN]) + (", ..." if len(astray) > SHOWN else "")
+        raise BadInput(
+            f"{where}: {len(astray)} of {len(pictures)} masks are of frames that are not there: {shown}",
+            hint=f"the sequence has frames 0 to {len(times) - 1} from {times[0]:.6f} to {times[-1]:.6f} s; "
+            "name masks by these numbers or times"
+            if len(times)
+            else "the sequence is empty",
+        )
+    return found, ways
+
+
+def numbers_in_names(names: Sequence[str]) -> list[int | None]:
+    """Return the number in each name: of several groups of digits the one that varies, else the last; None: none."""
+    groups = [[int(digits) for digits in re.findall(r"\d{1,18}", name, re.ASCII)] for name in names]
+    columns = {len(row) for row in groups}
+    if len(names) > 1 and len(columns) == 1 and groups[0]:
+        varying = [k for k in range(len(groups[0])) if len({row[k] for row in groups}) > 1]
+        if len(varying) == 1:
+            return [row[varying[0]] for row in groups]
+    return [row[-1] if row else None for row in groups]
+
+
+def _frame_of(picture: Picture, number: int | None, times: np.ndarray, tolerance: float) -> tuple[int | None, str]:
+    stamp = _stamp(picture)
+    if stamp is not None:
+        if not len(times):
+            return None, WAYS[2]
+        nearest = int(np.abs(times - stamp).argmin())
+        return (nearest if abs(times[nearest] - stamp) <= tolerance + 1e-9 else None), WAYS[2]
+    if NAME.fullmatch(picture.name):
+        frame, way = int(picture.name), WAYS[0]
+    else:
+        told = picture.number if number is None else number
+        frame, way = (-1 if told is None else told), WAYS[1]
+    return (frame if 0 <= frame < len(times) else None), way
+
+
+def _stamp(picture: Picture) -> float | None:
+    if picture.time is not None:
+        return picture.time
+    if SECONDS.fullmatch(picture.name):
+        return float(picture.name)
+    if TICKS.fullmatch(picture.name):
+        return int(picture.name) / 10 ** (len(picture.name) - 10)
+    return None
+
+
+def _told(picture: Picture, number: int | None) -> str:
+    stamp = _stamp(picture)
+    told = number if number is not None else picture.number
+    return f"{stamp:.6f} s" if stamp is not None else "none" if told is None else str(told)

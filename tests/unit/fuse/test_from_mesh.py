@@ -1,0 +1,270 @@
+"""Annotated scans as panoptic maps: every layout, and what is wrong with the broken ones."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from schemas.errors import BadInput, UsageError
+from schemas.panoptic_map import PanopticMap
+from stages.fuse import from_mesh
+from stages.fuse.annotated_scan import read_scan
+from stages.fuse.parameters import FuseParameters, check
+from stages.fuse.stage import run
+from stages.graph.parameters import GraphParameters
+from stages.graph.stage import run as graph
+from stages.kit.formats.entity_meshes import load_entity_mesh
+from stages.kit.progress import SilentProgress
+from stages.kit.stage import Context
+from tests.panoptic_maps import box_mesh, floor_mesh, table_mesh
+from tests.real_data import real_data
+
+THINGS = {"floor": 1, "table": 2, "box": 3, "wall": 4}
+SPACING = 0.04
+
+
+def room(up: np.ndarray | None = None) -> tuple[trimesh.Trimesh, np.ndarray]:
+    """A floor, a table, a box on it and two walls, and the number of each vertex's thing; `up` turns all of it."""
+    parts = [
+        (floor_mesh(), 1),
+        (table_mesh(), 2),
+        (box_mesh((-0.2, -0.1, 0.75), (0.1, 0.1, 0.95)), 3),
+        (box_mesh((-1.2, 1.2, 0.0), (1.2, 1.25, 1.5)), 4),
+    ]
+    pieces, labels = [], []
+    for mesh, number in parts:
+        vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, SPACING)
+        pieces.append(trimesh.Trimesh(vertices, faces, process=True))
+        labels.append(np.full(len(pieces[-1].vertices), number))
+    whole = trimesh.util.concatenate(pieces)
+    if up is not None:
+        whole.vertices = whole.vertices @ up.T
+    return whole, np.concatenate(labels)
+
+
+def write_ply(path: Path, mesh: trimesh.Trimesh, **columns: np.ndarray) -> None:
+    """A binary PLY with further columns of the vertices."""
+    rows = np.zeros(len(mesh.vertices), [("xyz", "<f4", 3), ("rgb", "u1", 3), *((name, "<u2") for name in columns)])
+    rows["xyz"], rows["rgb"] = mesh.vertices, 90
+    for name, values in columns.items():
+        rows[name] = values
+    faces = np.zeros(len(mesh.faces), [("n", "u1"), ("i", "<i4", 3)])
+    faces["n"], faces["i"] = 3, mesh.faces
+    further = "".join(f"property ushort {name}\n" for name in columns)
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\nproperty float x\nproperty float y\n"
+        f"property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n{further}"
+        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    path.write_bytes(header.encode() + rows.tobytes() + faces.tobytes())
+
+
+def scannet(root: Path) -> None:
+    mesh, labels = room()
+    write_ply(root / "scene_vh_clean_2.ply", mesh)
+    # Two segments a thing: 2 k and 2 k + 1.
+    segments = 2 * labels + (np.arange(len(labels)) % 2)
+    text = json.dumps({"sceneId": "scene", "segIndices": segments.tolist()})
+    (root / "scene_vh_clean_2.0.010000.segs.json").write_text(text)
+    rows = [{"id": k, "segments": [2 * k, 2 * k + 1], "label": name} for name, k in THINGS.items()]
+    (root / "scene.aggregation.json").write_text(json.dumps({"segGroups": rows}))
+
+
+def replica(root: Path) -> None:
+    mesh, labels = room()
+    owner = labels[mesh.faces[:, 0]]
+    faces = np.zeros(len(mesh.faces), [("n", "u1"), ("i", "<i4", 4), ("o", "<i4")])
+    faces["n"], faces["i"], faces["o"] = 4, mesh.faces[:, [0, 1, 2, 2]], owner - 1  # ids from 0 on; quads
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(mesh.vertices)}\nproperty float x\n"
+        f"property float y\nproperty float z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\n"
+        "property int object_id\nend_header\n"
+    )
+    (root / "habitat").mkdir()
+    body = mesh.vertices.astype("<f4").tobytes() + faces.tobytes()
+    (root / "habitat" / "mesh_semantic.ply").write_bytes(header.encode() + body)
+    objects = [{"id": k - 1, "class_name": name, "class_id": 9} for name, k in THINGS.items()]
+    (root / "habitat" / "info_semantic.json").write_text(json.dumps({"objects": objects}))
+
+
+def scenenn(root: Path) -> None:
+    tilt = trimesh.transformations.rotation_matrix(-1.4, [1, 0.2, 0])[:3, :3]  # as a hand-held camera began
+    mesh, labels = room(tilt)
+    write_ply(root / "011.ply", mesh, label=100 * labels)
+    rows = "".join(f'<label id="{100 * k}" text="my {name}" nyu_class="{name}"/>' for name, k in THINGS.items())
+    (root / "011.xml").write_text(f"<annotation>{rows}</annotation>")
+
+
+def nyu40(root: Path) -> None:
+    mesh, labels = room()
+    write_ply(root / "scene_vh_clean_2.labels.ply", mesh, label=np.array([0, 2, 7, 29, 1])[labels])
+
+
+def points(root: Path) -> None:
+    mesh, labels = room()
+    places, face = trimesh.sample.sample_surface_even(mesh, 60000, seed=1)
+    owner = labels[mesh.faces[face, 0]]
+    np.savez(
+        root / "points.npz", points=places.astype(np.float32), instance=owner, id=np.array([*THINGS.values()]),
+        classes=np.array([*THINGS]),
+    )  # fmt: skip
+
+
+LAYOUTS: dict[str, Callable[[Path], None]] = {
+    "ScanNet": scannet, "Replica": replica, "SceneNN": scenenn, "NYU40 labels": nyu40, "points": points,
+}  # fmt: skip
+
+
+def context(out: Path) -> Context:
+    out.mkdir(parents=True)
+    return Context(output=out, seed=0, device="cpu", progress=SilentProgress())
+
+
+def made(scan: Path, out: Path, **more: Path) -> PanopticMap:
+    return run(from_mesh=scan, parameters=FuseParameters(), context=context(out), **more)
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_a_graph_is_built_of_every_layout(tmp_path: Path, name: str) -> None:
+    (tmp_path / "scan").mkdir()
+    LAYOUTS[name](tmp_path / "scan")
+    panoptic_map = made(tmp_path / "scan", tmp_path / "map")
+    assert panoptic_map.outcome == "ok" and panoptic_map.summary["layout"] == name
+    classes = {entity.instance: entity.class_name for entity in panoptic_map.info.entities}
+    assert sorted(classes.values()) == sorted(THINGS)
+    by_class = {entity.class_name: entity for entity in panoptic_map.info.entities}
+    table = load_entity_mesh(panoptic_map.path(by_class["table"].mesh)).vertices
+    assert np.ptp(table, axis=0) == pytest.approx([1.2, 0.7, 0.75], abs=0.05)
+    with np.load(panoptic_map.path("mesh_labels.npz")) as labels:
+        assert set(np.unique(labels["instance"]).tolist()) - {0} == set(classes)
+    contact = graph(panoptic_map, parameters=GraphParameters(), context=context(tmp_path / "graph"))
+    carried = {
+        (link.source.rsplit("_", 1)[0], link.target.rsplit("_", 1)[0])
+        for link in contact.info.links
+        if link.relation == "supports"
+    }
+    assert {("floor", "table"), ("table", "box")} <= carried
+
+
+def test_the_same_scan_gives_the_same_bytes(tmp_path: Path) -> None:
+    (tmp_path / "scan").mkdir()
+    scannet(tmp_path / "scan")
+    first, second = made(tmp_path / "scan", tmp_path / "a"), made(tmp_path / "scan", tmp_path / "b")
+    files = sorted(path.relative_to(first.root) for path in first.root.rglob("*") if path.is_file())
+    assert files and all((first.root / file).read_bytes() == (second.root / file).read_bytes() for file in files)
+
+
+def test_a_fine_mesh_is_thinned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "scan").mkdir()
+    nyu40(tmp_path / "scan")
+    whole = made(tmp_path / "scan", tmp_path / "whole")
+    monkeypatch.setattr(from_mesh, "KEPT_FACES", 1000)
+    with caplog.at_level(logging.INFO, "scenewright"):
+        coarse = run(
+            from_mesh=tmp_path / "scan", parameters=FuseParameters(voxel_size=0.1), context=context(tmp_path / "coarse")
+        )
+    assert "more than 1000: thinned to" in caplog.text
+    assert coarse.summary["faces"] < whole.summary["faces"] / 3
+    assert {e.class_name for e in coarse.info.entities} == {e.class_name for e in whole.info.entities}
+    monkeypatch.setattr("stages.fuse.annotated_scan.MOST_FACES", 100)
+    with pytest.raises(BadInput, match="at most 100 are read"):
+        read_scan(tmp_path / "scan")
+
+
+def test_labels_without_names(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    mesh, labels = room()
+    write_ply(tmp_path / "mine.ply", mesh, label=labels)
+    with pytest.raises(BadInput, match=r"nothing says what label 1 is \(4 such labels\)"):
+        made(tmp_path / "mine.ply", tmp_path / "nameless")
+    table = tmp_path / "mine.toml"
+    rows = [f'{{ name = "n{k}", id = {k}, class = "{name}" }}' for name, k in THINGS.items() if name != "box"]
+    table.write_text(f"labels = [{', '.join(rows)}]")
+    panoptic_map = made(tmp_path / "mine.ply", tmp_path / "named", labels=table)
+    assert {e.class_name for e in panoptic_map.info.entities} == {"floor", "table", "wall"}
+    assert "1 without a name" in caplog.text
+
+
+def test_unknown_names_become_objects(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    scannet(tmp_path)
+    group = tmp_path / "scene.aggregation.json"
+    group.write_text(group.read_text().replace('"box"', '"sousaphone"').replace('"wall"', '"mirror"'))
+    panoptic_map = made(tmp_path, tmp_path / "map")
+    assert {e.class_name for e in panoptic_map.info.entities} == {"floor", "table", "object"}  # a mirror is void
+    assert "1 of its names are in no table and become `object`: sousaphone" in caplog.text
+
+
+def test_broken_scans(tmp_path: Path) -> None:
+    def change(file: str, old: str, new: str) -> Callable[[Path], None]:
+        def write(root: Path) -> None:
+            scannet(root)
+            path = root / file
+            text = path.read_text()
+            assert old in text
+            path.write_text(text.replace(old, new, 1))
+
+        return write
+
+    def without(name: str, layout: Callable[[Path], None] = scannet) -> Callable[[Path], None]:
+        def write(root: Path) -> None:
+            layout(root)
+            next(root.rglob(name)).unlink()
+
+        return write
+
+    def nothing(root: Path) -> None:
+        (root / "readme.txt").write_text("a scan")
+
+    def unlabelled(root: Path) -> None:
+        write_ply(root / "a.labels.ply", room()[0], label=np.zeros(len(room()[1]), int))
+
+    segments, group = "scene_vh_clean_2.0.010000.segs.json", "scene.aggregation.json"
+    cases = [
+        (change(segments, "[", "[7, "), "segments for the"),
+        (change(segments, "[", '["7", '), "is no list of integers"),
+        (change(segments, "[2,", "[-2,"), "not in 0..2"),
+        (change(segments, "{", ""), "no JSON"),
+        (change(group, "segGroups", "groups"), "lists no segGroups"),
+        (without("*.segs.json"), ".segs.json is not beside it"),
+        (without("*.ply"), "no mesh is beside it"),
+        (without("info_semantic.json", replica), "info_semantic.json is not beside it"),
+        (nothing, "no labelled mesh or points that are read here"),
+        (unlabelled, "nothing of it is labelled"),
+    ]
+    for k, (write, message) in enumerate(cases):
+        root = tmp_path / str(k)
+        root.mkdir()
+        write(root)
+        with pytest.raises(BadInput) as caught:
+            made(root, tmp_path / f"out {k}")
+        assert message in caught.value.message and "\n" not in caught.value.message
+
+
+def test_a_scan_takes_no_frames() -> None:
+    scan, frames = {"from_mesh": Path("m")}, {"sequence": Path("s"), "segments": Path("t")}
+    check(FuseParameters(), scan)
+    check(FuseParameters(), {**scan, "labels": Path("l")})
+    for given, message in [
+        ({**scan, **frames}, "takes no --sequence"),
+        ({"sequence": Path("s")}, "--segments is missing"),
+        ({}, "--sequence is missing"),
+        ({**frames, "labels": Path("l")}, "--labels names the labels of --from-mesh"),
+    ]:
+        with pytest.raises(UsageError, match=message):
+            check(FuseParameters(), given)
+
+
+def test_a_real_scan(tmp_path: Path) -> None:
+    """ScanNet's scene0470_00 with NYU40 labels: the five chairs, the table and the bin that Scan2CAD aligned."""
+    scan = real_data("scan2cad_sample") / "scannet-sample" / "scene0470_00"
+    counts: dict[str, int] = {}
+    for entity in made(scan, tmp_path / "map").info.entities:
+        counts[entity.class_name] = counts.get(entity.class_name, 0) + 1
+    assert counts["chair"] == 5 and counts["table"] == 1 and counts["floor"] == counts["wall"] == 1
