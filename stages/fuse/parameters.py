@@ -108,6 +108,10 @@ class FuseParameters(Parameters):
 
 def check(parameters: FuseParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError unless the depth range holds something, and for frames beside an annotated scan."""
+    if parameters.minimum_depth >= parameters.maximum_depth:
+        raise UsageError(
+            f"--minimum-depth {parameters.minimum_depth} is not below --maximum-depth {parameters.maximum_depth}"
+        )
     frames = [role for role in ("sequence", "segments", "trajectory") if role in inputs]
     if "from_mesh" in inputs and frames:
         raise UsageError(f"--from-mesh is a whole scan and takes no --{frames[0]}", hint="leave out one of the two")
@@ -116,10 +120,6 @@ def check(parameters: FuseParameters, inputs: Mapping[str, Any]) -> None:
         raise UsageError(f"fuse: --{missing[0]} is missing", hint="see --help")
     if "labels" in inputs and "from_mesh" not in inputs:
         raise UsageError("--labels names the labels of --from-mesh", hint="give the scan too")
-    if parameters.minimum_depth >= parameters.maximum_depth:
-        raise UsageError(
-            f"--minimum-depth {parameters.minimum_depth} is not below --maximum-depth {parameters.maximum_depth}"
-        )
 
 
 def _estimate(parameters: FuseParameters, inputs: Inputs) -> Estimate:
