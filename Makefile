@@ -164,7 +164,7 @@ PLANNING := $(OUTPUTS)/experiments/bench-planning$(if $(QUICK),-quick)
 bench-planning: setup ## Planning beside OMPL with pybullet checks (QUICK=1: 10 queries a set; SCENE=folder)
 	$(EXPERIMENT) planning_motion $(if $(wildcard $(SCENE)),--scene $(SCENE)) --out $(PLANNING)/motion $(ASKED)
 	$(EXPERIMENT) planning_tamp --out $(PLANNING)/tamp $(ASKED)
-	$(PYTHON) -m benchmarks.gather planning --out $(PLANNING)
+	$(EXPERIMENT) gather $(PLANNING)
 
 .PHONY: tidy
 # Fast: 200 reporting seeds a tier, about 20 minutes of one core; seen: images before each action, a second each;
@@ -172,14 +172,14 @@ bench-planning: setup ## Planning beside OMPL with pybullet checks (QUICK=1: 10 
 PARTS ?= fast seen physics detect
 TIDY := $(OUTPUTS)/experiments/tidy$(if $(QUICK),-quick)
 tidy: setup ## Clearing tables (TIDY): tables 7.1 to 7.3, joint planner, optimum, vision (QUICK=1: few tables; PARTS=...)
-	$(if $(filter fast,$(PARTS)),$(PYTHON) -m benchmarks.tidy $(if $(QUICK),--quick) --out $(TIDY)/fast)
-	$(if $(filter seen,$(PARTS)),$(PYTHON) -m benchmarks.tidy.seen $(if $(QUICK),--quick) --out $(TIDY)/seen)
-	$(if $(filter physics,$(PARTS)),$(PYTHON) -m benchmarks.tidy.physics $(if $(QUICK),--quick) --out $(TIDY)/physics)
-	$(if $(filter physics,$(PARTS)),$(PYTHON) -m benchmarks.tidy.physics_pulls $(if $(QUICK),--quick) --out $(TIDY)/pulls)
-	$(if $(filter physics,$(PARTS)),$(PYTHON) -m benchmarks.tidy.physics_holds $(if $(QUICK),--repeats 1) --out $(TIDY)/holds)
-	$(if $(filter detect,$(PARTS)),$(PYTHON) -m benchmarks.tidy.detect $(if $(QUICK),--quick) --out $(TIDY)/detect)
-	$(if $(and $(filter detect,$(PARTS)),$(wildcard $(REAL_DATA)/tableware)),$(PYTHON) -m benchmarks.tidy.detect_real --data $(REAL_DATA)/tableware --out $(TIDY)/detect_real)
-	$(PYTHON) -m benchmarks.gather tidy --out $(TIDY)
+	$(if $(filter fast,$(PARTS)),$(EXPERIMENT) tidy_fast --out $(TIDY)/fast $(ASKED))
+	$(if $(filter seen,$(PARTS)),$(EXPERIMENT) tidy_seen --out $(TIDY)/seen $(ASKED))
+	$(if $(filter physics,$(PARTS)),$(EXPERIMENT) tidy_physics --out $(TIDY)/physics $(ASKED))
+	$(if $(filter physics,$(PARTS)),$(EXPERIMENT) tidy_pulls --out $(TIDY)/pulls $(ASKED))
+	$(if $(filter physics,$(PARTS)),$(EXPERIMENT) tidy_holds --out $(TIDY)/holds $(ASKED))
+	$(if $(filter detect,$(PARTS)),$(EXPERIMENT) tidy_detect --out $(TIDY)/detect $(ASKED))
+	$(if $(and $(filter detect,$(PARTS)),$(wildcard $(REAL_DATA)/tableware)),$(EXPERIMENT) tidy_detect_real --data $(REAL_DATA)/tableware --out $(TIDY)/detect_real $(ASKED))
+	$(EXPERIMENT) gather $(TIDY)
 
 .PHONY: stitch
 # chain: every command on two rendered scenes and trials, into a report; the other parts are the benchmarks below, together
@@ -187,22 +187,22 @@ tidy: setup ## Clearing tables (TIDY): tables 7.1 to 7.3, joint planner, optimum
 STITCH_PARTS ?= chain needle segmentation thread trials
 STITCH := $(OUTPUTS)/experiments/stitch$(if $(QUICK),-quick)
 stitch: setup ## Suturing (STITCH): scene to disparity, needle, thread; trials, table 4.1, report (QUICK=1; STITCH_PARTS=...)
-	$(if $(filter chain,$(STITCH_PARTS)),$(PYTHON) -m benchmarks.stitch.chain $(if $(QUICK),--quick) --out $(STITCH)/chain)
-	$(if $(filter needle,$(STITCH_PARTS)),$(PYTHON) -m benchmarks.stitch.needle $(if $(QUICK),--quick) --out $(STITCH)/needle)
-	$(if $(filter segmentation,$(STITCH_PARTS)),$(PYTHON) -m benchmarks.stitch.segmentation $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --out $(STITCH)/segmentation)
-	$(if $(filter thread,$(STITCH_PARTS)),$(PYTHON) -m benchmarks.stitch.thread $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --out $(STITCH)/thread)
-	$(if $(filter trials,$(STITCH_PARTS)),$(PYTHON) -m benchmarks.stitch.trials $(if $(QUICK),--quick) --out $(STITCH)/trials)
-	$(PYTHON) -m benchmarks.gather stitch --out $(STITCH)
+	$(if $(filter chain,$(STITCH_PARTS)),$(EXPERIMENT) stitch_chain --out $(STITCH)/chain $(ASKED))
+	$(if $(filter needle,$(STITCH_PARTS)),$(EXPERIMENT) stitch_needle --out $(STITCH)/needle $(ASKED))
+	$(if $(filter segmentation,$(STITCH_PARTS)),$(EXPERIMENT) stitch_segmentation --views $(STITCH_VIEWS) --out $(STITCH)/segmentation $(ASKED))
+	$(if $(filter thread,$(STITCH_PARTS)),$(EXPERIMENT) stitch_thread --views $(STITCH_VIEWS) --out $(STITCH)/thread $(ASKED))
+	$(if $(filter trials,$(STITCH_PARTS)),$(EXPERIMENT) stitch_trials --out $(STITCH)/trials $(ASKED))
+	$(EXPERIMENT) gather $(STITCH)
 
 .PHONY: stitch-needle
 # Five hundred rendered views and more without pictures, about forty minutes of one core; a stopped run goes on.
 stitch-needle: setup ## The needle's pose: the thesis's estimator and ours on rendered views (QUICK=1: ten a case)
-	$(PYTHON) -m benchmarks.stitch.needle $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/stitch-needle$(if $(QUICK),-quick)
+	$(EXPERIMENT) stitch_needle --out $(OUTPUTS)/experiments/stitch-needle$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: stitch-trials
 # A hundred reporting seeds an arm, about three CPU minutes; a stopped run goes on where it was.
 stitch-trials: setup ## Whole suture trials in the simulator: table 4.1, the thesis's arms and ours (QUICK=1: ten trials)
-	$(PYTHON) -m benchmarks.stitch.trials $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/stitch-trials$(if $(QUICK),-quick)
+	$(EXPERIMENT) stitch_trials --out $(OUTPUTS)/experiments/stitch-trials$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: stitch-train stitch-segmentation stitch-thread
 # Rendered views are kept in one folder for all three: 168 to train on and to validate with, 100 to report on.
@@ -212,15 +212,15 @@ stitch-train: setup ## Train the needle and thread network anew, half a CPU hour
 	$(PYTHON) -m benchmarks.stitch.segmentation_train $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --steps 3000 --start $(OUTPUTS)/experiments/stitch-train$(if $(QUICK),-quick)/segmentation.safetensors --out $(OUTPUTS)/experiments/stitch-train-refined$(if $(QUICK),-quick)
 
 stitch-segmentation: setup ## The network's masks on held-out views, and the needle's pose from them (QUICK=1: four views)
-	$(PYTHON) -m benchmarks.stitch.segmentation $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-segmentation$(if $(QUICK),-quick)
+	$(EXPERIMENT) stitch_segmentation --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-segmentation$(if $(QUICK),-quick) $(ASKED)
 
 stitch-thread: setup ## Threads as curves in space, from true and from learned masks (QUICK=1: four views)
-	$(PYTHON) -m benchmarks.stitch.thread $(if $(QUICK),--quick) --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-thread$(if $(QUICK),-quick)
+	$(EXPERIMENT) stitch_thread --views $(STITCH_VIEWS) --out $(OUTPUTS)/experiments/stitch-thread$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: llm3
 # A hundred reporting seeds a cell, about ten minutes of one core; a stopped run goes on where it was.
 llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2, harder suites (QUICK=1: ten instances)
-	$(PYTHON) -m benchmarks.llm3 $(if $(QUICK),--quick) $(if $(FRESH),--fresh) --out $(OUTPUTS)/experiments/llm3$(if $(QUICK),-quick)
+	$(EXPERIMENT) llm3 --out $(OUTPUTS)/experiments/llm3$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: bench-disparity bench-reconstruct-stereo train-stereo
 # Rendered pairs are kept below the output folder; the network's arms run when its checkpoint is there.

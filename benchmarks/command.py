@@ -6,14 +6,15 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any
 
 from pydantic import ValidationError
-from pydantic.fields import FieldInfo
 
 from benchmarks.discovery import experiment_files, load_experiment, summary_of
-from benchmarks.experiment import Bench, Experiment, Results
+from benchmarks.experiment import Bench, Experiment, Results, shown
+from benchmarks.gather import gather
 from benchmarks.keeping import measure_missing, read_record, wanted_trials
+from benchmarks.options import add_option
 from benchmarks.results import write_results
 from schemas.errors import ScenewrightError
 
@@ -25,11 +26,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run an experiment; return the exit code (docs/ARCHITECTURE.md)."""
     words = list(sys.argv[1:] if argv is None else argv)
     if not words or words[0] in ("-h", "--help"):
-        print("python -m benchmarks NAME --out FOLDER [options]; NAME --help lists them\n")
+        print("python -m benchmarks NAME --out FOLDER [options]; NAME --help lists them")
+        print("python -m benchmarks gather FOLDER: one table and one metrics.json of the experiments below it\n")
         for name, file in experiment_files().items():
             print(f"  {name:18} {summary_of(file)}")
         return 0
     try:
+        if words[0] == "gather" and len(words) == len(("gather", "FOLDER")):
+            print(gather(Path(words[1])))
+            return 0
         return run(load_experiment(words[0]), words)
     except KeyboardInterrupt:
         print("stopped; what is measured is kept", file=sys.stderr)
@@ -55,7 +60,7 @@ def run(experiment: Experiment, words: Sequence[str]) -> int:
     if not records:
         print(f"{experiment.name}: nothing is measured", file=sys.stderr)
         return code
-    results = Results(experiment, bench, records)
+    results = Results(experiment, bench, shown(experiment, records))
     missing = [trial for trial in trials if trial not in records]
     print(write_results(results, ("python", "-m", "benchmarks", *words), missing))
     problems = experiment.problems(results) if experiment.problems else ()
@@ -93,21 +98,5 @@ def parser_of(experiment: Experiment) -> argparse.ArgumentParser:
     parser.add_argument("--fresh", action="store_true", help="measure again what is kept")
     parser.add_argument("--kept", action="store_true", help="measure nothing: tabulate what is kept, of any code")
     for name, field in experiment.parameters.model_fields.items():
-        _add_option(parser, name, field)
+        add_option(parser, name, field)
     return parser
-
-
-def _add_option(parser: argparse.ArgumentParser, name: str, field: FieldInfo) -> None:
-    kind = field.annotation
-    if get_origin(kind) is Union or type(kind).__name__ == "UnionType":
-        kind = next(each for each in get_args(kind) if each is not type(None))
-    option = f"--{name.replace('_', '-')}"
-    text = f"{field.description} (default: {field.default})".replace("%", "%%")
-    if kind is bool:
-        parser.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=text)
-    elif get_origin(kind) is Literal:
-        parser.add_argument(option, choices=get_args(kind), help=text)
-    elif get_origin(kind) is tuple:
-        parser.add_argument(option, nargs="*", type=get_args(kind)[0], help=text)
-    else:
-        parser.add_argument(option, type=kind, help=text)  # type: ignore[arg-type]

@@ -15,7 +15,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from stages.kit.measurement.bootstrap import Interval, figure_interval, paired_interval
+from stages.kit.measurement.bootstrap import Interval, bootstrap_interval, figure_interval, paired_interval
 from stages.kit.stage import Parameters
 
 RESAMPLES = 2000
@@ -132,8 +132,11 @@ class Experiment:
     """(first, second): arms whose difference on the same seeds is told."""
     compared: Sequence[str] = ()
     """Measures of the differences."""
-    more_figures: Callable[[Results], Mapping[str, float | None]] | None = None
-    """Further `<arm>/<case>/<measure>` -> value, without intervals."""
+    subcases: Mapping[str, tuple[str, Callable[[Any], Any | None]]] = field(default_factory=dict)
+    """A case that is shown -> the case that is measured for it, and what of a record counts there (None: nothing). With
+    any of them they are all that is shown."""
+    more_figures: Callable[[Results], Mapping[str, float | Interval | None]] | None = None
+    """Further `<arm>/<case>/<measure>` -> value."""
     notes: Callable[[Results], str] | None = None
     """What table.md says after the figures, the differences and the single seeds."""
     pictures: Callable[[Results], None] | None = None
@@ -173,6 +176,11 @@ class Results:
     def get(self, arm: str, case: str, seed: str) -> Any | None:
         """The record of one trial."""
         return self.records.get(Trial(arm, case, seed))
+
+    def pairs(self, first: str, second: str, case: str) -> list[tuple[Any, Any]]:
+        """The records of two arms on the seeds that both ran."""
+        found = ((self.get(first, case, seed), self.get(second, case, seed)) for seed in self.seeds(case))
+        return [(a, b) for a, b in found if a is not None and b is not None]
 
     def value(self, arm: str, case: str, measure: str) -> float | None:
         """A measure of an arm in a case."""
@@ -227,6 +235,31 @@ class Results:
             return values[drawn]
 
         return figure
+
+
+def shown(experiment: Experiment, records: Mapping[Trial, Any]) -> dict[Trial, Any]:
+    """Return the records by the cases that are shown."""
+    if not experiment.subcases:
+        return dict(records)
+    parts = {
+        Trial(trial.arm, name, trial.seed): part(record)
+        for name, (case, part) in experiment.subcases.items()
+        for trial, record in records.items()
+        if trial.case == case
+    }
+    return {trial: record for trial, record in parts.items() if record is not None}
+
+
+def ratio(pairs: Sequence[tuple[float, float]]) -> Interval | None:
+    """Return the mean of the firsts over that of the seconds with its 95 % interval over pairs; None for none."""
+
+    def over(values: np.ndarray, axis: int) -> np.ndarray:
+        means = values.mean(axis=axis)
+        return np.asarray(means[..., 0] / means[..., 1])
+
+    return bootstrap_interval(
+        np.array(pairs), np.random.default_rng(SEED_OF_INTERVALS), statistic=over, resamples=RESAMPLES
+    )
 
 
 def mean(name: str, unit: str = "", *, interval: bool = True) -> Measure:

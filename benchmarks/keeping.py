@@ -18,6 +18,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 from pydantic import TypeAdapter
 
@@ -25,7 +26,7 @@ from benchmarks.code_digest import code_digest
 from benchmarks.discovery import load_experiment
 from benchmarks.experiment import Bench, Experiment, Trial
 from schemas.base import canonical_json
-from schemas.errors import ScenewrightError, UsageError
+from schemas.errors import BadInput, ScenewrightError, UsageError
 from stages.engine.discovery import stage_by_name
 from stages.engine.reading import read_manifest
 from stages.kit.digests import external_digest, sha256_of_text
@@ -78,6 +79,20 @@ def read_record(experiment: Experiment, bench: Bench, trial: Trial, *, any_code:
         return TypeAdapter(experiment.record).validate_python(kept["record"])
     except (FileNotFoundError, json.JSONDecodeError, KeyError):
         return None
+
+
+def kept_records(name: str, out: Path) -> dict[Trial, Any]:
+    """Return every record that lies below the output folder of an experiment, whatever code it was measured with.
+    Raises BadInput when there is none."""
+    adapter, found = TypeAdapter(load_experiment(name).record), {}
+    for path in sorted((out / "trials").rglob(RECORD)):
+        arm, *case, seed = map(unquote, path.relative_to(out / "trials").parent.parts)
+        found[Trial(arm, "/".join(case), seed)] = adapter.validate_json(
+            json.dumps(json.loads(path.read_bytes())["record"])
+        )
+    if not found:
+        raise BadInput(f"{out}: no trial of {name}", hint=f"python -m benchmarks {name} --out {out} measures")
+    return found
 
 
 def keep_record(experiment: Experiment, bench: Bench, trial: Trial, key: str, record: Any, seconds: float) -> None:

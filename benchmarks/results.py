@@ -15,6 +15,7 @@ from typing import Any
 
 from benchmarks.experiment import RESAMPLES, Experiment, Results, Trial
 from benchmarks.tabulation import Figure, grid
+from stages.kit.measurement.bootstrap import Interval
 
 MOST_COLUMNS, MOST_SEEDS = 8, 200
 RUNNING = "trials"
@@ -36,9 +37,11 @@ def figures_of(results: Results) -> dict[str, Figure]:
                 if measure.interval and (found := results.interval(arm, case, name)) is not None:
                     low, high = found.low, found.high
                 figures[f"{arm}/{case}/{name}"] = Figure(value, low, high, cases, measure.unit)
-    for key, value in (results.experiment.more_figures(results) if results.experiment.more_figures else {}).items():
-        if value is not None and math.isfinite(value):
-            figures[key] = Figure(float(value), None, None, None, "")
+    for key, more in (results.experiment.more_figures(results) if results.experiment.more_figures else {}).items():
+        if isinstance(more, Interval):
+            figures[key] = Figure(more.value, more.low, more.high, None, "")
+        elif more is not None and math.isfinite(more):
+            figures[key] = Figure(float(more), None, None, None, "")
     return figures
 
 
@@ -55,6 +58,15 @@ def write_results(results: Results, command: Sequence[str], missing: Sequence[Tr
     if results.experiment.pictures:
         results.experiment.pictures(results)
     return text
+
+
+def write_measured(out: Path | None, metrics: Mapping[str, float], text: str) -> None:
+    """Print a measurement's table; write it and metrics.json where there is an output folder."""
+    print(text)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        _write(out / "metrics.json", metrics)
+        (out / "table.md").write_text(text, encoding="utf-8")
 
 
 def described(experiment: Experiment, figures: Mapping[str, Figure], command: Sequence[str]) -> dict[str, Any]:

@@ -21,7 +21,7 @@ class SceneBody(Model):
     class_name: str
     movable: bool
     """Movable bodies hang on floating joints in scene.urdf and have a file of their own."""
-    furniture: bool = Field(False, exclude_if=lambda value: not value)
+    furniture: bool = Field(default=False, exclude_if=lambda value: not value)
     """Movable, but nothing that an arm carries: a chair, a screen, a lamp. Absent otherwise."""
     file: RelativePath | None = None
     """`bodies/<name>.urdf` for movable bodies, None for those in static.urdf."""

@@ -10,17 +10,18 @@ machine. The result is `raft_stereo_small.safetensors`, the moving average of th
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
+from pydantic import Field
 from torch.nn import functional
 
 from benchmarks.disparity.crops import TEXTURES, Kept, Sample, kept_sample, shapes_sample
 from benchmarks.disparity.rendered_pairs import needle_stem, room_stems
 from benchmarks.disparity.shapes import texture_bank
+from benchmarks.options import Recipe, asked
 from benchmarks.steps import made
 from benchmarks.training.run import TrainingRun, rate_at, train
 from stages.disparity.raft.architecture import SMALL
@@ -161,16 +162,18 @@ def validation(run: Run, bank: list[np.ndarray], count: int = 24) -> dict[str, f
     }
 
 
+class Options(Recipe):
+    """Options."""
+
+    pairs: Path | None = Field(None, description="Where rendered pairs are kept; OUT/pairs if not given")
+    steps: int = Field(1750, description="Steps")
+    seed: int = Field(0, description="Seed")
+    save_every: float = Field(120.0, description="Seconds between states")
+
+
 def main() -> None:
     """Render what is missing, then train or go on with a training."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--pairs", type=Path, help="where rendered pairs are kept; OUT/pairs if not given")
-    parser.add_argument("--quick", action="store_true", help="proves the recipe: few pairs, 10 steps")
-    parser.add_argument("--steps", type=int, default=1750)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--save-every", type=float, default=120.0, help="seconds between states")
-    options = parser.parse_args()
+    options = asked(Options)
     torch.set_num_threads(1)
     sources = Sources(options.pairs or options.out / "pairs", options.seed, options.quick)
     held_out = texture_bank(options.seed + 1000, TEXTURES)

@@ -22,6 +22,7 @@ import numpy as np
 from pydantic import Field
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
+from benchmarks.experiments.mapping.figures_of_merit import summed_qualities
 from benchmarks.generated_rooms import REPORTING, STEPS, make_room
 from benchmarks.mosd_frames import CAMERA, FOLDER, frame_files, frame_names, read_frame
 from benchmarks.object_masks import score_object_masks
@@ -273,20 +274,11 @@ def draw(file: Path, frame: Frame, masks: PanopticFrame) -> None:
     cv2.imwrite(str(file), np.hstack([picture, painted])[..., ::-1])
 
 
-def summed(records: Sequence[Judged]) -> dict[str, ClassQuality]:
-    """Add the sums by class over rooms."""
-    sums: dict[str, ClassQuality] = {}
-    for record in records:
-        for name, entry in record.qualities.items():
-            sums[name] = sums.get(name, ClassQuality()) + entry
-    return sums
-
-
 def of_quality(which: str) -> Measure:
     """PQ, SQ or RQ: the mean over classes."""
 
     def figure(records: Sequence[Judged]) -> float | None:
-        sums = summed(records)
+        sums = summed_qualities(records)
         return (getattr(average_quality(sums.values()), which) or 0.0) if sums else None
 
     return Measure(figure)
@@ -334,7 +326,7 @@ def more_figures(results: Results) -> dict[str, float | None]:
     for case in results.cases:
         for arm in results.arms(case):
             records = results.of(arm, case)
-            flat |= {f"{arm}/{case}/pq_{name}": entry.pq for name, entry in summed(records).items()}
+            flat |= {f"{arm}/{case}/pq_{name}": entry.pq for name, entry in summed_qualities(records).items()}
             for record in records:
                 flat |= {f"{arm}/{case}/masks_{name}": value for name, value in record.masks.items()}
     return flat

@@ -15,8 +15,6 @@ Arms alternate within a run, as the machine may be busy with other work; medians
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import platform
 import resource
@@ -33,6 +31,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from benchmarks.options import Measurement, asked
+from benchmarks.results import write_measured
 from stages.engine.batch.expansion import Batch, PlannedRun, make_jobs, read_batch, scene_command
 from stages.engine.batch.job import Job
 from stages.engine.batch.local_executor import LocalExecutor, processors
@@ -317,16 +317,10 @@ def as_table(metrics: dict[str, float]) -> Table:
 
 def main() -> None:
     """Measure, print the table, write metrics.json and table.md."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("outputs/experiments/bench-speed-batch"))
-    parser.add_argument("--quick", action="store_true", help="once, with few and short scenes")
-    arguments = parser.parse_args()
+    arguments = asked(Measurement)
     metrics = measure(1, 4, 30, 200) if arguments.quick else measure(5, 6, 80, 1000)
     text = as_markdown(as_table(metrics))
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    (arguments.out / "metrics.json").write_text(json.dumps(metrics, sort_keys=True, indent=1) + "\n")
-    (arguments.out / "table.md").write_text(text)
-    print(text)
+    write_measured(arguments.out, metrics, text)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,6 @@ integrates depth alone, `open3d-color` depth and colour; both with truncation 4 
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
@@ -26,7 +25,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 
+from benchmarks.options import Measurement, asked
+from benchmarks.results import write_measured
 from schemas.scene_parts import Camera
 from schemas.segments import FrameSegment
 from schemas.vocabulary import load_vocabulary
@@ -313,23 +315,22 @@ def as_table(metrics: dict[str, float]) -> Table:
     return Table("table", "Labelled fusion beside Open3D without labels", columns, tuple(rows), note)
 
 
+class Options(Measurement):
+    """Options."""
+
+    worker: tuple[str, ...] = Field((), description="Arm, case and folder of frames: one measurement in this process")
+
+
 def main() -> None:
     """Measure, print the table, write metrics.json and table.md."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("outputs/experiments/bench-speed-fusion"))
-    parser.add_argument("--quick", action="store_true", help="20 frames once instead of 100 frames five times")
-    parser.add_argument("--worker", nargs=3, metavar=("ARM", "CASE", "FRAMES"), help=argparse.SUPPRESS)
-    arguments = parser.parse_args()
+    arguments = asked(Options)
     if arguments.worker:
         arm, case, folder = arguments.worker
         print(json.dumps(work(arm, case, Path(folder))))
         return
     metrics = measure(frame_count=20, runs=1) if arguments.quick else measure(frame_count=100, runs=5)
     text = as_markdown(as_table(metrics))
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    (arguments.out / "metrics.json").write_text(json.dumps(metrics, sort_keys=True, indent=1) + "\n")
-    (arguments.out / "table.md").write_text(text)
-    print(text)
+    write_measured(arguments.out, metrics, text)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,6 @@ geometric segments, and their fusion with the masks.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
@@ -29,7 +28,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import Field
 
+from benchmarks.options import Measurement, asked
+from benchmarks.results import write_measured
 from benchmarks.speed.corridor import (
     AREA,
     CAMERA,
@@ -335,14 +337,16 @@ def draw(results: dict[tuple[str, str], list[dict[str, float]]], path: Path) -> 
     plt.close(figure)
 
 
+class Options(Measurement):
+    """Options."""
+
+    only: tuple[str, ...] = Field((), description="These arms alone: segment, listing, growing, standing")
+    worker: tuple[str, ...] = Field((), description="Arm, case and folder of frames: one measurement in this process")
+
+
 def main() -> int:
     """Measure, print the tables, write metrics.json, table.md and growth.png."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("outputs/experiments/bench-growth"))
-    parser.add_argument("--quick", action="store_true", help="300 frames at 2 cm")
-    parser.add_argument("--only", nargs="*", choices=("segment", "listing", *CURVES), help="these arms alone")
-    parser.add_argument("--worker", nargs=3, metavar=("ARM", "CASE", "FRAMES"), help=argparse.SUPPRESS)
-    arguments = parser.parse_args()
+    arguments = asked(Options)
     if arguments.worker:
         arm, case, folder = arguments.worker
         print(json.dumps(worker(arm, case, Path(folder), arguments.quick)))
@@ -364,12 +368,9 @@ def main() -> int:
             )
             results[arm, case] = json.loads(done.stdout.splitlines()[-1])
     text = "\n".join(as_markdown(table) for table in as_tables(results))
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    (arguments.out / "metrics.json").write_text(json.dumps(flat_metrics(results), sort_keys=True, indent=1) + "\n")
-    (arguments.out / "table.md").write_text(text)
-    if any(arm == "growing" for arm, _ in results):
+    write_measured(arguments.out, flat_metrics(results), text)
+    if arguments.out and any(arm == "growing" for arm, _ in results):
         draw(results, arguments.out / "growth.png")
-    print(text)
     return 0
 
 

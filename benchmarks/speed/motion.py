@@ -10,11 +10,8 @@ Both ask the meshes alone here; what the compiled check gains is measured by `ma
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +19,8 @@ from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
+from benchmarks.options import Measurement, asked
+from benchmarks.results import write_measured
 from schemas.base import as_transform
 from schemas.interactive_scene import SceneBody
 from schemas.scene_parts import Box
@@ -183,10 +182,7 @@ def measure_paths(robot: Robot, queries: int) -> dict[str, float]:
 
 def main() -> None:
     """Measure, print the table, write metrics.json and table.md."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, help="folder for metrics.json and table.md")
-    parser.add_argument("--quick", action="store_true", help="fewer queries")
-    arguments = parser.parse_args()
+    arguments = asked(Measurement)
     ou.setLogLevel(ou.LogLevel.LOG_ERROR)
     ou.RNG.setSeed(1)
     queries = 12 if arguments.quick else 60
@@ -198,11 +194,7 @@ def main() -> None:
     lines += ["| measure | value |", "|---|---|"]
     lines += [f"| {name} | {value:.3g} |" for name, value in metrics.items()]
     text = "\n".join([*lines, ""])
-    print(text)
-    if arguments.out:
-        arguments.out.mkdir(parents=True, exist_ok=True)
-        (arguments.out / "metrics.json").write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
-        (arguments.out / "table.md").write_text(text)
+    write_measured(arguments.out, metrics, text)
 
 
 if __name__ == "__main__":

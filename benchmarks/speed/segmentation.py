@@ -8,8 +8,6 @@ findPlanes as another way to cut a depth image up, and the same convexity algori
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import platform
 import time
@@ -23,7 +21,10 @@ import cv2
 import numba
 import numpy as np
 import trimesh
+from pydantic import Field
 
+from benchmarks.options import Measurement, asked
+from benchmarks.results import write_measured
 from schemas.scene_parts import Camera
 from stages.kit.geometry.cameras import back_project, intrinsic_matrix
 from stages.kit.geometry.transforms import look_at
@@ -252,26 +253,22 @@ def table(seconds: dict[str, Timing], repeats: int) -> str:
     return "\n".join(lines) + "\n"
 
 
+class Options(Measurement):
+    """Options."""
+
+    weights: Path | None = Field(None, description="ONNX detector to time as well")
+
+
 def main() -> None:
     """Measure, print the table, write metrics.json and table.md."""
     numba.config.THREADING_LAYER = "omp"  # type: ignore[attr-defined] # the default probes TBB first and warns about its version
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, help="folder for metrics.json and table.md")
-    parser.add_argument("--quick", action="store_true", help="fewer repetitions")
-    parser.add_argument("--weights", type=Path, help="ONNX detector to time as well")
-    arguments = parser.parse_args()
+    arguments = asked(Options)
     repeats = 6 if arguments.quick else 30
     seconds = measure(repeats, arguments.weights)
     text = table(seconds, repeats)
-    print(text)
-    if arguments.out:
-        arguments.out.mkdir(parents=True, exist_ok=True)
-        metrics = {}
-        for name, value in seconds.items():
-            metrics[f"{name}/seconds_per_frame"] = value.wall
-            metrics[f"{name}/processor_seconds_per_frame"] = value.processor
-        (arguments.out / "metrics.json").write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
-        (arguments.out / "table.md").write_text(text)
+    metrics = {f"{name}/seconds_per_frame": value.wall for name, value in seconds.items()}
+    metrics |= {f"{name}/processor_seconds_per_frame": value.processor for name, value in seconds.items()}
+    write_measured(arguments.out, metrics, text)
 
 
 if __name__ == "__main__":

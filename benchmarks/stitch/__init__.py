@@ -1,1 +1,1 @@
-"""The suturing experiments (STITCH, Srinivas 2024)."""
+"""The suturing network: views, training; the fit of its error model; drawing."""

@@ -1,7 +1,6 @@
 """An error model of perception for the simulator of trials, fitted to what the needle benchmark measured of ours.
 
-    python -m benchmarks.stitch.perception --needle needle.jsonl [needle.jsonl ...] --commit HASH --out FILE.toml
-        [--seconds S] [--thread-length-error E]
+    python -m benchmarks.stitch.perception --needle FOLDER --commit HASH
 
 Right: answered, centre within 1 mm, plane within 10 degrees, and the tip not taken for the swage. Corner shares are of
 the corner's views in which the needle is more than 15 degrees from edge-on, as pose correction turns it to face the
@@ -11,14 +10,16 @@ much of an error stays) is kept as the thesis's model has it.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 
-from benchmarks.stitch.needle_records import read_estimates
+from benchmarks.keeping import kept_records
+from benchmarks.options import asked
 from stages.kit.measurement.proportions import wilson_interval
+from stages.kit.stage import Parameters
 from stages.suture.evaluation.judgement import Estimate
 from stages.suture.trials.perception import FOLDER, Errors, PerceptionModel, perception_model
 
@@ -133,19 +134,23 @@ def as_toml(model: PerceptionModel) -> str:
     return "\n".join(lines) + "\n"
 
 
+class Options(Parameters):
+    """Options of the fit."""
+
+    needle: Path = Field(description="Output folder of stitch_needle")
+    commit: str = Field(description="Of the estimator that was measured")
+    out: Path = Field(FOLDER / "perception_ours.toml", description="File")
+    seconds: float = Field(0.2, description="An estimate with its network")
+    thread_length_error: float = Field(0.05, description="Relative standard deviation")
+
+
 def main() -> None:
-    """Parse the command line, fit and write."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.stitch.perception", description=__doc__)
-    parser.add_argument("--needle", type=Path, nargs="+", required=True)
-    parser.add_argument("--commit", required=True, help="of the estimator that was measured")
-    parser.add_argument("--out", type=Path, default=FOLDER / "perception_ours.toml")
-    parser.add_argument("--seconds", type=float, default=0.2, help="an estimate with its network")
-    parser.add_argument("--thread-length-error", type=float, default=0.05, help="relative standard deviation")
-    options = parser.parse_args()
-    records = [record for path in options.needle for record in read_estimates(path)]
+    """Fit and write."""
+    options = asked(Options)
+    records: list[Estimate] = list(kept_records("stitch_needle", options.needle).values())
     seeds = sorted({record.seed for record in records})
     told = (
-        f"Measured by python -m benchmarks.stitch.needle at commit {options.commit}, seeds {seeds[0]} to {seeds[-1]}, "
+        f"Measured by python -m benchmarks stitch_needle at commit {options.commit}, seeds {seeds[0]} to {seeds[-1]}, "
         "fitted by python -m benchmarks.stitch.perception. Masks are the rendered truth spoiled as a learned mask's, "
         "not a network's; elsewhere and tissue are of both forms of the same scenes. An estimate takes 0.13 s of one "
         "core; what a network adds to it, persistence, systematic share and the error of the thread's length are "

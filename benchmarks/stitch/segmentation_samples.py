@@ -116,7 +116,7 @@ def _pattern(random: np.random.Generator) -> np.ndarray:
     for size in (2, 8, 32):
         coarse = random.standard_normal((max(CROP // size, 2), max(CROP // size, 2))).astype(np.float32)
         share += random.uniform(0.1, 0.6) * cv2.resize(coarse, (CROP, CROP), interpolation=cv2.INTER_CUBIC)
-    share = (1.0 / (1.0 + np.exp(-share)))[..., None]
+    share = (1.0 / (1.0 + np.exp(-share)))[..., None]  # type: ignore[assignment]
     first, second = random.uniform(0.05, 0.95, 3), random.uniform(0.05, 0.95, 3)
     return (share * first + (1.0 - share) * second).astype(np.float32)
 

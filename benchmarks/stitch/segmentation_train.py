@@ -11,15 +11,16 @@ machine. The result is `segmentation.safetensors`, the moving average of the wei
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
+from pydantic import Field
 from torch.nn import functional
 
+from benchmarks.options import Recipe, asked
 from benchmarks.stitch.segmentation_samples import Views, masks_of, sample
 from benchmarks.stitch.segmentation_views import kept_view
 from benchmarks.training.run import TrainingRun, rate_at, train
@@ -141,18 +142,20 @@ def overlap(network: SutureNetwork, views: Views) -> dict[str, float]:
     return {name: round(float(share), 4) for name, share in zip(CLASSES, shares, strict=True)}
 
 
+class Options(Recipe):
+    """Options."""
+
+    views: Path | None = Field(None, description="Where rendered views are kept; OUT/views if not given")
+    start: Path | None = Field(None, description="Refine this checkpoint")
+    steps: int = Field(2000, description="Steps")
+    batch: int = Field(8, description="Crops a step")
+    seed: int = Field(0, description="Seed")
+    save_every: float = Field(240.0, description="Seconds between states")
+
+
 def main() -> None:
     """Render what is missing, then train or go on with a training."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--views", type=Path, help="where rendered views are kept; OUT/views if not given")
-    parser.add_argument("--start", type=Path, help="refine this checkpoint")
-    parser.add_argument("--quick", action="store_true", help="proves the recipe: 4 views, 40 steps")
-    parser.add_argument("--steps", type=int, default=2000)
-    parser.add_argument("--batch", type=int, default=8)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--save-every", type=float, default=240.0, help="seconds between states")
-    options = parser.parse_args()
+    options = asked(Options)
     torch.set_num_threads(1)
     folder = options.views or options.out / "views"
     few = 2 if options.quick else None

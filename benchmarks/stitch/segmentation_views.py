@@ -1,27 +1,40 @@
 """Rendered pairs of the needle world, kept on disk: pictures and each pixel's body as PNG, truth by the scene's seed.
 
-    python -m benchmarks.stitch.segmentation_views --out FOLDER --first N --count N [--endoscope]
-
 A view that is there already is not rendered again, so that a stopped run goes on.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 from pathlib import Path
 
 import cv2
 import numpy as np
+from pydantic import Field
 
+from benchmarks.experiment import Bench
 from schemas.errors import BadInput
-from stages.suture.rig import ENDOSCOPE, TWO_CAMERAS, StereoRig
+from stages.kit.stage import Parameters
+from stages.suture.rig import StereoRig
+from stages.suture.segmentation.checkpoint import BUNDLED
 from stages.suture.world.render import render
 from stages.suture.world.sampling import seen_scene
 
 CALIBRATION_ERROR = 0.15
 """Standard deviation of the right eye's error [px], as in the needle benchmark's ordinary cases."""
 EYES = ("left", "right")
+
+
+class ViewParameters(Parameters):
+    """Options of experiments on kept views."""
+
+    views: Path | None = Field(None, description="Where rendered views are kept; OUT/views if not given")
+    checkpoint: Path = Field(BUNDLED, description="Of the network")
+
+
+def views_of(bench: Bench) -> Path:
+    """Return the folder of the kept views."""
+    return bench.parameters.views or bench.out / "views"
 
 
 def view_name(rig: StereoRig, seed: int) -> str:
@@ -60,20 +73,3 @@ def _write(path: Path, image: np.ndarray) -> None:
     half = path.with_name("half_" + path.name)
     cv2.imwrite(str(half), image)
     os.replace(half, path)
-
-
-def main() -> None:
-    """Parse the command line and render."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.stitch.segmentation_views", description=__doc__)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--first", type=int, required=True)
-    parser.add_argument("--count", type=int, required=True)
-    parser.add_argument("--endoscope", action="store_true", help="the endoscope's rig instead of the two cameras")
-    options = parser.parse_args()
-    rig = ENDOSCOPE if options.endoscope else TWO_CAMERAS
-    for seed in range(options.first, options.first + options.count):
-        kept_view(options.out, rig, seed)
-
-
-if __name__ == "__main__":
-    main()

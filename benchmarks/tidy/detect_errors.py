@@ -1,19 +1,22 @@
-"""Writes the error model of vision from the log of `benchmarks.tidy.detect`.
+"""Writes the error model of vision from what `tidy_detect` measured of ours.
 
-python -m benchmarks.tidy.detect --tuning --one --out FOLDER
-python -m benchmarks.tidy.detect_errors --runs FOLDER/runs.jsonl --commit HASH --date DATE
+python -m benchmarks tidy_detect --tuning --one --arms ours --out FOLDER
+python -m benchmarks.tidy.detect_errors --runs FOLDER --commit HASH --date DATE
 """
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 
-from benchmarks.tidy.detect import REPORTING, Look, read_looks
-from benchmarks.tidy.detection_score import Match
+from benchmarks.experiments.tidy_detect.experiment import REPORTING
+from benchmarks.experiments.tidy_detect.score import Match
+from benchmarks.keeping import kept_records
+from benchmarks.options import asked
+from stages.kit.stage import Parameters
 from stages.tableware.vision.error_model import FILE, ErrorModel, KindErrors
 from stages.tableware.world.items import MEASURES, UTENSILS, Kind
 
@@ -37,34 +40,33 @@ def kind_errors(kind: Kind, matches: list[Match], images: int) -> KindErrors:
     )
 
 
-def model_of(looks: list[Look], commit: str, date: str) -> ErrorModel:
-    """Return the error model of the looks of the arm `ours`."""
-    ours = [look for look in looks if look.arm == "ours"]
-    matches = [m for look in ours for m in look.matches]
-    seeds = sorted({look.seed for look in ours})
-    return ErrorModel(
-        date=date,
-        commit=commit,
-        command="python -m benchmarks.tidy.detect --tuning --one",
-        seeds="reporting" if seeds[0] >= REPORTING else "tuning",
-        images=len(ours),
-        conditions=f"seeds {seeds[0]} to {seeds[-1]}, six tiers, three lights, two schemes of colour",
-        kinds={kind: kind_errors(kind, matches, len(ours)) for kind in MEASURES},
-        unknown_rate=sum(m.found == "unknown" for m in matches) / len(ours),
-    )
+class Options(Parameters):
+    """Options of the fit."""
+
+    runs: Path = Field(description="Output folder of tidy_detect")
+    commit: str = Field(description="Of what was measured")
+    date: str = Field(description="When it was")
+    first: int = Field(60, description="Seeds from here: thresholds were set on those before")
+    out: Path = Field(FILE, description="File")
 
 
 def main() -> None:
-    """Parse the command line and write."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.tidy.detect_errors", description=__doc__)
-    parser.add_argument("--runs", type=Path, required=True)
-    parser.add_argument("--commit", required=True)
-    parser.add_argument("--date", required=True)
-    parser.add_argument("--first", type=int, default=60, help="seeds from here: thresholds were set on those before")
-    parser.add_argument("--out", type=Path, default=FILE)
-    options = parser.parse_args()
-    looks = [look for look in read_looks(options.runs) if look.seed >= options.first]
-    model_of(looks, options.commit, options.date).write(options.out)
+    """Fit and write."""
+    options = asked(Options)
+    kept = kept_records("tidy_detect", options.runs).items()
+    ours = {int(t.seed): looks for t, looks in kept if t.arm == "ours" and int(t.seed) >= options.first}
+    looks = [look for looks in ours.values() for look in looks]
+    matches = [match for look in looks for match in look.matches]
+    ErrorModel(
+        date=options.date,
+        commit=options.commit,
+        command="python -m benchmarks tidy_detect --tuning --one",
+        seeds="reporting" if min(ours) >= REPORTING[0] else "tuning",
+        images=len(looks),
+        conditions=f"seeds {min(ours)} to {max(ours)}, six tiers, three lights, two schemes of colour",
+        kinds={kind: kind_errors(kind, matches, len(looks)) for kind in MEASURES},
+        unknown_rate=sum(m.found == "unknown" for m in matches) / len(looks),
+    ).write(options.out)
 
 
 if __name__ == "__main__":

@@ -1,24 +1,30 @@
 """Fits what actions cost the arm in physics to trials on tuning seeds, and writes data/tableware/physics_times.json.
 
-python -m benchmarks.tidy.physics_times --trials FOLDER/trials.jsonl --date DATE
+python -m benchmarks tidy_physics --tuning --out FOLDER
+python -m benchmarks.tidy.physics_times --runs FOLDER --date DATE
 """
 
 from __future__ import annotations
 
-import argparse
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 from scipy.optimize import nnls
 
-from benchmarks.tidy.physics_records import PhysicsRun, read_runs
+from benchmarks.experiments.tidy_fast.arms import OURS
+from benchmarks.experiments.tidy_physics import FAR, Run, delay_of
+from benchmarks.keeping import kept_records
+from benchmarks.options import asked
+from stages.kit.stage import Parameters
 from stages.tableware.simulation.arm_times import FILE, ArmTimes
 
 FIRST_REPORTING = 1000
 
 
-def fit(runs: list[PhysicsRun]) -> tuple[float, float, float, float]:
+def fit(runs: list[Run]) -> tuple[float, float, float, float]:
     """Return seconds of a trip, a stacking, a pull, and the standard deviation about them, of trials that lost nothing,
     left nothing and met no trouble."""
     good = [run for run in runs if not run.failed and not run.troubles]
@@ -29,21 +35,30 @@ def fit(runs: list[PhysicsRun]) -> tuple[float, float, float, float]:
     return float(found[0]), float(found[1]), float(found[2]), residual
 
 
+class Options(Parameters):
+    """Options of the fit."""
+
+    runs: Path = Field(description="Output folder of tidy_physics")
+    date: str = Field(description="When the trials ran")
+
+
 def main() -> None:
-    """Parse the command line, fit and write."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.tidy.physics_times", description=__doc__)
-    parser.add_argument("--trials", type=Path, required=True)
-    parser.add_argument("--date", required=True, help="when the trials ran")
-    options = parser.parse_args()
-    runs = [run for run in read_runs(options.trials) if run.seed < FIRST_REPORTING and run.sight == "truth"]
-    trip, stack, pull, residual = fit(runs)
+    """Fit and write."""
+    options = asked(Options)
+    kept = {
+        trial: replace(run, time=run.time - 2.0 * delay_of(trial.case) * run.trips)
+        for trial, run in kept_records("tidy_physics", options.runs).items()
+        if int(trial.seed) < FIRST_REPORTING and "/truth" in trial.case
+        if not delay_of(trial.case) or (delay_of(trial.case) == FAR and trial.arm in OURS)
+    }
+    trip, stack, pull, residual = fit(list(kept.values()))
     commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True).stdout
-    seeds = sorted({run.seed for run in runs})
-    tiers, arms = sorted({run.tier for run in runs}), sorted({run.arm for run in runs})
+    seeds = sorted(int(trial.seed) for trial in kept)
+    tiers, arms = sorted({trial.case.split("/")[0] for trial in kept}), sorted({trial.arm for trial in kept})
     times = ArmTimes(
         trip=round(trip, 3), stack=round(stack, 3), pull=round(pull, 3), residual=round(residual, 3),
-        trials=sum(not run.failed and not run.troubles for run in runs), date=options.date, commit=commit.strip(),
-        command="python -m benchmarks.tidy.physics --tuning --sight truth, then benchmarks.tidy.physics_times",
+        trials=sum(not run.failed and not run.troubles for run in kept.values()), date=options.date,
+        commit=commit.strip(), command="python -m benchmarks tidy_physics --tuning, then benchmarks.tidy.physics_times",
         conditions=f"tuning seeds {seeds[0]} to {seeds[-1]}, {', '.join(tiers)}, arms {', '.join(arms)}",
     )  # fmt: skip
     times.write(FILE)

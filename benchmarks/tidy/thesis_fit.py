@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from benchmarks.tidy.printed import PRINTED
 from stages.tableware.planning.time_model import FILE, PLACEMENT_KINDS, Drops, Fit, Times
 
 COMMAND = "python -m benchmarks.tidy.thesis_fit"
@@ -27,12 +28,10 @@ class Row:
     """Piles at the start; None: as many as Random's trips."""
 
 
-TABLE_7_2: dict[str, Row] = {
-    "tier0_cups": Row((78.2, 154.8), (58.5, 88.5), (48.8, 85.4), 6),
-    "tier0_bowls": Row((63.3, 123.3), (60.2, 90.2), (41.3, 74.6), 6),
-    "tier0_utensils": Row((64.1, 124.1), (64.3, 97.6), (55.3, 88.7), 6),
-    "tier1": Row((121.3, 241.3), (111.3, 171.3), (102.1, 178.8), 12),
-    "tier2": Row((93.5, 176.9), (88.2, 134.9), (84.2, 137.5)),
+PILES = {"tier0_cups": 6, "tier0_bowls": 6, "tier0_utensils": 6, "tier1": 12}
+TABLE_7_2 = {
+    tier: Row(*((row[0], row[2]) for row in rows.values()), piles=PILES.get(tier))  # type: ignore[misc, arg-type]
+    for tier, rows in PRINTED.items()
 }
 
 
@@ -83,10 +82,7 @@ def fitted_hold(tier: str) -> float:
     return (low + high) / 2
 
 
-FAILED_TRIALS: dict[str, tuple[int, int, int]] = {
-    "tier0_cups": (0, 0, 2), "tier0_bowls": (0, 0, 0), "tier0_utensils": (0, 0, 1), "tier1": (1, 2, 3),
-    "tier2": (0, 2, 3),
-}  # fmt: skip
+FAILED_TRIALS = {tier: tuple(row[4] for row in rows.values()) for tier, rows in PRINTED.items()}
 """Failed trials of three: Random, Stack, Pull (table 7.1)."""
 
 

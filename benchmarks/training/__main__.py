@@ -8,12 +8,14 @@ frames, a few steps, and figures that mean nothing.
 
 from __future__ import annotations
 
-import argparse
-import json
 import subprocess
 import sys
 from pathlib import Path
 
+from pydantic import Field
+
+from benchmarks.options import Recipe, asked
+from benchmarks.results import write_measured
 from benchmarks.training.samples import FrameSet
 from benchmarks.training.validation import KNOWN, quality_of
 from schemas.vocabulary import load_vocabulary
@@ -26,13 +28,15 @@ LIBRARY_SEED, LIBRARY_SHAPES = 41, 12
 QUICK_STEPS, QUICK_SHAPES = 12, 3
 
 
+class Options(Recipe):
+    """Options."""
+
+    threads: int = Field(1, description="Of the training; 1 gives the same bytes again")
+
+
 def main() -> int:
     """Run the recipe."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--quick", action="store_true", help="a few frames and steps")
-    parser.add_argument("--threads", type=int, default=1, help="of the training; 1 gives the same bytes again")
-    arguments = parser.parse_args()
+    arguments = asked(Options)
     out: Path = arguments.out
     shapes = str(QUICK_SHAPES if arguments.quick else LIBRARY_SHAPES)
     code, _ = run_command(
@@ -59,9 +63,7 @@ def main() -> int:
         metrics |= {f"{name}/validation/{measure}": value for measure, value in values.items()}
         lines.append(f"| {name} | " + " | ".join(f"{100 * v:.1f}" for v in values.values()) + f" | {mean.classes} |")
     lines += ["", f"{predictor.checkpoint.description}; {len(frames)} validation frames."]
-    (out / "metrics.json").write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
-    (out / "table.md").write_text("\n".join(lines) + "\n")
-    print("\n".join(lines))
+    write_measured(out, metrics, "\n".join(lines) + "\n")
     print(f"to ship it: cp {weights} data/networks/panoptic.safetensors")
     return 0
 

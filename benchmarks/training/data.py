@@ -11,7 +11,6 @@ instance). Arrays are memory-mapped, so training needs little memory.
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from collections.abc import Iterator
@@ -21,7 +20,9 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from pydantic import Field
 
+from benchmarks.options import Recipe, asked
 from benchmarks.training.clutter import Thing, height_map, primitives, put_down
 from schemas.cad_library import CadLibrary
 from schemas.errors import BadInput
@@ -352,16 +353,18 @@ def write_set(samples: Iterator[Sample], folder: Path) -> int:
     return number
 
 
+class Options(Recipe):
+    """Options."""
+
+    library: Path = Field(description="CAD library (library build --seed 41)")
+    rooms: int = Field(4 * len(TRAINING_SEEDS), description="Training rooms")
+    tables: int = Field(260, description="Training tabletops")
+    frames: int = Field(22 * SHARD, description="Training frames at most")
+
+
 def main() -> None:
     """Make the training and the validation set."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--library", type=Path, required=True, help="CAD library (library build --seed 41)")
-    parser.add_argument("--rooms", type=int, default=4 * len(TRAINING_SEEDS), help="training rooms")
-    parser.add_argument("--tables", type=int, default=260, help="training tabletops")
-    parser.add_argument("--frames", type=int, default=22 * SHARD, help="training frames at most")
-    parser.add_argument("--quick", action="store_true", help="8 rooms, 4 tabletops")
-    arguments = parser.parse_args()
+    arguments = asked(Options)
     catalogue = Catalogue(open_artifact(arguments.library, CadLibrary))  # type: ignore[arg-type]
     started = time.perf_counter()
     names = recipe_names()

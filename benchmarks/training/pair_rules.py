@@ -11,16 +11,17 @@ for stages/segment/backends/objects/rules.py, and five-fold cross-validation ove
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 from scipy.optimize import minimize
 
 from benchmarks.mosd_frames import CAMERA, LabelledFrame, read_frames
 from benchmarks.object_masks import score_object_masks
+from benchmarks.options import Recipe, asked
 from benchmarks.training.pair_recording import pairs_of_frame
 from benchmarks.training.tabletop_pairs import FOLDS, GENERATED, GENERATED_QUICK, generated_frames
 from schemas.errors import BadInput
@@ -203,13 +204,15 @@ def fit(rows: Rows) -> tuple[tuple[Rule, ...], dict[int, float]]:
     return (*rules, *KEPT), start
 
 
+class Options(Recipe):
+    """Options."""
+
+    data: Path = Field(description="Folder that holds mosd_tabletop")
+
+
 def main() -> None:
     """Record, fit, validate, print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, required=True, help="folder that holds mosd_tabletop")
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--quick", action="store_true", help="few generated frames")
-    arguments = parser.parse_args()
+    arguments = asked(Options)
     try:
         frames = read_frames(arguments.data / "mosd_tabletop" / "learn")
     except BadInput as error:

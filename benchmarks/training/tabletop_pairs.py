@@ -12,7 +12,6 @@ minutes on one core; generated frames are kept below `--out`. The seed is fixed:
 
 from __future__ import annotations
 
-import argparse
 import json
 import shutil
 from collections.abc import Iterable
@@ -20,9 +19,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 
 from benchmarks.mosd_frames import CAMERA, LabelledFrame, read_frames
 from benchmarks.object_masks import score_object_masks
+from benchmarks.options import Recipe, asked
 from benchmarks.training.pair_recording import pairs_of_frame
 from benchmarks.training.tabletops import make_tabletop
 from benchmarks.training.tree_growing import grow_trees
@@ -102,14 +103,16 @@ def cross_validate(generated: list[Pairs], real: list[list[Pairs]], frames: list
     }
 
 
+class Options(Recipe):
+    """Options."""
+
+    data: Path = Field(description="Folder that holds mosd_tabletop")
+    ship: bool = Field(False, description="Copy the trees to data/networks")
+
+
 def main() -> None:
     """Record, train, validate, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, required=True, help="folder that holds mosd_tabletop")
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--quick", action="store_true", help="few generated frames")
-    parser.add_argument("--ship", action="store_true", help="copy the trees to data/networks")
-    arguments = parser.parse_args()
+    arguments = asked(Options)
     try:
         real_frames = read_frames(arguments.data / "mosd_tabletop" / "learn")
     except BadInput as error:

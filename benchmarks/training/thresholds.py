@@ -7,18 +7,20 @@ The network runs once per frame; only the grouping is repeated.
 
 from __future__ import annotations
 
-import argparse
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
+from pydantic import Field
 
+from benchmarks.options import asked
 from benchmarks.training.samples import FrameSet
 from benchmarks.training.validation import KNOWN, STUFF
 from schemas.vocabulary import load_vocabulary
 from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
+from stages.kit.stage import Parameters
 from stages.segment.backends.network.backend import load_predictor
 from stages.segment.backends.network.features import STRIDE, Mount, features
 from stages.segment.backends.network.grouping import GroupingSettings, group
@@ -31,13 +33,17 @@ GRID = {
 }
 
 
+class Options(Parameters):
+    """Options."""
+
+    data: Path = Field(description="Folder of benchmarks.training.data")
+    weights: Path = Field(description="Of the network")
+    every: int = Field(2, description="Every so many frames")
+
+
 def main() -> None:
     """Print the settings, best first."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, required=True)
-    parser.add_argument("--weights", type=Path, required=True)
-    parser.add_argument("--every", type=int, default=2)
-    arguments = parser.parse_args()
+    arguments = asked(Options)
     vocabulary = load_vocabulary()
     names = {entry.id: entry.name for entry in vocabulary.classes}
     predictor = load_predictor(arguments.weights, vocabulary)

@@ -10,14 +10,15 @@ The result is `panoptic.safetensors`: the moving average of the weights.
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
+from pydantic import Field
 from torch.nn import functional
 
+from benchmarks.options import Recipe, asked
 from benchmarks.training.run import TrainingRun, rate_at, train
 from benchmarks.training.samples import FrameSet, varied
 from benchmarks.training.targets import IGNORED, Targets
@@ -133,17 +134,20 @@ def _plan_record(plan: Plan) -> dict[str, int | list[str]]:
     return asdict(plan) | {"classes": list(plan.classes)}
 
 
+class Options(Recipe):
+    """Options."""
+
+    data: Path = Field(description="Folder of benchmarks.training.data")
+    steps: int = Field(4600, description="Steps")
+    batch: int = Field(8, description="Frames a step")
+    seed: int = Field(0, description="Seed")
+    threads: int = Field(1, description="Of the processor")
+    save_every: float = Field(240.0, description="Seconds between states")
+
+
 def main() -> None:
     """Train, or go on with a training."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, required=True, help="folder of benchmarks.training.data")
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--steps", type=int, default=4600)
-    parser.add_argument("--batch", type=int, default=8)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--save-every", type=float, default=240.0, help="seconds between states")
-    arguments = parser.parse_args()
+    arguments = asked(Options)
     torch.set_num_threads(arguments.threads)
     frames = FrameSet(arguments.data / "training")
     plan = Plan(arguments.steps, arguments.batch, arguments.seed, frames.class_names(), len(frames))

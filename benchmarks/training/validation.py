@@ -5,15 +5,17 @@ python -m benchmarks.training.validation --data FOLDER --weights FILE [--every N
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 
+from benchmarks.options import asked
 from benchmarks.training.samples import FrameSet
 from schemas.vocabulary import load_vocabulary
 from stages.kit.measurement.panoptic_quality import ClassQuality, average_quality, panoptic_quality
+from stages.kit.stage import Parameters
 from stages.segment.backends.network.backend import Predictor, load_predictor
 from stages.segment.backends.network.features import Mount
 
@@ -53,13 +55,17 @@ def quality_of(
     return sums
 
 
+class Options(Parameters):
+    """Options."""
+
+    data: Path = Field(description="Folder of benchmarks.training.data")
+    weights: Path = Field(description="Of the network")
+    every: int = Field(1, description="Every so many frames")
+
+
 def main() -> None:
     """Print PQ per class and its mean."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, required=True)
-    parser.add_argument("--weights", type=Path, required=True)
-    parser.add_argument("--every", type=int, default=1)
-    arguments = parser.parse_args()
+    arguments = asked(Options)
     predictor = load_predictor(arguments.weights, load_vocabulary())
     frames = FrameSet(arguments.data / "validation")
     indices = range(0, len(frames), arguments.every)

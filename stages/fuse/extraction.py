@@ -88,7 +88,7 @@ def face_labels(labels: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.where(agree, corners[:, 0], 0)
 
 
-def cut_mesh(surface: Surface, chosen: np.ndarray) -> ColoredMesh:
+def cut_mesh(surface: Surface | ColoredMesh, chosen: np.ndarray) -> ColoredMesh:
     """Return the chosen faces (indices) as a mesh of their own; vertices and faces keep their order."""
     faces = surface.faces[chosen]
     used, places = np.unique(faces, return_inverse=True)

@@ -48,7 +48,7 @@ def checked_scenes(cad_scene: CadScene, shelf: ModelShelf) -> list[CheckedScene]
             conflicts = conflicts_of(cad_scene, shelf, candidates)
             models = sum(candidate is not None for candidate in candidates.values())
             caption = _caption(title, conflicts, models)
-            scenes.append(CheckedScene(_painted(model, cad_scene, conflicts), conflicts, caption))
+            scenes.append(CheckedScene(_painted(model, conflicts), conflicts, caption))
     return scenes
 
 

@@ -19,7 +19,6 @@ from schemas.ground_truth import GroundTruth, GroundTruthFile, TrueObject
 from schemas.sequence import Sequence
 from schemas.vocabulary import VOCABULARY_FILE, load_vocabulary
 from stages.kit.drawing.palette import instance_color
-from stages.kit.formats.labelled_mesh import LabelledMesh, read_labelled_mesh
 from stages.kit.formats.ply_files import ColoredMesh, write_ply
 from stages.kit.formats.scenenn_annotation import (
     AnnotatedLabel,
@@ -30,6 +29,7 @@ from stages.kit.formats.scenenn_annotation import (
 from stages.kit.geometry.boxes import is_round, minimum_box
 from stages.kit.geometry.transforms import apply
 from stages.kit.stage import Context
+from stages.truth.labelled_mesh import LabelledMesh, read_labelled_mesh
 from stages.truth.parameters import WORDS, SceneNNParameters
 from stages.truth.surface import surface_points
 

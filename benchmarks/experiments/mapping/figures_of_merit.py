@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ Figure = Callable[[Sequence[Outcome]], float | None]
 ANY = "any"
 
 
-def summed_qualities(outcomes: Sequence[Outcome], field: str = "qualities") -> dict[str, ClassQuality]:
+def summed_qualities(outcomes: Sequence[Any], field: str = "qualities") -> dict[str, ClassQuality]:
     """Return the sums of eq. 2.15 by class over all rooms."""
     sums: dict[str, ClassQuality] = {}
     for outcome in outcomes:

@@ -9,18 +9,18 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Iterator, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
+from benchmarks.experiment import Bench, Experiment, Results, Trial
 from benchmarks.experiments.mapping.arms import Arm, all_arms
+from benchmarks.experiments.mapping.figures_of_merit import class_figures
 from benchmarks.experiments.mapping.measuring import Outcome, outcome_of_map
 from benchmarks.experiments.scenenn.scenes import Scene, find_scene
-from benchmarks.experiments.scenenn.tables import ALL, all_figures, figures, make_tables, read_published, summarise
+from benchmarks.experiments.scenenn.tables import ALL, MEASURES, all_figures, of_ten, printed, read_published
 from benchmarks.steps import opened, step
 from schemas.contact_graph import ContactGraph, ContactGraphFile
 from schemas.errors import BadInput, UsageError
@@ -29,7 +29,6 @@ from schemas.panoptic_map import PanopticMap
 from stages.evaluate.map_measures import PredictedMap, load_map
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.truth import load_truth
-from stages.kit.measurement.tables import as_markdown
 from stages.kit.stage import Parameters
 
 WHAT_TO_FETCH = (
@@ -144,37 +143,26 @@ def renamed_graph(graph: ContactGraphFile) -> ContactGraphFile:
     return graph.model_copy(update={"nodes": nodes})
 
 
-@cache
-def published() -> dict[str, Any]:
-    """What the thesis prints."""
-    return read_published()
-
-
-def of_summary(name: str) -> Measure:
-    """A figure over the sequences, of the thesis's ten classes."""
-
-    def figure(outcomes: Sequence[Outcome]) -> float | None:
-        stuff, things = published()["stuff"], published()["things"]
-        return figures(summarise(outcomes, [*stuff, *things], things), stuff).get(name)
-
-    return Measure(figure)
-
-
 def more_figures(results: Results) -> dict[str, float | None]:
-    """Every sequence by itself, every class, and how many sequences there were."""
-    outcomes = {(trial.arm, trial.seed): outcome for trial, outcome in results.records.items()}
-    counted = {f"{arm}/{ALL}/sequences": float(len(results.of(arm, ALL))) for arm in results.arms()}
-    return {**all_figures(outcomes, published()), **counted}
+    """Every class, every sequence by itself, and how many sequences there were."""
+    flat: dict[str, float | None] = {}
+    for arm in results.arms():
+        flat[f"{arm}/{ALL}/sequences"] = float(len(results.of(arm, ALL)))
+        flat |= {f"{arm}/{ALL}/{name}": value for name, value in class_figures(results.of(arm, ALL)).items()}
+        for seed in results.seeds(ALL):
+            if (outcome := results.get(arm, ALL, seed)) is not None:
+                flat |= {f"{arm}/{seed}/{name}": value for name, value in all_figures([outcome]).items()}
+    return flat
 
 
 def notes(results: Results) -> str:
     """Return the thesis's tables with its printed rows, and what was not there."""
     backend = results.bench.parameters.backend
-    metrics = {name: value for name, value in more_figures(results).items() if value is not None}
-    parts = [as_markdown(table) for table in make_tables(metrics, results.arms(), published())]
     seeds = results.seeds(ALL)
+    parts = [printed(seeds)]
     parts.append(
-        f"Masks: {backend}. {len(seeds)} of the thesis's {len(published()['sequences'])} sequences: {', '.join(seeds)}."
+        f"Masks: {backend}. {len(seeds)} of the thesis's {len(read_published()['sequences'])} sequences: "
+        f"{', '.join(seeds)}."
     )
     if backend in NAMELESS:
         parts.append("These masks name no classes: the figures by class are not about them.")
@@ -196,7 +184,8 @@ EXPERIMENT = Experiment(
     together=lambda trial: trial.seed,
     measure=measure,
     record=Outcome,
-    measures={name: of_summary(name) for name in ("pq", "sq", "rq", "instance_ap", "box_ap", "box_ap_refined")},
+    subcases={ALL: (ALL, of_ten)},
+    measures=MEASURES,
     more_figures=more_figures,
     parameters=ScenennParameters,
     places=frozenset({"data", "annotations", "weights", "sequences"}),

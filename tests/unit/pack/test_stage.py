@@ -11,13 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.llm3.arms import ARMS, HARD, PUBLISHED
-from benchmarks.llm3.records import Run
-from benchmarks.llm3.tables import bootstrap, metrics, table
+from benchmarks.experiments.llm3.arms import HARD, PUBLISHED
 from schemas.errors import BadInput, UsageError
 from schemas.packing import Packing
 from stages.kit.language.failures import LanguageFailed
-from stages.kit.measurement.proportions import wilson_interval
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.pack.parameters import STAGE, PackParameters, Suite
@@ -125,26 +122,3 @@ def test_the_declaration_names_every_suite_and_refuses_idle_transcripts() -> Non
     with pytest.raises(UsageError):
         STAGE.check(PackParameters(), {"transcript": Path("t.jsonl")})
     STAGE.check(PackParameters(proposer="symbolic"), {"transcript": Path("t.jsonl")})
-
-
-def _run(arm: str, seed: int, calls: int, success: bool = True) -> Run:
-    return Run(
-        arm=arm, case="hard/fill", seed=seed, success=success, proposer_calls=1, motion_planner_calls=calls,
-        mesh_calls=0, iterations=1, seconds=0.1, boxes=4, fill=0.7,
-    )  # fmt: skip
-
-
-def test_figures_and_tables_of_known_runs() -> None:
-    runs = [_run("ours", seed, 10) for seed in range(4)]
-    runs += [_run("backtracking", seed, 30, seed != 3) for seed in range(4)]
-    figures = metrics(runs)
-    assert figures["backtracking/hard/fill/success"] == 0.75
-    assert figures["ours/hard/fill/motion_planner_calls"] == 10
-    text = table(runs)
-    assert "| hard/fill | `backtracking` | 3.0 [3.0, 3.0] | 3 | 1 | 0 |" in text and "## Harder suites" in text
-    published = [run.model_copy(update={"case": "published/easy"}) for run in runs]
-    assert "## Harder suites" not in table(published) and "| published/easy | `backtracking` | 3.0" in table(published)
-    assert wilson_interval(50, 100) == pytest.approx((0.4038, 0.5962), abs=1e-4)  # Wilson 1927, as in many books
-    low, high = bootstrap(np.array([1.0, 2.0, 3.0, 4.0]))
-    assert 1.0 <= low < 2.5 < high <= 4.0
-    assert set(ARMS) >= {"random", "scripted_backtrack", "scripted_scratch", "ours", "fixed_layout"}

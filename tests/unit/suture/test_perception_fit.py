@@ -1,16 +1,13 @@
-"""The error model that is fitted to measured estimates, and the parts of `make stitch` put together."""
+"""The error model that is fitted to measured estimates."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.gather import gather
 from benchmarks.stitch.perception import as_toml, fitted
-from schemas.errors import BadInput
 from stages.suture.evaluation.judgement import Estimate
 from stages.suture.trials.perception import FOLDER, perception_model
 
@@ -50,17 +47,3 @@ def test_shares_and_spreads_are_those_of_the_estimates(tmp_path: Path) -> None:
     assert perception_model(path).model_dump(exclude={"provenance"}) == model.model_dump(exclude={"provenance"})
     with pytest.raises(ValueError, match="tissue: 0 views"):
         fitted(records()[:-10], thesis, 0.2, 0.05, "Measured here and now, for a test.")
-
-
-def test_parts_are_put_together_and_must_agree(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="no part"):
-        gather("stitch", tmp_path)
-    for part, value in (("needle", 1.0), ("trials", 2.0)):
-        (tmp_path / part).mkdir()
-        (tmp_path / part / "metrics.json").write_text(json.dumps({f"ours/{part}/x": value}))
-        (tmp_path / part / "table.md").write_text(f"# {part}\n")
-    figures, text = gather("stitch", tmp_path)
-    assert figures == {"ours/needle/x": 1.0, "ours/trials/x": 2.0} and text == "# needle\n\n# trials\n"
-    (tmp_path / "trials" / "metrics.json").write_text(json.dumps({"ours/needle/x": 3.0}))
-    with pytest.raises(BadInput, match="in another part"):
-        gather("stitch", tmp_path)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.stitch.trials_sight import Look, table
 from cli.main import run
 from stages.kit.geometry.transforms import apply, inverse
 from stages.suture.motion.needle import point_at
@@ -70,14 +69,3 @@ def test_an_error_model_is_not_for_rendered_views(tmp_path: Path) -> None:
     model = str(FOLDER / "perception_ours.toml")
     told = ["suture", "simulate", "--sight", "geometry", "--perception", model, "--out", str(tmp_path / "out")]
     assert run(told) == 2
-
-
-def test_the_table_of_looks(tmp_path: Path) -> None:
-    row = Look(
-        arm="ours", seed=1, sutures=4, sutures_neutral=4, attempts=5, seconds=500.0, errors="I", reasons=("why",),
-        cpu_seconds=1.0, sight="geometry", places={"tissue": {"right": 3, "wrong": 1}}, model_sutures=6,
-        model_attempts=6, model_seconds=660.0,
-    )  # fmt: skip
-    text = table([row, row.model_copy(update={"seed": 2, "sutures": 6, "errors": "", "reasons": ()})], MODEL)
-    assert "| geometry | 5.00 [4.00, 6.00] | 100 | 1 0 0 0 | 1 |" in text
-    assert "| tissue | 8 | 75.0 | 0.0 | 0.0 | 25.0 |" in text and "- seed 1, after 4: I, why" in text

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from benchmarks.tidy.detect_real import matched, overlap
-from benchmarks.tidy.detection_score import Match, compare, measures, reliability
+from benchmarks.experiments.tidy_detect.score import Match, compare, measures, reliability
+from benchmarks.experiments.tidy_detect_real import matched, overlap
 from schemas.errors import BadInput, UsageError
 from schemas.tableware_detections import TablewareDetection, TablewareDetections, TablewareDetectionsFile
 from stages.kit.progress import SilentProgress

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.tidy.physics_holds import held
-from benchmarks.tidy.physics_pulls import divergence
-from benchmarks.tidy.physics_records import PhysicsRun, metrics, table
+from benchmarks.experiments.tidy_holds import held
+from benchmarks.experiments.tidy_physics import Run
+from benchmarks.experiments.tidy_pulls import divergence
 from benchmarks.tidy.physics_times import fit
 from stages.kit.motion.kinematics import arm_chain, forward
 from stages.kit.simulation.robot_description import load_robot
@@ -112,8 +112,8 @@ def test_two_cups_side_by_side_come_in_one_trip() -> None:
 
 def test_nested_cups_beside_nested_cups_do_not_creep_out_of_the_grasp() -> None:
     row = held("cc|cc", 1)
-    assert row["stood"] and (row["moved"], row["dropped"]) == (4, 0)
-    assert float(str(row["tilt"])) < 15.0
+    assert row.stood and (row.moved, row.dropped) == (4, 0)
+    assert row.tilt < 15.0
 
 
 def test_two_utensils_side_by_side_are_held_level_though_their_heads_touch() -> None:
@@ -248,9 +248,9 @@ def test_key_frames_are_in_order_and_end_with_the_last() -> None:
 
 
 def test_the_times_of_the_arm_are_found_back_and_those_kept_say_where_they_are_from() -> None:
-    def run(trips: int, stacks: int, pulls: int, dropped: int = 0) -> PhysicsRun:
-        return PhysicsRun(
-            arm="pull", tier="tier1", seed=trips, sight="truth", trips=trips,
+    def run(trips: int, stacks: int, pulls: int, dropped: int = 0) -> Run:
+        return Run(
+            trips=trips, looks=0, losses=(),
             time=6.0 * trips + 5.0 * stacks + 4.0 * pulls + 90 * dropped, moved=12, pulls=pulls, stacks=stacks,
             dropped=dropped, left=0, actions=6, perception=0, policy=0, troubles=(), cpu_seconds=1.0,
         )  # fmt: skip
@@ -296,41 +296,3 @@ def test_a_knocked_cup_is_counted_and_no_longer_on_the_table() -> None:
     world.do(grasp(world.table, "up"))
     assert (world.trial.moved, world.trial.dropped, world.trial.left) == (1, 1, 0)
     world.close()
-
-
-def test_figures_are_of_tables_that_all_arms_ran() -> None:
-    def run(arm: str, seed: int, time: float, dropped: int) -> PhysicsRun:
-        return PhysicsRun(
-            arm=arm, tier="tier1", seed=seed, sight="image", time=time, trips=6, moved=12 - dropped, pulls=0, stacks=0,
-            dropped=dropped, left=0, actions=6, perception=dropped, policy=0, troubles=(), cpu_seconds=1.0,
-        )  # fmt: skip
-
-    figures = metrics([run("random", 1, 80.0, 0), run("random", 2, 10.0, 0), run("ours", 1, 40.0, 3)])
-    assert figures["ours/tier1/physics/time_ratio"] == 2.0
-    assert figures["random/tier1/physics/trials"] == 1
-    assert figures["ours/tier1/physics/failures_perception"] == 1.0
-    assert figures["ours/tier1/physics/failures_policy"] == 0.0
-    assert figures["ours/tier1/physics/items_lost_share"] == 0.25
-
-
-def test_far_bins_add_to_each_trip_and_ours_is_what_was_planned_for_them() -> None:
-    def run(arm: str, time: float, trips: int) -> PhysicsRun:
-        return PhysicsRun(
-            arm=arm, tier="tier2", seed=1, sight="truth", time=time, trips=trips, moved=12, pulls=0, stacks=0,
-            dropped=0, left=0, actions=6, perception=0, policy=0, troubles=(), cpu_seconds=1.0,
-        )  # fmt: skip
-
-    runs = [
-        run("random", 70.0, 12),
-        run("pull", 60.0, 7),
-        run("stack", 65.0, 6),
-        run("ours", 55.0, 8),
-        run("ours_far", 64.0, 4),
-    ]
-    figures = metrics(runs)
-    assert figures["ours/tier2/physics/truth/time"] == 55.0
-    assert figures["ours/tier2/physics/truth/delay5/time"] == 104.0
-    assert figures["random/tier2/physics/truth/delay3/time"] == 142.0
-    assert figures["pull/tier2/physics/truth/delay5/no_slower_share"] == 0.0
-    assert figures["ours/tier2/physics/truth/no_slower_share"] == 1.0
-    assert "| truth | `ours` | 1 | 0: 0.0%" in table(runs)

@@ -9,8 +9,6 @@ from math import pi
 import numpy as np
 import pytest
 
-from benchmarks.tidy.records import Run
-from benchmarks.tidy.tables import metrics, no_slower
 from benchmarks.tidy.thesis_fit import FAILED_TRIALS, TABLE_7_2, trips_of
 from schemas.errors import BadInput, MissingDependency
 from schemas.tableware_plan import TablewareAction
@@ -289,21 +287,6 @@ def test_physics_that_is_not_there_is_said(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(simulators, "SIMULATION", "stages.tableware.no_such_package")
     with pytest.raises(MissingDependency, match="no physics"):
         simulators.SIMULATORS["physics"](SimulateParameters(simulator="physics"))
-
-
-def test_no_slower_goes_by_the_means_of_the_draws() -> None:
-    def run(arm: str, seed: int, time: float, first: float) -> Run:
-        return Run(
-            arm=arm, case="tier1/fast", seed=seed, draws=9, time=time, time_first=first, objects_per_trip=2.0,
-            trips=6.0, pulls=0.0, stacks=0.0, failed=0.0, failed_first=False,
-        )  # fmt: skip
-
-    ours, pulls, stacks = ({0: run(arm, 0, *times)} for arm, times in
-                           (("ours", (80.0, 99.0)), ("pull", (81.0, 70.0)), ("stack", (90.0, 95.0))))  # fmt: skip
-    assert no_slower(ours, pulls, stacks).tolist() == [1.0]
-    assert no_slower(ours, pulls, stacks, first=True).tolist() == [0.0]
-    figures = metrics([*ours.values(), *pulls.values(), *stacks.values()])
-    assert figures["ours/tier1/fast/no_slower_share"] == 1.0 and figures["ours/tier1/fast/failures_policy"] == 0.0
 
 
 def test_pictures_show_what_is_there() -> None:

@@ -23,7 +23,6 @@ from stages.evaluate.surfaces import Surface
 from stages.evaluate.truth import load_truth
 from stages.ingest.parameters import IngestParameters
 from stages.ingest.stage import run as ingest
-from stages.kit.formats.labelled_mesh import read_labelled_mesh
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.formats.scenenn_annotation import (
@@ -34,6 +33,7 @@ from stages.kit.formats.scenenn_annotation import (
 )
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
+from stages.truth.labelled_mesh import read_labelled_mesh
 from stages.truth.parameters import SceneNNParameters
 from stages.truth.stage import read_words, run
 from stages.truth.surface import surface_points

@@ -11,11 +11,10 @@ import pytest
 from benchmarks.command import main
 from benchmarks.experiments.mapping.measuring import Outcome, ranked
 from benchmarks.experiments.scenenn.scenes import Scene, find_scene
-from benchmarks.experiments.scenenn.tables import all_figures, make_tables, read_published
+from benchmarks.experiments.scenenn.tables import all_figures, of_ten, printed, read_published
 from schemas.vocabulary import load_vocabulary
 from stages.kit.measurement.average_precision import Candidates
 from stages.kit.measurement.panoptic_quality import ClassQuality
-from stages.kit.measurement.tables import as_markdown
 from tests.unit.truth.scenenn_folder import SCENE, write_folder
 
 
@@ -89,19 +88,18 @@ def outcome(found: int, missed: int, confidence: float) -> Outcome:
 
 
 def test_figures_add_up_over_sequences_before_they_are_averaged():
-    published = read_published()
-    outcomes = {("ours", "011"): outcome(3, 0, 50.0), ("ours", "030"): outcome(1, 4, 10.0)}
-    metrics = all_figures(outcomes, published)
-    assert metrics["ours/011/pq"] == pytest.approx(0.8 * 3 / 3.5)
-    assert metrics["ours/all/pq_table"] == pytest.approx(0.8 * 4 / (4 + 1 + 2))
+    one, other = of_ten(outcome(3, 0, 50.0)), of_ten(outcome(1, 4, 10.0))
+    assert all_figures([one])["pq"] == pytest.approx(0.8 * 3 / 3.5)
+    both = all_figures([one, other])
+    assert both["pq_table"] == pytest.approx(0.8 * 4 / (4 + 1 + 2))
     # Classes outside of the ten take no part, whatever was predicted of them.
-    assert metrics["ours/all/pq"] == metrics["ours/all/pq_table"]
+    assert both["pq"] == both["pq_table"]
     # Sorted by confidence: three hits, a miss, a hit, a miss; three of eight tables are never found.
-    assert metrics["ours/all/instance_ap"] == pytest.approx((3 + 4 / 5) / 8)
-    assert metrics["ours/all/instance_ap_thesis_code"] > metrics["ours/all/instance_ap"]
-    tables = make_tables(metrics, ["ours"], published)
-    text = "\n".join(as_markdown(table) for table in tables)
-    assert "| 011 | ours | 68.600 |" in text and "| 011 | Han 2024: ours | 45.500 |" in text
+    assert both["instance_ap"] == pytest.approx((3 + 4 / 5) / 8)
+    code = both["instance_ap_thesis_code"]
+    assert code is not None and code > (3 + 4 / 5) / 8
+    text = printed(["011"])
+    assert "| 011 | Han 2024: ours | 45.5 |" in text
     assert "| 096 |" not in text  # a sequence that was not run is not in the table
     assert "Han 2024: OccuSeg" in text and "Han 2024: ours, refined" in text
 

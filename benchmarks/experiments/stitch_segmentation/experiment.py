@@ -1,0 +1,286 @@
+"""The network's masks of needle and thread on held-out rendered views, and the needle's pose from them.
+
+Reporting seeds begin at 1300: those from 1000 on were seen with an earlier estimator. Estimators run on spoiled true
+masks and on learned ones. Times are CPU times of one thread.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+import torch
+
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
+from benchmarks.experiments.stitch_needle.experiment import MEASURES as POSES
+from benchmarks.experiments.stitch_needle.views import CASES, observe
+from benchmarks.stitch.segmentation_views import (
+    CALIBRATION_ERROR,
+    EYES,
+    ViewParameters,
+    kept_view,
+    read_eye,
+    views_of,
+)
+from stages.suture.evaluation.judgement import Estimate, judged
+from stages.suture.masks import learned_masks
+from stages.suture.needle.estimate import estimate
+from stages.suture.needle.thesis import thesis_estimate
+from stages.suture.rig import TWO_CAMERAS
+from stages.suture.segmentation.infer import Masks, Segmenter
+from stages.suture.world.render import Eye
+from stages.suture.world.sampling import seen_scene
+from stages.suture.world.scene import NeedleScene
+from stages.suture.world.tubes import NEEDLE, THREAD
+
+TUNING, REPORTING = range(450, 550), range(1300, 1400)
+VIEWS, NETWORK = "views", "network"
+ESTIMATORS = {"thesis": thesis_estimate, "ours": estimate}
+MASKS = ("spoiled", "learned")
+HOLDERS, LIGHTS = ("air", "left", "right", "both", "tissue"), ("dim", "ordinary", "bright")
+CLOSE = 3.0
+"""An end is close to the mask within so many pixels."""
+PICTURED, HALF_WIDTH, HALF_HEIGHT = 6, 100, 75
+COLOURS = {
+    NEEDLE: ((60, 220, 60), (255, 30, 30), (40, 70, 255)),
+    THREAD: ((250, 230, 60), (255, 140, 0), (60, 240, 255)),
+}
+AT_AN_END = 3
+"""An eye sees an end if it sees one of so many samples of the arc next to it (1.5 degrees each)."""
+
+
+@dataclass(frozen=True)
+class MaskRecord:
+    """Counts of pixels of one eye's picture: found and true, and found or true; of thread also those found that lie
+    within a pixel of true thread, and true ones within a pixel of found thread. `tip`, `swage`: the distance [px] from
+    the projected end to the found needle, -1 where this eye does not see the end. `two_mm`: 2 mm at the needle, [px].
+    """
+
+    holder: str
+    light: str
+    needle_both: int
+    needle_either: int
+    needle_true: int
+    thread_both: int
+    thread_either: int
+    thread_true: int
+    thread_true_near: int
+    thread_found: int
+    thread_found_near: int
+    tip: float
+    swage: float
+    two_mm: float
+    seconds: float
+
+
+Masked = tuple[MaskRecord, ...]
+"""Of both eyes."""
+
+
+def light_of(scene: NeedleScene) -> str:
+    """Return whether the scene is dim, ordinary or bright: the lamps' strength times the exposure."""
+    strength = float(scene.light.lamps[:, 3].sum()) * scene.light.exposure
+    return "dim" if strength < 0.8 else "bright" if strength > 1.1 else "ordinary"
+
+
+def _near(mask: np.ndarray) -> np.ndarray:
+    """Return the mask grown by a pixel to each side."""
+    return cv2.dilate(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+
+
+def _to_mask(mask: np.ndarray, pixel: np.ndarray) -> float:
+    """Return the distance [px] from a pixel (column, row) to the mask; the picture's width where there is none."""
+    rows, columns = np.nonzero(mask)
+    if len(rows) == 0:
+        return float(mask.shape[1])
+    return float(np.hypot(columns - pixel[0], rows - pixel[1]).min())
+
+
+def mask_record(
+    scene: NeedleScene, name: str, eye: Eye, bodies: np.ndarray, found: Masks, seconds: float
+) -> MaskRecord:
+    """Return the record of one eye; `bodies` (H, W) are the true ones, `eye` says which part of the arc is seen."""
+    rig = scene.rig
+    needle, thread = bodies == NEEDLE, bodies == THREAD
+    ends = np.stack([scene.pose.tip, scene.pose.swage])
+    pixels = rig.left(ends) if name == "left" else rig.right(ends)
+    seen = (eye.sees[:AT_AN_END].any(), eye.sees[-AT_AN_END:].any())
+    tip, swage = (
+        _to_mask(found.needle, pixel) if visible else -1.0 for pixel, visible in zip(pixels, seen, strict=True)
+    )
+    return MaskRecord(
+        holder=scene.holder,
+        light=light_of(scene),
+        needle_both=int((needle & found.needle).sum()),
+        needle_either=int((needle | found.needle).sum()),
+        needle_true=int(needle.sum()),
+        thread_both=int((thread & found.thread).sum()),
+        thread_either=int((thread | found.thread).sum()),
+        thread_true=int(thread.sum()),
+        thread_true_near=int((thread & _near(found.thread)).sum()),
+        thread_found=int(found.thread.sum()),
+        thread_found_near=int((found.thread & _near(thread)).sum()),
+        tip=tip,
+        swage=swage,
+        two_mm=0.002 * rig.focal / float(scene.pose.centre[2]),
+        seconds=seconds,
+    )
+
+
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Masked | Estimate]]:
+    """Yield the masks of both eyes of one view, and the estimates of its needle from spoiled and learned masks."""
+    torch.set_num_threads(1)
+    seed, segmenter = int(trials[0].seed), Segmenter.load(bench.parameters.checkpoint)
+    stem = kept_view(views_of(bench), TWO_CAMERAS, seed)
+    scene, view = seen_scene(seed, TWO_CAMERAS, calibration_error=CALIBRATION_ERROR)
+    records, found, eyes = [], [], []
+    for name, eye in zip(EYES, (view.left, view.right), strict=True):
+        picture, bodies = read_eye(stem, name)
+        started = time.process_time()
+        masks = segmenter.masks(picture)
+        seconds = time.process_time() - started
+        records.append(mask_record(scene, name, eye, bodies, masks, seconds))
+        found.append(masks)
+        eyes.append(replace(eye, image=picture))
+    spoiled = observe(replace(view, left=eyes[0], right=eyes[1]), CASES["rendered"].disparity_noise, seed)
+    given = {"spoiled": spoiled, "learned": learned_masks(*found).observation(TWO_CAMERAS, spoiled.disparity)}
+    for trial in trials:
+        if trial.arm == NETWORK:
+            yield trial, tuple(records)
+            continue
+        arm, masks_are = trial.arm.split("_")
+        started = time.process_time()
+        answer = ESTIMATORS[arm](given[masks_are])
+        yield trial, judged(arm, masks_are, seed, view, answer, time.process_time() - started)
+
+
+def of_masks(which: Callable[[MaskRecord], bool]) -> tuple[str, Callable[[Masked | Estimate], Masked | None]]:
+    """The pictures of some views."""
+    return VIEWS, lambda record: record if isinstance(record, tuple) and which(record[0]) else None
+
+
+def of_poses(which: Callable[[Estimate], bool]) -> tuple[str, Callable[[Masked | Estimate], Estimate | None]]:
+    """The estimates in some views."""
+    return VIEWS, lambda record: record if isinstance(record, Estimate) and which(record) else None
+
+
+def pictured(figure: Callable[[list[MaskRecord]], float | None], interval: bool = False) -> Measure:
+    """Return a measure over single pictures; None where the records are estimates."""
+
+    def of(records: Sequence[Any]) -> float | None:
+        return figure([eye for record in records for eye in record]) if isinstance(records[0], tuple) else None
+
+    return Measure(of, interval=interval)
+
+
+def share(part: str, whole: str) -> Measure:
+    """Return a share of pixels, pooled over pictures."""
+    return pictured(
+        lambda eyes: sum(getattr(e, part) for e in eyes) / max(sum(getattr(e, whole) for e in eyes), 1), True
+    )
+
+
+def ends(which: str, near: Callable[[MaskRecord], float]) -> Measure:
+    """Return the share of the ends that are seen which lie this near [px] to the mask."""
+
+    def figure(eyes: list[MaskRecord]) -> float | None:
+        hits = [getattr(eye, which) <= near(eye) for eye in eyes if getattr(eye, which) >= 0]
+        return float(np.mean(hits)) if hits else None
+
+    return pictured(figure)
+
+
+def seen(which: str) -> Measure:
+    """Count the ends that are seen."""
+    return pictured(lambda eyes: float(sum(getattr(eye, which) >= 0 for eye in eyes)))
+
+
+def middle(part: str, whole: str) -> Measure:
+    """Return the median over pictures of a share of pixels."""
+    return pictured(lambda eyes: float(np.median([getattr(e, part) / max(getattr(e, whole), 1) for e in eyes])))
+
+
+MEASURES = {
+    "pictures": pictured(lambda eyes: float(len(eyes))),
+    "needle_iou": share("needle_both", "needle_either"),
+    "needle_iou_median": middle("needle_both", "needle_either"),
+    "thread_iou": share("thread_both", "thread_either"),
+    "thread_iou_median": middle("thread_both", "thread_either"),
+    "thread_recall_1px": share("thread_true_near", "thread_true"),
+    "thread_precision_1px": share("thread_found_near", "thread_found"),
+    "tips_seen": seen("tip"),
+    "tip_recall_2mm": ends("tip", lambda eye: eye.two_mm),
+    "tip_recall_3px": ends("tip", lambda eye: CLOSE),
+    "swages_seen": seen("swage"),
+    "swage_recall_2mm": ends("swage", lambda eye: eye.two_mm),
+    "swage_recall_3px": ends("swage", lambda eye: CLOSE),
+    "cpu_seconds": pictured(lambda eyes: float(np.median([eye.seconds for eye in eyes]))),
+}
+
+
+def either(name: str) -> Measure:
+    """Return the measure of this name, of masks or of poses, whichever the records are."""
+    masks, poses = MEASURES.get(name), POSES.get(name)
+
+    def of(records: Sequence[Any]) -> float | None:
+        measure = masks if isinstance(records[0], tuple) else poses
+        return measure.of(records) if measure else None
+
+    return Measure(of, interval=any(m is not None and m.interval for m in (masks, poses)))
+
+
+def pictures(results: Results) -> None:
+    """Draw learned masks about the needle in masks.png, beside what they are made of. Green: needle found rightly, red:
+    taken for needle, blue: missed; yellow: thread found rightly, orange: taken for thread, cyan: missed."""
+    bench, pairs = results.bench, []
+    for seed in map(int, results.seeds("all")[:PICTURED]):
+        picture, bodies = read_eye(kept_view(views_of(bench), TWO_CAMERAS, seed), "left")
+        found = Segmenter.load(bench.parameters.checkpoint).masks(picture)
+        rows, columns = np.nonzero(bodies == NEEDLE)
+        top = int(np.clip(rows.mean() - HALF_HEIGHT, 0, bodies.shape[0] - 2 * HALF_HEIGHT))
+        left = int(np.clip(columns.mean() - HALF_WIDTH, 0, bodies.shape[1] - 2 * HALF_WIDTH))
+        window = np.s_[top : top + 2 * HALF_HEIGHT, left : left + 2 * HALF_WIDTH]
+        painted = picture[window].copy()
+        for body, mask in ((THREAD, found.thread), (NEEDLE, found.needle)):
+            true, there = bodies[window] == body, mask[window]
+            for where, colour in zip((true & there, there & ~true, true & ~there), COLOURS[body], strict=True):
+                painted[where] = colour
+        pairs.append(np.hstack([picture[window], painted]))
+    if pairs:
+        image = np.vstack(pairs)[..., ::-1]
+        cv2.imwrite(str(bench.out / "masks.png"), cv2.resize(image, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST))
+
+
+EXPERIMENT = Experiment(
+    name="stitch_segmentation",
+    title="Needle and thread in a picture",
+    simulated="Pairs of the one rendered world the network was trained on; disparity is true with noise.",
+    knows="The picture; for the pose the needle's radius and taper.",
+    does_not_show="Anything about real pictures: one rendered world, one pad, one needle, one kind of driver.",
+    arms={name: name for name in (NETWORK, *(f"{arm}_{masks}" for masks in MASKS for arm in ESTIMATORS))},
+    cases=(VIEWS,),
+    tuning=tuple(map(str, TUNING)),
+    reporting=tuple(map(str, REPORTING)),
+    together=lambda trial: trial.seed,
+    measure=measure,
+    record=Masked | Estimate,
+    subcases={
+        "all": of_masks(lambda record: True),
+        **{f"holder_{h}": of_masks(lambda record, h=h: record.holder == h) for h in HOLDERS},  # type: ignore[misc]
+        **{f"light_{name}": of_masks(lambda record, n=name: record.light == n) for name in LIGHTS},  # type: ignore[misc]
+        "needle_visible": of_poses(lambda record: record.visible),
+        "needle_all": of_poses(lambda record: True),
+    },
+    measures={name: either(name) for name in dict.fromkeys((*MEASURES, *POSES))},
+    parameters=ViewParameters,
+    places=frozenset({"views", "checkpoint"}),
+    inputs=lambda bench, trial: [bench.parameters.checkpoint],
+    pairs=tuple((f"ours_{masks}", f"thesis_{masks}") for masks in MASKS),
+    compared=("within_tolerance",),
+    quick_seeds=4,
+    pictures=pictures,
+)

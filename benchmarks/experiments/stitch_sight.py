@@ -1,0 +1,110 @@
+"""Suture trials that see by rendered views of the trial itself, beside the same seeds seen by the error model.
+
+`geometry`: masks spoiled as a learned mask's, 15 s of one core a trial; `pictures`: rendered pictures and the network's
+masks, 80 s. What became of the looks by place is what the error model's shares say.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+
+import cv2
+
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
+from benchmarks.experiments.stitch_trials.experiment import REPORTING, TUNING, over, rate
+from benchmarks.stitch.eyes import drawn_looks
+from benchmarks.tabulation import markdown
+from schemas.suture_trial import SutureRun
+from stages.suture.options import ARM_NAMES
+from stages.suture.trials.machine import run_trial
+from stages.suture.trials.perception import FOLDER, PerceptionModel, perception_model
+from stages.suture.trials.policies import POLICIES
+from stages.suture.trials.records import run_of
+from stages.suture.trials.sight import LookingEyes
+
+TRIALS = {"geometry": 30, "pictures": 8, "error_model": 30}
+"""Case -> trials."""
+FATED = ("geometry", "pictures")
+FATES = ("right", "swapped", "abstained", "wrong")
+
+
+class Look(SutureRun):
+    """A trial with what became of the looks (place -> fate -> count)."""
+
+    cpu_seconds: float
+    places: dict[str, dict[str, int]] = {}
+
+
+def model_of(arm: str) -> PerceptionModel:
+    """Return the error model that an arm sees by."""
+    return perception_model(FOLDER / f"perception_{POLICIES[arm].perception}.toml")
+
+
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Look]]:
+    """Yield trials."""
+    for trial in trials:
+        seed, model = int(trial.seed), model_of(trial.arm)
+        eyes = LookingEyes(model, seed, trial.case == "pictures") if trial.case in FATED else None
+        started = time.process_time()
+        run = run_of(trial.arm, seed, run_trial(POLICIES[trial.arm], seed, model=model, eyes=eyes))
+        spent = time.process_time() - started
+        places = {place: dict(counts) for place, counts in eyes.places.items()} if eyes else {}
+        yield trial, Look(**run.model_dump(), cpu_seconds=spent, places=places)
+
+
+def looks(results: Results) -> str:
+    """Shares of looks by place, beside them those of the error model (a swap of the ends counts there as not right);
+    what ended trials."""
+    rows, ended = [], []
+    for case in (case for case in FATED if case in results.cases):
+        for arm in results.arms(case):
+            runs, model = results.of(arm, case), model_of(arm)
+            for place in sorted({place for run in runs for place in run.places}):
+                counts = [sum(run.places.get(place, {}).get(fate, 0) for run in runs) for fate in FATES]
+                right = model.right_share.at(place)
+                told = [count / sum(counts) for count in counts] + [
+                    right,
+                    (1 - right) * model.abstained_share.at(place),
+                ]
+                rows.append((case, arm, place, str(sum(counts)), *(f"{100 * share:.1f}" for share in told)))
+            ended += [
+                (case, arm, str(r.seed), str(r.sutures), r.errors[-1], r.reasons[-1]) for r in runs if r.errors
+            ]  # fmt: skip
+    head = ("case", "arm", "place", "looks", *FATES, "model: right", "model: abstained")
+    last = ("case", "arm", "seed", "after", "error", "reason")
+    return markdown("Looks [%]", head, rows) + "\n" + markdown("What ended trials", last, ended)
+
+
+def pictures(results: Results) -> None:
+    """Draw the first looks of the first trial that saw pictures in eyes.png."""
+    if "pictures" in results.cases:
+        cv2.imwrite(str(results.bench.out / "eyes.png"), drawn_looks(int(results.seeds("pictures")[0])))
+
+
+EXPERIMENT = Experiment(
+    name="stitch_sight",
+    title="Suture trials that see by rendered views",
+    simulated="Needle, tissue, thread, two arms, and in two cases what the cameras see of them.",
+    knows="No truth of the simulator.",
+    does_not_show="Anything about real pictures.",
+    arms={arm: arm for arm in ARM_NAMES},
+    default_arms=lambda bench: ("ours",),
+    cases=tuple(TRIALS),
+    default_cases=lambda bench: ("geometry", "error_model"),
+    tuning=tuple(map(str, TUNING)),
+    reporting=tuple(map(str, REPORTING)),
+    seeds_of=lambda bench, case: tuple(map(str, (TUNING if bench.tuning else REPORTING)[: TRIALS[case]])),
+    measure=measure,
+    record=Look,
+    measures={
+        "sutures_to_failure": mean("sutures"),
+        "seconds_per_suture": over(lambda run: run.seconds, lambda run: run.attempts),
+        "full_wound_rate": rate(lambda run: run.sutures >= 6),
+        "count": Measure(count, interval=False),
+        "cpu_seconds": mean("cpu_seconds", "s", interval=False),
+    },
+    quick_seeds=2,
+    notes=looks,
+    pictures=pictures,
+)

@@ -1,0 +1,204 @@
+"""Vision on real images: oblique RealSense frames of tabletops, and photographs of a restaurant table.
+
+`--data` holds `realsense_tabletop` (colour and depth PNGs; the truth is data/annotations/tableware, by eye) and `meal`
+(photographs with YOLO boxes). A detection in a frame counts when its rim's middle lies within 30 px of one of its kind;
+an outline in a photograph when its box overlaps one of its class by half (intersection over union), or, the weaker
+measure, when its middle lies in one. Beside each record lies the picture.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+from pydantic import Field
+from scipy.optimize import linear_sum_assignment
+
+from benchmarks.experiment import Bench, Experiment, Results, Trial
+from schemas.scene_parts import Camera
+from stages.kit.stage import Parameters
+from stages.tableware.vision.image_files import read_image
+from stages.tableware.vision.overlay import draw_outlines, draw_sight
+from stages.tableware.vision.photographs import Outline, find_outlines
+from stages.tableware.vision.seeing import Sight, Sizes, see
+
+ANNOTATIONS = Path(__file__).resolve().parents[2] / "data" / "annotations" / "tableware" / "realsense_tabletop.toml"
+NEAR = 30.0
+"""[px]"""
+PICTURE_WIDTH = 1.6
+"""What the photographs' width shows of the table [m]: our guess."""
+CLASSES = {6: "plate", 7: "plate", 8: "cup", 9: "cup"}
+"""Of the photographs' classes plate, plate bottom, shot and tea; the others are food and a board."""
+OVERLAP = 0.5
+SIZES: dict[str, Sizes] = {"detect_frames_known": "known", "detect_frames_estimated": "estimated"}
+Box = tuple[float, float, float, float]
+Counts = Counter[tuple[str, str]]
+"""(class, true | found | right) -> count."""
+
+
+def matched(gain: np.ndarray, least: float) -> list[tuple[int, int]]:
+    """Return pairs of rows and columns of greatest total gain, each at least `least`."""
+    if gain.size == 0:
+        return []
+    rows, columns = linear_sum_assignment(-np.where(gain >= least, gain, -1e3))
+    return [(int(r), int(c)) for r, c in zip(rows, columns, strict=True) if gain[r, c] >= least]
+
+
+def frame_counts(truth: list[tuple[str, float, float]], sight: Sight) -> Counts:
+    """Return counts by (class, true | found | right) of a frame; things of unknown kind count as `unknown`."""
+    camera_from_world = np.linalg.inv(sight.world_from_camera)
+    counts: Counts = Counter((kind, "true") for kind, _, _ in truth)
+    seen = []
+    for one in sight.detections:
+        counts[one.kind or "unknown", "found"] += 1
+        point = camera_from_world @ np.array([one.position[0], one.position[1], one.lip, 1.0])
+        seen.append((one.kind, sight.camera.fx * point[0] / point[2] + sight.camera.cx,
+                     sight.camera.fy * point[1] / point[2] + sight.camera.cy))  # fmt: skip
+    gain = np.array([[-np.hypot(u - x, v - y) if kind == other else -1e6 for other, x, y in seen]
+                     for kind, u, v in truth]).reshape(len(truth), len(seen))  # fmt: skip
+    for row, _ in matched(gain, -NEAR):
+        counts[truth[row][0], "right"] += 1
+    return counts
+
+
+def overlap(a: Box, b: Box) -> float:
+    """Return the intersection over union of two boxes (left, top, right, bottom)."""
+    width, height = (max(0.0, min(a[k + 2], b[k + 2]) - max(a[k], b[k])) for k in (0, 1))
+    areas = [(box[2] - box[0]) * (box[3] - box[1]) for box in (a, b)]
+    return width * height / max(sum(areas) - width * height, 1e-9)
+
+
+def middle_inside(a: Box, b: Box) -> float:
+    """Return 1 when the middle of box b lies in box a, else 0."""
+    u, v = 0.5 * (b[0] + b[2]), 0.5 * (b[1] + b[3])
+    return float(a[0] <= u <= a[2] and a[1] <= v <= a[3])
+
+
+def photograph_counts(
+    truth: list[tuple[str, Box]], outlines: tuple[Outline, ...], gain: Callable[[Box, Box], float], any_class: bool
+) -> Counts:
+    """Return counts by (class, true | found | right) of a photograph; with `any_class` kinds do not matter."""
+    counts: Counts = Counter()
+    for kind, _ in truth:
+        counts["any" if any_class else kind, "true"] += 1
+    for one in outlines:
+        counts["any" if any_class else str(one.kind), "found"] += 1
+    gains = np.array([[gain(box, one.box) if any_class or one.kind == kind else -1.0 for one in outlines]
+                      for kind, box in truth]).reshape(len(truth), len(outlines))  # fmt: skip
+    for row, _ in matched(gains, OVERLAP):
+        counts["any" if any_class else truth[row][0], "right"] += 1
+    return counts
+
+
+def read_boxes(path: Path, width: int, height: int) -> list[tuple[str, Box]]:
+    """Return the boxes [px] of a YOLO label file that map to our classes."""
+    boxes = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        number, *numbers = line.split()
+        if int(number) in CLASSES:
+            u, v, w, h = (float(value) for value in numbers[:4])
+            box = ((u - w / 2) * width, (v - h / 2) * height, (u + w / 2) * width, (v + h / 2) * height)
+            boxes.append((CLASSES[int(number)], box))
+    return boxes
+
+
+GAINS: dict[str, Callable[[Box, Box], float]] = {
+    "detect_photographs_overlap": overlap,
+    "detect_photographs_middle": middle_inside,
+}
+
+
+class RealParameters(Parameters):
+    """Options of the experiment."""
+
+    data: Path = Field(Path("../shared/data/tableware"), description="Folder of realsense_tabletop and meal")
+
+
+def annotated() -> tuple[Camera, dict[str, list[tuple[str, float, float]]]]:
+    """Return the camera of the frames, and by frame what lies in it: kind, column, row [px]."""
+    told = tomllib.loads(ANNOTATIONS.read_text(encoding="utf-8"))
+    frames = {name: [(str(k), float(u), float(v)) for k, u, v in marks] for name, marks in told["frames"].items()}
+    return Camera(**told["camera"]), dict(sorted(frames.items()))
+
+
+def photographs(data: Path) -> dict[str, Path]:
+    """Return the photographs by name."""
+    return {f"{p.parent.parent.name}_{p.stem}": p for p in sorted((data / "meal").glob("*/images/*.jpg"))}
+
+
+def seeds_of(bench: Bench, case: str) -> Sequence[str]:
+    """The frames, the photographs."""
+    data: Path = bench.parameters.data
+    if case in GAINS:
+        return tuple(photographs(data))
+    return tuple(annotated()[1]) if (data / "realsense_tabletop").is_dir() else ()
+
+
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, dict[str, int]]]:
+    """Yield `<class>/<true | found | right>` -> count of images."""
+    for trial in trials:
+        look = photograph_seen if trial.case in GAINS else frame_seen
+        counts, picture = look(bench.parameters.data, trial)
+        bench.folder(trial).mkdir(parents=True, exist_ok=True)
+        cv2.imwrite(str(bench.folder(trial) / "picture.png"), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+        yield trial, {"/".join(key): count for key, count in counts.items()}
+
+
+def frame_seen(data: Path, trial: Trial) -> tuple[Counts, np.ndarray]:
+    """Return the counts of a frame and its picture."""
+    camera, frames = annotated()
+    folder = data / "realsense_tabletop"
+    read = read_image(folder / f"{trial.seed}-color.png", folder / f"{trial.seed}-depth.png")
+    sight = see(read.color, read.depth, camera, sizes=SIZES[trial.case])
+    return frame_counts(frames[trial.seed], sight), draw_sight(read.color, sight)
+
+
+def photograph_seen(data: Path, trial: Trial) -> tuple[Counts, np.ndarray]:
+    """Return the counts of a photograph, by class and of any class, and its picture."""
+    path = photographs(data)[trial.seed]
+    color = read_image(path).color
+    outlines = find_outlines(color, PICTURE_WIDTH)
+    boxes = read_boxes(path.parent.parent / "labels" / f"{path.stem}.txt", color.shape[1], color.shape[0])
+    counts = Counter[tuple[str, str]]()
+    for any_class in (False, True):
+        counts.update(photograph_counts(boxes, outlines, GAINS[trial.case], any_class))
+    return counts, draw_outlines(color, outlines, "a photograph without depth: heights are unknown")
+
+
+def more_figures(results: Results) -> dict[str, float | None]:
+    """`ours/<case>/<class>/<measure>` over all images."""
+    flat: dict[str, float | None] = {}
+    for case in results.cases:
+        counts = sum((Counter(record) for record in results.of("ours", case)), Counter[str]())
+        for kind in sorted({name.split("/")[0] for name in counts}):
+            true, found, right = (counts[f"{kind}/{name}"] for name in ("true", "found", "right"))
+            at = f"ours/{case}/{kind}"
+            flat |= {f"{at}/true": true, f"{at}/found": found, f"{at}/right": right}
+            flat |= {
+                f"{at}/precision": right / found if found else None,
+                f"{at}/recall": right / true if true else None,
+            }
+    return flat
+
+
+EXPERIMENT = Experiment(
+    name="tidy_detect_real",
+    title="Vision of tableware on real images",
+    simulated="Nothing: nine RealSense frames, twelve photographs.",
+    knows="Intrinsics and depth, known dish sizes or none; developed on these frames.",
+    does_not_show="A test: sizes estimated was developed while looking at these frames; the truth was marked by eye.",
+    arms={"ours": "ours"},
+    cases=(*SIZES, *GAINS),
+    seeds_of=seeds_of,
+    measure=measure,
+    record=dict[str, int],
+    measures={},
+    more_figures=more_figures,
+    parameters=RealParameters,
+    places=frozenset({"data"}),
+    steps=("tableware",),
+)

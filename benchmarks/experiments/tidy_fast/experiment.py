@@ -1,0 +1,129 @@
+"""Clearing tables in the fast simulator: tables 7.1 and 7.2 (Srinivas 2024), a joint planner and the exact optimum."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean, ratio, statistic
+from benchmarks.experiments.tidy_fast.arms import ARMS, DELAYS, DROPS_ON, OURS, SPILLS_ON, WORLDS, Run, trials
+from benchmarks.tabulation import markdown
+from benchmarks.tidy.printed import PRINTED
+from benchmarks.tidy.rivals import against, no_slower
+from stages.kit.measurement.bootstrap import Interval
+from stages.tableware.world.scenes import TIERS
+
+TUNING, REPORTING = range(200), range(1000, 1200)
+AS_THE_THESIS = ("2000", "2001", "2002")
+"""Fifteen tables, three a tier but tier 3, in cases of their own."""
+FIFTEEN = "/thesis15"
+WORLDS_OF = {
+    tier: [
+        w
+        for w in WORLDS
+        if not (w == "fast/spills" and tier not in SPILLS_ON or w == "fast/drops" and tier not in DROPS_ON)
+    ]
+    for tier in TIERS
+}
+CASES = tuple(
+    f"{tier}/{world}{tag}" for tag in ("", FIFTEEN) for tier in TIERS for world in WORLDS_OF[tier]
+    if not (tag and tier == "tier3")
+)  # fmt: skip
+
+
+def seeds_of(bench: Bench, case: str) -> Sequence[str]:
+    """The tables."""
+    if case.endswith(FIFTEEN):
+        return () if bench.tuning else AS_THE_THESIS
+    return tuple(map(str, TUNING if bench.tuning else REPORTING))
+
+
+def measure(bench: Bench, asked: Sequence[Trial]) -> Iterator[tuple[Trial, tuple[Run, ...]]]:
+    """Yield one arm's trials on one table, at all delays."""
+    for trial in asked:
+        tier, world = trial.case.removesuffix(FIFTEEN).split("/", 1)
+        yield trial, trials(trial.arm, tier, world, int(trial.seed))
+
+
+def subcases() -> dict[str, tuple[str, Callable[[tuple[Run, ...]], Run | None]]]:
+    """Every case by the delay of its bin."""
+
+    def at(delay: int) -> Callable[[tuple[Run, ...]], Run | None]:
+        return lambda runs: next((run for run in runs if run.delay == delay), None)
+
+    return {f"{case}/delay{delay}" if delay else case: (case, at(delay)) for case in CASES for delay in DELAYS}
+
+
+def p95(values: Sequence[float]) -> float | None:
+    """The 95th percentile; None where nothing was planned."""
+    return float(np.percentile(values, 95)) if any(values) else None
+
+
+def more_figures(results: Results) -> dict[str, float | Interval | None]:
+    """Figures over other arms on the same tables: ratios against Random (`_piles`: against Random as its tier-2 figure
+    implies), shares of tables on which ours is no slower than the better of Pull and Stack, gaps to the optimum."""
+    flat: dict[str, float | Interval | None] = {}
+    for case in results.cases:
+        for arm in results.arms(case):
+            at = f"{arm}/{case}"
+            flat |= against(results, arm, case) | against(results, arm, case, "random_piles", "_piles")
+            if arm not in OURS:
+                continue
+            for name, ending in (("time", ""), ("time_first", "_one_draw")):
+                flat[f"{at}/no_slower_share{ending}"] = no_slower(results, arm, case, name)
+            faster = ratio([(a.time, b.time) for a, b in results.pairs(arm, "pull", case)])
+            flat[f"{at}/faster_than_pull"] = faster and Interval(1 - faster.value, 1 - faster.high, 1 - faster.low)
+            gaps = [a.time / b.time - 1.0 for a, b in results.pairs(arm, "optimum", case)]
+            flat[f"{at}/gap_to_optimum"] = float(np.mean(gaps)) if gaps else None
+            flat[f"{at}/gap_to_optimum_worst"] = max(gaps, default=None)
+    return flat
+
+
+def printed(results: Results) -> str:
+    """What the thesis prints."""
+    rows = [
+        (f"{tier}, {policy}", *(f"{value:g}" for value in row))
+        for tier, policies in PRINTED.items()
+        for policy, row in policies.items()
+    ]
+    head = ("as printed", "seconds", "3 s delay", "5 s delay", "objects a trip", "failed trials of 3")
+    return markdown("Tables 7.1 and 7.2 (Srinivas 2024)", head, rows)
+
+
+EXPERIMENT = Experiment(
+    name="tidy_fast",
+    title="Clearing tables in the fast simulator",
+    simulated="Times and slips of actions, fitted to the thesis; no sight, no physics. In `fast` pulls miss as in "
+    "table 7.3 and second piles slip as Pull's trips in table 7.2 imply; in `fast/exact` nothing does; in "
+    "`fast/spills` utensils also slide off dishes that are lifted side by side; in `fast/drops` things also "
+    "fall as often as the thesis's trials failed.",
+    knows="The whole table, and the chances and times it is judged by.",
+    does_not_show="What an arm does: no physics, no sight.",
+    arms={arm: arm for arm in ARMS},
+    cases=CASES,
+    runs=lambda arm, case: not (arm == "optimum" and "fast/drops" in case),
+    tuning=tuple(map(str, TUNING)),
+    reporting=tuple(map(str, REPORTING)),
+    seeds_of=seeds_of,
+    measure=measure,
+    record=tuple[Run, ...],
+    subcases=subcases(),
+    measures={
+        "time": mean("time", "s"),
+        "objects_per_trip": mean("objects_per_trip"),
+        "failure_rate": mean("failed", interval=False),
+        "failures_policy": Measure(lambda runs: sum(round(run.failed * run.draws) for run in runs), interval=False),
+        "tables": Measure(count, interval=False),
+        "trials": Measure(statistic("draws", np.sum), interval=False),
+        "planning_seconds_median": Measure(
+            lambda runs: float(np.median(times)) if any(times := [run.planning_seconds for run in runs]) else None,
+            "s",
+            interval=False,
+        ),
+        "planning_seconds_p95": Measure(lambda runs: p95([run.planning_seconds for run in runs]), "s", interval=False),
+    },
+    more_figures=more_figures,
+    quick_seeds=10,
+    notes=printed,
+)

@@ -1,0 +1,175 @@
+"""Clearing tables in physics: an arm with friction grasps, by the truth or through rendered images.
+
+Tables 1000, 1001 and 1010 to 1035 were seen while the arm was built. Where the bin is farther, trips cost its delay
+twice; ours are then trials of their own, planned for a bin 5 s away.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
+from benchmarks.experiments.tidy_fast.arms import DELAYS, OURS
+from benchmarks.tabulation import markdown
+from benchmarks.tidy.rivals import against, no_slower
+from stages.kit.measurement.bootstrap import Interval
+from stages.tableware.planning.choice import make_policy
+from stages.tableware.planning.joint import JointPolicy
+from stages.tableware.planning.policy import Policy
+from stages.tableware.planning.time_model import EXACT
+from stages.tableware.simulation.arm_times import arm_times
+from stages.tableware.simulation.physics_trial import run_physics_trial
+from stages.tableware.world.scenes import make_table
+
+TIERS = ("tier0_cups", "tier0_bowls", "tier0_utensils", "tier1", "tier2", "tier3")
+FAR = 5.0
+"""Delay of the bin [s] for which ours plan where it is farther."""
+UNLOADED, LOADED_ON = "ours_without_loaded_pulls", ("tier2", "tier3")
+"""What does the same as `ours` but where dishes that carry others stand from the beginning."""
+CHANCES = replace(EXACT, spills=True)
+"""What our planner is told of physics."""
+CASES = tuple(
+    f"{tier}/physics{sight}" + (f"/delay{delay}" if delay else "")
+    for sight in ("/truth", "") for delay in DELAYS for tier in TIERS
+)  # fmt: skip
+TUNING, REPORTING = range(20), range(1040, 1060)
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a trial came to. `perception` and `policy`: items dropped or left by whose fault."""
+
+    time: float
+    """Simulated seconds, with the delay of the bin."""
+    trips: int
+    moved: int
+    pulls: int
+    stacks: int
+    dropped: int
+    left: int
+    actions: int
+    looks: int
+    perception: int
+    policy: int
+    troubles: tuple[str, ...]
+    losses: tuple[str, ...]
+    """Of each item that was lost what it is and in which action, as `fork: take uu`."""
+    cpu_seconds: float
+
+    @property
+    def failed(self) -> bool:
+        """Whether not everything came to the bin."""
+        return self.dropped + self.left > 0
+
+    @property
+    def objects_per_trip(self) -> float:
+        """Items brought to the bin over trips."""
+        return self.moved / max(self.trips, 1)
+
+
+def delay_of(case: str) -> int:
+    """Return the delay of a case's bin [s]."""
+    return int(case.split("/delay")[1]) if "/delay" in case else 0
+
+
+def same_trial(trial: Trial) -> tuple[object, ...]:
+    """Cases that differ in their delay are one trial, but for ours planned near and far."""
+    return trial.seed, trial.case.split("/delay")[0], trial.arm, trial.arm in OURS and delay_of(trial.case) > 0
+
+
+def policy(arm: str, seed: int, far: bool) -> Policy:
+    """Return an arm's policy; ours plan by the arm's own times."""
+    if arm in OURS:
+        return JointPolicy(OURS[arm], arm_times(FAR if far else 0.0), CHANCES)
+    return make_policy(arm, arm_times(), EXACT, seed)
+
+
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Run]]:
+    """Yield one trial with all its delays."""
+    started = time.process_time()
+    first, seed = trials[0], int(trials[0].seed)
+    table, deciding = make_table(first.case.split("/")[0], seed), policy(first.arm, seed, delay_of(first.case) > 0)
+    outcome = run_physics_trial(table, deciding, seed, "truth" if "/truth" in first.case else "image")
+    done = outcome.trial
+    run = Run(
+        time=done.seconds, trips=done.trips, moved=done.moved, pulls=done.pulls, stacks=done.stacks,
+        dropped=done.dropped, left=done.left, actions=outcome.actions, looks=outcome.looks,
+        perception=outcome.perception, policy=outcome.policy, troubles=outcome.troubles, losses=outcome.losses,
+        cpu_seconds=time.process_time() - started,
+    )  # fmt: skip
+    for trial in trials:
+        yield trial, replace(run, time=run.time + 2.0 * delay_of(trial.case) * run.trips)
+
+
+def share(test: Callable[[Run], bool], interval: bool = True) -> Measure:
+    """Return the share of trials."""
+    return Measure(lambda runs: sum(map(test, runs)) / len(runs), interval=interval)
+
+
+def items_lost(runs: Sequence[Run]) -> float:
+    """The share of items that were dropped or left."""
+    return sum(run.dropped + run.left for run in runs) / sum(run.moved + run.dropped + run.left for run in runs)
+
+
+def more_figures(results: Results) -> dict[str, float | Interval | None]:
+    """Ratios against Random, shares of tables no slower than the better of Pull and Stack; failed trials of all tiers
+    (`far`: planned for a bin 5 s away)."""
+    flat: dict[str, float | Interval | None] = {}
+    for case in results.cases:
+        for arm in results.arms(case):
+            flat |= against(results, arm, case)
+            flat[f"{arm}/{case}/no_slower_share"] = no_slower(results, arm, case)
+    sums: Counter[str] = Counter()
+    for trial, run in results.records.items():
+        far = delay_of(trial.case)
+        if not far or (far == FAR and trial.arm in OURS):
+            at = f"{trial.arm}{'_far' * bool(far)}/{'truth' if '/truth' in trial.case else 'image'}"
+            sums.update({f"{at}/tables": 1, f"{at}/failed_tables": run.failed, f"{at}/lost_tables": run.dropped > 0})
+    return flat | {name: float(value) for name, value in sums.items()}
+
+
+def causes(results: Results) -> str:
+    """What was lost or left, in which actions."""
+    counts: Counter[tuple[str, str, str]] = Counter()
+    for trial, run in results.records.items():
+        if not delay_of(trial.case):
+            counts.update((trial.case, trial.arm, loss) for loss in run.losses)
+            counts[trial.case, trial.arm, "left on the table"] += run.left
+    rows = [(*cause, str(number)) for cause, number in sorted(counts.items()) if number]
+    return markdown("What was lost, in which action", ("case", "arm", "what", "items"), rows)
+
+
+EXPERIMENT = Experiment(
+    name="tidy_physics",
+    title="Clearing tables in physics",
+    simulated="An arm with friction grasps; images are rendered.",
+    knows="By truth, what stands where; through images, what `detect` finds with known sizes.",
+    does_not_show="A real arm or table. Rules were tuned in the same physics.",
+    arms={arm: arm for arm in ("random", "pull", "stack", *OURS)},
+    cases=CASES,
+    default_arms=lambda bench: ("random", "pull", "stack", "ours", UNLOADED),
+    default_cases=lambda bench: [case for case in CASES if "/truth" in case and "tier3" not in case],
+    runs=lambda arm, case: arm != UNLOADED or case.split("/")[0] in LOADED_ON,
+    tuning=tuple(map(str, TUNING)),
+    reporting=tuple(map(str, REPORTING)),
+    together=same_trial,
+    measure=measure,
+    record=Run,
+    measures={
+        "time": mean("time", "s"),
+        "objects_per_trip": mean("objects_per_trip"),
+        "trials": Measure(count, interval=False),
+        "failure_rate": share(lambda run: run.failed),
+        "lost_rate": share(lambda run: run.dropped > 0),
+        "failures_perception": share(lambda run: run.perception > 0, interval=False),
+        "failures_policy": share(lambda run: run.policy > 0, interval=False),
+        "items_lost_share": Measure(items_lost, interval=False),
+        "cpu_seconds": mean("cpu_seconds", "s", interval=False),
+    },
+    more_figures=more_figures,
+    quick_seeds=1,
+    notes=causes,
+)

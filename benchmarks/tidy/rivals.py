@@ -1,0 +1,34 @@
+"""Figures of an arm over other arms on the same tables."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.experiment import Results, ratio
+from stages.kit.measurement.bootstrap import Interval
+
+SAME = 1e-6
+
+
+def against(
+    results: Results, arm: str, case: str, rival: str = "random", ending: str = ""
+) -> dict[str, Interval | None]:
+    """Return the ratios against a rival: its time over the arm's, the arm's objects a trip over its."""
+    pairs = results.pairs(arm, rival, case)
+    return {
+        f"{arm}/{case}/time_ratio{ending}": ratio([(b.time, a.time) for a, b in pairs]),
+        f"{arm}/{case}/objects_per_trip_ratio{ending}": ratio(
+            [(a.objects_per_trip, b.objects_per_trip) for a, b in pairs]
+        ),
+    }
+
+
+def no_slower(results: Results, arm: str, case: str, name: str = "time") -> float | None:
+    """Return the share of tables on which an arm takes no longer than the better of Pull and Stack."""
+    shares = []
+    for seed in results.seeds(case):
+        runs = [results.get(each, case, seed) for each in (arm, "pull", "stack")]
+        if None not in runs:
+            own, *others = (getattr(run, name) for run in runs)
+            shares.append(own <= min(others) + SAME)
+    return float(np.mean(shares)) if shares else None
