@@ -124,7 +124,12 @@ def _draw_item(sheet: _Sheet, item: Item, level: int) -> None:
     for offset in (-0.42, -0.14, 0.14, 0.42):
         across = (-dy * wide * offset, dx * wide * offset)
         sheet.line((neck[0] + across[0], neck[1] + across[1]), (end[0] + across[0], end[1] + across[1]), color, 0.0024)
-    sheet.line((neck[0] + dy * wide / 2, neck[1] - dx * wide / 2), (neck[0] - dy * wide / 2, neck[1] + dx * wide / 2), color, 0.006)  # fmt: skip # noqa: E501
+    sheet.line(
+        (neck[0] + dy * wide / 2, neck[1] - dx * wide / 2),
+        (neck[0] - dy * wide / 2, neck[1] + dx * wide / 2),
+        color,
+        0.006,
+    )
 
 
 def _draw_pull(sheet: _Sheet, action: Pull) -> None:
