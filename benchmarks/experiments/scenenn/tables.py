@@ -37,9 +37,10 @@ def of_ten(outcome: Outcome) -> Outcome:
         "qualities_thesis_code": [*read_published()["stuff"], *things],
         **dict.fromkeys(("instances", "boxes", "boxes_refined"), things),
     }
-    return replace(
-        outcome, **{of: {k: v for k, v in getattr(outcome, of).items() if k in names} for of, names in kept.items()}
-    )
+    parts: dict[str, Any] = {
+        of: {name: value for name, value in getattr(outcome, of).items() if name in names} for of, names in kept.items()
+    }
+    return replace(outcome, **parts)
 
 
 def all_figures(outcomes: Sequence[Outcome]) -> dict[str, float | None]:
