@@ -16,6 +16,7 @@ import numpy as np
 import trimesh
 
 from schemas.errors import BadInput
+from schemas.outside import file_text
 from stages.fuse.parts import connected_parts
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.numpy_files import read_arrays
@@ -259,7 +260,7 @@ def _json(path: Path) -> dict[str, Any]:
     try:
         if path.stat().st_size > LARGEST_JSON:
             raise BadInput(f"{path}: larger than {LARGEST_JSON} bytes", hint=HINT)
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(file_text(path, LARGEST_JSON, hint=HINT))
     except OSError as error:
         raise BadInput(f"{path}: {error.strerror or error}", hint=HINT) from None
     except (ValueError, RecursionError) as error:

@@ -29,8 +29,7 @@ BOUNDED = "a container read piece by piece, regular files only, with bounds of i
 PICTURE = "a picture whose size is looked at before it is decoded"
 DEVICE = "the null device"
 CACHE = "what this program keeps for itself; what cannot be read is asked for anew"
-FOLDER = "a file of a folder of models, behind the bounds of stages/library"
-WORLD = "no file: a simulator's world"
+WORLD = "no file: a method of this name, of a simulator or a format"
 SERVICE = "a message of a service, cut at the largest body"
 
 WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
@@ -50,6 +49,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/engine/memory_limit.py": {"read_text": KERNEL},
     "stages/engine/model_cache.py": {"open": WRITES},
     "stages/engine/store.py": {"os.open": WRITES},
+    "stages/fuse/annotated_scan.py": {"json.loads": PARSED},
     "stages/ingest/folders/calibration_files.py": {"json.loads": PARSED},
     "stages/ingest/layouts/colmap/model.py": {"np.memmap": BOUNDED},
     "stages/ingest/messages/json_messages.py": {"json.loads": PARSED},
@@ -72,10 +72,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/kit/simulation/urdf_split.py": {"ElementTree.fromstring": PARSED},
     "stages/kit/tasks/fast_downward.py": {"read_text": MADE},
     "stages/library/importing/classes.py": {"tomllib.loads": OURS, "read_text": OURS},
-    "stages/library/importing/loose_models.py": {"open": FOLDER, "csv.DictReader": PARSED, "csv.reader": PARSED},
-    "stages/library/importing/mapping.py": {"tomllib.loads": FOLDER, "read_text": FOLDER},
-    "stages/library/importing/mesh_reading.py": {"json.loads": PARSED},
-    "stages/library/importing/source_folder.py": {"read_bytes": FOLDER},
+    "stages/library/importing/loose_models.py": {"csv.reader": PARSED},
     "stages/library/importing/urdf_models.py": {"json.loads": PARSED},
     "stages/pack/language_reading.py": {"json.loads": PARSED},
     "stages/plan/correspondence.py": {"ElementTree.fromstring": PARSED},
@@ -85,6 +82,9 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/report/images.py": {"Image.open": PICTURE},
     "stages/report/page.py": {"read_text": OURS},
     "stages/report/sections/tableware/view.py": {"Image.open": PICTURE},
+    "stages/segment/backends/masks/backend.py": {"open": WORLD},
+    "stages/segment/backends/masks/formats/npz_stacks.py": {"zipfile.ZipFile": BOUNDED},
+    "stages/segment/backends/masks/listing.py": {"json.loads": PARSED},
     "stages/segment/backends/network/weights.py": {"json.loads": PARSED},
     "stages/segment/backends/service/protocol.py": {"json.loads": SERVICE},
     "stages/segment/backends/service/reply_cache.py": {"read_bytes": CACHE},

@@ -37,10 +37,10 @@ def of_ten(outcome: Outcome) -> Outcome:
         "qualities_thesis_code": [*read_published()["stuff"], *things],
         **dict.fromkeys(("instances", "boxes", "boxes_refined"), things),
     }
-    parts: dict[str, Any] = {
+    changes: dict[str, Any] = {
         of: {name: value for name, value in getattr(outcome, of).items() if name in names} for of, names in kept.items()
     }
-    return replace(outcome, **parts)
+    return replace(outcome, **changes)
 
 
 def all_figures(outcomes: Sequence[Outcome]) -> dict[str, float | None]:

@@ -71,11 +71,6 @@ def rate(test: Callable[[Run], bool]) -> Measure:
     return over(test, lambda run: 1.0)
 
 
-def errors(kind: str) -> Callable[[Sequence[Run]], float]:
-    """Return what counts the errors of a class."""
-    return lambda runs: float(sum(run.errors.count(kind) for run in runs))
-
-
 def more_figures(results: Results) -> dict[str, float | Interval | None]:
     """Ours over the thesis's arm on the seeds of both: sutures, seconds an attempted throw, seconds a completed one."""
     flat: dict[str, float | Interval | None] = {}
@@ -114,6 +109,11 @@ def notes(results: Results) -> str:
     )
 
 
+def errors_of(kind: str) -> Measure:
+    """Return the number of errors of a kind, over all runs."""
+    return Measure(lambda runs: sum(run.errors.count(kind) for run in runs), interval=False)
+
+
 def pictures(results: Results) -> None:
     """Write the histogram of figure 4.1, the key frames (npz) of a trial of ours and a strip of its first motions."""
     from stages.suture.evaluation.plots import histogram
@@ -148,7 +148,7 @@ EXPERIMENT = Experiment(
         "seconds_per_suture": over(lambda run: run.seconds, lambda run: run.attempts),
         "seconds_per_completed": over(lambda run: run.seconds, lambda run: run.sutures),
         "sutures_to_intervention": over(lambda run: run.sutures, lambda run: run.interventions),
-        **{f"errors_{kind.lower()}": Measure(errors(kind), interval=False) for kind in KINDS},
+        **{f"errors_{kind.lower()}": errors_of(kind) for kind in KINDS},
         "seen_right_share": over(lambda run: run.right, lambda run: run.looks),
         "count": Measure(count, interval=False),
         "cpu_seconds": Measure(statistic("cpu_seconds", sum), "s", interval=False),

@@ -7,7 +7,6 @@ The bounds together keep `library add` below 2 GB, and its work linear in what i
 from __future__ import annotations
 
 import csv
-import re
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ from scipy.spatial import QhullError
 from shapely.errors import ShapelyError
 
 from schemas.errors import BadInput
+from schemas.plain_text import cleaned
 from stages.library.importing.source_model import Surface
 
 MOST_TRIANGLES = 1_000_000
@@ -31,7 +31,6 @@ MOST_FINDINGS = 40
 """What is said of one model."""
 LONGEST_TEXT = 300
 """Characters of a name or a finding."""
-UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 SIMPLIFY = f"simplify it to at most {MOST_TRIANGLES} triangles and {MOST_SHAPES} shapes, or split it"
 REFUSALS = (
     *(ArithmeticError, RecursionError, ValueError, QhullError, ShapelyError),
@@ -83,7 +82,7 @@ class Allowance:
 def plain_text(text: str, longest: int = LONGEST_TEXT) -> str:
     """Return a name or a reason fit for a table and for JSON: control characters, and halves of them, written out."""
     text = text if len(text) <= longest else f"{text[:longest]}..."
-    return UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return cleaned(" ".join(text.split()))
 
 
 def few_findings(findings: Sequence[str]) -> tuple[str, ...]:

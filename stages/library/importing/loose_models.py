@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from schemas.errors import BadInput
+from schemas.outside import opened
 from stages.library.importing.mesh_reading import read_mesh_file
 from stages.library.importing.source_folder import SourceFolder, numbers
 from stages.library.importing.source_model import Declared, Direction, SourceLink, SourceModel
@@ -45,10 +46,10 @@ def read_loose_model(folder: SourceFolder, path: Path) -> SourceModel:
 def is_shapenet_table(folder: SourceFolder, path: Path) -> bool:
     """Whether a metadata.csv has ShapeNetSem's columns."""
     try:
-        with path.open("rb") as file:
+        with opened(path) as file:
             head = file.read(LARGEST_HEADER)
         return set(next(_table(head), [])) >= SHAPENET_COLUMNS
-    except (OSError, csv.Error):
+    except (BadInput, OSError, csv.Error):
         return False
 
 

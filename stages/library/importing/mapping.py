@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import re
-import tomllib
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +13,7 @@ from pydantic import ValidationError
 
 from schemas.base import Model
 from schemas.errors import BadInput
+from schemas.outside import file_toml
 from schemas.vocabulary import load_vocabulary
 from stages.library.importing.source_model import SourceModel
 
@@ -70,19 +70,11 @@ def read_mapping(path: Path) -> Mapping:
     Raises BadInput for unknown classes, keys and values.
     """
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise BadInput(f"{path}: larger than {LARGEST_FILE} bytes")
-        if not path.is_file():
-            raise BadInput(f"{path}: no regular file")
-        mapping = Mapping.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        mapping = Mapping.model_validate(file_toml(path, LARGEST_FILE, hint="see docs/LIBRARY.md"))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         raise BadInput(f"{path}: {where}: {first['msg']}", hint="see docs/LIBRARY.md") from None
-    except RecursionError:
-        raise BadInput(f"{path}: nested too deeply", hint="see docs/LIBRARY.md") from None
-    except (OSError, ValueError) as error:  # malformed, no UTF-8, or a number that Python does not convert
-        raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}", hint="see docs/LIBRARY.md") from None
     if len(mapping.patterns) > MOST_PATTERNS:
         raise BadInput(f"{path}: more than {MOST_PATTERNS} patterns with * or ?", hint="see docs/LIBRARY.md")
     names = {entry.name for entry in load_vocabulary().classes} | {SKIP, ""}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import stat
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -13,6 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from schemas.errors import BadInput
+from schemas.outside import file_content
 from stages.kit.formats.xml_files import parse_xml
 
 LARGEST_FILE = 256 * 2**20
@@ -72,16 +72,7 @@ class SourceFolder:
 
     def read(self, path: Path, largest: int = LARGEST_FILE) -> bytes:
         """Return a file's bytes. Raises BadInput when it is too large, or cannot be read."""
-        try:
-            status = path.stat()
-            if not stat.S_ISREG(status.st_mode):
-                raise BadInput(f"{path}: no regular file")
-            if status.st_size > largest:
-                raise BadInput(f"{path}: larger than {largest} bytes", hint="simplify it, or leave it out")
-            with path.open("rb") as file:
-                data = file.read(status.st_size)
-        except (OSError, ValueError) as error:
-            raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+        data = file_content(path, largest, hint="simplify it, or leave it out")
         self.read_bytes_of.add(path.resolve())
         return data
 

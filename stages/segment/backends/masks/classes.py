@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from schemas.errors import BadInput
+from schemas.outside import LARGEST_SETTINGS, file_text
 from stages.segment.backends.masks.given import Category, entry
 from stages.segment.backends.masks.listing import Listing
 
@@ -26,7 +27,7 @@ def read_classes(listing: Listing) -> tuple[dict[int, Category], int]:
     where = str(path)
     if path.suffix == ".txt":
         try:
-            lines = [line.split("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
+            lines = [line.split("#")[0].strip() for line in file_text(path, LARGEST_SETTINGS, hint=HINT).splitlines()]
         except (OSError, ValueError) as error:
             raise BadInput(f"{path}: cannot be read as text ({type(error).__name__})", hint=HINT) from None
         return categories_of(dict(_pair(line) for line in lines if line), where), 0

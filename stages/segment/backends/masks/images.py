@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from schemas.errors import BadInput
+from schemas.outside import file_content
 from stages.kit.formats.image_headers import image_size, may_be_decoded
 from stages.kit.formats.masks import decode_panoptic_png
 
@@ -43,7 +44,7 @@ def _checked(path: Path, shape: tuple[int, int]) -> bytes:
     try:
         if path.stat().st_size > LARGEST_PNG:
             raise BadInput(f"{path}: larger than {LARGEST_PNG} bytes", hint="write it again")
-        data = path.read_bytes()
+        data = file_content(path, LARGEST_PNG, hint="check the file")
     except OSError as error:
         raise BadInput(f"{path}: {error.strerror or error}", hint="check the file") from None
     size = image_size(data)

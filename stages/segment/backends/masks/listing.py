@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from schemas.errors import BadInput
+from schemas.outside import file_content
 
 LARGEST_JSON = 512 * 2**20
 """Bytes."""
@@ -51,7 +52,9 @@ def read_json(path: Path) -> Any:
     try:
         if path.stat().st_size > LARGEST_JSON:
             raise BadInput(f"{path}: larger than {LARGEST_JSON} bytes", hint="write one file a frame")
-        return json.loads(path.read_bytes().decode("utf-8"), parse_constant=_no_constant)
+        return json.loads(
+            file_content(path, LARGEST_JSON, hint="check the file").decode("utf-8"), parse_constant=_no_constant
+        )
     except OSError as error:
         raise BadInput(f"{path}: {error.strerror or error}", hint="check the file") from None
     except (ValueError, RecursionError) as error:
