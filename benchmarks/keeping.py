@@ -182,9 +182,13 @@ def wanted_trials(
 
 
 def _crossed(
-    experiment: Experiment, bench: Bench, arms: Sequence[str], cases: Sequence[str], seeds: Sequence[str],
+    experiment: Experiment,
+    bench: Bench,
+    arms: Sequence[str],
+    cases: Sequence[str],
+    seeds: Sequence[str],
     most: int | None,
-) -> Iterator[Trial]:  # fmt: skip
+) -> Iterator[Trial]:
     for case in cases:
         known = list(experiment.seeds_of(bench, case) if experiment.seeds_of else _declared(experiment, bench))
         if not known:

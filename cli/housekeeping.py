@@ -100,12 +100,7 @@ def run(
         for line in expected.lines():
             _say(line)
     reports = run_pipeline(
-        chain,
-        out,
-        values,
-        extra=extra,
-        only=tuple(only or ()),
-        announce=(lambda text: None) if quiet else _say,
+        chain, out, values, extra=extra, only=tuple(only or ()), announce=(lambda text: None) if quiet else _say
     )
     for report in reports:
         status = report.facts.get("status", f"exit {report.exit_code}")

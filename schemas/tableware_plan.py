@@ -87,9 +87,7 @@ class StackGraspFields(Model):
 
 ActionFields = GraspFields | PullFields | PullGraspFields | StackFields | StackGraspFields
 ActionName = Literal["grasp", "pull", "pull_grasp", "stack", "stack_grasp"]
-FIELD_OF: dict[str, str] = {
-    "grasp": "u_G", "pull": "u_P", "pull_grasp": "u_PG", "stack": "u_S", "stack_grasp": "u_SG",
-}  # fmt: skip
+FIELD_OF: dict[str, str] = {"grasp": "u_G", "pull": "u_P", "pull_grasp": "u_PG", "stack": "u_S", "stack_grasp": "u_SG"}
 
 
 class TablewareAction(Model):

@@ -66,9 +66,24 @@ def _room_pairs(
     work: Path, library: Path, seed: int, frames: int, size: tuple[int, int], every: int
 ) -> Iterator[KeptPair]:
     made(
-        "synthesize", work / "truth", "--library", library, "--frames", frames, "--seed", seed, "--no-depth-noise",
-        "--width", size[0], "--height", size[1], "--stereo-baseline", BASELINE, "--picture-noise", PICTURE_NOISE,
-    )  # fmt: skip
+        "synthesize",
+        work / "truth",
+        "--library",
+        library,
+        "--frames",
+        frames,
+        "--seed",
+        seed,
+        "--no-depth-noise",
+        "--width",
+        size[0],
+        "--height",
+        size[1],
+        "--stereo-baseline",
+        BASELINE,
+        "--picture-noise",
+        PICTURE_NOISE,
+    )
     made("ingest", work / "sequence", "--log", work / "truth" / "log.mcap")
     with FrameReader(work / "sequence" / "frames.mcap") as reader:
         for frame in reader.frames(("color", "right", "depth"), every=every):

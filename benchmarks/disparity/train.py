@@ -181,9 +181,13 @@ def main() -> None:
     plan = Plan(10 if options.quick else options.steps, 2, 1, 1, 4, options.seed, pairs)
     run = Run(plan, options.out)
     train(
-        run, plan.steps, lambda: {"error": run.train_step(sources)}, options.save_every,
-        lambda: {"held_out": validation(run, held_out)}, 500,
-    )  # fmt: skip
+        run,
+        plan.steps,
+        lambda: {"error": run.train_step(sources)},
+        options.save_every,
+        lambda: {"held_out": validation(run, held_out)},
+        500,
+    )
 
 
 if __name__ == "__main__":

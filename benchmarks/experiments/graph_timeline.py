@@ -71,18 +71,26 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Grow
     for trial in trials:
         name = trial.case.rsplit("-", 1)[0]
         given = bench.parameters.rooms
-        room = RoomFolder(name, given / trial.case) if given else make_room(
-            bench.out / "rooms", name, FRAMES, clutter="medium"
-        )  # fmt: skip
+        room = (
+            RoomFolder(name, given / trial.case)
+            if given
+            else make_room(bench.out / "rooms", name, FRAMES, clutter="medium")
+        )
         yield trial, grow(room, bench.folder(trial), bench.parameters.every)
 
 
 def grow(folder: RoomFolder, work: Path, every: int) -> Growth:
     """Return the figures after so many frames, and the costs, of a room."""
     path = made(
-        "segment", work / "segments", "--sequence", folder.sequence, "--backend", "ground-truth",
-        "--corruption", CORRUPTION,
-    )  # fmt: skip
+        "segment",
+        work / "segments",
+        "--sequence",
+        folder.sequence,
+        "--backend",
+        "ground-truth",
+        "--corruption",
+        CORRUPTION,
+    )
     sequence, segments = opened(SequenceArtifact, folder.sequence), opened(Segments, path)
     seconds: dict[tuple[str, int], float] = {}
     maps: dict[int, PanopticMap] = {}

@@ -108,12 +108,22 @@ def scored(frame: LabelledFrame, labels: np.ndarray, seconds: float, processor_s
     """Compare labels with a frame's objects and parts."""
     score, parts = score_object_masks(frame.objects, labels), score_object_masks(frame.parts, labels)
     return FrameScore(
-        score.overlap.f, score.overlap.precision, score.overlap.recall,
-        score.boundary.f, score.boundary.precision, score.boundary.recall,
-        float(score.right_count), score.recalled_share,
-        parts.overlap.f, parts.boundary.f, float(parts.right_count),
-        score.true_count, score.found_count, seconds, 1000 * processor_seconds,
-    )  # fmt: skip
+        score.overlap.f,
+        score.overlap.precision,
+        score.overlap.recall,
+        score.boundary.f,
+        score.boundary.precision,
+        score.boundary.recall,
+        float(score.right_count),
+        score.recalled_share,
+        parts.overlap.f,
+        parts.boundary.f,
+        float(parts.right_count),
+        score.true_count,
+        score.found_count,
+        seconds,
+        1000 * processor_seconds,
+    )
 
 
 def rate(records: Sequence[FrameScore]) -> float | None:
@@ -122,9 +132,18 @@ def rate(records: Sequence[FrameScore]) -> float | None:
 
 
 SHARES = (
-    "overlap_precision", "overlap_recall", "overlap_f", "boundary_precision", "boundary_recall", "boundary_f",
-    "right_count", "recalled_share", "part_overlap_f", "part_boundary_f", "part_right_count",
-)  # fmt: skip
+    "overlap_precision",
+    "overlap_recall",
+    "overlap_f",
+    "boundary_precision",
+    "boundary_recall",
+    "boundary_f",
+    "right_count",
+    "recalled_share",
+    "part_overlap_f",
+    "part_boundary_f",
+    "part_right_count",
+)
 MEASURES = {name: mean(name) for name in SHARES} | {
     "frames": Measure(count, interval=False),
     "frames_per_second": Measure(rate, "frames/s", interval=False),

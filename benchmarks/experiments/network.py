@@ -124,9 +124,7 @@ def fused_masks(frame: Frame, camera: Camera, masks: PanopticFrame) -> tuple[np.
 def quality(frame: Frame, truth: dict[int, str], ids: np.ndarray, names: dict[int, str]) -> dict[str, ClassQuality]:
     """Return the sums of PQ per class of one frame."""
     assert frame.labels is not None
-    return panoptic_quality(
-        frame.labels.ravel().astype(np.int64), ids.ravel().astype(np.int64), truth, names, STUFF
-    )  # fmt: skip
+    return panoptic_quality(frame.labels.ravel().astype(np.int64), ids.ravel().astype(np.int64), truth, names, STUFF)
 
 
 def runs(arm: str, case: str) -> bool:
@@ -244,9 +242,13 @@ def judge_log(predictor: Predictor, bench: Bench, trials: Mapping[str, Trial]) -
         for arm, trial in trials.items():
             for k, frame in enumerate(reader.frames(streams=("color", "depth"))):
                 masks = masks_of(
-                    predictor, frame, reader.cameras[frame.camera_name], arm,
-                    gravity=method != "none", floor=method in ("given", "floor_plane"),
-                )  # fmt: skip
+                    predictor,
+                    frame,
+                    reader.cameras[frame.camera_name],
+                    arm,
+                    gravity=method != "none",
+                    floor=method in ("given", "floor_plane"),
+                )
                 counts[arm].update(NAMES[mask.category_id] for mask in masks.masks.values())
                 if k % max(1, total // PICTURES_PER_LOG) == 0 and arm != "network_no_gravity":
                     draw(bench.folder(trial) / f"{k:03d}.png", frame, masks)

@@ -76,9 +76,17 @@ MAPPED = f"{MAPS}{ROOMS[0]}"
 QUICK_ARMS = (GIVEN, "odometry", "ours", "exact", "drifting")
 CORRUPTION = "0.2"
 MEASURES = (
-    "ate_m", "rpe_second_m", "rpe_second_rad", "rpe_metre_m", "fit_m", "epipolar_rad", "posed_share", "loops",
-    "frames_per_cpu_second", "frames_per_second",
-)  # fmt: skip
+    "ate_m",
+    "rpe_second_m",
+    "rpe_second_rad",
+    "rpe_metre_m",
+    "fit_m",
+    "epipolar_rad",
+    "posed_share",
+    "loops",
+    "frames_per_cpu_second",
+    "frames_per_second",
+)
 EPIPOLAR_EVERY, EPIPOLAR_GAP, EPIPOLAR_MATCHES = 12, 25, 40
 """`epipolar_rad`: the turn between frames so far apart, against that which their features say by epipolar geometry,
 beginning at every so many-th frame and with at least so many matches that agree; neither depth nor truth is needed."""
@@ -346,9 +354,8 @@ def map_figures(log: Log, segments: Segments, path: Path | None, output: Path) -
     given: dict[str, Any] = {"sequence": log.sequence} | ({} if path is None else {"trajectory": Trajectory(path)})
     fused = unrecorded("fuse", output / "map", segments=segments, **given)
     unrecorded(
-        "evaluate", output / "evaluation", {"plots": False},
-        ground_truth=log.ground_truth, panoptic_map=fused, **given,
-    )  # fmt: skip
+        "evaluate", output / "evaluation", {"plots": False}, ground_truth=log.ground_truth, panoptic_map=fused, **given
+    )
     metrics = json.loads((output / "evaluation" / "metrics.json").read_text())["metrics"]
     return {
         "pq": metrics["map/pq"],

@@ -37,11 +37,19 @@ EVERY = 3
 """Every how many-th frame of the sequence shows the annotated things their surface."""
 LEAST_FACES = 10
 MEASURES = {
-    "edit_distance": "edit_distance", "wrong_support": "wrong_supports", "missing_detection": "missing_detections",
-    "wrong_detection": "wrong_detections", "support_f1": "any_support_f1", "support_precision": "any_support_precision",
-    "support_recall": "any_support_recall", "supports_f1": "supports_f1", "carries_on_wall_f1": "carries_on_wall_f1",
-    "true_nodes": "true_nodes", "predicted_nodes": "predicted_nodes", "exact": "edit_distance_exact",
-}  # fmt: skip
+    "edit_distance": "edit_distance",
+    "wrong_support": "wrong_supports",
+    "missing_detection": "missing_detections",
+    "wrong_detection": "wrong_detections",
+    "support_f1": "any_support_f1",
+    "support_precision": "any_support_precision",
+    "support_recall": "any_support_recall",
+    "supports_f1": "supports_f1",
+    "carries_on_wall_f1": "carries_on_wall_f1",
+    "true_nodes": "true_nodes",
+    "predicted_nodes": "predicted_nodes",
+    "exact": "edit_distance_exact",
+}
 """Name in metrics.json -> measure of `evaluate`. `support_f1` is that of all edges to a parent, whatever their kind."""
 
 
@@ -109,9 +117,13 @@ def score(truth: GroundTruth, panoptic_map: PanopticMap, method: str, work: Path
     """Return the measures of one graph and the rows of its errors."""
     graph = unrecorded("graph", work / "graph", {"method": method}, panoptic_map=panoptic_map)
     evaluation = unrecorded(
-        "evaluate", work / "evaluation", {"plots": False},
-        ground_truth=truth, panoptic_map=panoptic_map, contact_graph=graph,
-    )  # fmt: skip
+        "evaluate",
+        work / "evaluation",
+        {"plots": False},
+        ground_truth=truth,
+        panoptic_map=panoptic_map,
+        contact_graph=graph,
+    )
     metrics = json.loads((evaluation.root / "metrics.json").read_text())["metrics"]
     values = {name: metrics.get(f"graph/{measure}") for name, measure in MEASURES.items()}
     with (evaluation.root / "tables" / "graph_edit_distance.csv").open() as file:

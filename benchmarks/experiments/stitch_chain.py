@@ -39,10 +39,19 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, dict
     made("suture simulate", out / "trials", *arms, "--trials", asked.trials, "--seed", SEED, "--record", "ours")
     made("suture evaluate", out / "evaluation", "--trials", out / "trials")
     made(
-        "report", out / "report", "--sequence", out / "motion" / "disparity", "--suture-needle",
-        out / "motion" / "needle", "--suture-thread", out / "motion" / "thread", "--suture-trial", out / "trials",
-        "--suture-evaluation", out / "evaluation",
-    )  # fmt: skip
+        "report",
+        out / "report",
+        "--sequence",
+        out / "motion" / "disparity",
+        "--suture-needle",
+        out / "motion" / "needle",
+        "--suture-thread",
+        out / "motion" / "thread",
+        "--suture-trial",
+        out / "trials",
+        "--suture-evaluation",
+        out / "evaluation",
+    )
     figures: dict[str, float] = {}
     for part, folder in (("views_", out / "views"), ("motion_", out / "motion"), ("", out)):
         told = json.loads((folder / "evaluation" / "metrics.json").read_text(encoding="utf-8"))["metrics"]

@@ -68,9 +68,7 @@ def looks(results: Results) -> str:
                     (1 - right) * model.abstained_share.at(place),
                 ]
                 rows.append((case, arm, place, str(sum(counts)), *(f"{100 * share:.1f}" for share in told)))
-            ended += [
-                (case, arm, str(r.seed), str(r.sutures), r.errors[-1], r.reasons[-1]) for r in runs if r.errors
-            ]  # fmt: skip
+            ended += [(case, arm, str(r.seed), str(r.sutures), r.errors[-1], r.reasons[-1]) for r in runs if r.errors]
     head = ("case", "arm", "place", "looks", *FATES, "model: right", "model: abstained")
     last = ("case", "arm", "seed", "after", "error", "reason")
     return markdown("Looks [%]", head, rows) + "\n" + markdown("What ended trials", last, ended)

@@ -56,10 +56,16 @@ def frame_counts(truth: list[tuple[str, float, float]], sight: Sight) -> Counts:
     for one in sight.detections:
         counts[one.kind or "unknown", "found"] += 1
         point = camera_from_world @ np.array([one.position[0], one.position[1], one.lip, 1.0])
-        seen.append((one.kind, sight.camera.fx * point[0] / point[2] + sight.camera.cx,
-                     sight.camera.fy * point[1] / point[2] + sight.camera.cy))  # fmt: skip
-    gain = np.array([[-np.hypot(u - x, v - y) if kind == other else -1e6 for other, x, y in seen]
-                     for kind, u, v in truth]).reshape(len(truth), len(seen))  # fmt: skip
+        seen.append(
+            (
+                one.kind,
+                sight.camera.fx * point[0] / point[2] + sight.camera.cx,
+                sight.camera.fy * point[1] / point[2] + sight.camera.cy,
+            )
+        )
+    gain = np.array(
+        [[-np.hypot(u - x, v - y) if kind == other else -1e6 for other, x, y in seen] for kind, u, v in truth]
+    ).reshape(len(truth), len(seen))
     for row, _ in matched(gain, -NEAR):
         counts[truth[row][0], "right"] += 1
     return counts
@@ -87,8 +93,9 @@ def photograph_counts(
         counts["any" if any_class else kind, "true"] += 1
     for one in outlines:
         counts["any" if any_class else str(one.kind), "found"] += 1
-    gains = np.array([[gain(box, one.box) if any_class or one.kind == kind else -1.0 for one in outlines]
-                      for kind, box in truth]).reshape(len(truth), len(outlines))  # fmt: skip
+    gains = np.array(
+        [[gain(box, one.box) if any_class or one.kind == kind else -1.0 for one in outlines] for kind, box in truth]
+    ).reshape(len(truth), len(outlines))
     for row, _ in matched(gains, OVERLAP):
         counts["any" if any_class else truth[row][0], "right"] += 1
     return counts

@@ -20,11 +20,60 @@ from stages.tableware.world.footprints import footprint
 from stages.tableware.world.items import Item, Kind, Table, make_item, stand_height
 
 CASES = (
-    "c", "b", "u", "cc", "bb", "ccc", "bbb", "bc", "bcc", "bu", "buu", "buuuu", "bcu", "cu", "uu",
-    "c|c", "b|b", "u|u", "cc|c", "cc|cc", "bb|b", "bb|bb", "ccc|ccc", "bbb|bbb", "cu|c", "bu|b", "bu|bu", "bc|b",
-    "bc|bc", "uu|u", "uu|uu", "bb|bc", "bcc|bc", "bcc|bcc", "bcc|bb", "bbc|b", "bbc|bc", "bbc|bb", "bbc|bbc", "bbc|bcc",
-    "bbb|b", "bbb|bc", "bbb|bb", "ccc|c", "bcu|bc", "bcu|bcu", "bccuu", "bbcc", "cccuu", "buuu", "p", "pp", "pbc",
-)  # fmt: skip
+    "c",
+    "b",
+    "u",
+    "cc",
+    "bb",
+    "ccc",
+    "bbb",
+    "bc",
+    "bcc",
+    "bu",
+    "buu",
+    "buuuu",
+    "bcu",
+    "cu",
+    "uu",
+    "c|c",
+    "b|b",
+    "u|u",
+    "cc|c",
+    "cc|cc",
+    "bb|b",
+    "bb|bb",
+    "ccc|ccc",
+    "bbb|bbb",
+    "cu|c",
+    "bu|b",
+    "bu|bu",
+    "bc|b",
+    "bc|bc",
+    "uu|u",
+    "uu|uu",
+    "bb|bc",
+    "bcc|bc",
+    "bcc|bcc",
+    "bcc|bb",
+    "bbc|b",
+    "bbc|bc",
+    "bbc|bb",
+    "bbc|bbc",
+    "bbc|bcc",
+    "bbb|b",
+    "bbb|bc",
+    "bbb|bb",
+    "ccc|c",
+    "bcu|bc",
+    "bcu|bcu",
+    "bccuu",
+    "bbcc",
+    "cccuu",
+    "buuu",
+    "p",
+    "pp",
+    "pbc",
+)
 KINDS: dict[str, Kind] = {"c": "cup", "b": "bowl", "p": "plate"}
 NUDGE = 0.001
 """Standard deviation [m] of where a utensil comes to lie on what carries it, along each axis."""
@@ -118,10 +167,16 @@ def held(case: str, number: int) -> Grasp:
         world.do(grasp_two(table, *bases) if len(bases) == 2 else grasp(table, bases[0], angle))
     trial = world.trial
     row = Grasp(
-        stood=stood, items=count, moved=trial.moved, dropped=trial.dropped, left=trial.left, seconds=trial.seconds,
-        troubles=tuple(world.troubles), tilt=max(tilts.values(), default=0.0),
+        stood=stood,
+        items=count,
+        moved=trial.moved,
+        dropped=trial.dropped,
+        left=trial.left,
+        seconds=trial.seconds,
+        troubles=tuple(world.troubles),
+        tilt=max(tilts.values(), default=0.0),
         apart=hypot(*np.subtract(table.items[0].position[:2], table.items[-1].position[:2])),
-    )  # fmt: skip
+    )
     world.close()
     return row
 

@@ -33,8 +33,10 @@ CHANCES = replace(EXACT, spills=True)
 """What our planner is told of physics."""
 CASES = tuple(
     f"{tier}/physics{sight}" + (f"/delay{delay}" if delay else "")
-    for sight in ("/truth", "") for delay in DELAYS for tier in TIERS
-)  # fmt: skip
+    for sight in ("/truth", "")
+    for delay in DELAYS
+    for tier in TIERS
+)
 TUNING, REPORTING = range(20), range(1040, 1060)
 
 
@@ -95,11 +97,21 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Run]
     outcome = run_physics_trial(table, deciding, seed, "truth" if "/truth" in first.case else "image")
     done = outcome.trial
     run = Run(
-        time=done.seconds, trips=done.trips, moved=done.moved, pulls=done.pulls, stacks=done.stacks,
-        dropped=done.dropped, left=done.left, actions=outcome.actions, looks=outcome.looks,
-        perception=outcome.perception, policy=outcome.policy, troubles=outcome.troubles, losses=outcome.losses,
+        time=done.seconds,
+        trips=done.trips,
+        moved=done.moved,
+        pulls=done.pulls,
+        stacks=done.stacks,
+        dropped=done.dropped,
+        left=done.left,
+        actions=outcome.actions,
+        looks=outcome.looks,
+        perception=outcome.perception,
+        policy=outcome.policy,
+        troubles=outcome.troubles,
+        losses=outcome.losses,
         cpu_seconds=time.process_time() - started,
-    )  # fmt: skip
+    )
     for trial in trials:
         yield trial, replace(run, time=run.time + 2.0 * delay_of(trial.case) * run.trips)
 

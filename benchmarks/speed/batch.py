@@ -123,9 +123,11 @@ def measure_overhead(folder: Path, scenes: int) -> dict[str, float]:
     processor = processor_seconds()
     seconds, _ = timed_batch(batch, out, jobs=1)
     return {
-        "run/alone_s": direct, "run/batch_s": seconds / scenes, "run/ratio": seconds / scenes / direct,
+        "run/alone_s": direct,
+        "run/batch_s": seconds / scenes,
+        "run/ratio": seconds / scenes / direct,
         "run/processor_ratio": (processor_seconds() - processor) / direct_processor,
-    }  # fmt: skip
+    }
 
 
 def measure_nothing(folder: Path, scenes: int) -> dict[str, float]:
@@ -146,9 +148,11 @@ def measure_nothing(folder: Path, scenes: int) -> dict[str, float]:
     processor = processor_seconds() - processor
     two, _ = timed_batch(batch, folder / "two", jobs=2, command=nothing)
     return {
-        "nothing/alone_ms": 1000 * direct, "nothing/batch_ms": 1000 * one / scenes,
-        "nothing/batch_two_jobs_ms": 1000 * two / scenes, "nothing/batch_processor_ms": 1000 * processor / scenes,
-    }  # fmt: skip
+        "nothing/alone_ms": 1000 * direct,
+        "nothing/batch_ms": 1000 * one / scenes,
+        "nothing/batch_two_jobs_ms": 1000 * two / scenes,
+        "nothing/batch_processor_ms": 1000 * processor / scenes,
+    }
 
 
 @contextmanager
@@ -209,10 +213,18 @@ class InstantExecutor:
         measures = {f"evaluation/measure-{k}": k + len(job.name) / 7 for k in range(20)}
         return [
             SceneResult(
-                job=job.name, scene=job.scene, fingerprint=job.fingerprint, outcome="done", exit_code=0, seconds=1.0,
-                started="2026-01-01T00:00:00", measures=measures, peak_memory_bytes=0, attempts=1,
+                job=job.name,
+                scene=job.scene,
+                fingerprint=job.fingerprint,
+                outcome="done",
+                exit_code=0,
+                seconds=1.0,
+                started="2026-01-01T00:00:00",
+                measures=measures,
+                peak_memory_bytes=0,
+                attempts=1,
             )
-        ]  # fmt: skip
+        ]
 
     def cancel(self) -> None:
         """Nothing runs."""
@@ -242,10 +254,12 @@ def measure_scheduler(folder: Path, scenes: int) -> dict[str, float]:
     if again.ran:
         raise RuntimeError("a finished batch ran again")
     return {
-        "scheduler/loop_ms": 1000 * loop / scenes, "scheduler/reading_ms": 1000 * reading / scenes,
-        "scheduler/whole_ms": 1000 * whole / scenes, "scheduler/processor_ms": 1000 * processor / scenes,
+        "scheduler/loop_ms": 1000 * loop / scenes,
+        "scheduler/reading_ms": 1000 * reading / scenes,
+        "scheduler/whole_ms": 1000 * whole / scenes,
+        "scheduler/processor_ms": 1000 * processor / scenes,
         "scheduler/nothing_to_do_ms": 1000 * resumed / scenes,
-    }  # fmt: skip
+    }
 
 
 def measure(runs: int, scenes: int, rounds: int, many: int) -> dict[str, float]:

@@ -170,12 +170,15 @@ def load_frames(folder: Path) -> list[CorridorFrame]:
     }
     return [
         CorridorFrame(
-            arrays["depth"][k], arrays["color"][k], arrays["pose"][k], arrays["ids"][k],
+            arrays["depth"][k],
+            arrays["color"][k],
+            arrays["pose"][k],
+            arrays["ids"][k],
             tuple(FrameSegment(**segment) for segment in described["listing"]),
             PanopticFrame(arrays["masks"][k], {int(i): PanopticMask(*mask) for i, mask in described["masks"].items()}),
         )
         for k, described in enumerate(json.loads((folder / "frames.json").read_text()))
-    ]  # fmt: skip
+    ]
 
 
 def moved(pose: np.ndarray, cell: int) -> np.ndarray:

@@ -131,12 +131,16 @@ def ours(frames: dict[str, np.ndarray], voxel_size: float, whole: bool) -> tuple
         listings.append(
             [
                 FrameSegment(
-                    id=number, category_id=classes[number - 1].id, instance=number, score=1.0, area=1,
+                    id=number,
+                    category_id=classes[number - 1].id,
+                    instance=number,
+                    score=1.0,
+                    area=1,
                     is_thing=classes[number - 1].kind == "thing",
                 )
                 for number in numbers
             ]
-        )  # fmt: skip
+        )
     ids = frames["ids"].astype(np.int32)
     labels = np.arange(len(classes) + 1, dtype=np.int32)
 
@@ -145,10 +149,19 @@ def ours(frames: dict[str, np.ndarray], voxel_size: float, whole: bool) -> tuple
 
     def vote_only(k: int) -> None:
         integrate(
-            mapper.blocks, frames["depth"][k], CAMERA, frames["poses"][k], truncation=mapper.truncation_distance,
-            near=options.minimum_depth, far=RANGE, color=frames["color"][k], index_image=frames["ids"][k],
-            label_of_index=labels, canonical=labels, label_band=options.label_band * mapper.truncation_distance,
-        )  # fmt: skip
+            mapper.blocks,
+            frames["depth"][k],
+            CAMERA,
+            frames["poses"][k],
+            truncation=mapper.truncation_distance,
+            near=options.minimum_depth,
+            far=RANGE,
+            color=frames["color"][k],
+            index_image=frames["ids"][k],
+            label_of_index=labels,
+            canonical=labels,
+            label_band=options.label_band * mapper.truncation_distance,
+        )
 
     def mesh() -> tuple[np.ndarray, np.ndarray]:
         tsdf = smoothed_tsdf(mapper.blocks, options.smoothing)
@@ -165,9 +178,14 @@ def open3d(frames: dict[str, np.ndarray], voxel_size: float, color: bool) -> tup
     core, geometry = o3d.core, o3d.t.geometry
     names = ("tsdf", "weight", "color") if color else ("tsdf", "weight")
     grid = geometry.VoxelBlockGrid(
-        names, (core.float32,) * len(names), ((1), (1), (3))[: len(names)], voxel_size, 8,  # type: ignore[arg-type]
-        40_000 if voxel_size < 0.015 else 10_000, core.Device("CPU:0"),
-    )  # fmt: skip
+        names,
+        (core.float32,) * len(names),
+        ((1), (1), (3))[: len(names)],  # type: ignore[arg-type]
+        voxel_size,
+        8,
+        40_000 if voxel_size < 0.015 else 10_000,
+        core.Device("CPU:0"),
+    )
     # Its pixels begin at integer coordinates, ours are centred there: without the shift it would be half a pixel off.
     shifted = CAMERA.model_copy(update={"cx": CAMERA.cx + 0.5, "cy": CAMERA.cy + 0.5})
     intrinsic = core.Tensor(intrinsic_matrix(shifted))  # type: ignore[call-overload]
@@ -205,8 +223,10 @@ def surface_error(vertices: np.ndarray, faces: np.ndarray) -> dict[str, float]:
     points, _ = trimesh.sample.sample_surface(mesh, 100_000, seed=0)
     distance = true_scene().compute_distance(points.astype(np.float32)).numpy()
     return {
-        "error_mean": float(distance.mean()), "error_p95": float(np.percentile(distance, 95)), "area": float(mesh.area),
-    }  # fmt: skip
+        "error_mean": float(distance.mean()),
+        "error_p95": float(np.percentile(distance, 95)),
+        "area": float(mesh.area),
+    }
 
 
 def memory(field: str) -> float:
@@ -293,12 +313,19 @@ def as_table(metrics: dict[str, float]) -> Table:
 
             rows.append(
                 (
-                    case, arm, get("frames_per_second"), get("mean_frames_per_second"), get("share_of_open3d"),
+                    case,
+                    arm,
+                    get("frames_per_second"),
+                    get("mean_frames_per_second"),
+                    get("share_of_open3d"),
                     get("processor_ms"),
-                    get("peak_memory_mb"), get("mesh_seconds"), get("error_mean", 1000), get("error_p95", 1000),
+                    get("peak_memory_mb"),
+                    get("mesh_seconds"),
+                    get("error_mean", 1000),
+                    get("error_p95", 1000),
                     get("area"),
                 )
-            )  # fmt: skip
+            )
     share = min(metrics[f"ours/{case}/share_of_open3d"] for case in CASES)
     error = metrics[f"ours/{ERROR_CASE}/error_mean"]
     note = (
@@ -309,9 +336,18 @@ def as_table(metrics: dict[str, float]) -> Table:
         f"at 2 cm at most {1000 * AIM_ERROR:g} mm ({1000 * error:.2f}: {'met' if error <= AIM_ERROR else 'missed'})."
     )
     columns = (
-        "voxel", "arm", "frames/s", "frames/s (all)", "share of open3d", "processor ms", "peak MB", "mesh s",
-        "error mean mm", "error p95 mm", "area m2",
-    )  # fmt: skip
+        "voxel",
+        "arm",
+        "frames/s",
+        "frames/s (all)",
+        "share of open3d",
+        "processor ms",
+        "peak MB",
+        "mesh s",
+        "error mean mm",
+        "error p95 mm",
+        "area m2",
+    )
     return Table("table", "Labelled fusion beside Open3D without labels", columns, tuple(rows), note)
 
 

@@ -246,9 +246,10 @@ def flat_metrics(results: dict[tuple[str, str], list[dict[str, float]]]) -> dict
         if len(rows) > 3:
             metrics[f"{arm}/{case}/growth"] = growth(rows)
             metrics[f"{arm}/{case}/memory_kb_a_frame_at_the_end"] = (
-                1024 * (rows[-1]["memory_mb"] - rows[len(rows) // 2]["memory_mb"])
+                1024
+                * (rows[-1]["memory_mb"] - rows[len(rows) // 2]["memory_mb"])
                 / (rows[-1]["frames"] - rows[len(rows) // 2]["frames"])
-            )  # fmt: skip
+            )
     return metrics
 
 
@@ -267,15 +268,32 @@ def as_tables(results: dict[tuple[str, str], list[dict[str, float]]]) -> list[Ta
         for row in rows:
             lines.append(
                 (
-                    case, arm, int(row["frames"]), round(row["area_m2"]), row["frame_ms"],
-                    *(row[f"{part}_ms"] for part in PARTS), row["slowest_ms"], round(row["memory_mb"]),
-                    int(row["segment_labels"]), int(row["pairs"]), row.get("extraction_s"),
+                    case,
+                    arm,
+                    int(row["frames"]),
+                    round(row["area_m2"]),
+                    row["frame_ms"],
+                    *(row[f"{part}_ms"] for part in PARTS),
+                    row["slowest_ms"],
+                    round(row["memory_mb"]),
+                    int(row["segment_labels"]),
+                    int(row["pairs"]),
+                    row.get("extraction_s"),
                 )
-            )  # fmt: skip
+            )
     columns = (
-        "voxel", "arm", "frames", "floor m2", "ms a frame", *(f"{part} ms" for part in PARTS), "slowest ms", "peak MB",
-        "labels", "pairs", "extraction s",
-    )  # fmt: skip
+        "voxel",
+        "arm",
+        "frames",
+        "floor m2",
+        "ms a frame",
+        *(f"{part} ms" for part in PARTS),
+        "slowest ms",
+        "peak MB",
+        "labels",
+        "pairs",
+        "extraction s",
+    )
     verdicts = [
         f"{case}, {arm}: {growth(rows):.2f}x ({'flat' if growth(rows) <= FLAT else 'not flat'})"
         for (arm, case), rows in results.items()
@@ -292,18 +310,25 @@ def as_tables(results: dict[tuple[str, str], list[dict[str, float]]]) -> list[Ta
     if segment:
         row = segment[0]
         cells = (
-            row["frame_ms"], row["geometric_ms"], row["fusion_ms"], row["wall_ms"], 1000 / row["wall_ms"],
+            row["frame_ms"],
+            row["geometric_ms"],
+            row["fusion_ms"],
+            row["wall_ms"],
+            1000 / row["wall_ms"],
             row["memory_mb"],
-        )  # fmt: skip
+        )
         names = ("ms a frame", "geometric ms", "fusion ms", "wall ms", "frames/s", "peak MB")
         tables.append(Table("segment", "segment without its network", names, (cells,)))
     listing = results.get(("listing", "640x480"))
     if listing:
         row = listing[0]
         held = (
-            int(row["frames"]), int(row["segments"]), row["memory_mb"], 1024 * row["memory_mb"] / row["frames"],
+            int(row["frames"]),
+            int(row["segments"]),
+            row["memory_mb"],
+            1024 * row["memory_mb"] / row["frames"],
             row["peak_mb"],
-        )  # fmt: skip
+        )
         columns = ("frames", "segments", "MB", "kB a frame", "MB while it is read")
         tables.append(Table("listing", "What fuse holds of every frame: the list of its segments", columns, (held,)))
     return tables

@@ -49,10 +49,14 @@ def boxes_world() -> PhysicsWorld:
         pose = np.eye(4)
         pose[:3, 3] = [0.65 * np.cos(angle), 0.65 * np.sin(angle), random.uniform(0.4, 1.2)]
         record = SceneBody(
-            name=f"box_{number}", class_name="box", movable=False, world_from_body=as_transform(pose), mass=1.0,
+            name=f"box_{number}",
+            class_name="box",
+            movable=False,
+            world_from_body=as_transform(pose),
+            mass=1.0,
             world_from_reconstructed=None,
             box=Box(center=tuple(pose[:3, 3].tolist()), size=tuple(size.tolist())),
-        )  # fmt: skip
+        )
         shape = f'<geometry><box size="{size[0]} {size[1]} {size[2]}"/></geometry>'
         inertia = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
         link = f'<inertial><mass value="1"/>{inertia}</inertial><collision>{shape}</collision>'
@@ -92,10 +96,14 @@ def measure_inverse(robot: Robot, queries: int) -> dict[str, float]:
                 for index, value in zip(joints, start.tolist(), strict=True):  # noqa: B023
                     engine.resetJointState(arm_only, index, value, physicsClientId=client)
                 answer = engine.calculateInverseKinematics(
-                    arm_only, tool, target[:3, 3].tolist(),  # noqa: B023
-                    quaternion_of(target).tolist(), maxNumIterations=200, residualThreshold=1e-4,  # noqa: B023
+                    arm_only,
+                    tool,
+                    target[:3, 3].tolist(),  # noqa: B023
+                    quaternion_of(target).tolist(),  # noqa: B023
+                    maxNumIterations=200,
+                    residualThreshold=1e-4,  # noqa: B023
                     physicsClientId=client,
-                )  # fmt: skip
+                )
                 values = np.array(answer[:7])
                 reached = forward(chain, values)
                 inside = bool(np.all(values >= chain.lower) and np.all(values <= chain.upper))
@@ -113,8 +121,9 @@ def measure_inverse(robot: Robot, queries: int) -> dict[str, float]:
     return result | {f"inverse_kinematics/{name}/solved": count / queries for name, count in solved.items()}
 
 
-def ompl_path(start: np.ndarray, goal: np.ndarray, free: Callable[[np.ndarray], bool], lower: np.ndarray,
-              upper: np.ndarray) -> bool:  # fmt: skip
+def ompl_path(
+    start: np.ndarray, goal: np.ndarray, free: Callable[[np.ndarray], bool], lower: np.ndarray, upper: np.ndarray
+) -> bool:
     """Return whether OMPL's RRT-Connect finds a path within 5 s."""
     space = ob.RealVectorStateSpace(7)
     bounds = ob.RealVectorBounds(7)

@@ -231,10 +231,7 @@ def _detect(detector: Any, color: np.ndarray, k: int) -> object:
 
 def table(seconds: dict[str, Timing], repeats: int) -> str:
     """Return the table as Markdown: every part, its time, and its ratio to ours."""
-    lines = [
-        "| part | method | ms per frame | processor ms | frames/s | time / ours |",
-        "|---|---|---|---|---|---|",
-    ]
+    lines = ["| part | method | ms per frame | processor ms | frames/s | time / ours |", "|---|---|---|---|---|---|"]
     for name, value in sorted(seconds.items(), key=lambda item: (item[0].split("/")[1], item[1].wall)):
         method, part = name.split("/")
         ratio = value.wall / seconds[f"ours/{part}"].wall

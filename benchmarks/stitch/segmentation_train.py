@@ -168,9 +168,13 @@ def main() -> None:
     plan = Plan(40 if options.quick else options.steps, options.batch, options.seed, len(views), digest)
     run = Run(plan, options.out, options.start)
     train(
-        run, plan.steps, lambda: {"loss": run.train_step(views)}, options.save_every,
-        lambda: {"overlap": overlap(run.averaged(), validation)}, 600,
-    )  # fmt: skip
+        run,
+        plan.steps,
+        lambda: {"loss": run.train_step(views)},
+        options.save_every,
+        lambda: {"overlap": overlap(run.averaged(), validation)},
+        600,
+    )
 
 
 if __name__ == "__main__":

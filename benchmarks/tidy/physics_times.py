@@ -56,11 +56,16 @@ def main() -> None:
     seeds = sorted(int(trial.seed) for trial in kept)
     tiers, arms = sorted({trial.case.split("/")[0] for trial in kept}), sorted({trial.arm for trial in kept})
     times = ArmTimes(
-        trip=round(trip, 3), stack=round(stack, 3), pull=round(pull, 3), residual=round(residual, 3),
-        trials=sum(not run.failed and not run.troubles for run in kept.values()), date=options.date,
-        commit=commit.strip(), command="python -m benchmarks tidy_physics --tuning, then benchmarks.tidy.physics_times",
+        trip=round(trip, 3),
+        stack=round(stack, 3),
+        pull=round(pull, 3),
+        residual=round(residual, 3),
+        trials=sum(not run.failed and not run.troubles for run in kept.values()),
+        date=options.date,
+        commit=commit.strip(),
+        command="python -m benchmarks tidy_physics --tuning, then benchmarks.tidy.physics_times",
         conditions=f"tuning seeds {seeds[0]} to {seeds[-1]}, {', '.join(tiers)}, arms {', '.join(arms)}",
-    )  # fmt: skip
+    )
     times.write(FILE)
     print(FILE)
 

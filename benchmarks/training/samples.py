@@ -136,9 +136,13 @@ def _crop(
     window = (slice(top, top + height), slice(left, left + width))
     size = (CROP_WIDTH, CROP_HEIGHT)
     camera = Camera(
-        width=CROP_WIDTH, height=CROP_HEIGHT, fx=camera.fx * factor, fy=camera.fy * factor,
-        cx=(camera.cx - left + 0.5) * factor - 0.5, cy=(camera.cy - top + 0.5) * factor - 0.5,
-    )  # fmt: skip
+        width=CROP_WIDTH,
+        height=CROP_HEIGHT,
+        fx=camera.fx * factor,
+        fy=camera.fy * factor,
+        cx=(camera.cx - left + 0.5) * factor - 0.5,
+        cy=(camera.cy - top + 0.5) * factor - 0.5,
+    )
     return (
         cv2.resize(np.ascontiguousarray(color[window]), size, interpolation=cv2.INTER_AREA),
         cv2.resize(np.ascontiguousarray(depth[window]), size, interpolation=cv2.INTER_NEAREST_EXACT),

@@ -124,10 +124,13 @@ class Run(TrainingRun):
         """Write the state, and the checkpoint as it would be used now."""
         super().save()
         save_checkpoint(
-            self.out / "panoptic.safetensors", self.averaged(), self.plan.classes, self.widths,
+            self.out / "panoptic.safetensors",
+            self.averaged(),
+            self.plan.classes,
+            self.widths,
             f"trained on {self.plan.frames} frames of generated rooms and tabletops, "
             f"step {self.step} of {self.plan.steps}, batch {self.plan.batch}, seed {self.plan.seed}",
-        )  # fmt: skip
+        )
 
 
 def _plan_record(plan: Plan) -> dict[str, int | list[str]]:

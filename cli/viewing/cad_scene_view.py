@@ -81,9 +81,11 @@ def candidate_table(cad_scene: CadScene) -> str:
         if replacement.decision == "layout":
             continue
         candidates = candidates_of(replacement)
-        lines += [f"### {replacement.node}", "", replacement.reason, ""] if replacement.reason else [
-            f"### {replacement.node}", ""
-        ]  # fmt: skip
+        lines += (
+            [f"### {replacement.node}", "", replacement.reason, ""]
+            if replacement.reason
+            else [f"### {replacement.node}", ""]
+        )
         if candidates:
             lines += [
                 "| model | | matching error | alignment error [mm] | scale | joints |",

@@ -124,8 +124,7 @@ class Canvas:
         """Draw points (N, 3) with colours (N, 3) uint8."""
         self._arrangement.drawn = True
         self._log(
-            f"{WORLD}/{path}",
-            self._rerun.Points3D(np.asarray(points, dtype=np.float32), colors=colors, radii=radius),
+            f"{WORLD}/{path}", self._rerun.Points3D(np.asarray(points, dtype=np.float32), colors=colors, radii=radius)
         )
 
     def line(

@@ -79,10 +79,16 @@ def relation_table(graph: ContactGraphFile) -> str:
     for link in sorted(graph.links, key=lambda k: (k.confidence, k.relation, k.source, k.target)):
         contact = "" if link.contact is None else " ".join(f"{value:.2f}" for value in link.contact)
         cells = (
-            link.relation.replace("_", " "), link.source, link.target, f"{link.confidence:.2f}",
-            "" if link.plane is None else str(link.plane), _scaled(link.gap, 1000), _scaled(link.overlap, 100),
-            _scaled(link.inside, 100), contact,
-        )  # fmt: skip
+            link.relation.replace("_", " "),
+            link.source,
+            link.target,
+            f"{link.confidence:.2f}",
+            "" if link.plane is None else str(link.plane),
+            _scaled(link.gap, 1000),
+            _scaled(link.overlap, 100),
+            _scaled(link.inside, 100),
+            contact,
+        )
         rows.append(f"| {' | '.join(cells)} |")
     return "\n".join(rows)
 

@@ -59,9 +59,13 @@ def load_free_space(panoptic_map: PanopticMap) -> FreeSpace:
         return NOTHING_KNOWN
     info = panoptic_map.info
     blocks, tsdf, weight = read_arrays(
-        path, "block_coordinates", "tsdf", "weight",
-        shapes=("B 3", f"B {SIDE**3}", f"B {SIDE**3}"), hint="make the panoptic map again",
-    )  # fmt: skip
+        path,
+        "block_coordinates",
+        "tsdf",
+        "weight",
+        shapes=("B 3", f"B {SIDE**3}", f"B {SIDE**3}"),
+        hint="make the panoptic map again",
+    )
     keys = _packed(blocks)
     order = np.argsort(keys, kind="stable")
     tsdf, weight = tsdf[order], weight[order]

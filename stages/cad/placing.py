@@ -13,13 +13,7 @@ from stages.cad.alignment import Alignment
 from stages.cad.matching import CUBE_ROTATIONS, Match
 from stages.cad.model_surfaces import ModelSurface, to_world
 from stages.cad.shapes import Placement
-from stages.kit.geometry.boxes import (
-    box_corners,
-    clip_polygon,
-    footprint,
-    gravity_aligned_box,
-    polygon_area,
-)
+from stages.kit.geometry.boxes import box_corners, clip_polygon, footprint, gravity_aligned_box, polygon_area
 from stages.kit.geometry.transforms import transform_from_yaw
 
 UPWARD = 0.9

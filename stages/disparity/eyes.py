@@ -86,8 +86,11 @@ def check_eyes(
     if rows.checked and abs(rows.median_disparity) < NO_PARALLAX:
         logger.warning(
             "%s: %d matched features of %r have a median disparity of %.2f px: one picture twice, or nothing near",
-            sequence.root, rows.matches, name, rows.median_disparity,
-        )  # fmt: skip
+            sequence.root,
+            rows.matches,
+            name,
+            rows.median_disparity,
+        )
     report = row_report(rows, name, len(pairs), parameters)
     _tell(report, sequence, parameters, camera, logger)
     return report
@@ -134,9 +137,13 @@ def _tell(
     elif report.verdict == "corrected":
         logger.warning(
             "%s: not rectified: rows differ by %.2f px; the right eye is turned back by %.3f degrees (pitch) and %.3f "
-            "(roll), which leaves %.2f px", where, report.row_error, math.degrees(report.pitch or 0.0),
-            math.degrees(report.roll or 0.0), report.corrected_row_error,
-        )  # fmt: skip
+            "(roll), which leaves %.2f px",
+            where,
+            report.row_error,
+            math.degrees(report.pitch or 0.0),
+            math.degrees(report.roll or 0.0),
+            report.corrected_row_error,
+        )
     else:
         message = (
             f"{where}: left and right are not rectified: rows of {report.matches} matched features differ by "

@@ -139,6 +139,9 @@ def straightened(right: np.ndarray, pitch: float, roll: float, camera: Camera) -
     lower = camera.fy * (pitch * (1 + y * y) - roll * x)
     sideways = camera.fx * (pitch * x * y + roll * y)
     return cv2.remap(
-        right, (column + sideways).astype(np.float32), (row + lower).astype(np.float32), cv2.INTER_LINEAR,
+        right,
+        (column + sideways).astype(np.float32),
+        (row + lower).astype(np.float32),
+        cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_REPLICATE,
-    )  # fmt: skip
+    )

@@ -60,9 +60,18 @@ def shrunken(picture: np.ndarray, factor: int) -> np.ndarray:
 def small_disparities(left: np.ndarray, right: np.ndarray, levels: int) -> np.ndarray:
     """Return the disparities (N,) [px] of the pixels that semi-global matching with OpenCV's own checks is sure of."""
     matcher = cv2.StereoSGBM.create(
-        minDisparity=0, numDisparities=levels, blockSize=3, P1=72, P2=288, disp12MaxDiff=1, preFilterCap=31,
-        uniquenessRatio=15, speckleWindowSize=30, speckleRange=2, mode=cv2.StereoSGBM_MODE_SGBM_3WAY,
-    )  # fmt: skip
+        minDisparity=0,
+        numDisparities=levels,
+        blockSize=3,
+        P1=72,
+        P2=288,
+        disp12MaxDiff=1,
+        preFilterCap=31,
+        uniquenessRatio=15,
+        speckleWindowSize=30,
+        speckleRange=2,
+        mode=cv2.StereoSGBM_MODE_SGBM_3WAY,
+    )
     padded = [cv2.copyMakeBorder(picture, 0, 0, levels, 0, cv2.BORDER_REPLICATE) for picture in (left, right)]
     disparity = matcher.compute(*padded)[:, levels:].astype(np.float32) / 16.0
     return disparity[disparity > 0]

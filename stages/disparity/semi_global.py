@@ -89,10 +89,16 @@ def directed(left: np.ndarray, right: np.ndarray, settings: SemiGlobalSettings, 
     area = settings.block_size**2
     modes = {"low": cv2.StereoSGBM_MODE_SGBM_3WAY, "medium": cv2.StereoSGBM_MODE_HH4, "high": cv2.StereoSGBM_MODE_HH}
     matcher = cv2.StereoSGBM.create(
-        minDisparity=low, numDisparities=levels, blockSize=settings.block_size, P1=settings.small_penalty * area,
-        P2=settings.large_penalty * area, disp12MaxDiff=-1, preFilterCap=settings.filter_cap,
-        uniquenessRatio=settings.uniqueness, mode=modes[settings.effort],
-    )  # fmt: skip
+        minDisparity=low,
+        numDisparities=levels,
+        blockSize=settings.block_size,
+        P1=settings.small_penalty * area,
+        P2=settings.large_penalty * area,
+        disp12MaxDiff=-1,
+        preFilterCap=settings.filter_cap,
+        uniquenessRatio=settings.uniqueness,
+        mode=modes[settings.effort],
+    )
     border = low + levels
     padded = [cv2.copyMakeBorder(picture, 0, 0, border, 0, cv2.BORDER_REPLICATE) for picture in (left, right)]
     fixed = matcher.compute(*padded)[:, border:]

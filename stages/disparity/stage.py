@@ -64,9 +64,11 @@ def open_matcher(parameters: DisparityParameters, weights: Path | None, context:
 
 def _semi_global(parameters: DisparityParameters, weights: Path | None, context: Context) -> tuple[Matcher, str]:
     settings = semi_global.SemiGlobalSettings(
-        effort=parameters.effort, block_size=parameters.block_size, agreement=parameters.agreement,
+        effort=parameters.effort,
+        block_size=parameters.block_size,
+        agreement=parameters.agreement,
         refine=parameters.refine,
-    )  # fmt: skip
+    )
     return (
         lambda left, right, limits: semi_global.match(left, right, settings, limits),
         f"semi-global matching, effort {settings.effort}, blocks of {settings.block_size} px, both directions",
@@ -101,11 +103,16 @@ def _match_all(
     cameras = {name: reader.cameras[name] for name in sorted(baselines)}
     with (
         FrameWriter(
-            context.output / "frames.mcap", main, labels=has_labels, world_up=_world_up(reader), registered=True,
-            label_table=reader.label_table, cameras=cameras,
+            context.output / "frames.mcap",
+            main,
+            labels=has_labels,
+            world_up=_world_up(reader),
+            registered=True,
+            label_table=reader.label_table,
+            cameras=cameras,
         ) as frames,
         DisparityWriter(context.output / "disparity.mcap", cameras) as maps,
-    ):  # fmt: skip
+    ):
         for index in context.progress.track(range(len(reader)), total=len(reader), description="matching"):
             frame = reader.read(index, ("color", "right", "labels") if has_labels else ("color", "right"))
             if frame.color is None or frame.right is None:
@@ -155,12 +162,16 @@ def _note(
 ) -> None:
     written.frames.append(
         FrameDisparity(
-            frame=len(written.frames), input_frame=index, lowest=limits[0], levels=limits[1],
-            known=round(float(matched.known.mean()), 4), trusted=round(float((depth > 0).mean()), 4),
+            frame=len(written.frames),
+            input_frame=index,
+            lowest=limits[0],
+            levels=limits[1],
+            known=round(float(matched.known.mean()), 4),
+            trusted=round(float((depth > 0).mean()), 4),
             median_disparity=round(float(np.nanmedian(matched.disparity)), 3),
             median_depth=round(float(np.median(depth[depth > 0])), 4),
         )
-    )  # fmt: skip
+    )
     written.cameras[frame.camera_name] += 1
     if frame.world_from_camera is not None:
         written.times.append(frame.time)

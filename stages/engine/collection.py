@@ -220,12 +220,7 @@ def _leftover_item(target: Path, found: list[Path]) -> Item:
 
 
 def _classified(
-    path: Path,
-    artifacts: dict[Path, _Artifact],
-    *,
-    superseded: bool,
-    intermediate: bool,
-    keep: Collection[str],
+    path: Path, artifacts: dict[Path, _Artifact], *, superseded: bool, intermediate: bool, keep: Collection[str]
 ) -> Item:
     artifact = artifacts[path]
     manifest = artifact.manifest

@@ -54,9 +54,12 @@ class Figure:
     def as_json(self) -> dict[str, Any]:
         """Return the figure with its change, for --json."""
         return {
-            "name": self.name, "before": self.before, "after": self.after, "change": self.change,
+            "name": self.name,
+            "before": self.before,
+            "after": self.after,
+            "change": self.change,
             "relative": self.relative,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,27 @@ from stages.engine.model_cache import cache_folder, cached_models
 from stages.kit.library_versions import library_version
 
 CORE = {
-    "typer": "typer", "open3d": "open3d", "trimesh": "trimesh", "pycolmap": "pycolmap",
-    "opencv-python-headless": "cv2", "numpy": "numpy", "scipy": "scipy", "torch": "torch", "mcap": "mcap",
-    "pybullet": "pybullet", "pydantic": "pydantic", "numba": "numba", "python-fcl": "fcl", "embreex": "embreex",
-    "shapely": "shapely", "networkx": "networkx", "ompl": "ompl", "matplotlib": "matplotlib",
-    "rosbags": "rosbags", "psutil": "psutil",
-}  # fmt: skip
+    "typer": "typer",
+    "open3d": "open3d",
+    "trimesh": "trimesh",
+    "pycolmap": "pycolmap",
+    "opencv-python-headless": "cv2",
+    "numpy": "numpy",
+    "scipy": "scipy",
+    "torch": "torch",
+    "mcap": "mcap",
+    "pybullet": "pybullet",
+    "pydantic": "pydantic",
+    "numba": "numba",
+    "python-fcl": "fcl",
+    "embreex": "embreex",
+    "shapely": "shapely",
+    "networkx": "networkx",
+    "ompl": "ompl",
+    "matplotlib": "matplotlib",
+    "rosbags": "rosbags",
+    "psutil": "psutil",
+}
 EXTRAS = {
     "rerun-sdk": ("rerun", "viewing artifacts: pip install rerun-sdk"),
     "ray": ("ray", "batches on a cluster: pip install ray"),

@@ -200,11 +200,23 @@ def measure_cad(
         Table(
             "cad_objects",
             "CAD replacement by object",
-            ("true object", "node", "class", "decision", "model", "true model", "position [m]", "yaw [deg]",
-             "yaw mod symmetry [deg]", "scale error", "box IoU", "largest joint error"),
+            (
+                "true object",
+                "node",
+                "class",
+                "decision",
+                "model",
+                "true model",
+                "position [m]",
+                "yaw [deg]",
+                "yaw mod symmetry [deg]",
+                "scale error",
+                "box IoU",
+                "largest joint error",
+            ),
             tuple(_row(p) for p in sorted(pairs, key=lambda p: p.true)),
         )
-    )  # fmt: skip
+    )
 
 
 def _row(pair: CadPair) -> tuple[Cell, ...]:
@@ -212,7 +224,16 @@ def _row(pair: CadPair) -> tuple[Cell, ...]:
         return None if value is None else round(float(np.degrees(value)), 2)
 
     return (
-        pair.true, pair.predicted, "same" if pair.class_match else "other", pair.decision, pair.model,
-        pair.true_model, pair.position, degrees(pair.yaw), degrees(pair.yaw_symmetric), pair.scale, pair.box_iou,
+        pair.true,
+        pair.predicted,
+        "same" if pair.class_match else "other",
+        pair.decision,
+        pair.model,
+        pair.true_model,
+        pair.position,
+        degrees(pair.yaw),
+        degrees(pair.yaw_symmetric),
+        pair.scale,
+        pair.box_iou,
         max(pair.joints.values()) if pair.joints else None,
-    )  # fmt: skip
+    )

@@ -50,12 +50,18 @@ def count_entities(part: Part, predicted: PredictedMap) -> None:
             "Entities in the map",
             ("instance", "class", "vertices", "confidence", "observations", "height [m]"),
             tuple(
-                (e.instance, e.class_name, e.vertices, e.confidence, e.observations,
-                 e.box_maximum[2] - e.box_minimum[2])
+                (
+                    e.instance,
+                    e.class_name,
+                    e.vertices,
+                    e.confidence,
+                    e.observations,
+                    e.box_maximum[2] - e.box_minimum[2],
+                )
                 for e in sorted(entities, key=lambda e: e.instance)
             ),
         )
-    )  # fmt: skip
+    )
 
 
 def measure_floor(part: Part, panoptic_map: PanopticMap, predicted: PredictedMap) -> None:

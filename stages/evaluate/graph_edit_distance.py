@@ -176,11 +176,7 @@ class _Problem:
 
 
 def graph_edit_distance(
-    true: SupportTree,
-    predicted: SupportTree,
-    affinity: np.ndarray | None = None,
-    *,
-    budget: int = EXPANSION_BUDGET,
+    true: SupportTree, predicted: SupportTree, affinity: np.ndarray | None = None, *, budget: int = EXPANSION_BUDGET
 ) -> EditDistance:
     """Fewest operations that turn `predicted` into `true`, with the thesis's costs.
 

@@ -34,10 +34,7 @@ class GraphComparison:
 
 
 def compare_graphs(
-    truth: TrueRoom,
-    graph: ContactGraphFile,
-    overlaps: Mapping[tuple[int, int], float] | None,
-    minimum_iou: float,
+    truth: TrueRoom, graph: ContactGraphFile, overlaps: Mapping[tuple[int, int], float] | None, minimum_iou: float
 ) -> GraphComparison:
     """Edit distance between the true graph and `graph` over pairs of nodes that can be the same entity."""
     true_graph, _ = merge_stuff_nodes(truth.graph)

@@ -91,9 +91,13 @@ def measure_quality(
     # Whatever the class: things only, true stuff is void (what lies on it is no mistake, walls in parts neither).
     true_things = {i: ANY_CLASS for i, name in true_classes.items() if name not in stuff}
     agnostic = panoptic_quality(
-        np.where(np.isin(true_labels, sorted(true_things)), true_labels, 0), labels, true_things,
-        dict.fromkeys(predicted.classes(), ANY_CLASS), frozenset(), parameters.match_iou,
-    )  # fmt: skip
+        np.where(np.isin(true_labels, sorted(true_things)), true_labels, 0),
+        labels,
+        true_things,
+        dict.fromkeys(predicted.classes(), ANY_CLASS),
+        frozenset(),
+        parameters.match_iou,
+    )
     whole = agnostic.get(ANY_CLASS, ClassQuality())
     part.set("pq_class_agnostic", whole.pq if whole.segments else None)
     part.set("rq_class_agnostic", whole.rq if whole.segments else None)

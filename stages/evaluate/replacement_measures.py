@@ -171,9 +171,19 @@ def _compare(
             colors=replacement.part_colors,
         )
     return ObjectResult(
-        true.name, true.class_name, model_id, node, replacement.decision, chosen.model_id,
-        model_class, rank, error, joints, spurious, judged,
-    )  # fmt: skip
+        true.name,
+        true.class_name,
+        model_id,
+        node,
+        replacement.decision,
+        chosen.model_id,
+        model_class,
+        rank,
+        error,
+        joints,
+        spurious,
+        judged,
+    )
 
 
 def retrieval_rank(replacement: Replacement, true_model: str) -> int | None:

@@ -45,16 +45,30 @@ def alignment_table(stem: str, objects: Sequence[ObjectResult]) -> Table:
         ratios = None if error is None else " ".join(f"{ratio:.2f}" for ratio in error.scale_ratios)
         rows.append(
             (
-                r.name, r.node, r.decision, r.true_model, r.model, r.rank,
+                r.name,
+                r.node,
+                r.decision,
+                r.true_model,
+                r.model,
+                r.rank,
                 None if error is None else 1e3 * error.translation,
                 None if error is None else float(np.degrees(error.rotation)),
-                ratios, _yes(r.success),
+                ratios,
+                _yes(r.success),
             )
-        )  # fmt: skip
+        )
     columns = (
-        "true object", "node", "decision", "true model", "model", "rank of the true model", "translation [mm]",
-        "rotation [deg]", "extents over true extents", "success",
-    )  # fmt: skip
+        "true object",
+        "node",
+        "decision",
+        "true model",
+        "model",
+        "rank of the true model",
+        "translation [mm]",
+        "rotation [deg]",
+        "extents over true extents",
+        "success",
+    )
     return Table(f"{stem}_objects", "CAD replacement against the truth", columns, tuple(rows))
 
 
@@ -68,14 +82,30 @@ def equivalence_table(stem: str, objects: Sequence[ObjectResult]) -> Table:
             continue
         rows.append(
             (
-                r.name, r.node, _yes(e.same_class), _yes(e.same_relation), _yes(e.affordance), _yes(e.size),
-                _yes(e.shape), _yes(e.appearance), e.color_difference, _yes(e.functional),
+                r.name,
+                r.node,
+                _yes(e.same_class),
+                _yes(e.same_relation),
+                _yes(e.affordance),
+                _yes(e.size),
+                _yes(e.shape),
+                _yes(e.appearance),
+                e.color_difference,
+                _yes(e.functional),
             )
-        )  # fmt: skip
+        )
     columns = (
-        "true object", "node", "class", "carried by the same", "affordance", "size", "shape", "appearance",
-        "colour difference", "functional",
-    )  # fmt: skip
+        "true object",
+        "node",
+        "class",
+        "carried by the same",
+        "affordance",
+        "size",
+        "shape",
+        "appearance",
+        "colour difference",
+        "functional",
+    )
     return Table(f"{stem}_equivalence", "Functional equivalence of the replacements", columns, tuple(rows))
 
 
@@ -83,17 +113,28 @@ def joint_table(stem: str, objects: Sequence[ObjectResult]) -> Table:
     """One row a true joint of a replaced object."""
     rows: list[tuple[Cell, ...]] = [
         (
-            r.name, joint.joint, joint.type, joint.partner,
+            r.name,
+            joint.joint,
+            joint.type,
+            joint.partner,
             None if joint.angle is None else float(np.degrees(joint.angle)),
-            None if joint.offset is None else 1e3 * joint.offset, joint.limits, joint.value,
+            None if joint.offset is None else 1e3 * joint.offset,
+            joint.limits,
+            joint.value,
         )
         for r in objects
         for joint in r.joints
-    ]  # fmt: skip
+    ]
     columns = (
-        "true object", "joint", "type", "stands for it", "axis angle [deg]", "axis offset [mm]",
-        "limit error [rad or m]", "value error [rad or m]",
-    )  # fmt: skip
+        "true object",
+        "joint",
+        "type",
+        "stands for it",
+        "axis angle [deg]",
+        "axis offset [mm]",
+        "limit error [rad or m]",
+        "value error [rad or m]",
+    )
     return Table(f"{stem}_joints", "Joints of the replacements", columns, tuple(rows))
 
 

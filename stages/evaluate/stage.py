@@ -45,12 +45,24 @@ from stages.kit.stage import Context
 FAR_FROM_TRUTH = 0.3
 """An aligned trajectory error from which on the reader is warned [m]."""
 HEADLINES = (
-    "map/pq", "map/pq_class_agnostic", "map/instance_ap50", "map/accuracy_mean_mm", "map/mesh_recall",
-    "graph/edit_distance", "graph/support_f1", "graph/any_support_f1", "graph/obb_ap50_refined",
-    "cad/position_error_m_mean", "replacement/scan2cad_success", "replacement/functional",
-    "replacement/max_penetration_mm", "replacement/collisions", "plan/goal_reached", "counts/entities",
+    "map/pq",
+    "map/pq_class_agnostic",
+    "map/instance_ap50",
+    "map/accuracy_mean_mm",
+    "map/mesh_recall",
+    "graph/edit_distance",
+    "graph/support_f1",
+    "graph/any_support_f1",
+    "graph/obb_ap50_refined",
+    "cad/position_error_m_mean",
+    "replacement/scan2cad_success",
+    "replacement/functional",
+    "replacement/max_penetration_mm",
+    "replacement/collisions",
+    "plan/goal_reached",
+    "counts/entities",
     "counts/support_edges",
-)  # fmt: skip
+)
 
 
 @dataclass
@@ -103,9 +115,17 @@ def run(
     Figures are shares in [0, 1] unless the measure's name ends in a unit. Writes metrics.json, tables and plots.
     """
     inputs = Inputs(
-        ground_truth, sequence, trajectory, segments, panoptic_map, contact_graph, cad_scene, interactive_scene, plan,
+        ground_truth,
+        sequence,
+        trajectory,
+        segments,
+        panoptic_map,
+        contact_graph,
+        cad_scene,
+        interactive_scene,
+        plan,
         cad_library,
-    )  # fmt: skip
+    )
     for folder in ("tables", "plots"):
         (context.output / folder).mkdir()
     if panoptic_map is not None:
@@ -226,18 +246,28 @@ def _evaluate_replacement(
 ) -> None:
     """Measure the scene, and where the library is given and `cad` recorded it, the scene before the global check."""
     measured = replacements_of(
-        ground_truth, truth, cad_scene, world_from_log=world_from_log(inputs.sequence), overlaps=inputs.overlaps,
+        ground_truth,
+        truth,
+        cad_scene,
+        world_from_log=world_from_log(inputs.sequence),
+        overlaps=inputs.overlaps,
         minimum_iou=parameters.node_match_iou,
-    )  # fmt: skip
+    )
     if measured is None:
         return
     record_replacements(inputs.part("replacement"), measured)
     if inputs.cad_library is None or all(r.best_single is None for r in cad_scene.info.replacements):
         return
     before = replacements_of(
-        ground_truth, truth, cad_scene, world_from_log=world_from_log(inputs.sequence), overlaps=inputs.overlaps,
-        minimum_iou=parameters.node_match_iou, library_models=inputs.cad_library.path("models"), best_single=True,
-    )  # fmt: skip
+        ground_truth,
+        truth,
+        cad_scene,
+        world_from_log=world_from_log(inputs.sequence),
+        overlaps=inputs.overlaps,
+        minimum_iou=parameters.node_match_iou,
+        library_models=inputs.cad_library.path("models"),
+        best_single=True,
+    )
     if before is not None:
         record_replacements(inputs.part("replacement_before_check"), before)
 

@@ -143,10 +143,19 @@ def measure_overlap(
     of depth (H, W) float32 [m] is looked at. `canonical` (int32) tells which label each label was merged into.
     """
     rows, labels = _sample_voxels(
-        np.ascontiguousarray(depth, dtype=np.float32), index_image, intrinsics_of(camera),
-        np.ascontiguousarray(world_from_camera, dtype=np.float64), stride, near, far, blocks.voxel_size, blocks.keys,
-        blocks.slots, blocks.segment, canonical,
-    )  # fmt: skip
+        np.ascontiguousarray(depth, dtype=np.float32),
+        index_image,
+        intrinsics_of(camera),
+        np.ascontiguousarray(world_from_camera, dtype=np.float64),
+        stride,
+        near,
+        far,
+        blocks.voxel_size,
+        blocks.keys,
+        blocks.slots,
+        blocks.segment,
+        canonical,
+    )
     sizes = np.bincount(rows, minlength=segment_count)
     # Only labels that are in sight get a column: a table of all labels of the map would grow with it.
     present = np.flatnonzero(np.bincount(labels, minlength=1))

@@ -52,8 +52,11 @@ def run_from_mesh(scan: Path, labels: Path | None, *, parameters: FuseParameters
     if table.unknown:
         context.logger.warning(
             "%s: %d of its names are in no table and become `%s`: %s",
-            scan, len(table.unknown), ANYTHING, ", ".join(table.unknown[:10]),
-        )  # fmt: skip
+            scan,
+            len(table.unknown),
+            ANYTHING,
+            ", ".join(table.unknown[:10]),
+        )
     with context.progress.step("entities"):
         surface, instance, class_of = _entities(read, classes, vocabulary, parameters, context)
         turned = upright(surface.vertices, instance, class_of, vocabulary, context)
@@ -80,10 +83,14 @@ def run_from_mesh(scan: Path, labels: Path | None, *, parameters: FuseParameters
         own = instance.astype(np.int32)
         write_arrays(context.output / "mesh_labels.npz", {"instance": own, "segment": own, "class_id": table_of[own]})
     summary = {
-        "layout": read.layout, "frames": 0, "entities": len(entities), "unnamed": len(table.unknown),
-        "labelled_share": round(float((instance > 0).mean()), 3), "vertices": len(surface.vertices),
+        "layout": read.layout,
+        "frames": 0,
+        "entities": len(entities),
+        "unnamed": len(table.unknown),
+        "labelled_share": round(float((instance > 0).mean()), 3),
+        "vertices": len(surface.vertices),
         "faces": len(surface.faces),
-    }  # fmt: skip
+    }
     return PanopticMap(context.output, outcome="ok" if entities else "empty", summary=summary)
 
 
@@ -158,8 +165,11 @@ def _entities(
         vertices, faces, colors, instance = thinned(vertices, faces, colors, instance, parameters.voxel_size)
         context.logger.info(
             "%d faces are more than %d: thinned to %d, one vertex in each cube of %g m",
-            before, KEPT_FACES, len(faces), parameters.voxel_size,
-        )  # fmt: skip
+            before,
+            KEPT_FACES,
+            len(faces),
+            parameters.voxel_size,
+        )
     return ColoredMesh(vertices.astype(np.float32), faces.astype(np.int32), colors), instance, class_of
 
 

@@ -158,10 +158,25 @@ def integrate(
     )
     with parallel_chunksize(CHUNK):
         _integrate(
-            touched, blocks.coordinates, blocks.tsdf, blocks.weight, blocks.color, blocks.segment, blocks.votes, depth,
+            touched,
+            blocks.coordinates,
+            blocks.tsdf,
+            blocks.weight,
+            blocks.color,
+            blocks.segment,
+            blocks.votes,
+            depth,
             NO_IMAGE if color is None else np.ascontiguousarray(color),
-            NO_INDEX if index_image is None else index_image, label_of_index, canonical,
-            np.ascontiguousarray(np.linalg.inv(world_from_camera)), intrinsics, blocks.voxel_size, truncation,
-            truncation if label_band is None else label_band, near, far, maximum_weight,
-        )  # fmt: skip
+            NO_INDEX if index_image is None else index_image,
+            label_of_index,
+            canonical,
+            np.ascontiguousarray(np.linalg.inv(world_from_camera)),
+            intrinsics,
+            blocks.voxel_size,
+            truncation,
+            truncation if label_band is None else label_band,
+            near,
+            far,
+            maximum_weight,
+        )
     return len(touched)

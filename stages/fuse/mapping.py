@@ -10,13 +10,7 @@ import numpy as np
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from schemas.segments import FrameSegment
-from stages.fuse.association import (
-    Prediction,
-    index_segments,
-    match_segments,
-    measure_overlap,
-    overlapping_labels,
-)
+from stages.fuse.association import Prediction, index_segments, match_segments, measure_overlap, overlapping_labels
 from stages.fuse.integration import integrate
 from stages.fuse.merging import Merging, SharedSegment
 from stages.fuse.parameters import FuseParameters
@@ -89,11 +83,21 @@ class PanopticMapper:
         if ids is not None:
             index_image, frame_labels = self._associate(camera, depth, world_from_camera, ids, listing)
         integrate(
-            self.blocks, depth, camera, world_from_camera, truncation=self.truncation_distance,
-            near=options.minimum_depth, far=options.maximum_depth, color=color, index_image=index_image,
-            label_of_index=frame_labels, canonical=self.labels.table(), maximum_weight=options.maximum_weight,
-            label_band=options.label_band * self.truncation_distance, stride=options.block_stride,
-        )  # fmt: skip
+            self.blocks,
+            depth,
+            camera,
+            world_from_camera,
+            truncation=self.truncation_distance,
+            near=options.minimum_depth,
+            far=options.maximum_depth,
+            color=color,
+            index_image=index_image,
+            label_of_index=frame_labels,
+            canonical=self.labels.table(),
+            maximum_weight=options.maximum_weight,
+            label_band=options.label_band * self.truncation_distance,
+            stride=options.block_stride,
+        )
         self.frames_integrated += 1
         if self.frames_integrated % options.regularize_every == 0:
             self.regularize()
@@ -131,10 +135,17 @@ class PanopticMapper:
                 hint="run `scenewright segment` again",
             )
         overlap = measure_overlap(
-            self.blocks, depth, index_image, len(segments), camera, world_from_camera,
-            canonical=self.labels.table(), near=options.minimum_depth, far=options.maximum_depth,
+            self.blocks,
+            depth,
+            index_image,
+            len(segments),
+            camera,
+            world_from_camera,
+            canonical=self.labels.table(),
+            near=options.minimum_depth,
+            far=options.maximum_depth,
             stride=options.overlap_stride,
-        )  # fmt: skip
+        )
         matched = match_segments(
             overlap, minimum_voxels=options.minimum_overlap_voxels, minimum_share=options.minimum_overlap_share
         )

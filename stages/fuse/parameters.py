@@ -27,9 +27,7 @@ class FuseParameters(Parameters):
     every: int = Field(1, ge=1, description="Integrate every how many-th frame")
     block_stride: int = Field(4, ge=1, le=16, description="Every how many-th pixel looks for voxel blocks")
     snapshot_every: int = Field(
-        0,
-        ge=0,
-        description="Keep the map as it is after every so many frames, for graphs that grow with it (0: never)",
+        0, ge=0, description="Keep the map as it is after every so many frames, for graphs that grow with it (0: never)"
     )
     pose_tolerance: float = Field(
         0.02, ge=0, description="A pose of --trajectory belongs to the frame at most this far from its time [s]"
@@ -83,9 +81,12 @@ class FuseParameters(Parameters):
         description="Entities that fewer frames voted for are dropped; a tenth of the frames where that is less",
     )
     minimum_prediction_share: float = Field(
-        0.15, ge=0, le=1, description="Segments that are background in more than the rest of their frames stay "
-        "unlabelled (0: the thesis, in which the background has no vote)"
-    )  # fmt: skip
+        0.15,
+        ge=0,
+        le=1,
+        description="Segments that are background in more than the rest of their frames stay "
+        "unlabelled (0: the thesis, in which the background has no vote)",
+    )
     spread_steps: int = Field(
         2, ge=0, description="Unlabelled vertices take the label of the smooth surface around them, so many times"
     )
@@ -96,10 +97,7 @@ class FuseParameters(Parameters):
         description="Parts of a thing under this share of its largest part take the label of what surrounds them",
     )
     piece_share: float = Field(
-        0.2,
-        ge=0,
-        lt=1,
-        description="Things under this share of one of their class that they touch are a part of it",
+        0.2, ge=0, lt=1, description="Things under this share of one of their class that they touch are a part of it"
     )
     part_distance: float = Field(
         0.2, gt=0, description="Parts of a thing farther than this from its largest part are left unlabelled [m]"

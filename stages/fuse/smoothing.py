@@ -17,12 +17,7 @@ from stages.fuse.voxel_blocks import SIDE, VOXELS, VoxelBlocks
 
 @njit(parallel=True, cache=True)
 def _smooth(
-    order: np.ndarray,
-    neighbours: np.ndarray,
-    tsdf: np.ndarray,
-    weight: np.ndarray,
-    strength: float,
-    result: np.ndarray,
+    order: np.ndarray, neighbours: np.ndarray, tsdf: np.ndarray, weight: np.ndarray, strength: float, result: np.ndarray
 ) -> None:
     for rank in prange(order.shape[0]):
         for cell in range(VOXELS):
@@ -49,7 +44,11 @@ def smoothed_tsdf(blocks: VoxelBlocks, strength: float) -> np.ndarray:
     order = blocks.canonical_order()
     result = np.zeros_like(blocks.tsdf)
     _smooth(
-        order, find_neighbours(order, blocks), blocks.tsdf.reshape(-1), blocks.weight.reshape(-1), strength,
+        order,
+        find_neighbours(order, blocks),
+        blocks.tsdf.reshape(-1),
+        blocks.weight.reshape(-1),
+        strength,
         result.reshape(-1),
-    )  # fmt: skip
+    )
     return result

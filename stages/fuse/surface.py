@@ -243,9 +243,20 @@ def extract_surface(
     def vertex_pass(write: bool, offsets: np.ndarray, count: int) -> Surface:
         arrays = np.zeros((count, 3), np.float32), np.zeros((count, 3), np.uint8), np.zeros(count, np.int32)
         _vertices(
-            write, order, neighbours, blocks.coordinates, tsdf, weight, *fields, blocks.voxel_size, minimum_weight,
-            jump, offsets, index, *arrays,
-        )  # fmt: skip
+            write,
+            order,
+            neighbours,
+            blocks.coordinates,
+            tsdf,
+            weight,
+            *fields,
+            blocks.voxel_size,
+            minimum_weight,
+            jump,
+            offsets,
+            index,
+            *arrays,
+        )
         return Surface(arrays[0], np.zeros((0, 3), np.int32), arrays[1], arrays[2])
 
     offsets = np.zeros(len(order), dtype=np.int64)
@@ -255,9 +266,19 @@ def extract_surface(
     def face_pass(write: bool, offsets: np.ndarray, count: int) -> np.ndarray:
         faces = np.zeros((count, 3), dtype=np.int32)
         _faces(
-            write, order, rank_of_slot, neighbours, tsdf, weight, minimum_weight, jump, index, surface.vertices,
-            offsets, faces,
-        )  # fmt: skip
+            write,
+            order,
+            rank_of_slot,
+            neighbours,
+            tsdf,
+            weight,
+            minimum_weight,
+            jump,
+            index,
+            surface.vertices,
+            offsets,
+            faces,
+        )
         return faces
 
     offsets = np.zeros(len(order), dtype=np.int64)

@@ -187,9 +187,22 @@ class VoxelBlocks:
         touched = np.empty(self.capacity, dtype=np.int32)
         while True:
             self.count, used = _touch(
-                depth, intrinsics, world_from_camera, stride, near, far, truncation, self.block_size, self.keys,
-                self.slots, self.coordinates, self.last_touched, self.count, self._stamp, touched,
-            )  # fmt: skip
+                depth,
+                intrinsics,
+                world_from_camera,
+                stride,
+                near,
+                far,
+                truncation,
+                self.block_size,
+                self.keys,
+                self.slots,
+                self.coordinates,
+                self.last_touched,
+                self.count,
+                self._stamp,
+                touched,
+            )
             if used >= 0:
                 return touched[:used]
             self._grow(2 * self.capacity)

@@ -70,10 +70,7 @@ def lasting_ids(snapshots: list[dict[int, str]]) -> dict[int, str]:
 
 
 def changes_between(
-    before: GraphSnapshot | None,
-    nodes: tuple[GraphNode, ...],
-    links: tuple[Relation, ...],
-    merged: Mapping[str, str],
+    before: GraphSnapshot | None, nodes: tuple[GraphNode, ...], links: tuple[Relation, ...], merged: Mapping[str, str]
 ) -> GraphChanges:
     """Return what is different from the snapshot before (None: everything appeared)."""
     old_nodes = {node.id: node for node in before.nodes} if before else {}

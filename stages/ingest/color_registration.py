@@ -34,11 +34,7 @@ def registered_loader(
 
 
 def color_in_depth_camera(
-    color: np.ndarray,
-    depth: np.ndarray,
-    depth_camera: Camera,
-    color_camera: Camera,
-    color_from_depth: np.ndarray,
+    color: np.ndarray, depth: np.ndarray, depth_camera: Camera, color_camera: Camera, color_from_depth: np.ndarray
 ) -> np.ndarray:
     """Return the colour (H, W, 3) uint8 that the depth pixels (H, W) [m, 0 invalid] see.
 

@@ -66,13 +66,29 @@ def _draw(
             if spans[row + 1, column + 1]:
                 a, b = row + 1, column + 1
                 _draw_triangle(
-                    u[row, column], v[row, column], w[row, column], u[row, b], v[row, b], w[row, b],
-                    u[a, column], v[a, column], w[a, column], inverse_depth,
-                )  # fmt: skip
+                    u[row, column],
+                    v[row, column],
+                    w[row, column],
+                    u[row, b],
+                    v[row, b],
+                    w[row, b],
+                    u[a, column],
+                    v[a, column],
+                    w[a, column],
+                    inverse_depth,
+                )
                 _draw_triangle(
-                    u[a, b], v[a, b], w[a, b], u[row, b], v[row, b], w[row, b],
-                    u[a, column], v[a, column], w[a, column], inverse_depth,
-                )  # fmt: skip
+                    u[a, b],
+                    v[a, b],
+                    w[a, b],
+                    u[row, b],
+                    v[row, b],
+                    w[row, b],
+                    u[a, column],
+                    v[a, column],
+                    w[a, column],
+                    inverse_depth,
+                )
 
 
 @njit(cache=True)
@@ -167,13 +183,7 @@ def _draw_triangle(
 
 @njit(cache=True)
 def _draw_square(
-    z: float,
-    row: int,
-    column: int,
-    intrinsics: np.ndarray,
-    target: np.ndarray,
-    motion: np.ndarray,
-    buffer: np.ndarray,
+    z: float, row: int, column: int, intrinsics: np.ndarray, target: np.ndarray, motion: np.ndarray, buffer: np.ndarray
 ) -> None:
     """Draw the square that a single pixel covers, at its depth, as two triangles."""
     u = np.empty(4)

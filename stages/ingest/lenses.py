@@ -16,9 +16,16 @@ from stages.ingest.source import Unusable
 from stages.kit.geometry.cameras import intrinsic_matrix
 
 OPENCV_MODELS = (
-    "", "none", "plumb_bob", "rational_polynomial", "thin_prism", "brown_conrady", "radtan", "radial_tangential",
+    "",
+    "none",
+    "plumb_bob",
+    "rational_polynomial",
+    "thin_prism",
+    "brown_conrady",
+    "radtan",
+    "radial_tangential",
     "pinhole",
-)  # fmt: skip
+)
 """Names under which logs mean OpenCV's radial, tangential and thin prism coefficients, in OpenCV's order."""
 OPENCV_COUNTS = (4, 5, 8, 12, 14)
 FISHEYE_MODELS = ("equidistant", "fisheye", "kannala_brandt", "kannala_brandt4")

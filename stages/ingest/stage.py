@@ -164,8 +164,12 @@ def _note(written: _Written, time: float, camera_name: str, loaded: LoadedFrame,
     written.times.append(time)
     written.cameras.append(camera_name)
     streams: dict[StreamName, object] = {
-        "color": loaded.color, "depth": loaded.depth, "right": loaded.right, "labels": loaded.labels, "pose": pose
-    }  # fmt: skip
+        "color": loaded.color,
+        "depth": loaded.depth,
+        "right": loaded.right,
+        "labels": loaded.labels,
+        "pose": pose,
+    }
     written.streams |= {name for name, value in streams.items() if value is not None}
     if loaded.depth is not None:
         written.median_depths.append(float(np.median(loaded.depth[loaded.depth > 0])) / 1000)

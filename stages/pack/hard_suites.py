@@ -22,9 +22,17 @@ from stages.pack.records import Action, BoxState, Observation, Rectangle
 from stages.pack.sampling import pick_and_place
 
 STARTS = (
-    (0.39, -0.12), (0.39, 0.12), (0.39, -0.36), (0.39, 0.36), (0.39, -0.6), (0.39, 0.6),
-    (0.62, -0.36), (0.62, 0.36), (0.15, -0.5), (0.15, 0.5),
-)  # fmt: skip
+    (0.39, -0.12),
+    (0.39, 0.12),
+    (0.39, -0.36),
+    (0.39, 0.36),
+    (0.39, -0.6),
+    (0.39, 0.6),
+    (0.62, -0.36),
+    (0.62, 0.36),
+    (0.15, -0.5),
+    (0.15, 0.5),
+)
 """Where boxes may start (x, y) [m], far enough apart for the hand."""
 CLEARANCE = 0.004
 """Boxes of the certificate stand at least this far apart [m]."""

@@ -58,18 +58,24 @@ def centred(name: str, x: float, y: float, width: float, length: float) -> Recta
 # Extents in metres, in the order of the fixed plan of the sampler study (docs/LLM3.md; thesis figure 4.5).
 BOX_SETS: dict[str, tuple[tuple[str, float, float, float], ...]] = {
     "easy": (
-        ("red_box", 0.035, 0.035, 0.07), ("blue_box", 0.07, 0.07, 0.07),
-        ("green_box", 0.035, 0.035, 0.07), ("tan_box", 0.035, 0.035, 0.07),
+        ("red_box", 0.035, 0.035, 0.07),
+        ("blue_box", 0.07, 0.07, 0.07),
+        ("green_box", 0.035, 0.035, 0.07),
+        ("tan_box", 0.035, 0.035, 0.07),
     ),
     "medium": (
-        ("red_box", 0.035, 0.035, 0.04), ("blue_box", 0.07, 0.07, 0.07),
-        ("cyan_box", 0.07, 0.07, 0.07), ("yellow_box", 0.035, 0.035, 0.04),
+        ("red_box", 0.035, 0.035, 0.04),
+        ("blue_box", 0.07, 0.07, 0.07),
+        ("cyan_box", 0.07, 0.07, 0.07),
+        ("yellow_box", 0.035, 0.035, 0.04),
     ),
     "hard": (
-        ("red_box", 0.07, 0.07, 0.07), ("blue_box", 0.07, 0.07, 0.07),
-        ("green_box", 0.105, 0.035, 0.07), ("tan_box", 0.035, 0.035, 0.07),
+        ("red_box", 0.07, 0.07, 0.07),
+        ("blue_box", 0.07, 0.07, 0.07),
+        ("green_box", 0.105, 0.035, 0.07),
+        ("tan_box", 0.035, 0.035, 0.07),
     ),
-}  # fmt: skip
+}
 BASKETS: dict[str, Rectangle] = {
     "small": centred("basket", 0.65, 0.0, 0.22, 0.21),
     "medium": centred("basket", 0.70, 0.0, 0.32, 0.21),

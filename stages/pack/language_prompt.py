@@ -64,11 +64,7 @@ def packing_language(observation: Observation) -> ActionLanguage:
 
 
 def prompt(
-    observation: Observation,
-    trace: Sequence[Attempt],
-    variant: Variant,
-    *,
-    reasons: bool,
+    observation: Observation, trace: Sequence[Attempt], variant: Variant, *, reasons: bool
 ) -> tuple[Message, ...]:
     """Return the messages of one call. `trace`: the attempts that are shown, oldest first.
 

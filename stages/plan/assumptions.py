@@ -75,17 +75,28 @@ def believe(model: WorldModel, graph: ContactGraphFile, beliefs: list[Belief]) -
         pose = transform_from_yaw(0.0, middle + [0.0, 0.0, 0.001])
         box = Box(center=as_vector(middle + [0.0, 0.0, height / 2]), size=(width, width, height))
         record = SceneBody(
-            name=belief.name, class_name=belief.class_name, movable=True, parent=belief.container,
-            relation="contains" if region.doors else "supports", world_from_body=as_transform(pose),
-            world_from_reconstructed=None, box=box, mass=mass, grasp_width=width,
-        )  # fmt: skip
+            name=belief.name,
+            class_name=belief.class_name,
+            movable=True,
+            parent=belief.container,
+            relation="contains" if region.doors else "supports",
+            world_from_body=as_transform(pose),
+            world_from_reconstructed=None,
+            box=box,
+            mass=mass,
+            grasp_width=width,
+        )
         model.see(belief.name, record, _cylinder(belief.name, width / 2, height, mass), ())
         nodes.append(
             GraphNode(
-                id=belief.name, instance=max(node.instance for node in nodes) + 1, class_name=belief.class_name,
-                node_type="rigid", box=box, confidence=0.0,
+                id=belief.name,
+                instance=max(node.instance for node in nodes) + 1,
+                class_name=belief.class_name,
+                node_type="rigid",
+                box=box,
+                confidence=0.0,
             )
-        )  # fmt: skip
+        )
         links.append(
             Relation(source=belief.container, target=belief.name, relation=record.relation, confidence=0.0)  # type: ignore[arg-type]
         )

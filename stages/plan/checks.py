@@ -65,8 +65,9 @@ def _lowest_point(world: PhysicsWorld, item: str) -> float:
     shapes = link_shapes(world.bodies[item].text)
     return min(
         float(apply(world.link_pose(item, link), mesh.vertices)[:, 2].min())
-        for link, meshes in shapes.items() for mesh in meshes
-    )  # fmt: skip
+        for link, meshes in shapes.items()
+        for mesh in meshes
+    )
 
 
 def check_joints(world: PhysicsWorld, literal: str, body: str, joints: Sequence[str], shut: bool) -> Check:

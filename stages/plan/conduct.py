@@ -61,10 +61,13 @@ class Conduct:
     """The plan; what was planned anew stands in the place of what could not be carried out."""
 
     def run(
-        self, state: RobotState, steps: list[Step], replans: int = 0,
+        self,
+        state: RobotState,
+        steps: list[Step],
+        replans: int = 0,
         replan: Callable[[RobotState, int], list[Step] | None] = lambda state, number: None,
         reached: Callable[[], bool] = lambda: True,
-    ) -> bool:  # fmt: skip
+    ) -> bool:
         """Execute the steps; return whether all were carried out. Failures are collected.
 
         When an action fails in all its attempts, or when the goal is not `reached` at the end, `replan` is asked for
@@ -111,9 +114,13 @@ class Conduct:
     # --- closed loop ------------------------------------------------------------------------------------------
 
     def _act(
-        self, state: RobotState, group: list[Step], origin: str, number: int,
+        self,
+        state: RobotState,
+        group: list[Step],
+        origin: str,
+        number: int,
         following: list[tuple[str, tuple[str, ...]]],
-    ) -> tuple[RobotState | None, bool]:  # fmt: skip
+    ) -> tuple[RobotState | None, bool]:
         """Carry out one action with its drives, trying again after a look; return the state after it (None: the arm
         does not get back) and whether it was carried out."""
         name, arguments = group[-1].name, group[-1].arguments

@@ -50,9 +50,15 @@ def levelled(world_from_tool: np.ndarray, tool_from_item: np.ndarray) -> np.ndar
 
 
 def level_place(
-    model: WorldModel, state: RobotState, item: str, base: np.ndarray, placement: Placement, rest: dict[str, float],
-    planner: ArmPlanner, tally: Tally,
-) -> Manipulation | None:  # fmt: skip
+    model: WorldModel,
+    state: RobotState,
+    item: str,
+    base: np.ndarray,
+    placement: Placement,
+    rest: dict[str, float],
+    planner: ArmPlanner,
+    tally: Tally,
+) -> Manipulation | None:
     """Return the motion that puts a laden `item` down from how it is held, or None (counted in the tally).
 
     The hand keeps its heading to the pedestal, give or take, goes level over the place, down, and away upwards; the arm

@@ -50,9 +50,12 @@ class PlanParameters(Parameters):
     )
     clearance: float = Field(0.004, ge=0, le=0.05, description="Distance kept from obstacles [m]")
     size_uncertainty: float = Field(
-        0.02, ge=0, le=0.2, description="Items are planned to be up to this much thinner than reconstructed, as voxels "
+        0.02,
+        ge=0,
+        le=0.2,
+        description="Items are planned to be up to this much thinner than reconstructed, as voxels "
         "widen thin things [m]; what was looked at is taken as it is",
-    )  # fmt: skip
+    )
     base_samples: int = Field(240, ge=16, le=20000, description="Base poses drawn per query")
     pair_samples: int = Field(2500, ge=16, le=1_000_000, description="Pairs of base and tool pose tried per query")
     path_samples: int = Field(800, ge=16, le=1_000_000, description="Samples of one RRT-Connect search")
@@ -61,9 +64,12 @@ class PlanParameters(Parameters):
     task_attempts: int = Field(4, ge=1, le=100, description="Task plans tried, each without what failed before")
     execution_attempts: int = Field(3, ge=1, le=20, description="Times an action is tried when it fails physically")
     replans: int = Field(
-        2, ge=0, le=20, description="Times the robot looks around and plans anew when an action fails in all its "
-        "attempts, or when the goal does not hold at the end"
-    )  # fmt: skip
+        2,
+        ge=0,
+        le=20,
+        description="Times the robot looks around and plans anew when an action fails in all its "
+        "attempts, or when the goal does not hold at the end",
+    )
     video_rate: float = Field(1.0, ge=0, le=30, description="Images per second in execution.mcap [1/s]; 0: none")
     image_width: int = Field(640, ge=64, le=4096, description="Width of the key frames [px]")
 

@@ -101,10 +101,14 @@ def _shifted(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
 
 
 def _bases_around(
-    model: WorldModel, state: RobotState, target: np.ndarray, budgets: Budgets, random: np.random.Generator,
+    model: WorldModel,
+    state: RobotState,
+    target: np.ndarray,
+    budgets: Budgets,
+    random: np.random.Generator,
     tally: Tally,
     fixed: np.ndarray | None,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     if fixed is not None:
         return fixed[None]
     bases = sample_bases(target, model.room, budgets.bases, random)
@@ -193,9 +197,15 @@ def _first_motion(attempts: Iterator[Manipulation | MotionFailed | None], search
 
 
 def _try_pick(
-    model: WorldModel, state: RobotState, item: str, source: str, base: np.ndarray, grasp: Grasp,
-    arm_planner: ArmPlanner, tally: Tally,
-) -> Manipulation | MotionFailed | None:  # fmt: skip
+    model: WorldModel,
+    state: RobotState,
+    item: str,
+    source: str,
+    base: np.ndarray,
+    grasp: Grasp,
+    arm_planner: ArmPlanner,
+    tally: Tally,
+) -> Manipulation | MotionFailed | None:
     """Return the motion, None when a cheap test fails, or the failure of a path search (they are counted)."""
     world_from_item = model.pose(item)
     world_from_tool = world_from_item @ grasp.body_from_tool
@@ -356,9 +366,15 @@ def _cover(places: list[Placement], world_from_item: np.ndarray) -> tuple[bool, 
 
 
 def _try_place(
-    model: WorldModel, state: RobotState, item: str, target: str, base: np.ndarray, placement: Placement,
-    arm_planner: ArmPlanner, tally: Tally,
-) -> Manipulation | MotionFailed | None:  # fmt: skip
+    model: WorldModel,
+    state: RobotState,
+    item: str,
+    target: str,
+    base: np.ndarray,
+    placement: Placement,
+    arm_planner: ArmPlanner,
+    tally: Tally,
+) -> Manipulation | MotionFailed | None:
     assert state.tool_from_item is not None
     if model.laden(item):
         rest_on = {link: RESTING_DEPTH for link in model.links(target)}

@@ -67,9 +67,11 @@ class Recording:
 def _robot_links(robot: Robot) -> dict[str, np.ndarray]:
     names = list(robot.links)
     states = engine.getLinkStates(
-        robot.body_id, [robot.links[name] for name in names], computeForwardKinematics=1,
+        robot.body_id,
+        [robot.links[name] for name in names],
+        computeForwardKinematics=1,
         physicsClientId=robot.world.client,
-    )  # fmt: skip
+    )
     return {
         f"robot/{name}": transform_from_quaternion(np.array(state[5]), np.array(state[4]))
         for name, state in zip(names, states, strict=True)

@@ -34,9 +34,12 @@ MOST_ASKEW = 0.12
 
 
 def rim_grasps(
-    points: np.ndarray, world_from_body: np.ndarray, random: np.random.Generator, headings: int = 24,
+    points: np.ndarray,
+    world_from_body: np.ndarray,
+    random: np.random.Generator,
+    headings: int = 24,
     uncertainty: float = 0.0,
-) -> list[Grasp]:  # fmt: skip
+) -> list[Grasp]:
     """Return grasps straight from above with one finger outside and one inside of the outermost wall. Where there are
     any square to the wall, only those.
 

@@ -95,9 +95,14 @@ def only_planned(model: WorldModel, graph: ContactGraphFile, steps: list[Step] |
 
 
 def execute(
-    model: WorldModel, order: Order, budgets: Budgets, search: Search, parameters: PlanParameters, context: Context,
+    model: WorldModel,
+    order: Order,
+    budgets: Budgets,
+    search: Search,
+    parameters: PlanParameters,
+    context: Context,
     random: np.random.Generator,
-) -> Outcome:  # fmt: skip
+) -> Outcome:
     """Carry out the steps in the room, write pictures and log, and return what came of it.
 
     The room is that of the ground truth, else the planned scene itself. `search` plans anew when that is needed.
@@ -134,16 +139,27 @@ def execute(
         observe(START)
         physical.recording.keyframe(START, "start")
         conduct = Conduct(
-            model, room, physical, matches, joint_names, replace(budgets, size_uncertainty=0.0), random,
-            parameters.relocalize, parameters.execution_attempts, observe=observe,
-        )  # fmt: skip
+            model,
+            room,
+            physical,
+            matches,
+            joint_names,
+            replace(budgets, size_uncertainty=0.0),
+            random,
+            parameters.relocalize,
+            parameters.execution_attempts,
+            observe=observe,
+        )
         if failures:
             conduct.steps = order.steps
         else:
             conduct.run(
-                order.state, order.steps, parameters.replans, replan,
+                order.state,
+                order.steps,
+                parameters.replans,
+                replan,
                 reached=lambda: all(check.holds for check in settled_checks()),
-            )  # fmt: skip
+            )
         checks = settled_checks()
         physical.recording.keyframe(len(conduct.steps) - 1, "end")
         final = observed_state(world, matches, joint_names, physical.held)
@@ -202,9 +218,12 @@ def _named(steps: list[Step], planned: dict[str, SceneBody]) -> set[str]:
 
 
 def _differences(
-    model: WorldModel, believed: TreeState, steps: list[Step], observed: dict[int, TreeState],
+    model: WorldModel,
+    believed: TreeState,
+    steps: list[Step],
+    observed: dict[int, TreeState],
     anew: dict[int, TreeState],
-) -> tuple[TreeDifference, ...]:  # fmt: skip
+) -> tuple[TreeDifference, ...]:
     """Return where the tree was not as the steps say; what was planned anew began with the tree as it was then."""
     differences: list[TreeDifference] = []
     expected = replace(believed, parents={**believed.parents, **observed[START].parents})
@@ -212,9 +231,12 @@ def _differences(
         if number in anew:
             seen = anew[number]
             expected = replace(
-                expected, parents={**expected.parents, **seen.parents}, poses={**expected.poses, **seen.poses},
-                joints={**expected.joints, **seen.joints}, held=seen.held,
-            )  # fmt: skip
+                expected,
+                parents={**expected.parents, **seen.parents},
+                poses={**expected.poses, **seen.poses},
+                joints={**expected.joints, **seen.joints},
+                held=seen.held,
+            )
         expected = after_step(expected, step)
         if number in observed:
             differences += tree_differences(number, expected, observed[number], model)

@@ -59,9 +59,12 @@ def run(
         raise UsageError("--goal and --task cannot be given together", hint="leave one of them out")
     robot = load_robot(parameters.robot)
     budgets = Budgets(
-        parameters.base_samples, parameters.pair_samples, parameters.path_samples, parameters.path_searches,
+        parameters.base_samples,
+        parameters.pair_samples,
+        parameters.path_samples,
+        parameters.path_searches,
         parameters.size_uncertainty,
-    )  # fmt: skip
+    )
     with context.progress.step("load the scene"):
         model = WorldModel(scene.root, scene.graph, robot, parameters.clearance)
     try:
@@ -76,14 +79,23 @@ def run(
         if planning.steps is not None and parameters.execute:
             order = Order(scene, ground_truth, graph, beliefs, planning.literals, state, planning.steps)
             anew = partial(
-                plan_and_refine, model, domain=DOMAIN, budgets=replace(budgets, size_uncertainty=0.0),
-                random=context.random(REPLANNING), settings=_search_settings(parameters),
-            )  # fmt: skip
+                plan_and_refine,
+                model,
+                domain=DOMAIN,
+                budgets=replace(budgets, size_uncertainty=0.0),
+                random=context.random(REPLANNING),
+                settings=_search_settings(parameters),
+            )
             with context.progress.step("execute"):
                 outcome = execute(
-                    model, order, budgets, lambda state, problem: anew(state=state, problem=problem), parameters,
-                    context, context.random(EXECUTION),
-                )  # fmt: skip
+                    model,
+                    order,
+                    budgets,
+                    lambda state, problem: anew(state=state, problem=problem),
+                    parameters,
+                    context,
+                    context.random(EXECUTION),
+                )
         else:
             outcome = only_planned(model, graph, planning.steps)
         return _write(parameters, context, planning, outcome, graph, [belief.words for belief in beliefs], robot)
@@ -98,9 +110,14 @@ def _search_settings(parameters: PlanParameters) -> SearchSettings:
 
 
 def _find(
-    model: WorldModel, graph: ContactGraphFile, objects: dict[str, str], initial: frozenset[Atom], budgets: Budgets,
-    parameters: PlanParameters, context: Context,
-) -> tuple[RobotState, Found]:  # fmt: skip
+    model: WorldModel,
+    graph: ContactGraphFile,
+    objects: dict[str, str],
+    initial: frozenset[Atom],
+    budgets: Budgets,
+    parameters: PlanParameters,
+    context: Context,
+) -> tuple[RobotState, Found]:
     """Return where the robot starts, and the plan of the first goal that has one (or the first goal, without)."""
     planning = Found()
     carry = model.description.carry
@@ -116,9 +133,14 @@ def _find(
         return RobotState(np.zeros(3), carry), planning
     for number, (goal, literals) in enumerate(goals):
         attempt = plan_and_refine(
-            model, state, DOMAIN, task_problem(objects, initial, goal), budgets, context.random(SEARCH, number),
+            model,
+            state,
+            DOMAIN,
+            task_problem(objects, initial, goal),
+            budgets,
+            context.random(SEARCH, number),
             _search_settings(parameters),
-        )  # fmt: skip
+        )
         planning.failures += attempt.failures
         planning.learned += attempt.learned
         planning.tried += attempt.tried
@@ -148,23 +170,35 @@ def _nothing_to_do(model: WorldModel, graph: ContactGraphFile, initial: frozense
     inside = sum(atom[0] == "in" for atom in initial)
     tables = sum(record.class_name in TABLE_CLASSES for record in model.records.values())
     rigid = sorted(
-        {link.source for link in graph.links
-         if link.relation == "contains" and graph.node(link.source).node_type == "articulated"
-         and link.source in model.records and not model.records[link.source].joints}
-    )  # fmt: skip
+        {
+            link.source
+            for link in graph.links
+            if link.relation == "contains"
+            and graph.node(link.source).node_type == "articulated"
+            and link.source in model.records
+            and not model.records[link.source].joints
+        }
+    )
     message = f"the scene has {inside} items behind doors and {tables} tables: the demo's goal needs one of each"
     if rigid:
         message += f"; {', '.join(rigid)} contain things but have no CAD model with moving parts"
     return Failure(
-        kind="no_goal", message=message, objects=tuple(rigid),
+        kind="no_goal",
+        message=message,
+        objects=tuple(rigid),
         numbers={"items_inside": float(inside), "tables": float(tables)},
-    )  # fmt: skip
+    )
 
 
 def _write(
-    parameters: PlanParameters, context: Context, planning: Found, outcome: Outcome, graph: ContactGraphFile,
-    beliefs: list[str], robot: RobotDescription,
-) -> Plan:  # fmt: skip
+    parameters: PlanParameters,
+    context: Context,
+    planning: Found,
+    outcome: Outcome,
+    graph: ContactGraphFile,
+    beliefs: list[str],
+    robot: RobotDescription,
+) -> Plan:
     steps = outcome.steps
     rows, ranges = planned_rows(steps or [], robot)
     actions = tuple(
@@ -182,17 +216,30 @@ def _write(
     else:
         status = "executed" if reached else "execution_failed"
     unmet = tuple(
-        Failure(kind="condition_not_met", message=f"{check.condition} does not hold: {check.detail}",
-                numbers=check.numbers)
-        for check in outcome.checks if not check.holds
-    )  # fmt: skip
+        Failure(
+            kind="condition_not_met", message=f"{check.condition} does not hold: {check.detail}", numbers=check.numbers
+        )
+        for check in outcome.checks
+        if not check.holds
+    )
     plan = PlanFile(
-        goal=planning.literals, planned_in="reconstructed", executed_in=outcome.executed_in, actions=actions,
-        failures=(*planning.failures, *outcome.failures, *unmet), checks=outcome.checks, status=status,
-        matches=outcome.matches, assumptions=(*beliefs, *outcome.assumptions), bumps=outcome.bumps,
-        task=parameters.task or None, planner=parameters.planner, learned=(*planning.learned, *outcome.learned),
-        tried=(*planning.tried, *outcome.tried), replanned=outcome.replanned, tree_differences=outcome.differences,
-    )  # fmt: skip
+        goal=planning.literals,
+        planned_in="reconstructed",
+        executed_in=outcome.executed_in,
+        actions=actions,
+        failures=(*planning.failures, *outcome.failures, *unmet),
+        checks=outcome.checks,
+        status=status,
+        matches=outcome.matches,
+        assumptions=(*beliefs, *outcome.assumptions),
+        bumps=outcome.bumps,
+        task=parameters.task or None,
+        planner=parameters.planner,
+        learned=(*planning.learned, *outcome.learned),
+        tried=(*planning.tried, *outcome.tried),
+        replanned=outcome.replanned,
+        tree_differences=outcome.differences,
+    )
     plan.write(context.output / "plan.json")
     (outcome.graph or graph).write(context.output / "graph.json")
     if outcome.graphs:
@@ -203,10 +250,12 @@ def _write(
     context.output.joinpath("plan.txt").write_text(plan_text(plan, steps or []), encoding="utf-8")
     ok = status in ("executed", "planned")
     summary = {
-        "goal": " ".join(planning.literals), "status": status, "actions": len(actions),
+        "goal": " ".join(planning.literals),
+        "status": status,
+        "actions": len(actions),
         "checks": f"{sum(check.holds for check in outcome.checks)}/{len(outcome.checks)}",
         "failures": len(plan.failures),
-    }  # fmt: skip
+    }
     return Plan(context.output, outcome="ok" if ok else status, summary=summary)
 
 

@@ -36,8 +36,12 @@ def top_planes(meshes: list[trimesh.Trimesh]) -> tuple[SurfacePlane, ...]:
         corners = [(low[0], low[1], top), (high[0], low[1], top), (high[0], high[1], top), (low[0], high[1], top)]
         planes.append(
             SurfacePlane(
-                normal=(0.0, 0.0, 1.0), offset=-top, area=area, center=as_vector(np.mean(corners, axis=0)),
-                corners=tuple(as_vector(np.array(corner)) for corner in corners), horizontal=True,
+                normal=(0.0, 0.0, 1.0),
+                offset=-top,
+                area=area,
+                center=as_vector(np.mean(corners, axis=0)),
+                corners=tuple(as_vector(np.array(corner)) for corner in corners),
+                horizontal=True,
             )
-        )  # fmt: skip
+        )
     return tuple(planes)

@@ -42,10 +42,11 @@ class SceneFacts:
     def small(self, names: list[str]) -> list[str]:
         """Return those that can be picked up on their own: graspable, within reach, nothing on them, no carrier."""
         return [
-            name for name in names
+            name
+            for name in names
             if all(self.holds(word, name) for word in ("graspable", "reachable", "clear"))
             and not self.holds("carrier", name)
-        ]  # fmt: skip
+        ]
 
     def width(self, name: str) -> float:
         """Return the least width of a thing [m]; narrow things are safer to grasp."""
@@ -134,9 +135,11 @@ def put_away_in_drawer(facts: SceneFacts) -> Goals:
     """`in(item, furniture)`, shut: a small thing that stands in the open, into a drawer with room for it."""
     drawers = {
         joint.name: name
-        for name, record in facts.model.records.items() if facts.holds("reachable", name)
-        for joint in record.joints if joint.type == "prismatic" and facts.holds("reachable", joint.name)
-    }  # fmt: skip
+        for name, record in facts.model.records.items()
+        if facts.holds("reachable", name)
+        for joint in record.joints
+        if joint.type == "prismatic" and facts.holds("reachable", joint.name)
+    }
     things = facts.small(sorted(item for item, where in facts.on.items() if where in facts.bodies(*TABLES, *SHELVES)))
     ranked = []
     for item in things:
@@ -155,10 +158,11 @@ def put_away_in_drawer(facts: SceneFacts) -> Goals:
 def stack_and_carry(facts: SceneFacts) -> Goals:
     """Small things onto a tray, those that stand best, and the tray with all that onto another table."""
     trays = sorted(
-        name for name in facts.model.records
+        name
+        for name in facts.model.records
         if all(facts.holds(word, name) for word in ("carrier", "graspable", "reachable", "flat"))
         and facts.on.get(name) is not None
-    )  # fmt: skip
+    )
     surfaces = facts.bodies(*TABLES)
     ranked = []
     for tray in trays:

@@ -65,9 +65,7 @@ def executed_rows(snapshots: list[Snapshot]) -> dict[str, np.ndarray]:
 def _arrays(times: np.ndarray, body: np.ndarray, opening: np.ndarray, action: np.ndarray) -> dict[str, np.ndarray]:
     joints = np.concatenate([body[:, 3:], np.repeat(opening[:, None] / 2, 2, axis=1)], axis=1)
     bases = np.array([transform_from_yaw(float(row[2]), np.array([row[0], row[1], 0.0])) for row in body])
-    return {
-        "time": times, "joints": joints, "world_from_base": bases.reshape(-1, 4, 4), "action": action,
-    }  # fmt: skip
+    return {"time": times, "joints": joints, "world_from_base": bases.reshape(-1, 4, 4), "action": action}
 
 
 def write_trajectory(path: Path, arrays: dict[str, np.ndarray]) -> None:

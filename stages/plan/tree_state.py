@@ -22,8 +22,11 @@ MOVED = 0.05
 def start_state(model: WorldModel) -> TreeState:
     """Return what is believed at the beginning."""
     movable = [name for name, record in model.records.items() if record.carriable]
-    joints = {joint.name: model.joint_value(name, joint.name)
-              for name, record in model.records.items() for joint in record.joints}  # fmt: skip
+    joints = {
+        joint.name: model.joint_value(name, joint.name)
+        for name, record in model.records.items()
+        for joint in record.joints
+    }
     parents = {name: model.records[name].parent or SCENE_NODE for name in movable}
     return TreeState(parents, {name: model.pose(name) for name in movable}, joints)
 
@@ -75,10 +78,13 @@ def tree_differences(
             if joint.name not in observed.joints:
                 continue
             words = [
-                "open" if is_open(joint, state.joints[joint.name])
-                else "closed" if is_closed(joint, state.joints[joint.name]) else "between"
+                "open"
+                if is_open(joint, state.joints[joint.name])
+                else "closed"
+                if is_closed(joint, state.joints[joint.name])
+                else "between"
                 for state in (expected, observed)
-            ]  # fmt: skip
+            ]
             if words[0] != words[1]:
                 differences.append(TreeDifference(action=action, node=joint.name, expected=words[0], observed=words[1]))
     return tuple(differences)
@@ -105,8 +111,9 @@ def graph_of_state(
     for name, record in model.records.items():
         values = {
             joint.name.removeprefix(f"{name}__"): round(state.joints[joint.name], 6)
-            for joint in record.joints if joint.name in state.joints
-        }  # fmt: skip
+            for joint in record.joints
+            if joint.name in state.joints
+        }
         if values:
             joints[name] = values
     updated = update_graph(graph, moved, parents, joints)

@@ -70,7 +70,9 @@ def _moved_plane(plane: SurfacePlane, change: np.ndarray) -> SurfacePlane:
     corners = tuple(as_vector(change[:3, :3] @ np.array(corner) + change[:3, 3]) for corner in plane.corners)
     return plane.model_copy(
         update={
-            "normal": as_vector(normal), "offset": float(-normal @ center), "center": as_vector(center),
+            "normal": as_vector(normal),
+            "offset": float(-normal @ center),
+            "center": as_vector(center),
             "corners": corners,
         }
-    )  # fmt: skip
+    )

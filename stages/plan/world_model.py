@@ -199,8 +199,10 @@ class WorldModel:
     def snapshot(self) -> Snapshot:
         """Return where everything is, for `restore`."""
         poses = {name: self.pose(name) for name, record in self.records.items() if record.movable}
-        joints = {name: {joint: self.joint_value(name, joint) for joint in body.joints}
-                  for name, body in self.world.bodies.items()}  # fmt: skip
+        joints = {
+            name: {joint: self.joint_value(name, joint) for joint in body.joints}
+            for name, body in self.world.bodies.items()
+        }
         laden = tuple(sorted({carrier for carrier, _ in self._aboard.values()}))
         return Snapshot(poses, joints, dict(self.records), laden)
 

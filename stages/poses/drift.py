@@ -35,10 +35,15 @@ def loop_closures(estimate: Estimate) -> tuple[LoopClosure, ...]:
             way = float(travelled[loop.source] - travelled[loop.target])
         result.append(
             LoopClosure(
-                first=first.frame, second=second.frame, found_by=loop.found_by, weight=float(weight),
-                overlap=loop.alignment.overlap, odometry_error=error, path_length=way,
+                first=first.frame,
+                second=second.frame,
+                found_by=loop.found_by,
+                weight=float(weight),
+                overlap=loop.alignment.overlap,
+                odometry_error=error,
+                path_length=way,
             )
-        )  # fmt: skip
+        )
     return tuple(result)
 
 

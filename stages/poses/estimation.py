@@ -9,14 +9,7 @@ import numpy as np
 from stages.kit.formats.frames import FrameReader
 from stages.kit.stage import Context
 from stages.poses.features import Features, find_features
-from stages.poses.loops import (
-    Loop,
-    PyramidCache,
-    Verifier,
-    edge_of,
-    overlap_candidates,
-    place_candidates,
-)
+from stages.poses.loops import Loop, PyramidCache, Verifier, edge_of, overlap_candidates, place_candidates
 from stages.poses.parameters import PosesParameters
 from stages.poses.places import Ferns
 from stages.poses.pose_graph import Edge, Solution, laid_out, optimize, parts_of

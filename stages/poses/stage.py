@@ -123,11 +123,7 @@ METHODS = {
 
 
 def _finish(
-    reader: FrameReader,
-    camera_name: str,
-    result: Result,
-    parameters: PosesParameters,
-    context: Context,
+    reader: FrameReader, camera_name: str, result: Result, parameters: PosesParameters, context: Context
 ) -> Trajectory:
     posed = [pose for pose in result.poses if pose.world_from_camera is not None]
     if len(posed) < 2:
@@ -148,7 +144,8 @@ def _finish(
         world=world,
         frames=tuple(
             FrameEstimate(
-                frame=pose.frame, time=float(times[pose.frame]),
+                frame=pose.frame,
+                time=float(times[pose.frame]),
                 status=pose.status if pose.frame in kept else "unposed",
                 fault=pose.fault or ("" if pose.frame in kept else "not_joined"),
                 confidence=round(pose.confidence, 4) if pose.frame in kept else 0.0,
@@ -161,7 +158,7 @@ def _finish(
         variance_factor=result.variance_factor,
         parts=max(result.parts, 1),
         path_length=path_length(placed[:, :3, 3]),
-    )  # fmt: skip
+    )
     info.write(context.output / "poses.json")
     return Trajectory(context.output, outcome=outcome_of(info), summary=_summary(info, result, context))
 

@@ -232,10 +232,15 @@ class Tracker:
         points = points[points[:, 2] > 0]
         self.track.keys.append(
             KeyFrame(
-                seen.frame, part, part_from_key, self._features_of(seen), seen.describe_depth(),
-                points[:: max(1, len(points) // 200)].copy(), seen.pyramid.median_depth,
+                seen.frame,
+                part,
+                part_from_key,
+                self._features_of(seen),
+                seen.describe_depth(),
+                points[:: max(1, len(points) // 200)].copy(),
+                seen.pyramid.median_depth,
             )
-        )  # fmt: skip
+        )
         self._key = self._previous = seen
         self._key_from_previous, self._motion = np.eye(4), np.eye(4)
         return TrackedFrame(seen.frame, number, np.eye(4), None, fault)

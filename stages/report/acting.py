@@ -73,10 +73,14 @@ def body_rows(scene: InteractiveScene) -> list[BodyRow]:
                 joints.append(f"{name}: slide {low:.0f} to {high:.0f} cm, seen at {now:.0f} cm")
         rows.append(
             BodyRow(
-                body.name, body.class_name, body.movable, _place(body.relation, body.parent), f"{body.mass:.2f} kg",
+                body.name,
+                body.class_name,
+                body.movable,
+                _place(body.relation, body.parent),
+                f"{body.mass:.2f} kg",
                 tuple(joints),
             )
-        )  # fmt: skip
+        )
     return sorted(rows, key=lambda r: (not r.joints, not r.movable, r.name))
 
 

@@ -83,11 +83,15 @@ def draw_graph(
     }
     nodes = tuple(
         DrawnNode(
-            *boxes[node.id], node.id, node.node_type, hex_color(entity_color(node.instance, node.class_name)),
-            _node_title(node), marks.get(node.id, ""),
+            *boxes[node.id],
+            node.id,
+            node.node_type,
+            hex_color(entity_color(node.instance, node.class_name)),
+            _node_title(node),
+            marks.get(node.id, ""),
         )
         for node in graph.nodes
-    )  # fmt: skip
+    )
     edges, proximal = [], []
     for link in graph.links:
         if link.source not in boxes or link.target not in boxes:

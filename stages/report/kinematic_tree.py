@@ -64,10 +64,13 @@ def read_joints(path: Path) -> tuple[list[str], list[UrdfJoint]]:
             continue
         joints.append(
             UrdfJoint(
-                joint.get("name", ""), joint.get("type", ""), parent.get("link", ""), child.get("link", ""),
+                joint.get("name", ""),
+                joint.get("type", ""),
+                parent.get("link", ""),
+                child.get("link", ""),
                 "" if limit is None else _limits(limit),
             )
-        )  # fmt: skip
+        )
     return links, joints
 
 
@@ -112,11 +115,14 @@ def corresponding_trees(graph: ContactGraphFile, links: list[str], joints: list[
     )
     link_nodes = tuple(
         DrawnNode(
-            *right_boxes[link], shown[link], "scene" if link == root else "part" if link in parts else "rigid",
-            color(node_of[link]), f"link {link}",
+            *right_boxes[link],
+            shown[link],
+            "scene" if link == root else "part" if link in parts else "rigid",
+            color(node_of[link]),
+            f"link {link}",
         )
         for link in shown
-    )  # fmt: skip
+    )
     return Corresponding(
         width=max((x + width for x, _, width in right_boxes.values()), default=link_left) + 12,
         height=TOP + 20 + ROW * max((row for _, row in layout.values()), default=0.0),
@@ -184,12 +190,13 @@ def _boxes(
 def _graph_edges(graph: ContactGraphFile, boxes: Mapping[str, tuple[float, float, float]]) -> tuple[DrawnEdge, ...]:
     return tuple(
         DrawnEdge(
-            elbow(boxes[link.source], boxes[link.target]), link.relation,
+            elbow(boxes[link.source], boxes[link.target]),
+            link.relation,
             f"{link.source} {link.relation.replace('_', ' ')} {link.target}",
         )
         for link in graph.links
         if link.relation in TREE_RELATIONS and link.source in boxes and link.target in boxes
-    )  # fmt: skip
+    )
 
 
 def _joint_title(joint: UrdfJoint) -> str:

@@ -84,9 +84,16 @@ def _made(role: str, artifact: Artifact, report_folder: Path, slowest: float) ->
 
 def _nothing(artifact: Artifact) -> Manifest:
     return Manifest(
-        kind=artifact.kind, schema_version=artifact.schema_version, stage="", stage_version=0, key="",
-        content_digest="", files=(), outcome=artifact.outcome, summary=artifact.summary,
-    )  # fmt: skip
+        kind=artifact.kind,
+        schema_version=artifact.schema_version,
+        stage="",
+        stage_version=0,
+        key="",
+        content_digest="",
+        files=(),
+        outcome=artifact.outcome,
+        summary=artifact.summary,
+    )
 
 
 def _without_folders(command: tuple[str, ...]) -> list[str]:

@@ -35,8 +35,14 @@ class Bounds:
 
     def corners(self) -> np.ndarray:
         """(8, 3)."""
-        return np.array([[x, y, z] for x in (self.low[0], self.high[0]) for y in (self.low[1], self.high[1])
-                         for z in (self.low[2], self.high[2])])  # fmt: skip
+        return np.array(
+            [
+                [x, y, z]
+                for x in (self.low[0], self.high[0])
+                for y in (self.low[1], self.high[1])
+                for z in (self.low[2], self.high[2])
+            ]
+        )
 
 
 @dataclass(frozen=True)

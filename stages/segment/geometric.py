@@ -103,12 +103,7 @@ def _minimum_convexity(
 
 
 def minimum_convexity(
-    points: np.ndarray,
-    normals: np.ndarray,
-    *,
-    window: int = 5,
-    mask_threshold: float = -0.0005,
-    mutual: bool = True,
+    points: np.ndarray, normals: np.ndarray, *, window: int = 5, mask_threshold: float = -0.0005, mutual: bool = True
 ) -> np.ndarray:
     """Return the smallest convexity of every pixel to its neighbours, (H, W) float32 in -1..1.
 

@@ -152,12 +152,7 @@ def _estimates(
 
 
 def _draw(
-    folder: Path,
-    pair: Pair,
-    seen: EyeMasks,
-    pairs: StereoPairs,
-    answer: NeedleEstimate,
-    views: tuple[SutureView, ...],
+    folder: Path, pair: Pair, seen: EyeMasks, pairs: StereoPairs, answer: NeedleEstimate, views: tuple[SutureView, ...]
 ) -> None:
     folder.mkdir(exist_ok=True)
     truth = NeedlePose(np.array(views[pair.index].camera_from_needle)) if pair.index < len(views) else None

@@ -79,9 +79,13 @@ def make_camera(parameters: SynthesizeParameters) -> Camera:
     """Return the camera of the parameters: square pixels, principal point in the middle."""
     focal = 0.5 * parameters.width / float(np.tan(np.deg2rad(parameters.field_of_view) / 2))
     return Camera(
-        width=parameters.width, height=parameters.height, fx=focal, fy=focal,
-        cx=(parameters.width - 1) / 2, cy=(parameters.height - 1) / 2,
-    )  # fmt: skip
+        width=parameters.width,
+        height=parameters.height,
+        fx=focal,
+        fy=focal,
+        cx=(parameters.width - 1) / 2,
+        cy=(parameters.height - 1) / 2,
+    )
 
 
 def make_renderer(arrangement: Arrangement, recipe: Recipe, texel: float = 0.05) -> SceneRenderer:
@@ -118,9 +122,12 @@ def _record(
     visible = np.zeros(len(gloss), dtype=np.int64)
     poses, valid = [], 0
     with FrameWriter(
-        context.output / "log.mcap", camera, labels=True, label_table=labels,
+        context.output / "log.mcap",
+        camera,
+        labels=True,
+        label_table=labels,
         baselines={CAMERA_FRAME: baseline} if baseline > 0 else None,
-    ) as writer:  # fmt: skip
+    ) as writer:
         for time in context.progress.track(times, total=len(times), description="rendering"):
             pose = walk.pose(time * pace)
             view = renderer.render(camera, pose)

@@ -187,9 +187,14 @@ def _on_plane(
     foot = footprint(box)
     overlap = polygon_area(clip_polygon(foot, outline)) / max(polygon_area(foot), 1e-12)
     return Relation(
-        source=source, target=thing.name, relation=relation, confidence=1.0, plane=index, gap=float(gap),
+        source=source,
+        target=thing.name,
+        relation=relation,
+        confidence=1.0,
+        plane=index,
+        gap=float(gap),
         overlap=float(min(1.0, overlap)),
-    )  # fmt: skip
+    )
 
 
 def _proximal(arrangement: Arrangement, boxes: dict[str, Box], links: list[Relation]) -> list[Relation]:

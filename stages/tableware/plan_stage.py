@@ -88,10 +88,7 @@ def run(
 
 
 def _accepted(
-    detections: TablewareDetections | None,
-    scene: TablewareScene | None,
-    parameters: PlanParameters,
-    context: Context,
+    detections: TablewareDetections | None, scene: TablewareScene | None, parameters: PlanParameters, context: Context
 ) -> tuple[Accepted, tuple[str, ...]]:
     """Return what is planned for, and what vision did not handle. Raises BadInput for what cannot be planned from."""
     least, rules = parameters.least_confidence, Rules()

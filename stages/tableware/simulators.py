@@ -116,10 +116,7 @@ class PhysicsSimulator:
         pictures.write_physics_animation(folder / "clearing.gif", frames, words, min(ANIMATION_WIDTH, width))
 
 
-SIMULATORS: dict[str, Callable[[SimulateParameters], Simulator]] = {
-    "fast": FastSimulator,
-    "physics": PhysicsSimulator,
-}
+SIMULATORS: dict[str, Callable[[SimulateParameters], Simulator]] = {"fast": FastSimulator, "physics": PhysicsSimulator}
 
 
 def physics_part(name: str) -> Any:

@@ -40,10 +40,7 @@ class _Sheet:
     scale: float
 
     def at(self, x: float, y: float) -> tuple[float, float]:
-        return (
-            (x + TABLE_SIDES[0] / 2 + MARGIN) * self.scale,
-            (TABLE_SIDES[1] / 2 + MARGIN - y) * self.scale,
-        )
+        return ((x + TABLE_SIDES[0] / 2 + MARGIN) * self.scale, (TABLE_SIDES[1] / 2 + MARGIN - y) * self.scale)
 
     def disc(self, x: float, y: float, radius: float, fill: str | None, outline: str | None, width: float) -> None:
         u, v = self.at(x, y)
@@ -71,10 +68,7 @@ def draw_table(table: Table, width: int, action: Action | None = None, caption: 
     height = round((TABLE_SIDES[1] + 2 * MARGIN) * scale)
     image = Image.new("RGB", (SUPERSAMPLING * width, height), GROUND)
     sheet = _Sheet(ImageDraw.Draw(image), scale)
-    corners = (
-        *sheet.at(-TABLE_SIDES[0] / 2, TABLE_SIDES[1] / 2),
-        *sheet.at(TABLE_SIDES[0] / 2, -TABLE_SIDES[1] / 2),
-    )
+    corners = (*sheet.at(-TABLE_SIDES[0] / 2, TABLE_SIDES[1] / 2), *sheet.at(TABLE_SIDES[0] / 2, -TABLE_SIDES[1] / 2))
     sheet.draw.rectangle(corners, fill=CLOTH, outline=EDGE, width=SUPERSAMPLING)
     for x, y, radius in table.obstacles:
         sheet.disc(x, y, radius, "#fee2e2", REFUSED_INK, 0.003)

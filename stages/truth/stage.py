@@ -66,10 +66,15 @@ def run(
     info = sequence.info
     extent = np.ptp(vertices, axis=0)
     GroundTruthFile(
-        source="scan", seed=context.seed, recipe=f"SceneNN {name}",
-        room_size=(float(extent[0]), float(extent[1]), float(extent[2])), camera=info.camera,
-        frame_count=info.frame_count, depth_noise=True, objects=objects,
-    ).write(context.output / "ground_truth.json")  # fmt: skip
+        source="scan",
+        seed=context.seed,
+        recipe=f"SceneNN {name}",
+        room_size=(float(extent[0]), float(extent[1]), float(extent[2])),
+        camera=info.camera,
+        frame_count=info.frame_count,
+        depth_noise=True,
+        objects=objects,
+    ).write(context.output / "ground_truth.json")
     unconnected_graph(objects).write(context.output / "graph.json")
     np.savez(context.output / "visible.npz", points=points, instance=point_instances)
     write_ply(context.output / "mesh.ply", colored(vertices, scan.faces, instances))
@@ -164,11 +169,14 @@ def unconnected_graph(objects: tuple[TrueObject, ...]) -> ContactGraphFile:
     nodes = [GraphNode(id=SCENE_NODE, instance=0, class_name=SCENE_NODE, node_type="scene")]
     nodes += [
         GraphNode(
-            id=entry.name, instance=entry.instance, class_name=entry.class_name,
-            node_type=vocabulary.by_name(entry.class_name).node, box=entry.box,
+            id=entry.name,
+            instance=entry.instance,
+            class_name=entry.class_name,
+            node_type=vocabulary.by_name(entry.class_name).node,
+            box=entry.box,
         )
         for entry in objects
-    ]  # fmt: skip
+    ]
     return ContactGraphFile(graph={"annotated": "no"}, nodes=tuple(nodes), links=())
 
 

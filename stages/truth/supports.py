@@ -62,11 +62,15 @@ def run(
     info = sequence.info
     low, high = points[owner > 0].min(axis=0), points[owner > 0].max(axis=0)
     GroundTruthFile(
-        source="scan", seed=context.seed, recipe=annotation_file.scene, camera=info.camera,
+        source="scan",
+        seed=context.seed,
+        recipe=annotation_file.scene,
+        camera=info.camera,
         frame_count=info.frame_count,
         room_size=(float(high[0] - low[0]), float(high[1] - low[1]), float(high[2] - low[2])),
-        depth_noise=True, objects=objects,
-    ).write(context.output / "ground_truth.json")  # fmt: skip
+        depth_noise=True,
+        objects=objects,
+    ).write(context.output / "ground_truth.json")
     graph = annotated_graph(annotation_file, objects)
     graph.write(context.output / "graph.json")
     np.savez(context.output / "visible.npz", points=points.astype(np.float32), instance=owner.astype(np.int32))

@@ -16,11 +16,29 @@ from stages.kit.formats.scene_supports import resting_height
 STANDS = ("supports", "contains")
 BUILT_IN = frozenset(
     (
-        "wall_cabinet", "wall_shelf", "cabinet", "drawer_unit", "wardrobe", "chest", "shelf", "fridge", "oven",
-        "dishwasher", "washing_machine", "hob", "sink", "toilet", "bed", "person", "pendant_lamp", "board", "door",
-        "window", "curtain",
+        "wall_cabinet",
+        "wall_shelf",
+        "cabinet",
+        "drawer_unit",
+        "wardrobe",
+        "chest",
+        "shelf",
+        "fridge",
+        "oven",
+        "dishwasher",
+        "washing_machine",
+        "hob",
+        "sink",
+        "toilet",
+        "bed",
+        "person",
+        "pendant_lamp",
+        "board",
+        "door",
+        "window",
+        "curtain",
     )
-)  # fmt: skip
+)
 """Part of the building, fastened to it, or too heavy to be pushed."""
 NAMELESS = "object"
 LARGEST_NAMELESS = 0.5

@@ -23,9 +23,17 @@ def artifact(path: Path, *inputs: str, **fields: Any) -> Path:
     """Write the manifest of an artifact without files that names these inputs."""
     path.mkdir(parents=True, exist_ok=True)
     document = {
-        "kind": "trajectory", "schema_version": 1, "stage": "poses", "stage_version": 1, "key": "k", "files": [],
-        "content_digest": NOTHING, "inputs": reads(*inputs), "outcome": "empty", **fields,
-    }  # fmt: skip
+        "kind": "trajectory",
+        "schema_version": 1,
+        "stage": "poses",
+        "stage_version": 1,
+        "key": "k",
+        "files": [],
+        "content_digest": NOTHING,
+        "inputs": reads(*inputs),
+        "outcome": "empty",
+        **fields,
+    }
     (path / "manifest.json").write_text(json.dumps(document))
     return path
 

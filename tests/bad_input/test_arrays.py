@@ -48,7 +48,8 @@ def objects() -> bytes:
 BAD_ARRAYS = {
     "objects": (objects(), "expected plain numbers"),
     "objects in a record": (
-        npy("{'descr': [('a', '|O')], 'fortran_order': False, 'shape': (1,), }", bytes(8)), "expected plain numbers",
+        npy("{'descr': [('a', '|O')], 'fortran_order': False, 'shape': (1,), }", bytes(8)),
+        "expected plain numbers",
     ),
     "records": (npy("{'descr': [('a', '<f8')], 'fortran_order': False, 'shape': (1,), }", bytes(8)), "expected plain"),
     "times": (npy(header("(1,)", "<M8[s]"), bytes(8)), "expected plain numbers"),
@@ -67,7 +68,7 @@ BAD_ARRAYS = {
     "long header": (npy(header() + " " * 20_000, bytes(32)), "no array header"),
     "unknown kind": (npy(header(kind="<q99")), "no array header"),
     "half a header": (npy(header())[:20], "no array header"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", BAD_ARRAYS)
@@ -199,9 +200,19 @@ def _with(picture: bytes, name: str = NAME) -> bytes:
 
 
 @pytest.mark.parametrize(
-    "name", ["../../etc/evil.png", "/tmp/evil.png", "\u0663\u0663\u0663\u0663\u0663\u0663.png", "1e5.png", "-00001.png",
-             "9" * 5000 + ".png", "000000.png.png", "000000.PNG", "con.png"],
-)  # fmt: skip
+    "name",
+    [
+        "../../etc/evil.png",
+        "/tmp/evil.png",
+        "\u0663\u0663\u0663\u0663\u0663\u0663.png",
+        "1e5.png",
+        "-00001.png",
+        "9" * 5000 + ".png",
+        "000000.png.png",
+        "000000.PNG",
+        "con.png",
+    ],
+)
 def test_names_in_the_archive_lead_nowhere(tmp_path: Path, name: str) -> None:
     """Nothing is unpacked: entries whose names are not ours are not frames."""
     (tmp_path / "in").mkdir()

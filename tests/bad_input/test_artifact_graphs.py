@@ -182,9 +182,10 @@ def test_a_journal_moves_nothing_that_is_not_its_own(tmp_path: Path, plan: str) 
 def test_names_of_5000_letters(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     long = "x" * 5000
     words = {
-        "diff": ["diff", long, str(tmp_path)], "report": ["report", "--sequence", long, "--out", str(tmp_path / "o")],
+        "diff": ["diff", long, str(tmp_path)],
+        "report": ["report", "--sequence", long, "--out", str(tmp_path / "o")],
         "migrate": ["migrate", long, "--out", str(tmp_path / "o")],
-    }.get(name, [name, long])  # fmt: skip
+    }.get(name, [name, long])
     assert run(words) == 3
     assert capsys.readouterr().err.count("error: ") == 1
     assert run(["makefile", long]) == 2 and run(["run", long, "--out", str(tmp_path)]) == 2

@@ -725,9 +725,7 @@ def test_bag2_databases_that_lie(tmp_path: Path) -> None:
     _refused(path)
     endless = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i AS id, 1, i, x'00' FROM n"
     view = _changed(
-        tmp_path / "view",
-        "DROP TABLE messages",
-        f"CREATE VIEW messages(id, topic_id, timestamp, data) AS {endless}",
+        tmp_path / "view", "DROP TABLE messages", f"CREATE VIEW messages(id, topic_id, timestamp, data) AS {endless}"
     )
     with pytest.raises(BadInput, match="without the tables of a bag"):
         open_message_log(view, salvage=True)

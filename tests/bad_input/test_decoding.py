@@ -231,9 +231,39 @@ MSG = (
     f"{LINE}\nMSG: sensor_msgs/Part\nfloat64[3] x\nint8 KIND=3\nstring[] names\n"
 )
 WORDS = [
-    "struct", "module", "sequence<", ">", "{", "}", ";", "[", "]", "(", ")", "@", "const", "=", "<<", "::", "typedef",
-    "Part", "x", "string", "float64", "Header", "MSG: a/B", LINE, "\n", "#", '"', "/*", "\0", "9" * 30, "a/b/c/d", "-1",
-]  # fmt: skip
+    "struct",
+    "module",
+    "sequence<",
+    ">",
+    "{",
+    "}",
+    ";",
+    "[",
+    "]",
+    "(",
+    ")",
+    "@",
+    "const",
+    "=",
+    "<<",
+    "::",
+    "typedef",
+    "Part",
+    "x",
+    "string",
+    "float64",
+    "Header",
+    "MSG: a/B",
+    LINE,
+    "\n",
+    "#",
+    '"',
+    "/*",
+    "\0",
+    "9" * 30,
+    "a/b/c/d",
+    "-1",
+]
 
 
 @settings(max_examples=150, deadline=None)
@@ -303,10 +333,32 @@ def test_names_of_types_are_shown_short() -> None:
 
 READERS: list[Callable[[ImageRecord], Any]] = [color_pixels, depth_pixels, label_pixels]
 ENCODINGS = [
-    "rgb8", "bgr8", "rgba8", "mono8", "mono16", "16UC1", "32FC1", "rgb16", "bayer_rggb8", "bayer_gbrg8", "yuv422",
-    "yuyv", "nv12", "nv21", "32SC1", "8UC4", "jpeg", "", "rgb8; jpeg compressed rgb8", "16UC1; compressedDepth png",
-    "16UC1; compressedDepth rvl", "32FC1; compressedDepth rvl", "h264", "\0", "TYPE",
-]  # fmt: skip
+    "rgb8",
+    "bgr8",
+    "rgba8",
+    "mono8",
+    "mono16",
+    "16UC1",
+    "32FC1",
+    "rgb16",
+    "bayer_rggb8",
+    "bayer_gbrg8",
+    "yuv422",
+    "yuyv",
+    "nv12",
+    "nv21",
+    "32SC1",
+    "8UC4",
+    "jpeg",
+    "",
+    "rgb8; jpeg compressed rgb8",
+    "16UC1; compressedDepth png",
+    "16UC1; compressedDepth rvl",
+    "32FC1; compressedDepth rvl",
+    "h264",
+    "\0",
+    "TYPE",
+]
 SIZES = st.one_of(st.integers(0, 9), st.sampled_from([2**16, 2**31, 2**32 - 1]))
 
 

@@ -144,8 +144,11 @@ def test_models_that_do_not_hold_together(tmp_path: Path) -> None:
     library = json.loads((GOLDEN / "v1/cad_library/library.json").read_text())
     joint = {"name": "j", "type": "revolute", "part": "lid", "origin": [0, 0, 0], "axis": [0, 0, 1]}
     model = {**library["models"][0], "joints": [{**joint, "lower": 0, "upper": 1}]}
-    for change, complaint in (({"parts": []}, "are none"), ({"parts": ["a", "a"]}, "not different"),
-                              ({"parts": ["nothing_of_it"]}, "which is no part")):  # fmt: skip
+    for change, complaint in (
+        ({"parts": []}, "are none"),
+        ({"parts": ["a", "a"]}, "not different"),
+        ({"parts": ["nothing_of_it"]}, "which is no part"),
+    ):
         (tmp_path / "model.json").write_text(json.dumps({**model, **change}))
         with pytest.raises(BadInput, match=complaint):
             read_model(tmp_path)
@@ -154,10 +157,22 @@ def test_models_that_do_not_hold_together(tmp_path: Path) -> None:
 # --- TOML ---------------------------------------------------------------------------------------------------------
 
 BAD_TOML = [
-    b"", b"= 1", b"a = ", b"[step", b"\xff\xfe", b"a = 1\na = 2", b"a = " + b"[" * 5000, b"x" * 10**6, b"\x00",
-    b'name = "x"', b"step = 3", b"[[step]]\nname = 1", b"a = 99999-99-99", b"[variables]\na = 1",
+    b"",
+    b"= 1",
+    b"a = ",
+    b"[step",
+    b"\xff\xfe",
+    b"a = 1\na = 2",
+    b"a = " + b"[" * 5000,
+    b"x" * 10**6,
+    b"\x00",
+    b'name = "x"',
+    b"step = 3",
+    b"[[step]]\nname = 1",
+    b"a = 99999-99-99",
+    b"[variables]\na = 1",
     b'name = "p"\nsummary = "s"\n[[step]]\nname = "a"\nstage = "ingest"\ninputs = { log = "../../etc" }',
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("number", range(len(BAD_TOML)))

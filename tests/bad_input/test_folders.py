@@ -482,7 +482,7 @@ def test_poses_of_colmap_that_are_none_are_counted(tmp_path: Path) -> None:
         ("calib.txt", "cam0=[80 0 9; 0 80 9; 0 0 1]\ncam1=[80 0 60; 0 80 9; 0 0 1]\nbaseline=9\ndoffs=2\n", "doffs 2"),
         ("intrinsics.txt", " " * 300_000, "no calibration"),
     ],
-)  # fmt: skip
+)
 def test_calibration_files_that_are_none(tmp_path: Path, name: str, text: str, complaint: str) -> None:
     log = write_image_folder(tmp_path / "log", frames(1))
     (log / "intrinsics.txt").unlink()

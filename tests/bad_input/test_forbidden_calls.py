@@ -12,10 +12,24 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 FOLDERS = ("cli", "stages", "schemas", "benchmarks", "tests", "docs")
 MODULES = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "tarfile", "telnetlib"}
 CALLS = {
-    "eval", "exec", "compile", "__import__", "os.system", "os.popen", "tempfile.mktemp", "yaml.load", "yaml.full_load",
-    "yaml.unsafe_load", "yaml.load_all", "pickle.load", "pickle.loads", "pandas.read_pickle", "pd.read_pickle",
-    "minidom.parse", "minidom.parseString",
-}  # fmt: skip
+    "eval",
+    "exec",
+    "compile",
+    "__import__",
+    "os.system",
+    "os.popen",
+    "tempfile.mktemp",
+    "yaml.load",
+    "yaml.full_load",
+    "yaml.unsafe_load",
+    "yaml.load_all",
+    "pickle.load",
+    "pickle.loads",
+    "pandas.read_pickle",
+    "pd.read_pickle",
+    "minidom.parse",
+    "minidom.parseString",
+}
 METHODS = {"extractall", "read_pickle", "unsafe_load"}
 """Calls of these names on anything: archives are never unpacked to the paths they name."""
 READERS = {
@@ -71,12 +85,26 @@ def test_no_file_calls_what_is_forbidden() -> None:
 @pytest.mark.parametrize(
     "code",
     [
-        "import pickle", "from pickle import loads", "import joblib as j", "eval('1')", "exec(x)", "os.system('ls')",
-        "subprocess.run('ls', shell=True)", "np.load(p)", "np.load(p, allow_pickle=True)", "torch.load(p)",
-        "torch.load(p, weights_only=False)", "yaml.load(f, Loader=yaml.Loader)", "archive.extractall(p)", "YAML()",
-        "zipfile.ZipFile(p).extractall()", "trimesh.load(p)", "__import__('os')", "yaml.unsafe_load(f)",
+        "import pickle",
+        "from pickle import loads",
+        "import joblib as j",
+        "eval('1')",
+        "exec(x)",
+        "os.system('ls')",
+        "subprocess.run('ls', shell=True)",
+        "np.load(p)",
+        "np.load(p, allow_pickle=True)",
+        "torch.load(p)",
+        "torch.load(p, weights_only=False)",
+        "yaml.load(f, Loader=yaml.Loader)",
+        "archive.extractall(p)",
+        "YAML()",
+        "zipfile.ZipFile(p).extractall()",
+        "trimesh.load(p)",
+        "__import__('os')",
+        "yaml.unsafe_load(f)",
     ],
-)  # fmt: skip
+)
 def test_the_check_itself_finds_them(code: str) -> None:
     assert list(dangers(ast.parse(code), dict.fromkeys(READERS, False)))
 
@@ -84,9 +112,15 @@ def test_the_check_itself_finds_them(code: str) -> None:
 @pytest.mark.parametrize(
     "code",
     [
-        "np.load(p, allow_pickle=False)", "torch.load(p, weights_only=True)", "yaml.safe_load(f)", "YAML(typ='safe')",
-        "subprocess.run(['ls'])", "re.compile('x')", "model.eval()", "json.loads(t)",
+        "np.load(p, allow_pickle=False)",
+        "torch.load(p, weights_only=True)",
+        "yaml.safe_load(f)",
+        "YAML(typ='safe')",
+        "subprocess.run(['ls'])",
+        "re.compile('x')",
+        "model.eval()",
+        "json.loads(t)",
     ],
-)  # fmt: skip
+)
 def test_the_check_leaves_the_rest_alone(code: str) -> None:
     assert not list(dangers(ast.parse(code), {}))

@@ -118,10 +118,7 @@ REFUSED: dict[str, tuple[dict[str, str | bytes], str]] = {
         {"chair.urdf": f'<robot><link name="a">{f"<visual>{BOX}</visual>" * 2000}</link></robot>'},
         "chair.*in all",
     ),
-    "a collision hull far away": (
-        {"chair.urdf": urdf(BOX, f'<origin xyz="1e16 0 0"/>{BOX}')},
-        "chair.*far away",
-    ),
+    "a collision hull far away": ({"chair.urdf": urdf(BOX, f'<origin xyz="1e16 0 0"/>{BOX}')}, "chair.*far away"),
     "a slide that does not end": (
         {
             "chair.urdf": urdf(

@@ -45,10 +45,11 @@ def glb(**changes: object) -> bytes:
             {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"},
         ],
         "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 8}
+            {"buffer": 0, "byteOffset": 0, "byteLength": 36},
+            {"buffer": 0, "byteOffset": 36, "byteLength": 8},
         ],
         "buffers": [{"byteLength": 44}],
-    } | changes  # fmt: skip
+    } | changes
     text = json.dumps(tree).encode()
     text += b" " * (-len(text) % 4)
     chunks = struct.pack("<I", len(text)) + b"JSON" + text + struct.pack("<I", len(binary)) + b"BIN\0" + binary
@@ -61,10 +62,15 @@ def accessor(**changes: object) -> list[dict]:
 
 
 GOOD = {
-    "a.ply": ply(), "a.glb": glb(), "a.stl": CUBE.export(file_type="stl"), "b.ply": CUBE.export(file_type="ply"),
-    "a.obj": TRIANGLE, "unicode \u53f0 name.obj": TRIANGLE,
-    "ascii.stl": CUBE.export(file_type="stl_ascii").encode(), "b.glb": trimesh.Scene(CUBE).export(file_type="glb"),
-}  # fmt: skip
+    "a.ply": ply(),
+    "a.glb": glb(),
+    "a.stl": CUBE.export(file_type="stl"),
+    "b.ply": CUBE.export(file_type="ply"),
+    "a.obj": TRIANGLE,
+    "unicode \u53f0 name.obj": TRIANGLE,
+    "ascii.stl": CUBE.export(file_type="stl_ascii").encode(),
+    "b.glb": trimesh.Scene(CUBE).export(file_type="glb"),
+}
 
 BAD = {
     "empty.ply": (b"", "no PLY header"),
@@ -97,12 +103,13 @@ BAD = {
     "web.glb": (glb(images=[{"uri": "https://example.org/x.png"}]), "names another file"),
     "nonsense.glb": (b"glTF" + struct.pack("<II", 2, 28) + struct.pack("<I", 8) + b"JSON" + b"[[[[[[[[", "description"),
     "deep.glb": (
-        b"glTF" + struct.pack("<III", 2, 100_020, 100_000) + b"JSON" + b"[" * 100_000, "description is broken",
+        b"glTF" + struct.pack("<III", 2, 100_020, 100_000) + b"JSON" + b"[" * 100_000,
+        "description is broken",
     ),
     "zero bytes.obj": (b"v 0 0 0\0", "zero bytes"),
     "zip.ply": (b"PK\3\4" + bytes(100), "no PLY header"),
     "a.dae": (b"<x/>", "not a mesh format"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", GOOD)

@@ -11,11 +11,32 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 FOLDERS = ("cli", "stages", "schemas")
 DOOR = "schemas/outside.py"
 NAMES = {
-    "open", "os.open", "os.fdopen", "json.load", "json.loads", "tomllib.load", "tomllib.loads", "csv.reader",
-    "csv.DictReader", "Image.open", "cv2.imread", "sqlite3.connect", "zipfile.ZipFile", "ElementTree.parse",
-    "ElementTree.fromstring", "ET.parse", "ET.fromstring", "np.fromfile", "np.loadtxt", "np.genfromtxt", "np.memmap",
-    "onnxruntime.InferenceSession", "o3d.io.read_triangle_mesh", "trimesh.load", "linecache.getlines",
-}  # fmt: skip
+    "open",
+    "os.open",
+    "os.fdopen",
+    "json.load",
+    "json.loads",
+    "tomllib.load",
+    "tomllib.loads",
+    "csv.reader",
+    "csv.DictReader",
+    "Image.open",
+    "cv2.imread",
+    "sqlite3.connect",
+    "zipfile.ZipFile",
+    "ElementTree.parse",
+    "ElementTree.fromstring",
+    "ET.parse",
+    "ET.fromstring",
+    "np.fromfile",
+    "np.loadtxt",
+    "np.genfromtxt",
+    "np.memmap",
+    "onnxruntime.InferenceSession",
+    "o3d.io.read_triangle_mesh",
+    "trimesh.load",
+    "linecache.getlines",
+}
 METHODS = {"open", "read_text", "read_bytes", "model_validate_json", "parse_raw"}
 """Of paths, archives and models, whatever they are called."""
 
@@ -66,7 +87,9 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/kit/language/transcripts.py": {"model_validate_json": PARSED, "open": WRITES},
     "stages/kit/services/connection.py": {"json.loads": SERVICE},
     "stages/kit/simulation/robot_description.py": {
-        "tomllib.loads": OURS, "ElementTree.fromstring": PARSED, "read_text": OURS,
+        "tomllib.loads": OURS,
+        "ElementTree.fromstring": PARSED,
+        "read_text": OURS,
     },
     "stages/kit/simulation/shapes.py": {"ElementTree.fromstring": PARSED},
     "stages/kit/simulation/urdf_split.py": {"ElementTree.fromstring": PARSED},
@@ -96,7 +119,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/tableware/simulation/physics_pictures.py": {"read_text": OURS},
     "stages/tableware/vision/image_files.py": {"cv2.imread": PICTURE},
     "stages/truth/stage.py": {"tomllib.loads": OURS, "read_text": OURS},
-}  # fmt: skip
+}
 """File -> call -> reason."""
 
 
@@ -137,10 +160,22 @@ def test_whoever_reads_without_the_door_is_listed() -> None:
 
 def test_the_check_finds_reading_and_leaves_writing_alone() -> None:
     for code in (
-        "open(p)", "open(p, 'rb')", "path.open()", "path.open('rb')", "p.read_text()", "p.read_bytes()",
-        "tomllib.load(f)", "tomllib.loads(t)", "json.loads(t)", "os.open(p, os.O_RDONLY)", "zipfile.ZipFile(p)",
-        "cv2.imread(p)", "Image.open(p)", "Model.model_validate_json(t)", "csv.reader(f)",
-    ):  # fmt: skip
+        "open(p)",
+        "open(p, 'rb')",
+        "path.open()",
+        "path.open('rb')",
+        "p.read_text()",
+        "p.read_bytes()",
+        "tomllib.load(f)",
+        "tomllib.loads(t)",
+        "json.loads(t)",
+        "os.open(p, os.O_RDONLY)",
+        "zipfile.ZipFile(p)",
+        "cv2.imread(p)",
+        "Image.open(p)",
+        "Model.model_validate_json(t)",
+        "csv.reader(f)",
+    ):
         assert list(reads(ast.parse(code))), code
     for code in ("open(p, 'w')", "path.open('wb')", "path.open(mode='a')", "json.dumps(x)", "file_content(p, 9)"):
         assert not list(reads(ast.parse(code))), code

@@ -26,9 +26,10 @@ GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 @pytest.mark.parametrize("case", ["transposed", "fewer blocks", "words", "no axis"])
 def test_a_volume_of_another_shape(tmp_path: Path, case: str) -> None:
     arrays = {
-        "block_coordinates": np.zeros((5, 3), np.int32), "tsdf": np.zeros((5, 512), np.float16),
+        "block_coordinates": np.zeros((5, 3), np.int32),
+        "tsdf": np.zeros((5, 512), np.float16),
         "weight": np.zeros((5, 512), np.float16),
-    }  # fmt: skip
+    }
     EntitiesFile(
         voxel_size=0.02, truncation_distance=0.06, frames_integrated=1, segmentation="truth", entities=()
     ).write(tmp_path / "entities.json")

@@ -49,13 +49,7 @@ def test_five_thousand_links(tmp_path: Path, shape: str) -> None:
 
 @pytest.mark.parametrize(
     ("drivers", "wrong"),
-    [
-        ({"j": "k"}, False),
-        ({"j": "j"}, True),
-        ({"j": "k", "k": "j"}, True),
-        ({"j": "nobody"}, True),
-        ({"j": ""}, True),
-    ],
+    [({"j": "k"}, False), ({"j": "j"}, True), ({"j": "k", "k": "j"}, True), ({"j": "nobody"}, True), ({"j": ""}, True)],
 )
 def test_mimic(tmp_path: Path, drivers: dict[str, str], wrong: bool) -> None:
     def hinge(name: str, parent: str, child: str) -> str:

@@ -27,9 +27,13 @@ class ProbeParameters(Parameters):
 
 
 PROBE = Stage(
-    "probe", 1, "Probe of the contract tests", ProbeParameters,
-    {"upstream": Optionally(Trajectory), "log": Optionally(External("a file"))}, Trajectory,
-)  # fmt: skip
+    "probe",
+    1,
+    "Probe of the contract tests",
+    ProbeParameters,
+    {"upstream": Optionally(Trajectory), "log": Optionally(External("a file"))},
+    Trajectory,
+)
 
 
 def run(upstream: Trajectory | None, log: Path | None, *, parameters: ProbeParameters, context: Context) -> Trajectory:

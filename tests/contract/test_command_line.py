@@ -78,8 +78,11 @@ def test_config_file_supplies_parameters_and_flags_win(tmp_path: Path) -> None:
 def test_interrupt_exits_with_130_and_leaves_nothing(tmp_path: Path) -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "cli", "library", "build", "--out", str(tmp_path / "l")],
-        cwd=REPOSITORY, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        cwd=REPOSITORY,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     deadline = time.monotonic() + 30
     while not list(tmp_path.glob(".l.partial-*")) and time.monotonic() < deadline:
         time.sleep(0.01)
@@ -94,7 +97,10 @@ def test_packages_from_elsewhere_are_refused(tmp_path: Path) -> None:
     (tmp_path / "schemas").mkdir()
     (tmp_path / "schemas" / "__init__.py").write_text("")
     done = subprocess.run(
-        [sys.executable, "-c", "import schemas, cli.main; cli.main.main()"], cwd=tmp_path, capture_output=True,
-        text=True, env={**os.environ, "PYTHONPATH": f"{tmp_path}:{REPOSITORY}"},
-    )  # fmt: skip
+        [sys.executable, "-c", "import schemas, cli.main; cli.main.main()"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": f"{tmp_path}:{REPOSITORY}"},
+    )
     assert done.returncode == 5 and "comes from" in done.stderr

@@ -58,9 +58,14 @@ def write(root: Path, version: int, payload: str) -> Path:
     (root / "payload.json").write_text(payload)
     records = record_files(root, ())
     Manifest(
-        kind="test_sample", schema_version=version, stage="sample", stage_version=1, key="k",
-        content_digest=content_digest(records), files=records,
-    ).write(root / MANIFEST_NAME)  # fmt: skip
+        kind="test_sample",
+        schema_version=version,
+        stage="sample",
+        stage_version=1,
+        key="k",
+        content_digest=content_digest(records),
+        files=records,
+    ).write(root / MANIFEST_NAME)
     return root
 
 

@@ -137,8 +137,12 @@ class Program:
 
     def _decorated_by_us(self, module: Module, statement: ast.stmt) -> bool:
         """A decorator of ours may enter the definition somewhere, so that nobody has to name it."""
-        names = {inner.id for decorator in getattr(statement, "decorator_list", ())
-                 for inner in ast.walk(decorator) if isinstance(inner, ast.Name)}  # fmt: skip
+        names = {
+            inner.id
+            for decorator in getattr(statement, "decorator_list", ())
+            for inner in ast.walk(decorator)
+            if isinstance(inner, ast.Name)
+        }
         return bool(names & (module.definitions.keys() | module.imports.keys()))
 
     def add_imports(self, module: Module, node: ast.AST, package: str) -> None:

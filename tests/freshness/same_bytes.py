@@ -86,8 +86,11 @@ class Evidence:
         settings = {"OMP_NUM_THREADS": "1", "NUMBA_CACHE_DIR": str(self._folder / f"numba_{code.name}")}
         done = subprocess.run(
             [sys.executable, "-m", "cli", *run.step.split(), *words, "--out", str(out), "--quiet"],
-            cwd=code, env={**os.environ, **settings}, capture_output=True, text=True,
-        )  # fmt: skip
+            cwd=code,
+            env={**os.environ, **settings},
+            capture_output=True,
+            text=True,
+        )
         if done.returncode not in (0, 4):
             raise Refused(f"{run.step} {run.options} ({code.name}): {done.stderr.strip() or done.returncode}")
         return out

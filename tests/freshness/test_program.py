@@ -31,7 +31,7 @@ def run(dough, *, parameters, context):
     made = m.floor(2.5) + heat(dough) + crust(clock.MINUTES)
     return importlib.import_module(f"{PART}.{parameters.part}").finish(made)
 ''',
-    "stages/bake/oven.py": '''
+    "stages/bake/oven.py": """
 DEGREES = 200
 SPARE = 3
 TABLE = {}
@@ -44,14 +44,14 @@ def heat(dough):
 
 def unused():
     return SPARE
-''',
+""",
     "stages/bake/late.py": "def crust(minutes: int) -> int:\n    return minutes // 2\n",
     "stages/bake/unused.py": "class Cake:\n    layers = 3\n",
     "stages/bake/parts/__init__.py": "",
     "stages/bake/parts/icing.py": "SUGAR = 50\n\ndef finish(made):\n    return made + [SUGAR]\n",
     "stages/kit/__init__.py": "",
     "stages/kit/clock.py": "MINUTES = 30\nHOURS = 2\n",
-}  # fmt: skip
+}
 
 
 def code(tmp_path: Path, **changes: tuple[str, str]) -> Code:
@@ -84,7 +84,7 @@ def original(tmp_path: Path) -> Code:
         ("stage", "clock.MINUTES", "clock.HOURS"),
         ("stage", "import math as m", "import numpy as m"),
     ],
-)  # fmt: skip
+)
 def test_constants_lines_and_late_imports_count(
     tmp_path: Path, original: Code, file: str, before: str, after: str
 ) -> None:
@@ -112,7 +112,7 @@ def test_constants_lines_and_late_imports_count(
         ("unused", "3", "4"),
         ("clock", "HOURS = 2", "HOURS = 3"),
     ],
-)  # fmt: skip
+)
 def test_words_names_and_what_is_not_reached_do_not(
     tmp_path: Path, original: Code, file: str, before: str, after: str
 ) -> None:

@@ -29,10 +29,17 @@ from tests.unit.ingest.folder_writers import (
 from tests.unit.ingest.tiny_room import frames, write_posed_images, write_redwood, write_seven_scenes
 
 WRITERS: dict[str, Callable[[Path, list], Path]] = {
-    "7scenes": write_seven_scenes, "redwood": write_redwood, "posed_images": write_posed_images, "tum": write_tum,
-    "scenenn": write_scenenn, "scannet": write_scannet, "nerfstudio": write_nerfstudio, "replica": write_replica,
-    "colmap": write_colmap, "images": write_image_folder,
-}  # fmt: skip
+    "7scenes": write_seven_scenes,
+    "redwood": write_redwood,
+    "posed_images": write_posed_images,
+    "tum": write_tum,
+    "scenenn": write_scenenn,
+    "scannet": write_scannet,
+    "nerfstudio": write_nerfstudio,
+    "replica": write_replica,
+    "colmap": write_colmap,
+    "images": write_image_folder,
+}
 INTRINSICS = {"fx": 80.0, "fy": 80.0, "cx": 47.5, "cy": 35.5}
 DESCRIBING = (".txt", ".json", ".log", ".ini", ".yaml", ".bin", ".freiburg")
 CALIBRATIONS = ("calibration.yaml", "camera.json", "calib.txt", "intrinsics.txt")

@@ -207,8 +207,14 @@ def _definition_seeds() -> dict[str, bytes]:
     return seeds
 
 
-DEPTH_ENCODINGS = ("16UC1; compressedDepth png", "32FC1; compressedDepth png", "16UC1; compressedDepth rvl",
-                   "32FC1; compressedDepth rvl", "16UC1; compressedDepth", "compressedDepth")  # fmt: skip
+DEPTH_ENCODINGS = (
+    "16UC1; compressedDepth png",
+    "32FC1; compressedDepth png",
+    "16UC1; compressedDepth rvl",
+    "32FC1; compressedDepth rvl",
+    "16UC1; compressedDepth",
+    "compressedDepth",
+)
 
 
 def compressed_depth_image(data: bytes) -> None:
@@ -222,15 +228,28 @@ def compressed_depth_image(data: bytes) -> None:
 def _compressed_depth_seeds() -> dict[str, bytes]:
     metres = (SMALL / 1000).astype(np.float32) + 0.5
     return {
-        "png": b"\0" + compressed_depth(SMALL, "png"), "rvl": b"\2" + compressed_depth(SMALL, "rvl"),
-        "float png": b"\1" + compressed_depth(metres, "png"), "float rvl": b"\3" + compressed_depth(metres, "rvl"),
-    }  # fmt: skip
+        "png": b"\0" + compressed_depth(SMALL, "png"),
+        "rvl": b"\2" + compressed_depth(SMALL, "rvl"),
+        "float png": b"\1" + compressed_depth(metres, "png"),
+        "float rvl": b"\3" + compressed_depth(metres, "rvl"),
+    }
 
 
 IMAGE_ENCODINGS = (
-    ("rgb8", 3), ("bgr8", 3), ("rgba8", 4), ("mono8", 1), ("mono16", 2), ("16UC1", 2), ("32FC1", 4), ("8UC3", 3),
-    ("yuv422", 2), ("yuv422_yuy2", 2), ("bayer_rggb8", 1), ("nv12", 1), ("nonsense", 1),
-)  # fmt: skip
+    ("rgb8", 3),
+    ("bgr8", 3),
+    ("rgba8", 4),
+    ("mono8", 1),
+    ("mono16", 2),
+    ("16UC1", 2),
+    ("32FC1", 4),
+    ("8UC3", 3),
+    ("yuv422", 2),
+    ("yuv422_yuy2", 2),
+    ("bayer_rggb8", 1),
+    ("nv12", 1),
+    ("nonsense", 1),
+)
 
 
 def image_message(data: bytes) -> None:
@@ -247,10 +266,16 @@ def image_message(data: bytes) -> None:
         "16UC1; compressedDepth png",
     )
     record = ImageRecord(
-        FIRST, "optical", formats[head[0] % len(formats)] if compressed else encoding, compressed,
-        0 if compressed else head[2], 0 if compressed else head[3], head[4] * (256 if head[1] & 4 else 1),
-        bool(head[1] & 2), rest,
-    )  # fmt: skip
+        FIRST,
+        "optical",
+        formats[head[0] % len(formats)] if compressed else encoding,
+        compressed,
+        0 if compressed else head[2],
+        0 if compressed else head[3],
+        head[4] * (256 if head[1] & 4 else 1),
+        bool(head[1] & 2),
+        rest,
+    )
     for topic in ("/camera/color/image_raw", "/camera/depth/image_raw", "/labels"):
         _read_image(record, topic)
 
@@ -301,10 +326,12 @@ def _edited_room(dialect: str):  # type: ignore[no-untyped-def]
 
 def _script_seeds() -> dict[str, bytes]:
     return {
-        "nothing": b"", "one byte": script((3000, 1, b"\xff")), "cut out": script((5000, 200, b"")),
+        "nothing": b"",
+        "one byte": script((3000, 1, b"\xff")),
+        "cut out": script((5000, 200, b"")),
         "three": script((900, 4, b"\xff\xff\xff\xff"), (2000, 0, b"abc"), (9000, 8, bytes(8))),
         "a number": script((1200, 8, SECOND.to_bytes(8, "little"))),
-    }  # fmt: skip
+    }
 
 
 HARNESSES = {

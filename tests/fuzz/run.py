@@ -59,10 +59,27 @@ def fuzz(name: str, seconds: int, findings: Path, seed: int) -> Outcome:
         environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(REPOSITORY)}
         started = time.monotonic()
         done = subprocess.run(
-            [sys.executable, "-m", "tests.fuzz.run", "--worker", name, "--seconds", str(seconds), "--seed", str(seed),
-             "--corpus", str(corpus), "--current", str(current)],
-            cwd=REPOSITORY, env=environment, capture_output=True, text=True, errors="replace",
-        )  # fmt: skip
+            [
+                sys.executable,
+                "-m",
+                "tests.fuzz.run",
+                "--worker",
+                name,
+                "--seconds",
+                str(seconds),
+                "--seed",
+                str(seed),
+                "--corpus",
+                str(corpus),
+                "--current",
+                str(current),
+            ],
+            cwd=REPOSITORY,
+            env=environment,
+            capture_output=True,
+            text=True,
+            errors="replace",
+        )
         inputs = len(list(corpus.iterdir()))
         if done.returncode != 0 and current.exists():
             data = current.read_bytes()
@@ -115,10 +132,18 @@ def work(name: str, seconds: int, corpus: Path, current: Path, seed: int) -> Non
             os._exit(1)
 
     atheris.Setup(
-        [sys.argv[0], str(corpus), f"-max_total_time={seconds}", f"-rss_limit_mb={MEMORY_LIMIT}", f"-seed={seed}",
-         f"-timeout={3 * INPUT_SECONDS}", f"-max_len={harness.largest}", f"-artifact_prefix={current}-"],
+        [
+            sys.argv[0],
+            str(corpus),
+            f"-max_total_time={seconds}",
+            f"-rss_limit_mb={MEMORY_LIMIT}",
+            f"-seed={seed}",
+            f"-timeout={3 * INPUT_SECONDS}",
+            f"-max_len={harness.largest}",
+            f"-artifact_prefix={current}-",
+        ],
         target,
-    )  # fmt: skip
+    )
     atheris.Fuzz()
 
 

@@ -51,10 +51,14 @@ def runs_of(out: Path, job: str) -> int:
 def start(spec: Path, out: Path, jobs: int = 2) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "tests.pipeline.batch_process", str(spec), str(out), str(jobs)]
     return subprocess.Popen(
-        command, cwd=REPOSITORY, stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
+        command,
+        cwd=REPOSITORY,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
         # A shell lets what it starts in the background ignore SIGINT, and children inherit that.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )  # fmt: skip
+    )
 
 
 def wait_for(condition: object, what: str) -> None:
@@ -66,15 +70,27 @@ def wait_for(condition: object, what: str) -> None:
 
 def test_every_kind_of_end_is_told_apart_and_stops_nobody_else(tmp_path: Path) -> None:
     behaviours = {
-        "good": "write", "bad": "exit 3", "bad2": "exit 3", "empty": "outcome", "bug": "exit 1", "dead": "signal 11",
-        "slow": "sleep 60", "large": "allocate 400",
-    }  # fmt: skip
+        "good": "write",
+        "bad": "exit 3",
+        "bad2": "exit 3",
+        "empty": "outcome",
+        "bug": "exit 1",
+        "dead": "signal 11",
+        "slow": "sleep 60",
+        "large": "allocate 400",
+    }
     limits = '[limits]\ntime = "3 s"\nmemory = "200 MiB"\ngrace = "2 s"'
     end = run(batch_of(tmp_path, behaviours, limits), tmp_path / "out", jobs=2)
     assert outcomes(end) == {
-        "good": "done", "bad": "bad input", "bad2": "bad input", "empty": "not ok", "bug": "crash", "dead": "crash",
-        "slow": "time limit", "large": "memory limit",
-    }  # fmt: skip
+        "good": "done",
+        "bad": "bad input",
+        "bad2": "bad input",
+        "empty": "not ok",
+        "bug": "crash",
+        "dead": "crash",
+        "slow": "time limit",
+        "large": "memory limit",
+    }
     assert end.exit_code == 1
     rows = list(csv.DictReader((tmp_path / "out" / "summary.csv").open()))
     assert Counter(row["kind"] for row in rows) == {"done": 1, "explained": 5, "crashed": 2}
@@ -170,8 +186,9 @@ def test_a_batch_killed_at_any_moment_is_resumed(tmp_path: Path) -> None:
     assert "torn last line of 13 bytes" in errors
     results = read_results(out / RESULTS_NAME)
     assert {name: r.outcome for name, r in latest_by_job(results).items()} == {
-        **{f"s{k}": "done" for k in range(6)}, "x": "bad input",
-    }  # fmt: skip
+        **{f"s{k}": "done" for k in range(6)},
+        "x": "bad input",
+    }
     counts = Counter(result.job for result in results)
     assert all(counts[name] == 1 for name in done_before), "what had ended well did not run again"
     assert not list(out.glob("*/.batch-process.json"))
@@ -278,9 +295,12 @@ def test_the_command_line_end_to_end(tmp_path: Path) -> None:
     written = scenewright("batch", spec, "--out", out, "--json")
     assert written.returncode == 0 and json.loads(written.stdout)["submit"].endswith("submit.sh"), written.stderr
     task = subprocess.run(
-        ["bash", str(out / "slurm" / "array.sh")], env={**os.environ, "SLURM_ARRAY_TASK_ID": "1"}, cwd=tmp_path,
-        capture_output=True, text=True,
-    )  # fmt: skip
+        ["bash", str(out / "slurm" / "array.sh")],
+        env={**os.environ, "SLURM_ARRAY_TASK_ID": "1"},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
     assert task.returncode == 3, task.stderr
     collected = subprocess.run(["bash", str(out / "slurm" / "collect.sh")], capture_output=True, text=True)
     assert collected.returncode == 3 and collected.stdout == f"{out}\n", collected.stderr

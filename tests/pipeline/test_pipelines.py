@@ -14,13 +14,7 @@ from stages.engine.batch import read_batch, worst_exit_code
 from stages.engine.chain import StepReport, run_pipeline
 from stages.engine.given_inputs import check_given_inputs
 from stages.engine.make_rules import makefile_for
-from stages.engine.pipelines import (
-    PIPELINES_FOLDER,
-    pipeline_path,
-    read_pipeline,
-    resolve_variables,
-    step_arguments,
-)
+from stages.engine.pipelines import PIPELINES_FOLDER, pipeline_path, read_pipeline, resolve_variables, step_arguments
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 NAMES = sorted(path.stem for path in PIPELINES_FOLDER.glob("*.toml"))

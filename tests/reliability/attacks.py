@@ -110,8 +110,16 @@ def cases(root: Path) -> Iterator[Case]:
     yield Case("paths", ("diff", "/", "/"))
     yield from (Case("paths", (name, long)) for name in ("inspect", "verify", "gc", "timeline"))
     wide = str(root / "wide" / "x")
-    for words in (("--help",), ("fuse", "--help"), ("--version",), ("inspect", wide, "--json"), ("models", "--json"),
-                  ("gc", wide, "--json"), ("diff", wide, wide, "--json"), ("nonsense",)):  # fmt: skip
+    for words in (
+        ("--help",),
+        ("fuse", "--help"),
+        ("--version",),
+        ("inspect", wide, "--json"),
+        ("models", "--json"),
+        ("gc", wide, "--json"),
+        ("diff", wide, wide, "--json"),
+        ("nonsense",),
+    ):
         for streams in STREAMS:
             written = words != ("nonsense",) and streams in FULL
             yield Case("streams", words, streams, code=6 if written else None)
@@ -125,10 +133,15 @@ def fell(case: Case, checkout: Path, folder: Path) -> str:
         folder.mkdir()
         line = f"rmdir {shlex.quote(str(folder))} && {line}"
     process = subprocess.Popen(
-        ["bash", "-o", "pipefail", "-c", line], cwd=folder if case.gone else checkout, stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(checkout)},
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (LARGEST, LARGEST)), start_new_session=True,
-    )  # fmt: skip
+        ["bash", "-o", "pipefail", "-c", line],
+        cwd=folder if case.gone else checkout,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(checkout)},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (LARGEST, LARGEST)),
+        start_new_session=True,
+    )
     try:
         data, said = process.communicate(timeout=SECONDS)
     except subprocess.TimeoutExpired:

@@ -201,9 +201,18 @@ def run_trial(
         if beside_after:
             problems.append(f"left over after the next run: {beside_after}")
     return Trial(
-        name, how.name, previous, atomic, phase, stands + (f" + {beside}" if beside else ""), process.returncode,
-        round(took, 3), facts.get("status", "?"), resume_seconds, tuple(problems),
-    )  # fmt: skip
+        name,
+        how.name,
+        previous,
+        atomic,
+        phase,
+        stands + (f" + {beside}" if beside else ""),
+        process.returncode,
+        round(took, 3),
+        facts.get("status", "?"),
+        resume_seconds,
+        tuple(problems),
+    )
 
 
 def state_on_disk_when_readable(out: Path, clean: str, older: str | None) -> tuple[str, str]:

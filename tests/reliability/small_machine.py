@@ -44,8 +44,12 @@ def run_limited(name: str, runs: Path, out: Path, limit: Callable[[], None] | No
     """Run one step; returns its exit code and its line of error, or the end of what it said."""
     done = subprocess.run(
         [sys.executable, "-m", "cli", *arguments_of(name, runs, out), "--quiet"],
-        cwd=REPOSITORY, capture_output=True, text=True, errors="replace", preexec_fn=limit,
-    )  # fmt: skip
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        preexec_fn=limit,
+    )
     lines = [line for line in done.stderr.splitlines() if line.startswith("error:")]
     return done.returncode, lines[0] if len(lines) == 1 else done.stderr.strip()[-200:]
 

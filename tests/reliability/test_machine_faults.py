@@ -24,14 +24,7 @@ from stages.engine.reading import open_artifact
 from stages.engine.runner import RunResult, run_stage
 from stages.engine.verification import verify
 from tests.contract.probe_step import PROBE, ProbeParameters
-from tests.reliability.running import (
-    REPOSITORY,
-    file_size_limit,
-    memory_limit,
-    only_error,
-    run_probe,
-    small_disk,
-)
+from tests.reliability.running import REPOSITORY, file_size_limit, memory_limit, only_error, run_probe, small_disk
 
 
 def make(out: Path, inputs: dict[str, Path] | None = None, *, force: bool = False, **values) -> RunResult:
@@ -352,25 +345,35 @@ EDITS: dict[str, tuple[Callable[[Path], object], str, str]] = {
     "manifest deleted": (lambda out: (out / MANIFEST_NAME).unlink(), "not an artifact", "not an artifact"),
     "manifest empty": (lambda out: (out / MANIFEST_NAME).write_text(""), "manifest.json", "manifest.json"),
     "manifest torn": (
-        lambda out: (out / MANIFEST_NAME).write_bytes((out / MANIFEST_NAME).read_bytes()[:300]), "manifest.json", "man",
+        lambda out: (out / MANIFEST_NAME).write_bytes((out / MANIFEST_NAME).read_bytes()[:300]),
+        "manifest.json",
+        "man",
     ),
     "manifest without end": (lambda out: (out / MANIFEST_NAME).write_text("[" * 200_000), "manifest.json", "manifest"),
     "manifest of a list": (lambda out: (out / MANIFEST_NAME).write_text("[]"), "manifest.json", "manifest.json"),
     "manifest not text": (lambda out: (out / MANIFEST_NAME).write_bytes(b"\xff\xfe\x00"), "manifest.json", "manifest"),
     "manifest a folder": (
-        lambda out: ((out / MANIFEST_NAME).unlink(), (out / MANIFEST_NAME).mkdir()), "a folder, not", "a folder, not",
+        lambda out: ((out / MANIFEST_NAME).unlink(), (out / MANIFEST_NAME).mkdir()),
+        "a folder, not",
+        "a folder, not",
     ),
     "size that is no number": (lambda out: edit_manifest(out, schema_version=float("nan")), "schema_version", "schema"),
     "path outside": (
-        lambda out: edit_manifest(out, files=[{"path": "../x", "bytes": 1, "sha256": ""}]), "outside", "outside",
+        lambda out: edit_manifest(out, files=[{"path": "../x", "bytes": 1, "sha256": ""}]),
+        "outside",
+        "outside",
     ),
     "path absolute": (
-        lambda out: edit_manifest(out, files=[{"path": "/etc/passwd", "bytes": 1, "sha256": ""}]), "outside", "outside",
+        lambda out: edit_manifest(out, files=[{"path": "/etc/passwd", "bytes": 1, "sha256": ""}]),
+        "outside",
+        "outside",
     ),
     "path with a zero byte": (
-        lambda out: edit_manifest(out, files=[{"path": "a\0b", "bytes": 1, "sha256": ""}]), "is no path", "is no path",
+        lambda out: edit_manifest(out, files=[{"path": "a\0b", "bytes": 1, "sha256": ""}]),
+        "is no path",
+        "is no path",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", EDITS)
@@ -520,8 +523,11 @@ def test_signals_end_a_run_even_when_their_exception_gets_lost(
     words = ["probe", "--out", str(out), "--pause", "0.2", "--text", "b", "--behaviour", behaviour]
     process = subprocess.Popen(
         [sys.executable, "-m", "tests.reliability.probe_command", *words],
-        cwd=REPOSITORY, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
+        cwd=REPOSITORY,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
     while not list(tmp_path.glob(".a.partial-*/file-2.txt")) and process.poll() is None:
         time.sleep(0.005)
     process.send_signal(number)
@@ -616,9 +622,11 @@ def test_a_reader_that_leaves(tmp_path: Path) -> None:
     os.close(read)
     for streams in ({"stderr": write}, {"stdout": write, "stderr": write}):
         process = subprocess.Popen(
-            [*line.split()], cwd=REPOSITORY, text=True,
+            [*line.split()],
+            cwd=REPOSITORY,
+            text=True,
             **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams},
-        )  # fmt: skip
+        )
         _, errors = process.communicate(timeout=30)
         assert process.returncode in (0, 130) and "Traceback" not in (errors or "")
     os.close(write)

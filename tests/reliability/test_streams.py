@@ -24,9 +24,13 @@ NOISE = "pybullet build time"
 def in_shell(line: str, folder: Path = REPOSITORY) -> tuple[int, list[str]]:
     """Run a line of bash; returns the exit code of the first command that failed, and what standard error said."""
     done = subprocess.run(
-        ["bash", "-o", "pipefail", "-c", line], cwd=folder, capture_output=True, text=True, timeout=120,
+        ["bash", "-o", "pipefail", "-c", line],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=120,
         env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
-    )  # fmt: skip
+    )
     assert "Traceback" not in done.stderr, done.stderr
     return done.returncode, [line for line in done.stderr.splitlines() if not line.startswith(NOISE)]
 

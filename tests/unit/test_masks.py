@@ -13,12 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from schemas.errors import BadInput
-from stages.kit.formats.masks import (
-    PanopticReader,
-    decode_panoptic_png,
-    encode_panoptic_png,
-    write_panoptic_zip,
-)
+from stages.kit.formats.masks import PanopticReader, decode_panoptic_png, encode_panoptic_png, write_panoptic_zip
 
 
 @given(

@@ -34,9 +34,17 @@ def opencv_default(left: np.ndarray, right: np.ndarray, limits: tuple[int, int])
 def opencv_usual(left: np.ndarray, right: np.ndarray, limits: tuple[int, int]) -> DisparityMap:
     """StereoSGBM with the settings that OpenCV's own stereo example uses."""
     matcher = cv2.StereoSGBM.create(
-        minDisparity=limits[0], numDisparities=limits[1], blockSize=3, P1=8 * 9, P2=32 * 9, disp12MaxDiff=1,
-        preFilterCap=63, uniquenessRatio=10, speckleWindowSize=100, speckleRange=32,
-    )  # fmt: skip
+        minDisparity=limits[0],
+        numDisparities=limits[1],
+        blockSize=3,
+        P1=8 * 9,
+        P2=32 * 9,
+        disp12MaxDiff=1,
+        preFilterCap=63,
+        uniquenessRatio=10,
+        speckleWindowSize=100,
+        speckleRange=32,
+    )
     return opencv_map(matcher, left, right, limits[0])
 
 

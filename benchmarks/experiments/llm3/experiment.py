@@ -43,10 +43,16 @@ def attempt(arm: str, case: str, seed: int, world: PackingWorld) -> Run:
     seconds = time.process_time() - started
     failures = [e.task.kind if e.task else _kind(e.feedback[-1].failure) for e in run.attempts if e.task or e.feedback]
     return Run(
-        success=run.success, proposer_calls=run.proposer_calls, motion_planner_calls=run.motion_calls,
-        mesh_calls=run.mesh_calls, iterations=len(run.attempts), seconds=seconds, boxes=len(world.instance.boxes),
-        fill=world.instance.fill, failures=tuple(filter(None, failures))[:40],
-    )  # fmt: skip
+        success=run.success,
+        proposer_calls=run.proposer_calls,
+        motion_planner_calls=run.motion_calls,
+        mesh_calls=run.mesh_calls,
+        iterations=len(run.attempts),
+        seconds=seconds,
+        boxes=len(world.instance.boxes),
+        fill=world.instance.fill,
+        failures=tuple(filter(None, failures))[:40],
+    )
 
 
 def _kind(failure: object) -> str:

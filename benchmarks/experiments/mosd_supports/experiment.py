@@ -148,8 +148,14 @@ def of_counts(name: str) -> Callable[[Sequence[FrameSupports]], float | None]:
     return lambda records: measures_of(pooled(records)).get(name)
 
 
-SHARES = ("support_precision", "support_recall", "support_f1", "on_things_precision", "on_things_recall",
-          "on_things_f1")  # fmt: skip
+SHARES = (
+    "support_precision",
+    "support_recall",
+    "support_f1",
+    "on_things_precision",
+    "on_things_recall",
+    "on_things_f1",
+)
 COUNTS = [name for name in measures_of(SupportScore()) if name not in SHARES]
 MEASURES = {name: Measure(of_counts(name)) for name in SHARES}
 MEASURES |= {name: Measure(of_counts(name), interval=False) for name in COUNTS}

@@ -33,8 +33,14 @@ class SupportScore:
     def add(self, other: SupportScore) -> None:
         """Add the counts of other frames."""
         for name in (
-            "true", "predicted", "agreed", "true_to_things", "predicted_to_things", "agreed_to_things", "doubtful",
-        ):  # fmt: skip
+            "true",
+            "predicted",
+            "agreed",
+            "true_to_things",
+            "predicted_to_things",
+            "agreed_to_things",
+            "doubtful",
+        ):
             setattr(self, name, getattr(self, name) + getattr(other, name))
         for relation, counts in other.second.items():
             self.second[relation] = [a + b for a, b in zip(self.second[relation], counts, strict=True)]

@@ -74,9 +74,7 @@ def build_map(view: LabelledView, camera: Camera, backend: str, folder: Path) ->
             writer.write(0.1 * k, view.color, view.depth, view.world_from_camera, view.nodes.astype(np.uint16))
     sequence = step("ingest", folder / "sequence", log=folder / "log.mcap")
     segments = step("segment", folder / "segments", {"backend": backend}, sequence=sequence)
-    fused = step(
-        "fuse", folder / "panoptic_map", {"voxel_size": VOXEL_SIZE}, sequence=sequence, segments=segments
-    )  # fmt: skip
+    fused = step("fuse", folder / "panoptic_map", {"voxel_size": VOXEL_SIZE}, sequence=sequence, segments=segments)
     return opened(PanopticMap, fused)
 
 

@@ -40,9 +40,7 @@ def _query(query: MotionQuery) -> Query:
 def ours(checker: CollisionChecker, query: MotionQuery, seed: int) -> np.ndarray | None:
     """Compiled RRT-Connect, compiled shortcuts, confirmation by the meshes."""
     try:
-        return find_path(
-            _query(query), checker, np.random.default_rng(seed), samples=SAMPLES, smoothing=SMOOTHING
-        )  # fmt: skip
+        return find_path(_query(query), checker, np.random.default_rng(seed), samples=SAMPLES, smoothing=SMOOTHING)
     except MotionFailed:
         return None
 
@@ -52,9 +50,14 @@ def mesh_fallback(checker: CollisionChecker, query: MotionQuery, seed: int) -> n
     where the closer look at the path finds a hit."""
     try:
         return rrt_connect(
-            query.start, query.goal, lambda arm: checker.check_meshes(np.concatenate([query.base, arm])), SPACE,
-            np.random.default_rng(seed), samples=FALLBACK_SAMPLES, smoothing=SMOOTHING,
-        )  # fmt: skip
+            query.start,
+            query.goal,
+            lambda arm: checker.check_meshes(np.concatenate([query.base, arm])),
+            SPACE,
+            np.random.default_rng(seed),
+            samples=FALLBACK_SAMPLES,
+            smoothing=SMOOTHING,
+        )
     except MotionFailed:
         return None
 
@@ -102,8 +105,4 @@ def ompl_pybullet(checker: CollisionChecker, query: MotionQuery, seed: int) -> n
     return np.array([[state[joint] for joint in range(7)] for state in path.getStates()])
 
 
-ARMS: dict[str, Arm] = {
-    "ours": ours,
-    "ompl_pybullet": ompl_pybullet,
-    "mesh_fallback": mesh_fallback,
-}
+ARMS: dict[str, Arm] = {"ours": ours, "ompl_pybullet": ompl_pybullet, "mesh_fallback": mesh_fallback}

@@ -69,10 +69,14 @@ def plates_world(plates: dict[str, list[Plate]]) -> PhysicsWorld:
     inertia = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
     for name, entries in plates.items():
         record = SceneBody(
-            name=name, class_name="furniture", movable=False, world_from_body=as_transform(np.eye(4)), mass=1.0,
+            name=name,
+            class_name="furniture",
+            movable=False,
+            world_from_body=as_transform(np.eye(4)),
+            mass=1.0,
             world_from_reconstructed=None,
             box=Box(center=entries[0][0], size=entries[0][1]),
-        )  # fmt: skip
+        )
         shapes = "".join(
             f'<collision><origin xyz="{c[0]} {c[1]} {c[2]}"/><geometry><box size="{s[0]} {s[1]} {s[2]}"/></geometry>'
             "</collision>"
@@ -174,11 +178,12 @@ def room_set(scene: Path) -> QuerySet:
     low, high = room[0].min(axis=0), room[1].max(axis=0)
     surfaces = {
         name: surface_points(
-            [mesh for meshes in link_shapes(world.bodies[name].text).values() for mesh in meshes], 3000,
+            [mesh for meshes in link_shapes(world.bodies[name].text).values() for mesh in meshes],
+            3000,
             np.random.default_rng(0),
         )
         for name in items
-    }  # fmt: skip
+    }
 
     def draw(random: np.random.Generator) -> MotionQuery | None:
         item = items[int(random.integers(len(items)))]

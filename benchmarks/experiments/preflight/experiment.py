@@ -111,9 +111,12 @@ def judge(log: Path, parameters: IngestParameters, fault: Fault | None, frames: 
 def inspection_of(report: InspectionReport, seconds: float, named: Named | None) -> Inspection:
     """What is kept of a report."""
     return Inspection(
-        report.verdict, report.verdict != "ready", bool(named and named(report.cameras[0])), report.reason,
+        report.verdict,
+        report.verdict != "ready",
+        bool(named and named(report.cameras[0])),
+        report.reason,
         round(seconds, 2),
-    )  # fmt: skip
+    )
 
 
 def name_of(trial: Trial) -> str:

@@ -126,10 +126,7 @@ def load_room(bench: Bench, name: str, *, with_maps: bool) -> Room:
     sequence, artifact = opened(SequenceArtifact, folder.sequence), opened(GroundTruth, folder.ground_truth)
     world_from_log = np.array(sequence.info.gravity.world_from_log)
     truth = load_truth(artifact, world_from_log, OPTIONS.minimum_visible_points)
-    libraries = {
-        False: CadLibrary(rooms / "cad_library"),
-        True: CadLibrary(held_out_library(bench)),
-    }
+    libraries = {False: CadLibrary(rooms / "cad_library"), True: CadLibrary(held_out_library(bench))}
     maps = {trial.arm: mapping.folder(trial) / "panoptic_map" for trial in trials}
     return Room(name, artifact, truth, world_from_log, maps, libraries)
 

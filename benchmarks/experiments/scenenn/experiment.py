@@ -100,9 +100,13 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outc
     frames = {"format": "scenenn", "every": parameters.every, "max_frames": parameters.max_frames}
     sequence = step("ingest", out / "sequence", frames, log=scene.log)
     truth = step(
-        "truth scenenn", out / "ground_truth", {"matching": parameters.matching},
-        annotation=scene.annotation, mesh=scene.mesh, sequence=sequence,
-    )  # fmt: skip
+        "truth scenenn",
+        out / "ground_truth",
+        {"matching": parameters.matching},
+        annotation=scene.annotation,
+        mesh=scene.mesh,
+        sequence=sequence,
+    )
     arms = {arm.name: arm for arm in all_arms(parameters.voxel_size)}
     for trial in trials:
         arm, folder = arms[trial.arm], out / trial.arm
@@ -111,9 +115,13 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Outc
         graph = step("graph", folder / "contact_graph", arm.graph, panoptic_map=panoptic_map)
         # Without the sequence: the truth of a scan is in its world already.
         step(
-            "evaluate", folder / "evaluation",
-            ground_truth=truth, segments=segments, panoptic_map=panoptic_map, contact_graph=graph,
-        )  # fmt: skip
+            "evaluate",
+            folder / "evaluation",
+            ground_truth=truth,
+            segments=segments,
+            panoptic_map=panoptic_map,
+            contact_graph=graph,
+        )
         yield trial, outcome_of(truth, panoptic_map, graph)
 
 

@@ -73,11 +73,12 @@ SUBCASES = {
     "needle_all_endoscope": ("geometry_endoscope", _all),
     **{
         f"visible_geometry_{low}_to_{high}_degrees_from_edge_on": (
-            "geometry", where(lambda r, low=low, high=high: r.visible and low < r.degrees_from_edge_on <= high),  # type: ignore[misc]
+            "geometry",
+            where(lambda r, low=low, high=high: r.visible and low < r.degrees_from_edge_on <= high),  # type: ignore[misc]
         )
         for low, high in ((0, 15), (15, 30), (30, 60), (60, 90))
     },
-}  # fmt: skip
+}
 """Names without an ending are of the rendered form; `_geometry` and `_endoscope` say the other forms."""
 
 

@@ -18,14 +18,7 @@ import torch
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.stitch_needle.experiment import MEASURES as POSES
 from benchmarks.experiments.stitch_needle.views import CASES, observe
-from benchmarks.stitch.segmentation_views import (
-    CALIBRATION_ERROR,
-    EYES,
-    ViewParameters,
-    kept_view,
-    read_eye,
-    views_of,
-)
+from benchmarks.stitch.segmentation_views import CALIBRATION_ERROR, EYES, ViewParameters, kept_view, read_eye, views_of
 from stages.suture.evaluation.judgement import Estimate, judged
 from stages.suture.masks import learned_masks
 from stages.suture.needle.estimate import estimate

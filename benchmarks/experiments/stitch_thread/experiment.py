@@ -15,14 +15,7 @@ import torch
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count
 from benchmarks.experiments.stitch_thread.drawing import panel
 from benchmarks.experiments.stitch_thread.judging import ThreadRecord, judged
-from benchmarks.stitch.segmentation_views import (
-    CALIBRATION_ERROR,
-    EYES,
-    ViewParameters,
-    kept_view,
-    read_eye,
-    views_of,
-)
+from benchmarks.stitch.segmentation_views import CALIBRATION_ERROR, EYES, ViewParameters, kept_view, read_eye, views_of
 from stages.suture.rig import TWO_CAMERAS
 from stages.suture.segmentation.infer import Segmenter
 from stages.suture.thread.reconstruct import reconstruct_thread

@@ -88,9 +88,14 @@ def judged(scene: NeedleScene, true_masks: list[np.ndarray], curve: ThreadCurve,
     truth, along = finely(apply(scene.camera_from_world, scene.thread))
     seen = seen_by_both(truth, true_masks, scene.rig)
     none = ThreadRecord(
-        scene.holder, scene.crossing is not None, curve.status, tuple(curve.remarks),
-        true_length=1000.0 * float(along[-1]), seen_length=1000.0 * FINE * float(seen.sum()), seconds=seconds,
-    )  # fmt: skip
+        scene.holder,
+        scene.crossing is not None,
+        curve.status,
+        tuple(curve.remarks),
+        true_length=1000.0 * float(along[-1]),
+        seen_length=1000.0 * FINE * float(seen.sum()),
+        seconds=seconds,
+    )
     if curve.status == "none":
         return none
     distance, nearest = cKDTree(truth).query(curve.points)

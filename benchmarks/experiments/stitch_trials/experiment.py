@@ -98,9 +98,15 @@ def notes(results: Results) -> str:
         ("thesis_supervised", "4.47", "83.3", "100", "20", "141.9", "16 10 0 2", "2.25"),
     )
     head = (
-        "as printed", "sutures to failure", "single-suture rate %", "three throws %", "full wound %",
-        "seconds a suture", "I E H T", "sutures to intervention",
-    )  # fmt: skip
+        "as printed",
+        "sutures to failure",
+        "single-suture rate %",
+        "three throws %",
+        "full wound %",
+        "seconds a suture",
+        "I E H T",
+        "sutures to intervention",
+    )
     return "\n".join(
         (
             markdown("What ended trials", ("arm", "class", "reason", "count"), ended),

@@ -82,15 +82,29 @@ def compare(table: Table, detections: tuple[Detection, ...]) -> list[Match]:
         turn = float(np.angle(np.exp(1j * (one.yaw - item.yaw)))) if not item.is_dish else 0.0
         result.append(
             Match(
-                kind=item.kind, found=one.kind, stacked=stacked, dx=one.position[0] - item.position[0],
-                dy=one.position[1] - item.position[1], turn=turn, lip=one.lip - item.lip,
-                confidence=one.confidence, unsure=one.unsure, hidden=one.hidden,
+                kind=item.kind,
+                found=one.kind,
+                stacked=stacked,
+                dx=one.position[0] - item.position[0],
+                dy=one.position[1] - item.position[1],
+                turn=turn,
+                lip=one.lip - item.lip,
+                confidence=one.confidence,
+                unsure=one.unsure,
+                hidden=one.hidden,
             )
-        )  # fmt: skip
+        )
     for c, one in enumerate(detections):
         if c not in pairs.values():
-            result.append(Match(kind=None, found=one.kind or "unknown", confidence=one.confidence, unsure=one.unsure,
-                                hidden=one.hidden))  # fmt: skip
+            result.append(
+                Match(
+                    kind=None,
+                    found=one.kind or "unknown",
+                    confidence=one.confidence,
+                    unsure=one.unsure,
+                    hidden=one.hidden,
+                )
+            )
     return result
 
 

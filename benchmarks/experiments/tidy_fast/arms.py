@@ -138,10 +138,17 @@ def _optimum(table: Table, model: TimeModel, chances: Chances, delay: int) -> Ru
     trips, everything = optimum.trips(best), optimum.everything
     time, expected = float(best.seconds[everything]), float(best.trips[everything])
     return Run(
-        delay=delay, draws=1, time=time, time_first=time, objects_per_trip=len(table.items) / expected, trips=expected,
-        pulls=sum(trip.pull is not None for trip in trips), stacks=sum(len(trip.stacks) for trip in trips),
-        failed=0.0, planning_seconds=planning,
-    )  # fmt: skip
+        delay=delay,
+        draws=1,
+        time=time,
+        time_first=time,
+        objects_per_trip=len(table.items) / expected,
+        trips=expected,
+        pulls=sum(trip.pull is not None for trip in trips),
+        stacks=sum(len(trip.stacks) for trip in trips),
+        failed=0.0,
+        planning_seconds=planning,
+    )
 
 
 def _row(done: list[Trial], times: list[float], delay: int, planning: float) -> Run:
@@ -149,7 +156,14 @@ def _row(done: list[Trial], times: list[float], delay: int, planning: float) -> 
         return float(np.mean([getattr(trial, name) for trial in done]))
 
     return Run(
-        delay=delay, draws=len(done), time=float(np.mean(times)), time_first=times[0],
-        objects_per_trip=mean("objects_per_trip"), trips=mean("trips"), pulls=mean("pulls"), stacks=mean("stacks"),
-        failed=mean("failed"), planning_seconds=planning,
-    )  # fmt: skip
+        delay=delay,
+        draws=len(done),
+        time=float(np.mean(times)),
+        time_first=times[0],
+        objects_per_trip=mean("objects_per_trip"),
+        trips=mean("trips"),
+        pulls=mean("pulls"),
+        stacks=mean("stacks"),
+        failed=mean("failed"),
+        planning_seconds=planning,
+    )

@@ -27,9 +27,12 @@ WORLDS_OF = {
     for tier in TIERS
 }
 CASES = tuple(
-    f"{tier}/{world}{tag}" for tag in ("", FIFTEEN) for tier in TIERS for world in WORLDS_OF[tier]
+    f"{tier}/{world}{tag}"
+    for tag in ("", FIFTEEN)
+    for tier in TIERS
+    for world in WORLDS_OF[tier]
     if not (tag and tier == "tier3")
-)  # fmt: skip
+)
 
 
 def seeds_of(bench: Bench, case: str) -> Sequence[str]:

@@ -13,13 +13,7 @@ from typing import Protocol
 
 from schemas.errors import UsageError
 from stages.engine.batch.data_sets import find_scenes
-from stages.engine.batch.fingerprints import (
-    absolute_inputs,
-    file_state,
-    fingerprint,
-    input_variables,
-    pipeline_facts,
-)
+from stages.engine.batch.fingerprints import absolute_inputs, file_state, fingerprint, input_variables, pipeline_facts
 from stages.engine.batch.job import Job
 from stages.engine.batch.names import is_folder_name
 from stages.engine.batch.spec import BatchSpec, ParameterSet, read_spec

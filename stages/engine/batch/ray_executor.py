@@ -143,12 +143,20 @@ class RayExecutor:
         lost = self._lost.get(job.name, [])
         return SceneResult.model_validate(
             {
-                "job": job.name, "scene": job.scene, "parameters": job.parameters, "seed": job.seed,
-                "fingerprint": job.fingerprint, "outcome": outcome, "exit_code": exit_code, "reason": reason,
-                "seconds": 0.0, "started": datetime.now(UTC).isoformat(timespec="milliseconds"),
-                "attempts": max(1, len(lost)), "lost": tuple(lost),
+                "job": job.name,
+                "scene": job.scene,
+                "parameters": job.parameters,
+                "seed": job.seed,
+                "fingerprint": job.fingerprint,
+                "outcome": outcome,
+                "exit_code": exit_code,
+                "reason": reason,
+                "seconds": 0.0,
+                "started": datetime.now(UTC).isoformat(timespec="milliseconds"),
+                "attempts": max(1, len(lost)),
+                "lost": tuple(lost),
             }
-        )  # fmt: skip
+        )
 
     def cancel(self) -> None:
         """Interrupt all scenes; the workers end their processes (scene_run.py). Waits for that, within reason."""

@@ -113,8 +113,12 @@ def _start(job: Job, log: int) -> subprocess.Popen[bytes]:
     environment = {**job.environment, **os.environ, "PYTHONPATH": str(REPOSITORY)}
     process = subprocess.Popen(
         [sys.executable, "-I", "-S", str(LAUNCHER), str(os.getpid()), *job.command],
-        stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True, env=environment,
-    )  # fmt: skip
+        stdin=subprocess.DEVNULL,
+        stdout=log,
+        stderr=log,
+        start_new_session=True,
+        env=environment,
+    )
     if job.address_space is not None:
         with suppress(psutil.Error):
             psutil.Process(process.pid).rlimit(psutil.RLIMIT_AS, (job.address_space, job.address_space))

@@ -133,9 +133,12 @@ def run_batch(
             chosen = executor or make_executor(batch, jobs)
             with display_for(len(todo), say, terminal=terminal, quiet=quiet) as display:
                 progress = run_jobs(
-                    todo, chosen, results.append,
-                    stop_after_failures=batch.spec.limits.stop_after_failures, observer=display,
-                )  # fmt: skip
+                    todo,
+                    chosen,
+                    results.append,
+                    stop_after_failures=batch.spec.limits.stop_after_failures,
+                    observer=display,
+                )
             ran, ended = progress.results, progress.ended
         end = BatchEnd(tuple(all_jobs), _standing(all_jobs, read_results(results.path)), tuple(ran))
         write_summary(out, _title(batch), end.jobs, end.latest)
@@ -195,9 +198,12 @@ def run_task(
         todo = [job for job in own if job.name in reasons]
         with display_for(len(todo), say, terminal=False, quiet=quiet) as display:
             progress = run_jobs(
-                todo, executor or make_executor(batch, 1), results.append,
-                stop_after_failures=batch.spec.limits.stop_after_failures, observer=display,
-            )  # fmt: skip
+                todo,
+                executor or make_executor(batch, 1),
+                results.append,
+                stop_after_failures=batch.spec.limits.stop_after_failures,
+                observer=display,
+            )
         standing = _standing(own, [*before, *progress.results])
     if progress.ended == "interrupted":
         raise KeyboardInterrupt

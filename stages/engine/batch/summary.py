@@ -77,9 +77,22 @@ def scene_table(jobs: Sequence[Job], latest: Mapping[str, SceneResult], *, measu
     """Return a row for each scene, in the order of their names; with all measures for machines, without for people."""
     names = measure_names(latest) if measures else []
     columns = (
-        "scene", "parameters", "seed", "kind", "outcome", "exit_code", "failed_step", "reason", "seconds",
-        "peak_memory_mb", "attempts", "host", "started", "log", *names,
-    )  # fmt: skip
+        "scene",
+        "parameters",
+        "seed",
+        "kind",
+        "outcome",
+        "exit_code",
+        "failed_step",
+        "reason",
+        "seconds",
+        "peak_memory_mb",
+        "attempts",
+        "host",
+        "started",
+        "log",
+        *names,
+    )
     rows: list[tuple[Cell, ...]] = []
     for job in sorted(jobs, key=lambda job: (job.scene, job.parameters or "", -1 if job.seed is None else job.seed)):
         identity: tuple[Cell, ...] = (job.scene, job.parameters, job.seed)
@@ -89,11 +102,21 @@ def scene_table(jobs: Sequence[Job], latest: Mapping[str, SceneResult], *, measu
             continue
         rows.append(
             (
-                *identity, kind_of(result.outcome), result.outcome, result.exit_code, result.failed_step, result.reason,
-                result.seconds, round(result.peak_memory_bytes / 1e6, 1), result.attempts, result.host, result.started,
-                f"{job.name}/batch.log", *(result.measures.get(name) for name in names),
+                *identity,
+                kind_of(result.outcome),
+                result.outcome,
+                result.exit_code,
+                result.failed_step,
+                result.reason,
+                result.seconds,
+                round(result.peak_memory_bytes / 1e6, 1),
+                result.attempts,
+                result.host,
+                result.started,
+                f"{job.name}/batch.log",
+                *(result.measures.get(name) for name in names),
             )
-        )  # fmt: skip
+        )
     return Table("scenes", "Scenes", columns, tuple(rows))
 
 
@@ -120,9 +143,7 @@ def group_table(jobs: Sequence[Job], latest: Mapping[str, SceneResult]) -> Table
         bounds: tuple[Cell, Cell] = (interval.low, interval.high) if len(means) > 1 else (None, None)
         runs = sum(map(len, by_scene.values()))
         median = float(np.median(means))
-        rows.append(
-            (name, parameters, interval.value, *bounds, median, len(means), len(scenes[parameters]), runs)
-        )  # fmt: skip
+        rows.append((name, parameters, interval.value, *bounds, median, len(means), len(scenes[parameters]), runs))
     columns = ("measure", "parameters", "mean", "low", "high", "median", "scenes", "of", "runs")
     note = (
         "Over scenes that ended well; seeds of a scene are averaged first. low, high: 95 % percentile bootstrap of the "

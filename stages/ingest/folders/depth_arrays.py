@@ -31,10 +31,9 @@ def _npy(data: bytes) -> np.ndarray:
     stream = io.BytesIO(data[:NPY_HEADER])
     try:
         version = np.lib.format.read_magic(stream)
-        read_header = {
-            (1, 0): np.lib.format.read_array_header_1_0,
-            (2, 0): np.lib.format.read_array_header_2_0,
-        }[version]
+        read_header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[
+            version
+        ]
         shape, fortran_order, kind = read_header(stream)
     except Exception as error:  # numpy parses the header as a Python literal and raises whatever that stumbles over
         raise Unusable("undecodable_depth", f"no .npy array ({error})"[:200]) from None

@@ -320,6 +320,8 @@ def alternatives(camera: CameraTopics, content: LogContent) -> list[str]:
     return sorted(
         name
         for name, images in content.images.items()
-        if images.role in ("color", "depth") and place(name) == here and name not in camera.all
+        if images.role in ("color", "depth")
+        and place(name) == here
+        and name not in camera.all
         and without_transport(name) not in camera.all
-    )  # fmt: skip
+    )

@@ -16,12 +16,30 @@ LARGEST_DEFINITION = 1 << 18
 """Bytes of the definition of one type with all it refers to; those of the types read here have under 10,000."""
 
 PRIMITIVES = {
-    "bool": "B", "boolean": "B", "byte": "B", "octet": "B", "char": "B",
-    "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q",
-    "float32": "f", "float64": "d", "float": "f", "double": "d",
-    "short": "h", "unsigned short": "H", "long": "i", "unsigned long": "I", "long long": "q",
+    "bool": "B",
+    "boolean": "B",
+    "byte": "B",
+    "octet": "B",
+    "char": "B",
+    "int8": "b",
+    "uint8": "B",
+    "int16": "h",
+    "uint16": "H",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float32": "f",
+    "float64": "d",
+    "float": "f",
+    "double": "d",
+    "short": "h",
+    "unsigned short": "H",
+    "long": "i",
+    "unsigned long": "I",
+    "long long": "q",
     "unsigned long long": "Q",
-}  # fmt: skip
+}
 """Name in `.msg` or `.idl` -> code of the struct module."""
 TEXT = "string"
 SEQUENCE = -1

@@ -22,14 +22,7 @@ from stages.ingest.messages.record_fields import (
     stamp_of,
     vector_of,
 )
-from stages.ingest.messages.records import (
-    ImageRecord,
-    ImuRecord,
-    PointsRecord,
-    PoseRecord,
-    Record,
-    TransformRecord,
-)
+from stages.ingest.messages.records import ImageRecord, ImuRecord, PointsRecord, PoseRecord, Record, TransformRecord
 from stages.ingest.messages.ros_definitions import Field, definitions_of, short_name
 from stages.ingest.messages.ros_serialization import RosReader
 

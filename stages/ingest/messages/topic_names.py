@@ -11,19 +11,58 @@ from collections.abc import Iterable
 TRANSPORTS = frozenset({"compressed", "compresseddepth", "theora", "ffmpeg", "zstd", "draco"})
 STREAM_WORDS = frozenset(
     {
-        "color", "colour", "rgb", "bgr", "image", "images", "img", "raw", "rect", "rectified", "mono", "gray", "grey",
-        "depth", "aligned", "align", "registered", "to", "data", "hw", "sw", "float", "unrectified", "stereo", "frame",
-        "label", "labels", "instance", "instances", "segment", "segments", "segmentation", "semantic", "panoptic",
-        "mask", "masks",
+        "color",
+        "colour",
+        "rgb",
+        "bgr",
+        "image",
+        "images",
+        "img",
+        "raw",
+        "rect",
+        "rectified",
+        "mono",
+        "gray",
+        "grey",
+        "depth",
+        "aligned",
+        "align",
+        "registered",
+        "to",
+        "data",
+        "hw",
+        "sw",
+        "float",
+        "unrectified",
+        "stereo",
+        "frame",
+        "label",
+        "labels",
+        "instance",
+        "instances",
+        "segment",
+        "segments",
+        "segmentation",
+        "semantic",
+        "panoptic",
+        "mask",
+        "masks",
     }
     | TRANSPORTS
-)  # fmt: skip
+)
 """Words that say what a stream shows, not which device it comes from."""
 REGISTERED_WORDS = frozenset({"aligned", "registered"})
 SIDES = (
-    ("left", "right"), ("infra1", "infra2"), ("infra_1", "infra_2"), ("infrared_1", "infrared_2"),
-    ("ir1", "ir2"), ("image_0", "image_1"), ("cam0", "cam1"), ("cam_0", "cam_1"), ("camera_0", "camera_1"),
-)  # fmt: skip
+    ("left", "right"),
+    ("infra1", "infra2"),
+    ("infra_1", "infra_2"),
+    ("infrared_1", "infrared_2"),
+    ("ir1", "ir2"),
+    ("image_0", "image_1"),
+    ("cam0", "cam1"),
+    ("cam_0", "cam_1"),
+    ("camera_0", "camera_1"),
+)
 """Words for the left and the right eye. Whether two such cameras are a pair, only their calibration can say."""
 CALIBRATION_NAMES = ("camera_info", "calibration", "camera_calibration", "info")
 _REALSENSE = re.compile(r"(/device_\d+)/sensor_\d+/([A-Za-z]+_?\d*)/image/data")

@@ -323,11 +323,7 @@ def _gravity(
 
 
 def _frames_report(
-    source: LogSource,
-    kept: list[Entry],
-    drops: Counter[str],
-    materials: list[CameraMaterial],
-    unusable: Counter[str],
+    source: LogSource, kept: list[Entry], drops: Counter[str], materials: list[CameraMaterial], unusable: Counter[str]
 ) -> FramesReport:
     times = [entry.time for entry in kept]
     return FramesReport(

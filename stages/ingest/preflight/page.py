@@ -140,9 +140,10 @@ def _pair_pictures(report: CameraReport, material: CameraMaterial) -> tuple[Pict
     if outcome.as_is is None or outcome.pairs is None or poses is None or report.poses.method != "depth":
         return ()
     with_depth = [
-        k for k, (i, j) in enumerate(outcome.pairs.pairs)
+        k
+        for k, (i, j) in enumerate(outcome.pairs.pairs)
         if i in material.looks and material.looks[i].depth is not None and material.looks[j].depth is not None
-    ]  # fmt: skip
+    ]
     if not with_depth:
         return ()
     order = sorted(with_depth, key=lambda k: (outcome.as_is.fit.costs[k], k))  # type: ignore[union-attr]

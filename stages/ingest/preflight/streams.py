@@ -85,9 +85,7 @@ def _gaps(ordered: np.ndarray, intervals: np.ndarray, median: float) -> Gaps:
         return Gaps()
     longest = int(wide[np.argmax(intervals[wide])])
     return Gaps(
-        count=len(wide),
-        longest=exact(intervals[longest] * 1e-9),
-        longest_at=significant(ordered[longest] * 1e-9, 15),
+        count=len(wide), longest=exact(intervals[longest] * 1e-9), longest_at=significant(ordered[longest] * 1e-9, 15)
     )
 
 

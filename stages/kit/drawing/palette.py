@@ -14,11 +14,7 @@ RELATION_COLORS = {
     "proximal": "#8c8c8c",
 }
 UNLABELLED = (0.46, 0.45, 0.44)
-LAYOUT_COLORS = {
-    "floor": (0.80, 0.755, 0.69),
-    "wall": (0.715, 0.755, 0.785),
-    "ceiling": (0.84, 0.84, 0.82),
-}
+LAYOUT_COLORS = {"floor": (0.80, 0.755, 0.69), "wall": (0.715, 0.755, 0.785), "ceiling": (0.84, 0.84, 0.82)}
 """Calm colours for what is large and behind everything."""
 GOLDEN_RATIO = 0.6180339887498949
 

@@ -57,9 +57,14 @@ def plan_tree(branches: Sequence[Branch], title: str, width: int = 1100) -> Figu
 def _draw(axes: Axes, node: _Node, depth: int, row: float) -> float:
     """Draw a node and what follows it from a row down; return how many rows it took."""
     axes.text(
-        depth, row, node.label, fontsize=7, va="center", ha="center",
+        depth,
+        row,
+        node.label,
+        fontsize=7,
+        va="center",
+        ha="center",
         bbox={"boxstyle": "round,pad=0.2", "facecolor": BOX, "edgecolor": EDGE},
-    )  # fmt: skip
+    )
     used = 0.0
     for child in node.children.values():
         axes.plot([depth, depth + 1], [row, row + used], color=EDGE, linewidth=0.8, zorder=0)

@@ -207,14 +207,24 @@ def _draw_tree(
             axes.plot([x0, bend, bend, x1], [y0, y0, y1, y1], color=color, linewidth=width, linestyle=style)
         else:  # beside the tree: an arc at the left of both names, so that it covers no line of the tree
             out = min(x0, x1) - 1.2
-            axes.plot([x0 - 0.3, out, out, x1 - 0.3], [y0 + 0.2, y0 + 0.2, y1, y1], color=color, linewidth=width,
-                      linestyle=style)  # fmt: skip
+            axes.plot(
+                [x0 - 0.3, out, out, x1 - 0.3],
+                [y0 + 0.2, y0 + 0.2, y1, y1],
+                color=color,
+                linewidth=width,
+                linestyle=style,
+            )
     for name, (x, y) in places.items():
         axes.annotate(
-            name, (x, y), ha="left", va="center", size=7.5, color=marked.get(name, "#222222"),
+            name,
+            (x, y),
+            ha="left",
+            va="center",
+            size=7.5,
+            color=marked.get(name, "#222222"),
             weight="bold" if name in marked else "normal",
             bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"},
-        )  # fmt: skip
+        )
     axes.set_xlim(-1.0, max(left.values()) + 1.0)
     axes.set_ylim(max((y for _, y in layout.values()), default=0.0) + 0.7, -0.7)
     axes.axis("off")

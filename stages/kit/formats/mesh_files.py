@@ -353,11 +353,7 @@ def _stl_counts(data: bytes) -> tuple[int, int]:
     return count, 3 * count
 
 
-_COUNTS: dict[str, Callable[[bytes], tuple[int, int]]] = {
-    ".ply": _ply_counts,
-    ".stl": _stl_counts,
-    ".glb": _glb_counts,
-}
+_COUNTS: dict[str, Callable[[bytes], tuple[int, int]]] = {".ply": _ply_counts, ".stl": _stl_counts, ".glb": _glb_counts}
 """Triangles and vertices that the bytes of a file declare or hold."""
 _CHECKS: dict[str, Callable[[bytes], bool]] = {
     ".ply": _check_ply,

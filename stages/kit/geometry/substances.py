@@ -10,9 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 FRICTION_OF_LIKE = {
-    "stone": 0.60, "fabric": 0.60, "wood": 0.45, "cardboard": 0.45, "paper": 0.40, "ceramic": 0.40, "glass": 0.40,
-    "plastic": 0.35, "metal": 0.35,
-}  # fmt: skip
+    "stone": 0.60,
+    "fabric": 0.60,
+    "wood": 0.45,
+    "cardboard": 0.45,
+    "paper": 0.40,
+    "ceramic": 0.40,
+    "glass": 0.40,
+    "plastic": 0.35,
+    "metal": 0.35,
+}
 """Coefficient of sliding friction of a surface on one of its kind."""
 ROLLING_FRICTION, SPINNING_FRICTION = 0.0005, 0.005
 """Resistance to rolling and to turning on the spot [m], as Bullet and MuJoCo mean them."""

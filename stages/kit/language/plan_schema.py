@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from stages.kit.language.actions import (
-    MOST_CALLS,
-    ActionLanguage,
-    ActionType,
-    PlanReply,
-    check_calls,
-)
+from stages.kit.language.actions import MOST_CALLS, ActionLanguage, ActionType, PlanReply, check_calls
 from stages.kit.language.reply_schema import DoesNotFollow, ReplySchema, schema_of
 
 
@@ -55,9 +49,4 @@ def _form(action: ActionType, language: ActionLanguage, closed_names: bool) -> d
 
 
 def _object(properties: dict[str, Any]) -> dict[str, Any]:
-    return {
-        "type": "object",
-        "properties": properties,
-        "required": list(properties),
-        "additionalProperties": False,
-    }
+    return {"type": "object", "properties": properties, "required": list(properties), "additionalProperties": False}

@@ -69,9 +69,13 @@ class CollisionChecker:
             self._group(body.body_id, index, _SCENE, _ROBOT | _CARRIED)
             if body.record.class_name == "floor":
                 engine.setCollisionFilterPair(
-                    self.robot.body_id, body.body_id, self.robot.links[PEDESTAL_LINK], index, 0,
+                    self.robot.body_id,
+                    body.body_id,
+                    self.robot.links[PEDESTAL_LINK],
+                    index,
+                    0,
                     physicsClientId=self.world.client,
-                )  # fmt: skip
+                )
 
     # --- what is carried, what may be touched -----------------------------------------------------------------
 

@@ -51,9 +51,11 @@ def link_frames(chain: np.ndarray, mount_height: float, body: np.ndarray, frames
             child[row, 1] = y * cosine - x * sine
             child[row, 2] = z
             child[row, 3] = (
-                parent[row, 0] * fixed[0, 3] + parent[row, 1] * fixed[1, 3] + parent[row, 2] * fixed[2, 3]
+                parent[row, 0] * fixed[0, 3]
+                + parent[row, 1] * fixed[1, 3]
+                + parent[row, 2] * fixed[2, 3]
                 + parent[row, 3]
-            )  # fmt: skip
+            )
 
 
 @njit(cache=True, error_model="numpy", inline="always")

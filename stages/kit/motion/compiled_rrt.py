@@ -123,9 +123,15 @@ def _grown(points: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 @njit(cache=True, error_model="numpy")
 def search(
-    motion: Moving, start: np.ndarray, goals: np.ndarray, lower: np.ndarray, upper: np.ndarray, samples: int, step: int,
+    motion: Moving,
+    start: np.ndarray,
+    goals: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    samples: int,
+    step: int,
     random: np.random.Generator,
-) -> tuple[np.ndarray, int]:  # fmt: skip
+) -> tuple[np.ndarray, int]:
     """Return a free path (N, D) from `start` (D,) to one of `goals` (G, D) within `lower` and `upper` (D,), and the
     samples used.
 

@@ -91,9 +91,15 @@ def _aligned_headings(world_from_body: np.ndarray) -> np.ndarray:
 
 
 def _grasp_at(
-    points: np.ndarray, normals: np.ndarray, low: np.ndarray, high: np.ndarray, heading: float, pitch: float,
-    height: float, opening: float,
-) -> tuple[np.ndarray, float] | None:  # fmt: skip
+    points: np.ndarray,
+    normals: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    heading: float,
+    pitch: float,
+    height: float,
+    opening: float,
+) -> tuple[np.ndarray, float] | None:
     """Return world_from_tool (4, 4) and the width, or None where the item is too wide or fingers would slip."""
     approach = np.array([np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)])
     closing = np.array([-np.sin(heading), np.cos(heading), 0.0])

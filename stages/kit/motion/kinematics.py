@@ -126,9 +126,14 @@ def _pose_error(current: np.ndarray, target: np.ndarray, error: np.ndarray) -> N
 
 @njit(cache=True)
 def _descend(
-    fixed: np.ndarray, tool: np.ndarray, lower: np.ndarray, upper: np.ndarray, target: np.ndarray,
-    start: np.ndarray, iterations: int,
-) -> tuple[np.ndarray, float, float]:  # fmt: skip
+    fixed: np.ndarray,
+    tool: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    target: np.ndarray,
+    start: np.ndarray,
+    iterations: int,
+) -> tuple[np.ndarray, float, float]:
     """Levenberg-Marquardt from one start; return the arm (J,) and its position and rotation error."""
     count = fixed.shape[0]
     frames = np.zeros((count + 1, 4, 4))
@@ -200,9 +205,14 @@ def _descend(
 
 @njit(cache=True)
 def _search(
-    fixed: np.ndarray, tool: np.ndarray, lower: np.ndarray, upper: np.ndarray, target: np.ndarray,
-    starts: np.ndarray, iterations: int,
-) -> tuple[np.ndarray, float, float]:  # fmt: skip
+    fixed: np.ndarray,
+    tool: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    target: np.ndarray,
+    starts: np.ndarray,
+    iterations: int,
+) -> tuple[np.ndarray, float, float]:
     best = starts[0].copy()
     best_position, best_rotation = np.inf, np.inf
     for number in range(starts.shape[0]):
@@ -230,17 +240,18 @@ def reach(chain: ArmChain) -> float:
 
 
 def inverse_kinematics(
-    chain: ArmChain,
-    base_from_tool: np.ndarray,
-    starts: np.ndarray,
-    *,
-    iterations: int = 60,
+    chain: ArmChain, base_from_tool: np.ndarray, starts: np.ndarray, *, iterations: int = 60
 ) -> InverseSolution:
     """Find joint values within the limits for a tool pose (4, 4), tried from each start (S, J) until one converges."""
     arm, position, rotation = _search(
-        chain.fixed, chain.tool, chain.lower, chain.upper, np.ascontiguousarray(base_from_tool, dtype=float),
-        np.ascontiguousarray(np.atleast_2d(starts), dtype=float), iterations,
-    )  # fmt: skip
+        chain.fixed,
+        chain.tool,
+        chain.lower,
+        chain.upper,
+        np.ascontiguousarray(base_from_tool, dtype=float),
+        np.ascontiguousarray(np.atleast_2d(starts), dtype=float),
+        iterations,
+    )
     within = position < POSITION_TOLERANCE and rotation < ROTATION_TOLERANCE
     return InverseSolution(arm, float(position), float(rotation), bool(within))
 

@@ -61,9 +61,15 @@ def find_path(
     start = leave_narrow(query, query.start, checker, random, effort)
     while start is not None and ways and effort.samples < most_samples and effort.rejected < most_rejected:
         path = _compiled_path(
-            replace(query, start=start[-1]), np.array([way[-1] for way in ways]), checker, random,
-            most_samples - effort.samples, smoothing, counts, effort,
-        )  # fmt: skip
+            replace(query, start=start[-1]),
+            np.array([way[-1] for way in ways]),
+            checker,
+            random,
+            most_samples - effort.samples,
+            smoothing,
+            counts,
+            effort,
+        )
         if path is None:
             break
         last = next(way for way in ways if np.array_equal(way[-1], path[-1]))
@@ -98,9 +104,15 @@ def leave_narrow(
 
 
 def _compiled_path(
-    query: Query, goals: np.ndarray, checker: CollisionChecker, random: np.random.Generator, samples: int,
-    smoothing: int, counts: np.ndarray, effort: Effort,
-) -> np.ndarray | None:  # fmt: skip
+    query: Query,
+    goals: np.ndarray,
+    checker: CollisionChecker,
+    random: np.random.Generator,
+    samples: int,
+    smoothing: int,
+    counts: np.ndarray,
+    effort: Effort,
+) -> np.ndarray | None:
     """Return a smoothed path that is free for the compiled check at a finer resolution, or None."""
     space = query.space
     used = 0
@@ -125,9 +137,14 @@ def _compiled_path(
 
 
 def _mesh_path(
-    query: Query, goals: np.ndarray, checker: CollisionChecker, random: np.random.Generator, samples: int,
-    smoothing: int, effort: Effort,
-) -> np.ndarray:  # fmt: skip
+    query: Query,
+    goals: np.ndarray,
+    checker: CollisionChecker,
+    random: np.random.Generator,
+    samples: int,
+    smoothing: int,
+    effort: Effort,
+) -> np.ndarray:
     """Return a path found with the mesh checker deciding what the compiled one refuses. Raises MotionFailed."""
     effort.by_meshes = True
     last: MotionFailed | None = None
@@ -135,9 +152,14 @@ def _mesh_path(
         for goal in goals:
             try:
                 return rrt_connect(
-                    query.start, goal, lambda values: checker.check(query.whole(values)), query.space, random,
-                    samples=max(1, samples // len(goals)), smoothing=smoothing,
-                )  # fmt: skip
+                    query.start,
+                    goal,
+                    lambda values: checker.check(query.whole(values)),
+                    query.space,
+                    random,
+                    samples=max(1, samples // len(goals)),
+                    smoothing=smoothing,
+                )
             except MotionFailed as failed:
                 last = failed
     assert last is not None

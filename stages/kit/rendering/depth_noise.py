@@ -130,8 +130,11 @@ def _disturb(seen: _Seen, draws: _Draws, focal_length: float, sensor: DepthCamer
     depth, incidence_cosine, reflectance, gloss, shadow = seen
     normal, jump, chance, loss, shift = draws
     minimum, maximum, baseline, levels = (
-        sensor.minimum_range, sensor.maximum_range, sensor.baseline, sensor.disparity_levels
-    )  # fmt: skip
+        sensor.minimum_range,
+        sensor.maximum_range,
+        sensor.baseline,
+        sensor.disparity_levels,
+    )
     jump_share, block = sensor.jump_share, sensor.block
     height, width = depth.shape
     result = np.zeros((height, width), dtype=np.float32)

@@ -327,9 +327,12 @@ def bake(
             lit = rows[~blocked]
             direct[lit] += factor[lit, None] * np.asarray(light.color, dtype=np.float32)
     radiant = _Radiant(
-        LightMap(offset, subdivisions, direct), soup.face_normals, soup.corner_colors.mean(axis=1),
-        np.asarray(soft_light.sky, dtype=np.float32), ambient,
-    )  # fmt: skip
+        LightMap(offset, subdivisions, direct),
+        soup.face_normals,
+        soup.corner_colors.mean(axis=1),
+        np.asarray(soft_light.sky, dtype=np.float32),
+        ambient,
+    )
     light_map = direct.copy()
     inside = np.zeros(total, dtype=np.float32)
     chunk = 1 << 19

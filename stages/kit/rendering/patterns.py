@@ -45,14 +45,7 @@ class Material:
 
     def row(self) -> np.ndarray:
         """Return the material as one (ROW,) float32 row of the material table."""
-        head = [
-            PATTERNS.index(self.pattern),
-            self.strength,
-            self.period,
-            self.gloss,
-            self.sharpness,
-            self.seed % 4096,
-        ]
+        head = [PATTERNS.index(self.pattern), self.strength, self.period, self.gloss, self.sharpness, self.seed % 4096]
         return np.asarray([*head, *self.pattern_from_world[:3].reshape(-1), self.skirting, 0.0], dtype=np.float32)
 
 

@@ -58,11 +58,7 @@ def camera_rays(
 
 @njit(cache=True, parallel=True)
 def surface_at(
-    rays: np.ndarray,
-    primitive: np.ndarray,
-    uvs: np.ndarray,
-    corner_normals: np.ndarray,
-    face_normals: np.ndarray,
+    rays: np.ndarray, primitive: np.ndarray, uvs: np.ndarray, corner_normals: np.ndarray, face_normals: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (shading normals (N, 3) turned towards the camera, cosine of incidence (N,) of the true face)."""
     normals = np.zeros((len(rays), 3), dtype=np.float32)

@@ -7,12 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from schemas.errors import UsageError
-from stages.kit.geometry.transforms import (
-    inverse,
-    quaternion_of,
-    transform_from_quaternion,
-    transform_from_yaw,
-)
+from stages.kit.geometry.transforms import inverse, quaternion_of, transform_from_quaternion, transform_from_yaw
 from stages.kit.simulation.engine import engine
 from stages.kit.simulation.robot_description import BASE_JOINTS, PEDESTAL_LINK, RobotDescription, mobile_robot_urdf
 from stages.kit.simulation.world import Contact, PhysicsWorld
@@ -72,9 +67,8 @@ class Robot:
         self.finger_force = description.finger_force
         for finger in self.fingers:
             engine.changeDynamics(
-                self.body_id, finger, lateralFriction=FINGER_FRICTION, spinningFriction=0.02,
-                physicsClientId=client,
-            )  # fmt: skip
+                self.body_id, finger, lateralFriction=FINGER_FRICTION, spinningFriction=0.02, physicsClientId=client
+            )
         self._choose_self_collisions()
 
     def _choose_self_collisions(self) -> None:
@@ -84,9 +78,13 @@ class Robot:
             for second in names[number + 1 :]:
                 if self.always_near(first, second):
                     engine.setCollisionFilterPair(
-                        self.body_id, self.body_id, self.links[first], self.links[second], 0,
+                        self.body_id,
+                        self.body_id,
+                        self.links[first],
+                        self.links[second],
+                        0,
                         physicsClientId=self.world.client,
-                    )  # fmt: skip
+                    )
 
     def always_near(self, first: str, second: str) -> bool:
         """Whether two links, by name, are too near each other along the chain to be checked."""
@@ -131,15 +129,26 @@ class Robot:
         client = self.world.client
         forces = np.concatenate([np.full(3, BASE_FORCE), ARM_FORCES])
         engine.setJointMotorControlArray(
-            self.body_id, self.body_joints, engine.POSITION_CONTROL, targetPositions=body.tolist(),
+            self.body_id,
+            self.body_joints,
+            engine.POSITION_CONTROL,
+            targetPositions=body.tolist(),
             targetVelocities=(np.zeros(10) if velocity is None else velocity).tolist(),
-            positionGains=[0.25] * 10, velocityGains=[1.0] * 10, forces=forces.tolist(), physicsClientId=client,
-        )  # fmt: skip
-        engine.setJointMotorControlArray(
-            self.body_id, self.finger_joints, engine.POSITION_CONTROL, targetPositions=[opening / 2] * 2,
-            forces=[self.finger_force] * 2, positionGains=[0.1] * 2, velocityGains=[1.0] * 2,
+            positionGains=[0.25] * 10,
+            velocityGains=[1.0] * 10,
+            forces=forces.tolist(),
             physicsClientId=client,
-        )  # fmt: skip
+        )
+        engine.setJointMotorControlArray(
+            self.body_id,
+            self.finger_joints,
+            engine.POSITION_CONTROL,
+            targetPositions=[opening / 2] * 2,
+            forces=[self.finger_force] * 2,
+            positionGains=[0.1] * 2,
+            velocityGains=[1.0] * 2,
+            physicsClientId=client,
+        )
 
     def finger_contacts(self, name: str) -> dict[int, list[Contact]]:
         """Return the contacts of each finger with a scene body, as of the last step; only those that press."""
@@ -174,10 +183,18 @@ class Robot:
             np.array(quaternion), np.array(position)
         )
         self.grip = engine.createConstraint(
-            self.body_id, self.hand, body_id, -1, engine.JOINT_FIXED, [0, 0, 0],
-            hand_from_object[:3, 3].tolist(), [0, 0, 0], quaternion_of(hand_from_object).tolist(), [0, 0, 0, 1],
+            self.body_id,
+            self.hand,
+            body_id,
+            -1,
+            engine.JOINT_FIXED,
+            [0, 0, 0],
+            hand_from_object[:3, 3].tolist(),
+            [0, 0, 0],
+            quaternion_of(hand_from_object).tolist(),
+            [0, 0, 0, 1],
             physicsClientId=self.world.client,
-        )  # fmt: skip
+        )
         engine.changeConstraint(self.grip, maxForce=force, physicsClientId=self.world.client)
 
     def release(self) -> None:

@@ -84,9 +84,11 @@ class PhysicsWorld:
         self.time = 0.0
         engine.setGravity(0, 0, -GRAVITY, physicsClientId=self.client)
         engine.setPhysicsEngineParameter(
-            fixedTimeStep=time_step, numSolverIterations=100, deterministicOverlappingPairs=1,
+            fixedTimeStep=time_step,
+            numSolverIterations=100,
+            deterministicOverlappingPairs=1,
             physicsClientId=self.client,
-        )  # fmt: skip
+        )
 
     def __enter__(self) -> PhysicsWorld:
         return self
@@ -108,9 +110,11 @@ class PhysicsWorld:
             try:
                 with native_output_to_stderr():
                     return engine.loadURDF(
-                        path, useFixedBase=fixed, flags=flags | engine.URDF_USE_INERTIA_FROM_FILE,
+                        path,
+                        useFixedBase=fixed,
+                        flags=flags | engine.URDF_USE_INERTIA_FROM_FILE,
                         physicsClientId=self.client,
-                    )  # fmt: skip
+                    )
             except engine.error as error:
                 raise BadInput(f"pybullet cannot load a URDF: {error}", hint="run `scenewright verify`") from None
 
@@ -129,16 +133,24 @@ class PhysicsWorld:
         for joint, index in joints.items():
             self.set_joint(record.name, joint, record.joint_values.get(joint, 0.0))
             engine.setJointMotorControl2(
-                body_id, index, engine.VELOCITY_CONTROL, targetVelocity=0.0, force=JOINT_FRICTION,
+                body_id,
+                index,
+                engine.VELOCITY_CONTROL,
+                targetVelocity=0.0,
+                force=JOINT_FRICTION,
                 physicsClientId=self.client,
-            )  # fmt: skip
+            )
         with_friction = links_with_friction(text)
         for link, index in links.items():
             if link not in with_friction:
                 engine.changeDynamics(
-                    body_id, index, lateralFriction=FRICTION, spinningFriction=SPINNING_FRICTION,
-                    rollingFriction=ROLLING_FRICTION, physicsClientId=self.client,
-                )  # fmt: skip
+                    body_id,
+                    index,
+                    lateralFriction=FRICTION,
+                    spinningFriction=SPINNING_FRICTION,
+                    rollingFriction=ROLLING_FRICTION,
+                    physicsClientId=self.client,
+                )
         return body
 
     def remove_body(self, name: str) -> None:

@@ -107,8 +107,10 @@ def _restricted(
     predicates = {f"may-{schema.name}": tuple(kind for _, kind in schema.parameters) for schema in domain.schemas}
     allowed = frozenset((f"may-{action.name}", *action.arguments) for action in actions)
     task = Problem(
-        "task", {objects[name]: kind for name, kind in problem.objects.items()}, renamed(problem.initial | allowed),
+        "task",
+        {objects[name]: kind for name, kind in problem.objects.items()},
+        renamed(problem.initial | allowed),
         renamed(problem.goal),
-    )  # fmt: skip
+    )
     lines = {" ".join((action.name, *(objects[term] for term in action.arguments))): action for action in actions}
     return replace(domain, predicates={**domain.predicates, **predicates}, schemas=schemas), task, lines

@@ -101,11 +101,14 @@ def positive_task(domain: Domain, problem: Problem) -> tuple[Problem, list[Groun
 
     actions = [
         GroundAction(
-            action.name, action.arguments, action.preconditions | opposite(negative),
-            action.add | opposite(action.delete), action.delete | opposite(action.add),
+            action.name,
+            action.arguments,
+            action.preconditions | opposite(negative),
+            action.add | opposite(action.delete),
+            action.delete | opposite(action.add),
         )
         for action, negative in grounded
-    ]  # fmt: skip
+    ]
     initial = problem.initial | opposite(frozenset(tracked - problem.initial))
     goal = problem.goal | opposite(problem.negative_goal)
     return Problem(problem.name, problem.objects, initial, goal), actions

@@ -25,6 +25,8 @@ def _sphere() -> np.ndarray:
     """Return points on the unit sphere: poles, and rings with one of them on the equator."""
     height = np.sin(np.linspace(-0.5, 0.5, RINGS + 1)[1:-1] * np.pi)
     angle = 2 * np.pi * np.arange(SIDES) / SIDES
-    rings = [np.column_stack([r * np.cos(angle), r * np.sin(angle), np.full(SIDES, z)])
-             for z, r in zip(height, np.sqrt(1 - height**2), strict=True)]  # fmt: skip
+    rings = [
+        np.column_stack([r * np.cos(angle), r * np.sin(angle), np.full(SIDES, z)])
+        for z, r in zip(height, np.sqrt(1 - height**2), strict=True)
+    ]
     return np.concatenate([[[0.0, 0.0, -1.0]], *rings, [[0.0, 0.0, 1.0]]])

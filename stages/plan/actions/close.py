@@ -15,9 +15,7 @@ class Close(PlanAction):
 
     name = "close"
     order = 50
-    goals = {
-        "closed": lambda goal: check_joints(goal.world, goal.literal, goal.bodies[0], goal.joints, shut=True),
-    }
+    goals = {"closed": lambda goal: check_joints(goal.world, goal.literal, goal.bodies[0], goal.joints, shut=True)}
     schemas = (
         Schema(
             "close",

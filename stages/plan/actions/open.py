@@ -15,9 +15,7 @@ class Open(PlanAction):
 
     name = "open"
     order = 40
-    goals = {
-        "open": lambda goal: check_joints(goal.world, goal.literal, goal.bodies[0], goal.joints, shut=False),
-    }
+    goals = {"open": lambda goal: check_joints(goal.world, goal.literal, goal.bodies[0], goal.joints, shut=False)}
     schemas = (
         Schema(
             "open",

@@ -9,12 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from stages.kit.geometry.transforms import transform_from
-from stages.suture.motion.constants import (
-    APPROACH_OFFSET,
-    CORRECTION_TURN,
-    EXTRACTION_TURN,
-    INSERTION_TURN,
-)
+from stages.suture.motion.constants import APPROACH_OFFSET, CORRECTION_TURN, EXTRACTION_TURN, INSERTION_TURN
 from stages.suture.motion.needle import UP_THE_WOUND, turned
 
 STEPS = 20

@@ -91,9 +91,7 @@ def fuse(frames: list[tuple[NeedleEstimate, np.ndarray]]) -> NeedleEstimate:
 
 
 def _average(
-    pose: NeedlePose,
-    agreeing: list[tuple[int, bool]],
-    usable: list[tuple[NeedlePose, np.ndarray, NeedleEstimate]],
+    pose: NeedlePose, agreeing: list[tuple[int, bool]], usable: list[tuple[NeedlePose, np.ndarray, NeedleEstimate]]
 ) -> tuple[NeedlePose, np.ndarray, float]:
     """Return the agreeing frames' mean, its covariance, and the log-odds that its tip is the tip."""
     odds = 0.0

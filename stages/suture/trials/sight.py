@@ -28,15 +28,7 @@ from stages.suture.world.corruption import noisy_disparity
 from stages.suture.world.render import StereoView, render
 from stages.suture.world.scene import NeedleScene, make_scene
 from stages.suture.world.thread import THREAD_RADIUS
-from stages.suture.world.tubes import (
-    LEFT_DRIVER,
-    RIGHT_DRIVER,
-    THREAD,
-    Tubes,
-    chain,
-    joined,
-    needle_tube,
-)
+from stages.suture.world.tubes import LEFT_DRIVER, RIGHT_DRIVER, THREAD, Tubes, chain, joined, needle_tube
 
 PICTURED_FROM_TRIAL = transform_from(np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.zeros(3))
 """The needle world's wound runs away from the cameras, the trial's towards them."""

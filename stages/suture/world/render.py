@@ -10,16 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from stages.kit.geometry.transforms import inverse
 from stages.suture.rig import NeedlePose, StereoRig
-from stages.suture.world.raster import (
-    SUBPIXELS,
-    Cones,
-    Lighting,
-    View,
-    draw,
-    hide_below_pad,
-    label,
-    shade,
-)
+from stages.suture.world.raster import SUBPIXELS, Cones, Lighting, View, draw, hide_below_pad, label, shade
 from stages.suture.world.scene import NeedleScene
 from stages.suture.world.tubes import NEEDLE, Tubes
 

@@ -16,16 +16,7 @@ from stages.kit.geometry.transforms import apply, inverse, transform_from
 from stages.suture.rig import ENDOSCOPE, NEEDLE_RADIUS, TWO_CAMERAS, NeedlePose, StereoRig
 from stages.suture.world.pad import RIDGE_HEIGHT
 from stages.suture.world.thread import THREAD_RADIUS, loose_thread
-from stages.suture.world.tubes import (
-    LEFT_DRIVER,
-    RIGHT_DRIVER,
-    THREAD,
-    Tubes,
-    chain,
-    driver_tube,
-    joined,
-    needle_tube,
-)
+from stages.suture.world.tubes import LEFT_DRIVER, RIGHT_DRIVER, THREAD, Tubes, chain, driver_tube, joined, needle_tube
 
 HOLDERS = ("air", "left", "right", "both", "tissue")
 PLACES = {

@@ -125,8 +125,7 @@ def _portion(table: Table) -> Table:
         return table
     start = table.stacks[0][0].position
     near = sorted(
-        table.stacks,
-        key=lambda pile: (pile[0].position[0] - start[0]) ** 2 + (pile[0].position[1] - start[1]) ** 2,
+        table.stacks, key=lambda pile: (pile[0].position[0] - start[0]) ** 2 + (pile[0].position[1] - start[1]) ** 2
     )
     chosen: set[str] = set()
     for pile in near:

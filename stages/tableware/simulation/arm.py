@@ -266,10 +266,7 @@ class Arm:
     # --- inside -----------------------------------------------------------------------------------------------
 
     def _limits(self, share: float) -> tuple[np.ndarray, np.ndarray]:
-        return (
-            np.full(6, self.description.arm_speed * share),
-            np.full(6, self.description.arm_acceleration * share),
-        )
+        return (np.full(6, self.description.arm_speed * share), np.full(6, self.description.arm_acceleration * share))
 
     def _run(self, times: np.ndarray, points: np.ndarray) -> None:
         if len(times) < 2:

@@ -147,11 +147,7 @@ def height_map(
 
 
 def _table_plane(
-    part: np.ndarray,
-    center: tuple[float, float],
-    focal: tuple[float, float],
-    above: float,
-    sides: tuple[float, float],
+    part: np.ndarray, center: tuple[float, float], focal: tuple[float, float], above: float, sides: tuple[float, float]
 ) -> np.ndarray:
     """Return (a, b, c) of the table's depth a u + b v + c [m] on every sixth pixel, by least squares that leave out
     more and more."""

@@ -137,8 +137,11 @@ class _Build:
         self.data += data + b"\0" * (-len(data) % 4)
         component = {"f": FLOAT, "u": UNSIGNED_INT}[values.dtype.kind] if values.dtype.itemsize == 4 else UNSIGNED_SHORT
         entry: dict[str, Any] = {
-            "bufferView": len(self.views) - 1, "componentType": component, "count": len(values), "type": kind,
-        }  # fmt: skip
+            "bufferView": len(self.views) - 1,
+            "componentType": component,
+            "count": len(values),
+            "type": kind,
+        }
         if bounds:
             entry |= {
                 "min": values.min(axis=0).astype(float).tolist(),
@@ -160,9 +163,12 @@ class _Build:
         }
         if self.meshes:
             document |= {
-                "meshes": self.meshes, "materials": self.materials, "accessors": self.accessors,
-                "bufferViews": self.views, "buffers": [{"byteLength": len(self.data)}],
-            }  # fmt: skip
+                "meshes": self.meshes,
+                "materials": self.materials,
+                "accessors": self.accessors,
+                "bufferViews": self.views,
+                "buffers": [{"byteLength": len(self.data)}],
+            }
         text = json.dumps(document, separators=(",", ":"), sort_keys=True, allow_nan=False).encode()
         text += b" " * (-len(text) % 4)
         chunks = struct.pack("<II", len(text), 0x4E4F534A) + text

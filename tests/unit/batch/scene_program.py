@@ -22,10 +22,16 @@ def write_artifact(folder: Path, text: str, outcome: str = "ok") -> None:
     (folder / "data.txt").write_text(text)
     digest = hashlib.sha256(text.encode()).hexdigest()
     manifest = {
-        "kind": "sequence", "schema_version": 2, "stage": "ingest", "stage_version": 1, "key": "k",
-        "content_digest": digest, "files": [{"path": "data.txt", "bytes": len(text.encode()), "sha256": digest}],
-        "outcome": outcome, "summary": {"frames": len(text)},
-    }  # fmt: skip
+        "kind": "sequence",
+        "schema_version": 2,
+        "stage": "ingest",
+        "stage_version": 1,
+        "key": "k",
+        "content_digest": digest,
+        "files": [{"path": "data.txt", "bytes": len(text.encode()), "sha256": digest}],
+        "outcome": outcome,
+        "summary": {"frames": len(text)},
+    }
     (folder / "manifest.json").write_text(json.dumps(manifest))
 
 

@@ -12,15 +12,7 @@ from hypothesis import strategies as st
 
 from schemas.errors import UsageError
 from stages.engine.batch.expansion import make_jobs, read_batch, shuffled
-from stages.engine.batch.spec import (
-    BatchSpec,
-    DataSpec,
-    Limits,
-    LocalOptions,
-    RayOptions,
-    SlurmOptions,
-    check_spec,
-)
+from stages.engine.batch.spec import BatchSpec, DataSpec, Limits, LocalOptions, RayOptions, SlurmOptions, check_spec
 from tests.unit.batch.batches import batch_of, write_batch
 
 SETS = '[[parameters]]\nname = "fine"\nset = { every = 1 }\n[[parameters]]\nname = "coarse"\nset = { every = 5 }\n'
@@ -101,7 +93,7 @@ def test_folders_and_named_scenes_together(tmp_path: Path) -> None:
         ("nonsense = 1", "", "nonsense"),
         ("= 1", "", "TOML"),
     ],
-)  # fmt: skip
+)
 def test_wrong_batches_are_refused(tmp_path: Path, head: str, text: str, match: str) -> None:
     path = write_batch(tmp_path, {"a": "write"}, text, head)
     with pytest.raises(UsageError, match=match) as caught:
@@ -183,13 +175,19 @@ def test_a_bottomless_file_is_one_line(tmp_path: Path) -> None:
 
 KEYS = ("pipeline", "set", "scene", "data", "parameters", "seeds", "shuffle_seed", "limits", "executor", "time", "kind")
 VALUES = st.recursive(
-    st.sampled_from(["ray", "local", "slurm", "4 GiB", "1-3", "log", "", "x\0y"]) | st.integers(-2, 9) | st.booleans()
-    | st.floats() | st.datetimes(),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(
-        st.sampled_from((*KEYS, "name", "variable", "glob", "memory", "jobs", "address")), inner, max_size=4
+    st.sampled_from(["ray", "local", "slurm", "4 GiB", "1-3", "log", "", "x\0y"])
+    | st.integers(-2, 9)
+    | st.booleans()
+    | st.floats()
+    | st.datetimes(),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(
+            st.sampled_from((*KEYS, "name", "variable", "glob", "memory", "jobs", "address")), inner, max_size=4
+        )
     ),
     max_leaves=12,
-)  # fmt: skip
+)
 
 
 @given(st.dictionaries(st.sampled_from(KEYS), VALUES, max_size=8))

@@ -10,12 +10,23 @@ from stages.engine.batch.outcomes import MEANINGS, classify, is_explained, worst
 @pytest.mark.parametrize(
     ("status", "outcome", "code"),
     [
-        (0, "done", 0), (1, "crash", 1), (2, "usage", 2), (3, "bad input", 3), (4, "not ok", 4),
-        (5, "missing dependency", 5), (6, "machine failure", 6), (130, "interrupted", 130),
-        (-9, "crash", 137), (-11, "crash", 139), (137, "crash", 137), (256 - 9, "crash", 137), (256 - 11, "crash", 139),
-        (7, "crash", 7), (127, "crash", 127),
+        (0, "done", 0),
+        (1, "crash", 1),
+        (2, "usage", 2),
+        (3, "bad input", 3),
+        (4, "not ok", 4),
+        (5, "missing dependency", 5),
+        (6, "machine failure", 6),
+        (130, "interrupted", 130),
+        (-9, "crash", 137),
+        (-11, "crash", 139),
+        (137, "crash", 137),
+        (256 - 9, "crash", 137),
+        (256 - 11, "crash", 139),
+        (7, "crash", 7),
+        (127, "crash", 127),
     ],
-)  # fmt: skip
+)
 def test_every_status_has_an_outcome(status: int, outcome: str, code: int) -> None:
     assert classify(status) == (outcome, code)
 

@@ -6,13 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stages.engine.batch.quantities import (
-    format_bytes,
-    format_seconds,
-    parse_bytes,
-    parse_seconds,
-    parse_seed_range,
-)
+from stages.engine.batch.quantities import format_bytes, format_seconds, parse_bytes, parse_seconds, parse_seed_range
 
 
 def test_units() -> None:
@@ -49,6 +43,10 @@ def test_any_text_gives_a_value_or_a_value_error(text: str) -> None:
 
 def test_formats() -> None:
     assert [format_seconds(s) for s in (0.04, 99.9, 99.96, 250, 7500)] == [
-        "0.0 s", "99.9 s", "1 min 40 s", "4 min 10 s", "2 h 05 min",
-    ]  # fmt: skip
+        "0.0 s",
+        "99.9 s",
+        "1 min 40 s",
+        "4 min 10 s",
+        "2 h 05 min",
+    ]
     assert (format_bytes(300 * 2**20), format_bytes(1.5 * 2**30)) == ("300 MiB", "1.5 GiB")

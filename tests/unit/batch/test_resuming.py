@@ -14,9 +14,13 @@ from tests.unit.batch.batches import job, result
 
 @pytest.mark.parametrize(
     ("outcome", "failed", "none", "every"),
-    [("done", False, False, True), ("crash", True, False, True), ("not ok", True, False, True),
-     ("interrupted", True, True, True)],
-)  # fmt: skip
+    [
+        ("done", False, False, True),
+        ("crash", True, False, True),
+        ("not ok", True, False, True),
+        ("interrupted", True, True, True),
+    ],
+)
 def test_retry(outcome: str, failed: bool, none: bool, every: bool) -> None:
     one, before = job("a"), result("a", outcome)
     runs = [reason_to_run(one, before, retry) is not None for retry in ("failed", "none", "all")]

@@ -57,8 +57,12 @@ def test_the_command_line_in_the_script_is_quoted(tmp_path: Path) -> None:
     line = next(line for line in scripts.array.read_text().splitlines() if line.startswith("exec "))
     shown = subprocess.run(
         ["bash", "-c", line.replace("exec ", "printf '%s\\n' ", 1)],
-        env={"SLURM_ARRAY_TASK_ID": "0"}, capture_output=True, text=True, check=True, cwd=tmp_path,
-    )  # fmt: skip
+        env={"SLURM_ARRAY_TASK_ID": "0"},
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=tmp_path,
+    )
     assert shown.stdout.splitlines()[3:] == ["batch", f"{tmp_path}/spec.toml", "--out", str(out), "--task", "0/1"]
     assert not (tmp_path / "x").exists()
 

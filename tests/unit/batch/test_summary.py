@@ -27,13 +27,18 @@ LATEST = {
 def test_counts_and_reasons() -> None:
     counts = {row[1]: (row[0], row[2]) for row in count_table(JOBS, LATEST).rows}
     assert counts == {
-        "done": ("done", 1), "bad input": ("explained", 2), "time limit": ("explained", 1), "crash": ("crashed", 1),
+        "done": ("done", 1),
+        "bad input": ("explained", 2),
+        "time limit": ("explained", 1),
+        "crash": ("crashed", 1),
         "not run": ("", 1),
-    }  # fmt: skip
+    }
     rows = reason_table(JOBS, LATEST).rows
     assert [row[:4] for row in rows] == [
-        ("crashed", "crash", "cad", 1), ("explained", "bad input", "sequence", 2), ("explained", "time limit", "", 1),
-    ]  # fmt: skip
+        ("crashed", "crash", "cad", 1),
+        ("explained", "bad input", "sequence", 2),
+        ("explained", "time limit", "", 1),
+    ]
     assert rows[1][4:] == ("/data/b/log.mcap: 3 of 120 frames", "b")
     assert without_particulars("/a/b c.txt: 3.5 of 12") == "PATH c.txt: # of #"
 

@@ -77,7 +77,7 @@ def test_rooms_from_two_eyes_and_from_a_depth_camera_differ_in_the_log_alone() -
             for step in pipeline_of(arm).step
         }
         for arm in ("two_eyes", "depth_camera")
-    )  # fmt: skip
+    )
     assert "--stereo-baseline" in two["ground_truth"] and "--stereo-baseline" not in depth["ground_truth"]
     assert "--no-depth" not in depth["ground_truth"] and depth["sequence"][0] == "ingest"
     same = [name for name in depth if two[name] == depth[name]]

@@ -87,9 +87,17 @@ def test_ours_are_trials_of_their_own_where_the_bin_is_far() -> None:
 
 def test_looks_are_shown_beside_the_error_model() -> None:
     row = Look(
-        arm="ours", seed=1, sutures=4, sutures_neutral=4, attempts=5, seconds=500.0, errors="I", reasons=("why",),
-        cpu_seconds=1.0, places={"tissue": {"right": 3, "wrong": 1}},
-    )  # fmt: skip
+        arm="ours",
+        seed=1,
+        sutures=4,
+        sutures_neutral=4,
+        attempts=5,
+        seconds=500.0,
+        errors="I",
+        reasons=("why",),
+        cpu_seconds=1.0,
+        places={"tissue": {"right": 3, "wrong": 1}},
+    )
     text = looks(results("stitch_sight", {("ours", "geometry", "1"): row}))
     assert "| geometry | ours | tissue | 4 | 75.0 | 0.0 | 0.0 | 25.0 |" in text
     assert "| geometry | ours | 1 | 4 | I | why |" in text

@@ -53,11 +53,7 @@ def replace_objects(tmp_path: Path, library: CadLibrary):
             context=context(tmp_path / name / "graph"),
         )
         return run_cad(
-            graph,
-            panoptic_map,
-            library,
-            parameters=CadParameters(**options),
-            context=context(tmp_path / name / "cad"),
+            graph, panoptic_map, library, parameters=CadParameters(**options), context=context(tmp_path / name / "cad")
         )
 
     return replaced

@@ -96,10 +96,7 @@ def face_corners(low: np.ndarray, high: np.ndarray, axis: int, side: int) -> np.
 def chair(width: float, seat: float, height: float) -> dict:
     """Seat, back at +y, four legs."""
     half = width / 2
-    boxes = [
-        ((-half, -half, seat - 0.03), (half, half, seat)),
-        ((-half, half - 0.03, seat), (half, half, height)),
-    ]
+    boxes = [((-half, -half, seat - 0.03), (half, half, seat)), ((-half, half - 0.03, seat), (half, half, height))]
     for x in (-half, half - 0.04):
         for y in (-half, half - 0.04):
             boxes.append(((x, y, 0.0), (x + 0.04, y + 0.04, seat - 0.03)))

@@ -72,9 +72,13 @@ def write_folder(
     matrix = [CAMERA.fx, 0.0, CAMERA.cx, 0.0, CAMERA.fy, CAMERA.cy, 0.0, 0.0, 1.0]
     lines = ["%YAML:1.0", "---"]
     for name, values, shape in (
-        ("M1", matrix, (3, 3)), ("D1", [0.0] * 5, (1, 5)), ("M2", matrix, (3, 3)), ("D2", [0.0] * 5, (1, 5)),
-        ("R", np.eye(3).ravel().tolist(), (3, 3)), ("T", [-baseline, 0.0, 0.0], (3, 1)),
-    ):  # fmt: skip
+        ("M1", matrix, (3, 3)),
+        ("D1", [0.0] * 5, (1, 5)),
+        ("M2", matrix, (3, 3)),
+        ("D2", [0.0] * 5, (1, 5)),
+        ("R", np.eye(3).ravel().tolist(), (3, 3)),
+        ("T", [-baseline, 0.0, 0.0], (3, 1)),
+    ):
         data = json.dumps(values)
         lines += [
             f"{name}: !!opencv-matrix",

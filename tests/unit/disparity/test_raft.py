@@ -23,10 +23,10 @@ from tests.unit.disparity.pairs import pair
 
 SMALL = Architecture(
     widths=(4, 6, 8), hidden=(8, 8, 8), features=8, motion=(4, 8), head=8, mask=8, radius=2, downsample=2
-)  # fmt: skip
+)
 SMALL_FAST = Architecture(
     widths=(4, 6, 8), hidden=(8, 8, 8), scales=2, features=8, motion=(4, 8), head=8, mask=8, downsample=3, shared=True
-)  # fmt: skip
+)
 
 
 def small_state(sizes: Architecture = SMALL, seed: int = 0) -> dict[str, torch.Tensor]:
@@ -103,10 +103,7 @@ def published(shared: bool = False, scales: int = 3, factor: int = 4) -> dict[st
 
 @pytest.mark.parametrize(
     ("shared", "scales", "factor", "sizes"),
-    [
-        (False, 3, 4, Architecture()),
-        (True, 2, 8, Architecture(shared=True, scales=2, downsample=3)),
-    ],
+    [(False, 3, 4, Architecture()), (True, 2, 8, Architecture(shared=True, scales=2, downsample=3))],
 )
 def test_names_and_shapes_are_those_of_the_published_checkpoints(
     shared: bool, scales: int, factor: int, sizes: Architecture
@@ -156,9 +153,10 @@ def test_the_small_network_stays_within_its_reach(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(matching, "match", recorded)
     picture = np.zeros((40, 60, 3), np.uint8)
     for name, iterations, found, value in (
-        ("ours.safetensors", None, (20.0, 60.0), 10.0), ("ours.safetensors", 3, (200.0, 340.0), 20.0),
+        ("ours.safetensors", None, (20.0, 60.0), 10.0),
+        ("ours.safetensors", 3, (200.0, 340.0), 20.0),
         ("theirs.pth", None, (200.0, 340.0), 10.0),
-    ):  # fmt: skip
+    ):
         monkeypatch.setattr(matching, "usual_range", lambda left, right, found=found: found)
         matcher, detail = matching.open_raft(tmp_path / name, iterations, 1.0, "cpu")
         whole = matcher(picture, picture, (7, 16))

@@ -6,13 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from stages.disparity.rectification import (
-    check_rows,
-    fitted_turn,
-    matched_features,
-    row_shift,
-    straightened,
-)
+from stages.disparity.rectification import check_rows, fitted_turn, matched_features, row_shift, straightened
 from stages.kit.geometry.cameras import intrinsic_matrix
 from tests.unit.disparity.pairs import CAMERA, pair
 

@@ -95,10 +95,15 @@ def graph_of(things: tuple[Thing, ...]) -> ContactGraphFile:
     for t in things:
         nodes.append(
             GraphNode(
-                id=t.name, instance=t.instance, class_name=t.class_name, node_type=t.node_type,
-                mesh=f"entities/{t.instance}.ply", box=t.box, box_observed=t.box,
+                id=t.name,
+                instance=t.instance,
+                class_name=t.class_name,
+                node_type=t.node_type,
+                mesh=f"entities/{t.instance}.ply",
+                box=t.box,
+                box_observed=t.box,
             )
-        )  # fmt: skip
+        )
         links.append(
             Relation(source=names.get(t.parent, SCENE_NODE), target=t.name, relation=t.relation, confidence=1.0)
         )
@@ -121,15 +126,26 @@ def make_ground_truth(
     trimesh.util.concatenate([thing.mesh() for thing in things]).export(root / "mesh.ply")
     objects = tuple(
         TrueObject(
-            instance=t.instance, name=t.name, class_name=t.class_name, model_id=t.model_id, joints=t.joints,
-            world_from_model=as_transform(model_pose(t)), box=t.box, visible_pixels=0 if t.instance in unseen else 999,
+            instance=t.instance,
+            name=t.name,
+            class_name=t.class_name,
+            model_id=t.model_id,
+            joints=t.joints,
+            world_from_model=as_transform(model_pose(t)),
+            box=t.box,
+            visible_pixels=0 if t.instance in unseen else 999,
         )
         for t in things
-    )  # fmt: skip
+    )
     GroundTruthFile(
-        seed=3, recipe="handmade", room_size=(4.0, 4.0, 2.4), camera=CAMERA, frame_count=6, depth_noise=False,
+        seed=3,
+        recipe="handmade",
+        room_size=(4.0, 4.0, 2.4),
+        camera=CAMERA,
+        frame_count=6,
+        depth_noise=False,
         objects=objects,
-    ).write(root / "ground_truth.json")  # fmt: skip
+    ).write(root / "ground_truth.json")
     graph_of(things).write(root / "graph.json")
     write_tum(root / "trajectory.tum", np.arange(6) * 0.1, poses())
     make_interactive_scene(root / "room", things)
@@ -152,11 +168,18 @@ def make_map(root: Path, things: tuple[Thing, ...] = ROOM, voxel_size: float = 0
         mesh.export(root / "entities" / f"{thing.instance}.ply")
         entities.append(
             Entity(
-                instance=thing.instance, class_name=thing.class_name, mesh=f"entities/{thing.instance}.ply",
-                vertices=len(mesh.vertices), triangles=len(mesh.faces), box_minimum=thing.low,
-                box_maximum=thing.high, confidence=0.9, observations=5, segments=(thing.instance,),
+                instance=thing.instance,
+                class_name=thing.class_name,
+                mesh=f"entities/{thing.instance}.ply",
+                vertices=len(mesh.vertices),
+                triangles=len(mesh.faces),
+                box_minimum=thing.low,
+                box_maximum=thing.high,
+                confidence=0.9,
+                observations=5,
+                segments=(thing.instance,),
             )
-        )  # fmt: skip
+        )
     whole = trimesh.util.concatenate(meshes) if meshes else trimesh.Trimesh()
     if meshes:
         whole.visual.vertex_colors = np.full((len(whole.vertices), 4), 180, dtype=np.uint8)
@@ -168,9 +191,12 @@ def make_map(root: Path, things: tuple[Thing, ...] = ROOM, voxel_size: float = 0
     instance = np.concatenate(labels) if labels else np.zeros(0, dtype=np.int32)
     np.savez(root / "mesh_labels.npz", instance=instance, segment=instance, class_id=np.zeros_like(instance))
     EntitiesFile(
-        voxel_size=voxel_size, truncation_distance=4 * voxel_size, frames_integrated=6, segmentation=LABEL,
+        voxel_size=voxel_size,
+        truncation_distance=4 * voxel_size,
+        frames_integrated=6,
+        segmentation=LABEL,
         entities=tuple(entities),
-    ).write(root / "entities.json")  # fmt: skip
+    ).write(root / "entities.json")
     return PanopticMap(root)
 
 
@@ -196,9 +222,13 @@ def make_cad_scene(root: Path, things: tuple[Thing, ...] = ROOM, shift: float = 
         cosine, sine = np.cos(turn), np.sin(turn)
         pose[:2, :2] = [[cosine, -sine], [sine, cosine]]
         chosen = CadCandidate(
-            model_id=thing.model_id, joints={name: value + 0.1 for name, value in thing.joints.items()}, scale=1.0,
-            world_from_model=as_transform(pose), matching_error=0.1, alignment_error=0.01,
-        )  # fmt: skip
+            model_id=thing.model_id,
+            joints={name: value + 0.1 for name, value in thing.joints.items()},
+            scale=1.0,
+            world_from_model=as_transform(pose),
+            matching_error=0.1,
+            alignment_error=0.01,
+        )
         replacements.append(Replacement(node=thing.name, decision="cad", chosen=chosen))
     CadSceneFile(replacements=tuple(replacements), conflicts_before=1, conflicts_after=0, iterations=2).write(
         root / "scene.json"
@@ -213,17 +243,29 @@ def make_interactive_scene(root: Path, things: tuple[Thing, ...] = ROOM) -> Inte
     names = {thing.instance: thing.name for thing in things}
     bodies = tuple(
         SceneBody(
-            name=t.name, class_name=t.class_name, movable=t.class_name in ("cup", "bottle"),
-            parent=names.get(t.parent), relation=t.relation, world_from_body=as_transform(model_pose(t)), box=t.box,
+            name=t.name,
+            class_name=t.class_name,
+            movable=t.class_name in ("cup", "bottle"),
+            parent=names.get(t.parent),
+            relation=t.relation,
+            world_from_body=as_transform(model_pose(t)),
+            box=t.box,
             mass=1.0,
             joints=tuple(
-                Joint(name=f"{t.name}__{name}", type="revolute", part=f"{t.name}__{name}", origin=(0, 0, 0),
-                      axis=(0, 0, 1), lower=0.0, upper=1.6)
+                Joint(
+                    name=f"{t.name}__{name}",
+                    type="revolute",
+                    part=f"{t.name}__{name}",
+                    origin=(0, 0, 0),
+                    axis=(0, 0, 1),
+                    lower=0.0,
+                    upper=1.6,
+                )
                 for name in t.joints
             ),
         )
         for t in things
-    )  # fmt: skip
+    )
     InteractiveSceneFile(bodies=bodies).write(root / "scene.json")
     graph_of(things).write(root / "graph.json")
     return InteractiveScene(root)
@@ -239,11 +281,18 @@ def make_sequence(root: Path) -> Sequence:
             writer.write(0.1 * k, color, np.full((48, 64), 1.5, dtype=np.float32), pose)
     write_tum(root / "trajectory.tum", np.arange(6) * 0.1, poses())
     SequenceFile(
-        source_format="generated", rule="handmade", camera=CAMERA,
-        cameras=(SequenceCamera(name="camera", camera=CAMERA),), streams=("color", "depth", "pose"), frame_count=6,
-        frames_in_log=7, drops={"no depth": 1}, gravity=Gravity(method="given", world_from_log=as_transform(np.eye(4))),
-        label_table=(LabelEntry(instance=1, class_name="floor"),), end_time=0.5,
-    ).write(root / "sequence.json")  # fmt: skip
+        source_format="generated",
+        rule="handmade",
+        camera=CAMERA,
+        cameras=(SequenceCamera(name="camera", camera=CAMERA),),
+        streams=("color", "depth", "pose"),
+        frame_count=6,
+        frames_in_log=7,
+        drops={"no depth": 1},
+        gravity=Gravity(method="given", world_from_log=as_transform(np.eye(4))),
+        label_table=(LabelEntry(instance=1, class_name="floor"),),
+        end_time=0.5,
+    ).write(root / "sequence.json")
     return Sequence(root)
 
 
@@ -258,9 +307,13 @@ def make_segments(root: Path, label: str = LABEL) -> Segments:
         FrameSegment(id=2, category_id=5, instance=2, is_thing=True, score=0.8, area=int((image == 2).sum())),
     )
     SegmentsFile(
-        backend="ground-truth", label=label, corruption=0.2, width=64, height=48,
+        backend="ground-truth",
+        label=label,
+        corruption=0.2,
+        width=64,
+        height=48,
         frames=tuple(FrameSegments(frame=k, segments=segments) for k in range(6)),
-    ).write(root / "segments.json")  # fmt: skip
+    ).write(root / "segments.json")
     return Segments(root)
 
 
@@ -271,7 +324,9 @@ def make_plan(root: Path, detail: str = "the cup stands on the table") -> Plan:
     (root / "keyframes").mkdir(parents=True)
     Image.new("RGB", (64, 48), (90, 120, 160)).save(root / "keyframes" / "0_pick.png")
     PlanFile(
-        goal=("on(cup_4, table_3)", "closed(cabinet_6)"), planned_in="reconstructed", executed_in="ground_truth",
+        goal=("on(cup_4, table_3)", "closed(cabinet_6)"),
+        planned_in="reconstructed",
+        executed_in="ground_truth",
         actions=(PlannedAction(name="pick", arguments=("cup_4",), start=0, end=5, base_pose=as_transform(np.eye(4))),),
         failures=(Failure(kind="no_path", message="first base pose blocked", numbers={"tries": 3}),),
         checks=(
@@ -279,6 +334,6 @@ def make_plan(root: Path, detail: str = "the cup stands on the table") -> Plan:
             Check(condition="closed(cabinet_6)", holds=False, detail="door at 0.4 rad", numbers={"angle": 0.4}),
         ),
         status="executed",
-    ).write(root / "plan.json")  # fmt: skip
+    ).write(root / "plan.json")
     graph_of(ROOM).write(root / "graph.json")
     return Plan(root)

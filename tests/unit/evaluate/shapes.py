@@ -29,13 +29,27 @@ def cupboard(model_id: str, size=(0.8, 0.5, 1.0), *, hinge_x=0.4, upper=1.6, dra
     x, y, z = size
     parts = {"body": part((-x / 2, -y / 2, 0), (x / 2, y / 2, z)), "door": part((-x, -0.02, 0), (0, 0, z))}
     joints = [
-        Joint(name="door_hinge", type="revolute", part="door", origin=(hinge_x, -y / 2, 0.5), axis=(0, 0, 1),
-              lower=0.0, upper=upper)
-    ]  # fmt: skip
+        Joint(
+            name="door_hinge",
+            type="revolute",
+            part="door",
+            origin=(hinge_x, -y / 2, 0.5),
+            axis=(0, 0, 1),
+            lower=0.0,
+            upper=upper,
+        )
+    ]
     for k, height in enumerate(drawers):
         parts[f"drawer_{k}"] = part((-0.3, 0, 0), (0.3, 0.3, 0.1))
         joints.append(
-            Joint(name=f"drawer_{k}_slide", type="prismatic", part=f"drawer_{k}", origin=(0, -y / 2, height),
-                  axis=(0, -1, 0), lower=0.0, upper=0.3)
-        )  # fmt: skip
+            Joint(
+                name=f"drawer_{k}_slide",
+                type="prismatic",
+                part=f"drawer_{k}",
+                origin=(0, -y / 2, height),
+                axis=(0, -1, 0),
+                lower=0.0,
+                upper=0.3,
+            )
+        )
     return ModelShape(model_id, "cabinet", parts, tuple(joints), contains=True)

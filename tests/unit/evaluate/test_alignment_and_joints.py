@@ -56,10 +56,16 @@ def test_round_things_have_no_yaw_but_may_lean():
 @pytest.mark.parametrize(
     ("pose", "scale", "right"),
     [
-        (at(0.199), 1.0, True), (at(0.201), 1.0, False), (at(yaw=0.34), 1.0, True), (at(yaw=0.36), 1.0, False),
-        (at(), 1.19, True), (at(), 1.21, False), (at(), 0.81, True), (at(), 0.79, False),
+        (at(0.199), 1.0, True),
+        (at(0.201), 1.0, False),
+        (at(yaw=0.34), 1.0, True),
+        (at(yaw=0.36), 1.0, False),
+        (at(), 1.19, True),
+        (at(), 1.21, False),
+        (at(), 0.81, True),
+        (at(), 0.79, False),
     ],
-)  # fmt: skip
+)
 def test_success_has_the_thresholds_of_the_benchmark(pose, scale, right):
     assert alignment_error(PlacedShape(TABLE, at()), PlacedShape(TABLE, pose, scale)).succeeds() is right
 

@@ -52,23 +52,46 @@ def truth(tmp_path_factory):
 
 def test_a_perfect_reconstruction(tmp_path, truth):
     result = evaluate(
-        tmp_path / "evaluation", plots=True, ground_truth=truth, sequence=make_sequence(tmp_path / "sequence"),
-        segments=make_segments(tmp_path / "segments"), panoptic_map=make_map(tmp_path / "map"),
-        contact_graph=make_graph(tmp_path / "graph", graph_of(ROOM)), cad_scene=make_cad_scene(tmp_path / "cad"),
-        interactive_scene=make_interactive_scene(tmp_path / "scene"), plan=make_plan(tmp_path / "plan"),
-    )  # fmt: skip
+        tmp_path / "evaluation",
+        plots=True,
+        ground_truth=truth,
+        sequence=make_sequence(tmp_path / "sequence"),
+        segments=make_segments(tmp_path / "segments"),
+        panoptic_map=make_map(tmp_path / "map"),
+        contact_graph=make_graph(tmp_path / "graph", graph_of(ROOM)),
+        cad_scene=make_cad_scene(tmp_path / "cad"),
+        interactive_scene=make_interactive_scene(tmp_path / "scene"),
+        plan=make_plan(tmp_path / "plan"),
+    )
     metrics = result.info.metrics
     assert result.info.label == f"{LABEL}, handmade, seed 3"
     exact = {
-        "map/rq": 1.0, "map/rq_thesis_code": 1.0, "map/instance_ap50": 1.0, "map/mesh_recall": 1.0,
-        "map/mesh_precision": 1.0, "graph/edit_distance": 0.0, "graph/edit_distance_exact": 1.0,
-        "graph/any_support_f1": 1.0, "graph/contains_f1": 1.0, "graph/obb_ap50_observed": 1.0,
-        "graph/obb_ap50_refined": 1.0, "graph/obb_ap50_refined_thesis_code": 1.0, "cad/class_match": 1.0,
-        "cad/model_top1": 1.0, "cad/position_error_m_mean": 0.0, "cad/yaw_error_rad_mean": 0.0,
-        "cad/joints_revolute_compared": 1.0, "trajectory/ate_rmse_m": 0.0, "plan/checks_held": 1.0,
-        "plan/goal_reached": 0.0, "counts/entities": 7.0, "counts/entities_cup": 1.0, "counts/support_edges": 5.0,
-        "counts/frames_dropped": 1.0, "counts/joints": 1.0,
-    }  # fmt: skip
+        "map/rq": 1.0,
+        "map/rq_thesis_code": 1.0,
+        "map/instance_ap50": 1.0,
+        "map/mesh_recall": 1.0,
+        "map/mesh_precision": 1.0,
+        "graph/edit_distance": 0.0,
+        "graph/edit_distance_exact": 1.0,
+        "graph/any_support_f1": 1.0,
+        "graph/contains_f1": 1.0,
+        "graph/obb_ap50_observed": 1.0,
+        "graph/obb_ap50_refined": 1.0,
+        "graph/obb_ap50_refined_thesis_code": 1.0,
+        "cad/class_match": 1.0,
+        "cad/model_top1": 1.0,
+        "cad/position_error_m_mean": 0.0,
+        "cad/yaw_error_rad_mean": 0.0,
+        "cad/joints_revolute_compared": 1.0,
+        "trajectory/ate_rmse_m": 0.0,
+        "plan/checks_held": 1.0,
+        "plan/goal_reached": 0.0,
+        "counts/entities": 7.0,
+        "counts/entities_cup": 1.0,
+        "counts/support_edges": 5.0,
+        "counts/frames_dropped": 1.0,
+        "counts/joints": 1.0,
+    }
     assert {name: metrics[name] for name in exact} == pytest.approx(exact, abs=1e-9)
     assert metrics["map/pq"] > 0.85  # below 1: points between two touching boxes go to the nearest vertex
     assert metrics["cad/joint_error_revolute_rad_mean"] == pytest.approx(0.1)
@@ -87,9 +110,11 @@ def test_known_mistakes_give_known_figures(tmp_path, truth):
     sofa = replace(CHAIR, instance=9, class_name="sofa", low=(3.0, 3.0, 0.0), high=(3.5, 3.5, 0.6))
     seen = (FLOOR, WALL, table, cup, CABINET, BOTTLE, sofa)
     metrics = evaluate(
-        tmp_path / "evaluation", ground_truth=truth, panoptic_map=make_map(tmp_path / "map", seen),
+        tmp_path / "evaluation",
+        ground_truth=truth,
+        panoptic_map=make_map(tmp_path / "map", seen),
         contact_graph=make_graph(tmp_path / "graph", graph_of(seen)),
-    ).info.metrics  # fmt: skip
+    ).info.metrics
     # 2 wrong support (cup) + 1 wrong class (table) + 1 missing (chair) + 1 extra (sofa)
     assert metrics["graph/edit_distance"] == 5
     assert metrics["graph/wrong_supports"] == 1
@@ -111,9 +136,12 @@ def test_known_mistakes_give_known_figures(tmp_path, truth):
 
 def test_an_empty_map_is_zero_and_not_a_crash(tmp_path, truth):
     metrics = evaluate(
-        tmp_path / "evaluation", plots=True, ground_truth=truth, panoptic_map=make_map(tmp_path / "map", ()),
+        tmp_path / "evaluation",
+        plots=True,
+        ground_truth=truth,
+        panoptic_map=make_map(tmp_path / "map", ()),
         contact_graph=make_graph(tmp_path / "graph", graph_of(())),
-    ).info.metrics  # fmt: skip
+    ).info.metrics
     assert metrics["map/pq"] == metrics["map/rq"] == metrics["map/instance_ap50"] == metrics["map/mesh_recall"] == 0.0
     assert metrics["map/pq_thesis_code"] is None
     assert metrics["graph/edit_distance"] == len(ROOM)
@@ -201,9 +229,11 @@ def test_truth_follows_what_ingest_did_to_the_world(tmp_path, truth):
 
 def test_without_ground_truth_there_are_counts_only(tmp_path):
     result = evaluate(
-        tmp_path / "evaluation", plots=True, panoptic_map=make_map(tmp_path / "map"),
+        tmp_path / "evaluation",
+        plots=True,
+        panoptic_map=make_map(tmp_path / "map"),
         contact_graph=make_graph(tmp_path / "graph", graph_of(ROOM)),
-    )  # fmt: skip
+    )
     assert {name.split("/")[0] for name in result.info.metrics} == {"counts"}
     assert result.info.metrics["counts/floor_height_rms_m"] == pytest.approx(0.014, abs=0.001)
     assert result.info.metrics["counts/floor_tilt_rad"] == pytest.approx(0.0, abs=1e-6)
@@ -213,10 +243,12 @@ def test_without_ground_truth_there_are_counts_only(tmp_path):
 
 def test_twice_the_same_gives_the_same_bytes(tmp_path, truth):
     inputs = {
-        "ground_truth": truth, "sequence": make_sequence(tmp_path / "sequence"),
-        "panoptic_map": make_map(tmp_path / "map"), "contact_graph": make_graph(tmp_path / "graph", graph_of(ROOM)),
+        "ground_truth": truth,
+        "sequence": make_sequence(tmp_path / "sequence"),
+        "panoptic_map": make_map(tmp_path / "map"),
+        "contact_graph": make_graph(tmp_path / "graph", graph_of(ROOM)),
         "cad_scene": make_cad_scene(tmp_path / "cad", shift=0.01),
-    }  # fmt: skip
+    }
     first = evaluate(tmp_path / "a", plots=True, **inputs)
     second = evaluate(tmp_path / "b", plots=True, **inputs)
     files = sorted(path.relative_to(first.root) for path in first.root.rglob("*") if path.is_file())

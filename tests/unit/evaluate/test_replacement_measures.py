@@ -53,9 +53,12 @@ def truth(tmp_path_factory):
 
 def candidate(model_id: str, pose=None, scale=1.0) -> CadCandidate:
     return CadCandidate(
-        model_id=model_id, scale=scale, world_from_model=as_transform(np.eye(4) if pose is None else pose),
-        matching_error=0.1, alignment_error=0.01,
-    )  # fmt: skip
+        model_id=model_id,
+        scale=scale,
+        world_from_model=as_transform(np.eye(4) if pose is None else pose),
+        matching_error=0.1,
+        alignment_error=0.01,
+    )
 
 
 def results_of(truth, scene, graph, models=SHAPES):
@@ -142,9 +145,12 @@ def test_the_scene_before_the_global_check(tmp_path, truth):
 
 def test_rank_counts_models_in_the_order_in_which_they_fitted():
     record = Replacement(
-        node="cup_1", decision="cad", best_single=candidate("a"), chosen=candidate("b"),
+        node="cup_1",
+        decision="cad",
+        best_single=candidate("a"),
+        chosen=candidate("b"),
         alternatives=(candidate("a"), candidate("c")),
-    )  # fmt: skip
+    )
     assert [retrieval_rank(record, model) for model in ("a", "b", "c", "d")] == [1, 2, 3, None]
 
 

@@ -51,12 +51,18 @@ def make_truth(root: Path, bodies: list[BundleBody]) -> GroundTruth:
     instances = {body.name: int(body.name.rsplit("_", 1)[1]) for body in bodies}
     objects = tuple(
         TrueObject(
-            instance=instances[b.name], name=b.name, class_name=b.class_name, scale=b.scale, box=b.box,
-            model_id=b.model.id if b.model else None, world_from_model=as_transform(b.world_from_body),
-            joints=b.joint_values, visible_pixels=900,
+            instance=instances[b.name],
+            name=b.name,
+            class_name=b.class_name,
+            scale=b.scale,
+            box=b.box,
+            model_id=b.model.id if b.model else None,
+            world_from_model=as_transform(b.world_from_body),
+            joints=b.joint_values,
+            visible_pixels=900,
         )
         for b in bodies
-    )  # fmt: skip
+    )
     GroundTruthFile(
         seed=1, recipe="small", room_size=(4, 3, 2.5), camera=CAMERA, frame_count=1, depth_noise=False, objects=objects
     ).write(root / "ground_truth.json")
@@ -82,9 +88,13 @@ def make_cad(
             replacements.append(Replacement(node=body.name, decision="layout"))
             continue
         chosen = CadCandidate(
-            model_id=body.model.id, joints=body.joint_values, scale=body.scale,
-            world_from_model=as_transform(body.world_from_body), matching_error=0.1, alignment_error=0.01,
-        )  # fmt: skip
+            model_id=body.model.id,
+            joints=body.joint_values,
+            scale=body.scale,
+            world_from_model=as_transform(body.world_from_body),
+            matching_error=0.1,
+            alignment_error=0.01,
+        )
         single = (best or {}).get(body.name)
         replacements.append(Replacement(node=body.name, decision="cad", chosen=chosen, best_single=single))
         if not (root / "models" / body.model.id).exists():
@@ -123,9 +133,16 @@ def test_the_true_room_out_of_the_library_has_no_errors(tmp_path, library, truth
     found = measured(truth, make_cad(tmp_path / "cad", bodies, library), bodies)
     assert [r.name for r in found.objects if not (r.success and r.functional and r.rank == 1)] == []
     summary = found.summary
-    for name in ("translation_error_m_mean", "rotation_error_rad_mean", "scale_ratio_error_mean",
-                 "joint_axis_angle_rad_mean", "joint_axis_offset_m_mean", "joint_limit_error_prismatic_m_mean",
-                 "joint_limit_error_revolute_rad_mean", "joint_value_error_prismatic_m_mean"):  # fmt: skip
+    for name in (
+        "translation_error_m_mean",
+        "rotation_error_rad_mean",
+        "scale_ratio_error_mean",
+        "joint_axis_angle_rad_mean",
+        "joint_axis_offset_m_mean",
+        "joint_limit_error_prismatic_m_mean",
+        "joint_limit_error_revolute_rad_mean",
+        "joint_value_error_prismatic_m_mean",
+    ):
         assert summary[name] == pytest.approx(0.0, abs=2e-5), name
     assert summary["joints_found"] == 1.0 and summary["joints_spurious"] == 0.0
     assert summary["color_difference_mean"] == pytest.approx(0.0, abs=1.0)  # colours of a URDF have four digits

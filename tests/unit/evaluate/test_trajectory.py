@@ -62,9 +62,14 @@ def test_what_an_estimate_says_of_itself_is_counted(tmp_path: Path) -> None:
     frames[4] = FrameEstimate(frame=4, time=0.4, status="unposed", fault="no_depth")
     loops = [LoopClosure(first=0, second=20, found_by="place", weight=weight, overlap=0.5) for weight in (1.0, 0.1)]
     info = PosesFile(
-        method="rgbd", camera="camera", world="first", frames=tuple(frames), loops=tuple(loops), drift=0.01,
+        method="rgbd",
+        camera="camera",
+        world="first",
+        frames=tuple(frames),
+        loops=tuple(loops),
+        drift=0.01,
         gravity=Gravity(method="none", world_from_log=as_transform(np.eye(4))),
-    )  # fmt: skip
+    )
     metrics = evaluated(tmp_path, WALK, info, given=False)["metrics"]
     assert metrics["trajectory/frames"] == COUNT and metrics["trajectory/frames_unposed"] == 1
     assert metrics["trajectory/loops"] == 1 and metrics["trajectory/drift_per_metre"] == 0.01

@@ -89,12 +89,7 @@ def export(sequence: Sequence, output: Path, **options: Any) -> ExportedSequence
 
 
 def assert_same_frames(
-    first: Path,
-    again: Path,
-    *,
-    deepest: float | None = None,
-    streams: tuple[str, ...] = ("depth",),
-    named: bool = True,
+    first: Path, again: Path, *, deepest: float | None = None, streams: tuple[str, ...] = ("depth",), named: bool = True
 ) -> None:
     """Compare two frames.mcap: poses (1e-6), depth to the last unit up to `deepest` [m], pictures by bytes; with
     `named` also times (1e-6 s) and names of cameras."""

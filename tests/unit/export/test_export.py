@@ -110,10 +110,18 @@ def test_ros2_by_the_decoder_of_the_mcap_project(tmp_path: Path) -> None:
             assert schema.encoding == "ros2msg" and channel.message_encoding == "cdr"
             seen.setdefault(channel.topic, []).append((message.log_time, body))
     assert {topic: len(rows) for topic, rows in seen.items()} == dict.fromkeys(
-        ("/tf", "/camera/color/camera_info", "/camera/color/image_raw/compressed", "/camera/depth/camera_info",
-         "/camera/depth/image_raw", "/camera/labels/image_raw", "/camera/right/camera_info",
-         "/camera/right/image_raw/compressed"), 5,
-    )  # fmt: skip
+        (
+            "/tf",
+            "/camera/color/camera_info",
+            "/camera/color/image_raw/compressed",
+            "/camera/depth/camera_info",
+            "/camera/depth/image_raw",
+            "/camera/labels/image_raw",
+            "/camera/right/camera_info",
+            "/camera/right/image_raw/compressed",
+        ),
+        5,
+    )
     poses = camera_poses(5)
     with FrameReader(sequence.path("frames.mcap")) as frames:
         for index, stamp in enumerate(frames.stamps):
@@ -179,11 +187,7 @@ def test_same_sequence_same_bytes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"streams": ("colour",)}, "no stream 'colour'"),
-        ({"dialect": "ros2"}, "is about MCAP"),
-    ],
+    ("options", "words"), [({"streams": ("colour",)}, "no stream 'colour'"), ({"dialect": "ros2"}, "is about MCAP")]
 )
 def test_options_that_cannot_work_are_refused(options: dict, words: str) -> None:
     with pytest.raises(UsageError, match=words):
@@ -200,9 +204,14 @@ def test_an_export_is_a_log_by_its_payload(tmp_path: Path) -> None:
     source = write_sequence(tmp_path / "sequence").root
     records = record_files(source, ())
     Manifest(
-        kind="sequence", schema_version=Sequence.schema_version, stage="test", stage_version=1, key="k",
-        content_digest=content_digest(records), files=records,
-    ).write(source / MANIFEST_NAME)  # fmt: skip
+        kind="sequence",
+        schema_version=Sequence.schema_version,
+        stage="test",
+        stage_version=1,
+        key="k",
+        content_digest=content_digest(records),
+        files=records,
+    ).write(source / MANIFEST_NAME)
     out, again = tmp_path / "tum", tmp_path / "again"
     export_stage, ingest_stage = all_stages()["export"], all_stages()["ingest"]
     parameters = ingest_stage.parameters(gravity="given")

@@ -128,18 +128,21 @@ def write_scene(
     with FrameWriter(sequence.path("frames.mcap"), CAMERA) as writer:
         for index, pose in enumerate(poses):
             depth, image = render(blocks, pose)
-            writer.write(
-                0.1 * index, color_of(image), depth if with_depth else None, pose if with_pose else None
-            )  # fmt: skip
+            writer.write(0.1 * index, color_of(image), depth if with_depth else None, pose if with_pose else None)
             images.append((index, image))
             lost = (background or {}).get(index, ())
             listings.append(FrameSegments(frame=index, segments=tuple(frame_segments(blocks, image, lost))))
     write_tum(sequence.path("trajectory.tum"), 0.1 * np.arange(frames), np.array(poses))
     SequenceFile(
-        source_format="test", rule="test", camera=CAMERA,
-        cameras=(SequenceCamera(name="camera", camera=CAMERA),), streams=("color", "depth", "pose"), frame_count=frames,
-        frames_in_log=frames, gravity=Gravity(method="given", world_from_log=as_transform(np.eye(4))),
-    ).write(sequence.path("sequence.json"))  # fmt: skip
+        source_format="test",
+        rule="test",
+        camera=CAMERA,
+        cameras=(SequenceCamera(name="camera", camera=CAMERA),),
+        streams=("color", "depth", "pose"),
+        frame_count=frames,
+        frames_in_log=frames,
+        gravity=Gravity(method="given", world_from_log=as_transform(np.eye(4))),
+    ).write(sequence.path("sequence.json"))
     write_panoptic_zip(segments.path("panoptic.zip"), images)
     SegmentsFile(
         backend="ground-truth", label="true blocks", width=CAMERA.width, height=CAMERA.height, frames=tuple(listings)

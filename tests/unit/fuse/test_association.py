@@ -115,9 +115,17 @@ def test_overlap_counts_distinct_voxels(stride: int) -> None:
     empty = measure_overlap(blocks, depth, index_image, 4, CAMERA, pose, **options)
     assert len(empty.rows) == 0 and (empty.sizes > 0).all()
     integrate(
-        blocks, depth, CAMERA, pose, truncation=0.08, near=0.1, far=4.0, index_image=index_image,
-        label_of_index=label_of_index, canonical=np.arange(5, dtype=np.int32),
-    )  # fmt: skip
+        blocks,
+        depth,
+        CAMERA,
+        pose,
+        truncation=0.08,
+        near=0.1,
+        far=4.0,
+        index_image=index_image,
+        label_of_index=label_of_index,
+        canonical=np.arange(5, dtype=np.int32),
+    )
     found = measure_overlap(blocks, depth, index_image, 4, CAMERA, pose, **options)
     # The same by sets of voxel coordinates.
     rows, columns = np.mgrid[stride // 2 : CAMERA.height : stride, stride // 2 : CAMERA.width : stride]

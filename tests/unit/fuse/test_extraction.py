@@ -7,13 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stages.fuse.extraction import (
-    ExtractionSettings,
-    confidence_of,
-    extract_entities,
-    face_labels,
-    label_of_segments,
-)
+from stages.fuse.extraction import ExtractionSettings, confidence_of, extract_entities, face_labels, label_of_segments
 from stages.fuse.merging import Grouping
 from stages.fuse.parts import absorb_pieces, absorb_specks, connected_parts, drop_far_parts, spread_labels
 from stages.fuse.surface import Surface

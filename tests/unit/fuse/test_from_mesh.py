@@ -111,14 +111,21 @@ def points(root: Path) -> None:
     places, face = trimesh.sample.sample_surface_even(mesh, 60000, seed=1)
     owner = labels[mesh.faces[face, 0]]
     np.savez(
-        root / "points.npz", points=places.astype(np.float32), instance=owner, id=np.array([*THINGS.values()]),
+        root / "points.npz",
+        points=places.astype(np.float32),
+        instance=owner,
+        id=np.array([*THINGS.values()]),
         classes=np.array([*THINGS]),
-    )  # fmt: skip
+    )
 
 
 LAYOUTS: dict[str, Callable[[Path], None]] = {
-    "ScanNet": scannet, "Replica": replica, "SceneNN": scenenn, "NYU40 labels": nyu40, "points": points,
-}  # fmt: skip
+    "ScanNet": scannet,
+    "Replica": replica,
+    "SceneNN": scenenn,
+    "NYU40 labels": nyu40,
+    "points": points,
+}
 
 
 def context(out: Path) -> Context:

@@ -133,9 +133,18 @@ def test_plain_numpy_gives_the_same_numbers() -> None:
         color = np.maximum(color_of(image), 20)
         turned = np.roll(labels, 0) if number < 2 else np.array([0, 2, 1, 3, 4], dtype=np.int32)
         count = integrate(
-            blocks, depth, camera, pose, **LIMITS, color=color, index_image=image.astype(np.uint16),
-            label_of_index=turned, canonical=labels, label_band=band, stride=2,
-        )  # fmt: skip
+            blocks,
+            depth,
+            camera,
+            pose,
+            **LIMITS,
+            color=color,
+            index_image=image.astype(np.uint16),
+            label_of_index=turned,
+            canonical=labels,
+            label_band=band,
+            stride=2,
+        )
         touched = blocks.coordinates[: blocks.count][blocks.last_touched[: blocks.count] == blocks._stamp]
         assert len(touched) == count
         history.append((touched, depth, color, image, turned, pose))
@@ -170,9 +179,15 @@ def test_vote_is_taken_over_after_a_majority() -> None:
 
     def vote(label: int) -> tuple[int, int]:
         integrate(
-            blocks, depth, CAMERA, pose, **LIMITS, index_image=image.astype(np.uint16),
-            label_of_index=np.array([0, label], dtype=np.int32), canonical=canonical,
-        )  # fmt: skip
+            blocks,
+            depth,
+            CAMERA,
+            pose,
+            **LIMITS,
+            index_image=image.astype(np.uint16),
+            label_of_index=np.array([0, label], dtype=np.int32),
+            canonical=canonical,
+        )
         near = (blocks.segment > 0) & (np.abs(blocks.tsdf) < 0.2)
         (label,), (votes,) = np.unique(blocks.segment[near]), np.unique(blocks.votes[near])
         return int(label), int(votes)

@@ -32,8 +32,11 @@ def test_counts_add_up_and_sort() -> None:
         counts.add(*triple)
     arrays = counts.as_arrays()
     assert {name: values.tolist() for name, values in arrays.items()} == {
-        "segment": [1, 2], "class_id": [TABLE, CHAIR], "instance": [3, 1], "count": [1, 2],
-    }  # fmt: skip
+        "segment": [1, 2],
+        "class_id": [TABLE, CHAIR],
+        "instance": [3, 1],
+        "count": [1, 2],
+    }
     assert counts.instances(2, CHAIR) == {1: 2} and counts.instances(2, TABLE) == {}
     empty = TripleCounts().as_arrays()
     assert all(len(values) == 0 for values in empty.values())

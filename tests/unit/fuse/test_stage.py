@@ -222,9 +222,15 @@ def test_segments_of_another_sequence_are_refused(scene: tuple[Sequence, Segment
     def manifest(kind: str, digest: str, source: str = "") -> Manifest:
         inputs = (InputRecord(role="sequence", kind="sequence", digest=source, path="../x"),) if source else ()
         return Manifest(
-            kind=kind, schema_version=1, stage="x", stage_version=1, key="k", content_digest=digest, files=(),
+            kind=kind,
+            schema_version=1,
+            stage="x",
+            stage_version=1,
+            key="k",
+            content_digest=digest,
+            files=(),
             inputs=inputs,
-        )  # fmt: skip
+        )
 
     sequence = replace(scene[0], manifest=manifest("sequence", "aaa"))
     check_origin(sequence, replace(scene[1], manifest=manifest("segments", "bbb", "aaa")))

@@ -72,9 +72,7 @@ def meshes() -> dict[int, trimesh.Trimesh]:
     )
 
 
-CLASSES = {
-    1: "floor", 2: "drawer_unit", 3: "cup", 4: "box", 5: "cabinet", 6: "cup", 7: "cup", 8: "cup", 9: "cup",
-}  # fmt: skip
+CLASSES = {1: "floor", 2: "drawer_unit", 3: "cup", 4: "box", 5: "cabinet", 6: "cup", 7: "cup", 8: "cup", 9: "cup"}
 EXPECTED = {
     "cup_3": ("drawer_unit_2", "contains", 0.115),
     "box_4": ("drawer_unit_2", "contains", 0.115),

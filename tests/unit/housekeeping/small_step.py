@@ -19,9 +19,13 @@ class SmallParameters(Parameters):
 
 
 SMALL = Stage(
-    "small", 1, "Step of the housekeeping tests", SmallParameters,
-    {"upstream": Optionally(Trajectory), "log": Optionally(External("a file"))}, Trajectory,
-)  # fmt: skip
+    "small",
+    1,
+    "Step of the housekeeping tests",
+    SmallParameters,
+    {"upstream": Optionally(Trajectory), "log": Optionally(External("a file"))},
+    Trajectory,
+)
 
 
 def run(upstream: Trajectory | None, log: Path | None, *, parameters: SmallParameters, context: Context) -> Trajectory:

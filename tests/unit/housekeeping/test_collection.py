@@ -70,8 +70,11 @@ def test_listing_writes_nothing(tmp_path: Path) -> None:
     before = snapshot(tmp_path)
     found = survey([tmp_path], superseded=True, intermediate=True)
     assert categories(found) == {
-        "d": ("leftover", True), "a": ("intermediate", True), "b": ("intermediate", True), "c": ("result", False),
-    }  # fmt: skip
+        "d": ("leftover", True),
+        "a": ("intermediate", True),
+        "b": ("intermediate", True),
+        "c": ("result", False),
+    }
     assert snapshot(tmp_path) == before
     assert next(item for item in found if item.category == "leftover").bytes == 1000
 

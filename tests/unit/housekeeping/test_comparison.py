@@ -33,9 +33,11 @@ def two_runs(tmp_path: Path) -> tuple[Path, Path]:
             provenance={"started": "2", **made},
         )
         make_evaluation(
-            root / "evaluation", {"map/pq": pq, "map/ap": 0.25, "map/none": None},
-            inputs={"panoptic_map": root / "map"}, provenance={"started": "3", **made},
-        )  # fmt: skip
+            root / "evaluation",
+            {"map/pq": pq, "map/ap": 0.25, "map/none": None},
+            inputs={"panoptic_map": root / "map"},
+            provenance={"started": "3", **made},
+        )
     make_artifact(first / "zz_old", provenance={"started": "4"})
     return first, second
 
@@ -51,8 +53,10 @@ def test_runs_side_by_side(tmp_path: Path) -> None:
     assert Change("summary", "entities", 3, 4) in changed.changes
     assert not [change for change in changed.changes if change.group == "input"]  # the same content was read
     assert (changed.files.changed, changed.files.removed, changed.files.added) == (
-        ("mesh.ply",), ("only-a.txt",), ("only-b.txt",),
-    )  # fmt: skip
+        ("mesh.ply",),
+        ("only-a.txt",),
+        ("only-b.txt",),
+    )
     assert {figure.name for figure in changed.costs} == {"bytes", "seconds", "peak_memory_bytes"}
     evaluation = found["evaluation"]
     assert [change.name for change in evaluation.changes if change.group == "input"] == ["panoptic_map"]

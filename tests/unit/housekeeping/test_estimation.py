@@ -24,20 +24,39 @@ from tests.unit.housekeeping.small_step import SMALL, SmallParameters
 DEMO = read_pipeline(pipeline_path("demo"))
 MEASURED = {
     ("24", "240", "180", "0.04"): {
-        "cad_library": (16.23, 189), "ground_truth": (9.80, 648), "sequence": (0.87, 111), "segments": (0.41, 223),
-        "panoptic_map": (5.57, 269), "contact_graph": (0.08, 286), "cad_scene": (2.17, 489),
-        "interactive_scene": (3.26, 185), "evaluation": (0.30, 392), "report": (0.94, 863),
+        "cad_library": (16.23, 189),
+        "ground_truth": (9.80, 648),
+        "sequence": (0.87, 111),
+        "segments": (0.41, 223),
+        "panoptic_map": (5.57, 269),
+        "contact_graph": (0.08, 286),
+        "cad_scene": (2.17, 489),
+        "interactive_scene": (3.26, 185),
+        "evaluation": (0.30, 392),
+        "report": (0.94, 863),
     },
     ("60", "320", "240", "0.01"): {
-        "ground_truth": (19.36, 556), "sequence": (3.88, 113), "segments": (1.07, 227), "panoptic_map": (134.23, 1043),
-        "contact_graph": (0.10, 673), "cad_scene": (38.51, 492), "interactive_scene": (85.49, 1037),
+        "ground_truth": (19.36, 556),
+        "sequence": (3.88, 113),
+        "segments": (1.07, 227),
+        "panoptic_map": (134.23, 1043),
+        "contact_graph": (0.10, 673),
+        "cad_scene": (38.51, 492),
+        "interactive_scene": (85.49, 1037),
     },
     ("120", "640", "480", "0.02"): {
-        "ground_truth": (50.26, 830), "sequence": (32.28, 118), "segments": (3.56, 305), "panoptic_map": (31.47, 586),
-        "contact_graph": (0.12, 396), "cad_scene": (9.14, 505), "interactive_scene": (17.66, 303),
-        "plan": (2.14, 691), "evaluation": (0.37, 501), "report": (1.66, 1033),
+        "ground_truth": (50.26, 830),
+        "sequence": (32.28, 118),
+        "segments": (3.56, 305),
+        "panoptic_map": (31.47, 586),
+        "contact_graph": (0.12, 396),
+        "cad_scene": (9.14, 505),
+        "interactive_scene": (17.66, 303),
+        "plan": (2.14, 691),
+        "evaluation": (0.37, 501),
+        "report": (1.66, 1033),
     },
-}  # fmt: skip
+}
 """Frames, width, height, voxel size of `scenewright run demo` -> step -> (megabytes written, peak memory [MiB])."""
 
 

@@ -40,8 +40,11 @@ def run(run_folder: Path) -> dict:
     return load_run(run_folder)
 
 
-GOLDEN = [path for path in sorted((REPOSITORY / "tests" / "golden").glob("v*/*"))
-          if path.parent.name == f"v{KINDS[path.name].schema_version}"]  # fmt: skip
+GOLDEN = [
+    path
+    for path in sorted((REPOSITORY / "tests" / "golden").glob("v*/*"))
+    if path.parent.name == f"v{KINDS[path.name].schema_version}"
+]
 
 
 @pytest.mark.parametrize("root", GOLDEN, ids=lambda path: path.name)
@@ -196,9 +199,7 @@ def test_the_notebook_is_whole_and_carries_no_outputs() -> None:
 def test_the_notebook_runs(run_folder: Path, tmp_path: Path) -> None:
     script = tmp_path / "notebook.py"
     script.write_text("\n\n".join(notebook_cells()))
-    environment = {
-        **os.environ, "SCENEWRIGHT_RUN": str(run_folder), "MPLBACKEND": "Agg", "PYTHONPATH": str(REPOSITORY),
-    }  # fmt: skip
+    environment = {**os.environ, "SCENEWRIGHT_RUN": str(run_folder), "MPLBACKEND": "Agg", "PYTHONPATH": str(REPOSITORY)}
     done = subprocess.run([sys.executable, script], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert "panoptic_map" in done.stdout and "map/pq" in done.stdout

@@ -38,9 +38,10 @@ def test_resident_memory_is_what_was_touched() -> None:
 
 def test_the_step_is_stopped_and_says_so() -> None:
     before = signal.getsignal(signal.SIGUSR1)
-    with pytest.raises(MachineFailure, match="more than --max-memory") as caught, limited(
-        resident_memory_bytes() + 100 * MEBIBYTE, OUT
-    ):  # fmt: skip
+    with (
+        pytest.raises(MachineFailure, match="more than --max-memory") as caught,
+        limited(resident_memory_bytes() + 100 * MEBIBYTE, OUT),
+    ):
         grow(1200)
     assert str(OUT) in str(caught.value) and "\n" not in str(caught.value) and caught.value.exit_code == 6
     assert signal.getsignal(signal.SIGUSR1) == before

@@ -16,9 +16,13 @@ from stages.engine.model_cache import add_model, cache_folder, cached_models, re
 
 WEIGHTS = b"weights of a tiny network"
 KNOWN = KnownModel(
-    name="tiny", purpose="tests", file="tiny_net.onnx", source="nowhere", licence="none",
+    name="tiny",
+    purpose="tests",
+    file="tiny_net.onnx",
+    source="nowhere",
+    licence="none",
     sha256=hashlib.sha256(WEIGHTS).hexdigest(),
-)  # fmt: skip
+)
 
 
 @pytest.fixture(autouse=True)

@@ -29,9 +29,11 @@ def make_tiny_run(folder: Path) -> Path:
     rows = 4
     np.savez(
         artifacts.make_plan(folder) / "trajectory.npz",
-        time=np.arange(rows) / 10, joints=np.zeros((rows, 9)), action=np.zeros(rows, np.int32),
+        time=np.arange(rows) / 10,
+        joints=np.zeros((rows, 9)),
+        action=np.zeros(rows, np.int32),
         world_from_base=np.tile(np.eye(4), (rows, 1, 1)),
-    )  # fmt: skip
+    )
     artifacts.seal(folder / "plan", "plan", scene=folder / "interactive_scene")
     artifacts.make_packing(folder)
     trimesh.creation.box((4, 3, 2.5)).export(artifacts.make_ground_truth(folder, library) / "mesh.ply")

@@ -100,9 +100,19 @@ def write_nerfstudio(root: Path, recorded: list, *, depth: bool = True, **fields
         frames.append(frame)
     k = CAMERA
     document = {
-        "camera_model": "OPENCV", "fl_x": k.fx, "fl_y": k.fy, "cx": k.cx + 0.5, "cy": k.cy + 0.5, "w": k.width,
-        "h": k.height, "k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0, "frames": frames[::-1],
-    } | fields  # fmt: skip
+        "camera_model": "OPENCV",
+        "fl_x": k.fx,
+        "fl_y": k.fy,
+        "cx": k.cx + 0.5,
+        "cy": k.cy + 0.5,
+        "w": k.width,
+        "h": k.height,
+        "k1": 0.0,
+        "k2": 0.0,
+        "p1": 0.0,
+        "p2": 0.0,
+        "frames": frames[::-1],
+    } | fields
     document = {key: value for key, value in document.items() if value is not None}
     (root / "transforms.json").write_text(json.dumps(document))
     return root

@@ -284,8 +284,7 @@ def test_real_mcap_beside_the_mcap_package(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["example.bag", "example-bz2.bag", "example-lz4.bag", "watercan.bag", "single_depth_color_640x480.bag"],
+    "name", ["example.bag", "example-bz2.bag", "example-lz4.bag", "watercan.bag", "single_depth_color_640x480.bag"]
 )
 def test_real_bags_beside_the_rosbags_package(name: str) -> None:
     path = real_data("logs") / name

@@ -31,9 +31,22 @@ from tests.real_data import real_data
 from tests.unit.ingest.ros_writing import ROS1, ROS2, definition, long_name, typestore
 
 STRUCT_CODES = {
-    "bool": "B", "byte": "B", "char": "B", "octet": "B", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H",
-    "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f", "float64": "d", "string": "string",
-}  # fmt: skip
+    "bool": "B",
+    "byte": "B",
+    "char": "B",
+    "octet": "B",
+    "int8": "b",
+    "uint8": "B",
+    "int16": "h",
+    "uint16": "H",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float32": "f",
+    "float64": "d",
+    "string": "string",
+}
 
 
 def _as_rosbags_has_it(fields: Any) -> list[tuple[str, str, int | None]]:

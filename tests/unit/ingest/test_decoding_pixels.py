@@ -11,14 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from stages.ingest.messages.pixels import (
-    color_pixels,
-    depth_pixels,
-    depth_unit,
-    label_pixels,
-    role_of,
-    why_other,
-)
+from stages.ingest.messages.pixels import color_pixels, depth_pixels, depth_unit, label_pixels, role_of, why_other
 from stages.ingest.messages.records import ImageRecord
 from stages.ingest.source import Unusable
 
@@ -38,8 +31,13 @@ def raw(image: np.ndarray, encoding: str, *, padding: int = 0, big_endian: bool 
     rows = np.pad(rows, ((0, 0), (0, padding)), constant_values=170)
     fields = {"width": width, "height": height, "step": rows.shape[1], "data": rows.tobytes()} | changes
     return ImageRecord(
-        stamp=1, frame_id="f", encoding=encoding, compressed=False, big_endian=big_endian, **fields  # type: ignore
-    )  # fmt: skip
+        stamp=1,
+        frame_id="f",
+        encoding=encoding,
+        compressed=False,
+        big_endian=big_endian,
+        **fields,  # type: ignore
+    )
 
 
 def compressed(data: bytes, encoding: str = "jpeg") -> ImageRecord:
@@ -404,8 +402,11 @@ def test_roles_of_raw_images(encoding: str, topic: str, role: str) -> None:
 
 
 DEPTH_PNG, GREY_PNG, COLOR_PNG, JPEG = (
-    encoded(MILLIMETRES), encoded(COLOR[..., 0]), encoded(COLOR), encoded(COLOR, ".jpg"),
-)  # fmt: skip
+    encoded(MILLIMETRES),
+    encoded(COLOR[..., 0]),
+    encoded(COLOR),
+    encoded(COLOR, ".jpg"),
+)
 
 
 @pytest.mark.parametrize(

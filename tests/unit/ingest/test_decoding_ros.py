@@ -52,9 +52,16 @@ def decoded(store: Stores, type_name: str, *, schema: str | None = None, **field
 def test_image(store: Stores) -> None:
     data = np.arange(60, dtype=np.uint8)
     (record,) = decoded(
-        store, "sensor_msgs/Image", header=header(store, STAMP, "/optical"), height=3, width=9, encoding="16UC1",
-        is_bigendian=1, step=20, data=data,
-    )  # fmt: skip
+        store,
+        "sensor_msgs/Image",
+        header=header(store, STAMP, "/optical"),
+        height=3,
+        width=9,
+        encoding="16UC1",
+        is_bigendian=1,
+        step=20,
+        data=data,
+    )
     assert record == ImageRecord(STAMP, "optical", "16UC1", False, 9, 3, 20, True, data.tobytes())
 
 
@@ -72,10 +79,18 @@ def test_camera_info_with_its_letters_in_either_case(store: Stores, embedded: bo
     k = [500.0, 0, 320, 0, 501, 240, 0, 0, 1]
     p = [500.0, 0, 320, -25, 0, 501, 240, 0, 0, 0, 1, 0]
     (record,) = decoded(
-        store, "sensor_msgs/CameraInfo", schema=None if embedded else "", header=header(store, STAMP, "optical"),
-        height=480, width=640, distortion_model="plumb_bob", d=[0.1, -0.2, 0.001, 0.002, 0.3], k=k, r=np.eye(3).ravel(),
+        store,
+        "sensor_msgs/CameraInfo",
+        schema=None if embedded else "",
+        header=header(store, STAMP, "optical"),
+        height=480,
+        width=640,
+        distortion_model="plumb_bob",
+        d=[0.1, -0.2, 0.001, 0.002, 0.3],
+        k=k,
+        r=np.eye(3).ravel(),
         p=p,
-    )  # fmt: skip
+    )
     d = (0.1, -0.2, 0.001, 0.002, 0.3)
     expected = CalibrationRecord(
         STAMP, "optical", 640, 480, "plumb_bob", d, tuple(k), tuple(np.eye(3).ravel()), tuple(p)
@@ -272,8 +287,10 @@ def test_realsense_bag() -> None:
     depth, color = "device_0/sensor_0/Depth_0", "device_0/sensor_1/Color_0"
     images = {frame: found[f"/{frame}/image/data"] for frame in (depth, color)}
     assert [(r.encoding, r.width, r.height, r.frame_id) for r in images[depth] + images[color]] == [  # type: ignore
-        ("mono16", 640, 480, depth), ("mono16", 640, 480, depth), ("rgb8", 640, 480, color),
-    ]  # fmt: skip
+        ("mono16", 640, 480, depth),
+        ("mono16", 640, 480, depth),
+        ("rgb8", 640, 480, color),
+    ]
     assert images[depth][0].stamp == 360_815_089_000
     for frame in (depth, color):
         (calibration,) = found[f"/{frame}/info/camera_info"]

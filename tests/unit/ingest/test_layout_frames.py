@@ -23,14 +23,7 @@ from tests.unit.ingest.folder_writers import (
     write_tum,
 )
 from tests.unit.ingest.loading import loaded_frames
-from tests.unit.ingest.tiny_room import (
-    CAMERA,
-    frames,
-    png,
-    write_posed_images,
-    write_redwood,
-    write_seven_scenes,
-)
+from tests.unit.ingest.tiny_room import CAMERA, frames, png, write_posed_images, write_redwood, write_seven_scenes
 
 INTRINSICS = {"fx": CAMERA.fx, "fy": CAMERA.fy, "cx": CAMERA.cx, "cy": CAMERA.cy}
 

@@ -118,9 +118,13 @@ def _opencv_file(
     right_from_left = inverse(left_from_right)
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
     for name, value in (
-        ("M1", intrinsic_matrix(left)), ("D1", np.array([[*lens, 0.0]])), ("M2", intrinsic_matrix(right)),
-        ("D2", np.zeros((1, 5))), ("R", right_from_left[:3, :3]), ("T", right_from_left[:3, 3:] * unit),
-    ):  # fmt: skip
+        ("M1", intrinsic_matrix(left)),
+        ("D1", np.array([[*lens, 0.0]])),
+        ("M2", intrinsic_matrix(right)),
+        ("D2", np.zeros((1, 5))),
+        ("R", right_from_left[:3, :3]),
+        ("T", right_from_left[:3, 3:] * unit),
+    ):
         storage.write(name, np.asarray(value, dtype=float))
     storage.release()
 

@@ -291,10 +291,7 @@ def test_swapped_eyes_are_refused_by_name(tmp_path: Path) -> None:
         BadInput, match=r"swapped: /stereo/right/\S+ stands 0.1 m to the left of /stereo/left.*--color-topic"
     ):
         ingest(log.path, tmp_path / "out")
-    fixed = {
-        "color_topic": "/stereo/right/image_rect/compressed",
-        "right_topic": "/stereo/left/image_rect/compressed",
-    }
+    fixed = {"color_topic": "/stereo/right/image_rect/compressed", "right_topic": "/stereo/left/image_rect/compressed"}
     assert ingest(log.path, tmp_path / "fixed", **fixed).info.cameras[0].baseline == pytest.approx(0.1)
 
 

@@ -38,8 +38,10 @@ def test_poses_in_another_convention(tmp_path: Path, convention: str, written) -
 def test_positions_in_millimetres(tmp_path: Path) -> None:
     room = frames(4)
     plain = ingest(write_seven_scenes(tmp_path / "plain", room), tmp_path / "a", gravity="none")
-    large = [(color, depth, np.diag([1000.0, 1000, 1000, 1]) @ pose @ np.diag([1e-3, 1e-3, 1e-3, 1]))
-             for color, depth, pose in room]  # fmt: skip
+    large = [
+        (color, depth, np.diag([1000.0, 1000, 1000, 1]) @ pose @ np.diag([1e-3, 1e-3, 1e-3, 1]))
+        for color, depth, pose in room
+    ]
     same = ingest(write_seven_scenes(tmp_path / "large", large), tmp_path / "b", gravity="none", pose_scale=0.001)
     np.testing.assert_allclose(_poses(same), _poses(plain), atol=1e-6)
 

@@ -73,12 +73,20 @@ def test_schema_and_reader_agree(closed: bool) -> None:
     Draft202012Validator.check_schema(schema.document)
     validator = Draft202012Validator(schema.document)
     calls = [
-        GOOD_PLACE, {"action": "wave", "objects": [], "parameters": {}},
+        GOOD_PLACE,
+        {"action": "wave", "objects": [], "parameters": {}},
         {"action": "pick", "objects": ["cup_2"], "parameters": {}},
-        place(objects=["cup_9", "table_3"]), place(parameters={"x": 2, "yaw": 0}), place(parameters={"x": 0.5}),
-        {"action": "fly", "objects": [], "parameters": {}}, place(objects=["cup_1"]),
-        place(parameters={"x": "0.5", "yaw": 0}), place(more=1), place(objects="cup_1"), 3, None,
-    ]  # fmt: skip
+        place(objects=["cup_9", "table_3"]),
+        place(parameters={"x": 2, "yaw": 0}),
+        place(parameters={"x": 0.5}),
+        {"action": "fly", "objects": [], "parameters": {}},
+        place(objects=["cup_1"]),
+        place(parameters={"x": "0.5", "yaw": 0}),
+        place(more=1),
+        place(objects="cup_1"),
+        3,
+        None,
+    ]
     verdicts = []
     for call in calls:
         value = {"reasoning": "", "plan": [call]}

@@ -111,9 +111,11 @@ def test_the_document_requires_all_and_the_reader_does_not() -> None:
     assert inner["required"] == ["default", "name"] and "default" not in inner["properties"]["default"]
     assert schema.read({"parts": [{"name": "x"}]}).parts[0].default == 1.0
     for wrong, words in (
-        ({"parts": [{"name": 3}]}, "parts.0.name: "), ({"note": "a", "more": 1}, "more: "),
-        ({"parts": [{"name": "x", "default": "1.5"}]}, "parts.0.default: "), ([], "the object: "),
-    ):  # fmt: skip
+        ({"parts": [{"name": 3}]}, "parts.0.name: "),
+        ({"note": "a", "more": 1}, "more: "),
+        ({"parts": [{"name": "x", "default": "1.5"}]}, "parts.0.default: "),
+        ([], "the object: "),
+    ):
         with pytest.raises(DoesNotFollow, match=words):
             schema.read(wrong)
 
@@ -240,9 +242,13 @@ def test_images_are_checked_and_digested() -> None:
 def test_the_digest_knows_all_that_decides_a_reply() -> None:
     base = {"messages": QUESTION, "schema": SCHEMA, "model": "m", "temperature": 0.0, "maximum_tokens": 9}
     changes: list[dict[str, Any]] = [
-        {}, {"messages": QUESTION[1:]}, {"messages": (QUESTION[0], say("assistant", "How many?"))},
-        {"schema": schema_of(Outer)}, {"model": "n"}, {"temperature": 0.5},
-    ]  # fmt: skip
+        {},
+        {"messages": QUESTION[1:]},
+        {"messages": (QUESTION[0], say("assistant", "How many?"))},
+        {"schema": schema_of(Outer)},
+        {"model": "n"},
+        {"temperature": 0.5},
+    ]
     assert len({Request(**{**base, **change}).digest for change in changes}) == len(changes)
     # Fixed, so that a recording of today is found tomorrow.
     fixed = {**base, "schema": schema_from("any", {"type": "object"})}

@@ -51,8 +51,9 @@ def test_a_question_as_it_crosses_the_wire() -> None:
     assert asked.body["model"] == "stub" and asked.body["temperature"] == 0.25 and asked.body["max_tokens"] == 99
     assert asked.body["stream"] is False
     assert asked.body["messages"][:2] == [
-        {"role": "system", "content": "You count."}, {"role": "user", "content": "How many?"}
-    ]  # fmt: skip
+        {"role": "system", "content": "You count."},
+        {"role": "user", "content": "How many?"},
+    ]
     parts = asked.body["messages"][2]["content"]
     assert parts[0] == {"type": "text", "text": "Look:"}
     urls = [part["image_url"]["url"].split(",") for part in parts[1:]]
@@ -102,9 +103,14 @@ def test_a_server_may_name_a_date_and_no_eternity() -> None:
     hints = ({"Retry_After": until}, {"Retry_After": "86400"}, {"Retry_After": "soon"})
     with serving(*(status(429, **hint) for hint in hints), replies(GOOD)) as server:
         connection = Connection(
-            server.base_url, timeout=5, retries=3, retry_wait=0.5, longest_wait=90, sleep=waits.append,
+            server.base_url,
+            timeout=5,
+            retries=3,
+            retry_wait=0.5,
+            longest_wait=90,
+            sleep=waits.append,
             now=lambda: 1_000_000.0,
-        )  # fmt: skip
+        )
         assert connection.post("/chat/completions", b"{}", "application/json").body == envelope(json.dumps(GOOD))
     assert waits == [40.0, 90.0, 2.0]
 

@@ -113,9 +113,13 @@ def test_replies_may_be_edited_and_prompts_may_not(transcript: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("no JSON\n", "line 1: line: Invalid JSON"), ('\n{"format": "x"}\n', "line 2: format"), ("\xff", "line 1"),
-     ("[" * 9999, "line 1")],
-)  # fmt: skip
+    [
+        ("no JSON\n", "line 1: line: Invalid JSON"),
+        ('\n{"format": "x"}\n', "line 2: format"),
+        ("\xff", "line 1"),
+        ("[" * 9999, "line 1"),
+    ],
+)
 def test_damaged_transcripts(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "transcript.jsonl"
     path.write_text(text, encoding="latin-1")

@@ -402,19 +402,36 @@ BOMB = '<!DOCTYPE a [<!ENTITY x "y"><!ENTITY z "&x;&x;&x;">]><robot name="a"><li
     [
         ("chair.urdf", BOMB, "document type or entities"),
         ("chair.urdf", "<robot", "well-formed"),
-        ("chair.urdf", '<robot><link name="a"><visual><geometry><mesh filename="/etc/passwd"/></geometry></visual>'
-         "</link></robot>", "is not in the folder"),
-        ("chair.urdf", '<robot><link name="a"><visual><geometry><mesh filename="../secret.obj"/></geometry></visual>'
-         "</link></robot>", "is not in the folder"),
-        ("chair.urdf", '<robot><link name="a"><visual><geometry><box size="1 nan 1"/></geometry></visual></link>'
-         "</robot>", "is not finite"),
+        (
+            "chair.urdf",
+            '<robot><link name="a"><visual><geometry><mesh filename="/etc/passwd"/></geometry></visual></link></robot>',
+            "is not in the folder",
+        ),
+        (
+            "chair.urdf",
+            '<robot><link name="a"><visual><geometry><mesh filename="../secret.obj"/></geometry></visual>'
+            "</link></robot>",
+            "is not in the folder",
+        ),
+        (
+            "chair.urdf",
+            '<robot><link name="a"><visual><geometry><box size="1 nan 1"/></geometry></visual></link></robot>',
+            "is not finite",
+        ),
         ("chair.urdf", '<robot><link name="a"/><link name="b"/></robot>', "2 root links"),
-        ("chair.urdf", '<robot><link name="a"/><link name="b"/><link name="c"/><joint name="j" type="fixed">'
-         '<parent link="b"/><child link="c"/></joint><joint name="k" type="fixed"><parent link="c"/>'
-         '<child link="b"/></joint></robot>', "circle"),
+        (
+            "chair.urdf",
+            '<robot><link name="a"/><link name="b"/><link name="c"/><joint name="j" type="fixed">'
+            '<parent link="b"/><child link="c"/></joint><joint name="k" type="fixed"><parent link="c"/>'
+            '<child link="b"/></joint></robot>',
+            "circle",
+        ),
         ("chair.xml", '<mujoco><include file="chair.xml"/><worldbody/></mujoco>', "in a circle"),
-        ("chair.xml", '<mujoco><worldbody><body><geom type="box" size="0 1 1"/></body></worldbody></mujoco>',
-         "without size"),
+        (
+            "chair.xml",
+            '<mujoco><worldbody><body><geom type="box" size="0 1 1"/></body></worldbody></mujoco>',
+            "without size",
+        ),
         ("chair.sdf", '<sdf><model name="chair"/></sdf>', "no links"),
         ("chair.dae", "<COLLADA><asset><unit meter='-1'/></asset></COLLADA>", "unit of -1"),
         ("chair.obj", "v 0 0 0\nv 1 0 0\nf 1 2 9\n", "element 9 of 2"),
@@ -422,7 +439,7 @@ BOMB = '<!DOCTYPE a [<!ENTITY x "y"><!ENTITY z "&x;&x;&x;">]><robot name="a"><li
         ("chair.gltf", '{"buffers": [{"uri": "../secret.bin", "byteLength": 4}]}', "is not in the folder"),
         ("readme.txt", "nothing", "no model files"),
     ],
-)  # fmt: skip
+)
 def test_bad_input_is_one_line(tmp_path, name, text, reason) -> None:
     write(tmp_path / "in" / name, text)
     obj_box(tmp_path / "secret.obj", (1, 1, 1))
@@ -570,7 +587,7 @@ SEEDS = {
     "<radius>1</radius><length>2</length></cylinder></geometry></visual></link></model></sdf>",
     "cup.gltf": '{"buffers":[{"uri":"data:;base64,AAAA","byteLength":3}],"bufferViews":[{"buffer":0,"byteLength":3}],'
     '"accessors":[{"bufferView":0,"count":1,"type":"SCALAR","componentType":5121}],"meshes":[{"primitives":[{}]}]}',
-}  # fmt: skip
+}
 PIECES = (
     "",
     "nan",

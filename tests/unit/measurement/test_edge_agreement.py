@@ -27,13 +27,15 @@ def graph(edges: list[tuple[str, str, str]], suffix: str = "") -> ContactGraphFi
 
 
 TRUE = [
-    (SCENE_NODE, "floor", "supports"), (SCENE_NODE, "wall", "supports"), ("floor", "desk", "supports"),
-    ("floor", "shelf", "supports"), ("shelf", "cup", "contains"), ("desk", "board", "supports"),
+    (SCENE_NODE, "floor", "supports"),
+    (SCENE_NODE, "wall", "supports"),
+    ("floor", "desk", "supports"),
+    ("floor", "shelf", "supports"),
+    ("shelf", "cup", "contains"),
+    ("desk", "board", "supports"),
     ("wall", "board", "leans_on"),
-]  # fmt: skip
-FOUND = [
-    *TRUE[:4], ("shelf", "cup", "supports"), ("desk", "board", "supports"), ("shelf", "board", "also_supports"),
-]  # fmt: skip
+]
+FOUND = [*TRUE[:4], ("shelf", "cup", "supports"), ("desk", "board", "supports"), ("shelf", "board", "also_supports")]
 PARTNER = {name: f"{name}_x" for name in CLASSES}
 
 
@@ -56,8 +58,9 @@ def test_edges_that_are_missing_and_wrong():
     missing, wrong = edge_errors(graph(TRUE), graph(TRUE, "_x"), without_cup)
     assert missing == {("shelf", "cup", "contains")} and wrong == {("shelf_x", "cup_x", "contains")}
     assert edge_errors(graph(TRUE), graph(FOUND, "_x"), PARTNER, ignored=frozenset({"cup", "board"})) == (
-        frozenset(), frozenset(),
-    )  # fmt: skip
+        frozenset(),
+        frozenset(),
+    )
 
 
 def test_a_tree_in_the_order_of_another():

@@ -23,8 +23,8 @@ def tree(*nodes: tuple[str, str, str]) -> SupportTree:
 
 
 ROOM = tree(
-    ("floor", "floor", "scene"), ("table", "table", "floor"), ("chair", "chair", "floor"), ("cup", "cup", "table"),
-)  # fmt: skip
+    ("floor", "floor", "scene"), ("table", "table", "floor"), ("chair", "chair", "floor"), ("cup", "cup", "table")
+)
 
 
 def brute_force(true: SupportTree, predicted: SupportTree, allowed: np.ndarray) -> int:
@@ -76,8 +76,8 @@ def test_nothing_to_edit():
 
 def test_a_wrong_support_costs_two():
     predicted = tree(
-        ("floor", "floor", "scene"), ("table", "table", "floor"), ("chair", "chair", "floor"), ("cup", "cup", "chair"),
-    )  # fmt: skip
+        ("floor", "floor", "scene"), ("table", "table", "floor"), ("chair", "chair", "floor"), ("cup", "cup", "chair")
+    )
     result = graph_edit_distance(ROOM, predicted, np.eye(4))
     assert result.total == 2
     assert result.wrong_supports == (("cup", "cup"),)
@@ -91,8 +91,8 @@ def test_missing_extra_and_wrong_class_cost_one_each():
     result = graph_edit_distance(ROOM, extra)
     assert (result.total, result.extra, result.wrong_detections) == (1, ("ghost",), 1)
     renamed = tree(
-        ("floor", "floor", "scene"), ("table", "table", "floor"), ("oven", "oven", "floor"), ("cup", "cup", "table"),
-    )  # fmt: skip
+        ("floor", "floor", "scene"), ("table", "table", "floor"), ("oven", "oven", "floor"), ("cup", "cup", "table")
+    )
     result = graph_edit_distance(ROOM, renamed, np.eye(4))
     assert (result.total, result.substituted, result.wrong_detections) == (1, (("chair", "oven"),), 1)
 
@@ -163,13 +163,18 @@ def test_support_tree_reads_a_graph_and_refuses_circles():
 
 def test_edges_by_relation():
     true = graph(
-        ("scene", "floor_1", "supports"), ("floor_1", "box_2", "supports"), ("box_2", "cup_3", "contains"),
-        ("box_2", "cup_4", "proximal"), ("floor_1", "cup_4", "supports"),
-    )  # fmt: skip
+        ("scene", "floor_1", "supports"),
+        ("floor_1", "box_2", "supports"),
+        ("box_2", "cup_3", "contains"),
+        ("box_2", "cup_4", "proximal"),
+        ("floor_1", "cup_4", "supports"),
+    )
     predicted = graph(
-        ("scene", "floor_1", "supports"), ("floor_1", "box_2", "supports"), ("box_2", "cup_3", "supports"),
+        ("scene", "floor_1", "supports"),
+        ("floor_1", "box_2", "supports"),
+        ("box_2", "cup_3", "supports"),
         ("cup_4", "box_2", "proximal"),
-    )  # fmt: skip
+    )
     partner = {n.id: n.id for n in predicted.nodes}
     edges = edge_agreement(true, predicted, partner)
     assert (edges["supports"].precision, edges["supports"].recall) == (2 / 3, 2 / 3)

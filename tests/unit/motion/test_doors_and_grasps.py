@@ -12,9 +12,15 @@ from stages.kit.motion.grasps import _square, narrowest_width, sample_grasps
 from stages.kit.simulation.shapes import surface_points
 
 HINGE = Joint(
-    name="f__hinge", type="revolute", part="f__door", origin=(-0.3, -0.3, 0.0), axis=(0.0, 0.0, -1.0), lower=0.0,
-    upper=2.0, handle=(0.25, -0.35, 0.9),
-)  # fmt: skip
+    name="f__hinge",
+    type="revolute",
+    part="f__door",
+    origin=(-0.3, -0.3, 0.0),
+    axis=(0.0, 0.0, -1.0),
+    lower=0.0,
+    upper=2.0,
+    handle=(0.25, -0.35, 0.9),
+)
 SLIDE = HINGE.model_copy(update={"type": "prismatic", "axis": (0.0, -1.0, 0.0), "upper": 0.4})
 
 

@@ -161,10 +161,15 @@ def test_without_reasons_nothing_but_the_failed_action_is_read() -> None:
 def _problem(extents: list[tuple[float, float]], side: tuple[float, float], reach: float = np.inf) -> LayoutProblem:
     count = len(extents)
     return LayoutProblem(
-        extents=np.array(extents), container=np.array([0.0, 0.0, *side]), fixed=np.zeros((0, 4)),
-        hand=np.zeros((2, 1, 4)), over_fixed=np.zeros((count, 0, 1), dtype=bool),
-        over_boxes=np.zeros((count, count, 1), dtype=bool), reach=reach, refused=np.zeros((0, 5)),
-    )  # fmt: skip
+        extents=np.array(extents),
+        container=np.array([0.0, 0.0, *side]),
+        fixed=np.zeros((0, 4)),
+        hand=np.zeros((2, 1, 4)),
+        over_fixed=np.zeros((count, 0, 1), dtype=bool),
+        over_boxes=np.zeros((count, count, 1), dtype=bool),
+        reach=reach,
+        refused=np.zeros((0, 5)),
+    )
 
 
 def test_the_layout_search_fills_a_container_almost_wholly() -> None:

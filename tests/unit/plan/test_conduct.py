@@ -286,8 +286,11 @@ def looking(scene: Path, kitchen_model: WorldModel) -> Iterator[Conduct]:
     """The kitchen as it is believed to be, and as it is: the same at first."""
     model, before = kitchen_model, kitchen_model.snapshot()
     bodies = read_scene_bodies(scene)
-    room = Room({name: record for name, (record, _) in bodies.items()},
-                {name: text for name, (_, text) in bodies.items()}, {name: () for name in bodies})  # fmt: skip
+    room = Room(
+        {name: record for name, (record, _) in bodies.items()},
+        {name: text for name, (_, text) in bodies.items()},
+        {name: () for name in bodies},
+    )
     matches = {name: BodyMatch(body=name, matched=name) for name in bodies}
     with load_scene(scene) as world:
         physical = SimpleNamespace(world=world, held=None, action=-1)

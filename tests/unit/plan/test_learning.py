@@ -105,8 +105,10 @@ def test_tree_states_follow_the_actions(model: WorldModel) -> None:
     placed = after_step(held, Step("place", ("bottle_7", "table_3"), (), put))
     assert placed.parents["bottle_7"] == "table_3" and placed.held is None
     np.testing.assert_allclose(placed.poses["bottle_7"], there)
-    shut = after_step(placed, Step("close", ("fridge_2__hinge",), (),
-                                   Manipulation(np.zeros(3), (), joint_values={"fridge_2__hinge": 0.0})))  # fmt: skip
+    shut = after_step(
+        placed,
+        Step("close", ("fridge_2__hinge",), (), Manipulation(np.zeros(3), (), joint_values={"fridge_2__hinge": 0.0})),
+    )
     assert shut.joints["fridge_2__hinge"] == 0.0 and start.joints["fridge_2__hinge"] > 0.5
 
 
@@ -156,8 +158,11 @@ def test_only_what_was_held_at_first_has_to_be_taken_otherwise() -> None:
     """A thing that the plan itself picked up was taken by a grasp of its choice; so was anything when nothing was held.
     What cannot be put down for want of room cannot by another grasp either."""
     in_the_way = failure("goal_in_collision", "cup", "table")
-    for lessons, reason in ((Lessons(), in_the_way), (Lessons(held="can"), in_the_way),
-                            (Lessons(held="cup"), failure("no_placement", "cup", "table"))):  # fmt: skip
+    for lessons, reason in (
+        (Lessons(), in_the_way),
+        (Lessons(held="can"), in_the_way),
+        (Lessons(held="cup"), failure("no_placement", "cup", "table")),
+    ):
         lessons.learn(PUT, reason, [*ALL, PUT], frozenset())
         assert lessons.needs == {} and lessons.blocked == {("place", ("cup", "table"))}
 
@@ -185,5 +190,7 @@ def test_the_task_search_finds_the_way_round_with_a_held_thing() -> None:
     around = plan_task(problem, lessons.apply(actions)).actions
     assert around is not None
     assert [entry.text for entry in around if entry.name != "drive"] == [
-        "place(cup, shelf)", "pick(cup, shelf)", "place(cup, table)",
-    ]  # fmt: skip
+        "place(cup, shelf)",
+        "pick(cup, shelf)",
+        "place(cup, table)",
+    ]

@@ -45,8 +45,12 @@ def test_symbols_of_the_kitchen(kitchen_model: tuple[WorldModel, ContactGraphFil
     model, graph = kitchen_model
     objects, atoms = symbolic_state(model, graph)
     assert objects["fridge_2"] == "container" and objects["table_3"] == "surface" and objects["cup_5"] == "item"
-    assert {("in", "bottle_7", "fridge_2"), ("behind", "bottle_7", "fridge_2__hinge"), ("open", "fridge_2__hinge"),
-            ("on", "cup_5", "table_3")} <= atoms  # fmt: skip
+    assert {
+        ("in", "bottle_7", "fridge_2"),
+        ("behind", "bottle_7", "fridge_2__hinge"),
+        ("open", "fridge_2__hinge"),
+        ("on", "cup_5", "table_3"),
+    } <= atoms
     assert ("closed", "fridge_2__hinge") not in atoms
     assert default_goals(model, atoms, 0.08) == [("on(bottle_7, table_3)", "closed(fridge_2)")]
     assert default_goals(model, frozenset(atom for atom in atoms if atom[0] != "in"), 0.08) == []
@@ -77,9 +81,14 @@ def test_every_motion_of_a_refined_plan_is_free_of_collision(
     objects, initial = symbolic_state(model, graph)
     goal, _ = parse_goal(("on(bottle_7, table_3)",), objects)
     attempt = plan_and_refine(
-        model, START, DOMAIN, task_problem(objects, initial, goal), BUDGETS, np.random.default_rng(0),
+        model,
+        START,
+        DOMAIN,
+        task_problem(objects, initial, goal),
+        BUDGETS,
+        np.random.default_rng(0),
         SearchSettings("add", task_attempts=2, refinement_attempts=3),
-    )  # fmt: skip
+    )
     assert attempt.steps is not None
     assert [step.name for step in attempt.steps] == ["drive", "pick", "drive", "place"]
     pick = attempt.steps[1].manipulation
@@ -106,8 +115,15 @@ def test_every_motion_of_a_refined_plan_is_free_of_collision(
 
 
 def test_too_wide_for_the_gripper(tmp_path: Path) -> None:
-    wide = HandmadeBody("box_9", "box", transform_from_yaw(0.0, np.array([-1.3, -1.0, 0.75])),
-                        [((0, 0, 0.1), (0.15, 0.14, 0.2))], "table_3", movable=True, mass=0.3)  # fmt: skip
+    wide = HandmadeBody(
+        "box_9",
+        "box",
+        transform_from_yaw(0.0, np.array([-1.3, -1.0, 0.75])),
+        [((0, 0, 0.1), (0.15, 0.14, 0.2))],
+        "table_3",
+        movable=True,
+        mass=0.3,
+    )
     model, _ = model_of(tmp_path, [*kitchen(), wide])
     try:
         with pytest.raises(MotionFailed) as raised:
@@ -151,9 +167,16 @@ def test_behind_a_shut_door_the_door_is_named(tmp_path: Path) -> None:
 
 
 def test_a_robot_walled_in_cannot_drive(tmp_path: Path) -> None:
-    cage = HandmadeBody("cabinet_8", "cabinet", np.eye(4),
-                        [((x, y, 0.5), (0.1 + 1.4 * (x == 0), 0.1 + 1.4 * (y == 0), 1.0))
-                         for x, y in ((0.7, 0), (-0.7, 0), (0, 0.7), (0, -0.7))], "floor_1")  # fmt: skip
+    cage = HandmadeBody(
+        "cabinet_8",
+        "cabinet",
+        np.eye(4),
+        [
+            ((x, y, 0.5), (0.1 + 1.4 * (x == 0), 0.1 + 1.4 * (y == 0), 1.0))
+            for x, y in ((0.7, 0), (-0.7, 0), (0, 0.7), (0, -0.7))
+        ],
+        "floor_1",
+    )
     model, _ = model_of(tmp_path, [*kitchen(), cage])
     try:
         with pytest.raises(MotionFailed) as raised:
@@ -189,17 +212,29 @@ def test_a_door_that_something_blocks_cannot_be_shut(tmp_path: Path) -> None:
 
 
 def test_what_the_hand_cannot_take_is_known_before_any_geometry(tmp_path: Path) -> None:
-    wide = HandmadeBody("box_9", "box", transform_from_yaw(0.0, np.array([-1.3, -1.0, 0.75])),
-                        [((0, 0, 0.1), (0.15, 0.14, 0.2))], "table_3", movable=True, mass=0.3)  # fmt: skip
+    wide = HandmadeBody(
+        "box_9",
+        "box",
+        transform_from_yaw(0.0, np.array([-1.3, -1.0, 0.75])),
+        [((0, 0, 0.1), (0.15, 0.14, 0.2))],
+        "table_3",
+        movable=True,
+        mass=0.3,
+    )
     bodies = [*kitchen(), wide]
     model, graph = model_of(tmp_path, bodies)
     try:
         objects, initial = symbolic_state(model, graph)
         goal, _ = parse_goal(("holding(box_9)",), objects)
         attempt = plan_and_refine(
-            model, START, DOMAIN, task_problem(objects, initial, goal), BUDGETS, np.random.default_rng(0),
+            model,
+            START,
+            DOMAIN,
+            task_problem(objects, initial, goal),
+            BUDGETS,
+            np.random.default_rng(0),
             SearchSettings("add", task_attempts=3, refinement_attempts=2),
-        )  # fmt: skip
+        )
     finally:
         model.close()
     assert attempt.steps is None

@@ -20,11 +20,21 @@ from stages.plan.replanning import Replanning, in_the_middle
 from stages.plan.tree_state import start_state
 from stages.plan.world_model import RobotState, WorldModel
 
-FIRST = frozenset({
-    ("hand_empty",), ("on", "cup", "tray"), ("carried_along", "cup", "tray"), ("on", "tray", "desk"),
-    ("in", "can", "fridge"), ("behind", "can", "hinge"), ("clear", "cup"), ("near", "start"),
-    ("unmoved", "cup"), ("unmoved", "tray"), ("unmoved", "can"),
-})  # fmt: skip
+FIRST = frozenset(
+    {
+        ("hand_empty",),
+        ("on", "cup", "tray"),
+        ("carried_along", "cup", "tray"),
+        ("on", "tray", "desk"),
+        ("in", "can", "fridge"),
+        ("behind", "can", "hinge"),
+        ("clear", "cup"),
+        ("near", "start"),
+        ("unmoved", "cup"),
+        ("unmoved", "tray"),
+        ("unmoved", "can"),
+    }
+)
 
 
 def tree(**parents: str) -> TreeState:
@@ -160,6 +170,8 @@ def test_failures_of_every_search_are_kept_and_only_plans_count(model: WorldMode
     results = [anew.plan(state, anew.believed, anew.believed, number) for number in (2, 3, 5)]
     assert results == [None, None, [STEP]] and anew.places == [5]
     assert [failure.kind for failure in anew.failures] == [
-        "goal_unsatisfiable", "start_in_collision", "goal_unsatisfiable",
-    ]  # fmt: skip
+        "goal_unsatisfiable",
+        "start_in_collision",
+        "goal_unsatisfiable",
+    ]
     assert anew.learned == ["first", "second"] and len(anew.tried) == 1

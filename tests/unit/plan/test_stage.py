@@ -44,8 +44,12 @@ def executed(tmp_path_factory: pytest.TempPathFactory) -> Plan:
     root = tmp_path_factory.mktemp("executed")
     write_scene(root / "truth" / "room", kitchen())
     (root / "truth" / "graph.json").write_bytes((root / "truth" / "room" / "graph.json").read_bytes())
-    offsets = {"bottle_7": (0.03, -0.02, 0.004), "table_3": (-0.02, 0.03, -0.015), "fridge_2": (0.02, 0.015, 0.0),
-               "cup_5": (-0.02, 0.03, -0.015)}  # fmt: skip
+    offsets = {
+        "bottle_7": (0.03, -0.02, 0.004),
+        "table_3": (-0.02, 0.03, -0.015),
+        "fridge_2": (0.02, 0.015, 0.0),
+        "cup_5": (-0.02, 0.03, -0.015),
+    }
     write_scene(root / "scene", shifted(kitchen(1.5), offsets))
     return plan(root, root / "scene", root / "truth")
 

@@ -156,8 +156,15 @@ def test_a_hand_that_would_reach_below_the_foot_comes_last(
     monkeypatch.setattr(pick_place, "_bases_around", lambda *_: np.zeros((3, 3)))
     model.world.set_pose("cup_5", transform_from_yaw(0.0, np.array([-1.3, -1.0, 0.75])))
     with pytest.raises(MotionFailed):
-        plan_pick(model, RobotState(np.zeros(3), PANDA.carry), "cup_5", "table_3", Budgets(4, 4000, 10, 1),
-                  np.random.default_rng(0), style=style)  # fmt: skip
+        plan_pick(
+            model,
+            RobotState(np.zeros(3), PANDA.carry),
+            "cup_5",
+            "table_3",
+            Budgets(4, 4000, 10, 1),
+            np.random.default_rng(0),
+            style=style,
+        )
     below = [entry[0] for entry in tried]
     assert 0 < sum(below) < len(below)
     assert below == sorted(below), "no hand over the edge is tried before one that is not"

@@ -98,10 +98,14 @@ REACH, BREADTH, THICKNESS = 0.12, 0.06, 0.02
 def room(tmp_path: Path) -> Iterator[PhysicsWorld]:
     """A table, and a thing of two crossed bars (along x and z): turned by 45 degrees it stands on two of its ends."""
     cross = HandmadeBody(
-        "jack_9", "toy", transform_from_yaw(0.0, np.array([0.0, 0.0, 1.0])),
+        "jack_9",
+        "toy",
+        transform_from_yaw(0.0, np.array([0.0, 0.0, 1.0])),
         [((0, 0, 0), (2 * REACH, BREADTH, THICKNESS)), ((0, 0, 0), (THICKNESS, BREADTH, 2 * REACH))],
-        "table_3", movable=True, mass=0.2,
-    )  # fmt: skip
+        "table_3",
+        movable=True,
+        mass=0.2,
+    )
     write_scene(tmp_path, [floor(), table(0.0, 0.0), cross])
     with load_scene(tmp_path) as world:
         yield world

@@ -94,8 +94,13 @@ def test_moments_of_a_lever() -> None:
     pair = holding_moments(poses, np.array([[0.1, 0.0], [0.2, 0.4]]), np.array([1.0, 1.0]))
     assert pair[2] == pytest.approx(0.0, abs=1e-12)
     assert pair[0] == pytest.approx(GRAVITY * 2.0 * 0.25)
-    torques = [sum(np.cross(np.array([x, y, 0.0]) - pose[:3, 3] * [1, 1, 0], [0, 0, -GRAVITY * m])
-                   for (x, y), m in (((0.1, 0.3), 0.2), ((-0.2, 0.1), 1.1))) for pose in poses]  # fmt: skip
+    torques = [
+        sum(
+            np.cross(np.array([x, y, 0.0]) - pose[:3, 3] * [1, 1, 0], [0, 0, -GRAVITY * m])
+            for (x, y), m in (((0.1, 0.3), 0.2), ((-0.2, 0.1), 1.1))
+        )
+        for pose in poses
+    ]
     found = holding_moments(poses, np.array([[0.1, 0.3], [-0.2, 0.1]]), np.array([0.2, 1.1]))
     assert found == pytest.approx(np.linalg.norm(torques, axis=1))
 
@@ -120,8 +125,9 @@ def can(name: str, x: float, y: float, parent: str, mass: float = 0.2) -> Handma
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("tray")
-    write_scene(root, [floor(), table(0.0, 0.0), tray(), can("can_7", 0.5, 0.2, "table_3"),
-                       can("can_8", 0.5, -0.2, "table_3")])  # fmt: skip
+    write_scene(
+        root, [floor(), table(0.0, 0.0), tray(), can("can_7", 0.5, 0.2, "table_3"), can("can_8", 0.5, -0.2, "table_3")]
+    )
     return root
 
 

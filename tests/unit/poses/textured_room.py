@@ -71,9 +71,7 @@ def write_sequence(
 ) -> Sequence:
     """Write a sequence of the room seen from `poses`; the frames in `blank` see black and no depth."""
     root.mkdir(parents=True)
-    streams = [
-        name for name, there in (("color", with_color), ("depth", with_depth), ("pose", with_pose)) if there
-    ]  # fmt: skip
+    streams = [name for name, there in (("color", with_color), ("depth", with_depth), ("pose", with_pose)) if there]
     random = np.random.default_rng(0)
     with FrameWriter(root / "frames.mcap", CAMERA, world_up="unknown") as writer:
         for index, pose in enumerate(poses):
@@ -87,9 +85,13 @@ def write_sequence(
     posed = poses if with_pose else poses[:0]
     write_tum(root / "trajectory.tum", 0.1 * np.arange(len(posed)), posed)
     SequenceFile(
-        source_format="test", rule="test", camera=CAMERA,
-        cameras=(SequenceCamera(name="camera", camera=CAMERA, frame_count=len(poses)),), streams=tuple(streams),
-        frame_count=len(poses), frames_in_log=len(poses),
+        source_format="test",
+        rule="test",
+        camera=CAMERA,
+        cameras=(SequenceCamera(name="camera", camera=CAMERA, frame_count=len(poses)),),
+        streams=tuple(streams),
+        frame_count=len(poses),
+        frames_in_log=len(poses),
         gravity=Gravity(method="none", world_from_log=as_transform(np.eye(4))),
-    ).write(root / "sequence.json")  # fmt: skip
+    ).write(root / "sequence.json")
     return Sequence(root)

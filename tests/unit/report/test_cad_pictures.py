@@ -118,11 +118,16 @@ def write_urdf(path: Path, joints: list[tuple[str, str, str]]) -> Path:
 
 
 JOINTS = [
-    ("fixed", "world", "floor_1"), ("fixed", "world", "wall_2"), ("fixed", "floor_1", "table_3"),
-    ("floating", "table_3", "cup_4"), ("fixed", "floor_1", "chair_5"), ("fixed", "floor_1", "cabinet_6"),
-    ("revolute", "cabinet_6", "cabinet_6__door"), ("prismatic", "cabinet_6__door", "cabinet_6__drawer"),
+    ("fixed", "world", "floor_1"),
+    ("fixed", "world", "wall_2"),
+    ("fixed", "floor_1", "table_3"),
+    ("floating", "table_3", "cup_4"),
+    ("fixed", "floor_1", "chair_5"),
+    ("fixed", "floor_1", "cabinet_6"),
+    ("revolute", "cabinet_6", "cabinet_6__door"),
+    ("prismatic", "cabinet_6__door", "cabinet_6__drawer"),
     ("floating", "cabinet_6", "bottle_7"),
-]  # fmt: skip
+]
 
 
 def test_the_same_thing_stands_in_the_same_row_of_both_trees(tmp_path):
@@ -162,8 +167,14 @@ def test_the_page_shows_all_of_it(tmp_path):
     cad = make_scene(tmp_path / "cad", {CUP.name: (0.05, 0.0, 0.0)})
     made = report(tmp_path / "report", SMALL.model_copy(update={"candidates": 1, "candidate_width": 60}), cad_scene=cad)
     page = parse((made.root / "report.html").read_text())
-    for text in ("Before and after the global check", "moved by 5 cm by the global check", "chosen, best by itself",
-                 "7 alignment rank", "2 more", "Candidates of the other objects"):  # fmt: skip
+    for text in (
+        "Before and after the global check",
+        "moved by 5 cm by the global check",
+        "chosen, best by itself",
+        "7 alignment rank",
+        "2 more",
+        "Candidates of the other objects",
+    ):
         assert text in page.text, text
 
 

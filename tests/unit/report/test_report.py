@@ -100,21 +100,31 @@ def make_evaluation(root: Path, label: str = LABEL, **metrics: float | None) -> 
 def whole(tmp_path_factory) -> tuple[Path, Report]:
     """Everything in one report."""
     folder = tmp_path_factory.mktemp("run")
-    evaluation = make_evaluation(folder / "evaluation", map__pq=0.623, graph__edit_distance=2.0, cad__box_iou_mean=0.5,
-                                 cad__box_iou_mean_low=0.4, cad__box_iou_mean_high=0.6)  # fmt: skip
+    evaluation = make_evaluation(
+        folder / "evaluation",
+        map__pq=0.623,
+        graph__edit_distance=2.0,
+        cad__box_iou_mean=0.5,
+        cad__box_iou_mean_low=0.4,
+        cad__box_iou_mean_high=0.6,
+    )
     (evaluation.root / "tables" / "graph_edit_distance.csv").write_text(
         "error,cost,true,predicted,true parent,predicted parent\nwrong support,2,cup_4,cup_4,desk_9,table_3\n"
         "missing detection,1,sofa_8,,floor_1,\n"
     )
     made = report(
         folder / "report",
-        ground_truth=make_ground_truth(folder / "truth"), sequence=make_sequence(folder / "sequence"),
-        segments=make_segments(folder / "segments"), panoptic_map=make_map(folder / "map"),
-        contact_graph=make_graph(folder / "graph", graph_of(ROOM)), cad_scene=cad_without_models(folder / "cad"),
-        interactive_scene=make_interactive_scene(folder / "scene"), plan=make_plan(folder / "plan"),
+        ground_truth=make_ground_truth(folder / "truth"),
+        sequence=make_sequence(folder / "sequence"),
+        segments=make_segments(folder / "segments"),
+        panoptic_map=make_map(folder / "map"),
+        contact_graph=make_graph(folder / "graph", graph_of(ROOM)),
+        cad_scene=cad_without_models(folder / "cad"),
+        interactive_scene=make_interactive_scene(folder / "scene"),
+        plan=make_plan(folder / "plan"),
         evaluation=evaluation,
         baseline_evaluation=make_evaluation(folder / "baseline", label="geometric segments", map__pq=0.101),
-    )  # fmt: skip
+    )
     return folder, made
 
 
@@ -140,9 +150,21 @@ def test_every_section_is_there_and_the_page_is_sound(whole):
     assert ids == {"outlook", "frames", "map", "graph", "cad", "scene", "plan", "figures", "cost", "made"}
     links = {attributes["href"] for tag, attributes in tags.seen if tag == "a" and attributes["href"].startswith("#")}
     assert links == {f"#{name}" for name in ids}
-    for text in ("62.3 %", "10.1 %", "40.0 % to 60.0 %", "geometric segments", "cup_4", "Missing altogether: sofa_8",
-                 "A fine table", "0.123", "on(cup_4, table_3)", "first base pose blocked", "a note",
-                 "hinge 0° to 92°", "in cabinet_6"):  # fmt: skip
+    for text in (
+        "62.3 %",
+        "10.1 %",
+        "40.0 % to 60.0 %",
+        "geometric segments",
+        "cup_4",
+        "Missing altogether: sofa_8",
+        "A fine table",
+        "0.123",
+        "on(cup_4, table_3)",
+        "first base pose blocked",
+        "a note",
+        "hinge 0° to 92°",
+        "in cabinet_6",
+    ):
         assert text in tags.text, text
     assert made.summary["sections"] == 9
     assert Report(folder / "report").json_files["report.json"].read(folder / "report" / "report.json").sections
@@ -192,11 +214,14 @@ def test_hostile_names_are_text(tmp_path):
     sequence = make_sequence(tmp_path / "sequence")
     sequence.info.model_copy(update={"source_format": HOSTILE}).write(tmp_path / "sequence" / "sequence.json")
     report(
-        tmp_path / "report", SMALL.model_copy(update={"title": HOSTILE}), sequence=sequence,
+        tmp_path / "report",
+        SMALL.model_copy(update={"title": HOSTILE}),
+        sequence=sequence,
         segments=make_segments(tmp_path / "segments", label=HOSTILE),
-        contact_graph=make_graph(tmp_path / "graph", graph), plan=make_plan(tmp_path / "plan", detail=HOSTILE),
+        contact_graph=make_graph(tmp_path / "graph", graph),
+        plan=make_plan(tmp_path / "plan", detail=HOSTILE),
         evaluation=make_evaluation(tmp_path / "evaluation", label=HOSTILE, map__pq=0.5),
-    )  # fmt: skip
+    )
     page = (tmp_path / "report" / "report.html").read_text()
     tags = parse(page)
     assert "<script" not in page
@@ -214,9 +239,10 @@ def test_parts_that_are_missing_have_no_section(tmp_path):
 
 def test_an_empty_map_and_graph_are_reported(tmp_path):
     made = report(
-        tmp_path / "report", panoptic_map=make_map(tmp_path / "map", ()),
+        tmp_path / "report",
+        panoptic_map=make_map(tmp_path / "map", ()),
         contact_graph=make_graph(tmp_path / "graph", graph_of(())),
-    )  # fmt: skip
+    )
     page = parse((made.root / "report.html").read_text())
     assert "0 entities in a map" in page.text
     assert "relations: none" in page.text
@@ -224,12 +250,29 @@ def test_an_empty_map_and_graph_are_reported(tmp_path):
 
 def manifest(command: tuple[str, ...] = ("scenewright", "ingest", "--log", "a b")) -> Manifest:
     return Manifest(
-        kind="sequence", schema_version=1, stage="ingest", stage_version=2, key="k" * 64, content_digest="d" * 64,
-        files=(), inputs=(InputRecord(role="log", kind="external", digest="e", path="../log"),), seed=5,
-        parameters={"every": 2}, libraries={"numpy": "2.4.6"}, outcome="ok", summary={"frames": 6},
-        provenance=Provenance(command=command, git_commit="c0ffee" * 7, git_dirty=True, platform="Linux",
-                              python="3.11", seconds=12.5, peak_memory_bytes=512_000_000),
-    )  # fmt: skip
+        kind="sequence",
+        schema_version=1,
+        stage="ingest",
+        stage_version=2,
+        key="k" * 64,
+        content_digest="d" * 64,
+        files=(),
+        inputs=(InputRecord(role="log", kind="external", digest="e", path="../log"),),
+        seed=5,
+        parameters={"every": 2},
+        libraries={"numpy": "2.4.6"},
+        outcome="ok",
+        summary={"frames": 6},
+        provenance=Provenance(
+            command=command,
+            git_commit="c0ffee" * 7,
+            git_dirty=True,
+            platform="Linux",
+            python="3.11",
+            seconds=12.5,
+            peak_memory_bytes=512_000_000,
+        ),
+    )
 
 
 def test_times_and_commands_come_from_the_manifests(tmp_path):
@@ -237,8 +280,17 @@ def test_times_and_commands_come_from_the_manifests(tmp_path):
     sequence = type(sequence)(sequence.root, manifest=manifest())
     made = report(tmp_path / "report", sequence=sequence)
     page = parse((made.root / "report.html").read_text())
-    for text in ("12.5 s", "512 MB", "ingest v2", "scenewright ingest --log 'a b'", "d" * 64, "c0ffeec0ffee with local",
-                 "numpy 2.4.6", '{"every": 2}', "frames.mcap"):  # fmt: skip
+    for text in (
+        "12.5 s",
+        "512 MB",
+        "ingest v2",
+        "scenewright ingest --log 'a b'",
+        "d" * 64,
+        "c0ffeec0ffee with local",
+        "numpy 2.4.6",
+        '{"every": 2}',
+        "frames.mcap",
+    ):
         assert text in page.text, text
     hrefs = {a["href"] for tag, a in page.seen if tag == "a"}
     assert "../sequence/frames.mcap" in hrefs
@@ -307,6 +359,7 @@ def test_metric_rows_pair_with_the_baseline(tmp_path):
     theirs = make_evaluation(tmp_path / "b", map__sq=0.25)
     groups = dict(metric_groups(ours, theirs))
     assert [(r.name[:8], r.value, r.baseline) for r in groups["Panoptic map"]] == [
-        ("Panoptic", "50.0 %", "–"), ("Segmenta", "–", "25.0 %")
-    ]  # fmt: skip
+        ("Panoptic", "50.0 %", "–"),
+        ("Segmenta", "–", "25.0 %"),
+    ]
     assert list(groups) == ["Panoptic map", "Counts"]

@@ -16,15 +16,7 @@ from stages.segment.geometric import (
     segment_depth,
 )
 from stages.segment.normals import surface_normals
-from tests.unit.segment.scenes import (
-    CAMERA,
-    best_overlap,
-    box_depth,
-    combine,
-    plane_depth,
-    rays,
-    sphere_depth,
-)
+from tests.unit.segment.scenes import CAMERA, best_overlap, box_depth, combine, plane_depth, rays, sphere_depth
 
 SMALL = GeometricSettings(normal_window=7, normal_step=1, minimum_pixels=600)
 """At 160x120 a window of 7 is what 13 is at about 320x240; 600 becomes 38 pixels."""

@@ -192,10 +192,15 @@ def test_what_folders_can_lack(folders: dict[str, Path], tmp_path: Path) -> None
     (blind / "preprocessor_config.json").write_text("[]")
     (nameless / "config.json").write_text(json.dumps({**config, "id2label": {str(k): f"LABEL_{k}" for k in range(5)}}))
     for folder, text in (
-        (pickled, "no .safetensors"), (torn, "cannot be loaded"), (wrong, "parameters are missing or of another shape"),
-        (other, "type 'bert'"), (garbled, "no JSON"), (blind, "preprocessor_config"), (nameless, "no table"),
+        (pickled, "no .safetensors"),
+        (torn, "cannot be loaded"),
+        (wrong, "parameters are missing or of another shape"),
+        (other, "type 'bert'"),
+        (garbled, "no JSON"),
+        (blind, "preprocessor_config"),
+        (nameless, "no table"),
         (tmp_path, "file is missing"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(BadInput, match=text) as caught:
             backend(folder)
         assert "\n" not in str(caught.value)

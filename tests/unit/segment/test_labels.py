@@ -65,8 +65,12 @@ def test_labels_are_matched_by_name_not_by_position() -> None:
     matched = match_labels(names, where="net")
     assert matched.set_name == "coco-panoptic" and matched.unknown == ("quark",)
     assert {number: label.class_name for number, label in matched.labels.items()} == {
-        7: "table", 3: "chair", 250: "wall", 5: "", 6: "wall",
-    }  # fmt: skip
+        7: "table",
+        3: "chair",
+        250: "wall",
+        5: "",
+        6: "wall",
+    }
     assert matched.stuff() == {5, 6, 7, 250}
     few = match_labels({0: "chair", 1: "table"}, where="net")
     assert few.set_name == "scenewright" and not few.stuff()  # somebody's own network: every table is one
@@ -79,8 +83,11 @@ def test_labels_are_matched_by_name_not_by_position() -> None:
 def test_words() -> None:
     labels = parse_words(["mug", " night stand ", "abacus", "blue thing = box  # a comment", "", "# nothing"], "words")
     assert [(label.name, label.class_name) for label in labels] == [
-        ("mug", "cup"), ("night stand", "cabinet"), ("abacus", "object"), ("blue thing", "box"),
-    ]  # fmt: skip
+        ("mug", "cup"),
+        ("night stand", "cabinet"),
+        ("abacus", "object"),
+        ("blue thing", "box"),
+    ]
     assert class_of_word("Dining_Table") == "table"
     for words, text in (
         (["cup = crockery"], "crockery"),
@@ -147,8 +154,10 @@ def test_segments_take_classes() -> None:
     )
     wall_id, cabinet_id = VOCABULARY.by_name("wall").id, VOCABULARY.by_name("cabinet").id
     assert [(m.category_id, m.is_thing, m.score) for m in found.masks.values()] == [
-        (wall_id, False, 0.9), (cabinet_id, True, 0.7), (cabinet_id, True, 0.7),
-    ]  # fmt: skip
+        (wall_id, False, 0.9),
+        (cabinet_id, True, 0.7),
+        (cabinet_id, True, 0.7),
+    ]
     assert found.ids[0, 0] == found.ids[0, 7] == 1  # one wall, of two kinds of wall
     assert found.ids[0, 4] == 2 and found.ids[5, 4] == 3  # two cabinets
     assert found.ids[0, 9] == 0 and found.ids[5, 9] == 0  # too small, no class
@@ -167,8 +176,10 @@ def test_overlapping_instances() -> None:
             InstanceMask(hidden, cup, 0.8),  # too small
             InstanceMask(np.zeros_like(top), cup, 0.99),
         ],
-        (6, 10), VOCABULARY, minimum_pixels=2,
-    )  # fmt: skip
+        (6, 10),
+        VOCABULARY,
+        minimum_pixels=2,
+    )
     assert [(VOCABULARY.by_id(m.category_id).name, m.score) for m in found.masks.values()] == [
         ("table", 0.9),
         ("cup", 0.5),

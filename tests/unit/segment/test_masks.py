@@ -175,9 +175,13 @@ def reply(image: np.ndarray, scores: bool) -> bytes:
 def through_service(room: Written, out: Path, scores: bool = True) -> Segments:
     images = truth(room)
     info = {
-        "protocol": PROTOCOL, "name": "mine", "revision": "1", "streams": ["color"], "required": ["color"],
+        "protocol": PROTOCOL,
+        "name": "mine",
+        "revision": "1",
+        "streams": ["color"],
+        "required": ["color"],
         "categories": CATEGORIES,
-    }  # fmt: skip
+    }
     with serving(FakeServer(lambda k: (200, {}, reply(images[k], scores)), json.dumps(info).encode())) as address:
         return segment(room, out, None, address)
 
@@ -467,10 +471,15 @@ def test_broken_folders(room: Written, tmp_path: Path, monkeypatch: pytest.Monke
         (folder / "readme.md").write_text("masks")
 
     cases = {
-        unlisted: "is not in segments_info", lost: "its image '000001.png' is not in", torn: "cannot hold",
-        beyond: "1 of 3 masks are of frames that are not there: 000009 (name 9)", bomb: "unpacks to more than",
-        pickled: "holds object", colours: "one channel", text: "holds no masks that are read here",
-    }  # fmt: skip
+        unlisted: "is not in segments_info",
+        lost: "its image '000001.png' is not in",
+        torn: "cannot hold",
+        beyond: "1 of 3 masks are of frames that are not there: 000009 (name 9)",
+        bomb: "unpacks to more than",
+        pickled: "holds object",
+        colours: "one channel",
+        text: "holds no masks that are read here",
+    }
     for write, message in cases.items():
         (tmp_path / write.__name__).mkdir()
         assert message in refusal(room, tmp_path / write.__name__, write), write.__name__
@@ -502,9 +511,12 @@ def test_the_script_of_the_page_writes_such_a_folder(room: Written, tmp_path: Pa
     script = tmp_path / "write_masks.py"
     script.write_text(block)
     done = subprocess.run(
-        [sys.executable, script], cwd=tmp_path, capture_output=True, text=True,
+        [sys.executable, script],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
         env={"PYTHONPATH": f"{REPOSITORY}:{tmp_path}", "PATH": "/usr/bin:/bin"},
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     made = segment(Written(Sequence(sequence), []), tmp_path / "segments", tmp_path / "outputs" / "room" / "masks")
     assert len(list((tmp_path / "outputs" / "room" / "masks").iterdir())) == FRAMES

@@ -32,8 +32,15 @@ def image() -> np.ndarray:
     return pixels
 
 
-def save(path: Path, nodes: list[Any], outputs: dict[str, list[Any]], constants: dict[str, np.ndarray], size: Any,
-         metadata: dict[str, str] | None = None, batch: bool = True) -> Path:  # fmt: skip
+def save(
+    path: Path,
+    nodes: list[Any],
+    outputs: dict[str, list[Any]],
+    constants: dict[str, np.ndarray],
+    size: Any,
+    metadata: dict[str, str] | None = None,
+    batch: bool = True,
+) -> Path:
     helper, kind = onnx.helper, onnx.TensorProto.FLOAT
     shape = [1, 3, *size] if batch else [3, *size]
     whole = {"int64": onnx.TensorProto.INT64, "float32": kind}
@@ -246,13 +253,17 @@ def test_bad_files(tmp_path: Path) -> None:
     sidecar = tmp_path / "sidecar.toml"
     good = 'layout = "panoptic"\nlabels = "coco-panoptic"\n[outputs]\nclasses = "classes"\nmasks = "masks"\n'
     for change, text in (
-        (('"panoptic"\n', '"boxes"\n'), "layout"), (('masks = "masks"', ""), "outputs are"),
+        (('"panoptic"\n', '"boxes"\n'), "layout"),
+        (('masks = "masks"', ""), "outputs are"),
         (('masks = "masks"', 'masks = "mask"'), "no output 'mask'"),
         (('"coco-panoptic"', '"imagenet"'), "no label set"),
-        (('"coco-panoptic"', '"ade20k"'), "has 133 classes, ade20k has 150"), (("layout", "layuot"), "layuot|layout"),
-        (("[outputs]", "size = [0, 3]\n[outputs]"), "size"), (("[outputs]", "scale = 0.0\n[outputs]"), "of 0"),
-        (("[outputs]", "deviation = [1.0, 0.0, 1.0]\n[outputs]"), "of 0"), ((good, "= ="), "line 1|Invalid"),
-    ):  # fmt: skip
+        (('"coco-panoptic"', '"ade20k"'), "has 133 classes, ade20k has 150"),
+        (("layout", "layuot"), "layuot|layout"),
+        (("[outputs]", "size = [0, 3]\n[outputs]"), "size"),
+        (("[outputs]", "scale = 0.0\n[outputs]"), "of 0"),
+        (("[outputs]", "deviation = [1.0, 0.0, 1.0]\n[outputs]"), "of 0"),
+        ((good, "= ="), "line 1|Invalid"),
+    ):
         sidecar.write_text(good.replace(*change))
         with pytest.raises(BadInput, match=text):
             found_by(sound, sidecar=sidecar)

@@ -112,9 +112,13 @@ class FakeServer(ThreadingHTTPServer):
     def __init__(self, answer: Callable[[int], tuple[int, dict[str, str], bytes]], info: bytes | None = None) -> None:
         self.answer, self.requests, self.bodies = answer, 0, []
         description = {
-            "protocol": PROTOCOL, "name": "fake", "revision": "1", "streams": ["color"], "required": ["color"],
+            "protocol": PROTOCOL,
+            "name": "fake",
+            "revision": "1",
+            "streams": ["color"],
+            "required": ["color"],
             "categories": [{**c.model_dump(), "supercategory": "x"} for c in CATEGORIES.values()],
-        }  # fmt: skip
+        }
         self.info = info if info is not None else json.dumps(description).encode()
         super().__init__(("127.0.0.1", 0), FakeHandler)
 
@@ -536,9 +540,13 @@ def test_a_port_that_is_taken() -> None:
         port = taken.getsockname()[1]
         with pytest.raises(MachineFailure, match="in use"):
             SegmentationServer(
-                "127.0.0.1", port, choose_backend(BackendRequest(parameters)), geometric_settings(parameters),
-                revision="", required=(),
-            )  # fmt: skip
+                "127.0.0.1",
+                port,
+                choose_backend(BackendRequest(parameters)),
+                geometric_settings(parameters),
+                revision="",
+                required=(),
+            )
 
 
 # ---- fuzz ----------------------------------------------------------------------------------------------------------
@@ -568,12 +576,7 @@ def test_fuzz_values_of_a_reply(key: str, value: Any) -> None:
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    st.fixed_dictionaries(
-        {},
-        optional={"id": VALUES, "category_id": VALUES, "score": VALUES, "isthing": VALUES},
-    )
-)
+@given(st.fixed_dictionaries({}, optional={"id": VALUES, "category_id": VALUES, "score": VALUES, "isthing": VALUES}))
 def test_fuzz_entries_of_a_reply(entry: dict[str, Any]) -> None:
     judged(json.dumps({**json.loads(GOOD), "segments_info": [{"id": 5, "category_id": 7}, {**entry}]}).encode())
     judged(

@@ -202,10 +202,19 @@ def fridge(x: float, y: float, yaw: float = 0.0, door_value: float = 1.6, name: 
     door += [((0.25, -0.327, height), (0.02, 0.04, 0.02)) for height in (0.72, 1.08)]
     pose = transform_from_yaw(yaw, np.array([x, y, 0.0]))
     return HandmadeBody(
-        name, "fridge", pose, boxes, "floor_1", mass=50.0, door=door, door_origin=(-0.3, -0.285, 0.0),
-        door_axis=(0, 0, -1), door_value=door_value, handle=(0.25, -0.35, 0.9),
+        name,
+        "fridge",
+        pose,
+        boxes,
+        "floor_1",
+        mass=50.0,
+        door=door,
+        door_origin=(-0.3, -0.285, 0.0),
+        door_axis=(0, 0, -1),
+        door_value=door_value,
+        handle=(0.25, -0.35, 0.9),
         supports=[(0, 0, height, 0.5, 0.5) for height in shelves],
-    )  # fmt: skip
+    )
 
 
 def bottle(
@@ -220,9 +229,15 @@ def bottle(
 def kitchen(door_value: float = 1.6) -> list[HandmadeBody]:
     """Floor, table, fridge with a bottle on its middle shelf, a cup on the table."""
     cup = HandmadeBody(
-        "cup_5", "cup", transform_from_yaw(0.0, np.array([-1.3, -0.75, 0.75])), [((0, 0, 0.05), (0.07, 0.07, 0.1))],
-        "table_3", movable=True, mass=0.2, grasp_width=0.07,
-    )  # fmt: skip
+        "cup_5",
+        "cup",
+        transform_from_yaw(0.0, np.array([-1.3, -0.75, 0.75])),
+        [((0, 0, 0.05), (0.07, 0.07, 0.1))],
+        "table_3",
+        movable=True,
+        mass=0.2,
+        grasp_width=0.07,
+    )
     return [
         floor(),
         fridge(1.0, 1.5, door_value=door_value),

@@ -25,9 +25,16 @@ def block(name: str, center: tuple[float, float, float], size: tuple[float, floa
 def drawer(door_upper: float = 0.4) -> HandmadeBody:
     """A chest with one drawer that opens along -y from y = -0.3, 0.4 m wide and 0.2 m high."""
     return HandmadeBody(
-        "chest_2", "cabinet", np.eye(4), [((0, 0.05, 0.5), (0.4, 0.4, 0.1))], "floor_1",
-        door=[((0, -0.2, 0.7), (0.4, 0.2, 0.2))], door_axis=(0, -1, 0), door_upper=door_upper, door_type="prismatic",
-    )  # fmt: skip
+        "chest_2",
+        "cabinet",
+        np.eye(4),
+        [((0, 0.05, 0.5), (0.4, 0.4, 0.1))],
+        "floor_1",
+        door=[((0, -0.2, 0.7), (0.4, 0.2, 0.2))],
+        door_axis=(0, -1, 0),
+        door_upper=door_upper,
+        door_type="prismatic",
+    )
 
 
 def report_of(folder: Path, bodies: list[HandmadeBody], seconds: float = 1.0) -> SettleReport:

@@ -43,8 +43,10 @@ def test_a_door_stays_where_it_was_left(scene: Path) -> None:
 
 
 def test_an_unsupported_body_falls_and_a_supported_one_stays(tmp_path: Path) -> None:
-    write_scene(tmp_path, [floor(), bottle(0.0, 0.0, 1.0, "floor_1", name="bottle_1"),
-                           bottle(1.0, 0.0, 0.0, "floor_1", name="bottle_2")])  # fmt: skip
+    write_scene(
+        tmp_path,
+        [floor(), bottle(0.0, 0.0, 1.0, "floor_1", name="bottle_1"), bottle(1.0, 0.0, 0.0, "floor_1", name="bottle_2")],
+    )
     with load_scene(tmp_path) as world:
         moved = world.settle(1.5)
         assert moved["bottle_1"] > 0.9

@@ -15,12 +15,25 @@ from stages.suture.trials.perception import FOLDER, perception_model
 def estimate(case: str, seed: int, holder: str = "air", answered: bool = True, wrong: str = "") -> Estimate:
     swapped, stray = wrong == "swapped", wrong == "stray"
     return Estimate(
-        arm="ours", case=case, seed=seed, holder=holder, place="corner", degrees_from_edge_on=40.0, seen=0.9,
-        answered=answered, guessed=True, reason="" if answered else "why", normal_error_deg=20.0 if stray else 2.0,
-        centre_error_mm=3.0 if stray else 0.3, tip_error_mm=24.0 if swapped else 1.0,
-        swage_error_mm=24.0 if swapped else 12.0 if stray else 1.0, end_error_mm=1.0, swapped=swapped, mahalanobis=4.0,
+        arm="ours",
+        case=case,
+        seed=seed,
+        holder=holder,
+        place="corner",
+        degrees_from_edge_on=40.0,
+        seen=0.9,
+        answered=answered,
+        guessed=True,
+        reason="" if answered else "why",
+        normal_error_deg=20.0 if stray else 2.0,
+        centre_error_mm=3.0 if stray else 0.3,
+        tip_error_mm=24.0 if swapped else 1.0,
+        swage_error_mm=24.0 if swapped else 12.0 if stray else 1.0,
+        end_error_mm=1.0,
+        swapped=swapped,
+        mahalanobis=4.0,
         tip_probability=0.9,
-    )  # fmt: skip
+    )
 
 
 def records() -> list[Estimate]:

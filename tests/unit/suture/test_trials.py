@@ -45,9 +45,19 @@ from stages.suture.trials.thread import Thread, draw, pull_on, pull_through
 from stages.suture.trials.wound import CHORD, HOLE_HEIGHT, entry, exit_, passage
 
 STILL_WORLD = World(
-    thread_shortest=0.30, thread_longest=0.30, loading_normal=0, loading_in_plane=0, hand_eye=0, closing_normal=0,
-    closing_in_plane=0, insertion_slip=0, knock=0, knock_held=0, stitch_noise=0, sweep_height_noise=0,
-)  # fmt: skip
+    thread_shortest=0.30,
+    thread_longest=0.30,
+    loading_normal=0,
+    loading_in_plane=0,
+    hand_eye=0,
+    closing_normal=0,
+    closing_in_plane=0,
+    insertion_slip=0,
+    knock=0,
+    knock_held=0,
+    stitch_noise=0,
+    sweep_height_noise=0,
+)
 
 
 def perfect(name: str = "ours") -> PerceptionModel:
@@ -429,10 +439,21 @@ def test_frames_are_recorded_and_drawn(tmp_path: Path) -> None:
 def test_tables_count_as_they_say() -> None:
     def run(arm: str, seed: int, sutures: int, errors: str) -> SutureRun:
         return SutureRun(
-            arm=arm, seed=seed, sutures=sutures, sutures_neutral=sutures, attempts=sutures + len(errors), seconds=100.0,
-            errors=errors, reasons=("why",) * len(errors), interventions=0, looks=10, right=4, abstained=0,
-            stopped_short=0, thread_length=0.3,
-        )  # fmt: skip
+            arm=arm,
+            seed=seed,
+            sutures=sutures,
+            sutures_neutral=sutures,
+            attempts=sutures + len(errors),
+            seconds=100.0,
+            errors=errors,
+            reasons=("why",) * len(errors),
+            interventions=0,
+            looks=10,
+            right=4,
+            abstained=0,
+            stopped_short=0,
+            thread_length=0.3,
+        )
 
     runs = [
         run("thesis", 1000, 3, "I"),

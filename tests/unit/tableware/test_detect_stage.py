@@ -99,9 +99,12 @@ def test_a_photograph_has_outlines_without_heights(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("options", "said"),
-    [({"picture_width": 1.0}, "--picture-width"), ({"photograph": True, "sizes": "estimated"}, "--sizes"),
-     ({"photograph": True, "overhead": True}, "colour alone")],
-)  # fmt: skip
+    [
+        ({"picture_width": 1.0}, "--picture-width"),
+        ({"photograph": True, "sizes": "estimated"}, "--sizes"),
+        ({"photograph": True, "overhead": True}, "colour alone"),
+    ],
+)
 def test_options_that_contradict_are_refused(options: dict[str, Any], said: str) -> None:
     with pytest.raises(UsageError, match=said):
         check_inputs(DetectParameters(**options), {})
@@ -119,10 +122,13 @@ def test_files_that_cannot_be_read_are_refused(scene: Path, tmp_path: Path) -> N
     (tmp_path / "short.npz").write_bytes(b"PK")
     color = scene / "color.png"
     for image, depth, said in (
-        (tmp_path / "none.png", None, "no such file"), (tmp_path / "text.png", None, "no image"),
-        (tmp_path / "empty", None, "no colour image"), (color, color, "not 16 bits"),
-        (color, tmp_path / "three.npy", "the depth is"), (color, tmp_path / "short.npz", "not a zip file"),
-    ):  # fmt: skip
+        (tmp_path / "none.png", None, "no such file"),
+        (tmp_path / "text.png", None, "no image"),
+        (tmp_path / "empty", None, "no colour image"),
+        (color, color, "not 16 bits"),
+        (color, tmp_path / "three.npy", "the depth is"),
+        (color, tmp_path / "short.npz", "not a zip file"),
+    ):
         with pytest.raises(BadInput, match=said) as refusal:
             read_image(image, depth)
         assert refusal.value.hint
@@ -154,8 +160,13 @@ def test_detections_that_cannot_be_are_refused() -> None:
 
 
 def test_the_score_tells_errors_misses_confusions_and_things_in_vain() -> None:
-    table = Table((make_item("cup_1", "cup", 0.0, 0.0), make_item("fork_1", "fork", 0.2, 0.0, 0.5),
-                   make_item("bowl_1", "bowl", -0.2, 0.0)))  # fmt: skip
+    table = Table(
+        (
+            make_item("cup_1", "cup", 0.0, 0.0),
+            make_item("fork_1", "fork", 0.2, 0.0, 0.5),
+            make_item("bowl_1", "bowl", -0.2, 0.0),
+        )
+    )
     found = (
         Detection("cup", (0.003, 0.004, 0.0), lip=0.08, confidence=0.97),
         Detection("spoon", (0.2, 0.001, 0.0), yaw=0.5, lip=0.003, confidence=0.7, unsure=("fork or spoon",)),
@@ -201,10 +212,25 @@ def test_the_error_model_is_measured_and_whole() -> None:
 
 
 def test_sampled_detections_err_as_the_model_says() -> None:
-    errors = KindErrors(items=1, position_sigma=0.002, miss_rate=0.2, confused_as={"spoon": 0.1}, false_rate=0.0,
-                        yaw_sigma=0.01, turned_rate=0.0)  # fmt: skip
-    model = ErrorModel(date="", commit="", command="", seeds="", images=1, conditions="", unknown_rate=0.0,
-                       kinds=dict.fromkeys(MEASURES, errors))  # fmt: skip
+    errors = KindErrors(
+        items=1,
+        position_sigma=0.002,
+        miss_rate=0.2,
+        confused_as={"spoon": 0.1},
+        false_rate=0.0,
+        yaw_sigma=0.01,
+        turned_rate=0.0,
+    )
+    model = ErrorModel(
+        date="",
+        commit="",
+        command="",
+        seeds="",
+        images=1,
+        conditions="",
+        unknown_rate=0.0,
+        kinds=dict.fromkeys(MEASURES, errors),
+    )
     table = Table((make_item("bowl_1", "bowl", 0.0, 0.0), make_item("fork_1", "fork", 0.0, 0.0, 1.0, 0.07, "bowl_1")))
     random = np.random.default_rng(0)
     draws = [sampled_detections(table, random, model) for _ in range(3000)]
@@ -215,7 +241,13 @@ def test_sampled_detections_err_as_the_model_says() -> None:
     assert np.std([one[0].position[0] for one in both]) == pytest.approx(0.002, rel=0.1)
     assert np.mean([one[1].kind == "spoon" for one in both]) == pytest.approx(0.1, abs=0.03)
     nothing_wrong = ErrorModel(
-        date="", commit="", command="", seeds="", images=1, conditions="", unknown_rate=0.0,
+        date="",
+        commit="",
+        command="",
+        seeds="",
+        images=1,
+        conditions="",
+        unknown_rate=0.0,
         kinds=dict.fromkeys(MEASURES, KindErrors(items=1, position_sigma=0.0, miss_rate=0.0, false_rate=0.0)),
-    )  # fmt: skip
+    )
     assert as_table(sampled_detections(table, random, nothing_wrong)).items[1].position == table.items[1].position

@@ -40,8 +40,10 @@ def test_utensil_is_closed_and_has_its_volume(kind, arch):
     assert mesh.bounds[0, 2] == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize(("upper", "lower"), [("cup", "cup"), ("bowl", "bowl"), ("plate", "plate"), ("cup", "bowl"),
-                                              ("cup", "plate"), ("bowl", "plate")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("upper", "lower"),
+    [("cup", "cup"), ("bowl", "bowl"), ("plate", "plate"), ("cup", "bowl"), ("cup", "plate"), ("bowl", "plate")],
+)
 def test_stacked_dishes_touch_and_do_not_meet(upper, lower):
     """Heights by `items.rise`: every ring of the upper is inside the hollow of the lower, and one touches."""
     above, below = MEASURES[upper], MEASURES[lower]

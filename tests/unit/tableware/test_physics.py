@@ -34,9 +34,13 @@ from stages.tableware.world.items import MEASURES, Item, Kind, Table, make_item,
 from tests.unit.tableware.volumes import shell_volume
 
 DENAVIT_HARTENBERG = (
-    (0.089159, 0.0, pi / 2), (0.0, -0.425, 0.0), (0.0, -0.39225, 0.0), (0.10915, 0.0, pi / 2),
-    (0.09465, 0.0, -pi / 2), (0.0823 + 0.163, 0.0, 0.0),
-)  # fmt: skip
+    (0.089159, 0.0, pi / 2),
+    (0.0, -0.425, 0.0),
+    (0.0, -0.39225, 0.0),
+    (0.10915, 0.0, pi / 2),
+    (0.09465, 0.0, -pi / 2),
+    (0.0823 + 0.163, 0.0, 0.0),
+)
 """d, a, alpha of the UR5; the last with the hand's length."""
 
 
@@ -250,10 +254,21 @@ def test_key_frames_are_in_order_and_end_with_the_last() -> None:
 def test_the_times_of_the_arm_are_found_back_and_those_kept_say_where_they_are_from() -> None:
     def run(trips: int, stacks: int, pulls: int, dropped: int = 0) -> Run:
         return Run(
-            trips=trips, looks=0, losses=(),
-            time=6.0 * trips + 5.0 * stacks + 4.0 * pulls + 90 * dropped, moved=12, pulls=pulls, stacks=stacks,
-            dropped=dropped, left=0, actions=6, perception=0, policy=0, troubles=(), cpu_seconds=1.0,
-        )  # fmt: skip
+            trips=trips,
+            looks=0,
+            losses=(),
+            time=6.0 * trips + 5.0 * stacks + 4.0 * pulls + 90 * dropped,
+            moved=12,
+            pulls=pulls,
+            stacks=stacks,
+            dropped=dropped,
+            left=0,
+            actions=6,
+            perception=0,
+            policy=0,
+            troubles=(),
+            cpu_seconds=1.0,
+        )
 
     found = fit([run(6, 0, 4), run(12, 0, 0), run(6, 6, 0), run(5, 2, 1), run(9, 9, 9, dropped=1)])
     assert found == pytest.approx((6.0, 5.0, 4.0, 0.0), abs=1e-6)

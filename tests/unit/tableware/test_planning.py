@@ -188,9 +188,7 @@ def test_refusals_name_their_reasons() -> None:
     found = accept(table, {"b": Doubt(0.2, ("glare",))}, (Unknown("unknown_1", 0.1, 0.1, 0.04),), 0.5, RULES)
     assert not found.table.items and len(found.table.obstacles) == 4
     reasons = {one.name: one.reason for one in found.refused}
-    assert reasons == {
-        "unknown_1": "unknown_object", "a": "in_a_refused_pile", "b": "unsure", "c": "outside_workspace",
-    }  # fmt: skip
+    assert reasons == {"unknown_1": "unknown_object", "a": "in_a_refused_pile", "b": "unsure", "c": "outside_workspace"}
     assert "glare" in statement(found) and "\n" not in statement(found)
     assert statement(accept(Table(()), {}, (), 0.5, RULES)) == "the table is empty: nothing to clear"
     edge = Table((make_item("d", "cup", 0.346, 0.0), make_item("e", "fork", 0.0, 0.2))).moved("e", 0.346, 0.0, on="d")
@@ -231,9 +229,12 @@ def test_actions_survive_their_records() -> None:
     table = Table((make_item("a", "cup", -0.2, 0.0), make_item("b", "cup", 0.1, 0.0), make_item("c", "bowl", 0.1, 0.2)))
     chances = with_thesis_failures()
     actions = (
-        grasp(table, "a", 0.3), pull(table, "a", "b", RULES), pull_grasp(table, "a", "b", RULES),
-        stack(table, "b", "c"), stack_grasp(table, "b", "c"),
-    )  # fmt: skip
+        grasp(table, "a", 0.3),
+        pull(table, "a", "b", RULES),
+        pull_grasp(table, "a", "b", RULES),
+        stack(table, "b", "c"),
+        stack_grasp(table, "b", "c"),
+    )
     for action in actions:
         record = TablewareAction.model_validate_json(as_record(action, table, MODEL, chances).model_dump_json())
         assert as_action(record) == action

@@ -17,11 +17,16 @@ VIEW = overhead_camera()
 
 @pytest.mark.parametrize(
     ("depth", "said"),
-    [(np.zeros((720, 1280)), "0% of the pixels"), (np.full((720, 1280), 830.0), "in metres"),
-     (np.full((720, 1280), 0.00083), "0.00083"), (np.full((720, 1280), 0.70), "no table"),
-     (np.zeros((360, 640)), "the depth image is"), (np.full((720, 1280), np.nan), "no numbers"),
-     (None, "no depth image")],
-)  # fmt: skip
+    [
+        (np.zeros((720, 1280)), "0% of the pixels"),
+        (np.full((720, 1280), 830.0), "in metres"),
+        (np.full((720, 1280), 0.00083), "0.00083"),
+        (np.full((720, 1280), 0.70), "no table"),
+        (np.zeros((360, 640)), "the depth image is"),
+        (np.full((720, 1280), np.nan), "no numbers"),
+        (None, "no depth image"),
+    ],
+)
 def test_useless_depth_is_refused_in_one_line(depth, said):
     with pytest.raises(BadInput, match=said) as refusal:
         see_image(np.zeros((720, 1280, 3), dtype=np.uint8), depth, VIEW)

@@ -77,9 +77,12 @@ def test_an_unseen_head_leaves_the_kind_in_doubt():
 def flat(shape=(240, 240)):
     """Return a map of heights over a bare table, as far as reading a utensil goes."""
     return SimpleNamespace(
-        smooth=np.zeros(shape, np.float32), raw=np.zeros(shape, np.float32), valid=np.ones(shape, bool),
-        scale=lambda z: SCALE, world=lambda u, v, z: ((u - 120.0) / SCALE, -(v - 120.0) / SCALE),
-    )  # fmt: skip
+        smooth=np.zeros(shape, np.float32),
+        raw=np.zeros(shape, np.float32),
+        valid=np.ones(shape, bool),
+        scale=lambda z: SCALE,
+        world=lambda u, v, z: ((u - 120.0) / SCALE, -(v - 120.0) / SCALE),
+    )
 
 
 @pytest.mark.parametrize(
@@ -134,10 +137,14 @@ def heights_for_doubt(white=0.0):
 
 @pytest.mark.parametrize(
     ("lip", "depth_share", "white", "crossed", "reason"),
-    [(0.080, 1.0, 0.0, False, None), (0.070, 1.0, 0.0, False, "a stack of unknown height"),
-     (0.080, 0.2, 0.0, False, "no depth"), (0.080, 1.0, 0.6, False, "glare"),
-     (0.080, 1.0, 0.0, True, "overlapping rims")],
-)  # fmt: skip
+    [
+        (0.080, 1.0, 0.0, False, None),
+        (0.070, 1.0, 0.0, False, "a stack of unknown height"),
+        (0.080, 0.2, 0.0, False, "no depth"),
+        (0.080, 1.0, 0.6, False, "glare"),
+        (0.080, 1.0, 0.0, True, "overlapping rims"),
+    ],
+)
 def test_a_dishs_doubts_have_reasons_and_cost_confidence(lip, depth_share, white, crossed, reason):
     rim = Rim("cup", 0.0, 0.0, lip, 0.9, depth_share)
     (stack,) = read_stacks([rim])

@@ -17,16 +17,36 @@ BLOCKS = Domain(
     {"block": ""},
     {"on": ("block", "block"), "table": ("block",), "clear": ("block",), "holding": ("block",), "empty": ()},
     (
-        Schema("pick", (("?x", "block"),), (("table", "?x"), ("clear", "?x"), ("empty",)), (("holding", "?x"),),
-               (("table", "?x"), ("clear", "?x"), ("empty",))),
-        Schema("drop", (("?x", "block"),), (("holding", "?x"),), (("table", "?x"), ("clear", "?x"), ("empty",)),
-               (("holding", "?x"),)),
-        Schema("stack", (("?x", "block"), ("?y", "block")), (("holding", "?x"), ("clear", "?y")),
-               (("on", "?x", "?y"), ("clear", "?x"), ("empty",)), (("holding", "?x"), ("clear", "?y"))),
-        Schema("unstack", (("?x", "block"), ("?y", "block")), (("on", "?x", "?y"), ("clear", "?x"), ("empty",)),
-               (("holding", "?x"), ("clear", "?y")), (("on", "?x", "?y"), ("clear", "?x"), ("empty",))),
+        Schema(
+            "pick",
+            (("?x", "block"),),
+            (("table", "?x"), ("clear", "?x"), ("empty",)),
+            (("holding", "?x"),),
+            (("table", "?x"), ("clear", "?x"), ("empty",)),
+        ),
+        Schema(
+            "drop",
+            (("?x", "block"),),
+            (("holding", "?x"),),
+            (("table", "?x"), ("clear", "?x"), ("empty",)),
+            (("holding", "?x"),),
+        ),
+        Schema(
+            "stack",
+            (("?x", "block"), ("?y", "block")),
+            (("holding", "?x"), ("clear", "?y")),
+            (("on", "?x", "?y"), ("clear", "?x"), ("empty",)),
+            (("holding", "?x"), ("clear", "?y")),
+        ),
+        Schema(
+            "unstack",
+            (("?x", "block"), ("?y", "block")),
+            (("on", "?x", "?y"), ("clear", "?x"), ("empty",)),
+            (("holding", "?x"), ("clear", "?y")),
+            (("on", "?x", "?y"), ("clear", "?x"), ("empty",)),
+        ),
     ),
-)  # fmt: skip
+)
 
 
 def tower_problem(names: str, goal: str) -> Problem:

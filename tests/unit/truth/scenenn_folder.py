@@ -84,8 +84,18 @@ def labelled_mesh(relabel: dict[int, int] | None = None) -> tuple[np.ndarray, np
 
 def ply_bytes(vertices: np.ndarray, faces: np.ndarray, labels: np.ndarray, *, text: bool = False) -> bytes:
     """The columns of SceneNN's meshes: position, normal, label, colour."""
-    kinds = {"x": "float", "y": "float", "z": "float", "nx": "float", "ny": "float", "nz": "float", "label": "uint",
-             "red": "uchar", "green": "uchar", "blue": "uchar"}  # fmt: skip
+    kinds = {
+        "x": "float",
+        "y": "float",
+        "z": "float",
+        "nx": "float",
+        "ny": "float",
+        "nz": "float",
+        "label": "uint",
+        "red": "uchar",
+        "green": "uchar",
+        "blue": "uchar",
+    }
     types = {"float": "<f4", "uint": "<u4", "uchar": "u1"}
     table = np.zeros(len(vertices), np.dtype([(name, types[kind]) for name, kind in kinds.items()]))
     for k, name in enumerate("xyz"):

@@ -37,15 +37,7 @@ from stages.truth.labelled_mesh import read_labelled_mesh
 from stages.truth.parameters import SceneNNParameters
 from stages.truth.stage import read_words, run
 from stages.truth.surface import surface_points
-from tests.unit.truth.scenenn_folder import (
-    ROOM,
-    SCENE,
-    VOID,
-    annotation,
-    labelled_mesh,
-    ply_bytes,
-    write_folder,
-)
+from tests.unit.truth.scenenn_folder import ROOM, SCENE, VOID, annotation, labelled_mesh, ply_bytes, write_folder
 
 
 def context(folder: Path) -> Context:
@@ -70,9 +62,12 @@ def truth(scene, sequence, tmp_path_factory) -> GroundTruth:
 
 def make(scene: Path, sequence: Sequence, out: Path, **parameters) -> GroundTruth:
     return run(
-        scene / f"{SCENE}.xml", scene / f"{SCENE}.ply", sequence,
-        parameters=SceneNNParameters(**parameters), context=context(out),
-    )  # fmt: skip
+        scene / f"{SCENE}.xml",
+        scene / f"{SCENE}.ply",
+        sequence,
+        parameters=SceneNNParameters(**parameters),
+        context=context(out),
+    )
 
 
 def test_classes_and_instances_come_back(truth):
@@ -106,12 +101,19 @@ def test_the_annotation_evaluated_against_itself_is_perfect(truth):
     room = load_truth(truth, np.eye(4), parameters.minimum_visible_points)
     entities = tuple(
         Entity(
-            instance=entry.instance, class_name=entry.class_name, mesh="entities/1.ply",
-            vertices=int((room.instances == entry.instance).sum()), triangles=1, box_minimum=(0, 0, 0),
-            box_maximum=(1, 1, 1), confidence=1.0, observations=1, segments=(entry.instance,),
+            instance=entry.instance,
+            class_name=entry.class_name,
+            mesh="entities/1.ply",
+            vertices=int((room.instances == entry.instance).sum()),
+            triangles=1,
+            box_minimum=(0, 0, 0),
+            box_maximum=(1, 1, 1),
+            confidence=1.0,
+            observations=1,
+            segments=(entry.instance,),
         )
         for entry in room.objects
-    )  # fmt: skip
+    )
     info = EntitiesFile(
         voxel_size=0.01, truncation_distance=0.04, frames_integrated=1, segmentation="the annotation", entities=entities
     )
@@ -122,9 +124,17 @@ def test_the_annotation_evaluated_against_itself_is_perfect(truth):
     measure_instances(part, room, predicted, labels, parameters)
     measure_boxes(part, room, truth.graph, {}, parameters)
     for measure in (
-        "pq", "sq", "rq", "pq_stuff", "pq_thing", "pq_thesis_code", "instance_ap50", "instance_ap50_thesis_code",
-        "obb_ap50_observed", "obb_ap50_refined",
-    ):  # fmt: skip
+        "pq",
+        "sq",
+        "rq",
+        "pq_stuff",
+        "pq_thing",
+        "pq_thesis_code",
+        "instance_ap50",
+        "instance_ap50_thesis_code",
+        "obb_ap50_observed",
+        "obb_ap50_refined",
+    ):
         assert part.metrics[f"map/{measure}"] == 1.0, measure
     assert part.metrics["map/classes"] == 5
 
@@ -137,9 +147,11 @@ def test_the_truth_is_not_moved_twice(truth, sequence, tmp_path):
     still, given = load_truth(truth, np.eye(4), least), load_truth(truth, world_from_log, least)
     assert np.array_equal(still.points, given.points) and still.objects == given.objects
     made = evaluate(
-        ground_truth=truth, sequence=sequence, parameters=EvaluateParameters(plots=False),
+        ground_truth=truth,
+        sequence=sequence,
+        parameters=EvaluateParameters(plots=False),
         context=context(tmp_path / "evaluation"),
-    )  # fmt: skip
+    )
     assert made.outcome == "ok"
 
 
@@ -174,8 +186,10 @@ def test_the_thesis_s_words():
 @pytest.mark.parametrize(
     ("xml", "message"),
     [
-        ('<!DOCTYPE a [<!ENTITY b "bbbb"><!ENTITY c "&b;&b;">]><annotation><label id="1" text="&c;"/></annotation>',
-         "document type"),
+        (
+            '<!DOCTYPE a [<!ENTITY b "bbbb"><!ENTITY c "&b;&b;">]><annotation><label id="1" text="&c;"/></annotation>',
+            "document type",
+        ),
         ('<!DOCTYPE a SYSTEM "file:///etc/passwd"><annotation><label id="1" text="a"/></annotation>', "document type"),
         ('<annotation><label id="1" text="a"></annotation>', "well-formed"),
         ("<annotation/>", "no label"),
@@ -187,7 +201,7 @@ def test_the_thesis_s_words():
         ('<annotation><label id="3"/><label id="3"/></annotation>', "twice"),
         ("", "well-formed"),
     ],
-)  # fmt: skip
+)
 def test_bad_annotations_are_told(tmp_path, xml, message):
     path = tmp_path / "011.xml"
     path.write_text(xml)

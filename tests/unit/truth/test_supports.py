@@ -97,9 +97,13 @@ def test_boxes_in_the_world_take_the_points_within_and_the_smallest_wins(sequenc
     assert len(points[owner == 1]) > 1000 and (np.abs(points[owner == 1][:, 2]) <= 0.031).all()
     links = {(link.source, link.target, link.relation) for link in truth.graph.links}
     assert links == {
-        ("scene", "floor", "supports"), ("floor", "table", "supports"), ("table", "tray", "supports"),
-        ("far", "tray", "also_supports"), ("floor", "tray", "leans_on"), ("scene", "far", "supports"),
-    }  # fmt: skip
+        ("scene", "floor", "supports"),
+        ("floor", "table", "supports"),
+        ("table", "tray", "supports"),
+        ("far", "tray", "also_supports"),
+        ("floor", "tray", "leans_on"),
+        ("scene", "far", "supports"),
+    }
     assert truth.summary["unseen"] == 1
 
 
@@ -119,8 +123,9 @@ def test_labels_are_found_in_the_label_images(sequence, tmp_path):
 
 def test_points_take_the_surface_of_the_map_s_entity(sequence, tmp_path):
     """Two points name one entity: it is shared. A point far from every entity finds nothing."""
-    panoptic_map = write_map(tmp_path / "map", {5: box_mesh((-0.6, -0.4, 0), (0.6, 0.4, 0.72)).subdivide_to_size(0.02)},
-                             {5: "table"})  # fmt: skip
+    panoptic_map = write_map(
+        tmp_path / "map", {5: box_mesh((-0.6, -0.4, 0), (0.6, 0.4, 0.72)).subdivide_to_size(0.02)}, {5: "table"}
+    )
     document = copy.deepcopy(BY_BOXES)
     document["nodes"] = [
         {"name": "left", "class": "table", "find": {"point": [-0.6, 0, 0.5]}},
@@ -157,9 +162,11 @@ def test_evaluate_scores_a_graph_against_the_annotation(sequence, tmp_path, pare
     truth = make(BY_BOXES, sequence, tmp_path)
     graph = predicted_graph(truth, tmp_path / "graph", parent)
     made = evaluate(
-        ground_truth=truth, contact_graph=graph, parameters=EvaluateParameters(plots=False),
+        ground_truth=truth,
+        contact_graph=graph,
+        parameters=EvaluateParameters(plots=False),
         context=context(tmp_path / "evaluation"),
-    )  # fmt: skip
+    )
     metrics = json.loads((made.root / "metrics.json").read_text())["metrics"]
     assert metrics["graph/edit_distance"] == distance
     assert metrics["graph/wrong_supports"] == distance / 2
@@ -179,9 +186,11 @@ def test_optional_things_are_neither_missed_nor_extra(sequence, tmp_path):
     ContactGraphFile(nodes=nodes, links=links).write(without.root / "graph.json")
     for number, graph in enumerate((whole, without)):
         made = evaluate(
-            ground_truth=truth, contact_graph=graph, parameters=EvaluateParameters(plots=False),
+            ground_truth=truth,
+            contact_graph=graph,
+            parameters=EvaluateParameters(plots=False),
             context=context(tmp_path / f"evaluation{number}"),
-        )  # fmt: skip
+        )
         metrics = json.loads((made.root / "metrics.json").read_text())["metrics"]
         assert metrics["graph/missing_detections"] == metrics["graph/wrong_detections"] == 0
         assert metrics["graph/supports_f1"] == 1.0

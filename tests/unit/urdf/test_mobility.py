@@ -33,12 +33,16 @@ def graph_with(
     nodes = [
         GraphNode(id=SCENE_NODE, instance=0, class_name=SCENE_NODE, node_type="scene"),
         GraphNode(
-            id="floor_1", instance=1, class_name="floor", node_type="layout", planes=(FLOOR,),
+            id="floor_1",
+            instance=1,
+            class_name="floor",
+            node_type="layout",
+            planes=(FLOOR,),
             box=Box(center=(0, 0, 0), size=(6, 6, 0.02)),
         ),
         GraphNode(id="thing_2", instance=2, class_name=class_name, node_type="rigid", box=box),
         GraphNode(id="cup_3", instance=3, class_name="cup", node_type="rigid", box=top),
-    ]  # fmt: skip
+    ]
     links = [
         Relation(source=SCENE_NODE, target="floor_1", relation="supports", confidence=1.0),
         Relation(source="floor_1", target="thing_2", relation=relation, confidence=1.0, plane=0),  # type: ignore[arg-type]
@@ -61,7 +65,7 @@ def graph_with(
         (graph_with("object", size=0.3), Mobility(False)),  # 0.8 m high
         (graph_with("sofa", size=1.8), FREE),
     ],
-)  # fmt: skip
+)
 def test_what_is_free(graph: ContactGraphFile, expected: Mobility) -> None:
     node = next(node for node in graph.nodes if node.id == "thing_2")
     assert mobility(graph, node, CARRIABLE, ()) == expected

@@ -26,15 +26,30 @@ VALUES = {"hinge": 0.7, "slide": 0.2}
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A cupboard 0.6 m wide; its door turns about z at x = -0.3, a tray on the door slides along x."""
     joints = (
-        Joint(name="slide", type="prismatic", part="tray", parent="door", origin=(-0.1, -0.35, 0.5), axis=(1, 0, 0),
-              lower=0.0, upper=0.3),
-        Joint(name="hinge", type="revolute", part="door", origin=(-0.3, -0.25, 0.0), axis=(0, 0, -1), lower=0.0,
-              upper=1.5),
-    )  # fmt: skip
+        Joint(
+            name="slide",
+            type="prismatic",
+            part="tray",
+            parent="door",
+            origin=(-0.1, -0.35, 0.5),
+            axis=(1, 0, 0),
+            lower=0.0,
+            upper=0.3,
+        ),
+        Joint(
+            name="hinge", type="revolute", part="door", origin=(-0.3, -0.25, 0.0), axis=(0, 0, -1), lower=0.0, upper=1.5
+        ),
+    )
     model = CadModel(
-        id="cupboard", class_name="cabinet", articulated=True, mass=100.0, states=(), joints=joints, movable=False,
+        id="cupboard",
+        class_name="cabinet",
+        articulated=True,
+        mass=100.0,
+        states=(),
+        joints=joints,
+        movable=False,
         parts=("body", "tray", "door"),
-    )  # fmt: skip
+    )
     blocks = {
         "body": box((-0.3, 0.3), (-0.25, 0.25), (0.0, 1.0)),
         "tray": box((-0.1, 0.1), (-0.05, 0.05), (0.0, 0.05)),
@@ -61,10 +76,18 @@ def expected_tray(scale: float) -> np.ndarray:
 def body(folder: Path, scale: float) -> BundleBody:
     model = read_model(folder)
     return BundleBody(
-        name="cabinet_1", class_name="cabinet", parent=None, relation="supports", world_from_body=np.eye(4),
-        movable=False, box=Box(center=(0, 0, 0.5), size=(0.6, 0.5, 1.0)), model=model, model_folder=folder,
-        scale=scale, joint_values=VALUES,
-    )  # fmt: skip
+        name="cabinet_1",
+        class_name="cabinet",
+        parent=None,
+        relation="supports",
+        world_from_body=np.eye(4),
+        movable=False,
+        box=Box(center=(0, 0, 0.5), size=(0.6, 0.5, 1.0)),
+        model=model,
+        model_folder=folder,
+        scale=scale,
+        joint_values=VALUES,
+    )
 
 
 def test_the_model_moves_what_hangs_on_a_moving_part(folder: Path) -> None:

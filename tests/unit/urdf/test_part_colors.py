@@ -40,10 +40,7 @@ def test_shapes_are_weighted_by_their_surface(tmp_path: Path) -> None:
     """A box of 1 m and one of 2 m: a quarter of the surface weighs as much as four quarters."""
     cube = trimesh.creation.box((1, 1, 1))
     write_obj(tmp_path / "cube.obj", cube.vertices, cube.faces)
-    shapes = (
-        Shape("cube.obj", color=(0.2, 0.2, 0.2, 1.0)),
-        Shape("cube.obj", scale=2.0, color=(0.6, 0.6, 0.6, 0.5)),
-    )
+    shapes = (Shape("cube.obj", color=(0.2, 0.2, 0.2, 1.0)), Shape("cube.obj", scale=2.0, color=(0.6, 0.6, 0.6, 0.5)))
     small, large = recolored_shapes(tmp_path, "cup_1", shapes, (102, 102, 102))
     assert small.color == pytest.approx((0.08, 0.08, 0.08, 1.0))
     assert large.color == pytest.approx((0.48, 0.48, 0.48, 0.5))

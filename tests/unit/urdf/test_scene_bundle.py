@@ -249,10 +249,15 @@ def test_mjcf_has_the_same_tree(bundle):
         child.get("name"): parent.get("name", "world") for parent in world.iter() for child in parent.findall("body")
     }
     assert parents == {
-        "floor_1": "world", "wall_2": "world", "table_3": "floor_1", "fridge_4": "floor_1",
+        "floor_1": "world",
+        "wall_2": "world",
+        "table_3": "floor_1",
+        "fridge_4": "floor_1",
         "fridge_4__door": "fridge_4",
-        "cup_5": "world", "bottle_6": "world", "cup_7": "world",
-    }  # fmt: skip
+        "cup_5": "world",
+        "bottle_6": "world",
+        "cup_7": "world",
+    }
     free = {body.get("name") for body in world.findall("body") if body.find("freejoint") is not None}
     assert free == {"cup_5", "bottle_6", "cup_7"}, "free joints stand right under the world"
     key = tree.find("keyframe/key")
@@ -362,8 +367,14 @@ def test_things_without_model_keep_their_mesh_and_collide_as_their_hull(tmp_path
     floor = layout("floor_1", "floor", (0, 0, -0.01), (2, 2, 0.02))
     pose = np.eye(4)
     pose[:3, 3] = [0.2, 0.1, 0.5]
-    ball = replace(layout("box_2", "box", (0.2, 0.1, 0.6), (0.2, 0.2, 0.2)), parent="floor_1", movable=True, mesh=mesh,
-                   world_from_body=pose, mass=0.7)  # fmt: skip
+    ball = replace(
+        layout("box_2", "box", (0.2, 0.1, 0.6), (0.2, 0.2, 0.2)),
+        parent="floor_1",
+        movable=True,
+        mesh=mesh,
+        world_from_body=pose,
+        mass=0.7,
+    )
     flat = replace(ball, name="book_3", class_name="book", mesh=bumpy_sheet(0.2, 0.0), mass=None)
     unknown = replace(layout("object_4", "object", (-0.6, 0, 0.1), (0.2, 0.2, 0.2)), parent="floor_1")
     bodies = [floor, ball, flat, unknown]
@@ -422,7 +433,7 @@ def test_a_fixed_thing_on_a_movable_one_stands_in_the_static_tree(library, tmp_p
         ({"model_folder": None}, "folder"),
         ({"class_name": "unicorn", "model": None, "model_folder": None}, "unicorn"),
     ],
-)  # fmt: skip
+)
 def test_broken_bodies_are_bad_input(library, tmp_path, change, message):
     body = replace(placed(library, "cup_1", "cup_00", (0, 0, 0), movable=True), **change)
     with pytest.raises(BadInput, match=message):

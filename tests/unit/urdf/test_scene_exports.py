@@ -93,8 +93,9 @@ def test_mcap_places_every_link_and_shows_it(scene: Path) -> None:
         for schema, channel, message in make_reader(file).iter_messages():
             messages[channel.topic] = (schema.name, message.data)
     assert {topic: name for topic, (name, _) in messages.items()} == {
-        "/tf": "foxglove.FrameTransforms", "/scene": "foxglove.SceneUpdate",
-    }  # fmt: skip
+        "/tf": "foxglove.FrameTransforms",
+        "/scene": "foxglove.SceneUpdate",
+    }
     poses, _ = poses_and_values(scene)
     found = {"world": np.eye(4)}
     for entry in FrameTransforms.FromString(messages["/tf"][1]).transforms:

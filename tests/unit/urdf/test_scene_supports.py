@@ -92,16 +92,25 @@ def uneven_scene() -> tuple[list[BundleBody], ContactGraphFile]:
     nodes = [GraphNode(id=SCENE_NODE, instance=0, class_name="scene", node_type="scene")]
     nodes += [
         GraphNode(
-            id=body.name, instance=k, class_name=body.class_name, node_type="layout" if k == 1 else "rigid",
-            box=body.box, planes=(plane,) if body.name == "table_2" else (),
+            id=body.name,
+            instance=k,
+            class_name=body.class_name,
+            node_type="layout" if k == 1 else "rigid",
+            box=body.box,
+            planes=(plane,) if body.name == "table_2" else (),
         )
         for k, body in enumerate(bodies, start=1)
-    ]  # fmt: skip
+    ]
     links = tuple(
-        Relation(source=body.parent or SCENE_NODE, target=body.name, relation="supports", confidence=1.0,
-                 plane=0 if body.name == "object_3" else None)
+        Relation(
+            source=body.parent or SCENE_NODE,
+            target=body.name,
+            relation="supports",
+            confidence=1.0,
+            plane=0 if body.name == "object_3" else None,
+        )
         for body in bodies
-    )  # fmt: skip
+    )
     return bodies, ContactGraphFile(nodes=tuple(nodes), links=links)
 
 

@@ -142,7 +142,7 @@ BROKEN = {
     "two numbers for three": (robot("", joint('<origin xyz="0 0"/>' + HINGE)), "unreadable"),
     "joint without child": (robot("", '<joint name="j" type="fixed"><parent link="a"/></joint>'), "unreadable"),
     "no links": ('<robot name="r"/>', "roots"),
-}  # fmt: skip
+}
 
 
 def test_the_yardstick_itself_is_sound(tmp_path):

@@ -231,11 +231,16 @@ def make_packing(run: Path) -> Path:
     pick = PackingStep(name="pick", box="red", tried=True)
     bad, good = (PackingStep(name="place", box="red", x=x, y=0.0, yaw=0.0, tried=True) for x in (0.61, 0.7))
     PackingFile(
-        name="mine", proposer="ours", success=True, proposer_calls=2, motion_planner_calls=3,
+        name="mine",
+        proposer="ours",
+        success=True,
+        proposer_calls=2,
+        motion_planner_calls=3,
         attempts=(
-            PackingAttempt(steps=(pick, bad.model_copy(update={"failure": hit}))), PackingAttempt(steps=(pick, good)),
+            PackingAttempt(steps=(pick, bad.model_copy(update={"failure": hit}))),
+            PackingAttempt(steps=(pick, good)),
         ),
-    ).write(root / "packing.json")  # fmt: skip
+    ).write(root / "packing.json")
     joints = np.zeros((3, 7))
     joints[:, 0] = [0.0, 0.1, 0.2]
     np.savez(root / "trajectory.npz", joints=joints, action=np.array([0, 0, 1], np.int32))

@@ -50,22 +50,39 @@ def make_scene(run: Path) -> Path:
     np.savez_compressed(root / "threads.npz", thread_000000=CURVE)
     write_tum(root / "trajectory.tum", np.array([1.0]), np.linalg.inv(FROM_WORLD)[None])
     SequenceFile(
-        source_format="rendered", rule="suture scene", camera=CAMERA, streams=("color", "right", "pose"),
-        cameras=(SequenceCamera(name="camera", camera=CAMERA, baseline=0.06, frame_count=1),), frame_count=1,
-        frames_in_log=1, gravity=Gravity(method="given", world_from_log=as_transform(np.eye(4))), start_time=1.0,
+        source_format="rendered",
+        rule="suture scene",
+        camera=CAMERA,
+        streams=("color", "right", "pose"),
+        cameras=(SequenceCamera(name="camera", camera=CAMERA, baseline=0.06, frame_count=1),),
+        frame_count=1,
+        frames_in_log=1,
+        gravity=Gravity(method="given", world_from_log=as_transform(np.eye(4))),
+        start_time=1.0,
         end_time=1.0,
-    ).write(root / "sequence.json")  # fmt: skip
+    ).write(root / "sequence.json")
     SutureSceneFile(
-        seed=0, arrangement="motion", rig=RIG, rig_name="two_cameras", needle_radius=0.012, calibration_error=0.15,
+        seed=0,
+        arrangement="motion",
+        rig=RIG,
+        rig_name="two_cameras",
+        needle_radius=0.012,
+        calibration_error=0.15,
         bodies={"needle": 1, "thread": 2, "left_driver": 3, "right_driver": 4},
         views=(
             SutureView(
-                frame=0, seed=0, holder="air", place="wound", camera_from_needle=as_transform(POSE),
-                camera_from_world=as_transform(FROM_WORLD), right_eye_turn=(0.0, 0.0, 0.0), seen=0.9,
+                frame=0,
+                seed=0,
+                holder="air",
+                place="wound",
+                camera_from_needle=as_transform(POSE),
+                camera_from_world=as_transform(FROM_WORLD),
+                right_eye_turn=(0.0, 0.0, 0.0),
+                seen=0.9,
                 degrees_from_edge_on=89.6,
             ),
         ),
-    ).write(root / "scene.json")  # fmt: skip
+    ).write(root / "scene.json")
     return seal(root, "suture_scene")
 
 
@@ -74,14 +91,23 @@ def make_needle(run: Path) -> Path:
     root = run / "suture_needle"
     (root / "pictures").mkdir(parents=True)
     known = NeedleEstimateRecord(
-        camera_from_needle=as_transform(POSE), tip_probability=0.97, abstained="",
+        camera_from_needle=as_transform(POSE),
+        tip_probability=0.97,
+        abstained="",
         covariance=tuple(tuple(row) for row in np.diag([1e-7] * 3 + [1e-3] * 3).tolist()),
-    )  # fmt: skip
+    )
     SutureNeedleFile(
-        statement="the needle is known", estimator="ours", masks="truth", masks_from="the rendered truth", disparity="",
-        rig=RIG, needle_radius=0.012, filtered=known, filter="still",
+        statement="the needle is known",
+        estimator="ours",
+        masks="truth",
+        masks_from="the rendered truth",
+        disparity="",
+        rig=RIG,
+        needle_radius=0.012,
+        filtered=known,
+        filter="still",
         frames=(NeedleFrame(frame=0, time=1.0, estimate=known, mask_pixels=(24, 24)),),
-    ).write(root / "needle.json")  # fmt: skip
+    ).write(root / "needle.json")
     (root / "pictures" / "000000.png").write_bytes(PICTURE)
     return seal(root, "suture_needle", sequence=run / "suture_scene")
 
@@ -91,9 +117,13 @@ def make_thread(run: Path) -> Path:
     root = run / "suture_thread"
     (root / "pictures").mkdir(parents=True)
     SutureThreadFile(
-        statement="thread of 20 mm", masks="truth", masks_from="the rendered truth", rig=RIG, started_at_needle=True,
+        statement="thread of 20 mm",
+        masks="truth",
+        masks_from="the rendered truth",
+        rig=RIG,
+        started_at_needle=True,
         frames=(ThreadFrame(frame=0, time=1.0, points=5, length=0.02, status="ok", mask_pixels=(24, 24)),),
-    ).write(root / "thread.json")  # fmt: skip
+    ).write(root / "thread.json")
     np.savez_compressed(root / "threads.npz", points_000000=CURVE, deviation_000000=np.full(5, 1e-4))
     (root / "pictures" / "000000.png").write_bytes(PICTURE)
     return seal(root, "suture_thread", sequence=run / "suture_scene")
@@ -107,25 +137,46 @@ def make_trial(run: Path) -> Path:
         statement="thesis, seed 0: 2 of 6 sutures in 300 s",
         runs=(
             SutureRun(
-                arm="thesis", seed=0, sutures=2, sutures_neutral=2, attempts=3, seconds=300.0, errors="I",
-                reasons=("the tip missed the raised edge",), error_sutures=(2,), error_seconds=(300.0,), looks=40,
-                right=20, thread_length=0.3,
+                arm="thesis",
+                seed=0,
+                sutures=2,
+                sutures_neutral=2,
+                attempts=3,
+                seconds=300.0,
+                errors="I",
+                reasons=("the tip missed the raised edge",),
+                error_sutures=(2,),
+                error_seconds=(300.0,),
+                looks=40,
+                right=20,
+                thread_length=0.3,
             ),
         ),
         perception=(SuturePerception(arm="thesis", model="thesis", measured=False, provenance="as printed"),),
-        world={"speed": 0.007}, recorded_arm="thesis", recorded_seed=0,
+        world={"speed": 0.007},
+        recorded_arm="thesis",
+        recorded_seed=0,
         events=(SutureEvent(seconds=4.0, suture=0, what="i: to the corner"),),
-    ).write(root / "trial.json")  # fmt: skip
+    ).write(root / "trial.json")
     (root / "trial.txt").write_text("thesis, seed 0: 2 of 6 sutures\n")
     tool = np.tile(np.eye(4), (2, 1, 1))
     np.savez_compressed(
-        root / "frames.npz", panel=np.array(["i: to the corner"], dtype="U40"), suture=np.array([0], np.int32),
-        seconds=np.array([4.0]), world_from_tool=tool[None], world_from_needle=POSE[None], thread=CURVE[None],
-    )  # fmt: skip
+        root / "frames.npz",
+        panel=np.array(["i: to the corner"], dtype="U40"),
+        suture=np.array([0], np.int32),
+        seconds=np.array([4.0]),
+        world_from_tool=tool[None],
+        world_from_needle=POSE[None],
+        thread=CURVE[None],
+    )
     np.savez_compressed(
-        root / "motions.npz", seconds=np.array([1.0, 2.0]), arm=np.array([0, 1], np.int8), world_from_tool=tool,
-        world_from_needle=np.tile(POSE, (2, 1, 1)), joints=np.zeros((2, 6)),
-    )  # fmt: skip
+        root / "motions.npz",
+        seconds=np.array([1.0, 2.0]),
+        arm=np.array([0, 1], np.int8),
+        world_from_tool=tool,
+        world_from_needle=np.tile(POSE, (2, 1, 1)),
+        joints=np.zeros((2, 6)),
+    )
     (root / "strip.png").write_bytes(PICTURE)
     return seal(root, "suture_trial")
 

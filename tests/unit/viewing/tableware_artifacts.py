@@ -31,9 +31,11 @@ ITEMS = (
 LIFT = GraspFields(items=("cup_1",), p_G=(0.14, 0.0, 0.075), theta_G=0.0)
 TAKE = GraspFields(items=("cup_2",), p_G=(-0.06, 0.0, 0.075), theta_G=0.0)
 ACTION = TablewareAction(
-    name="stack_grasp", seconds=18.5, risk=0.0,
+    name="stack_grasp",
+    seconds=18.5,
+    risk=0.0,
     u_SG=StackGraspFields(u_S=StackFields(u_G=LIFT, onto="cup_2", p_L=(-0.1, 0.0, 0.02), theta_L=0.0), u_G=TAKE),
-)  # fmt: skip
+)
 TIMES = TimesOfActions(trip=10.1, stack=8.4, pull=5.7)
 PICTURE = cv2.imencode(".png", np.zeros((4, 4, 3), np.uint8))[1].tobytes()
 
@@ -43,9 +45,14 @@ def make_tableware(run: Path) -> None:
     scene = run / "tableware_scene"
     scene.mkdir()
     TablewareSceneFile(
-        tier="tier0_cups", seed=0, light="usual", colors="dark_on_white", items=ITEMS,
-        camera=Camera(width=4, height=4, fx=4.0, fy=4.0, cx=1.5, cy=1.5), world_from_camera=as_transform(np.eye(4)),
-    ).write(scene / "scene.json")  # fmt: skip
+        tier="tier0_cups",
+        seed=0,
+        light="usual",
+        colors="dark_on_white",
+        items=ITEMS,
+        camera=Camera(width=4, height=4, fx=4.0, fy=4.0, cx=1.5, cy=1.5),
+        world_from_camera=as_transform(np.eye(4)),
+    ).write(scene / "scene.json")
     (scene / "color.png").write_bytes(PICTURE)
     np.savez(scene / "depth.npz", depth=np.ones((4, 4), np.float32))
     write_shapes(scene)
@@ -72,10 +79,21 @@ def make_plan(run: Path) -> Path:
     root = run / "tableware_plan"
     root.mkdir()
     TablewarePlanFile(
-        policy="stack", source="truth", times=TIMES, chances="exact", items=ITEMS,
-        steps=(TablewareStep(action=ACTION, before=ITEMS),), seconds=18.5, trips=1, expected_seconds=18.5,
-        expected_trips=1.0, expected_objects_per_trip=2.0, risk=0.0, draws=1, statement="2 items to clear",
-    ).write(root / "plan.json")  # fmt: skip
+        policy="stack",
+        source="truth",
+        times=TIMES,
+        chances="exact",
+        items=ITEMS,
+        steps=(TablewareStep(action=ACTION, before=ITEMS),),
+        seconds=18.5,
+        trips=1,
+        expected_seconds=18.5,
+        expected_trips=1.0,
+        expected_objects_per_trip=2.0,
+        risk=0.0,
+        draws=1,
+        statement="2 items to clear",
+    ).write(root / "plan.json")
     (root / "plan.txt").write_text("2 items to clear\n")
     (root / "strip.png").write_bytes(PICTURE)
     return seal(root, "tableware_plan", scene=run / "tableware_scene")
@@ -86,12 +104,17 @@ def make_trial(run: Path) -> Path:
     root = run / "tableware_trial"
     root.mkdir()
     TablewareTrialFile(
-        policy="stack", simulator="fast", sight="truth", times=TIMES, chances="exact", statement="2 of 2 items",
+        policy="stack",
+        simulator="fast",
+        sight="truth",
+        times=TIMES,
+        chances="exact",
+        statement="2 of 2 items",
         counts=TrialCounts(
             seconds=18.5, trips=1, moved=2, pulls=0, stacks=1, dropped=0, left=0, objects_per_trip=2.0, failure=""
         ),
         steps=(TrialStep(action=ACTION, start=0.0, end=18.5, before=ITEMS, after=(), binned=("cup_1", "cup_2")),),
-    ).write(root / "trial.json")  # fmt: skip
+    ).write(root / "trial.json")
     (root / "trial.txt").write_text("2 of 2 items\n")
     (root / "keyframes.png").write_bytes(PICTURE)
     write_shapes(root)
@@ -103,12 +126,22 @@ def make_evaluation(run: Path) -> Path:
     root = run / "tableware_evaluation"
     root.mkdir()
     row = EvaluatedPolicy(
-        policy="stack", tier="tier0_cups", tables=1, trials=1, time=55.0, time_interval=(55.0, 55.0),
-        objects_per_trip=2.0, objects_per_trip_interval=(2.0, 2.0), time_ratio=None, objects_per_trip_ratio=None,
-        failure_rate=0.0, failures_policy=0, failures_perception=0,
-    )  # fmt: skip
-    TablewareEvaluationFile(
-        chances="exact", sight="truth", delay=0.0, draws=1, first_scene=0, rows=(row,)
-    ).write(root / "results.json")  # fmt: skip
+        policy="stack",
+        tier="tier0_cups",
+        tables=1,
+        trials=1,
+        time=55.0,
+        time_interval=(55.0, 55.0),
+        objects_per_trip=2.0,
+        objects_per_trip_interval=(2.0, 2.0),
+        time_ratio=None,
+        objects_per_trip_ratio=None,
+        failure_rate=0.0,
+        failures_policy=0,
+        failures_perception=0,
+    )
+    TablewareEvaluationFile(chances="exact", sight="truth", delay=0.0, draws=1, first_scene=0, rows=(row,)).write(
+        root / "results.json"
+    )
     (root / "table.md").write_text("| policy |\n|---|\n| stack |\n")
     return seal(root, "tableware_evaluation")

@@ -172,9 +172,16 @@ def test_a_kind_is_drawn_as_what_it_can_be_read_as() -> None:
 
 def test_relations_show_their_confidence_and_evidence(recordings: dict) -> None:
     link = Relation(
-        source="shelf_2", target="cup_5", relation="contains", confidence=0.875, plane=3, gap=-0.004, overlap=0.9,
-        contact=(0.1, 0.25, 1.0), inside=0.66,
-    )  # fmt: skip
+        source="shelf_2",
+        target="cup_5",
+        relation="contains",
+        confidence=0.875,
+        plane=3,
+        gap=-0.004,
+        overlap=0.9,
+        contact=(0.1, 0.25, 1.0),
+        inside=0.66,
+    )
     assert evidence(link) == (
         "confidence 0.88, plane 3 of shelf_2, gap -4 mm, overlap 90 %, inside 66 %, meet at 0.10, 0.25, 1.00"
     )
@@ -190,8 +197,10 @@ def test_candidates_of_each_object_are_listed(recordings: dict) -> None:
     (text,) = _column(recordings["cad_scene"]["/candidates"], "text")[0]
     rows = [line for line in text.splitlines() if line.startswith("| table")]
     assert [row.split(" | ")[:3] for row in rows] == [
-        ["| table_00", "chosen, best by itself", "0.100"], ["| table_00", "", "0.300"], ["| table_99", "", "0.100"],
-    ]  # fmt: skip
+        ["| table_00", "chosen, best by itself", "0.100"],
+        ["| table_00", "", "0.300"],
+        ["| table_99", "", "0.100"],
+    ]
     assert "Rejected: 4 scale out of range." in text and "nothing fits" in text and "floor_1" not in text
 
 

@@ -23,9 +23,12 @@ def write(job: ExportJob) -> None:
     ) as writer:
         for frame in job.frames:
             values = {
-                "color": frame.color, "depth": frame.depth, "right": frame.right, "labels": frame.labels,
+                "color": frame.color,
+                "depth": frame.depth,
+                "right": frame.right,
+                "labels": frame.labels,
                 "pose": frame.world_from_camera,
-            }  # fmt: skip
+            }
             tally.streams |= {stream for stream, value in values.items() if value is not None}
             writer.write(
                 frame.stamp * 1e-9,

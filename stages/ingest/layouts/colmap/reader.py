@@ -37,8 +37,13 @@ DENSE_ENDINGS = (".geometric.bin", ".photometric.bin")
 """In the order in which they are preferred: geometric ones were checked against other views."""
 
 ONE_FOCAL_LENGTH = (
-    "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "SIMPLE_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE"
-)  # fmt: skip
+    "SIMPLE_PINHOLE",
+    "SIMPLE_RADIAL",
+    "RADIAL",
+    "SIMPLE_FISHEYE",
+    "SIMPLE_RADIAL_FISHEYE",
+    "RADIAL_FISHEYE",
+)
 TWO_FOCAL_LENGTHS = ("PINHOLE", "OPENCV", "OPENCV_FISHEYE", "FULL_OPENCV", "FISHEYE")
 """Models that are OpenCV's, with some coefficients zero."""
 

@@ -14,9 +14,12 @@ from stages.ingest.folders.files import COLOR_SUFFIXES, DEPTH_SUFFIXES, files_of
 from stages.ingest.layouts.images.video_frames import SUFFIXES as VIDEO_SUFFIXES
 
 STEREO_FOLDERS = (
-    ("left", "right"), ("image_0", "image_1"), ("image_2", "image_3"), ("cam0/data", "cam1/data"),
+    ("left", "right"),
+    ("image_0", "image_1"),
+    ("image_2", "image_3"),
+    ("cam0/data", "cam1/data"),
     ("image_left", "image_right"),
-)  # fmt: skip
+)
 COLOR_FOLDERS = ("color", "rgb", "image", "images", "frames", "image_0", "image_2", "cam0/data")
 DEPTH_FOLDERS = ("depth", "depths")
 MARKED = re.compile(
@@ -159,9 +162,14 @@ def _marked(root: Path) -> FolderImages | None:
     if depths:
         places["depth"] = "*depth*" if roles["depth"] else "disp0"
     return FolderImages(
-        tuple(name or "pair" for name in names), columns[0], columns[1], columns[2], 0, places,
+        tuple(name or "pair" for name in names),
+        columns[0],
+        columns[1],
+        columns[2],
+        0,
+        places,
         depth_is_disparity=not roles["depth"] and bool(depths),
-    )  # fmt: skip
+    )
 
 
 def stamps_of(names: tuple[str, ...]) -> np.ndarray | None:

@@ -303,11 +303,7 @@ def _times(
 
 
 def _poses(
-    root: Path,
-    names: tuple[str, ...],
-    times: np.ndarray,
-    calibration: FolderCalibration,
-    parameters: IngestParameters,
+    root: Path, names: tuple[str, ...], times: np.ndarray, calibration: FolderCalibration, parameters: IngestParameters
 ) -> tuple[list[Pose], tuple[str, ...]]:
     """Return the pose of each frame, and what was assumed of them."""
     path = pose_file(root)

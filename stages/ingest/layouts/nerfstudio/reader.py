@@ -241,9 +241,14 @@ def _stated(frame: _Frame) -> _Stated:
             raise BadInput(f"{where}: images of {width:g}x{height:g} pixels")
         size = (round(width), round(height))
     return _Stated(
-        size, optional("fl_x"), optional("fl_y"), optional("cx"), optional("cy"), optional("camera_angle_x"),
+        size,
+        optional("fl_x"),
+        optional("fl_y"),
+        optional("cx"),
+        optional("cy"),
+        optional("camera_angle_x"),
         _lens(fields, where),
-    )  # fmt: skip
+    )
 
 
 def _camera(stated: _Stated, size: tuple[int, int] | None, replaced: bool, where: str) -> RecordedCamera:

@@ -124,10 +124,7 @@ def _camera(root: Path, size: tuple[int, int] | None, parameters: IngestParamete
         camera = resized_camera(_read_ini(path), size, str(path))
         camera, given = overridden(camera, parameters)
         return camera, (f"intrinsics read from {path.name}", *given)
-    if all_intrinsics_given(parameters) or size not in (
-        None,
-        (640, 480),
-    ):
+    if all_intrinsics_given(parameters) or size not in (None, (640, 480)):
         why = f"{root}: there is no {INTRINSICS[0]}"
         return camera_from_options(size, parameters, why), ("intrinsics given by option",)
     camera, given = overridden(pinhole(ASUS, size or (640, 480), str(root)), parameters)

@@ -64,12 +64,15 @@ def _candidates(page: Page, cad_scene: CadScene, seen_from: View) -> dict[str, A
     size, parameters = page.room.font_size(20.0), page.parameters
     objects = (
         object_views(
-            cad_scene, shelf, page.given("panoptic_map", PanopticMap),
-            count=parameters.candidates, width=parameters.candidate_width,
+            cad_scene,
+            shelf,
+            page.given("panoptic_map", PanopticMap),
+            count=parameters.candidates,
+            width=parameters.candidate_width,
         )
         if parameters.candidates
         else []
-    )  # fmt: skip
+    )
     return {
         "checked": [draw(scene.model, seen_from, scene.caption, size) for scene in checked_scenes(cad_scene, shelf)],
         "objects_changed": [entry for entry in objects if entry.changed],

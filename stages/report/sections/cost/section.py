@@ -4,8 +4,4 @@ from __future__ import annotations
 
 from stages.report.section import Section
 
-SECTION = Section(
-    "cost",
-    "Time and memory",
-    order=120,
-)
+SECTION = Section("cost", "Time and memory", order=120)

@@ -5,9 +5,4 @@ from __future__ import annotations
 from schemas.evaluation import Evaluation
 from stages.report.section import Section
 
-SECTION = Section(
-    "figures",
-    "Figures",
-    order=110,
-    reads={"evaluation": Evaluation, "baseline_evaluation": Evaluation},
-)
+SECTION = Section("figures", "Figures", order=110, reads={"evaluation": Evaluation, "baseline_evaluation": Evaluation})

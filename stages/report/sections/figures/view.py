@@ -9,10 +9,19 @@ from stages.report.figures import GROUPS, all_metrics, metric_groups, read_plots
 from stages.report.page import Page
 
 HEADLINES = (
-    "counts/frames", "counts/entities", "map/pq", "map/mesh_recall", "map/accuracy_mean_mm", "graph/edit_distance",
-    "graph/support_f1", "counts/support_edges", "cad/replaced", "replacement/scan2cad_success", "counts/joints",
+    "counts/frames",
+    "counts/entities",
+    "map/pq",
+    "map/mesh_recall",
+    "map/accuracy_mean_mm",
+    "graph/edit_distance",
+    "graph/support_f1",
+    "counts/support_edges",
+    "cad/replaced",
+    "replacement/scan2cad_success",
+    "counts/joints",
     "plan/goal_reached",
-)  # fmt: skip
+)
 
 
 def view(page: Page) -> dict[str, Any] | None:

@@ -4,8 +4,4 @@ from __future__ import annotations
 
 from stages.report.section import Section
 
-SECTION = Section(
-    "made",
-    "How it was made",
-    order=130,
-)
+SECTION = Section("made", "How it was made", order=130)

@@ -6,9 +6,5 @@ from schemas.panoptic_map import PanopticMap
 from stages.report.section import Section
 
 SECTION = Section(
-    "map",
-    "Map",
-    order=30,
-    reads={"panoptic_map": PanopticMap},
-    became={"panoptic_map": "a labelled map"},
+    "map", "Map", order=30, reads={"panoptic_map": PanopticMap}, became={"panoptic_map": "a labelled map"}
 )

@@ -16,10 +16,4 @@ def _became(plan: Plan) -> str:
     return BECAME.get(plan.info.status, "an attempt to plan that found no way")
 
 
-SECTION = Section(
-    "plan",
-    "Plan",
-    order=70,
-    reads={"plan": Plan},
-    became={"plan": _became},
-)
+SECTION = Section("plan", "Plan", order=70, reads={"plan": Plan}, became={"plan": _became})

@@ -99,7 +99,9 @@ def suture_view(
         thread_pictures=_pictures(thread, "thread", width),
         trial="" if file is None else file.statement,
         strip=strip,
-        strip_text="" if file is None else f"{file.recorded_arm}, seed {file.recorded_seed}: a suture's motions, a "
+        strip_text=""
+        if file is None
+        else f"{file.recorded_arm}, seed {file.recorded_seed}: a suture's motions, a "
         "to k of the thesis's figure 3.2, from the cameras and from above",
         runs=() if file is None else tuple(_run_row(run) for run in file.runs[:MOST_RUNS]),
         runs_left_out=0 if file is None else max(0, len(file.runs) - MOST_RUNS),
@@ -107,7 +109,7 @@ def suture_view(
         plots=_plots(evaluation, width),
         tables=() if evaluation is None else tables_of(file_text(evaluation.path("table.md"), LARGEST_SHOWN)),
         notes=() if metrics is None else (metrics.label, *metrics.notes),
-    )  # fmt: skip
+    )
 
 
 def _needle_row(frame: NeedleFrame) -> NeedleRow:

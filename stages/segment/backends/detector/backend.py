@@ -72,8 +72,7 @@ class DetectorBackend:
         self._anything = vocabulary.by_name(UNNAMED)
         self._layout = {name: vocabulary.by_name(name) for name in ("floor", "wall", "ceiling")}
         self.room: Room = find_room(
-            _surface_samples(reader, geometric),
-            floor_is_zero=sequence.gravity.method in ("given", "floor_plane"),
+            _surface_samples(reader, geometric), floor_is_zero=sequence.gravity.method in ("given", "floor_plane")
         )
 
     def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
@@ -99,10 +98,7 @@ class DetectorBackend:
             if semantic is None:
                 continue
             mask = box_mask(
-                box,
-                geometry,
-                large_face=semantic.name in LARGE_FACED,
-                flat_topped=semantic.name in FLAT_TOPPED,
+                box, geometry, large_face=semantic.name in LARGE_FACED, flat_topped=semantic.name in FLAT_TOPPED
             )
             if mask.sum() < pixels_at(self.minimum_pixels, mask.shape):
                 continue

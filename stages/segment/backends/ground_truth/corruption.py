@@ -47,10 +47,7 @@ def rates_of_level(level: float) -> CorruptionRates:
 
 
 def corrupt(
-    frame: PanopticFrame,
-    rates: CorruptionRates,
-    classes: dict[bool, tuple[int, ...]],
-    random: np.random.Generator,
+    frame: PanopticFrame, rates: CorruptionRates, classes: dict[bool, tuple[int, ...]], random: np.random.Generator
 ) -> PanopticFrame:
     """Return the frame with masks missed, merged, split, with flipped classes and noisy boundaries, in this order.
 

@@ -67,8 +67,10 @@ class PanopticSegmenter:
         if self._labels.unknown:
             logger.warning(
                 "%s: %d of its labels are in no table and stay void: %s",
-                short_name(folder), len(self._labels.unknown), ", ".join(self._labels.unknown[:10]),
-            )  # fmt: skip
+                short_name(folder),
+                len(self._labels.unknown),
+                ", ".join(self._labels.unknown[:10]),
+            )
         self._task = self._task_tokens(folder) if self._is_oneformer else None
 
     def __call__(self, color: np.ndarray) -> tuple[np.ndarray, dict[int, NamedSegment]]:

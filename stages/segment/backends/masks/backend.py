@@ -60,8 +60,11 @@ class MasksBackend:
             first = next(index for index in range(len(times)) if index not in self._places)
             logger.warning(
                 "%s: %d of %d frames have no masks, the first is %d; they add geometry alone",
-                self._root, len(times) - len(self._places), len(times), first,
-            )  # fmt: skip
+                self._root,
+                len(times) - len(self._places),
+                len(times),
+                first,
+            )
         if self._source.lacks:
             lost = " and ".join(self._source.lacks)
             logger.info("%s: holds no %s: what the network said of them is lost", self._root, lost)
@@ -118,13 +121,17 @@ class MasksBackend:
             logger.warning(
                 "%s: masks overlap in %d frames: of equal ones the best scored was kept, smaller ones lie over larger "
                 "ones; %d masks lost pixels or all of them",
-                self._root, self._tally.frames, self._tally.overlapping,
-            )  # fmt: skip
+                self._root,
+                self._tally.frames,
+                self._tally.overlapping,
+            )
         if self._tally.faint:
             logger.info(
                 "%s: %d masks score under --score-threshold %g and were left out",
-                self._root, self._tally.faint, self._settings[0],
-            )  # fmt: skip
+                self._root,
+                self._tally.faint,
+                self._settings[0],
+            )
 
 
 def open_folder(listing: Listing) -> tuple[MaskFormat, MaskSource]:
@@ -148,8 +155,10 @@ def _labels(source: MaskSource, given: LabelSet | None, where: str) -> dict[int,
     if matched.unknown:
         logger.warning(
             "%s: %d of its categories are in no table and stay void: %s",
-            where, len(matched.unknown), ", ".join(matched.unknown[:10]),
-        )  # fmt: skip
+            where,
+            len(matched.unknown),
+            ", ".join(matched.unknown[:10]),
+        )
     labels = {}
     for number, label in matched.labels.items():
         thing = source.categories[number].is_thing

@@ -68,9 +68,13 @@ def input_camera(camera: Camera) -> Camera:
     width, height = INPUT_WIDTH, max(32, round(camera.height * INPUT_WIDTH / camera.width))
     across, down = width / camera.width, height / camera.height
     return Camera(
-        width=width, height=height, fx=camera.fx * across, fy=camera.fy * down,
-        cx=(camera.cx + 0.5) * across - 0.5, cy=(camera.cy + 0.5) * down - 0.5,
-    )  # fmt: skip
+        width=width,
+        height=height,
+        fx=camera.fx * across,
+        fy=camera.fy * down,
+        cx=(camera.cx + 0.5) * across - 0.5,
+        cy=(camera.cy + 0.5) * down - 0.5,
+    )
 
 
 def resized(depth: np.ndarray, color: np.ndarray | None, camera: Camera) -> tuple[np.ndarray, np.ndarray | None]:

@@ -198,11 +198,7 @@ def find_patches(
         settings.jump,
     )
     labels = label_regions(
-        edges,
-        standing,
-        normals,
-        minimum_pixels=pixels_at(settings.minimum_pixels, depth.shape),
-        ratio=settings.jump,
+        edges, standing, normals, minimum_pixels=pixels_at(settings.minimum_pixels, depth.shape), ratio=settings.jump
     )
     return PatchFrame(window, labels, points, normals, inverse, supports, height)
 

@@ -66,9 +66,13 @@ class OnnxBackend:
         outputs = self._network(fitted)
         if self._network.sidecar.layout == "panoptic":
             ids, segments = decoding.panoptic(
-                outputs["classes"], outputs["masks"], fitted, shape,
-                score_threshold=self._threshold, stuff=self._labels.stuff(),
-            )  # fmt: skip
+                outputs["classes"],
+                outputs["masks"],
+                fitted,
+                shape,
+                score_threshold=self._threshold,
+                stuff=self._labels.stuff(),
+            )
             named = {
                 segment: NamedSegment(self._labels.labels[number], score)
                 for segment, (number, score) in segments.items()
@@ -77,14 +81,23 @@ class OnnxBackend:
             return name_segments(ids, named, self._vocabulary, minimum_pixels=least)
         if self._network.sidecar.layout == "yolo-seg":
             things = decoding.yolo_seg(
-                outputs["predictions"], outputs["prototypes"], fitted, shape,
-                score_threshold=self._threshold, suppression_overlap=self._overlap,
-            )  # fmt: skip
+                outputs["predictions"],
+                outputs["prototypes"],
+                fitted,
+                shape,
+                score_threshold=self._threshold,
+                suppression_overlap=self._overlap,
+            )
         else:
             things = decoding.instances(
-                outputs["boxes"], outputs["labels"], outputs["scores"], outputs["masks"], fitted, shape,
+                outputs["boxes"],
+                outputs["labels"],
+                outputs["scores"],
+                outputs["masks"],
+                fitted,
+                shape,
                 score_threshold=self._threshold,
-            )  # fmt: skip
+            )
         masks = [
             InstanceMask(thing.mask, self._labels.labels[thing.number], thing.score)
             for thing in things
@@ -129,8 +142,10 @@ def _warned(matched: LabelMap, name: str) -> LabelMap:
     if matched.unknown:
         logger.warning(
             "%s: %d of its labels are in no table and stay void: %s",
-            name, len(matched.unknown), ", ".join(matched.unknown[:10]),
-        )  # fmt: skip
+            name,
+            len(matched.unknown),
+            ", ".join(matched.unknown[:10]),
+        )
     return matched
 
 

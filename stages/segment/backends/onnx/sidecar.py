@@ -22,9 +22,14 @@ OUTPUTS: Mapping[str, tuple[str, ...]] = {
 }
 """Layout -> roles of its outputs."""
 KNOWN_NAMES = {
-    "boxes": "boxes", "labels": "labels", "scores": "scores", "masks": "masks",
-    "pred_boxes": "boxes", "pred_classes": "labels", "pred_masks": "masks",
-}  # fmt: skip
+    "boxes": "boxes",
+    "labels": "labels",
+    "scores": "scores",
+    "masks": "masks",
+    "pred_boxes": "boxes",
+    "pred_classes": "labels",
+    "pred_masks": "masks",
+}
 """Names of outputs in exports of torchvision's and Detectron2's Mask R-CNN -> role."""
 
 

@@ -125,11 +125,7 @@ class ServiceBackend:
 def connect(address: str, own: ServiceParameters) -> Connection:
     """Return a connection to the service at `address`; nothing is asked yet."""
     return Connection(
-        address,
-        timeout=own.request_timeout,
-        retries=own.retries,
-        retry_wait=own.retry_wait,
-        refused_hint=REFUSED_HINT,
+        address, timeout=own.request_timeout, retries=own.retries, retry_wait=own.retry_wait, refused_hint=REFUSED_HINT
     )
 
 
@@ -161,8 +157,10 @@ def _labels(info: ServiceInfo, given: LabelSet | None, address: str) -> dict[int
     if matched.unknown:
         logger.warning(
             "%s: %d of its categories are in no table and stay void: %s",
-            address, len(matched.unknown), ", ".join(matched.unknown[:10]),
-        )  # fmt: skip
+            address,
+            len(matched.unknown),
+            ", ".join(matched.unknown[:10]),
+        )
     kinds = {category.id: "thing" if category.isthing else "stuff" for category in info.categories}
     return {number: label.model_copy(update={"kind": kinds[number]}) for number, label in matched.labels.items()}
 

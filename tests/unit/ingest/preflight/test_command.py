@@ -18,14 +18,39 @@ from tests.unit.ingest.preflight.textured_room import CAMERA, painted, walk
 from tests.unit.ingest.tiny_room import jpeg, millimetres, png, room_depth
 
 KEYS = {
-    "schema_version", "path", "format", "rule", "verdict", "reason", "fix", "findings", "frames", "damage", "notes",
-    "streams", "clocks", "cameras", "other_cameras", "gravity", "steps",
+    "schema_version",
+    "path",
+    "format",
+    "rule",
+    "verdict",
+    "reason",
+    "fix",
+    "findings",
+    "frames",
+    "damage",
+    "notes",
+    "streams",
+    "clocks",
+    "cameras",
+    "other_cameras",
+    "gravity",
+    "steps",
     "command",
-}  # fmt: skip
+}
 CAMERA_KEYS = {
-    "name", "camera", "registered", "frames", "streams", "calibration", "depth", "poses", "registration", "pictures",
-    "motion", "stereo",
-}  # fmt: skip
+    "name",
+    "camera",
+    "registered",
+    "frames",
+    "streams",
+    "calibration",
+    "depth",
+    "poses",
+    "registration",
+    "pictures",
+    "motion",
+    "stereo",
+}
 
 
 def write_log(root: Path, count: int, change=lambda pose: pose) -> Path:

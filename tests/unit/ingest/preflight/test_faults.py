@@ -15,9 +15,17 @@ from tests.unit.ingest.preflight.textured_room import CAMERA, inspected, source,
 
 COUNT = 48
 FLIPS = [
-    "inverse poses", "OpenGL axes", "OpenGL view matrices", "ROS body axes", "left-handed", "quaternion w first",
-    "translations x10", "translations /10", "translations x1000", "OpenGL and mm",
-]  # fmt: skip
+    "inverse poses",
+    "OpenGL axes",
+    "OpenGL view matrices",
+    "ROS body axes",
+    "left-handed",
+    "quaternion w first",
+    "translations x10",
+    "translations /10",
+    "translations x1000",
+    "OpenGL and mm",
+]
 
 
 def report_of(what: LogSource) -> InspectionReport:
@@ -107,10 +115,7 @@ def test_wrong_intrinsics() -> None:
     plant, named = FAULTS["focal length x1.3"]
     report = report_of(plant(source(COUNT)))
     assert named(report.cameras[0]) and "focal length" in first(report, "calibration")
-    other = replace(
-        source(COUNT),
-        cameras=(SourceCamera("camera", CAMERA.model_copy(update=doubled(CAMERA))),),
-    )
+    other = replace(source(COUNT), cameras=(SourceCamera("camera", CAMERA.model_copy(update=doubled(CAMERA))),))
     report = report_of(other)
     assert report.verdict == "wasted" and "for 320x240" in first(report, "calibration")
     assert "--fx 130" in first(report, "calibration")

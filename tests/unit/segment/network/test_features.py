@@ -64,9 +64,11 @@ def test_the_mirrored_image_has_the_mirrored_inputs() -> None:
     plain = features(depth, color, CAMERA, MOUNT)
     assert MOUNT.up is not None
     mirrored = features(
-        np.ascontiguousarray(depth[:, ::-1]), color[:, ::-1], CAMERA,
+        np.ascontiguousarray(depth[:, ::-1]),
+        color[:, ::-1],
+        CAMERA,
         Mount(MOUNT.up * np.array([-1.0, 1.0, 1.0]), MOUNT.height),
-    )  # fmt: skip
+    )
     turned = mirrored[:, :, ::-1].copy()
     for name in ("normal_right", "ray_right"):
         turned[CHANNELS.index(name)] *= -1
