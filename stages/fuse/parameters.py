@@ -13,6 +13,7 @@ from schemas.segments import Segments
 from schemas.sequence import Sequence
 from schemas.trajectory import Trajectory
 from stages.kit.estimates import Estimate, Inputs
+from stages.kit.labels import LABEL_TABLES
 from stages.kit.stage import External, Optionally, Parameters, Stage
 
 
@@ -146,6 +147,7 @@ STAGE = Stage(
     },
     writes=PanopticMap,
     libraries=("numpy", "numba", "scipy"),
+    data_files=lambda parameters: LABEL_TABLES,
     check=check,
     example="scenewright fuse --sequence outputs/demo/sequence --segments outputs/demo/segments "
     "--out outputs/demo/panoptic_map",

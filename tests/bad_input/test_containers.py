@@ -631,7 +631,7 @@ BAD_METADATA = {
     "objects": ("rosbag2_bagfile_information: !!python/object/apply:os.system ['true']", "does not describe a bag"),
     "lists as keys": ("rosbag2_bagfile_information: {[1]: 2}", "key that is no text"),
     "zero byte": ('rosbag2_bagfile_information:\n  relative_file_paths: ["a\\0b.db3"]\n', "cannot be read"),
-    "long": ("rosbag2_bagfile_information:\n" + "# long\n" * 400_000, "more than the"),
+    "long": ("rosbag2_bagfile_information:\n" + "# long\n" * 400_000, "larger than"),
     "packed otherwise": (
         "rosbag2_bagfile_information: {compression_mode: FILE, compression_format: rar, relative_file_paths: []}",
         "packed with 'rar'",

@@ -335,7 +335,7 @@ def test_damaged_intrinsics_of_redwood(tmp_path: Path, text: str) -> None:
         ({"camera_model": "EQUIRECTANGULAR"}, "'EQUIRECTANGULAR' are not read"),
         ({"camera_model": ["OPENCV"]}, "are not read"),
         ({"depth_unit_scale_factor": 0}, "not positive"),
-        ({"depth_unit_scale_factor": 10**400}, "is no number"),
+        ({"depth_unit_scale_factor": 10**400}, "64 bits"),
         ({"applied_scale": 0}, "not positive"),
         ({"applied_transform": [[1, 0], [0, 1]]}, "no rigid transform"),
         ({"applied_transform": [[-1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}, "no rigid transform"),

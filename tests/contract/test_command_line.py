@@ -28,7 +28,7 @@ def scenewright(*arguments: str | Path, **options) -> subprocess.CompletedProces
     ("arguments", "code", "words"),
     [
         (("nonsense",), 2, "No such command"),
-        (("fuse",), 2, "--sequence"),
+        (("graph",), 2, "--panoptic-map"),
         (("fuse", "--nonsense", "1"), 2, "--nonsense"),
         (("library", "build", "--out", "{tmp}/l", "--seed", "-1"), 2, "--seed"),
         (("library", "build", "--out", "{tmp}/l", "--seed", "x"), 2, "--seed"),

@@ -267,7 +267,7 @@ class _IdlReader:
         words = []
         while (word := self._take()) != ";":
             words.append(word)
-        if len(words) >= 3 and words[-2] == "=" and words[-1].isdigit() and len(words[-1]) < 11:
+        if len(words) >= 3 and words[-2] == "=" and words[-1].isascii() and words[-1].isdigit() and len(words[-1]) < 11:
             self._constants[words[-3]] = int(words[-1])
 
     def _kind(self) -> tuple[str, int | None]:
@@ -323,7 +323,7 @@ class _IdlReader:
 
     def _bound(self) -> int:
         word = self._take()
-        if word.isdigit() and len(word) < 11:
+        if word.isascii() and word.isdigit() and len(word) < 11:
             return int(word)
         if word.rpartition("::")[2] in self._constants:
             return self._constants[word.rpartition("::")[2]]

@@ -50,7 +50,9 @@ def read_bag_metadata(folder: Path) -> BagMetadata:
         if not isinstance(tree, dict) or not isinstance(tree.get(KEY), dict):
             raise ValueError("it does not describe a bag")
         return _described(folder, tree[KEY])
-    except (BadInput, OSError, ValueError, YAMLError) as error:
+    except BadInput:
+        raise
+    except (OSError, ValueError, YAMLError) as error:
         reason = " ".join(str(error).split())
         raise BadInput(f"{path}: cannot be read: {reason:.200}", hint="`ros2 bag reindex` writes it anew") from None
 
@@ -128,4 +130,4 @@ def is_part_name(name: str) -> bool:
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
-    return [(int(piece), "") if piece.isdigit() else (-1, piece) for piece in re.split(r"([0-9]+)", path.name)]
+    return [(int(piece), "") if piece.isdecimal() else (-1, piece) for piece in re.split(r"([0-9]+)", path.name)]

@@ -148,7 +148,7 @@ def test_a_graph_is_built_of_every_layout(tmp_path: Path, name: str) -> None:
     by_class = {entity.class_name: entity for entity in panoptic_map.info.entities}
     table = load_entity_mesh(panoptic_map.path(by_class["table"].mesh)).vertices
     assert np.ptp(table, axis=0) == pytest.approx([1.2, 0.7, 0.75], abs=0.05)
-    with np.load(panoptic_map.path("mesh_labels.npz")) as labels:
+    with np.load(panoptic_map.path("mesh_labels.npz"), allow_pickle=False) as labels:
         assert set(np.unique(labels["instance"]).tolist()) - {0} == set(classes)
     contact = graph(panoptic_map, parameters=GraphParameters(), context=context(tmp_path / "graph"))
     carried = {

@@ -214,7 +214,9 @@ def test_camera_outside_of_the_grid_is_refused(tmp_path: Path) -> None:
 def test_depth_range_must_hold_something() -> None:
     assert STAGE.check is not None
     with pytest.raises(UsageError, match="minimum-depth 3.0 is not below"):
-        STAGE.check(FuseParameters(minimum_depth=3.0, maximum_depth=2.0), {})
+        STAGE.check(
+            FuseParameters(minimum_depth=3.0, maximum_depth=2.0), {"sequence": Path("s"), "segments": Path("t")}
+        )
     STAGE.check(FuseParameters(), {"sequence": Path("s"), "segments": Path("t")})
 
 

@@ -47,7 +47,7 @@ def test_ingested_seven_scenes_ingests_again_to_the_same(tmp_path: Path) -> None
     assert second.info.source_format == "mcap"
     assert second.info.gravity.method == "given" and "metadata" in second.info.gravity.detail
     assert second.info.camera == first.info.camera
-    assert second.info.color_depth_registered is False  # known from the first log, kept in the file
+    assert second.info.color_depth_registered is first.info.color_depth_registered  # kept in the file
     _same_frames(first, second)
 
 

@@ -166,7 +166,7 @@ def test_every_section_is_there_and_the_page_is_sound(whole):
         "in cabinet_6",
     ):
         assert text in tags.text, text
-    assert made.summary["sections"] == 9
+    assert made.summary["sections"] == 10  # the outlook first
     assert Report(folder / "report").json_files["report.json"].read(folder / "report" / "report.json").sections
 
 
