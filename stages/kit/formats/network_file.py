@@ -43,3 +43,15 @@ def put_tensors(network: torch.nn.Module, tensors: Mapping[str, np.ndarray], whe
     numbers |= {name: torch.tensor(0) for name in state.keys() - needed}
     network.load_state_dict(numbers, assign=True)
     network.eval()
+    choose_vector_kernels()
+
+
+def choose_vector_kernels() -> None:
+    """Have torch's library of vector mathematics choose its kernels now, on one thread.
+
+    It chooses at the first call; when that comes from two threads at once, one may still compute with another kernel,
+    and the first result of a process had other last digits in one run of three.
+    """
+    few = torch.linspace(-1.0, 1.0, 64)
+    for function in (torch.tanh, torch.exp, torch.sigmoid):
+        function(few)
