@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema
 
 from schemas.errors import BadInput
 from schemas.outside import LARGEST_DOCUMENT, check_integers, file_content
@@ -64,10 +65,44 @@ def as_vector(values: np.ndarray) -> Vector3:
     return (x, y, z)
 
 
+SMALLEST_INT32, LARGEST_INT32 = -(2**31), 2**31 - 1
+LARGEST_NUMBER = 1e12
+"""Size of the numbers of a payload: metres, seconds since 1970, kilograms; their squares fit into a float32."""
+LARGEST_SEED = 2**31 - 1
+"""Of a command; those that follow from it are larger by a few."""
+Seed = Annotated[int, Field(ge=0, le=2**53)]
+
+
+def _bounded(schema: Any) -> Any:
+    """Return a schema of pydantic's whose numbers all have bounds: those that it states, else the ones above.
+
+    Models within it are left as they are: they have been here themselves.
+    """
+    if isinstance(schema, list):
+        return [_bounded(part) for part in schema]
+    if not isinstance(schema, dict):
+        return schema
+    kind = schema.get("type")
+    if kind == "int":
+        return {"ge": SMALLEST_INT32, "le": LARGEST_INT32, **schema}
+    if kind == "float":
+        return {"ge": -LARGEST_NUMBER, "le": LARGEST_NUMBER, **schema}
+    return {
+        key: part if key in ("metadata", "serialization", "default", "expected", "ref") else _bounded(part)
+        for key, part in schema.items()
+    }
+
+
 class Model(BaseModel):
-    """A payload model. Unknown keys are errors, values are immutable, NaN is refused."""
+    """A payload model. Unknown keys are errors, values are immutable, NaN is refused, and so are numbers that arrays of
+    32 bits cannot hold."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, protected_namespaces=())
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Bound every number of the fields."""
+        return _bounded(handler(source))
 
     @classmethod
     def read(cls, path: Path, *, largest: int = LARGEST_DOCUMENT, hint: str = "make the artifact again") -> Self:
