@@ -73,22 +73,23 @@ LARGEST_SEED = 2**31 - 1
 Seed = Annotated[int, Field(ge=0, le=2**53)]
 
 
-def _bounded(schema: Any) -> Any:
+def bounded(schema: Any, above_zero: float = 0.0) -> Any:
     """Return a schema of pydantic's whose numbers all have bounds: those that it states, else the ones above.
 
-    Models within it are left as they are: they have been here themselves.
+    Numbers that must be greater than zero are at least `above_zero`.
     """
     if isinstance(schema, list):
-        return [_bounded(part) for part in schema]
+        return [bounded(part, above_zero) for part in schema]
     if not isinstance(schema, dict):
         return schema
     kind = schema.get("type")
     if kind == "int":
         return {"ge": SMALLEST_INT32, "le": LARGEST_INT32, **schema}
     if kind == "float":
-        return {"ge": -LARGEST_NUMBER, "le": LARGEST_NUMBER, **schema}
+        least = above_zero if schema.get("gt") == 0 else -LARGEST_NUMBER
+        return {"ge": least, "le": LARGEST_NUMBER, **schema}
     return {
-        key: part if key in ("metadata", "serialization", "default", "expected", "ref") else _bounded(part)
+        key: part if key in ("metadata", "serialization", "default", "expected", "ref") else bounded(part, above_zero)
         for key, part in schema.items()
     }
 
@@ -102,7 +103,7 @@ class Model(BaseModel):
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Bound every number of the fields."""
-        return _bounded(handler(source))
+        return bounded(handler(source))
 
     @classmethod
     def read(cls, path: Path, *, largest: int = LARGEST_DOCUMENT, hint: str = "make the artifact again") -> Self:

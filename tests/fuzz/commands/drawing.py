@@ -42,17 +42,7 @@ FOREIGN_ROLES: dict[str, tuple[str, ...]] = {
 }
 """Inputs from outside: what of the base can be given."""
 TEXTS = (".tum", ".urdf", ".xml", ".srdf", ".pddl", ".toml", ".txt", ".csv", ".obj", ".mtl")
-PLACES = (
-    f"{'@'}settings/config.toml",
-    "@nothing",
-    "@report",
-    "/dev/null",
-    "/dev/zero",
-    "/",
-    "",
-    "x" * 300,
-    "@map/mesh.ply",
-)
+PLACES = (f"{'@'}settings/config.toml", "@nothing", "@report", "/dev/null", "/dev/zero", "", "x" * 300, "@map/mesh.ply")
 """Paths that are no artifact of the kind that is asked for."""
 WEIGHTS = {
     **{

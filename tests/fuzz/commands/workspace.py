@@ -25,7 +25,8 @@ Stamps = dict[str, tuple[int, int, int]]
 def names_in(case: Case) -> list[str]:
     """Return the names of what a case reads, in the order of its words, then what it edits beside them."""
     words = [word[1:].split("/")[0] for word in case.words if word.startswith("@")]
-    return [name for name in dict.fromkeys([*words, *(edit.target for edit in case.edits)]) if name != OUT]
+    words += ["graph", "map", "segments"] if "@" in case.words else []  # the folder that they stand in
+    return [name for name in dict.fromkeys([*words, *(edit.target for edit in case.edits)]) if name not in (OUT, "")]
 
 
 def prepare(case: Case, base: Path, root: Path) -> list[str]:
@@ -36,6 +37,7 @@ def prepare(case: Case, base: Path, root: Path) -> list[str]:
     """
     edited = list(dict.fromkeys(edit.target for edit in case.edits))
     digests: dict[str, str] = {}
+    (root / "in").mkdir(parents=True)
     for name in edited:
         source, copy = place_of(base, name), root / "in" / name
         shutil.copytree(source, copy)
