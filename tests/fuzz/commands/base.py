@@ -1,6 +1,7 @@
 """What cases start from: a small artifact of every kind, each made by its step, and files as people bring them.
 
-`python -m tests.fuzz.commands.base FOLDER` makes them (some minutes); what is up to date stays.
+`python -m tests.fuzz.commands.base FOLDER` makes them (some minutes); what is up to date stays. With
+--keep, what the corpus needs of them goes into the repository.
 """
 
 from __future__ import annotations
@@ -10,11 +11,13 @@ import os
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from tests.freshness.runs import Run
+from tests.fuzz.harness import CORPUS
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 SMALL = "--width 96 --height 72 --seed 3 --clutter low"
@@ -55,6 +58,29 @@ RUNS = (
 )
 FOREIGN = "foreign"
 """Folder of what people bring; its parts are named like the artifacts."""
+
+
+KEPT = ("sequence", "segments", "urdf")
+"""What the cases of the corpus start from, kept in the repository."""
+ARCHIVE = CORPUS / "base.zip"
+FIXED_TIME = (1980, 1, 1, 0, 0, 0)
+
+
+def keep(folder: Path) -> None:
+    """Put what the corpus starts from into the repository (by hand, when a schema version was raised)."""
+    with zipfile.ZipFile(ARCHIVE, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        for path in sorted(path for name in KEPT for path in (folder / name).rglob("*") if path.is_file()):
+            entry = zipfile.ZipInfo(path.relative_to(folder).as_posix(), FIXED_TIME)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, path.read_bytes())
+
+
+def take(folder: Path) -> None:
+    """Lay out what the corpus starts from."""
+    with zipfile.ZipFile(ARCHIVE) as archive:
+        for name in archive.namelist():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(archive.read(name))
 
 
 def make(folder: Path) -> None:
@@ -219,3 +245,5 @@ def place_of(folder: Path, name: str) -> Path:
 
 if __name__ == "__main__":
     make(Path(sys.argv[1]).resolve())
+    if "--keep" in sys.argv[2:]:
+        keep(Path(sys.argv[1]).resolve())

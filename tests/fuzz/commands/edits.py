@@ -385,7 +385,10 @@ EDITS: dict[str, Callable[..., None]] = {
     function.__name__: function
     for function in (put, delete, add, times, clone, rename, array, number, line, attribute, cut, flip, remove, content)
 } | {function.__name__: function for function in (swap, mesh, picture, frames, masks)}
-MISFITS = (LookupError, TypeError, ValueError, OSError, AttributeError, OverflowError, zipfile.BadZipFile, cv2.error)
+MISFITS = (
+    *(LookupError, TypeError, ValueError, OSError, AttributeError, OverflowError, NotImplementedError),
+    *(zipfile.BadZipFile, cv2.error),
+)
 """What an edit raises that does not fit what an earlier one left."""
 
 

@@ -89,8 +89,9 @@ def _left(case: Case, ended: forking.Ended, root: Path) -> str:
     if strange and not ended.hung:
         return "left a partial folder"
     out = root / OUT
-    if not out.is_dir() or not (out / MANIFEST_NAME).exists():
-        return "half an artifact" if out.is_dir() and any(out.glob("*.json")) and case.words[0] not in _FREE else ""
+    if not (out / MANIFEST_NAME).is_file():
+        written = any(path.is_file() for path in out.glob("*.json"))
+        return "half an artifact" if written and case.words[0] not in _FREE else ""
     try:
         artifact = open_artifact(out)
         assert artifact.manifest is not None

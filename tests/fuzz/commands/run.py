@@ -9,6 +9,7 @@ in outputs/fuzz/commands/found/; once mended, put it into tests/fuzz/corpus/comm
 from __future__ import annotations
 
 import argparse
+import atexit
 import json
 import shutil
 import sys
@@ -64,13 +65,19 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the first case; each next one has the next")
     parser.add_argument("--count", type=int, help="cases instead of minutes")
     parser.add_argument("--only", nargs="*", help="commands: 'library add', inspect")
-    parser.add_argument("--base", type=Path, default=Path("outputs/fuzz/base"))
+    parser.add_argument("--base", type=Path, help="small artifacts, made when missing [outputs/fuzz/base]")
     parser.add_argument("--found", type=Path, default=Path("outputs/fuzz/commands/found"))
     parser.add_argument("--replay", nargs="*", type=Path, help="cases to run instead; none: the corpus")
     parser.add_argument("--out", type=Path, help="JSON file of what was tried and what fell")
     options = parser.parse_args()
-    base = options.base.resolve()
-    if not (base / base_artifacts.FOREIGN / "scenenn").exists():
+    memory = Path("/dev/shm")
+    root = Path(tempfile.mkdtemp(prefix="fuzz-commands-", dir=memory if memory.is_dir() else None))
+    atexit.register(shutil.rmtree, root, ignore_errors=True)
+    base = (options.base or Path("outputs/fuzz/base")).resolve()
+    if options.replay is not None and options.base is None:
+        base = root / "base"
+        base_artifacts.take(base)
+    elif not (base / base_artifacts.FOREIGN / "scenenn").exists():
         base_artifacts.make(base)
     forking.settle_environment()
     forking.import_everything()
@@ -78,8 +85,7 @@ def main() -> int:
     from tests.fuzz.commands.judging import judge
     from tests.fuzz.commands.workspace import stamps_of
 
-    memory = Path("/dev/shm")
-    root = Path(tempfile.mkdtemp(prefix="fuzz-commands-", dir=memory if memory.is_dir() else None))
+    place = root / "case"
     tried: Counter[str] = Counter()
     fell: Counter[str] = Counter()
     codes: Counter[int] = Counter()
@@ -89,47 +95,42 @@ def main() -> int:
     started, last, used, seed = time.monotonic(), time.monotonic(), 0.0, options.seed
     if options.replay is not None:
         queue = [read_case(path) for path in options.replay or sorted(COMMANDS.glob("*.json"))]
-    try:
-        while True:
-            if options.replay is not None:
-                if not queue:
-                    break
-                case = queue.pop(0)
-            elif sum(tried.values()) >= options.count if options.count else used > 60 * options.minutes:
+    while True:
+        if options.replay is not None:
+            if not queue:
                 break
-            else:
-                case = draw_case(seed, base)
-                seed += 1
-            if options.only and case.command not in options.only:
-                continue
-            before = time.process_time()
-            verdict = judge(case, base, root, stamps)
-            used += verdict.cpu_seconds + time.process_time() - before
-            tried[case.command] += 1
-            codes[verdict.code] += 1
-            cpu[case.command] += verdict.cpu_seconds
-            if verdict.reason:
-                fell[case.command] += 1
-                if verdict.name not in found:
-                    whole = options.replay is not None or verdict.reason in ("does not end", "memory")
-                    small = case if whole else minimised(case, verdict.name, base, root)
-                    again = verdict if small == case else judge(small, base, root)
-                    entry = {"name": verdict.name, "seed": seed - 1, "said": (again.said or verdict.said)[-600:]}
-                    found[verdict.name] = entry
-                    options.found.mkdir(parents=True, exist_ok=True)
-                    (options.found / f"{case.command.replace(' ', '_')}-{seed - 1}.json").write_text(small.text())
-                    print(f"\n{seed - 1} {verdict.name}\n  {' '.join(small.words)}\n  {small.edits}", flush=True)
-                    print("  " + str(entry["said"]).strip()[-400:].replace("\n", "\n  "), flush=True)
-            elif options.replay is not None:
-                print(f"stood: {' '.join(case.words)[:100]} (exit {verdict.code})")
-            if time.monotonic() - last > 60:
-                last = time.monotonic()
-                rate = sum(tried.values()) / (last - started)
-                print(
-                    f"-- {sum(tried.values())} cases, {rate:.2f}/s, {used / 60:.1f} min, {len(found)} found", flush=True
-                )
-    finally:
-        shutil.rmtree(root, ignore_errors=True)
+            case = queue.pop(0)
+        elif sum(tried.values()) >= options.count if options.count else used > 60 * options.minutes:
+            break
+        else:
+            case = draw_case(seed, base)
+            seed += 1
+        if options.only and case.command not in options.only:
+            continue
+        before = time.process_time()
+        verdict = judge(case, base, place, stamps)
+        used += verdict.cpu_seconds + time.process_time() - before
+        tried[case.command] += 1
+        codes[verdict.code] += 1
+        cpu[case.command] += verdict.cpu_seconds
+        if verdict.reason:
+            fell[case.command] += 1
+            if verdict.name not in found:
+                whole = options.replay is not None or verdict.reason in ("does not end", "memory")
+                small = case if whole else minimised(case, verdict.name, base, place)
+                again = verdict if small == case else judge(small, base, place)
+                entry = {"name": verdict.name, "seed": seed - 1, "said": (again.said or verdict.said)[-600:]}
+                found[verdict.name] = entry
+                options.found.mkdir(parents=True, exist_ok=True)
+                (options.found / f"{case.command.replace(' ', '_')}-{seed - 1}.json").write_text(small.text())
+                print(f"\n{seed - 1} {verdict.name}\n  {' '.join(small.words)}\n  {small.edits}", flush=True)
+                print("  " + str(entry["said"]).strip()[-400:].replace("\n", "\n  "), flush=True)
+        elif options.replay is not None:
+            print(f"stood: {' '.join(case.words)[:100]} (exit {verdict.code})")
+        if time.monotonic() - last > 60:
+            last = time.monotonic()
+            rate = sum(tried.values()) / (last - started)
+            print(f"-- {sum(tried.values())} cases, {rate:.2f}/s, {used / 60:.1f} min, {len(found)} found", flush=True)
     seconds = time.monotonic() - started
     facts = {
         "cases": sum(tried.values()),
