@@ -26,11 +26,12 @@ class Item:
     key: str
     position: Position
     color: str
-    used: bool | None
     radius: float
     place: str
     votes: dict[Region, str | None] = field(default_factory=dict)
     """Region of views -> the class that was seen from there; None: it should have been seen and was not."""
+    used_votes: dict[Region, bool] = field(default_factory=dict)
+    """The same of whether it is used."""
 
     @property
     def label(self) -> str:
@@ -44,6 +45,13 @@ class Item:
         ranks = Counter(self.votes.values())
         own = ranks.pop(self.label, 0)
         return own - max(ranks.values(), default=0)
+
+    @property
+    def used(self) -> bool | None:
+        """What most regions say; None where it could not be told, or as many say the one as the other."""
+        said = list(self.used_votes.values())
+        yes = said.count(True)
+        return None if 2 * yes == len(said) else 2 * yes > len(said)
 
 
 class SceneMap:
@@ -70,21 +78,19 @@ class SceneMap:
 
     def add(self, detection: Detection, place: str, region: Region) -> Item:
         """Enter a detection: a vote of its region for the thing that lies there, or a new thing."""
-        item = self.at(detection.position, place, carrier=detection.label in CARRIERS)
+        item = self.at(detection.position, place)
         if item is None:
             key = self._name(detection.label)
-            item = self.items[key] = Item(
-                key, detection.position, detection.color, detection.used, detection.radius, place
-            )
+            item = self.items[key] = Item(key, detection.position, detection.color, detection.radius, place)
         item.votes[region] = detection.label
         item.position = detection.position
-        item.used = detection.used if detection.used is not None else item.used
+        if detection.used is not None:
+            item.used_votes[region] = detection.used
         return item
 
-    def at(self, position: Position, place: str, *, carrier: bool) -> Item | None:
-        """Return the thing of a place that a sighting at a position is of. What carries lies below what it carries."""
-        alike = [i for i in self.items.values() if i.place == place and (i.label in CARRIERS) == carrier]
-        near = [(_apart(i.position, position), i.key) for i in alike]
+    def at(self, position: Position, place: str) -> Item | None:
+        """Return the thing of a place that a sighting at a position is of."""
+        near = [(_apart(i.position, position), i.key) for i in self.items.values() if i.place == place]
         return self.items[min(near)[1]] if near and min(near)[0] <= SAME_THING else None
 
     def carrier_of(self, item: Item) -> str:

@@ -60,10 +60,13 @@ class OwnSkills(CommonSkills):
     # ---- eyes ----
 
     def explore_local(self, place: str) -> ObjectMap:
-        """Look from here, or from another side where one was looked from already; what was seen before stays."""
+        """Look from here, where that was done already from another side, and where there is none at each thing from
+        near by. What was seen before stays."""
         piece, looked = self.scene.furniture[place], self._looked.get(place, set())
-        if self._use.other_sides and quarter(self._body.base, piece.centre) in looked:
-            self._go_round(place, looked)
+        again = self._use.other_sides and quarter(self._body.base, piece.centre) in looked
+        if again and not self._go_round(place, looked):
+            for item in [i for i in self.scene.items.values() if i.place == place]:
+                self._look(place, item)
         self._look(place)
         if self._use.agreement:
             for item in [i for i in self.scene.items.values() if i.place == place]:
@@ -77,12 +80,17 @@ class OwnSkills(CommonSkills):
         return Observation("hand", (label,) if label else ())
 
     def picture_of(self, target: SceneObject) -> Observation:
-        """What is there by all views so far and one more."""
+        """What is there by all views so far and one from where there was none yet."""
         if target.key in self.scene.furniture:
             found = self.explore_local(target.key)
             return Observation(target.key, tuple(o.label for o in found))
         item = self.scene.items[target.key]
-        self._look(item.place, item)
+        for _ in range(MOST_VIEWS):
+            if (quarter(self._body.base, item.position), True) in item.votes and self._use.other_sides:
+                self._go_round(item.place, {int(side) for side, close in item.votes if close and side != "hand"})
+            self._look(item.place, item)
+            if item.used is not None or item.key not in self.scene.items or not self._use.other_sides:
+                break
         gone = item.key not in self.scene.items
         return Observation(target.key, () if gone else (item.label,), item.used)
 
@@ -185,7 +193,7 @@ class OwnSkills(CommonSkills):
             if item.key not in self.scene.items:
                 return Outcome(False, "gone", f"{item.key} is not there, seen from {len(item.votes)} views")
             if item.label != believed:
-                return Outcome(False, "wrong_object", f"{item.key} is rather a {item.label}")
+                return Outcome(False, "wrong_object", f"{item.key} is rather a {item.label}", label=item.label)
         place, candidate, tries = item.place, 0, 0
         for base in self._stations(place, item.position):
             if tries and not self._use.repair:
@@ -210,12 +218,12 @@ class OwnSkills(CommonSkills):
         return self._unreachable(place, tries)
 
     def _holds(self, item: Item, held: str) -> Outcome:
+        believed = item.label
         item.votes["hand", True] = held
         self.took(item)
-        if held == item.label and (not self._use.agreement or item.margin >= 1):
+        if held == believed:
             return Outcome(True)
-        item.votes = {("hand", True): held}
-        return Outcome(False, "wrong_in_hand", f"what the hand holds looks like a {held}")
+        return Outcome(False, "wrong_in_hand", f"what the hand holds looks like a {held}", label=held)
 
     def _found_again(self, item: Item) -> bool:
         """Look for a thing that was pushed; move its entry there."""
@@ -256,22 +264,19 @@ class OwnSkills(CommonSkills):
         """Look at the spot from two regions of views; say where it lies if not there."""
         item = self.holding
         assert item is not None
-        wanted = item.label
-        item.votes = {}
+        wanted = {vote for vote in item.votes.values() if vote}
         self.put(place, at)
         if not self._use.recheck:
-            item.votes[quarter(self._body.base, at), False] = wanted
             return Outcome(True)
         self.scene.items.pop(item.key)
         for close in (True, False):
             look = self._body.look(at, close=close)
-            near = [
-                (hypot(d.position[0] - at[0], d.position[1] - at[1]), d) for d in look.detections if d.label == wanted
-            ]
+            new = [d for d in look.detections if d.label in wanted and self.scene.at(d.position, place) is None]
+            near = [(hypot(d.position[0] - at[0], d.position[1] - at[1]), d) for d in new]
             away, seen = min(near, default=(BESIDE, None), key=lambda pair: pair[0])
             if seen is not None and away < BESIDE:
                 item.position, item.place = seen.position, place
-                item.votes[quarter(self._body.base, seen.position), close] = wanted
+                item.votes[quarter(self._body.base, seen.position), close] = seen.label
                 self.scene.items[item.key] = item
                 if away <= 0.1:
                     return Outcome(True)

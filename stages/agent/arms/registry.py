@@ -26,7 +26,8 @@ class Arm:
 
 
 def _ours(mechanisms: Mechanisms, *, true_eyes: bool = False) -> Arm:
-    style = Style(skilled=True, rounds=2 if mechanisms.other_sides else 1)
+    sides = mechanisms.other_sides
+    style = Style(skilled=True, rounds=3 if sides else 1, thorough=2 if sides else 1)
     return Arm(lambda body: OwnSkills(body, mechanisms), style, true_eyes=true_eyes)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from math import hypot
 from typing import Protocol
 
-from stages.agent.arms.stations import spots, spots_on
+from stages.agent.arms.stations import spots, spots_near, spots_on
 from stages.agent.body import Base, Body, Position
 from stages.agent.exploration import explore
 from stages.agent.goals import CARRIERS
@@ -80,8 +80,9 @@ class CommonSkills:
             raise PlanError("wrong_arguments", f"{target.key} is furniture", nearest="place(object) -> bool")
         item = self.scene.items[target.key]
         alike = [i.position for i in self.scene.items.values() if i.label == item.label and i.place == item.place]
-        middle = tuple(sum(p[k] for p in alike) / len(alike) for k in range(3))
-        return self.place_at(item.place, self.scene.furniture[item.place].label, [(middle[0], middle[1], middle[2])])
+        middle = (sum(p[0] for p in alike) / len(alike), sum(p[1] for p in alike) / len(alike), alike[0][2])
+        at = spots_near(self.scene, item.place, middle)
+        return self.place_at(item.place, self.scene.furniture[item.place].label, at)
 
     def _call_open(self, target: SceneObject) -> Outcome:
         return self._turn(target, opening=True)

@@ -5,12 +5,15 @@ from __future__ import annotations
 from math import atan2, ceil, cos, hypot, pi, sin
 
 from stages.agent.body import Base, Position, SeenFurniture
+from stages.agent.goals import NEAR_MIDDLE
 from stages.agent.scene_map import Item, SceneMap, quarter
 
 OFF = 0.45
 """Of the middle of the base from the edge of furniture [m]."""
 APART = 0.35
 """Between neighbouring base poses along an edge [m]."""
+FINE = 0.03
+"""Between positions around a middle, and of one from the rim of what is known to stand near [m]."""
 RING = 0.75
 """Of the radius of a small carrier, where things are put on it."""
 INSIDE = 0.2
@@ -75,6 +78,20 @@ def spots_on(scene: SceneMap, carrier: Item) -> list[Position]:
     taken = [i.position for i in scene.items.values() if i.key != carrier.key and i.place == carrier.place]
     near = {p: min((hypot(p[0] - q[0], p[1] - q[1]) for q in taken), default=1.0) for p in ring}
     return sorted(ring, key=lambda p: -round(near[p], 2))
+
+
+def spots_near(scene: SceneMap, place: str, middle: Position) -> list[Position]:
+    """Return positions around a middle that are free as far as is known, the nearest first; the middle if none is."""
+    x, y, z = middle
+    steps = [k * FINE for k in range(-3, 4)]
+    taken = [(i.position, i.radius) for i in scene.items.values() if i.place == place]
+    free = [
+        (x + dx, y + dy, z)
+        for dx in steps
+        for dy in steps
+        if hypot(dx, dy) <= NEAR_MIDDLE - FINE and all(hypot(x + dx - p[0], y + dy - p[1]) > r + FINE for p, r in taken)
+    ]
+    return sorted(free, key=lambda p: hypot(p[0] - x, p[1] - y)) or [middle]
 
 
 def other_sides(scene: SceneMap, place: str, base: Base, seen: set[int]) -> list[tuple[float, Base]]:

@@ -33,6 +33,8 @@ class Style:
     """Calls find base poses, repair and re-check by themselves and say why they failed (`ours`)."""
     rounds: int = 1
     """How often every place is looked at, from another side each, before something counts as not there."""
+    thorough: int = 1
+    """How often the places are looked at that all things of a kind are to be brought from."""
 
 
 class _GiveUp(Exception):
@@ -55,6 +57,8 @@ class RulesBrain:
         self._rejected: set[str] = set()
         self._checked: set[str] = set()
         self._moved: set[str] = set()
+        self._handled: set[str] = set()
+        """Classes of things that were taken, which may be anywhere since."""
         self._at, self._turn, self._troubles = "", 0, 0
         self._held: SceneObject | None = None
         self._gathered = ""
@@ -142,6 +146,7 @@ class RulesBrain:
         return self._failed[what, key]
 
     def _grasped(self, thing: SceneObject, outcome: Outcome) -> None:
+        self._handled.add(thing.label)
         if outcome.ok:
             self._held = self._things.pop(thing.key)
             self._at = thing.place
@@ -149,7 +154,7 @@ class RulesBrain:
             return
         tries = self._trouble("grasp", thing.key)
         if outcome.kind == "wrong_in_hand":
-            self._held, self._put_back = self._things.pop(thing.key), True
+            self._held = replace(self._things.pop(thing.key), label=outcome.label)
         elif outcome.kind == "unreachable" or tries >= MOST_FAILURES:
             self._rejected.add(thing.key)
         else:
@@ -168,7 +173,9 @@ class RulesBrain:
             self._at = place
             if self._put_back:
                 self._put_back = False
-                self._rejected.add(thing.key)
+                if not self._style.skilled or self._failed["grasp", thing.key] >= MOST_FAILURES:
+                    self._rejected.add(thing.key)
+                self._look_again = self._style.skilled
                 return
             self._moved.add(thing.key)
             where = "middle" if self._asked[0] == "place_among" else "spot"
@@ -231,6 +238,7 @@ class RulesBrain:
             held = self._held
             goals = tuple(g for g in goals if self._moves(g).fits(held.label, held.color, held.used))
             if not goals:
+                self._put_back = True
                 return self._return_it(held)
         for goal in goals:
             step = self._pursue(goal)
@@ -263,11 +271,15 @@ class RulesBrain:
                 raise _GiveUp(f"there is no {goal.start}")
         if not self._held:
             needed = starts if goal.start else [self._at] if goal.every else []
-            unseen = [p for p in needed if self._looked[p] < (self._style.rounds if goal.every else 1)]
+            unseen = [p for p in needed if self._looked[p] < (self._style.thorough if goal.every else 1)]
             if unseen:
                 return self._go_and_look(unseen[0])
         there = [t for t in self._fitting(what) if self._is_on(t, onto, how)]
-        away = [t for t in self._fitting(what) if t not in there and (not goal.start or t.place in starts)]
+        away = [
+            t
+            for t in self._fitting(what)
+            if t not in there and (not goal.start or t.place in starts or t.label in self._handled)
+        ]
         if self._held is None and ((there and not goal.every) or (goal.every and not away and there)):
             return None
         thing = self._held or next(iter(sorted(away, key=lambda t: (t.place != self._at, t.key))), None)
@@ -282,7 +294,7 @@ class RulesBrain:
         if not self._rooms:
             return self._explore()
         places = self._furniture(onto)
-        unseen = [place for place in places if self._looked[place] < self._style.rounds]
+        unseen = [place for place in places if self._looked[place] < self._style.thorough]
         if unseen and self._held is None:
             return self._go_and_look(unseen[0])
         things = self._fitting(what)
@@ -335,20 +347,26 @@ class RulesBrain:
         return thing.key not in self._checked and (self._style.pictures or clean)
 
     def _return_it(self, held: SceneObject) -> Reply:
-        """Put back what turned out to be something else."""
-        if held.place not in self._rooms:
+        """Put back what turned out to be something else, near something where the furniture is not known yet."""
+        near = [t for t in self._things.values() if t.place == held.place and t.label not in CARRIERS]
+        if held.place not in self._rooms and not near:
             return self._explore()
-        self._target = self._rooms[held.place]
+        self._target = self._rooms[held.place] if held.place in self._rooms else near[0]
         if self._at != held.place and not self._style.skilled:
             return self._step(Step("navigate", held.place))
         return self._call("That is not it: put it back.", "place", self._target)
 
     def _search(self, what: Description, places: list[str]) -> Reply:
         """Look where nobody looked yet, tables first, what has doors last; from other sides after that."""
+        if self._held is not None and self._rooms:
+            raise _GiveUp(f"no {what.text} was found to put it on")
+        for thing in self._things.values():
+            doubtful = self._style.skilled and what.clean and thing.label in what.labels and thing.used
+            if doubtful and self._failed["picture", thing.key] < MOST_FAILURES - 1:
+                self._failed["picture", thing.key] += 1
+                return self._call("Is it really used?", "report_observation", thing)
         if not self._rooms:
             return self._explore()
-        if self._held is not None:
-            raise _GiveUp(f"no {what.text} was found to put it on")
         order = places or sorted(
             self._rooms, key=lambda k: (self._rooms[k].door, self._rooms[k].label != "table", k != self._at)
         )

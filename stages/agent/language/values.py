@@ -27,7 +27,8 @@ class SceneObject:
     @property
     def text(self) -> str:
         """As feedback says it."""
-        look = [self.color] if self.color else []
+        look = [] if self.key.startswith(self.label.replace(" ", "_")) else [f"looks like a {self.label}"]
+        look += [self.color] if self.color else []
         look += [] if self.used is None else ["used" if self.used else "clean"]
         look += [] if not self.door else ["open" if self.opened else "closed"]
         where = f" on {self.on or self.place}" if self.place else ""
@@ -67,6 +68,8 @@ class Outcome:
     knows."""
     message: str = ""
     numbers: dict[str, float] = field(default_factory=dict)
+    label: str = ""
+    """What the thing turned out to look like, where it was about that."""
 
     @property
     def text(self) -> str:

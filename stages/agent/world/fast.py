@@ -23,8 +23,8 @@ NOISE = 0.01
 """Standard deviation of measured positions [m], persistent within a region of views."""
 BASE_CELL = 0.35
 """Base poses within such a square around a piece of furniture are one and the same to the arm [m]."""
-ROLLS = 0.22
-"""How far beside its place something comes to lie that rolls [m]."""
+ROLLS, BESIDE = 0.22, 0.1
+"""How far something rolls on furniture, and how far beside a small carrier it comes to lie [m]."""
 SPEED = 0.4
 """Of the base [m/s]."""
 SECONDS = {
@@ -356,14 +356,15 @@ class FastWorld:
         body.moved += 1
 
     def _roll(self, body: Body, at: Position) -> None:
-        """Something rolls off its place, towards the middle of the furniture where there is any."""
+        """Something rolls off its place and comes to lie beside it, towards the middle of the furniture."""
         piece = self._under(at)
+        over = self.bodies.get(body.on)
+        origin, far = (over.at, over.thing.radius + BESIDE) if over is not None else (at[:2], ROLLS)
         centre = piece.centre if piece is not None else at[:2]
-        toward = atan2(centre[1] - at[1], centre[0] - at[0]) + (
-            self._luck.uniform("roll", body.thing.name, body.moved) - 0.5
-        )
+        toward = atan2(centre[1] - origin[1], centre[0] - origin[0])
+        toward += self._luck.uniform("roll", body.thing.name, body.moved) - 0.5
         body.on = piece.name if piece is not None else "floor"
-        body.at = self._kept_on(body, (at[0] + ROLLS * cos(toward), at[1] + ROLLS * sin(toward)))
+        body.at = self._kept_on(body, (origin[0] + far * cos(toward), origin[1] + far * sin(toward)))
 
     def _kept_on(self, body: Body, at: tuple[float, float]) -> tuple[float, float]:
         """Return a position within the furniture that a thing is on."""
