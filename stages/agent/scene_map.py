@@ -11,7 +11,7 @@ from stages.agent.goals import CARRIERS
 from stages.agent.language.values import ObjectMap, SceneObject
 from stages.agent.obstacle_map import ObstacleMap
 
-SAME_FURNITURE, SAME_THING = 0.3, 0.05
+SAME_FURNITURE, SAME_THING = 0.3, 0.04
 """Two sightings this near are of one thing [m]."""
 IN_FRONT = 0.7
 """Furniture whose edge is this near to the base is in front of it [m]."""
@@ -41,10 +41,16 @@ class Item:
 
     @property
     def margin(self) -> int:
-        """By how many regions its class is ahead of everything else that was said."""
-        ranks = Counter(self.votes.values())
-        own = ranks.pop(self.label, 0)
-        return own - max(ranks.values(), default=0)
+        """By how many regions its class is ahead of any other, and of the sides from which nothing was seen."""
+        said = Counter(vote for vote in self.votes.values() if vote is not None)
+        own = said.pop(self.label, 0)
+        return own - max([*said.values(), len(self.sides(seen=False))])
+
+    def sides(self, *, seen: bool) -> set[int | str]:
+        """Return the sides from which it was seen from near or far, or from which it should have been and was not:
+        what hides a thing hides it from a side."""
+        there = {side for (side, _), vote in self.votes.items() if vote is not None}
+        return there if seen else {side for side, _ in self.votes} - there
 
     @property
     def used(self) -> bool | None:
@@ -95,18 +101,12 @@ class SceneMap:
 
     def carrier_of(self, item: Item) -> str:
         """Return the key of the small carrier on which a thing lies, or nothing."""
-        if item.label in CARRIERS:
-            return ""
-        return next(
-            (
-                other.key
-                for other in self.items.values()
-                if other.label in CARRIERS
-                and other.place == item.place
-                and _apart(other.position, item.position) <= other.radius
-            ),
-            "",
-        )
+        return "" if item.label in CARRIERS else self.at_carrier(item.position, item.place)
+
+    def at_carrier(self, position: Position, place: str) -> str:
+        """Return the key of the small carrier of a place that is at a position, or nothing."""
+        carriers = (item for item in self.items.values() if item.label in CARRIERS and item.place == place)
+        return next((c.key for c in carriers if _apart(c.position, position) <= c.radius), "")
 
     def scene_object(self, key: str) -> SceneObject:
         """Return a thing or piece of furniture as programs see it."""

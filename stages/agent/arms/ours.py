@@ -23,6 +23,8 @@ TRIES = 6
 """Executions within one call."""
 BESIDE = 0.4
 """How far around its spot something is looked for that is not on it [m]."""
+AWAY = 0.1
+"""Of what was placed from its spot, at most [m]."""
 OFF_SPOT = 0.05
 """Spots this near to one that something rolled off are not tried again [m]."""
 HAND_VIEWS = 3
@@ -107,7 +109,7 @@ class OwnSkills(CommonSkills):
         for each in should:
             if each.key not in seen:
                 each.votes[quarter(base, each.position), close] = None
-                if sum(v is None for v in each.votes.values()) > len(each.votes) / 2:
+                if len(each.sides(seen=False)) > len(each.sides(seen=True)):
                     self.scene.items.pop(each.key, None)
 
     def _confirm(self, item: Item) -> None:
@@ -269,6 +271,7 @@ class OwnSkills(CommonSkills):
         if not self._use.recheck:
             return Outcome(True)
         self.scene.items.pop(item.key)
+        over = self.scene.at_carrier(at, place)
         for close in (True, False):
             look = self._body.look(at, close=close)
             new = [d for d in look.detections if d.label in wanted and self.scene.at(d.position, place) is None]
@@ -278,7 +281,7 @@ class OwnSkills(CommonSkills):
                 item.position, item.place = seen.position, place
                 item.votes[quarter(self._body.base, seen.position), close] = seen.label
                 self.scene.items[item.key] = item
-                if away <= 0.1:
+                if away <= AWAY and self.scene.carrier_of(item) == over:
                     return Outcome(True)
         self._off.append(at)
         if item.key in self.scene.items:

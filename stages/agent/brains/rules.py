@@ -270,8 +270,9 @@ class RulesBrain:
             if goal.start and not starts:
                 raise _GiveUp(f"there is no {goal.start}")
         if not self._held:
-            needed = starts if goal.start else [self._at] if goal.every else []
-            unseen = [p for p in needed if self._looked[p] < (self._style.thorough if goal.every else 1)]
+            all_of_them = goal.every or how == "place_among"
+            needed = starts if goal.start else [self._at] if all_of_them else []
+            unseen = [p for p in needed if self._looked[p] < (self._style.thorough if all_of_them else 1)]
             if unseen:
                 return self._go_and_look(unseen[0])
         there = [t for t in self._fitting(what) if self._is_on(t, onto, how)]

@@ -19,8 +19,8 @@ REACH, HIGHEST = 1.3, 1.4
 """Of the arm from the middle of the base over the ground, and the highest place [m]."""
 FOUND_WITHIN = 0.12
 """The hand closes on what is nearest to where it goes, up to this far [m]."""
-NOISE = 0.01
-"""Standard deviation of measured positions [m], persistent within a region of views."""
+NOISE, FURNITURE_NOISE = 0.006, 0.02
+"""Standard deviation of measured positions of things and of furniture [m], persistent within a region of views."""
 BASE_CELL = 0.35
 """Base poses within such a square around a piece of furniture are one and the same to the arm [m]."""
 ROLLS, BESIDE = 0.22, 0.1
@@ -244,7 +244,7 @@ class FastWorld:
             self.events.append(Event("look", step, False, cause))
 
     def _seen(self, piece: Furniture) -> SeenFurniture:
-        x, y = (c + NOISE * 2 * self._normal("furniture", piece.name, k) for k, c in enumerate(piece.centre))
+        x, y = (c + FURNITURE_NOISE * self._normal("furniture", piece.name, k) for k, c in enumerate(piece.centre))
         return SeenFurniture(piece.label, (x, y), piece.size, piece.height, piece.door, piece.name in self.opened)
 
     def _visible(self, piece: Furniture | None) -> list[Body]:
