@@ -31,6 +31,11 @@ def make_apartment(task: Task, seed: int) -> Apartment:
     return drawn(seed, list(TASKS).index(task.name), task.stock)
 
 
+def make_household(seed: int) -> Apartment:
+    """Return an apartment with a little of everything, for words of the user's own."""
+    return drawn(seed, len(TASKS), _household)
+
+
 def _furnish(draft: Draft, tables: int = 2, *more: str) -> list[str]:
     """Put up what every apartment has, the tables first; return the tables' names."""
     for label in (*("table",) * tables, "bed", "sofa", "fridge", "dresser", *more):
@@ -142,6 +147,19 @@ def _high_shelf(draft: Draft) -> None:
     tables = _furnish(draft, 2, "shelf")
     draft.add_thing("book", tables[0])
     draft.add_thing("cup", tables[1], color="red")
+
+
+def _household(draft: Draft) -> None:
+    first, second = _furnish(draft)
+    draft.add_thing("plate", first, carries=True)
+    for label in ("apple", "banana"):
+        draft.add_thing(label, first)
+    for label in ("doll", "book"):
+        draft.add_thing(label, second)
+    for table, color in ((first, "blue"), (second, "red")):
+        draft.add_thing("cup", table, color=color)
+    draft.add_thing("bottle", "fridge_0")
+    draft.add_thing("spoon", "dresser_0")
 
 
 _TOYS_AWAY = Move(kind("toy"), kind("sofa"), every=True, start="table")

@@ -66,9 +66,10 @@ def run_trial(
     arm: str,
     brain: Brain | None = None,
     *,
+    one_program: bool = False,
     watch: Callable[[Turn, CommonSkills, FastWorld], None] | None = None,
 ) -> tuple[Session, FastWorld]:
-    """Run one trial. A language brain answers turn by turn, whatever the arm."""
+    """Run one trial. A brain that is given answers turn by turn, unless it is to say `one_program`."""
     world = open_world(setting, arm)
     skills = ARMS[arm].skills(world)
 
@@ -76,6 +77,6 @@ def run_trial(
         if watch is not None:
             watch(turn, skills, world)
 
-    one = ARMS[arm].one_program and brain is None
+    one = one_program or (brain is None and ARMS[arm].one_program)
     session = run_session(brain or rules_brain(setting, arm), skills, world, setting.limits, one_program=one, watch=see)
     return session, world
