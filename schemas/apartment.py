@@ -78,7 +78,7 @@ class Apartment(Model):
     @model_validator(mode="after")
     def _fits_together(self) -> Apartment:
         rooms = {room.name for room in self.rooms}
-        bodies = [body.name for body in (*self.furniture, *self.things)]
+        bodies = [piece.name for piece in self.furniture] + [thing.name for thing in self.things]
         for name in bodies:
             if bodies.count(name) > 1:
                 raise ValueError(f"two things are called {name!r}")

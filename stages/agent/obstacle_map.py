@@ -52,7 +52,7 @@ class ObstacleMap:
             self.state[rows[:, 0], rows[:, 1]] = np.maximum(target, value)
         self._fields.clear()
         self._drivable = None
-        return int(np.count_nonzero(self.window)) - before
+        return int(np.count_nonzero(self.window) - before)
 
     @property
     def window(self) -> np.ndarray:

@@ -20,9 +20,7 @@ class RunParameters(LanguageParameters):
     """Options of `agent run`. The apartment follows from the task and --seed, or is --world."""
 
     task: str = Field("place_fruit", description="Name of a built-in task, or what you want in words (docs/AGENT.md)")
-    arm: ArmName = Field(
-        "ours", description="How calls are carried out and checked; only `oracle` sees without errors"
-    )
+    arm: ArmName = Field("ours", description="How calls are carried out and checked; only `oracle` sees without errors")
     brain: Literal["rules", "language"] = Field(
         "rules", description="Who writes the programs: rules of ours, no model; or a language model (--language)"
     )

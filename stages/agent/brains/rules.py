@@ -65,7 +65,7 @@ class RulesBrain:
         """Where things are being gathered."""
         self._asked: tuple[str, str] = ("", "")
         """Call and key of what the last program was about."""
-        self._put_back = self._look_again = self._step_back = False
+        self._put_back = self._look_again = self._step_back = self._explored = False
         self._check: tuple[str, SceneObject, SceneObject] | None = None
         """`hand`, `spot` or `middle`, the thing, and the target: what a picture has to show."""
 
@@ -106,7 +106,7 @@ class RulesBrain:
         key, value = self._asked[1], called.value
         match called.name, value:
             case "explore_global", ObjectMap():
-                self._rooms = {item.key: item for item in value}
+                self._rooms, self._explored = {item.key: item for item in value}, True
             case "explore_local", ObjectMap():
                 self._mapped(value)
             case "report_observation", Observation():
@@ -219,7 +219,7 @@ class RulesBrain:
     # ---- what to do next ----
 
     def _next(self, goals: tuple[Goal, ...]) -> Reply:
-        if not self._looked and not self._rooms:
+        if not self._looked and not self._explored:
             return self._write("See what is here.", "explore_local", "", "here = explore_local()")
         if self._check is not None:
             what, _, target = self._check
@@ -265,7 +265,7 @@ class RulesBrain:
     def _bring(self, what: Description, onto: Description, goal: Move, how: str) -> Reply | None:
         starts = self._furniture(Description((goal.start,))) if goal.start else []
         if goal.start or onto.labels[0] in FURNITURE:
-            if not self._rooms:
+            if not self._explored:
                 return self._explore()
             if goal.start and not starts:
                 raise _GiveUp(f"there is no {goal.start}")
@@ -292,7 +292,7 @@ class RulesBrain:
         return self._deliver(thing, what, target, how)
 
     def _gather(self, what: Description, onto: Description) -> Reply | None:
-        if not self._rooms:
+        if not self._explored:
             return self._explore()
         places = self._furniture(onto)
         unseen = [place for place in places if self._looked[place] < self._style.thorough]
@@ -312,7 +312,7 @@ class RulesBrain:
         return self._deliver(thing, what, self._rooms[best], "place")
 
     def _shut(self, what: Description, opened: bool) -> Reply | None:
-        if not self._rooms:
+        if not self._explored:
             return self._explore()
         for place in self._furniture(what):
             if self._rooms[place].opened != opened and place not in self._rejected:
@@ -359,14 +359,14 @@ class RulesBrain:
 
     def _search(self, what: Description, places: list[str]) -> Reply:
         """Look where nobody looked yet, tables first, what has doors last; from other sides after that."""
-        if self._held is not None and self._rooms:
+        if self._held is not None and self._explored:
             raise _GiveUp(f"no {what.text} was found to put it on")
         for thing in self._things.values():
             doubtful = self._style.skilled and what.clean and thing.label in what.labels and thing.used
             if doubtful and self._failed["picture", thing.key] < MOST_FAILURES - 1:
                 self._failed["picture", thing.key] += 1
                 return self._call("Is it really used?", "report_observation", thing)
-        if not self._rooms:
+        if not self._explored:
             return self._explore()
         order = places or sorted(
             self._rooms, key=lambda k: (self._rooms[k].door, self._rooms[k].label != "table", k != self._at)
