@@ -82,6 +82,7 @@ REPLAY = Stage(
     writes=AgentEpisode,
     libraries=("numpy", "scipy", "numba", "matplotlib"),
     module="replay_stage",
+    data_files=lambda parameters: (RECIPE,),
     example="scenewright agent replay --episode outputs/agent/episode --out outputs/agent/again",
 )
 EVALUATE = Stage(
