@@ -225,6 +225,11 @@ stitch-thread: setup ## Threads as curves in space, from true and from learned m
 llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2, harder suites (QUICK=1: ten instances)
 	$(EXPERIMENT) llm3 --out $(OUTPUTS)/experiments/llm3$(if $(QUICK),-quick) $(ASKED)
 
+.PHONY: come-robot
+# A hundred reporting seeds a task, twelve tasks, ablations and curves: about four minutes of two cores.
+come-robot: setup ## A robot told in words (COME-robot): tables 3.2 to 3.4, ablations, curves (QUICK=1: ten seeds)
+	$(EXPERIMENT) come_robot --out $(OUTPUTS)/experiments/come-robot$(if $(QUICK),-quick) $(ASKED)
+
 .PHONY: bench-disparity bench-reconstruct-stereo train-stereo
 # Rendered pairs are kept below the output folder; the network's arms run when its checkpoint is there.
 STEREO_NETWORK ?= data/disparity/raft_stereo_small.safetensors

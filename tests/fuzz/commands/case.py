@@ -7,8 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-GROUPED = ("library", "suture", "tableware", "truth")
-"""First words of commands of two words."""
+from stages.engine.discovery import all_stages
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,8 @@ class Case:
     @property
     def command(self) -> str:
         """The command's name, for tables: `library add`, `inspect`."""
-        return " ".join(self.words[: 2 if self.words[0] in GROUPED else 1])
+        groups = {name.split()[0] for name in all_stages() if " " in name}
+        return " ".join(self.words[: 2 if self.words[0] in groups else 1])
 
 
 def read_case(path: Path) -> Case:
