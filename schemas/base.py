@@ -124,6 +124,16 @@ class Model(BaseModel):
         except ValueError as error:
             raise BadInput(f"{path}: {error}", hint=hint) from None
 
+    @classmethod
+    def of_outside(cls, where: Path | str, *, hint: str = "", **values: Any) -> Self:
+        """Return the model of values that a file of others states. Raises BadInput, beginning with `where`."""
+        try:
+            return cls(**values)
+        except ValidationError as error:
+            first = error.errors()[0]
+            name = ".".join(str(part) for part in first["loc"])
+            raise BadInput(f"{where}: {name} = {str(first.get('input')):.40}: {first['msg']}", hint=hint) from None
+
     def check_read(self) -> None:
         """Raise ValueError when the parts of what was read do not fit each other; kinds say here what has to."""
 

@@ -85,7 +85,7 @@ def lens_of(record: CalibrationRecord, size: tuple[int, int], rectified: bool, w
     calibration that cannot be, or of another image shape, or a distortion model that is not known.
     """
     matrix, notes = scaled_matrix(record, _projection(record) if rectified else record.K, size, where, what)
-    camera = _camera(matrix, size if size != (0, 0) else (record.width, record.height))
+    camera = _camera(matrix, size if size != (0, 0) else (record.width, record.height), where)
     if rectified:
         named = "P" if has_projection(record) else "K"
         return Lens(camera, size, notes=(*notes, f"{what} are rectified: intrinsics are those of {named}"))
@@ -112,7 +112,7 @@ def turned_lens(
     if size == (0, 0):
         return Lens(camera, size, None, turned, notes)
     if rectified:
-        recorded = _camera(matrix, size)
+        recorded = _camera(matrix, size, where)
         if same and recorded == camera:
             return Lens(camera, size, None, None, notes)
         maps = _maps(matrix, np.zeros(5), camera_from_frame, camera)
@@ -155,8 +155,10 @@ def scaled_matrix(
     return np.linalg.inv(shift) @ scale @ shift @ matrix, (note,)
 
 
-def _camera(matrix: np.ndarray, size: tuple[int, int]) -> Camera:
-    return Camera(
+def _camera(matrix: np.ndarray, size: tuple[int, int], where: str) -> Camera:
+    return Camera.of_outside(
+        where,
+        hint=HINT,
         width=size[0],
         height=size[1],
         fx=float(matrix[0, 0]),

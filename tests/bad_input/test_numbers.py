@@ -8,16 +8,19 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from pydantic import Field
 
 from cli.main import run
 from schemas.base import LARGEST_INT32, LARGEST_SEED, Model, Seed
 from schemas.errors import BadInput, UsageError
+from schemas.scene_parts import Camera
 from stages.engine.discovery import all_stages
 from stages.engine.json_schemas import json_schemas
 from stages.engine.machine_faults import is_machines
 from stages.kit.configuration import parameters_for
+from stages.kit.geometry.point_clouds import sample_large_triangles
 
 
 class Inner(Model):
@@ -64,6 +67,19 @@ def test_numbers_at_the_bounds(tmp_path: Path) -> None:
     ):
         whole.write(tmp_path / "a.json")
         assert Payload.read(tmp_path / "a.json") == whole
+
+
+def test_values_of_a_file_of_others() -> None:
+    with pytest.raises(BadInput, match=r"^a.mcap: cx = 1e.20: .*less than .* .give --cx.$"):
+        Camera.of_outside("a.mcap", hint="give --cx", width=1, height=1, fx=1.0, fy=1.0, cx=1e20, cy=0.0)
+    assert Camera.of_outside("a", width=1, height=2, fx=1.0, fy=1.0, cx=0.0, cy=0.0).height == 2
+
+
+@pytest.mark.parametrize("size", [1e9, 1e18])
+def test_surfaces_of_more_points_than_there_is_memory(size: float) -> None:
+    vertices = np.array([[0, 0, 0], [size, 0, 0], [0, size, 0]], np.float32)
+    with pytest.raises(BadInput, match="is too large for points 0.01 m apart"):
+        sample_large_triangles(vertices, np.array([[0, 1, 2]]), 0.01, np.random.default_rng(0))
 
 
 def unbounded(schema: Any) -> list[Any]:

@@ -395,9 +395,8 @@ def require_depth(sequence: Sequence) -> None:
 def _camera_of(message: Any, path: Path) -> Camera:
     if len(message.K) != 9 or message.K[0] <= 0 or message.K[4] <= 0:
         raise BadInput(f"{path}: calibration has no focal lengths (K = {list(message.K)})")
-    return Camera(
-        width=message.width, height=message.height, fx=message.K[0], fy=message.K[4], cx=message.K[2], cy=message.K[5]
-    )
+    fx, _, cx, _, fy, cy, *_ = message.K
+    return Camera.of_outside(path, width=message.width, height=message.height, fx=fx, fy=fy, cx=cx, cy=cy)
 
 
 def _label_table(table: dict[str, str], path: Path) -> tuple[LabelEntry, ...]:

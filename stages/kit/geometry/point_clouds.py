@@ -7,6 +7,11 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from schemas.errors import BadInput
+
+MOST_SAMPLES = 50_000_000
+"""Points on the large triangles of one mesh: 2,500 m^2 at a centimetre."""
+
 
 def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Return unit normals (V, 3) of vertices (V, 3): area-weighted means of the faces (F, 3) around them.
@@ -29,12 +34,19 @@ def sample_large_triangles(
     """Return points (K, 3) and unit normals on triangles that are larger than a grid of `spacing` [m].
 
     Meshes of a TSDF have vertices everywhere and add nothing; a box of twelve triangles needs this to be seen.
-    About one point falls on each spacing^2 / 2 of area.
+    About one point falls on each spacing^2 / 2 of area. Raises BadInput when that were over `MOST_SAMPLES`.
     """
     corners = vertices[faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * np.linalg.norm(cross, axis=1)
-    counts = np.where(area > spacing**2, np.ceil(2.0 * area / spacing**2), 0).astype(int)
+    with np.errstate(over="ignore"):
+        wanted = np.where(area > spacing**2, np.ceil(2.0 * area / spacing**2), 0)
+    if not wanted.sum() <= MOST_SAMPLES:
+        raise BadInput(
+            f"a surface of {area.sum():.3g} m^2 is too large for points {spacing:g} m apart",
+            hint="its mesh may be damaged",
+        )
+    counts = wanted.astype(int)
     owner = np.repeat(np.arange(len(faces)), counts)
     u, v = random.random((2, len(owner), 1))
     flip = u + v > 1.0

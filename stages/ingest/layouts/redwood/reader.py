@@ -100,4 +100,4 @@ def _read_intrinsics(path: Path, size: tuple[int, int] | None) -> Camera:
         raise BadInput(f"{path}: focal lengths {fx:g}, {fy:g} are not positive")
     if size is not None and size != (width, height):
         raise BadInput(f"{path}: is for {width}x{height}, the depth images are {size[0]}x{size[1]}")
-    return Camera(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)
+    return Camera.of_outside(path, width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)
