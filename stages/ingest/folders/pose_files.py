@@ -3,7 +3,7 @@
 Poses are taken to be world_from_camera. What a row holds is told by its columns: 7 is tx ty tz qx qy qz qw, 8 has a
 stamp before these (TUM), 12 is a 3x4 matrix row by row (KITTI), 16 a 4x4 matrix. One column more is the name of the
 row's image, with or without folder and ending, or its number; such rows may stand in any order and leave images out.
-Eight columns of numbers are named poses where most first columns are an image's name or whole number, stamped otherwise.
+Eight columns of numbers are named poses where half the first column or more names images, and stamped ones otherwise.
 """
 
 from __future__ import annotations
