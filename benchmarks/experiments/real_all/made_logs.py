@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.mosd_frames import CAMERA, DEPTH_UNIT, read_frames
 
-TABLETOP = 40
+TABLETOP = "test40"
 """Which of the reporting frames: cups and a can, one behind the other."""
 BOX_MARGIN = 0.02
 """Points so far outside a box are still its own [m]."""
@@ -32,7 +32,7 @@ def bin_frame(source: Path, folder: Path) -> tuple[Path, Path]:
 
 def labelled_tabletop(source: Path, folder: Path) -> tuple[Path, Path]:
     """One Kinect frame of a tabletop with the masks of its things."""
-    frame = read_frames(source, TABLETOP)[1]
+    frame = next(frame for frame in read_frames(source) if frame.name == TABLETOP)
     log = _frame(folder, frame.color[..., ::-1], frame.depth / DEPTH_UNIT)
     numbers = {name: getattr(CAMERA, name) for name in ("fx", "fy", "cx", "cy", "width", "height")}
     (log / "camera.json").write_text(json.dumps(numbers), encoding="utf-8")
