@@ -95,7 +95,7 @@ REAL_DATA ?= ../shared/data
 real: setup ## The chain on real logs, one table; fails unless it finds what the pictures show (REAL_DATA=folder)
 	$(EXPERIMENT) real --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real $(ASKED)
 
-# Up to an hour of two cores; a stopped run goes on where it was. `OPTIONS="--detector FILE.onnx"`.
+# Under an hour of two cores; a stopped run goes on where it was. `OPTIONS="--detector FILE.onnx"`.
 real-all: setup ## Every real log through every backend that runs here; fails unless each run explains itself (QUICK=1: few frames)
 	OMP_NUM_THREADS=1 $(EXPERIMENT) real_all --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real-all$(if $(QUICK),-quick) --jobs 2 $(ASKED)
 
