@@ -78,6 +78,8 @@ def _frame(folder: Path, color: np.ndarray, depth: np.ndarray) -> Path:
     for name, image in (("color", color), ("depth", np.clip(depth, 0, 65535).astype(np.uint16))):
         (log / name).mkdir(parents=True, exist_ok=True)
         cv2.imwrite(str(log / name / "000000.png"), image)
+    row = " ".join(f"{value:g}" for value in np.eye(4).ravel())
+    (log / "poses.txt").write_text(f"000000 {row}\n", encoding="ascii")  # one frame has no path to estimate
     return log
 
 
