@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 
 from benchmarks.mosd_frames import CAMERA, DEPTH_UNIT, read_frames
+from schemas.errors import BadInput
 
 TABLETOP = "test40"
 """Which of the reporting frames: cups and a can, one behind the other."""
@@ -24,7 +25,10 @@ def bin_frame(source: Path, folder: Path) -> tuple[Path, Path]:
     with np.load(source / "data.npz", allow_pickle=False) as data:
         depth, masks, labels = data["depth"], data["masks"] == 1, data["labels"]
     names = (source / "class_names.txt").read_text(encoding="utf-8").split()
-    log = _frame(folder, cv2.imread(str(source / "rgb.jpg")), np.nan_to_num(depth) * 1000)
+    picture = cv2.imread(str(source / "rgb.jpg"))
+    if picture is None:
+        raise BadInput(f"{source / 'rgb.jpg'}: no picture that can be read", hint="see docs/DATA.md")
+    log = _frame(folder, picture, np.nan_to_num(depth) * 1000)
     shutil.copy(source / "camera_info.json", log / "camera_info.json")
     classes = np.array([names[k] for k in labels])
     return log, _masks(folder, masks, {name: "object" for name in sorted(set(classes))}, classes)
