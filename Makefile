@@ -91,9 +91,13 @@ ASKED = $(if $(QUICK),--quick) $(if $(FRESH),--fresh) $(OPTIONS)
 # The folder that holds the real logs (see docs/DATA.md); none of it is part of the project.
 REAL_DATA ?= ../shared/data
 
-.PHONY: real bench bench-preflight
+.PHONY: real real-all bench bench-preflight
 real: setup ## The chain on real logs, one table; fails unless it finds what the pictures show (REAL_DATA=folder)
 	$(EXPERIMENT) real --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real $(ASKED)
+
+# Under an hour of two cores; a stopped run goes on where it was. `OPTIONS="--detector FILE.onnx"`.
+real-all: setup ## Every real log through every backend that runs here; fails unless each run explains itself (QUICK=1: few frames)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) real_all --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real-all$(if $(QUICK),-quick) --jobs 2 $(ASKED)
 
 # Twelve generated rooms (three with QUICK=1) and the real logs, each with every planted fault.
 bench-preflight: setup ## What `inspect` makes of planted faults (QUICK=1: three rooms)
