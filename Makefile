@@ -48,7 +48,10 @@ test-all: extras ## Run the slow tests and those of the extras too
 	OMP_NUM_THREADS=1 $(PYTHON) -m pytest -n $(TEST_JOBS) --dist loadfile -m ''
 
 SECONDS_EACH ?= 60
-fuzz: extras ## Fuzz every parser with coverage guidance (SECONDS_EACH=60)
+MINUTES ?= 10
+SEED ?= 0
+fuzz: extras ## Fuzz the commands (MINUTES=10 of processor time, SEED=0), then every parser with coverage guidance (SECONDS_EACH=60)
+	$(PYTHON) -m tests.fuzz.commands.run --minutes $(MINUTES) --seed $(SEED)
 	$(PYTHON) -m tests.fuzz.run --seconds $(SECONDS_EACH)
 
 lint: setup ## Format and lint check, types, who may import whom

@@ -54,6 +54,7 @@ def run(arguments: list[str]) -> int:
     from cli.streams import INTERRUPTED, ReaderLeft
     from schemas.errors import MachineFailure, ScenewrightError
     from stages.engine import interruption
+    from stages.engine.machine_faults import is_machines
     from stages.engine.runner import NO_CODE_CACHE, NO_CODE_CACHE_HINT, NO_CODE_CACHE_TEXT
 
     debug = "--debug" in arguments
@@ -90,6 +91,8 @@ def run(arguments: list[str]) -> int:
     except (OSError, MemoryError) as error:  # inputs and outputs have their own words where they are opened
         if debug:
             raise
+        if not is_machines(error, arguments):
+            return _say_bug(error)
         place, what = getattr(error, "filename", None), getattr(error, "strerror", None)
         say_error(f"{f'{place}: ' if place else ''}{what or str(error) or 'out of memory'} (the machine failed)")
         return MachineFailure.exit_code
@@ -99,8 +102,14 @@ def run(arguments: list[str]) -> int:
         if NO_CODE_CACHE in str(error):
             say_error(f"{NO_CODE_CACHE_TEXT} ({NO_CODE_CACHE_HINT})")
             return MachineFailure.exit_code
-        say_error(f"internal error: {type(error).__name__}: {error} (a bug of ours; --debug shows where)")
-        return 1
+        return _say_bug(error)
+
+
+def _say_bug(error: Exception) -> int:
+    from cli.output import say_error
+
+    say_error(f"internal error: {type(error).__name__}: {error} (a bug of ours; --debug shows where)")
+    return 1
 
 
 def _check_surroundings() -> None:

@@ -16,6 +16,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from cli.output import out, say, say_error
+from schemas.base import LARGEST_SEED
 from schemas.errors import UsageError
 from stages.engine.chain import OUTCOME_EXIT_CODE
 from stages.engine.memory_limit import parse_limit
@@ -112,9 +113,10 @@ def _common_options(stage: Stage) -> list[inspect.Parameter]:
         return _parameter(name, bool, typer.Option(False, f"--{name.replace('_', '-')}", help=text, **panel))
 
     out = f"Folder of the {stage.writes.kind} artifact to write."
+    seed = "Seed of all randomness [default: 0]."
     return [
         _parameter("out", Path, typer.Option(..., "--out", help=out, **panel)),
-        _parameter("seed", int, typer.Option(0, "--seed", min=0, help="Seed of all randomness [default: 0].", **panel)),
+        _parameter("seed", int, typer.Option(0, "--seed", min=0, max=LARGEST_SEED, help=seed, **panel)),
         _parameter("device", str, typer.Option("cpu", "--device", help="auto, cpu or cuda [default: cpu].", **panel)),
         _parameter(
             "config",

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema
 
 from schemas.errors import BadInput
 from schemas.outside import LARGEST_DOCUMENT, check_integers, file_content
@@ -64,10 +65,45 @@ def as_vector(values: np.ndarray) -> Vector3:
     return (x, y, z)
 
 
+SMALLEST_INT32, LARGEST_INT32 = -(2**31), 2**31 - 1
+LARGEST_NUMBER = 1e12
+"""Size of the numbers of a payload: metres, seconds since 1970, kilograms; their squares fit into a float32."""
+LARGEST_SEED = 2**31 - 1
+"""Of a command; those that follow from it are larger by a few."""
+Seed = Annotated[int, Field(ge=0, le=2**53)]
+
+
+def bounded(schema: Any, above_zero: float = 0.0) -> Any:
+    """Return a schema of pydantic's whose numbers all have bounds: those that it states, else the ones above.
+
+    Numbers that must be greater than zero are at least `above_zero`.
+    """
+    if isinstance(schema, list):
+        return [bounded(part, above_zero) for part in schema]
+    if not isinstance(schema, dict):
+        return schema
+    kind = schema.get("type")
+    if kind == "int":
+        return {"ge": SMALLEST_INT32, "le": LARGEST_INT32, **schema}
+    if kind == "float":
+        least = above_zero if schema.get("gt") == 0 else -LARGEST_NUMBER
+        return {"ge": least, "le": LARGEST_NUMBER, **schema}
+    return {
+        key: part if key in ("metadata", "serialization", "default", "expected", "ref") else bounded(part, above_zero)
+        for key, part in schema.items()
+    }
+
+
 class Model(BaseModel):
-    """A payload model. Unknown keys are errors, values are immutable, NaN is refused."""
+    """A payload model. Unknown keys are errors, values are immutable, NaN is refused, and so are numbers that arrays of
+    32 bits cannot hold."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, protected_namespaces=())
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Bound every number of the fields."""
+        return bounded(handler(source))
 
     @classmethod
     def read(cls, path: Path, *, largest: int = LARGEST_DOCUMENT, hint: str = "make the artifact again") -> Self:

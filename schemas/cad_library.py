@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from schemas.artifact import Artifact, Document, OptionalDocument
-from schemas.base import Model, Name, Vector3
+from schemas.base import Model, Name, Seed, Vector3
 from schemas.scene_parts import Joint, SurfacePlane
 
 
@@ -116,7 +116,7 @@ class Affordances(Model):
 class LibraryFile(Model):
     """library.json."""
 
-    seed: int
+    seed: Seed
     models: tuple[CadModel, ...]
     affordances: tuple[Affordances, ...] = ()
     """In the order of the models; those of a library from before they were derived have none."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from schemas.artifact import Artifact, Document
-from schemas.base import Model, Name, Transform, Vector3
+from schemas.base import Model, Name, Seed, Transform, Vector3
 from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import Box, Camera
 
@@ -39,7 +39,7 @@ class GroundTruthFile(Model):
     source: Literal["generated", "scan"] = "generated"
     """`generated`: the frame is the world of the log. `scan`: somebody annotated a real scan; the frame is the world of
     the sequence that it was made for, already upright."""
-    seed: int
+    seed: Seed
     recipe: str
     room_size: Vector3
     camera: Camera

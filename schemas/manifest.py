@@ -98,7 +98,7 @@ class Manifest(Model):
     files: tuple[FileRecord, ...]
     inputs: Annotated[tuple[InputRecord, ...], Field(max_length=MOST_INPUTS)] = ()
     parameters: Values = {}
-    seed: int = 0
+    seed: Count = 0
     libraries: dict[str, str] = {}
     data_files: dict[str, str] = {}
     """Files of data/ that decided the output -> sha256."""

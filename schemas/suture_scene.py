@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from schemas.artifact import Document
-from schemas.base import Model, Transform, Vector3
+from schemas.base import Model, Seed, Transform, Vector3
 from schemas.scene_parts import Camera
 from schemas.sequence import Sequence
 
@@ -33,7 +33,7 @@ class SutureView(Model):
     """The truth of one frame."""
 
     frame: int = Field(ge=0)
-    seed: int
+    seed: Seed
     holder: Holder
     """Who holds the needle."""
     place: Place
@@ -54,7 +54,7 @@ class SutureView(Model):
 class SutureSceneFile(Model):
     """scene.json."""
 
-    seed: int
+    seed: Seed
     arrangement: Literal["motion", "views"]
     """`motion`: one needle that moves; `views`: every frame another scene."""
     rig: StereoRigRecord

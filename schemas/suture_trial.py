@@ -7,7 +7,7 @@ from typing import ClassVar
 from pydantic import Field, model_validator
 
 from schemas.artifact import Artifact, Document
-from schemas.base import Model
+from schemas.base import Model, Seed
 from schemas.evaluation import MetricsFile
 
 
@@ -20,7 +20,7 @@ class SutureRun(Model):
     """
 
     arm: str
-    seed: int
+    seed: Seed
     sutures: int = Field(ge=0)
     sutures_neutral: int = Field(ge=0)
     attempts: int = Field(ge=0)
@@ -71,7 +71,7 @@ class SutureTrialFile(Model):
     world: dict[str, float]
     """The simulator's parameters, the same for every arm (docs/STITCH_TRIALS.md)."""
     recorded_arm: str
-    recorded_seed: int
+    recorded_seed: Seed
     events: tuple[SutureEvent, ...]
     """Of the recorded trial, as are frames.npz, motions.npz and the pictures."""
 

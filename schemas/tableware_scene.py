@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 from pydantic import Field, model_validator
 
 from schemas.artifact import Artifact, Document
-from schemas.base import Model, Name, Transform, Vector3
+from schemas.base import Model, Name, Seed, Transform, Vector3
 from schemas.scene_parts import Camera
 
 TablewareKind = Literal["cup", "bowl", "plate", "fork", "spoon"]
@@ -52,7 +52,7 @@ class TablewareSceneFile(Model):
     """scene.json: the recipe (tier, seed, light, colours) and the truth."""
 
     tier: str
-    seed: int
+    seed: Seed
     light: Literal["bright", "usual", "dim"]
     colors: Literal["dark_on_white", "white_on_dark"]
     camera: Camera

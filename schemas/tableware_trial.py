@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from schemas.artifact import Artifact, Document
-from schemas.base import Model, Name
+from schemas.base import Model, Name, Seed
 from schemas.tableware_plan import TablewareAction, TimesOfActions
 from schemas.tableware_scene import TablewareItem
 
@@ -98,7 +98,7 @@ class TablewareEvaluationFile(Model):
     sight: Literal["truth", "image"]
     delay: float
     draws: int
-    first_scene: int
+    first_scene: Seed
     rows: tuple[EvaluatedPolicy, ...]
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import errno
 import importlib
 import json
 import logging
 import os
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -21,6 +19,7 @@ from schemas.manifest import LONGEST_PATH, MANIFEST_NAME, InputRecord, Manifest
 from stages.engine import estimation, interruption, memory_limit, shared_artifacts, store
 from stages.engine.digests import content_digest, record_files
 from stages.engine.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
+from stages.engine.machine_faults import MACHINE_ERRORS, OUT_OF_MEMORY, first_cause
 from stages.engine.model_cache import resolve_weights, with_usual_models
 from stages.engine.provenance import provenance_now
 from stages.engine.reading import check_hashes, check_sizes, open_artifact, read_manifest
@@ -56,17 +55,6 @@ class RunResult:
         """Outcome of the artifact; `unknown` for one that a dry run would make."""
         return self.manifest.outcome if self.manifest else "unknown"
 
-
-MACHINE_ERRORS = (
-    *(errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO, errno.EACCES, errno.EPERM, errno.ENAMETOOLONG),
-    *(errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENXIO, errno.ENODEV, errno.ESTALE, errno.ETIMEDOUT, errno.EMLINK),
-)
-"""What the system says when the fault is neither the input's nor ours."""
-OUT_OF_MEMORY = re.compile(
-    r"failed to map segment|annot allocate memory|can't allocate memory|out of memory|bad_alloc|Insufficient memory"
-    r"|Unable to allocate|can't start new thread",
-    re.IGNORECASE,
-)
 
 NO_CODE_CACHE = "cannot cache function"
 """How numba begins what it says when every folder for it is read-only."""
@@ -225,20 +213,13 @@ def _what_changed(old: Manifest, new: dict[str, Any]) -> list[str]:
     return changed
 
 
-def _first_cause(error: OSError) -> tuple[int | None, str]:
-    """Return number and words of what the system said; copying a folder gathers them as text."""
-    if error.errno is None and (found := re.search(r"\[Errno (\d+)\] ([^:\"']+)", str(error))):
-        return int(found[1]), found[2]
-    return error.errno, error.strerror or str(error)
-
-
 @contextmanager
 def _machine_errors(out: Path) -> Iterator[None]:
     """Turn a full or read-only disk, a forbidden file and exhausted memory into MachineFailure."""
     try:
         yield
     except OSError as error:
-        number, reason = _first_cause(error)
+        number, reason = first_cause(error)
         if number in MACHINE_ERRORS:
             raise MachineFailure(
                 f"{error.filename or out}: {reason}", hint="free space or choose another --out"

@@ -20,7 +20,7 @@ from stages.kit.stage import External, Optionally, Parameters, Stage
 class FuseParameters(Parameters):
     """Options of `fuse`."""
 
-    voxel_size: float = Field(0.02, gt=0, le=1, description="TSDF voxel edge [m]")
+    voxel_size: float = Field(0.02, ge=0.001, le=1, description="TSDF voxel edge [m]")
     truncation_voxels: float = Field(4.0, ge=1, le=32, description="Truncation distance [voxels]")
     minimum_depth: float = Field(0.1, ge=0.01, description="Nearer depth is not used [m]")
     maximum_depth: float = Field(4.0, gt=0.01, description="Farther depth is not used [m]")

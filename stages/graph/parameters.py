@@ -26,7 +26,7 @@ class GraphParameters(Parameters):
         0.5, ge=0.0, le=1.0, description="b_th: least share of the child's footprint over the supporting plane"
     )
     minimum_score: float = Field(0.2, ge=0.0, le=1.0, description="Least score (2.3) of a supporting relation")
-    point_spacing: float = Field(0.01, gt=0.0, description="Grid to which meshes are thinned for plane search [m]")
+    point_spacing: float = Field(0.01, ge=0.001, description="Grid to which meshes are thinned for plane search [m]")
     plane_distance: float = Field(
         0.03, gt=0.0, description="RANSAC inlier distance, at most a quarter of the box's smallest edge [m]"
     )

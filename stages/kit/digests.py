@@ -39,9 +39,13 @@ def external_digest(path: Path) -> str:
         return sha256_of_file(path)
     if not is_folder:
         raise BadInput(f"{path}: no such file or folder", hint="check the path")
-    rows = [
-        [file.relative_to(path).as_posix(), file.stat().st_size, sha256_of_file(file)] for file in external_files(path)
-    ]
+    try:
+        rows = [
+            [file.relative_to(path).as_posix(), file.stat().st_size, sha256_of_file(file)]
+            for file in external_files(path)
+        ]
+    except FileNotFoundError as error:
+        raise BadInput(f"{error.filename}: is gone", hint="let nobody write to the folder meanwhile") from None
     return sha256_of_text(canonical_json(rows))
 
 

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
+from pydantic_core import CoreSchema
 
 from schemas.artifact import Artifact
+from schemas.base import bounded
 from stages.kit.estimates import Formula
 
 Item = TypeVar("Item")
@@ -21,14 +23,24 @@ NOT_SHOWN = "not_shown"
 """Type of a PydanticCustomError whose input must not be printed: a key that was given where its name belongs."""
 
 
+SMALLEST_ABOVE_ZERO = 1e-9
+"""Of an option that divides, spaces or weighs something."""
+
+
 class Parameters(BaseModel):
     """Options of a step. The command line, its help, its ranges and the config file come from these fields.
 
     Every field has a default and a description. Allowed field types: bool, int, float, str, Literal of str,
-    Enum, Path-free tuples of str/int/float, and `X | None`.
+    Enum, Path-free tuples of str/int/float, and `X | None`. Numbers without bounds of their own have those of payloads,
+    and what must be above zero is at least `SMALLEST_ABOVE_ZERO`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Bound every number."""
+        return bounded(handler(source), SMALLEST_ABOVE_ZERO)
 
 
 @dataclass(frozen=True)

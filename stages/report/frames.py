@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from schemas.errors import BadInput
 from schemas.segments import FrameSegment, Segments
 from schemas.sequence import Sequence
 from schemas.vocabulary import load_vocabulary
@@ -54,6 +55,12 @@ def frame_views(
             if segments is not None and frame.color is not None and index in by_frame:
                 with PanopticReader(segments.path("panoptic.zip")) as masks:
                     ids = masks.read(index)
+                if ids.shape != frame.color.shape[:2]:
+                    raise BadInput(
+                        f"{segments.root}: segments are of another sequence: {ids.shape[1]}x{ids.shape[0]} pixels, "
+                        f"its frames have {frame.color.shape[1]}x{frame.color.shape[0]}",
+                        hint="give the --segments that were made from --sequence",
+                    )
                 colors, shown = segment_colors(by_frame[index])
                 seen |= shown
                 overlay = jpeg(blend_segments(frame.color, ids, colors), f"segments of frame {index}", width)

@@ -110,19 +110,42 @@ def test_other_encodings_without_entities_are_fine() -> None:
         assert parse_xml(text.format(encoding).encode(encoding), "x").get("name") == "t\u00fcr"
 
 
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("v 0 0 0\n", "holds no triangles"),
+        ("", "holds no triangles"),
+        (TRIANGLE.replace("v 1", "v nan"), "not finite"),
+        (TRIANGLE.replace("v 1", "v 1e30"), "reaches 1e"),
+        (TRIANGLE.replace("2 3", "2 9"), ""),
+    ],
+)
+def test_meshes_that_engines_crash_on(tmp_path: Path, content: str, said: str) -> None:
+    (tmp_path / "m.obj").write_text(content)
+    path = tmp_path / "a.urdf"
+    mesh = '<collision><geometry><mesh filename="m.obj"/></geometry></collision>'
+    path.write_text(f'<robot name="r"><link name="a">{INERTIA}{mesh}</link></robot>')
+    assert kinds(tmp_path, path.read_text()) == {"mesh_unreadable"}
+    with pytest.raises(BadInput, match=f"m.obj.*{said}"):
+        require_sound(path)
+
+
 @pytest.mark.parametrize("name", ["a" * 5000 + ".obj", "a\tb.obj", "\u53f0.obj", "a b.obj", "file:///etc/passwd", "."])
 def test_odd_mesh_names(tmp_path: Path, name: str) -> None:
     mesh = f'<visual><geometry><mesh filename="{name}"/></geometry></visual>'
     text = f'<robot name="r"><link name="a">{INERTIA}{mesh}</link></robot>'
     assert kinds(tmp_path, text) <= {"mesh_outside", "mesh_missing"} != set()
     if name in ("\u53f0.obj", "a b.obj"):
-        (tmp_path / name).write_text("v 0 0 0\n")
+        (tmp_path / name).write_text(TRIANGLE)
         assert kinds(tmp_path, text) == set()
 
 
 def test_case_collision_is_two_files(tmp_path: Path) -> None:
     """Names that differ in case alone are different here; a URDF that means one of them finds that one."""
-    (tmp_path / "M.obj").write_text("v 0 0 0\n")
+    (tmp_path / "M.obj").write_text(TRIANGLE)
     mesh = '<visual><geometry><mesh filename="m.obj"/></geometry></visual>'
     assert kinds(tmp_path, f'<robot name="r"><link name="a">{INERTIA}{mesh}</link></robot>') == {"mesh_missing"}
 

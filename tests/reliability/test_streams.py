@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import shlex
+import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -122,3 +124,36 @@ def test_compiled_code_that_can_be_kept_nowhere(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(CacheImpl, "_locator_classes", [])  # as when every folder for it is read-only
     with pytest.raises(MachineFailure, match="NUMBA_CACHE_DIR"), runner._machine_errors(tmp_path):
         numba.njit(cache=True)(lambda number: number + 1)
+
+
+NOBODY = (
+    *("setpriv", "--reuid=54321", "--regid=54321", "--clear-groups"),
+    *("--inh-caps=+dac_read_search", "--ambient-caps=+dac_read_search"),
+)
+"""Starts a command as somebody of whom the system knows nothing, not even a home, and who may read all and write nothing
+of the program."""
+GOLDEN = REPOSITORY / "tests" / "golden"
+FUSE = ("fuse", "--sequence", GOLDEN / "v2" / "sequence", "--segments", GOLDEN / "v1" / "segments")
+
+
+@pytest.mark.parametrize(
+    "words, said", [(("models",), "no home folder is known (set HOME)"), (FUSE, "set NUMBA_CACHE_DIR")]
+)
+def test_a_user_without_a_home_and_without_a_place_for_compiled_code(words: tuple[str | Path, ...], said: str) -> None:
+    if os.getuid() != 0 or subprocess.run([*NOBODY, "true"], capture_output=True).returncode != 0:
+        pytest.skip("becoming nobody is not allowed here")
+    place = Path(tempfile.mkdtemp())  # where others may enter, unlike a folder of pytest's
+    place.chmod(0o777)
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("HOME", "XDG_", "NUMBA_"))}
+    done = subprocess.run(
+        [*NOBODY, sys.executable, "-B", "-c", "from cli.main import main; main()", *map(str, words)]
+        + (["--out", str(place / "out")] if words == FUSE else []),
+        cwd="/",  # a folder that may not be written either: numba takes ~ for a folder of it
+        env={**kept, "PYTHONPATH": str(REPOSITORY)},
+        capture_output=True,
+        text=True,
+    )
+    errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
+    assert done.returncode == 6 and len(errors) == 1 and said in errors[0], done.stderr
+    assert "Traceback" not in done.stderr and not (place / "out").exists()
+    shutil.rmtree(place)

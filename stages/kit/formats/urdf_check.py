@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections import Counter
 from dataclasses import dataclass
@@ -10,9 +11,13 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from schemas.errors import BadInput
+from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.urdf_file import JOINT_TYPES, Link, Shape, Urdf, UrdfJoint, parse_urdf
 
 NAME = re.compile(r"[A-Za-z0-9_.\-]+")
+READ_MESHES = (".obj", ".stl", ".ply", ".glb")
+LARGEST_REACH = 1e5
+"""Metres, of a mesh's vertices from its origin: engines compute in float32."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,8 @@ def check_urdf(path: Path, root: Path | None = None) -> list[Problem]:
 
     Mesh files must lie inside `root` (the folder of the URDF when None).
     Kinds: `unreadable`, `name`, `duplicate`, `dangling`, `cycle`, `roots`, `not_finite`, `axis`, `limits`,
-    `joint_type`, `mimic`, `mass`, `inertia`, `no_inertia`, `friction`, `mesh_missing`, `mesh_outside`, `geometry`.
+    `joint_type`, `mimic`, `mass`, `inertia`, `no_inertia`, `friction`, `mesh_missing`, `mesh_outside`,
+    `mesh_unreadable`, `geometry`.
     """
     path = Path(path)
     try:
@@ -180,7 +186,26 @@ def _check_shape(link: str, shape: Shape, folder: Path, root: Path) -> list[Prob
         return [Problem("mesh_outside", element, f"mesh {name!r} is not a path inside the folder of the model")]
     if not exists:
         return [Problem("mesh_missing", element, f"mesh {name!r} does not exist")]
-    return []
+    reason = _mesh_fault(target)
+    return [Problem("mesh_unreadable", element, f"mesh {name!r}: {reason}")] if reason else []
+
+
+def _mesh_fault(path: Path) -> str:
+    """Say why physics engines, which crash on it or load nothing, must not be given this mesh file; empty: they may."""
+    if path.suffix.lower() not in READ_MESHES:
+        return ""
+    status = path.stat()
+    return _mesh_fault_of(str(path), status.st_mtime_ns, status.st_size)
+
+
+@functools.lru_cache(maxsize=20_000)
+def _mesh_fault_of(path: str, changed_ns: int, size: int) -> str:
+    try:
+        mesh = read_mesh(Path(path))
+    except BadInput as error:
+        return error.message.removeprefix(f"{path}: ")
+    reach = float(np.abs(mesh.vertices).max())
+    return f"reaches {reach:.3g} m from its origin" if reach > LARGEST_REACH else ""
 
 
 def _check_joint(joint: UrdfJoint) -> list[Problem]:
