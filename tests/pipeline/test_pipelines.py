@@ -119,7 +119,15 @@ def test_what_is_given_is_looked_at_before_anything_runs(tmp_path: Path) -> None
 
 
 def test_make_looks_at_the_log_before_it_builds_a_library(tmp_path: Path) -> None:
-    words = ["make", "--no-print-directory", "-n", "-f", "data/pipelines/reconstruct.mk", f"OUTPUTS={tmp_path}", f"LOG={tmp_path}/nowhere"]
+    words = [
+        "make",
+        "--no-print-directory",
+        "-n",
+        "-f",
+        "data/pipelines/reconstruct.mk",
+        f"OUTPUTS={tmp_path}",
+        f"LOG={tmp_path}/nowhere",
+    ]
     done = subprocess.run(words, cwd=REPOSITORY, capture_output=True, text=True, check=False)
     assert done.returncode == 2 and "nowhere: no such file or folder" in done.stderr and done.stdout == ""
     words[-1] = f"LOG={tmp_path}"
