@@ -52,8 +52,8 @@ class Policy(Protocol):
         """Return the next cut of what lies on the board."""
         ...
 
-    def done(self, action: Action, results: Mapping[int, Body]) -> None:
-        """Hear what came of a cut."""
+    def done(self, action: Action, results: Mapping[int, Body], above: frozenset[int]) -> None:
+        """Hear what came of a cut, where it lies now, and which of it was on the side of the plane's normal."""
         ...
 
     def refused(self, action: Action, failure: Failure) -> None:
@@ -125,13 +125,13 @@ def carry_out(
         in_a_row = 0
         del board[action.piece]
         first = len(carving.pieces)
-        for number, part in enumerate(parts, start=first):
-            side = np.sign(action.plane.height(part.moments[0][None])[0])
-            board[number] = part.shifted(0.5 * GAP * side * action.plane.normal)
+        sides = action.plane.height(np.array([part.moments[0] for part in parts])) > 0
+        for number, (part, up) in enumerate(zip(parts, sides, strict=True), start=first):
+            board[number] = part.shifted((0.5 if up else -0.5) * GAP * action.plane.normal)
         if lie is not None:
             lie(board)
         results = {number: board[number] for number in range(first, first + len(parts))}
         carving.pieces |= results
         carving.steps.append(Step(action, tuple(results)))
-        policy.done(action, results)
+        policy.done(action, results, frozenset(n for n, up in zip(results, sides, strict=True) if up))
     return carving

@@ -9,15 +9,22 @@ import numpy as np
 from stages.cutting.ours.cells import Cloud, Tree, cells
 from stages.cutting.ours.grammar import Grammar
 from stages.cutting.ours.items import Item, features, likeness
-from stages.cutting.ours.structures import best_trees, groupings, match, proposals, rule_bits
+from stages.cutting.ours.structures import MOST_BITS, best_trees, groupings, match, misfits, proposals, rule_bits
 
 MOST_PIECES = 4
 """Beyond these, pieces are filled one by one."""
 MOST_GROUPS = 6
-BEAM, FINALISTS = 60, 4
+BEAM, FINALISTS = 60, 6
 """Ways to share groups among the pieces that are judged on points, and then by whole trees."""
+UNLIKE = 0.5
+"""Distance of the middles of groups, in deviations of alike fragments, from which pieces may share them apart: like
+fragments of two pieces differ by little."""
 SLACK = 0.3
 """By how much of a piece's volume a way may miss it, by the groups' mean volumes."""
+SETTLED = 12
+"""Ways that are settled by volumes."""
+VOLUME_DEVIATION = 0.02
+"""Of the volume of a piece beside that of its fragments, as a share: what seeing adds."""
 DONE = 0.9
 """Likeness at which a piece is taken for a fragment that is wanted."""
 
@@ -31,7 +38,7 @@ def allocate(clouds: Sequence[Cloud], items: Sequence[Item], grammar: Grammar) -
     wanted = features(items)
     foreseen: dict[tuple[int, tuple[int, ...]], tuple[np.ndarray, float]] = {}
     ways = []
-    for groups in groupings(wanted, grammar, MOST_GROUPS):
+    for groups in groupings(wanted, grammar, MOST_GROUPS, UNLIKE):
         means = [wanted[group].mean(axis=0) for group in groups]
         foreseen.clear()
         for counts in sharings([len(g) for g in groups], np.exp([m[3] for m in means]), clouds):
@@ -42,21 +49,63 @@ def allocate(clouds: Sequence[Cloud], items: Sequence[Item], grammar: Grammar) -
                     foreseen[key] = _sketch(cloud, means, counts[:, k], grammar)
                 made.append(foreseen[key][0])
                 bits += foreseen[key][1]
-            misfit, order = match(np.concatenate(made), wanted, grammar.scatter)
-            ways.append((misfit + bits, counts.sum(axis=0), order))
+            foreseen_by_piece = np.concatenate(made)
+            misfit, order = match(foreseen_by_piece, wanted, grammar.scatter)
+            ways.append((misfit + bits, counts.sum(axis=0), order, foreseen_by_piece))
     if not ways:
         return _one_by_one(clouds, items)
     ways.sort(key=lambda way: way[0])
+    room = np.array([cloud.body.volume for cloud in clouds])
+    volumes = np.array([item.volume for item in items])
     finalists: dict[tuple[tuple[int, ...], ...], None] = {}
-    for _, counts, order in ways:
-        shared = np.split(order, np.cumsum(counts)[:-1])
-        finalists[tuple(tuple(sorted(part.tolist())) for part in shared)] = None
+    for _, counts, order, made_by_piece in ways[:SETTLED]:
+        owner = np.repeat(np.arange(len(clouds)), counts)
+        order = settle(misfits(made_by_piece, wanted, grammar.scatter), order, owner, volumes, room)
+        finalists[tuple(tuple(sorted(order[owner == k].tolist())) for k in range(len(clouds)))] = None
         if len(finalists) == FINALISTS:
             break
-    return min(
-        ([[items[n] for n in part] for part in way] for way in finalists),
-        key=lambda way: sum(best_trees(c, part, grammar)[0].bits for c, part in zip(clouds, way, strict=True)),
-    )
+
+    def bits_of(way: tuple[tuple[int, ...], ...]) -> float:
+        trees = (
+            best_trees(cloud, [items[n] for n in part], grammar)[0] for cloud, part in zip(clouds, way, strict=True)
+        )
+        held = np.array([volumes[list(part)].sum() for part in way])
+        return sum(tree.bits for tree in trees) + float(volume_bits(held, room))
+
+    return [[items[n] for n in part] for part in min(finalists, key=bits_of)]
+
+
+def volume_bits(held: np.ndarray, room: np.ndarray) -> np.ndarray:
+    """Return what it costs (...) [bits] that items of these volumes (..., pieces) come out of these pieces."""
+    off = (held - room) / (VOLUME_DEVIATION * room)
+    return np.asarray(np.minimum(0.5 * off**2 / np.log(2), MOST_BITS).sum(axis=-1))
+
+
+def settle(
+    table: np.ndarray, order: np.ndarray, owner: np.ndarray, volumes: np.ndarray, room: np.ndarray
+) -> np.ndarray:
+    """Return which item each fragment becomes, after items changed places between pieces as long as that saves bits.
+
+    `table` (fragments, items) [bits], `order` the items to begin with, `owner` the piece of each fragment.
+    """
+    order = order.copy()
+    pieces = np.arange(len(room))
+    fragments = np.arange(len(order))
+    for _ in range(len(order)):
+        held = np.bincount(owner, volumes[order], len(room))
+        mine = table[fragments, order]
+        swapped = table[:, order]  # what a fragment would cost with the item of another
+        change = swapped + swapped.T - mine[:, None] - mine[None]
+        moved = volumes[order][None] - volumes[order][:, None]
+        to, away = owner[:, None, None] == pieces, owner[None, :, None] == pieces
+        after = held + moved[..., None] * (to.astype(float) - away)
+        change += volume_bits(after, room) - volume_bits(held, room)
+        change[owner[:, None] == owner[None]] = 0.0
+        i, j = np.unravel_index(int(change.argmin()), change.shape)
+        if change[i, j] > -1e-6:
+            break
+        order[i], order[j] = order[j], order[i]
+    return order
 
 
 def sharings(counts: Sequence[int], volumes: np.ndarray, clouds: Sequence[Cloud]) -> list[np.ndarray]:
@@ -101,7 +150,7 @@ def _sketch(
     """Return the features and the rules' bits of the first proposal for so many items of each group."""
     groups = [np.tile(mean, (count, 1)) for mean, count in zip(means, counts, strict=True) if count]
     tree: Tree = next(iter(proposals(cloud.edges, groups, grammar)))
-    return cells(cloud, tree), rule_bits(grammar, cloud.edges, tree)
+    return cells(cloud.coarse, tree), rule_bits(grammar, cloud.edges, tree)
 
 
 def _one_by_one(clouds: Sequence[Cloud], items: Sequence[Item]) -> list[list[Item]]:

@@ -7,8 +7,10 @@ coded with what was seen so far (Krichevsky and Trofimov 1981), so that they nee
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.cluster.vq import kmeans2
@@ -69,12 +71,34 @@ class Grammar:
         """Return the likeliest types (N,)."""
         return np.asarray(self.log_likelihoods(edges).argmax(axis=1))
 
+    def type_of_box(self, edges: Sequence[float]) -> int:
+        """Return the likeliest type of one box with these edges [m], in any order (asked often: no arrays)."""
+        logs = [math.log(edge) for edge in sorted(edges)]
+        best, found = -math.inf, 0
+        for number, (constant, middle, width) in enumerate(self._plain):
+            value = constant - 0.5 * sum(((x - m) / d) ** 2 for x, m, d in zip(logs, middle, width, strict=True))
+            if value > best:
+                best, found = value, number
+        return found
+
+    @cached_property
+    def _plain(self) -> list[tuple[float, list[float], list[float]]]:
+        constants = np.log(self.shares) - np.log(self.deviations).sum(axis=1)
+        return list(zip(constants.tolist(), self.means.tolist(), self.deviations.tolist(), strict=True))
+
+    @cached_property
+    def _seen(self) -> dict[int, dict[tuple[int, tuple[int, int]], int]]:
+        found: dict[int, dict[tuple[int, tuple[int, int]], int]] = {}
+        for rule in self.rules:
+            found.setdefault(rule.parent, {})[rule.axis, rule.children] = rule.seen
+        return found
+
     def rule_bits(self, parent: int, axis: int, children: tuple[int, int]) -> float:
         """Return the code length of a rule [bits]: short for what was often seen of a type."""
         pair = (min(children), max(children))
-        seen = {(rule.axis, rule.children): rule.seen for rule in self.rules if rule.parent == parent}
+        seen = self._seen.get(parent, {})
         possible = AXES * self.types * (self.types + 1) / 2
-        return float(-np.log2((seen.get((axis, pair), 0) + 0.5) / (sum(seen.values()) + 0.5 * possible)))
+        return -math.log2((seen.get((axis, pair), 0) + 0.5) / (sum(seen.values()) + 0.5 * possible))
 
     def category_of(self, edges: np.ndarray) -> np.ndarray:
         """Return the likeliest category (N,) of fragments, through their types."""

@@ -59,14 +59,14 @@ class OursPolicy:
             self._ahead = _cuts(piece, cloud, best_trees(cloud, self._jobs[piece], self._grammar))
         return self._ahead[0].action
 
-    def done(self, action: Action, results: Mapping[int, Body]) -> None:
+    def done(self, action: Action, results: Mapping[int, Body], above: frozenset[int]) -> None:
         """Hand the items on: to the larger piece on each side of the plane."""
         assert self._jobs is not None
         planned, self._ahead = self._ahead[0], []
         del self._jobs[action.piece]
         sides: dict[bool, list[int]] = {False: [], True: []}
-        for number, body in results.items():
-            sides[bool(action.plane.height(body.moments[0][None])[0] > 0)].append(number)
+        for number in results:
+            sides[number in above].append(number)
             self._jobs[number] = []
         for side, items in ((False, planned.below), (True, planned.above)):
             if sides[side]:

@@ -10,13 +10,16 @@ from itertools import permutations
 import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import pdist
 
-from stages.cutting.ours.cells import Cloud, Split, Tree, cells, leaves
+from stages.cutting.ours.cells import Cloud, Split, Tree, cells
 from stages.cutting.ours.grammar import Grammar
 from stages.cutting.ours.items import Item, features, likeness
 
-BEAM = 4
-"""Trees of a grouping that are judged on points."""
+BEAM, FINALISTS = 4, 5
+"""Trees of a group that are judged on a few points, and of these on all points, with planes by volume."""
+UNLIKE = 1.5
+"""Distance of the middles of groups, in deviations of alike fragments, from which they may be set apart."""
 MOST_GROUPS = 4
 """Groups of unlike fragments that are set apart within one piece before anything else."""
 MOST_BITS = 60.0
@@ -44,11 +47,16 @@ def best_trees(cloud: Cloud, items: Sequence[Item], grammar: Grammar) -> list[Fo
     trees: dict[Tree, None] = {}
     for groups in groupings(wanted, grammar):
         trees |= dict.fromkeys(proposals(cloud.edges, [wanted[group] for group in groups], grammar))
-    found = [_foresee(cloud, tree, items, wanted, grammar) for tree in trees]
+    chosen = list(trees)
+    if len(chosen) > FINALISTS:
+        chosen.sort(key=lambda tree: _rough_bits(cloud.coarse, tree, wanted, grammar))
+    found = [_foresee(cloud, tree, items, wanted, grammar) for tree in chosen[:FINALISTS]]
     return sorted(found, key=lambda foreseen: foreseen.bits)
 
 
-def groupings(wanted: np.ndarray, grammar: Grammar, most: int = MOST_GROUPS) -> list[list[np.ndarray]]:
+def groupings(
+    wanted: np.ndarray, grammar: Grammar, most: int = MOST_GROUPS, unlike: float = UNLIKE
+) -> list[list[np.ndarray]]:
     """Return ways to group items (N, 4): all alike, by what their types are called, by clusters of their own."""
     known = ~np.isnan(wanted[:, 0])
     labels = [np.zeros(len(wanted), dtype=int)]
@@ -60,11 +68,16 @@ def groupings(wanted: np.ndarray, grammar: Grammar, most: int = MOST_GROUPS) -> 
         for count in range(2, most + 1):
             clusters = np.full(len(wanted), -1)
             clusters[known] = fcluster(tree, count, "maxclust")
+            if clusters.max() < count:
+                break
+            middles = [(wanted[clusters == value] / grammar.scatter).mean(axis=0) for value in range(1, count + 1)]
+            if pdist(np.array(middles)).min() < unlike:
+                break
             labels.append(clusters)
     found: dict[tuple[tuple[int, ...], ...], None] = {}
     for each in labels:
         groups = sorted(tuple(np.flatnonzero(each == value).tolist()) for value in np.unique(each))
-        if len(groups) <= most:
+        if len(groups) <= most and (len(groups) == 1 or len(groups) < len(wanted)):
             found[tuple(groups)] = None
     return [[np.array(group) for group in groups] for groups in found]
 
@@ -78,51 +91,50 @@ def proposals(edges: np.ndarray, groups: Sequence[np.ndarray], grammar: Grammar)
     shares = volumes / volumes.sum()
     rows = []
     for axis in range(3):
-        parts = []
-        for share, group in zip(shares, groups, strict=True):
-            slab = edges.copy()
-            slab[axis] *= share
-            parts.append(_grids(slab, group, grammar)[0])
         slabs = [edges * np.where(np.arange(3) == axis, share, 1.0) for share in shares]
         misfit = sum(
-            len(group) * _grid_bits(slab, _counts(part), group, grammar)
-            for slab, part, group in zip(slabs, parts, groups, strict=True)
+            len(group) * float(_grid_bits(slab, factors(len(group)), group, grammar).min())
+            for slab, group in zip(slabs, groups, strict=True)
         )
-        rows.append((misfit, axis, parts))
-    for rank, (_, axis, parts) in enumerate(sorted(rows, key=lambda row: row[0])):
+        rows.append((misfit, axis, slabs))
+    for rank, (_, axis, slabs) in enumerate(sorted(rows, key=lambda row: row[0])):
+        parts = [_grids(slab, group, grammar, 1)[0] for slab, group in zip(slabs, groups, strict=True)]
         orders = list(permutations(range(len(groups))))
         for order in orders if rank == 0 else orders[:1]:
             yield Split(axis, tuple(parts[k] for k in order), tuple(float(shares[k]) for k in order))
 
 
-def _grids(edges: np.ndarray, group: np.ndarray, grammar: Grammar) -> list[Tree]:
+def _grids(edges: np.ndarray, group: np.ndarray, grammar: Grammar, most: int = BEAM) -> list[Tree]:
     """Return grids of as many cells as the group has items, those first whose cells fit best."""
-    ranked = sorted(factors(len(group)), key=lambda counts: _grid_bits(edges, counts, group, grammar))
-    return [_nested(edges, counts, grammar) for counts in ranked[:BEAM]]
+    counts = factors(len(group))
+    ranked = np.argsort(_grid_bits(edges, counts, group, grammar), kind="stable")[:most]
+    return [nested(edges, tuple(counts[k].tolist()), grammar) for k in ranked]
 
 
-def _grid_bits(edges: np.ndarray, counts: tuple[int, int, int], group: np.ndarray, grammar: Grammar) -> float:
-    """Return the misfit [bits] of a grid's cell to the middle of a group."""
-    known = group[~np.isnan(group[:, 0]), :3]
-    if not len(known):
-        return 0.0
-    cell = np.sort(np.log(edges / np.array(counts)))
-    return float((((cell - known.mean(axis=0)) / grammar.scatter[:3]) ** 2).sum() * 0.5 / np.log(2))
+def _grid_bits(edges: np.ndarray, counts: np.ndarray, group: np.ndarray, grammar: Grammar) -> np.ndarray:
+    """Return the misfit [bits] (N,) of the cells of grids (N, 3) to the middle of a group."""
+    middle = group[~np.isnan(group[:, 0]), :3]
+    if not len(middle):
+        return np.zeros(len(counts))
+    cell = np.sort(np.log(edges / counts), axis=1)
+    return np.asarray((((cell - middle.mean(axis=0)) / grammar.scatter[:3]) ** 2).sum(axis=1) * 0.5 / np.log(2))
 
 
 @lru_cache(maxsize=256)
-def factors(count: int) -> tuple[tuple[int, int, int], ...]:
-    """Return all (a, b, c) whose product is the count."""
-    return tuple(
-        (a, b, count // a // b)
-        for a in range(1, count + 1)
-        if count % a == 0
-        for b in range(1, count // a + 1)
-        if count // a % b == 0
+def factors(count: int) -> np.ndarray:
+    """Return all (a, b, c) whose product is the count (N, 3)."""
+    return np.array(
+        [
+            (a, b, count // a // b)
+            for a in range(1, count + 1)
+            if count % a == 0
+            for b in range(1, count // a + 1)
+            if count // a % b == 0
+        ]
     )
 
 
-def _nested(edges: np.ndarray, counts: tuple[int, int, int], grammar: Grammar) -> Tree:
+def nested(edges: np.ndarray, counts: Sequence[int], grammar: Grammar) -> Tree:
     """Return the grid as nested splits, in the order of axes that costs the fewest bits."""
     axes = [axis for axis in range(3) if counts[axis] > 1]
     trees = []
@@ -136,14 +148,6 @@ def _nested(edges: np.ndarray, counts: tuple[int, int, int], grammar: Grammar) -
     return min(trees, key=lambda tree: rule_bits(grammar, edges, tree))
 
 
-def _counts(tree: Tree) -> tuple[int, int, int]:
-    counts = [1, 1, 1]
-    while tree is not None:
-        counts[tree.axis] = len(tree.parts)
-        tree = tree.parts[0]
-    return counts[0], counts[1], counts[2]
-
-
 def rule_bits(grammar: Grammar, edges: np.ndarray, tree: Tree) -> float:
     """Return the code length [bits] of deriving a tree from a box (3,) [m] by rules that cut in two, halving runs."""
     kept: dict[tuple[object, ...], float] = {}
@@ -151,7 +155,7 @@ def rule_bits(grammar: Grammar, edges: np.ndarray, tree: Tree) -> float:
 
     def type_of(box: tuple[float, ...]) -> int:
         if box not in types:
-            types[box] = int(grammar.type_of(np.log(np.sort(box))[None])[0])
+            types[box] = grammar.type_of_box(box)
         return types[box]
 
     def bits(box: tuple[float, ...], split: Split, first: int, last: int) -> float:
@@ -178,6 +182,10 @@ def rule_bits(grammar: Grammar, edges: np.ndarray, tree: Tree) -> float:
     return 0.0 if tree is None else bits(box, tree, 0, len(tree.parts))
 
 
+def _rough_bits(cloud: Cloud, tree: Tree, wanted: np.ndarray, grammar: Grammar) -> float:
+    return match(cells(cloud, tree), wanted, grammar.scatter)[0] + rule_bits(grammar, cloud.edges, tree)
+
+
 def _foresee(cloud: Cloud, tree: Tree, items: Sequence[Item], wanted: np.ndarray, grammar: Grammar) -> Foreseen:
     """Match fragments to items by thickness, put the planes where the items' volumes are, and match again."""
     _, order = match(cells(cloud, tree), wanted, grammar.scatter)
@@ -190,12 +198,14 @@ def _foresee(cloud: Cloud, tree: Tree, items: Sequence[Item], wanted: np.ndarray
     )
 
 
+def misfits(made: np.ndarray, wanted: np.ndarray, scatter: np.ndarray) -> np.ndarray:
+    """Return the bits (N, M) that it takes to tell each of the wanted (M, 4) where a fragment (N, 4) is expected."""
+    off = (made[:, None] - wanted[None]) / scatter
+    return np.asarray(np.minimum(np.nan_to_num((off**2).sum(axis=2), nan=0.0) * 0.5 / np.log(2), MOST_BITS))
+
+
 def match(made: np.ndarray, wanted: np.ndarray, scatter: np.ndarray) -> tuple[float, np.ndarray]:
     """Return the least bits by which fragments (N, 4) can be taken for the wanted (N, 4), and which each becomes."""
-    off = (made[:, None] - wanted[None]) / scatter
-    table = np.minimum(np.nan_to_num((off**2).sum(axis=2), nan=0.0) * 0.5 / np.log(2), MOST_BITS)
+    table = misfits(made, wanted, scatter)
     rows, columns = linear_sum_assignment(table)
     return float(table[rows, columns].sum()), columns
-
-
-__all__ = ["Foreseen", "best_trees", "groupings", "leaves", "match", "proposals", "rule_bits"]

@@ -125,7 +125,7 @@ class ChoicePolicy:
         plane = plane_out(board[numbers[place]], self._model.network.planes.draw(given, self._random))
         return Action(numbers[place], plane, f"value {float(values[place]):.2f}")
 
-    def done(self, action: Action, results: Mapping[int, Body]) -> None:
+    def done(self, action: Action, results: Mapping[int, Body], above: frozenset[int]) -> None:
         """What was refused may be tried again."""
         self._refused.clear()
 

@@ -37,13 +37,12 @@ class ThesisModel:
         return np.concatenate([np.eye(len(self.grammar.productions))[production], z])
 
 
-def learn(demonstrations: Sequence[Demonstration], seed: int) -> ThesisModel:
-    """Train on demonstrations. Raises ValueError where nothing was cut."""
+def learn_features(demonstrations: Sequence[Demonstration], seed: int) -> tuple[Corpus, Features]:
+    """Return the corpus of demonstrations and features trained on it. Raises ValueError where nothing was cut."""
     corpus = corpus_of(demonstrations)
     if not corpus.choices:
         raise ValueError("no demonstration cuts anything")
-    features = Features.fitted(train_encoder(corpus.shapes, seed), corpus.shapes)
-    return learn_grammar(corpus, features, seed)
+    return corpus, Features.fitted(train_encoder(corpus.shapes, seed), corpus.shapes)
 
 
 def learn_grammar(corpus: Corpus, features: Features, seed: int) -> ThesisModel:

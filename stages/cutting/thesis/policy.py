@@ -46,7 +46,7 @@ class ThesisPolicy:
             f"type {production.left} into {production.right}, {production.chance:.2f}",
         )
 
-    def done(self, action: Action, results: Mapping[int, Body]) -> None:
+    def done(self, action: Action, results: Mapping[int, Body], above: frozenset[int]) -> None:
         """Nothing is carried over: the next tree is inferred from what is there."""
 
     def refused(self, action: Action, failure: Failure) -> None:
