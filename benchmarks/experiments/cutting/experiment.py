@@ -1,4 +1,4 @@
-"""Cutting towards goals that were cut by somebody else: table 6.1 (Han 2024), and growth with the number of fragments."""
+"""Cutting towards goals that somebody else cut: table 6.1 (Han 2024), and growth with the number of fragments."""
 
 from __future__ import annotations
 
