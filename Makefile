@@ -222,6 +222,11 @@ stitch-thread: setup ## Threads as curves in space, from true and from learned m
 llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2, harder suites (QUICK=1: ten instances)
 	$(EXPERIMENT) llm3 --out $(OUTPUTS)/experiments/llm3$(if $(QUICK),-quick) $(ASKED)
 
+.PHONY: cutting
+# A hundred goals a cell and five trainings of the networks, about half an hour of one core; a stopped run goes on.
+cutting: setup ## Cutting towards goals: table 6.1, the thesis's arms and ours (QUICK=1: two goals a cell)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) cutting --out $(OUTPUTS)/experiments/cutting$(if $(QUICK),-quick) $(ASKED)
+
 .PHONY: bench-disparity bench-reconstruct-stereo train-stereo
 # Rendered pairs are kept below the output folder; the network's arms run when its checkpoint is there.
 STEREO_NETWORK ?= data/disparity/raft_stereo_small.safetensors

@@ -72,7 +72,7 @@ def learn_methods(
     corpus, features = learn_features(demonstrations, seed)
     tell("networks")
     thesis = learn_grammar(corpus, features, seed) if "thesis" in methods else None
-    choices = {rule: cloning.learn(corpus, features, rule, seed) for rule in rivals}  # type: ignore[arg-type]
+    choices: dict[str, cloning.ChoiceModel] = {rule: cloning.learn(corpus, features, rule, seed) for rule in rivals}  # type: ignore[arg-type]
     return Learned(grammar, thesis, choices)
 
 
@@ -124,7 +124,7 @@ def read_learned(model: CuttingModel) -> Learned:
         classifier = _network(layers(FEATURES, 64, len(centres)), "classifier", tensors, path)
         planes = _network(MixtureOfPlanes(len(rules) + FEATURES), "planes", tensors, path)
         thesis = ThesisModel(features, induction.Grammar(centres, rules), classifier, planes)
-    choices = {
+    choices: dict[str, cloning.ChoiceModel] = {
         rule: cloning.ChoiceModel(features, _network(cloning.ChoiceNetwork(), rule, tensors, path), rule)  # type: ignore[arg-type]
         for rule in ("bc", "qnet")
         if rule in file.methods

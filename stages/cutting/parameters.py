@@ -44,8 +44,8 @@ class PlanParameters(Parameters):
     method: MethodName = Field("ours", description="Who plans; the model must have learned it")
     goal: str = Field("", description='What is wanted in words, e.g. "6 slices, 8 cubes"; else --goal-meshes, --trial')
     trial: int = Field(0, ge=0, le=2000, description="Trial of --demonstrations whose objects and fragments are taken")
-    food: FoodName = Field("carrot", description="What is cut without --object and --demonstrations, made from --seed")
-    unit: Literal["m", "mm"] = Field("m", description="Unit of --object and --goal-meshes")
+    food: FoodName = Field("carrot", description="What is cut without --mesh and --demonstrations, made from --seed")
+    unit: Literal["m", "mm"] = Field("m", description="Unit of --mesh and --goal-meshes")
     image_width: int = Field(1200, ge=300, le=4000, description="Width of the pictures [px]")
 
 
@@ -91,8 +91,8 @@ def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
         raise UsageError(
             "cutting plan: nothing is wanted", hint='give --goal "6 slices", --goal-meshes or --demonstrations'
         )
-    if "demonstrations" in given and inputs.get("object") is not None:
-        raise UsageError("--object and --demonstrations both say what is cut", hint="give one of them")
+    if "demonstrations" in given and inputs.get("mesh") is not None:
+        raise UsageError("--mesh and --demonstrations both say what is cut", hint="give one of them")
 
 
 def _check_names(option: str, names: tuple[str, ...], known: tuple[str, ...]) -> None:
@@ -132,7 +132,7 @@ PLAN = Stage(
     reads={
         "model": CuttingModel,
         "demonstrations": Optionally(CuttingDemonstrations),
-        "object": Optionally(External("closed mesh of what is cut (PLY, OBJ, STL, GLB)")),
+        "mesh": Optionally(External("closed mesh of what is cut (PLY, OBJ, STL, GLB)")),
         "goal_meshes": Optionally(External("folder of closed meshes, the fragments that are wanted")),
     },
     writes=CuttingPlan,

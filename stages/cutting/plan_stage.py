@@ -45,7 +45,7 @@ class _Task:
 def run(
     model: CuttingModel,
     demonstrations: CuttingDemonstrations | None,
-    object: Path | None,
+    mesh: Path | None,
     goal_meshes: Path | None,
     *,
     parameters: PlanParameters,
@@ -53,7 +53,7 @@ def run(
 ) -> CuttingPlan:
     """Plan, in a model of the world that cuts exactly."""
     learned = read_learned(model)
-    task = _task(learned, demonstrations, object, goal_meshes, parameters, context)
+    task = _task(learned, demonstrations, mesh, goal_meshes, parameters, context)
     if task.goal:
         policy = learned.policy(parameters.method, Goal(tuple(task.goal)), context.seed)
     else:
@@ -84,7 +84,7 @@ def _most(method: str, task: _Task) -> int:
 def _task(
     learned: Learned,
     demonstrations: CuttingDemonstrations | None,
-    object: Path | None,
+    mesh: Path | None,
     goal_meshes: Path | None,
     parameters: PlanParameters,
     context: Context,
@@ -97,9 +97,9 @@ def _task(
         objects = trial.objects
         if not parameters.goal and goal_meshes is None:
             goal, said = trial.fragments, f"the fragments of trial {parameters.trial}"
-    elif object is not None:
-        body, mended = read_body(object, parameters.unit)
-        objects, notes = [body], [f"{object.name}: {text}" for text in mended]
+    elif mesh is not None:
+        body, mended = read_body(mesh, parameters.unit)
+        objects, notes = [body], [f"{mesh.name}: {text}" for text in mended]
     else:
         objects = [make_food(parameters.food, context.random(0))]
     if goal_meshes is not None:

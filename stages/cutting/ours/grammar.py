@@ -189,10 +189,10 @@ def _named(grammar: Grammar, demonstrations: Sequence[Demonstration]) -> Grammar
             if not pieces:
                 continue
             rows = features([item_of(body, k) for k, body in enumerate(pieces)])
-            np.add.at(named, (grammar.type_of(rows[:, :3]), number), 1)
+            named[:, number] += np.bincount(grammar.type_of(rows[:, :3]), minlength=grammar.types)
             ratios[number].append(np.diff(rows[:, :3], axis=1))
             spread.append(rows - rows.mean(axis=0))
-    shapes = np.zeros((len(CATEGORIES), 2, 2))
+    shapes = np.tile([[0.0, 0.0], [1.0, 1.0]], (len(CATEGORIES), 1, 1))  # of what was never shown, anything
     for number, found in enumerate(ratios):
         if found:
             together = np.concatenate(found)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from schemas.cutting_demonstrations import CategoryName
+from schemas.errors import BadInput
 from stages.cutting.demonstrations.recipes import CATEGORIES, LONG
 from stages.cutting.ours.cells import Cloud, Split, Tree, cells, cloud_of
 from stages.cutting.ours.grammar import Grammar
@@ -21,8 +22,12 @@ def imagine(objects: Sequence[Body], words: Words, grammar: Grammar) -> tuple[li
     """Return items of the wanted categories and their names.
 
     Each category gets as much volume as any other, each object of every category a share by its volume; within an
-    object categories lie one after the other along its length, as demonstrated.
+    object categories lie one after the other along its length, as demonstrated. Raises BadInput for a category that
+    no demonstration showed.
     """
+    for _, name in words:
+        if not grammar.named[:, CATEGORIES.index(name)].any():
+            raise BadInput(f"the model has not been shown {name}", hint="learn from more demonstrations")
     clouds = [cloud_of(body) for body in objects]
     room = np.array([body.volume for body in objects])
     items: list[Item] = []
@@ -60,5 +65,5 @@ def _grid(edges: np.ndarray, count: int, name: CategoryName, grammar: Grammar) -
     grids = factors(count)
     ratios = np.diff(np.sort(np.log(edges / grids), axis=1), axis=1)
     mean, deviation = grammar.ratios[CATEGORIES.index(name)]
-    best = int(np.argmin((((ratios - mean) / np.maximum(deviation, 1e-6)) ** 2).sum(axis=1)))
+    best = int(np.argmin((((ratios - mean) / deviation) ** 2).sum(axis=1)))
     return nested(edges, grids[best].tolist(), grammar)

@@ -168,14 +168,14 @@ def rule_bits(grammar: Grammar, edges: np.ndarray, tree: Tree) -> float:
             middle = (first + last) // 2
             weights = split.weights
             whole = sum(weights[first:last])
-            sides = []
+            sides: list[tuple[tuple[float, ...], int, int]] = []
             for low, high in ((first, middle), (middle, last)):
-                part = list(box)
-                part[split.axis] = round(box[split.axis] * sum(weights[low:high]) / whole, 6)
-                sides.append((tuple(part), low, high))
+                side = list(box)
+                side[split.axis] = round(box[split.axis] * sum(weights[low:high]) / whole, 6)
+                sides.append((tuple(side), low, high))
             rank = sum(edge < box[split.axis] for k, edge in enumerate(box) if k != split.axis)
             rule = grammar.rule_bits(type_of(box), rank, (type_of(sides[0][0]), type_of(sides[1][0])))
-            kept[key] = rule + sum(bits(part, split, low, high) for part, low, high in sides)
+            kept[key] = rule + sum(bits(cut_box, split, low, high) for cut_box, low, high in sides)
         return kept[key]
 
     box = tuple(float(edge) for edge in np.round(edges, 6))
