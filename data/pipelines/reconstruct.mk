@@ -23,8 +23,8 @@ $(FOLDER)/cad_library/manifest.json: data/pipelines/reconstruct.toml
 $(FOLDER)/sequence/manifest.json: data/pipelines/reconstruct.toml $(LOG)
 	$(PYTHON) -m cli ingest --log '$(LOG)' --format '$(FORMAT)' $(if $(CAMERA),--camera '$(CAMERA)') --every '$(EVERY)' $(if $(MAX_FRAMES),--max-frames '$(MAX_FRAMES)') $(if $(DEPTH_SCALE),--depth-scale '$(DEPTH_SCALE)') --pose-convention '$(POSE_CONVENTION)' $(if $(FX),--fx '$(FX)') $(if $(FY),--fy '$(FY)') $(if $(CX),--cx '$(CX)') $(if $(CY),--cy '$(CY)') --out $(FOLDER)/sequence
 
-$(FOLDER)/segments/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/sequence/manifest.json $(wildcard $(WEIGHTS)) $(MASKS) $(LABELS)
-	$(PYTHON) -m cli segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') $(if $(MASKS),--masks '$(MASKS)') $(if $(LABELS),--labels '$(LABELS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments
+$(FOLDER)/segments/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/sequence/manifest.json $(wildcard $(WEIGHTS)) $(wildcard $(SEMANTIC_WEIGHTS)) $(MASKS) $(LABELS)
+	$(PYTHON) -m cli segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') $(if $(SEMANTIC_WEIGHTS),--semantic-weights '$(SEMANTIC_WEIGHTS)') $(if $(MASKS),--masks '$(MASKS)') $(if $(LABELS),--labels '$(LABELS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments
 
 $(FOLDER)/panoptic_map/manifest.json: data/pipelines/reconstruct.toml $(FOLDER)/sequence/manifest.json $(FOLDER)/segments/manifest.json
 	$(PYTHON) -m cli fuse --sequence $(FOLDER)/sequence --segments $(FOLDER)/segments --voxel-size '$(VOXEL_SIZE)' --out $(FOLDER)/panoptic_map

@@ -1,15 +1,18 @@
 """Where weight files are kept: one folder, every file named by the beginning of its sha256 and its own name.
 
 `$SCENEWRIGHT_MODELS`, else `$XDG_CACHE_HOME/scenewright/models`, else `~/.cache/scenewright/models`. Nothing is ever
-downloaded: people bring the files (`scenewright models --add FILE`), steps find them by name.
+downloaded: people bring the files (`scenewright models --add FILE`), steps find them by name, and some are taken where
+nothing else is asked for.
 """
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import secrets
 import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +21,9 @@ from stages.engine.hub_cache import find_in_hub_cache, home_folder, is_hub_id
 from stages.engine.known_models import KnownModel, known_models
 from stages.engine.store import sync_folder
 from stages.kit.digests import sha256_of_file
+from stages.kit.stage import Optionally
+
+logger = logging.getLogger("scenewright")
 
 ENVIRONMENT = "SCENEWRIGHT_MODELS"
 PREFIX_LENGTH = 16
@@ -128,6 +134,22 @@ def resolve_weights(path: Path) -> Path:
     if sha256_of_file(found[0].path)[:PREFIX_LENGTH] != found[0].prefix:
         raise BadInput(f"{found[0].path}: damaged, its sha256 is another one", hint="delete it and add it again")
     return found[0].path
+
+
+def with_usual_models(reads: Mapping[str, object], parameters: object, given: Mapping[str, Path]) -> dict[str, Path]:
+    """Return the inputs (role -> path) with those models of the cache that the step takes when nothing was given.
+
+    Raises BadInput as `resolve_weights` does.
+    """
+    complete = dict(given)
+    for role, declared in reads.items():
+        if role in complete or not isinstance(declared, Optionally) or declared.usual is None:
+            continue
+        name = declared.usual(parameters, complete)
+        if name and any(name in _names(model) for model in cached_models()):
+            complete[role] = resolve_weights(Path(name))
+            logger.info("--%s: %s, from the cache of models", role.replace("_", "-"), name)
+    return complete
 
 
 def _names(model: CachedModel) -> set[str]:

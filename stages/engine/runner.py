@@ -21,7 +21,7 @@ from schemas.manifest import LONGEST_PATH, MANIFEST_NAME, InputRecord, Manifest
 from stages.engine import estimation, interruption, memory_limit, shared_artifacts, store
 from stages.engine.digests import content_digest, record_files
 from stages.engine.keys import artifact_key, data_file_digests, library_versions, parameters_as_json
-from stages.engine.model_cache import resolve_weights
+from stages.engine.model_cache import resolve_weights, with_usual_models
 from stages.engine.provenance import provenance_now
 from stages.engine.reading import check_hashes, check_sizes, open_artifact, read_manifest
 from stages.kit.digests import external_digest, external_files
@@ -276,6 +276,7 @@ def run_stage(
     Raises BadInput, UsageError, MissingDependency or MachineFailure; whatever stood at `out` is then untouched.
     """
     out = _resolved(out)
+    inputs = with_usual_models(stage.reads, parameters, inputs)
     if stage.check is not None:
         stage.check(parameters, inputs)
     if shared is not None and inputs:

@@ -48,6 +48,9 @@ class Optionally:
     """Marks an input that may be left out; `run` then gets None."""
 
     what: type[Artifact] | External
+    usual: Callable[[Any, Mapping[str, Any]], str] | None = None
+    """Parameters and the inputs given (role -> path) -> name of the model that the step takes from the cache of models
+    when it is there and nothing else was given; empty: none."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from stages.kit.stage import Parameters
 from stages.segment.geometric import GeometricFrame
 from stages.segment.panoptic import PanopticFrame
 from stages.segment.parameters import SegmentParameters
-from stages.segment.registry import BackendDeclaration, all_backends, backend_for
+from stages.segment.registry import AUTO, BackendDeclaration, all_backends, automatic, backend_for
 
 STREAM_WORDS = {"color": "colour", "labels": "ground-truth labels"}
 
@@ -43,6 +43,7 @@ class BackendRequest:
     parameters: SegmentParameters
     weights: Path | None = None
     mask_weights: Path | None = None
+    semantic_weights: Path | None = None
     labels: Path | None = None
     """Label table or list of words."""
     sidecar: Path | None = None
@@ -73,7 +74,8 @@ class BackendRequest:
 
 def choose_backend(request: BackendRequest) -> Backend:
     """Return the backend that the parameters ask for. Raises UsageError, BadInput or MissingDependency."""
-    chosen = backend_for(request.parameters.backend)
+    automatically = request.parameters.backend == AUTO
+    chosen = automatic(request.weights) if automatically else backend_for(request.parameters.backend)
     _refuse_options_of_others(request.parameters, chosen)
     if request.sequence is not None:
         _require_streams(request.sequence, chosen)

@@ -13,7 +13,15 @@ from schemas.segments import Segments
 from schemas.sequence import Sequence
 from stages.kit.estimates import USUAL_FRAME, Estimate, Inputs
 from stages.kit.stage import External, Optionally, Parameters, Stage
-from stages.segment.registry import all_backends, backend_help, check_backend, data_files, weights_help
+from stages.segment.registry import (
+    all_backends,
+    backend_help,
+    check_backend,
+    data_files,
+    usual_detector,
+    usual_witness,
+    weights_help,
+)
 
 
 class CommonParameters(Parameters):
@@ -119,12 +127,20 @@ STAGE = Stage(
     parameters=SegmentParameters,
     reads={
         "sequence": Sequence,
-        "weights": Optionally(External(f"Network: {weights_help()}", weights=True)),
+        "weights": Optionally(External(f"Network: {weights_help()}", weights=True), usual=usual_detector),
         "mask_weights": Optionally(
             External(
                 "Segment Anything folder or hub id that turns the boxes of an open-vocabulary model into masks",
                 weights=True,
             )
+        ),
+        "semantic_weights": Optionally(
+            External(
+                "Semantic segmenter (DeepLab with PASCAL VOC's classes, .tflite) as the witness of the detector: what "
+                "both see counts at half the score, what it denies loses its name",
+                weights=True,
+            ),
+            usual=usual_witness,
         ),
         "labels": Optionally(
             External("The network's labels and their classes (TOML as in data/labels), or a list of words, one a line")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, Literal
 
 from stages.kit.declared import declared_in
@@ -82,6 +84,25 @@ def backend_for(backend: str) -> BackendDeclaration:
     raise ValueError(f"no such backend; {guess}one of {', '.join((*names, *addresses))}")
 
 
+def automatic(weights: Path | None) -> BackendDeclaration:
+    """Return the backend that `auto` takes with these weights, or with none: a detector taught on photographs before
+    our own network, which was taught in generated rooms."""
+    own = weights is None or weights.suffix == ".safetensors"
+    return backend_for(AUTO if own else "detector")
+
+
+def usual_detector(parameters: Any, given: Mapping[str, Any]) -> str:
+    """Return the known model that `auto` takes for a detector where the cache has it."""
+    return "yolox_nano" if parameters.backend == AUTO else ""
+
+
+def usual_witness(parameters: Any, given: Mapping[str, Any]) -> str:
+    """Return the known model that `auto` takes as the detector's witness where the cache has it and it can be run."""
+    detecting = "weights" in given and automatic(Path(given["weights"])).name == "detector"
+    usable = parameters.backend == AUTO and detecting and find_spec("ai_edge_litert") is not None
+    return "deeplab_voc" if usable else ""
+
+
 def check_backend(backend: str) -> str:
     """Return the name of a backend, or an address without its closing slash. Raises ValueError."""
     declared = backend_for(backend)
@@ -92,7 +113,10 @@ def backend_help() -> str:
     """Return the names and what stands behind each, for the help of `--backend`."""
     named = [f"`{declared.name}`: {declared.summary}" for declared in all_backends() if not declared.address]
     addresses = [f"or {declared.address}" for declared in all_backends() if declared.address]
-    unasked = f"`{AUTO}`: what needs nothing installed and nothing known of the log: `{backend_for(AUTO).name}`"
+    unasked = (
+        f"`{AUTO}`: `detector` where --weights is an ONNX file or the cache of models has yolox_nano (`scenewright "
+        f"models`), else what needs nothing: `{backend_for(AUTO).name}`"
+    )
     return "; ".join([*named, unasked, *addresses])
 
 
@@ -117,4 +141,5 @@ def versions(parameters: Any) -> dict[str, str]:
     """
     declared = backend_for(parameters.backend)
     further: dict[str, str] = declared.load(declared.versions).versions(parameters) if declared.versions else {}
-    return {name: library_version(name) for name in declared.libraries} | further
+    taken = (declared, backend_for("detector")) if parameters.backend == AUTO else (declared,)
+    return {name: library_version(name) for backend in taken for name in backend.libraries} | further

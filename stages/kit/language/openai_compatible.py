@@ -1,7 +1,8 @@
 """Backend `openai`: any server with the chat completions of OpenAI (vLLM, llama.cpp, a service), over plain HTTP.
 
 Servers differ in what they understand, and say so with status 400 or 422: a JSON schema for the reply, JSON of any
-kind, or text only; `max_tokens` or `max_completion_tokens`. The backend asks for the most and gives way once.
+kind, or text only; `max_tokens` or `max_completion_tokens`; no temperature. The backend asks for the most and gives way
+once.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ class OpenAICompatibleBackend:
         self.form: Form = FORMS[0]
         """How replies are asked for; falls back for good when the server does not understand."""
         self._limit_name = "max_tokens"
+        self._says_temperature = True
 
     @property
     def label(self) -> str:
@@ -51,7 +53,9 @@ class OpenAICompatibleBackend:
         """Return the reply. Raises LanguageFailed: `refused`, `unreachable`."""
         before, form, lowered = self._connection.repeats, self.form, False
         while True:
-            body = json.dumps(encode_request(request, self.form, self._limit_name)).encode()
+            body = json.dumps(
+                encode_request(request, self.form, self._limit_name, temperature=self._says_temperature)
+            ).encode()
             try:
                 answer = self._connection.post(PATH, body, "application/json", judge=_judge)
             except Refused as error:
@@ -79,7 +83,10 @@ class OpenAICompatibleBackend:
         if self._limit_name == "max_tokens" and "max_completion_tokens" in excerpt:
             self._limit_name = "max_completion_tokens"
             return True
-        return "temperature" not in excerpt and self._lower_form()
+        if "temperature" in excerpt:  # reasoning models take none, or only their own
+            gave, self._says_temperature = self._says_temperature, False
+            return gave
+        return self._lower_form()
 
     def _lower_form(self) -> bool:
         at = FORMS.index(self.form)
@@ -103,16 +110,13 @@ class OpenAICompatibleBackend:
         return self._connection.hide(text).encode("utf-8", "replace").decode()
 
 
-def encode_request(request: Request, form: Form, limit_name: str) -> dict[str, Any]:
-    """Return the body of a request; `form` says how the reply is asked for."""
+def encode_request(request: Request, form: Form, limit_name: str, *, temperature: bool = True) -> dict[str, Any]:
+    """Return the body of a request; `form` says how the reply is asked for, `temperature` whether one is."""
     schema = request.schema
     messages = [_encoded(message) for message in request.messages]
-    body: dict[str, Any] = {
-        "model": request.model,
-        "temperature": request.temperature,
-        limit_name: request.maximum_tokens,
-        "stream": False,
-    }
+    body: dict[str, Any] = {"model": request.model, limit_name: request.maximum_tokens, "stream": False}
+    if temperature:
+        body["temperature"] = request.temperature
     if form == "json_schema":
         body["response_format"] = {
             "type": "json_schema",

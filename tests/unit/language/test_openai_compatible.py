@@ -216,6 +216,18 @@ def test_the_newer_name_of_the_limit() -> None:
     assert server.asked[1].body["response_format"]["type"] == "json_schema"
 
 
+def test_a_server_that_takes_no_temperature_is_asked_without_and_refused_once_only() -> None:
+    words = b'{"error": {"message": "Unsupported value: \'temperature\' does not support 0"}}'
+    with serving(status(400, words), replies(GOOD), replies(GOOD)) as server:
+        chat = opened(server.base_url)
+        chat.ask(QUESTION, SCHEMA)
+        chat.ask(QUESTION, SCHEMA)
+    assert ["temperature" in asked.body for asked in server.asked] == [True, False, False]
+    assert server.asked[1].body["response_format"]["type"] == "json_schema"
+    with serving(status(400, words), status(400, words)) as server, pytest.raises(LanguageFailed):
+        opened(server.base_url).ask(QUESTION, SCHEMA)
+
+
 def test_content_in_parts() -> None:
     with serving(replies([{"type": "text", "text": '{"answer"'}, {"type": "x"}, {"text": ": 4}"}])) as server:
         assert opened(server.base_url).ask(QUESTION, SCHEMA).answer == 4

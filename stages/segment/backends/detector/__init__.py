@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from stages.kit.stage import Parameters
+from stages.kit.stage import Extra, Parameters
 from stages.segment.registry import BackendDeclaration
 
 
@@ -23,4 +23,6 @@ BACKEND = BackendDeclaration(
     needs=frozenset({"color"}),
     weights="an ONNX file",
     parameters=DetectorParameters,
+    libraries=("ai-edge-litert",),
+    extras=(Extra("ai-edge-litert", "ai_edge_litert", "segment --semantic-weights: pip install ai-edge-litert"),),
 )

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -13,9 +11,11 @@ from schemas.sequence import SequenceFile
 from schemas.vocabulary import SemanticClass, Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame, FrameReader
 from stages.segment.backends.detector import DetectorParameters
+from stages.segment.backends.detector.agreement import HEARD, Thing, witnessed
 from stages.segment.backends.detector.box_masks import box_mask, frame_geometry
 from stages.segment.backends.detector.plausibility import extent_of, is_plausible
 from stages.segment.backends.detector.room import Room, SurfaceSample, find_room, room_masks, sample_surface
+from stages.segment.backends.detector.semantic import FROM_VOC, VOC_NAMES, SemanticSegmenter
 from stages.segment.backends.detector.yolox import Detections, Detector
 from stages.segment.choice import BackendRequest
 from stages.segment.coco import COCO_NAMES
@@ -35,16 +35,6 @@ DUPLICATE_OVERLAP = 0.5
 """Two masks of one class that share this much of the smaller one are the same thing."""
 
 
-@dataclass(frozen=True)
-class Thing:
-    """One detected thing in a frame."""
-
-    semantic: SemanticClass
-    score: float
-    mask: np.ndarray
-    """(H, W) bool."""
-
-
 class DetectorBackend:
     """Detector boxes combined with geometric segments.
 
@@ -61,12 +51,21 @@ class DetectorBackend:
         vocabulary: Vocabulary,
         detector: Detector,
         *,
-        weights: Path,
+        label: str,
         geometric: GeometricSettings,
         minimum_pixels: int,
+        witness: SemanticSegmenter | None = None,
+        threshold: float = 0.0,
     ) -> None:
-        self.label = f"detector {Path(weights).stem} + geometric segments"
+        """`witness`: a segmenter that is asked what it calls the detected things; where it says nothing, detections
+        under `threshold` do not count."""
+        self.label = label
         self.minimum_pixels = minimum_pixels
+        self._witness = witness
+        self._threshold = threshold
+        self._known = {
+            number: vocabulary.by_name(FROM_VOC[name]) for number, name in enumerate(VOC_NAMES) if name in FROM_VOC
+        }
         self._detector = detector
         self._classes = [vocabulary.by_alias(name, "coco") for name in COCO_NAMES]
         self._anything = vocabulary.by_name(UNNAMED)
@@ -110,6 +109,9 @@ class DetectorBackend:
                     continue
                 semantic = self._anything
             things.append(Thing(semantic, float(score), mask))
+        if self._witness is not None:
+            classes = self._witness.classify(frame.color)
+            things = list(witnessed(things, classes, self._known, threshold=self._threshold, anything=self._anything))
         return merge_duplicates(things)
 
 
@@ -173,9 +175,14 @@ def open_backend(request: BackendRequest) -> DetectorBackend:
             "--backend detector needs the weights of a detector",
             hint="give an ONNX export of a YOLOX model (COCO-80) with --weights, or use --backend geometric",
         )
+    label = f"detector {request.weights.stem} + geometric segments"
+    witness, heard = None, parameters.score_threshold
+    if request.semantic_weights is not None:
+        witness, heard = SemanticSegmenter(request.semantic_weights), HEARD * parameters.score_threshold
+        label = f"detector {request.weights.stem}, witnessed by {request.semantic_weights.stem}, + geometric segments"
     detector = Detector(
         request.weights,
-        score_threshold=parameters.score_threshold,
+        score_threshold=heard,
         suppression_overlap=parameters.suppression_overlap,
         tile_side=min(reader.camera.width, reader.camera.height) if request.own(DetectorParameters).tiles else 0,
     )
@@ -184,7 +191,9 @@ def open_backend(request: BackendRequest) -> DetectorBackend:
         reader,
         load_vocabulary(),
         detector,
-        weights=request.weights,
+        label=label,
         geometric=geometric_settings(parameters),
         minimum_pixels=parameters.small_object_pixels,
+        witness=witness,
+        threshold=parameters.score_threshold,
     )

@@ -1,0 +1,156 @@
+"""Kinds `agent_episode`, one session of a robot that was told something, and `agent_evaluation`, many of them."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pydantic import Field
+
+from schemas.apartment import Apartment
+from schemas.artifact import Artifact, Document
+from schemas.base import Model
+from schemas.language import LanguageRecord
+from schemas.plan import Failure
+
+
+class EpisodeCall(Model):
+    """A call of the plan language, and what it returned in words."""
+
+    name: str
+    arguments: tuple[str, ...]
+    returned: str
+    error: Failure | None = None
+
+
+class EpisodeTurn(Model):
+    """A program of the brain and what came of it."""
+
+    reason: str
+    code: str
+    calls: tuple[EpisodeCall, ...]
+    printed: tuple[str, ...] = ()
+    error: Failure | None = None
+    seconds: float
+    """Of the robot, when it was over."""
+    base: tuple[float, float, float]
+    """x, y [m], yaw [rad] where the robot stood then."""
+    holding: str
+    """Key of what it believed to hold."""
+
+
+class EpisodeScore(Model):
+    """What it truly came to, by the truth of the world."""
+
+    success: bool
+    claimed: bool
+    executions: int
+    executed: int
+    """Executions that did what they were to do."""
+    replanned: int
+    """Executions of a step that had failed before."""
+    recovered: int
+    calls: int
+    seconds: float
+    metres: float
+    failures: dict[str, tuple[int, int]]
+    """Cause -> failures that nothing made good in a session that failed, and the others."""
+
+
+class EpisodeFile(Model):
+    """episode.json."""
+
+    words: str
+    task: str
+    """Name of a built-in task; empty for words of the user's own."""
+    arm: str
+    brain: str
+    """`rules`, `open loop rules`: no language model; or the label of the language backend."""
+    seed: int
+    failures: float
+    """Factor of the rates at which executions fail, and of those of the eyes."""
+    perception: float
+    most_turns: int = Field(ge=1)
+    end: str
+    """`done`, `give_up`, `ask`; `turns`, `time`, `repeats`: a limit; `brain`: no usable answer."""
+    said: str
+    """What the robot told the user at the end."""
+    stopped: Failure | None = None
+    understood: bool
+    """Whether a judge of ours knows what the words ask for; otherwise `score.success` says nothing."""
+    turns: tuple[EpisodeTurn, ...]
+    score: EpisodeScore
+    language: LanguageRecord | None = None
+
+
+class MapThing(Model):
+    """A thing or piece of furniture of the robot's map."""
+
+    key: str
+    label: str
+    place: str
+    """Furniture that it is on or in; empty for furniture."""
+    on: str
+    """Small carrier on which it lies."""
+    position: tuple[float, float, float]
+    size: tuple[float, float]
+    """Over the ground, x and y [m]."""
+    views: int
+    """Regions of views that said something of it."""
+
+
+class MapSnapshot(Model):
+    """The two-level contact graph that the robot believed after a turn: what is on what."""
+
+    turn: int
+    known_area: float
+    """Floor seen so far [m²]."""
+    things: tuple[MapThing, ...]
+
+
+class EpisodeMaps(Model):
+    """maps.json: one for every turn that changed something."""
+
+    snapshots: tuple[MapSnapshot, ...]
+
+
+class AgentEpisode(Artifact):
+    """`episode.json`, `episode.txt`, `apartment.json` (the true one), `maps.json`, `map.png` (what the robot knew as it
+    grew); `transcript.jsonl` when a language model was asked."""
+
+    kind: ClassVar[str] = "agent_episode"
+    description: ClassVar[str] = "a robot told in words: programs, calls, maps, and what came of it"
+    info = Document(EpisodeFile, "episode.json")
+    apartment = Document(Apartment, "apartment.json")
+    maps = Document(EpisodeMaps, "maps.json")
+
+
+class EvaluatedArm(Model):
+    """Pooled over the trials of one arm in one task; percentages, None where there is nothing to count."""
+
+    task: str
+    arm: str
+    trials: int
+    success: float
+    step_success: float | None
+    recovery: float | None
+    false_success: float
+    calls: float
+    seconds: float
+    metres: float
+
+
+class AgentEvaluationFile(Model):
+    """results.json."""
+
+    first_seed: int
+    failures: float
+    perception: float
+    rows: tuple[EvaluatedArm, ...]
+
+
+class AgentEvaluation(Artifact):
+    """`results.json` and `table.md`."""
+
+    kind: ClassVar[str] = "agent_evaluation"
+    description: ClassVar[str] = "arms of the agent compared over tasks and seeds"
+    info = Document(AgentEvaluationFile, "results.json")

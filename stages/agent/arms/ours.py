@@ -1,0 +1,306 @@
+"""Our ways of the same calls: what failed is repaired by the smallest layer that can, and what was done is looked at.
+
+Within a call: another view, another grasp, another base pose. Above it, by the brain: another object, another plan. A
+call answers with what was found out, as a kind, a sentence and numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import hypot
+
+from stages.agent.arms.skills import CommonSkills
+from stages.agent.arms.stations import around, drivable, other_sides
+from stages.agent.body import Base, Body, Position
+from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
+from stages.agent.scene_map import Item, quarter
+
+ENOUGH = 2
+"""Regions of views by which a class has to be ahead before anything is done about it."""
+MOST_VIEWS = 6
+TRIES = 6
+"""Executions within one call."""
+BESIDE = 0.4
+"""How far around its spot something is looked for that is not on it [m]."""
+AWAY = 0.1
+"""Of what was placed from its spot, at most [m]."""
+OFF_SPOT = 0.05
+"""Spots this near to one that something rolled off are not tried again [m]."""
+HAND_VIEWS = 3
+
+
+@dataclass(frozen=True)
+class Mechanisms:
+    """What ours is made of; an ablation leaves one out."""
+
+    agreement: bool = True
+    """A thing is evidence only when the views that should see it do."""
+    reachability: bool = True
+    """Base poses are chosen by whether the arm would get there."""
+    repair: bool = True
+    """Another grasp or base pose within the call."""
+    recheck: bool = True
+    """What was done is looked at from two views."""
+    memory: bool = True
+    """What failed where is not tried again."""
+    other_sides: bool = True
+    """What is not found is looked for from other sides, and `every` counts only after that."""
+
+
+class OwnSkills(CommonSkills):
+    """Arms `ours` and `oracle`."""
+
+    def __init__(self, body: Body, mechanisms: Mechanisms | None = None) -> None:
+        super().__init__(body)
+        self._use = mechanisms or Mechanisms()
+        self._bad: dict[str, list[Base]] = {}
+        self._off: list[Position] = []
+        """Spots from which something rolled off."""
+        self._looked: dict[str, set[int]] = {}
+
+    # ---- eyes ----
+
+    def explore_local(self, place: str) -> ObjectMap:
+        """Look from here, where that was done already from another side, and where there is none at each thing from
+        near by. What was seen before stays."""
+        piece, looked = self.scene.furniture[place], self._looked.get(place, set())
+        again = self._use.other_sides and quarter(self._body.base, piece.centre) in looked
+        if again and not self._go_round(place, looked):
+            for item in [i for i in self.scene.items.values() if i.place == place]:
+                self._look(place, item)
+        self._look(place)
+        if self._use.agreement:
+            for item in [i for i in self.scene.items.values() if i.place == place]:
+                if len(set(item.votes.values())) > 1:
+                    self._confirm(item)
+        return self.scene.local_map(place)
+
+    def picture_of_hand(self) -> Observation:
+        """What two of three views agree on."""
+        label = self._in_hand()
+        return Observation("hand", (label,) if label else ())
+
+    def picture_of(self, target: SceneObject) -> Observation:
+        """What is there by all views so far and one from where there was none yet."""
+        if target.key in self.scene.furniture:
+            found = self.explore_local(target.key)
+            return Observation(target.key, tuple(o.label for o in found))
+        item = self.scene.items[target.key]
+        for _ in range(MOST_VIEWS):
+            if (quarter(self._body.base, item.position), True) in item.votes and self._use.other_sides:
+                self._go_round(item.place, {int(side) for side, close in item.votes if close and side != "hand"})
+            self._look(item.place, item)
+            if item.used is not None or item.key not in self.scene.items or not self._use.other_sides:
+                break
+        gone = item.key not in self.scene.items
+        return Observation(target.key, () if gone else (item.label,), item.used)
+
+    def _look(self, place: str, item: Item | None = None) -> None:
+        """Look at a place, or at one of its things from near by, and count the votes."""
+        piece, base = self.scene.furniture[place], self._body.base
+        close = item is not None
+        at = item.position if item is not None else (*piece.centre, piece.height)
+        look = self._body.look(at, close=close)
+        if not close:
+            self._looked.setdefault(place, set()).add(look.sector)
+        seen = {self.scene.add(d, place, (quarter(base, d.position), close)).key for d in look.detections}
+        should = [item] if item is not None else [i for i in self.scene.items.values() if i.place == place]
+        for each in should:
+            if each.key not in seen:
+                each.votes[quarter(base, each.position), close] = None
+                if len(each.sides(seen=False)) > len(each.sides(seen=True)):
+                    self.scene.items.pop(each.key, None)
+
+    def _confirm(self, item: Item) -> None:
+        """Take views of a thing until one class is enough ahead. Views of one region say the same, and by the error
+        model all others tell equally much, so that the next is the cheapest from where it was not seen yet."""
+        for _ in range(MOST_VIEWS):
+            if item.margin >= ENOUGH or item.key not in self.scene.items:
+                return
+            here = quarter(self._body.base, item.position)
+            if (here, True) not in item.votes and self._body.reaches(self._body.base, item.position):
+                self._look(item.place, item)
+                continue
+            seen = {int(side) for side, _ in item.votes if side != "hand"}
+            if not self._use.other_sides or not self._go_round(item.place, seen):
+                return
+            self._look(item.place)
+
+    def _go_round(self, place: str, seen: set[int]) -> bool:
+        """Drive to another side of furniture; False where none can be got to."""
+        return any(self.drive(base, place) for _, base in other_sides(self.scene, place, self._body.base, seen)[:2])
+
+    def _in_hand(self) -> str:
+        """Return the class that two views of the hand agree on, empty for an empty hand."""
+        said: list[str] = []
+        for view in range(HAND_VIEWS):
+            seen = self._body.look_at_hand(view)
+            label = seen.label if seen else ""
+            if label in said:
+                return label
+            said.append(label)
+        return said[0]
+
+    # ---- base and arm ----
+
+    def navigate(self, target: SceneObject) -> Outcome:
+        """Drive before furniture, to a side from which it was not looked at yet as long as there is one."""
+        place = target.key if target.key in self.scene.furniture else self.scene.items[target.key].place
+        seen = self._looked.get(place, set()) if self._use.other_sides else set()
+        poses = other_sides(self.scene, place, self._body.base, seen) or drivable(
+            self.scene, self._body.base, around(self.scene.furniture[place])
+        )
+        for _, base in poses[: TRIES if self._use.repair else 1]:
+            if self.drive(base, place):
+                return Outcome(True)
+        return Outcome(False, "no_way", f"no way to {place} was found", {"base_poses": len(poses)})
+
+    def _stations(self, place: str, at: Position) -> Iterator[Base]:
+        """Yield base poses that reach a position on furniture, first where the robot stands if that will do."""
+        tried: list[Base] = []
+        while len(tried) < TRIES:
+            poses = [(0.0, self._body.base)] if self.scene.in_front(self._body.base) == place else []
+            poses += drivable(self.scene, self._body.base, around(self.scene.furniture[place]))
+            known = tried + (self._bad.get(place, []) if self._use.memory else [])
+            fresh = [
+                base
+                for _, base in poses
+                if not any(hypot(base.x - b.x, base.y - b.y) < 0.3 for b in known)
+                and (not self._use.reachability or self._body.reaches(base, at))
+            ]
+            if not fresh:
+                return
+            tried.append(fresh[0])
+            yield fresh[0]
+
+    def _there(self, base: Base, place: str) -> bool:
+        return base == self._body.base or self.drive(base, place)
+
+    def _failed_from(self, place: str, base: Base) -> None:
+        self._bad.setdefault(place, []).append(base)
+
+    def _unreachable(self, place: str, tries: int) -> Outcome:
+        piece = self.scene.furniture[place]
+        why = f"the arm gets to nothing on {place} ({piece.label}, {piece.height:.1f} m high)"
+        return Outcome(
+            False, "unreachable", f"{why}: {tries} base poses failed", {"height": piece.height, "base_poses": tries}
+        )
+
+    def grasp(self, item: Item) -> Outcome:
+        """Make sure of what it is, take it, and make sure that it is held."""
+        believed = item.label
+        if self._use.agreement:
+            self._confirm(item)
+            if item.key not in self.scene.items:
+                return Outcome(False, "gone", f"{item.key} is not there, seen from {len(item.votes)} views")
+            if item.label != believed:
+                return Outcome(False, "wrong_object", f"{item.key} is rather a {item.label}", label=item.label)
+        place, candidate, tries = item.place, 0, 0
+        for base in self._stations(place, item.position):
+            if tries and not self._use.repair:
+                break
+            if not self._there(base, place):
+                tries += 1
+                continue
+            while tries < TRIES:
+                tries += 1
+                felt = self._body.grasp(item.position, item.label, candidate)
+                if not felt.ok:
+                    self._failed_from(place, base)
+                    break
+                held = self._in_hand() if self._use.recheck else item.label
+                if held:
+                    return self._holds(item, held)
+                candidate += 1
+                if not self._use.repair:
+                    return Outcome(False, "not_held", f"{item.key} slipped out of the hand")
+                if not self._found_again(item):
+                    return Outcome(False, "gone", f"{item.key} slipped and is not seen any more")
+        return self._unreachable(place, tries)
+
+    def _holds(self, item: Item, held: str) -> Outcome:
+        believed = item.label
+        item.votes["hand", True] = held
+        self.took(item)
+        if held == believed:
+            return Outcome(True)
+        return Outcome(False, "wrong_in_hand", f"what the hand holds looks like a {held}", label=held)
+
+    def _found_again(self, item: Item) -> bool:
+        """Look for a thing that was pushed; move its entry there."""
+        self.scene.items.pop(item.key, None)
+        for close in (True, False):
+            look = self._body.look(item.position, close=close)
+            near = [d for d in look.detections if d.label == item.label]
+            near = [d for d in near if hypot(d.position[0] - item.position[0], d.position[1] - item.position[1]) < 0.12]
+            if near:
+                item.position = near[0].position
+                self.scene.items[item.key] = item
+                return True
+        return False
+
+    def place(self, target: SceneObject) -> Outcome:
+        """Put down what is held, on a carrier or on free spots of furniture, and make sure that it lies there."""
+        place, label, at = self.places_on(target)
+        if self._use.memory:
+            at = [p for p in at if not any(hypot(p[0] - q[0], p[1] - q[1]) < OFF_SPOT for q in self._off)] or at
+        return self.place_at(place, label, at[:: max(1, len(at) // TRIES)])
+
+    def place_at(self, place: str, label: str, at: list[Position]) -> Outcome:
+        """Try the positions, each from base poses that reach it."""
+        tries = 0
+        for position in at:
+            for base in self._stations(place, position):
+                if tries >= (TRIES if self._use.repair else 1):
+                    return Outcome(False, "no_trajectory", f"no way to put it on {label}", {"tries": tries})
+                tries += 1
+                if not self._there(base, place):
+                    continue
+                if self._body.release(position, label).ok:
+                    return self._lies(place, label, position)
+                self._failed_from(place, base)
+        return self._unreachable(place, tries)
+
+    def _lies(self, place: str, label: str, at: Position) -> Outcome:
+        """Look at the spot from two regions of views; say where it lies if not there."""
+        item = self.holding
+        assert item is not None
+        wanted = {vote for vote in item.votes.values() if vote}
+        self.put(place, at)
+        if not self._use.recheck:
+            return Outcome(True)
+        self.scene.items.pop(item.key)
+        over = self.scene.at_carrier(at, place)
+        for close in (True, False):
+            look = self._body.look(at, close=close)
+            new = [d for d in look.detections if d.label in wanted and self.scene.at(d.position, place) is None]
+            near = [(hypot(d.position[0] - at[0], d.position[1] - at[1]), d) for d in new]
+            away, seen = min(near, default=(BESIDE, None), key=lambda pair: pair[0])
+            if seen is not None and away < BESIDE:
+                item.position, item.place = seen.position, place
+                item.votes[quarter(self._body.base, seen.position), close] = seen.label
+                self.scene.items[item.key] = item
+                if away <= AWAY and self.scene.carrier_of(item) == over:
+                    return Outcome(True)
+        self._off.append(at)
+        if item.key in self.scene.items:
+            return Outcome(False, "not_there", f"{item.key} lies beside {label}, not on it")
+        return Outcome(False, "gone", f"{item.key} is not seen on {label}")
+
+    def pull(self, key: str, *, opening: bool) -> Outcome:
+        """Pull or push a door from base poses that reach it."""
+        piece = self.scene.furniture[key]
+        at = (*piece.centre, piece.height)
+        tries = 0
+        for base in self._stations(key, at):
+            if tries and not self._use.repair:
+                break
+            tries += 1
+            if not self._there(base, key):
+                continue
+            if self._body.pull(at, opening=opening).ok:
+                self.scene.set_opened(key, opening)
+                return Outcome(True)
+            self._failed_from(key, base)
+        return self._unreachable(key, tries)

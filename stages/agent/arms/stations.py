@@ -1,0 +1,101 @@
+"""Base poses before furniture, and spots on it."""
+
+from __future__ import annotations
+
+from math import atan2, ceil, cos, hypot, pi, sin
+
+from stages.agent.body import Base, Position, SeenFurniture
+from stages.agent.goals import NEAR_MIDDLE
+from stages.agent.scene_map import Item, SceneMap, quarter
+
+OFF = 0.45
+"""Of the middle of the base from the edge of furniture [m]."""
+APART = 0.35
+"""Between neighbouring base poses along an edge [m]."""
+FINE = 0.03
+"""Between positions around a middle, and of one from the rim of what is known to stand near [m]."""
+RING = 0.65
+"""Of the radius of a small carrier, where things are put on it."""
+INSIDE = 0.2
+"""Of a spot from the edge over which it is placed [m]."""
+
+
+def facing(x: float, y: float, at: tuple[float, ...]) -> Base:
+    """Return the base pose at a point [m] that faces a position."""
+    return Base(x, y, atan2(at[1] - y, at[0] - x))
+
+
+def middles(piece: SeenFurniture) -> list[Base]:
+    """Return the four base poses before the middles of the sides."""
+    (x, y), (w, d) = piece.centre, (piece.size[0] / 2 + OFF, piece.size[1] / 2 + OFF)
+    return [facing(*p, piece.centre) for p in ((x, y - d), (x, y + d), (x - w, y), (x + w, y))]
+
+
+def around(piece: SeenFurniture) -> list[Base]:
+    """Return base poses along all four sides."""
+    (x, y), (w, d) = piece.centre, piece.size
+    poses = []
+    for length, across, turned in ((w, d, False), (d, w, True)):
+        count = max(1, ceil(length / APART))
+        for k in range(count):
+            along = (k + 0.5) / count * length - length / 2
+            for side in (-1, 1):
+                out = side * (across / 2 + OFF)
+                px, py = (x + out, y + along) if turned else (x + along, y + out)
+                look = (x, y + along) if turned else (x + along, y)
+                poses.append(facing(px, py, look))
+    return poses
+
+
+def drivable(scene: SceneMap, base: Base, poses: list[Base]) -> list[tuple[float, Base]]:
+    """Return the poses that the robot can get to with the way [m], the nearest first."""
+    ways = [(scene.obstacles.way(base, (p.x, p.y)), p) for p in poses if scene.obstacles.fits(p.x, p.y)]
+    return sorted(((way, p) for way, p in ways if way < float("inf")), key=lambda pair: pair[0])
+
+
+def spots(scene: SceneMap, place: str, base: Base, apart: float = 0.18) -> list[Position]:
+    """Return positions on furniture that are free as far as is known, the nearest to the base first."""
+    piece = scene.furniture[place]
+    steps = [
+        [c - s / 2 + INSIDE + k * apart for k in range(max(1, int((s - 2 * INSIDE) / apart) + 1))]
+        for c, s in zip(piece.centre, piece.size, strict=True)
+    ]
+    taken = [(i.position, i.radius) for i in scene.items.values() if i.place == place]
+    free = [
+        (x, y, piece.height + 0.02)
+        for x in steps[0]
+        for y in steps[1]
+        if all(hypot(x - p[0], y - p[1]) > r + 0.1 for p, r in taken)
+    ]
+    return sorted(free, key=lambda p: hypot(p[0] - base.x, p[1] - base.y))
+
+
+def spots_on(scene: SceneMap, carrier: Item) -> list[Position]:
+    """Return positions within a small carrier, those that nothing known lies near first."""
+    x, y, z = carrier.position
+    far = RING * carrier.radius
+    ring = [(x + far * cos(k * pi / 3), y + far * sin(k * pi / 3), z) for k in range(6)]
+    taken = [i.position for i in scene.items.values() if i.key != carrier.key and i.place == carrier.place]
+    near = {p: min((hypot(p[0] - q[0], p[1] - q[1]) for q in taken), default=1.0) for p in ring}
+    return sorted(ring, key=lambda p: -round(near[p], 2))
+
+
+def spots_near(scene: SceneMap, place: str, middle: Position) -> list[Position]:
+    """Return positions around a middle that are free as far as is known, the nearest first; the middle if none is."""
+    x, y, z = middle
+    steps = [k * FINE for k in range(-3, 4)]
+    taken = [(i.position, i.radius) for i in scene.items.values() if i.place == place]
+    free = [
+        (x + dx, y + dy, z)
+        for dx in steps
+        for dy in steps
+        if hypot(dx, dy) <= NEAR_MIDDLE - FINE and all(hypot(x + dx - p[0], y + dy - p[1]) > r + FINE for p, r in taken)
+    ]
+    return sorted(free, key=lambda p: hypot(p[0] - x, p[1] - y)) or [middle]
+
+
+def other_sides(scene: SceneMap, place: str, base: Base, seen: set[int]) -> list[tuple[float, Base]]:
+    """Return the base poses before furniture from quarters from which it was not looked at, the nearest first."""
+    piece = scene.furniture[place]
+    poses = [p for p in around(piece) if quarter(p, piece.centre) not in seen]
+    return drivable(scene, base, poses)

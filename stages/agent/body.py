@@ -1,0 +1,127 @@
+"""The one interface between a world and an arm: what the robot's cameras and joints tell, what it can be made to do.
+
+A world in physics or a real robot has to offer the same. Nothing here names a true thing: positions are measured,
+labels are what the eyes say. Positions are in the map frame [m], which the robot's localisation defines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+
+Position = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Base:
+    """Pose of the driving base: x, y [m], yaw [rad]."""
+
+    x: float
+    y: float
+    yaw: float
+
+
+@dataclass(frozen=True)
+class SeenFurniture:
+    """A large box that the head camera made out: centre and size (x, y) [m], height [m]."""
+
+    label: str
+    centre: tuple[float, float]
+    size: tuple[float, float]
+    height: float
+    door: bool
+    opened: bool
+
+
+@dataclass(frozen=True)
+class Detection:
+    """A thing that the wrist camera made out."""
+
+    label: str
+    position: Position
+    color: str
+    used: bool | None
+    """None: cannot be told from here."""
+    radius: float
+    """Of its extent over the ground [m]."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What the wrist camera saw from its three poses at one base, or from one pose near by.
+
+    `sector` and `close` name the region of views: errors of the eyes persist within one.
+    """
+
+    detections: tuple[Detection, ...]
+    sector: int
+    """Quarter turn of the camera around what was looked at, 0 to 3."""
+    close: bool
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What the head camera saw on one turn: cells of the obstacle map (N, 2) that are free and that are not."""
+
+    free: np.ndarray
+    occupied: np.ndarray
+    furniture: tuple[SeenFurniture, ...]
+
+
+FeltKind = Literal["", "no_way", "no_grasp", "no_trajectory", "door_stuck", "out_of_reach"]
+
+
+@dataclass(frozen=True)
+class Felt:
+    """What the robot itself knows of a motion: whether one was planned and carried out. Not whether it did any good."""
+
+    ok: bool
+    kind: FeltKind = ""
+
+
+class Body(Protocol):
+    """A robot in some world."""
+
+    @property
+    def base(self) -> Base:
+        """Where localisation says that it stands."""
+        ...
+
+    @property
+    def seconds(self) -> float:
+        """Since the beginning."""
+        ...
+
+    def sweep(self) -> Sweep:
+        """Turn the head camera around once."""
+        ...
+
+    def drive(self, base: Base, length: float, toward: str) -> Felt:
+        """Drive to a pose along a path of a length [m]. `toward`: what the arm calls its goal; empty: exploring."""
+        ...
+
+    def look(self, at: Position, *, close: bool) -> Look:
+        """Look at the surface around a position: all of it (three wrist poses), or what lies there from near by."""
+        ...
+
+    def look_at_hand(self, view: int) -> Detection | None:
+        """What the hand holds as seen from one of the wrist's views; None: nothing. The same view says the same."""
+        ...
+
+    def reaches(self, base: Base, at: Position) -> bool:
+        """Whether a collision-free arm pose at the position exists in the robot's own map, from a base pose."""
+        ...
+
+    def grasp(self, at: Position, label: str, candidate: int) -> Felt:
+        """Close the hand at a position by the grasp of a rank (0 first). `label`: what is believed to be there."""
+        ...
+
+    def release(self, at: Position, label: str) -> Felt:
+        """Let go over a position. `label`: what is believed to be below."""
+        ...
+
+    def pull(self, at: Position, *, opening: bool) -> Felt:
+        """Open or close the door or drawer of the furniture at a position."""
+        ...

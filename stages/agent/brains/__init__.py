@@ -1,0 +1,1 @@
+"""Who writes the programs: a language model, or rules of ours."""

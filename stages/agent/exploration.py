@@ -1,0 +1,44 @@
+"""Global exploration: to the nearest frontier of the obstacle map, until there is none (Yamauchi 1997; 3.3.3)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.agent.body import Base, Body
+from stages.agent.obstacle_map import CELL
+from stages.agent.scene_map import SceneMap
+
+MOST_STOPS = 60
+NEAR = 0.5
+"""Frontiers this near to where the robot has looked around already, or could not get, are left alone [m]."""
+
+
+def explore(body: Body, scene: SceneMap) -> int:
+    """Drive through everything that can be reached; return the number of stops."""
+    scene.sweep(body)
+    left = [(body.base.x, body.base.y)]
+    for stop in range(MOST_STOPS):
+        goal = _nearest_frontier(body.base, scene, np.array(left))
+        if goal is None:
+            return stop
+        left.append(goal)
+        x, y = goal
+        yaw = float(np.arctan2(y - body.base.y, x - body.base.x))
+        if body.drive(Base(x, y, yaw), scene.obstacles.way(body.base, goal), "").ok:
+            scene.sweep(body)
+    return MOST_STOPS
+
+
+def _nearest_frontier(base: Base, scene: SceneMap, left: np.ndarray) -> tuple[float, float] | None:
+    points = scene.obstacles.frontiers()
+    if not len(points):
+        return None
+    known = np.hypot(*(points[:, None] - left[None]).transpose(2, 0, 1)).min(axis=1) > NEAR
+    points = points[known]
+    field, origin = scene.obstacles.distances_from(base.x, base.y), np.array(scene.obstacles.origin)
+    if not len(points):
+        return None
+    rows = np.rint((points - origin) / CELL).astype(int)
+    away = field[rows[:, 0], rows[:, 1]]
+    best = int(np.argmin(away))
+    return (float(points[best, 0]), float(points[best, 1])) if np.isfinite(away[best]) else None

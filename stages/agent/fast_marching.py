@@ -1,0 +1,38 @@
+"""Distances over free cells of a grid by fast marching (Sethian 1996), and paths down their slope."""
+
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def distances(free: np.ndarray, row: int, column: int) -> np.ndarray:
+    """Return (H, W) the travel distance [cells] from a cell over the free ones (bool); inf where there is no way.
+
+    First-order upwind solution of the eikonal equation with unit speed.
+    """
+    height, width = free.shape
+    found = np.full((height, width), np.inf)
+    done = np.zeros((height, width), np.bool_)
+    found[row, column] = 0.0
+    queue = [(0.0, row, column)]
+    while len(queue) > 0:
+        value, r, c = heapq.heappop(queue)
+        if done[r, c]:
+            continue
+        done[r, c] = True
+        for k in range(4):
+            i, j = r + (k == 0) - (k == 1), c + (k == 2) - (k == 3)
+            if i < 0 or j < 0 or i >= height or j >= width or done[i, j] or not free[i, j]:
+                continue
+            up = min(found[i - 1, j] if i > 0 else np.inf, found[i + 1, j] if i + 1 < height else np.inf)
+            side = min(found[i, j - 1] if j > 0 else np.inf, found[i, j + 1] if j + 1 < width else np.inf)
+            near, far = min(up, side), max(up, side)
+            new = near + 1.0 if far - near >= 1.0 else 0.5 * (near + far + np.sqrt(2.0 - (far - near) ** 2))
+            if new < found[i, j]:
+                found[i, j] = new
+                heapq.heappush(queue, (new, i, j))
+    return found

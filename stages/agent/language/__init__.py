@@ -1,0 +1,1 @@
+"""The checked plan language: Python syntax from a white list, interpreted by us."""

@@ -1,0 +1,113 @@
+"""The obstacle map that the robot draws of what its head camera saw: free, occupied, unknown cells of 10 cm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.ndimage import binary_dilation
+
+from schemas.apartment import LARGEST_SIDE
+from stages.agent.body import Base, Sweep
+from stages.agent.fast_marching import distances
+
+CELL = 0.1
+"""Edge of a cell [m]; cell (i, j) has its middle at (i, j) * CELL of the map frame."""
+CLEARANCE = 3
+"""Cells that the base keeps from what is occupied."""
+UNKNOWN, FREE, OCCUPIED = 0, 1, 2
+HALF = int(LARGEST_SIDE / CELL) + 20
+_DISK = np.hypot(*np.mgrid[-CLEARANCE : CLEARANCE + 1, -CLEARANCE : CLEARANCE + 1]) <= CLEARANCE
+
+
+def cell_of(x: float, y: float) -> tuple[int, int]:
+    """Return the cell of a point [m]."""
+    return round(x / CELL), round(y / CELL)
+
+
+@dataclass
+class ObstacleMap:
+    """Grows by sweeps. Only the rectangle around what is known is worked on."""
+
+    start: Base
+    state: np.ndarray = field(init=False)
+    _fields: dict[tuple[int, int], np.ndarray] = field(init=False, default_factory=dict)
+    _drivable: np.ndarray | None = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        self.state = np.zeros((2 * HALF + 1, 2 * HALF + 1), np.int8)
+        i, j = cell_of(self.start.x, self.start.y)
+        self._zero = (i - HALF, j - HALF)
+        self._low, self._high = np.array([HALF - 1, HALF - 1]), np.array([HALF + 2, HALF + 2])
+
+    def add(self, sweep: Sweep) -> int:
+        """Enter what a sweep saw; return how many cells were not known before. Occupied wins."""
+        before = np.count_nonzero(self.window)
+        for cells, value in ((sweep.free, FREE), (sweep.occupied, OCCUPIED)):
+            if not len(cells):
+                continue
+            rows = cells - self._zero
+            self._low, self._high = np.minimum(self._low, rows.min(0)), np.maximum(self._high, rows.max(0) + 1)
+            target = self.state[rows[:, 0], rows[:, 1]]
+            self.state[rows[:, 0], rows[:, 1]] = np.maximum(target, value)
+        self._fields.clear()
+        self._drivable = None
+        return int(np.count_nonzero(self.window) - before)
+
+    @property
+    def window(self) -> np.ndarray:
+        """(H, W) the known rectangle of the state."""
+        return self.state[self._low[0] : self._high[0], self._low[1] : self._high[1]]
+
+    @property
+    def origin(self) -> tuple[float, float]:
+        """Middle of the window's first cell [m]."""
+        return (self._low[0] + self._zero[0]) * CELL, (self._low[1] + self._zero[1]) * CELL
+
+    def _in_window(self, x: float, y: float) -> tuple[int, int] | None:
+        i, j = cell_of(x, y)
+        row, column = i - self._zero[0] - self._low[0], j - self._zero[1] - self._low[1]
+        height, width = self.window.shape
+        return (int(row), int(column)) if 0 <= row < height and 0 <= column < width else None
+
+    @property
+    def drivable(self) -> np.ndarray:
+        """(H, W) bool: cells of the window where the base fits."""
+        if self._drivable is None:
+            blocked = binary_dilation(self.window == OCCUPIED, _DISK)
+            self._drivable = (self.window == FREE) & ~blocked
+        return self._drivable
+
+    def fits(self, x: float, y: float) -> bool:
+        """Whether the base fits at a point [m], as far as is known."""
+        at = self._in_window(x, y)
+        return at is not None and bool(self.drivable[at])
+
+    def distances_from(self, x: float, y: float) -> np.ndarray:
+        """Return (H, W) distances [m] that the base drives from a point, inf where it cannot get."""
+        at = self._in_window(x, y)
+        if at is None:
+            return np.full(self.window.shape, np.inf)
+        if at not in self._fields:
+            free = self.drivable.copy()
+            free[
+                max(0, at[0] - CLEARANCE) : at[0] + CLEARANCE + 1, max(0, at[1] - CLEARANCE) : at[1] + CLEARANCE + 1
+            ] |= (
+                self.window[
+                    max(0, at[0] - CLEARANCE) : at[0] + CLEARANCE + 1, max(0, at[1] - CLEARANCE) : at[1] + CLEARANCE + 1
+                ]
+                == FREE
+            )  # it stands here already, however near to something
+            self._fields[at] = distances(free, at[0], at[1]) * CELL
+        return self._fields[at]
+
+    def way(self, start: Base, goal: tuple[float, float]) -> float:
+        """Return the distance [m] to drive from a pose to a point; inf where there is no known way."""
+        at = self._in_window(*goal)
+        return float(self.distances_from(start.x, start.y)[at]) if at is not None else float("inf")
+
+    def frontiers(self) -> np.ndarray:
+        """Return (N, 2) points [m]: drivable cells next to which something is unknown."""
+        near_unknown = binary_dilation(self.window == UNKNOWN, iterations=CLEARANCE + 1)
+        rows = np.argwhere(self.drivable & near_unknown)
+        return rows * CELL + np.array(self.origin)

@@ -1,0 +1,51 @@
+"""The step `agent replay`: an episode again, with the programs that it holds."""
+
+from __future__ import annotations
+
+import shutil
+
+from schemas.agent_episode import AgentEpisode
+from schemas.errors import BadInput
+from stages.agent.arms.registry import ARMS
+from stages.agent.brains.open_loop import OpenLoopBrain
+from stages.agent.episodes import RecordedBrain, write_episode
+from stages.agent.parameters import ReplayParameters
+from stages.agent.session import Limits
+from stages.agent.tasks import TASKS
+from stages.agent.trials import Setting, goals_of
+from stages.agent.world.failures import Rates
+from stages.kit.stage import Context
+
+
+def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context) -> AgentEpisode:
+    """Carry out the programs of an episode in its world once more."""
+    file = episode.info
+    if file.arm not in ARMS or (file.task and file.task not in TASKS):
+        raise BadInput(f"{episode.root}: no arm {file.arm!r}, or no task {file.task!r}", hint="run it again")
+    task = TASKS.get(file.task)
+    setting = Setting(
+        episode.apartment,
+        file.words,
+        task.goals if task else goals_of(file.words),
+        Rates().scaled(file.failures, file.perception),
+        file.seed,
+        Limits(turns=file.most_turns),
+    )
+    made = write_episode(
+        context.output,
+        setting,
+        file.arm,
+        task=file.task,
+        impossible=task.impossible if task else "",
+        scales=(file.failures, file.perception),
+        brain=RecordedBrain(file),
+        one_program=file.brain == OpenLoopBrain.label,
+        language=lambda: file.language,
+        label=file.brain,
+        width=parameters.image_width,
+    )
+    if episode.path("transcript.jsonl").is_file():
+        shutil.copyfile(episode.path("transcript.jsonl"), context.output / "transcript.jsonl")
+    if made.info != file:
+        return AgentEpisode(root=made.root, outcome="differs", summary=made.summary)
+    return made

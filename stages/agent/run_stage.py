@@ -1,0 +1,63 @@
+"""The step `agent run`: one task in one apartment, by one arm and one brain."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from schemas.agent_episode import AgentEpisode
+from schemas.apartment import Apartment
+from schemas.outside import LARGEST_SETTINGS
+from stages.agent.arms.registry import ARMS
+from stages.agent.brains.brain import Brain
+from stages.agent.brains.language import LanguageBrain
+from stages.agent.episodes import write_episode
+from stages.agent.parameters import RunParameters
+from stages.agent.session import Limits
+from stages.agent.tasks import TASKS, make_apartment, make_household
+from stages.agent.trials import Setting, goals_of, rules_brain
+from stages.agent.world.failures import Rates
+from stages.kit.language.chat import Chat
+from stages.kit.language.opening import open_chat
+from stages.kit.language.scripted import ScriptedBackend
+from stages.kit.stage import Context
+
+
+def run(world: Path | None, transcript: Path | None, *, parameters: RunParameters, context: Context) -> AgentEpisode:
+    """Let the robot do what it is told."""
+    task = TASKS.get(parameters.task)
+    words = task.words if task else parameters.task
+    if world is not None:
+        apartment = Apartment.read(world, largest=LARGEST_SETTINGS, hint="see docs/AGENT.md")
+    else:
+        apartment = make_apartment(task, context.seed) if task else make_household(context.seed)
+    setting = Setting(
+        apartment,
+        words,
+        task.goals if task else goals_of(words),
+        Rates().scaled(parameters.failures, parameters.perception),
+        context.seed,
+        Limits(turns=parameters.turns),
+    )
+    chat = _chat(parameters, transcript, context) if parameters.brain == "language" else None
+    brain: Brain = LanguageBrain(words, chat) if chat is not None else rules_brain(setting, parameters.arm)
+    if chat is None:
+        context.logger.info("no language model is asked: rules of ours write the programs")
+    with context.progress.step("session"):
+        return write_episode(
+            context.output,
+            setting,
+            parameters.arm,
+            task=task.name if task else "",
+            impossible=task.impossible if task else "",
+            scales=(parameters.failures, parameters.perception),
+            brain=brain,
+            one_program=chat is None and ARMS[parameters.arm].one_program,
+            language=lambda: chat.record if chat is not None else None,
+            label=brain.label,
+            width=parameters.image_width,
+        )
+
+
+def _chat(parameters: RunParameters, transcript: Path | None, context: Context) -> Chat:
+    nobody = ScriptedBackend("nobody", lambda request: "")  # refused before: --brain language needs somebody to ask
+    return open_chat(parameters, scripted=nobody, transcript=transcript, record=context.output / "transcript.jsonl")

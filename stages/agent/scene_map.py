@@ -1,0 +1,148 @@
+"""What an arm knows: furniture on the obstacle map, things on it, and what every region of views said of each."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from math import atan2, hypot, pi
+
+from stages.agent.body import Base, Body, Detection, Position, SeenFurniture
+from stages.agent.goals import CARRIERS
+from stages.agent.language.values import ObjectMap, SceneObject
+from stages.agent.obstacle_map import ObstacleMap
+
+SAME_FURNITURE, SAME_THING = 0.3, 0.04
+"""Two sightings this near are of one thing [m]."""
+IN_FRONT = 0.7
+"""Furniture whose edge is this near to the base is in front of it [m]."""
+Region = tuple[int | str, bool]
+"""Quarter turn (or `hand`) from which something was seen, and whether from near by."""
+
+
+@dataclass
+class Item:
+    """A thing of the map."""
+
+    key: str
+    position: Position
+    color: str
+    radius: float
+    place: str
+    votes: dict[Region, str | None] = field(default_factory=dict)
+    """Region of views -> the class that was seen from there; None: it should have been seen and was not."""
+    used_votes: dict[Region, bool] = field(default_factory=dict)
+    """The same of whether it is used."""
+
+    @property
+    def label(self) -> str:
+        """The class that most regions say; the first said among equals."""
+        said = Counter(vote for vote in self.votes.values() if vote is not None)
+        return said.most_common(1)[0][0] if said else "thing"
+
+    @property
+    def margin(self) -> int:
+        """By how many regions its class is ahead of any other, and of the sides from which nothing was seen."""
+        said = Counter(vote for vote in self.votes.values() if vote is not None)
+        own = said.pop(self.label, 0)
+        return own - max([*said.values(), len(self.sides(seen=False))])
+
+    def sides(self, *, seen: bool) -> set[int | str]:
+        """Return the sides from which it was seen from near or far, or from which it should have been and was not:
+        what hides a thing hides it from a side."""
+        there = {side for (side, _), vote in self.votes.items() if vote is not None}
+        return there if seen else {side for side, _ in self.votes} - there
+
+    @property
+    def used(self) -> bool | None:
+        """What most regions say; None where it could not be told, or as many say the one as the other."""
+        said = list(self.used_votes.values())
+        yes = said.count(True)
+        return None if 2 * yes == len(said) else 2 * yes > len(said)
+
+
+class SceneMap:
+    """Furniture and things by key, names given in the order in which they were found."""
+
+    def __init__(self, body: Body) -> None:
+        self.furniture: dict[str, SeenFurniture] = {}
+        self.items: dict[str, Item] = {}
+        self.obstacles = ObstacleMap(body.base)
+        self._named: Counter[str] = Counter()
+
+    def sweep(self, body: Body) -> int:
+        """Turn the head camera around and enter what it saw; return how many cells are new."""
+        sweep = body.sweep()
+        for seen in sweep.furniture:
+            key = next((k for k, f in self.furniture.items() if _apart(f.centre, seen.centre) < SAME_FURNITURE), None)
+            self.furniture[key or self._name(seen.label)] = seen
+        return self.obstacles.add(sweep)
+
+    def in_front(self, base: Base) -> str:
+        """Return the key of the furniture before a base pose, or nothing."""
+        near = [(edge_distance(f, base.x, base.y), key) for key, f in self.furniture.items()]
+        return min(near)[1] if near and min(near)[0] <= IN_FRONT else ""
+
+    def add(self, detection: Detection, place: str, region: Region) -> Item:
+        """Enter a detection: a vote of its region for the thing that lies there, or a new thing."""
+        item = self.at(detection.position, place)
+        if item is None:
+            key = self._name(detection.label)
+            item = self.items[key] = Item(key, detection.position, detection.color, detection.radius, place)
+        item.votes[region] = detection.label
+        item.position = detection.position
+        if detection.used is not None:
+            item.used_votes[region] = detection.used
+        return item
+
+    def at(self, position: Position, place: str) -> Item | None:
+        """Return the thing of a place that a sighting at a position is of."""
+        near = [(_apart(i.position, position), i.key) for i in self.items.values() if i.place == place]
+        return self.items[min(near)[1]] if near and min(near)[0] <= SAME_THING else None
+
+    def carrier_of(self, item: Item) -> str:
+        """Return the key of the small carrier on which a thing lies, or nothing."""
+        return "" if item.label in CARRIERS else self.at_carrier(item.position, item.place)
+
+    def at_carrier(self, position: Position, place: str) -> str:
+        """Return the key of the small carrier of a place that is at a position, or nothing."""
+        carriers = (item for item in self.items.values() if item.label in CARRIERS and item.place == place)
+        return next((c.key for c in carriers if _apart(c.position, position) <= c.radius), "")
+
+    def scene_object(self, key: str) -> SceneObject:
+        """Return a thing or piece of furniture as programs see it."""
+        if key in self.furniture:
+            piece = self.furniture[key]
+            return SceneObject(key, piece.label, door=piece.door, opened=piece.opened)
+        item = self.items[key]
+        return SceneObject(key, item.label, item.place, item.color, item.used, on=self.carrier_of(item))
+
+    def global_map(self) -> ObjectMap:
+        """Return the furniture."""
+        return ObjectMap(tuple(map(self.scene_object, self.furniture)))
+
+    def local_map(self, place: str) -> ObjectMap:
+        """Return the things of a place."""
+        return ObjectMap(tuple(self.scene_object(i.key) for i in self.items.values() if i.place == place))
+
+    def set_opened(self, key: str, opened: bool) -> None:
+        """Remember that a door was opened or closed."""
+        self.furniture[key] = replace(self.furniture[key], opened=opened)
+
+    def _name(self, label: str) -> str:
+        name = f"{label.replace(' ', '_')}_{self._named[label]}"
+        self._named[label] += 1
+        return name
+
+
+def _apart(a: tuple[float, ...], b: tuple[float, ...]) -> float:
+    return hypot(a[0] - b[0], a[1] - b[1])
+
+
+def edge_distance(piece: SeenFurniture, x: float, y: float) -> float:
+    """Distance [m] of a point from the edge of a piece of furniture, 0 inside."""
+    return hypot(*(max(0.0, abs(p - c) - s / 2) for p, c, s in zip((x, y), piece.centre, piece.size, strict=True)))
+
+
+def quarter(base: Base, at: tuple[float, ...]) -> int:
+    """Return the quarter turn, 0 to 3, from which a base pose looks at a position."""
+    return int(((atan2(base.y - at[1], base.x - at[0]) + pi / 4) % (2 * pi)) // (pi / 2)) % 4

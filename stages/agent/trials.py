@@ -1,0 +1,82 @@
+"""One trial from a task, an arm and a seed: the apartment, the world, the arm's calls, the brain, the session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from schemas.apartment import Apartment
+from stages.agent.arms.registry import ARMS
+from stages.agent.arms.skills import CommonSkills
+from stages.agent.brains.brain import Brain
+from stages.agent.brains.open_loop import OpenLoopBrain
+from stages.agent.brains.rules import RulesBrain
+from stages.agent.brains.slips import Slips
+from stages.agent.brains.words import NotUnderstood, understood
+from stages.agent.goals import Goal, sought
+from stages.agent.session import Limits, Session, Turn, run_session
+from stages.agent.world.failures import Luck, Rates
+from stages.agent.world.fast import FastWorld
+from stages.agent.world.floor import Floor
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a trial is made of."""
+
+    apartment: Apartment
+    words: str
+    goals: tuple[Goal, ...]
+    """What the judge asks for."""
+    rates: Rates
+    seed: int
+    limits: Limits = Limits()
+    floor: Floor | None = None
+    """Of the apartment, where several trials share it."""
+
+
+def goals_of(words: str) -> tuple[Goal, ...]:
+    """Return the goals of a user's words for the judge; none where we do not understand them."""
+    try:
+        return understood(words)
+    except NotUnderstood:
+        return ()
+
+
+def open_world(setting: Setting, arm: str) -> FastWorld:
+    """Return the world of a trial: its eyes are prompted with the classes that the goals name."""
+    rates = setting.rates.with_true_eyes() if ARMS[arm].true_eyes else setting.rates
+    return FastWorld(setting.apartment, sought(setting.goals), rates, setting.seed, setting.floor)
+
+
+def rules_brain(setting: Setting, arm: str) -> Brain:
+    """Return the brain without a language model; it writes calls down wrongly at the rate of the failure table."""
+    luck = Luck(setting.seed)
+
+    def happens(key: int) -> float | None:
+        return luck.uniform("which", key) if luck.happens(setting.rates.api, "api", key) else None
+
+    if ARMS[arm].one_program:
+        return OpenLoopBrain(setting.words, Slips(happens))
+    return RulesBrain(setting.words, ARMS[arm].style, Slips(happens))
+
+
+def run_trial(
+    setting: Setting,
+    arm: str,
+    brain: Brain | None = None,
+    *,
+    one_program: bool = False,
+    watch: Callable[[Turn, CommonSkills, FastWorld], None] | None = None,
+) -> tuple[Session, FastWorld]:
+    """Run one trial. A brain that is given answers turn by turn, unless it is to say `one_program`."""
+    world = open_world(setting, arm)
+    skills = ARMS[arm].skills(world)
+
+    def see(turn: Turn) -> None:
+        if watch is not None:
+            watch(turn, skills, world)
+
+    one = one_program or (brain is None and ARMS[arm].one_program)
+    session = run_session(brain or rules_brain(setting, arm), skills, world, setting.limits, one_program=one, watch=see)
+    return session, world

@@ -1,0 +1,1 @@
+"""Where the robot lives: apartments, what goes wrong in them, and the fast world without contact."""

@@ -1,0 +1,1 @@
+"""Section `agent`: a robot told in words."""

@@ -1,0 +1,133 @@
+"""Apartments, persistent causes, distances, and what the words of tasks mean."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from schemas.apartment import Apartment, Furniture, Room, Thing
+from stages.agent.body import Base
+from stages.agent.brains.words import NotUnderstood, understood
+from stages.agent.exploration import explore
+from stages.agent.fast_marching import distances
+from stages.agent.goals import Move, Shut, kind
+from stages.agent.scene_map import SceneMap
+from stages.agent.tasks import TASKS, make_apartment
+from stages.agent.world.failures import COUNTS, EXECUTIONS, GRASPS, PLACES, TABLE_3_4, Luck, Rates
+from stages.agent.world.fast import FastWorld
+
+NOTHING_FAILS = Rates().scaled(0.0, 0.0)
+
+
+@pytest.mark.parametrize("task", TASKS.values(), ids=lambda task: task.name)
+def test_words_mean_what_the_judge_asks_for(task) -> None:  # type: ignore[no-untyped-def]
+    assert understood(task.words) == task.goals
+
+
+def test_other_words() -> None:
+    assert understood("on(bottle, table), closed(fridge)") == (
+        Move(kind("bottle"), kind("table")),
+        Shut(kind("fridge")),
+    )
+    for words in ("", "sing", "put the flurb on the table", "put the cup on the moon", "x" * 5000):
+        with pytest.raises(NotUnderstood):
+            understood(words)
+
+
+@pytest.mark.parametrize("name", ["tidy_table", "drawer_spoon"])
+def test_an_apartment_is_its_seed_and_keeps_passages(name: str) -> None:
+    apartment = make_apartment(TASKS[name], 5)
+    assert apartment == make_apartment(TASKS[name], 5) != make_apartment(TASKS[name], 6)
+    assert 2 <= len(apartment.rooms) <= 4 and len(apartment.doors) >= len(apartment.rooms) - 1
+    for k, a in enumerate(apartment.furniture):
+        for b in apartment.furniture[:k]:
+            gaps = [abs(a.centre[i] - b.centre[i]) - (a.size[i] + b.size[i]) / 2 for i in (0, 1)]
+            assert max(gaps) >= 0.95 - 1e-9
+
+
+def test_exploration_finds_all_furniture_without_being_told() -> None:
+    apartment = make_apartment(TASKS["move_toy"], 3)
+    world = FastWorld(apartment, (), NOTHING_FAILS, 3)
+    scene = SceneMap(world)
+    explore(world, scene)
+    assert sorted(f.label for f in scene.furniture.values()) == sorted(f.label for f in apartment.furniture)
+
+
+def test_distances_are_those_of_the_plane_and_go_around_walls() -> None:
+    free = np.ones((41, 41), bool)
+    found = distances(free, 20, 20)
+    rows, columns = np.mgrid[:41, :41]
+    straight = np.hypot(rows - 20, columns - 20)
+    assert np.all(found >= straight - 1e-9) and np.max(found - straight) < 1.6  # first order: worst along diagonals
+    free[:40, 25] = False
+    around = distances(free, 20, 20)
+    assert around[20, 30] > 20 and not np.isfinite(around[5, 25])
+
+
+def test_a_cause_persists_and_is_nested_in_higher_rates() -> None:
+    luck = Luck(7)
+    keys = [("cause", k) for k in range(2000)]
+    low, high = ({k for k in keys if luck.happens(rate, *k)} for rate in (0.1, 0.3))
+    assert low < high and low == {k for k in keys if Luck(7).happens(0.1, *k)}
+    assert abs(len(low) / 2000 - 0.1) < 0.03
+
+
+def test_rates_give_the_printed_counts_over_the_assumed_executions() -> None:
+    rates = Rates()
+    assert (rates.base + rates.slip) * GRASPS == pytest.approx(COUNTS["grasp"])
+    assert (rates.shut + rates.roll) * PLACES == pytest.approx(COUNTS["place"])
+    assert rates.confusable * rates.confused * 5 * GRASPS == pytest.approx(COUNTS["false_positive"])
+    assert rates.api * EXECUTIONS == pytest.approx(COUNTS["api"])
+    assert sum(direct for direct, _ in TABLE_3_4.values()) == 14
+
+
+def test_what_failed_fails_again_until_something_changes() -> None:
+    """The same grasp slips for ever unless the thing lies anew; a bad base pose stays bad; another view shows more."""
+    apartment = make_apartment(TASKS["place_fruit"], 1)
+    sure = Rates(slip=1.0, base=0.0, confusable=0.0, hidden=0.0, missed=0.0)
+    fruit = next(t for t in apartment.things if t.label in ("apple", "banana", "orange", "lemon"))
+    world = FastWorld(apartment, (fruit.label,), sure, 1)
+    at = (*fruit.at, 0.76)
+    before = world.bodies[fruit.name].moved
+    assert world.grasp(at, fruit.label, 0).ok and world.held is None  # a slip is not felt
+    assert world.bodies[fruit.name].moved == before + 1
+    stuck = FastWorld(apartment, (fruit.label,), Rates(base=1.0), 1)
+    assert [stuck.grasp(at, fruit.label, k).ok for k in range(3)] == [False] * 3
+    assert [e.replanned for e in stuck.events] == [False, True, True]
+    again = FastWorld(apartment, (fruit.label,), Rates(confusable=1.0, confused=0.5), 1)
+    assert again.look(at, close=True).detections == again.look(at, close=True).detections
+
+
+BOX = Furniture(name="table_0", label="table", centre=(2, 2), size=(1, 1), height=0.7)
+CUP = Thing(name="cup_0", label="cup", on="table_0", at=(2, 2))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"furniture": (BOX, BOX)}, "two things"),
+        ({"things": (CUP.model_copy(update={"on": "moon"}),)}, "carries nothing"),
+        ({"things": (CUP.model_copy(update={"on": "b", "carries": True, "name": "a"}),
+                     CUP.model_copy(update={"on": "a", "carries": True, "name": "b"}))}, "carries itself"),
+        ({"start": (9.0, 9.0, 0.0)}, "in no room"),
+        ({"rooms": ()}, "at least 1"),
+    ],
+)  # fmt: skip
+def test_apartments_that_do_not_fit_together_are_refused(changes: dict[str, object], words: str) -> None:
+    whole = {
+        "rooms": (Room(name="r", low=(0, 0), high=(4, 4)),),
+        "furniture": (BOX,),
+        "things": (CUP,),
+        "start": (1, 1, 0),
+    }
+    Apartment.model_validate(whole)
+    with pytest.raises(ValidationError, match=words):
+        Apartment.model_validate(whole | changes)
+
+
+def test_the_base_stays_where_a_pose_is_not_free() -> None:
+    apartment = Apartment(rooms=(Room(name="r", low=(0, 0), high=(4, 4)),), furniture=(BOX,), start=(1, 1, 0))
+    world = FastWorld(apartment, (), NOTHING_FAILS, 0)
+    assert not world.drive(Base(2.0, 2.0, 0.0), 1.0, "table").ok and world.base == Base(1, 1, 0)
+    assert not world.drive(Base(9.0, 9.0, 0.0), 1.0, "").ok and world.drive(Base(3.2, 1.0, 0.0), 2.2, "").ok
