@@ -229,6 +229,11 @@ stitch-thread: setup ## Threads as curves in space, from true and from learned m
 llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2, harder suites (QUICK=1: ten instances)
 	$(EXPERIMENT) llm3 --out $(OUTPUTS)/experiments/llm3$(if $(QUICK),-quick) $(ASKED)
 
+.PHONY: cutting
+# A hundred goals a cell and five trainings of the networks; a stopped run goes on where it was.
+cutting: setup ## Cutting towards goals: table 6.1, the thesis's arms and ours (QUICK=1: two goals a cell)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) cutting --out $(OUTPUTS)/experiments/cutting$(if $(QUICK),-quick) $(ASKED)
+
 .PHONY: come-robot
 # A hundred reporting seeds a task, twelve tasks, ablations and curves: about four minutes of two cores.
 come-robot: setup ## A robot told in words (COME-robot): tables 3.2 to 3.4, ablations, curves (QUICK=1: ten seeds)
