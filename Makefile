@@ -94,9 +94,13 @@ ASKED = $(if $(QUICK),--quick) $(if $(FRESH),--fresh) $(OPTIONS)
 # The folder that holds the real logs (see docs/DATA.md); none of it is part of the project.
 REAL_DATA ?= ../shared/data
 
-.PHONY: real bench bench-preflight
+.PHONY: real real-all bench bench-preflight
 real: setup ## The chain on real logs, one table; fails unless it finds what the pictures show (REAL_DATA=folder)
 	$(EXPERIMENT) real --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real $(ASKED)
+
+# Under an hour of two cores; a stopped run goes on where it was. `OPTIONS="--detector FILE.onnx"`.
+real-all: setup ## Every real log through every backend that runs here; fails unless each run explains itself (QUICK=1: few frames)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) real_all --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real-all$(if $(QUICK),-quick) --jobs 2 $(ASKED)
 
 # Twelve generated rooms (three with QUICK=1) and the real logs, each with every planted fault.
 bench-preflight: setup ## What `inspect` makes of planted faults (QUICK=1: three rooms)
@@ -224,6 +228,11 @@ stitch-thread: setup ## Threads as curves in space, from true and from learned m
 # A hundred reporting seeds a cell, about ten minutes of one core; a stopped run goes on where it was.
 llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2, harder suites (QUICK=1: ten instances)
 	$(EXPERIMENT) llm3 --out $(OUTPUTS)/experiments/llm3$(if $(QUICK),-quick) $(ASKED)
+
+.PHONY: cutting
+# A hundred goals a cell and five trainings of the networks; a stopped run goes on where it was.
+cutting: setup ## Cutting towards goals: table 6.1, the thesis's arms and ours (QUICK=1: two goals a cell)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) cutting --out $(OUTPUTS)/experiments/cutting$(if $(QUICK),-quick) $(ASKED)
 
 .PHONY: come-robot
 # A hundred reporting seeds a task, twelve tasks, ablations and curves: about four minutes of two cores.

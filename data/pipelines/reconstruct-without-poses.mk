@@ -15,10 +15,7 @@ $(if $(LOG),$(if $(wildcard $(LOG)),,$(error LOG=$(LOG): no such file or folder)
 $(if $(MASKS),$(if $(wildcard $(MASKS)),,$(error MASKS=$(MASKS): no such file or folder)))
 $(if $(LABELS),$(if $(wildcard $(LABELS)),,$(error LABELS=$(LABELS): no such file or folder)))
 .PHONY: all
-all: $(FOLDER)/cad_library/manifest.json $(FOLDER)/sequence/manifest.json $(FOLDER)/trajectory/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
-
-$(FOLDER)/cad_library/manifest.json: data/pipelines/reconstruct-without-poses.toml
-	$(PYTHON) -m cli library build --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
+all: $(FOLDER)/sequence/manifest.json $(FOLDER)/trajectory/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_library/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
 
 $(FOLDER)/sequence/manifest.json: data/pipelines/reconstruct-without-poses.toml $(LOG)
 	$(PYTHON) -m cli ingest --log '$(LOG)' --format '$(FORMAT)' $(if $(CAMERA),--camera '$(CAMERA)') --every '$(EVERY)' $(if $(MAX_FRAMES),--max-frames '$(MAX_FRAMES)') $(if $(DEPTH_SCALE),--depth-scale '$(DEPTH_SCALE)') $(if $(FX),--fx '$(FX)') $(if $(FY),--fy '$(FY)') $(if $(CX),--cx '$(CX)') $(if $(CY),--cy '$(CY)') --out $(FOLDER)/sequence
@@ -34,6 +31,9 @@ $(FOLDER)/panoptic_map/manifest.json: data/pipelines/reconstruct-without-poses.t
 
 $(FOLDER)/contact_graph/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/panoptic_map/manifest.json
 	$(PYTHON) -m cli graph --panoptic-map $(FOLDER)/panoptic_map --seed '$(SEED)' --out $(FOLDER)/contact_graph
+
+$(FOLDER)/cad_library/manifest.json: data/pipelines/reconstruct-without-poses.toml
+	$(PYTHON) -m cli library build --seed 1 --shared $(FOLDER)/../.shared --out $(FOLDER)/cad_library
 
 $(FOLDER)/cad_scene/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/contact_graph/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/cad_library/manifest.json
 	$(PYTHON) -m cli cad --contact-graph $(FOLDER)/contact_graph --panoptic-map $(FOLDER)/panoptic_map --library $(FOLDER)/cad_library --seed '$(SEED)' --out $(FOLDER)/cad_scene

@@ -121,7 +121,7 @@ class CadParameters(Parameters):
 
 STAGE = Stage(
     name="cad",
-    version=4,
+    version=5,
     summary="Replace objects by CAD models that fit, stand on their supports and do not collide",
     parameters=CadParameters,
     reads={"contact_graph": ContactGraph, "panoptic_map": PanopticMap, "library": CadLibrary},

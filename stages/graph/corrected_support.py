@@ -40,6 +40,8 @@ HIDDEN_TOP_DISTANCE = 0.15
 """A hidden supporting plane is looked for this close to the top of a box [m]."""
 NAMELESS = "object"
 """Class of things that masks found and nobody named."""
+HIGHEST_FOOT = 0.5
+"""What is farther above furniture does not stand on it [m]: a hood hangs over the hob. Legs on the floor are longer."""
 LEAST_SEAM = 0.2
 """Share of its foot along which a plane must be seen to reach up to an object that is hardly over it."""
 LEAST_SMALLER_SHARE = 0.4
@@ -92,6 +94,8 @@ def seen_candidate(child: Entity, parent: Entity, k: int, parameters: GraphParam
         return None
     # Legs are missed, so furniture may seem to float; a cup or a keyboard does not lose its lower half metre.
     if child.movable and gap > parameters.movable_gap:
+        return None
+    if parent.class_name != "floor" and gap > HIGHEST_FOOT:
         return None
     inside = stands_inside(child, parent, height)
     least = parameters.area_threshold

@@ -8,6 +8,8 @@ from stages.kit.geometry.transforms import apply
 from stages.kit.motion.base_placement import SHOULDER_HEIGHT
 from stages.kit.motion.grasps import narrowest_width
 from stages.kit.motion.kinematics import reach
+from stages.kit.simulation.robot_description import RobotDescription
+from stages.kit.simulation.world import FRICTION, GRAVITY
 from stages.kit.tasks.strips import Atom
 from stages.plan.regions import Region
 from stages.plan.rim_grasps import has_rim
@@ -22,7 +24,8 @@ def affordance_atoms(model: WorldModel, objects: dict[str, str], size_uncertaint
     """Return the static atoms of a scene.
 
     `reachable`: at a height that the arm reaches from its pedestal; that a base fits before it shows in the geometry.
-    `graspable`: narrower than the fingers open, give or take `size_uncertainty` [m], or with a rim for carriers.
+    `graspable`: not heavier than the fingers hold (`liftable_mass`), and narrower than they open, give or take
+    `size_uncertainty` [m], or with a rim for carriers.
     `flat`: has a place to put things that no door hides. `fits(item, x)`: of a support, it has room on such a place;
     of a door, behind it. `entrance(door, container)`: something behind this door takes things.
     """
@@ -43,6 +46,11 @@ def within_height(model: WorldModel, height: float) -> bool:
     return abs(height - shoulder) < 0.95 * reach(model.chain)
 
 
+def liftable_mass(robot: RobotDescription) -> float:
+    """Return the largest mass [kg] that the friction of both fingers holds against gravity."""
+    return 2 * FRICTION * robot.finger_force / GRAVITY
+
+
 def _of_item(model: WorldModel, name: str, size_uncertainty: float) -> set[Atom]:
     atoms: set[Atom] = set()
     points = apply(model.pose(name), model.points(name))
@@ -51,6 +59,8 @@ def _of_item(model: WorldModel, name: str, size_uncertainty: float) -> set[Atom]
     carrier = model.records[name].class_name in CARRIER_CLASSES
     if carrier:
         atoms.add(("carrier", name))
+    if model.records[name].mass > liftable_mass(model.description):
+        return atoms
     if narrowest_width(points) < model.description.opening + size_uncertainty or (
         carrier and has_rim(model, name, size_uncertainty)
     ):

@@ -82,7 +82,7 @@ def robot_files(parameters: PlanParameters) -> tuple[str, ...]:
 
 STAGE = Stage(
     name="plan",
-    version=8,
+    version=9,
     summary="Plan what a robot does in the scene, execute it in physics, check the goal or say why not",
     parameters=PlanParameters,
     reads={"scene": InteractiveScene, "ground_truth": Optionally(GroundTruth)},

@@ -14,6 +14,7 @@ CLASS_AGNOSTIC = "class-agnostic"
 """In the label of masks that have no names."""
 MANY_UNCERTAIN, MANY_MESHES, MANY_LOST = 0.25, 0.5, 0.1
 """Shares of supports, of things without a model, of frames, from which there is something to do about them."""
+HELD_UPRIGHT = "which way is up: no floor was seen, the camera is taken to have been held upright"
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,9 @@ class Outlook:
 def outlook(facts: Mapping[str, Facts]) -> Outlook:
     """Return what the facts of a run's artifacts amount to, role (`sequence`, `panoptic_map`) -> facts."""
     found = Outlook()
+    if "trajectory" in facts and "sequence" in facts:  # which way is up is then that of the trajectory
+        summary = {name: value for name, value in facts["sequence"].summary.items() if name != "gravity"}
+        facts = {**facts, "sequence": Facts(facts["sequence"].outcome, summary)}
     for role, judge in JUDGES.items():
         if role in facts:
             more = judge(facts[role])
@@ -75,9 +79,20 @@ def _sequence(facts: Facts) -> Outlook:
     missing = [f"{lost} of {used + lost} frames could not be used"] if lost else []
     advice = ["scenewright inspect LOG says why frames are lost"] if lost > MANY_LOST * (used + lost) else []
     doubtful = ["which way is up: nothing in the log says it"] if facts.summary.get("gravity") == "none" else []
+    if facts.summary.get("gravity") == "mean_camera_up":
+        doubtful = [HELD_UPRIGHT]
     if facts.summary.get("damage"):
         doubtful.append("the log is damaged; what is whole of it was used")
     return Outlook((), tuple(doubtful), tuple(missing), tuple(advice))
+
+
+def _trajectory(facts: Facts) -> Outlook:
+    posed, frames = facts.count("posed"), facts.count("frames")
+    sound = (f"{posed} of {frames} frames have an estimated pose",)
+    doubtful = (HELD_UPRIGHT,) if facts.summary.get("gravity") == "mean_camera_up" else ()
+    missing = (f"{frames - posed} frames whose place was not found",) if posed < frames else ()
+    advice = ("move the camera slowly, so that neighbouring pictures share most of what they show",) if missing else ()
+    return Outlook(sound, doubtful, missing, advice)
 
 
 def _segments(facts: Facts) -> Outlook:
@@ -145,6 +160,8 @@ def _interactive_scene(facts: Facts) -> Outlook:
             return Outlook(doubtful=("whether it stays when it is let go: that was not tried",))
         return Outlook((f"let go, all {movable} movable bodies stay; {joints} joints are free at their start",))
     reason = str(facts.summary.get("reason", facts.outcome))
+    if held := facts.count("held"):
+        reason += f"; {held} things that could be pushed lie in others and stay"
     if facts.outcome == "nothing_movable":
         return Outlook(doubtful=(f"acting in it: {reason}",), advice=("masks that tell things from furniture",))
     sound = () if collisions else ("nothing stands more than 5 mm in anything else",)
@@ -154,6 +171,7 @@ def _interactive_scene(facts: Facts) -> Outlook:
 
 JUDGES: dict[str, Callable[[Facts], Outlook]] = {
     "sequence": _sequence,
+    "trajectory": _trajectory,
     "segments": _segments,
     "panoptic_map": _panoptic_map,
     "contact_graph": _contact_graph,

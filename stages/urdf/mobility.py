@@ -1,8 +1,7 @@
 """What of a scene is free to move: what an arm carries, and furniture that stands by its own weight.
 
 Free is what stands on something (what hangs would fall) and is either of a class that an arm carries, or furniture: a
-rigid thing, not built in, on which nothing stands, and which the contact graph puts on a level plane within 4 cm of
-its bottom. What carries other things stays where it is, so that these have something to stand on.
+rigid thing, not built in, which the contact graph puts on a level plane within 4 cm of its bottom, laden or not.
 """
 
 from __future__ import annotations
@@ -66,14 +65,10 @@ def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str
         return Mobility(True)
     if link is None or link.source == SCENE_NODE or node.node_type == "articulated" or node.joints:
         return Mobility(False)
-    if node.class_name in BUILT_IN or node.class_name in fixed or _carries(graph, node.id):
+    if node.class_name in BUILT_IN or node.class_name in fixed:
         return Mobility(False)
     if node.class_name == NAMELESS and (node.box is None or max(node.box.size) > LARGEST_NAMELESS):
         return Mobility(False)
     if resting_height(graph, {entry.id: entry for entry in graph.nodes}, node.id) is None:
         return Mobility(False)
     return Mobility(True, furniture=True)
-
-
-def _carries(graph: ContactGraphFile, name: str) -> bool:
-    return any(link.source == name and link.relation != "proximal" for link in graph.links)

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
+from pathlib import Path
 
 from schemas.cad_scene import CadScene
 from schemas.errors import UsageError
 from schemas.interactive_scene import InteractiveScene
 from schemas.vocabulary import load_vocabulary
-from stages.kit.formats.scene_bundle import write_scene_bundle
+from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
 from stages.kit.stage import Context
 from stages.urdf.bodies import scene_bodies
 from stages.urdf.exports import write_exports
 from stages.urdf.parameters import UrdfParameters
 from stages.urdf.resting import rested_bodies
 from stages.urdf.settle_report import SettleReport, settle_report
+from stages.urdf.wedged import wedged_furniture
 
 
 def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) -> InteractiveScene:
@@ -28,6 +31,10 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
         graph = cad_scene.graph
         bodies = scene_bodies(cad_scene, graph, movable, parameters.fixed_classes)
     with context.progress.step("write and check the kinematic tree"):
+        scene = write_scene_bundle(context.output, bodies, graph)
+    held = _wedged(context)
+    if held:
+        bodies = _held(context.output, bodies, held)
         scene = write_scene_bundle(context.output, bodies, graph)
     rested = 0
     if parameters.rest:
@@ -45,6 +52,7 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
         "joints": sum(len(body.joints) for body in scene.bodies),
         "cad_models": sum(body.model is not None for body in bodies),
         "rested": rested,
+        "held": len(held),
     }
     outcome = "ok" if scene.bodies else "empty"
     if parameters.settle_seconds:
@@ -54,6 +62,25 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
         if scene.bodies and not report.settled:
             outcome, summary["reason"] = report.verdict, report.reason
     return InteractiveScene(context.output, outcome=outcome, summary=summary)
+
+
+def _wedged(context: Context) -> dict[str, str]:
+    """Return the furniture of the scene just written that cannot be free, and say so."""
+    with context.progress.step("look for what is wedged"):
+        held = wedged_furniture(context.output)
+    for name, other in sorted(held.items()):
+        context.logger.warning("%s could be pushed but lies in %s: it stays", name, other)
+    return held
+
+
+def _held(root: Path, bodies: list[BundleBody], held: Collection[str]) -> list[BundleBody]:
+    """Return the bodies for another writing into `root`, some of them held; removes what only free ones have there."""
+    for name in held:
+        (root / "bodies" / f"{name}.urdf").unlink()
+        for file in (root / "meshes" / name).glob("collision_*.obj"):
+            file.unlink()
+    again = [replace(body, mesh_is_written=body.mesh is not None) for body in bodies]
+    return [replace(body, movable=False, furniture=False) if body.name in held else body for body in again]
 
 
 def _settle(context: Context, parameters: UrdfParameters) -> SettleReport:

@@ -14,6 +14,7 @@ from stages.kit.formats.urdf_check import check_urdf, require_sound
 from stages.kit.formats.urdf_file import parse_urdf
 from stages.kit.formats.xml_files import parse_xml
 from stages.kit.geometry.boxes import box_from_bounds
+from stages.kit.motion.convex_pieces import ConvexPiece
 from stages.kit.simulation.urdf_split import read_urdf
 from tests.unit.urdf.test_urdf_file import HINGE, INERTIA, joint, robot
 
@@ -121,6 +122,7 @@ TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
         (TRIANGLE.replace("v 1", "v nan"), "not finite"),
         (TRIANGLE.replace("v 1", "v 1e30"), "reaches 1e"),
         (TRIANGLE.replace("2 3", "2 9"), ""),
+        (TRIANGLE.replace("1", "0", 2).replace("f 0", "f 1"), "is a single point"),
     ],
 )
 def test_meshes_that_engines_crash_on(tmp_path: Path, content: str, said: str) -> None:
@@ -171,3 +173,11 @@ def test_a_tower_of_two_thousand_bodies_and_a_circle_of_as_many(tmp_path: Path) 
     assert [b.name for b in _parents_first(tower)] == [f"b{k}" for k in reversed(range(2000))]
     with pytest.raises(BadInput, match="in a circle"):
         _parents_first([body(f"b{k}", f"b{(k + 1) % 2000}") for k in range(2000)])
+
+
+@pytest.mark.parametrize("corners", [1, 2, 3])
+def test_boxes_around_points_and_lines(corners: int) -> None:
+    vertices = np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 5.0], [1.0, 4.0, 3.0]])[:corners]
+    link_from_box, half = ConvexPiece(vertices).box
+    assert np.allclose(link_from_box[:3, 3], (vertices.min(axis=0) + vertices.max(axis=0)) / 2)
+    assert np.allclose(np.sort(half), np.sort(np.ptp(vertices, axis=0) / 2))

@@ -75,5 +75,10 @@ RUNS = (
     Run("thread", "suture thread", f"{SEEN} --needle @needle"),
     Run("trial", "suture simulate", "--seed 3"),
     Run("suture_evaluation", "suture evaluate", "--trials @trial --scene @needle_scene --needle @needle"),
+    Run("cut_shown", "cutting demonstrate", "--share 0.3 --image-width 300 --seed 1"),
+    Run("cut_model", "cutting learn", "--demonstrations @cut_shown"),
+    Run("cut_plan", "cutting plan", "--model @cut_model --demonstrations @cut_shown --trial 20 --image-width 300"),
+    Run("cut_trial", "cutting simulate", "--plan @cut_plan --model @cut_model --image-width 300"),
+    Run("cut_evaluation", "cutting evaluate", "--model @cut_model --cells n2m1 --goals 2"),
 )
 """`library add`, `truth scenenn` and `truth supports` read what somebody downloaded: no run here."""

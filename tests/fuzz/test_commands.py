@@ -82,6 +82,6 @@ def test_smaller_cases() -> None:
 
 
 def test_where_it_happened() -> None:
-    ours, another = 'File "/x/stages/fuse/stage.py", line 3, in run', 'File "/lib/n.py", line 1, in f'
-    text = f"Traceback\n  {ours}\n  {another}\nValueError: no\n"
+    calls = '  File "/x/stages/fuse/stage.py", line 3, in run\n  File "/lib/n.py", line 1, in f\n'
+    text = f"Traceback\n{calls}ValueError: no\n"
     assert where(text) == "ValueError at stages/fuse/stage.py run"

@@ -130,8 +130,8 @@ NOBODY = (
     *("setpriv", "--reuid=54321", "--regid=54321", "--clear-groups"),
     *("--inh-caps=+dac_read_search", "--ambient-caps=+dac_read_search"),
 )
-"""Starts a command as somebody of whom the system knows nothing, not even a home, and who may read everything, and
-write nothing of the program."""
+"""Starts a command as somebody of whom the system knows nothing, not even a home, and who may read all and write
+nothing of the program."""
 GOLDEN = REPOSITORY / "tests" / "golden"
 FUSE = ("fuse", "--sequence", GOLDEN / "v2" / "sequence", "--segments", GOLDEN / "v1" / "segments")
 

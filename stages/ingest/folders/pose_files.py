@@ -1,12 +1,14 @@
 """Poses beside plain images: a file with a pose an image, a stamped trajectory, or a file of 4x4 numbers an image.
 
 Poses are taken to be world_from_camera. What a row holds is told by its columns: 7 is tx ty tz qx qy qz qw, 8 has a
-stamp before these (TUM), 12 is a 3x4 matrix row by row (KITTI), 16 a 4x4 matrix. A first column that is no number is
-the name of the row's image, with or without folder and ending; such rows may stand in any order and leave images out.
+stamp before these (TUM), 12 is a 3x4 matrix row by row (KITTI), 16 a 4x4 matrix. One column more is the name of the
+row's image, with or without folder and ending, or its number; such rows may stand in any order and leave images out.
+Eight columns of numbers are named poses where half the first column or more names images, and stamped ones otherwise.
 """
 
 from __future__ import annotations
 
+import re
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -27,6 +29,7 @@ from stages.kit.formats.trajectories import (
 FILES = ("pose.txt", "poses.txt", "groundtruth.txt", "trajectory.txt", "trajectory.tum", "traj.txt", "trajectory.log")
 FOLDERS = ("pose", "poses")
 WITHOUT_STAMP = (7, 12, 16)
+WHOLE_NUMBER = re.compile(r"[0-9]{1,18}")
 COLUMNS = (8, *WITHOUT_STAMP)
 Pose = tuple[np.ndarray | None, str | None]
 """world_from_camera (4, 4), or the reason why there is none."""
@@ -43,16 +46,6 @@ def pose_file(root: Path) -> Path | None:
 def columns_of(path: Path) -> int:
     """Return the number of columns in the first row of a text file, 0 when it has none. Raises BadInput."""
     return len(_first_row(path))
-
-
-def has_names(path: Path) -> bool:
-    """Whether the first column of a text file holds no number in its first row."""
-    row = _first_row(path)
-    try:
-        float(row[0]) if row else None
-    except ValueError:
-        return True
-    return False
 
 
 def _first_row(path: Path) -> list[str]:
@@ -73,9 +66,11 @@ def read_pose_list(path: Path, names: list[str]) -> list[Pose] | StampedPoses:
         matrices: list[Pose] = [(matrix, None) for matrix in read_open3d_log(path)]
         return _counted(matrices, names, path)
     columns = columns_of(path)
-    if columns - 1 in WITHOUT_STAMP and has_names(path):
-        return _named(path, columns, names)
-    if columns == 8:
+    if columns - 1 in WITHOUT_STAMP:
+        rows = named_rows(path, columns)
+        images = _images([label for _, label, _ in rows], names)
+        if columns != 8 or _are_names([label for _, label, _ in rows], images):
+            return _named(path, rows, images, names)
         return read_stamped_poses(path)
     if columns not in COLUMNS:
         read_text(path)
@@ -86,21 +81,58 @@ def read_pose_list(path: Path, names: list[str]) -> list[Pose] | StampedPoses:
     return _counted([_pose(row, f"{path}: line {line}") for line, row in number_rows(path, columns)], names, path)
 
 
-def _named(path: Path, columns: int, names: list[str]) -> list[Pose]:
-    """Return the pose of each image by the name in the first column; none for images without a row.
+def _images(labels: list[str], names: list[str]) -> list[str | None]:
+    """Return the image of `names` (stems) that each label means, None where it means none.
 
-    Raises BadInput when no name is that of an image, and when one is there twice.
+    A label is a name with or without folder and ending; where no label is one, labels that are whole numbers mean the
+    images whose names end in these numbers, if they differ.
     """
-    by_stem: dict[str, Pose] = {}
-    for line, name, row in named_rows(path, columns):
-        stem = PurePosixPath(name).stem if PurePosixPath(name).suffix else PurePosixPath(name).name
-        if stem in by_stem:
-            raise BadInput(f"{path}: line {line}: a second pose for {stem!r:.60}", hint="one pose an image")
-        by_stem[stem] = _pose(row, f"{path}: line {line}")
-    if not by_stem.keys() & set(names):
-        first = next(iter(by_stem), "")
+    known, found = set(names), []
+    for label in labels:
+        path = PurePosixPath(label)
+        stem = path.name if WHOLE_NUMBER.fullmatch(path.suffix[1:]) else path.stem  # decimals are no file's ending
+        found.append(next((text for text in (path.name, stem) if text in known), None))
+    if any(image is not None for image in found) or not all(WHOLE_NUMBER.fullmatch(label) for label in labels):
+        return found
+    by_number = {_last_number(name): name for name in names}
+    if None in by_number or len(by_number) < len(known):
+        return found
+    return [by_number.get(int(label)) for label in labels]
+
+
+def _are_names(labels: list[str], images: list[str | None]) -> bool:
+    """Whether the first of eight columns names images: it holds what is no number, or half of it or more does.
+
+    A stamp may by chance be an image's number (0, say); half of them are not.
+    """
+    return not all(_is_number(label) for label in labels[:1]) or 2 * sum(map(bool, images)) >= max(len(labels), 1)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _named(
+    path: Path, rows: list[tuple[int, str, np.ndarray]], images: list[str | None], names: list[str]
+) -> list[Pose]:
+    """Return the pose of each image by the image that a row is of; none for images without a row.
+
+    Raises BadInput when no row is of an image, and when two are of one.
+    """
+    poses: dict[str, Pose] = {}
+    for (line, label, row), image in zip(rows, images, strict=True):
+        if image is not None and image in poses:
+            raise BadInput(f"{path}: line {line}: a second pose for {label!r:.60}", hint="one pose an image")
+        if image is not None:
+            poses[image] = _pose(row, f"{path}: line {line}")
+    if not poses:
+        first = rows[0][1] if rows else ""
         raise BadInput(f"{path}: {first!r:.60} and the rest name no image of the log", hint="name the image files")
-    return [by_stem.get(name, (None, None)) for name in names]
+    return [poses.get(name, (None, None)) for name in names]
 
 
 def _pose(row: np.ndarray, where: str) -> Pose:

@@ -190,7 +190,8 @@ def _mesh_links(
         before = pose if body.reconstructed is None else body.reconstructed
         rests_at = None if height is None else height - float(before[2, 3])
         if body.furniture:
-            return furniture_links(root, body.name, mesh, visual, density, rests_at=rests_at)
+            carried = carried_by(graph, nodes, body.name)
+            return furniture_links(root, body.name, mesh, visual, density, before, rests_at=rests_at, carried=carried)
         return mesh_links(root, body.name, mesh, visual, density, rests_at=rests_at)
     yaw = float(box_yaw(body.box) - np.arctan2(pose[1, 0], pose[0, 0]))
     return still_mesh_links(body.name, mesh, visual, density, pose, yaw, carried_by(graph, nodes, body.name))

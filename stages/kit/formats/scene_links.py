@@ -17,7 +17,7 @@ from schemas.scene_parts import Box, Joint
 from stages.kit.formats.cad_models import URDF_FILE, load_visual_parts
 from stages.kit.formats.model_writer import write_obj
 from stages.kit.formats.part_colors import recolored_shapes, vertex_colors
-from stages.kit.formats.scene_supports import Carried, levelled, pads, standing_points
+from stages.kit.formats.scene_supports import Carried, cut_below, levelled, pads, standing_points
 from stages.kit.formats.urdf_file import Link, Shape, UrdfJoint, parse_urdf
 from stages.kit.geometry.box_cover import cover_with_boxes
 from stages.kit.geometry.convex_pieces import convex_pieces
@@ -185,13 +185,22 @@ def mesh_links(
 
 
 def furniture_links(
-    root: Path, name: str, mesh: trimesh.Trimesh, visual: Shape, density: float, *, rests_at: float | None
+    root: Path,
+    name: str,
+    mesh: trimesh.Trimesh,
+    visual: Shape,
+    density: float,
+    world_from_body: np.ndarray,
+    *,
+    rests_at: float | None,
+    carried: Sequence[Carried] = (),
 ) -> BodyLinks:
     """Return the link of furniture without CAD model: `visual` to look at, convex pieces of its mesh (body frame) to
     collide with, weighing what the hull of it all weighs at `density` [kg/m^3].
 
     It stands on one foot more at the height `rests_at` [m] of the body frame: the hull of what reaches down there, as
-    far as 10 cm above, 1 cm thick, so that legs of which the camera missed the ends carry it all the same.
+    far as 10 cm above, 1 cm thick, so that legs of which the camera missed the ends carry it all the same. Pieces are
+    cut level below what it carries (`world_from_body`: where it was reconstructed), and a pad lies under each of these.
     """
     points = np.asarray(mesh.vertices, dtype=float)
     whole = _hull(points, density)[1]
@@ -204,8 +213,9 @@ def furniture_links(
             foot = np.concatenate([low, low])
             foot[:, 2] = np.repeat([rests_at, rests_at + FOOT_THICKNESS], len(low))
             pieces.append(foot)
+    pieces = cut_below(pieces, world_from_body, carried)
     solids = [_hull(piece, density)[0] for piece in pieces]
-    collisions = []
+    collisions = _pads_of(world_from_body, carried)
     for number, solid in enumerate(solids):
         write_obj(root / "meshes" / name / f"collision_{number}.obj", solid.vertices, solid.faces)
         collisions.append(Shape(f"meshes/{name}/collision_{number}.obj"))
@@ -234,11 +244,17 @@ def still_mesh_links(
         frame = turned.copy()
         frame[:3, 3] = turned[:3, :3] @ center
         collisions.append(Shape(box_size=_triple(size), link_from_shape=frame))
-    body_from_world = inverse(world_from_body)
+    collisions += _pads_of(world_from_body, carried)
+    return BodyLinks((Link(name, properties, (visual,), tuple(collisions)),))
+
+
+def _pads_of(world_from_body: np.ndarray, carried: Sequence[Carried]) -> list[Shape]:
+    """Return a flat box below each carried thing, body frame."""
+    body_from_world, shapes = inverse(world_from_body), []
     for center, size, world_yaw in pads(carried):
         frame = body_from_world @ transform_from_yaw(world_yaw, center)
-        collisions.append(Shape(box_size=_triple(size), link_from_shape=frame))
-    return BodyLinks((Link(name, properties, (visual,), tuple(collisions)),))
+        shapes.append(Shape(box_size=_triple(size), link_from_shape=frame))
+    return shapes
 
 
 def _hull(points: np.ndarray, density: float) -> tuple[Solid, MassProperties]:

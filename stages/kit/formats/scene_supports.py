@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from shapely.geometry import Polygon
+from shapely import contains_xy
+from shapely.geometry import MultiPoint, Polygon
 
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.scene_parts import Box
@@ -102,6 +103,42 @@ def levelled(
         if high - low > 1e-3:
             kept.append((np.array([center[0], center[1], 0.5 * (low + high)]), np.array([*size[:2], high - low])))
     return kept
+
+
+def cut_below(
+    pieces: Sequence[np.ndarray], world_from_body: np.ndarray, carried: Sequence[Carried]
+) -> list[np.ndarray]:
+    """Return the corner points (N, 3) of convex pieces (body frame), none in what is carried over them.
+
+    A piece over whose plane something stands ends at that plane; what of it reaches more than 4 cm above stays as a
+    piece of its own, unless that would reach over the thing. `world_from_body` turns about z alone.
+    """
+    kept = list(pieces)
+    for thing in carried:
+        area, height = thing.polygon(MARGIN), thing.height - world_from_body[2, 3]
+
+        def meets(points: np.ndarray, area: Polygon = area) -> bool:
+            in_world = points[:, :2] @ world_from_body[:2, :2].T + world_from_body[:2, 3]
+            return bool(area.intersects(MultiPoint(in_world).convex_hull))
+
+        cut = []
+        for piece in kept:
+            if piece[:, 2].max() <= height or piece[:, 2].min() >= height + thing.box.size[2] or not meets(piece):
+                cut.append(piece)
+                continue
+            low = piece.copy()
+            low[:, 2] = np.minimum(low[:, 2], height)
+            cut += [low] if piece[:, 2].min() < height - MARGIN else []
+            high = piece[piece[:, 2] > height + LARGEST_STEP]
+            high = high[~_within(high, world_from_body, area)]
+            cut += [high] if len(high) and not meets(high) else []
+        kept = cut
+    return kept
+
+
+def _within(points: np.ndarray, world_from_body: np.ndarray, area: Polygon) -> np.ndarray:
+    in_world = points[:, :2] @ world_from_body[:2, :2].T + world_from_body[:2, 3]
+    return np.asarray(contains_xy(area, in_world[:, 0], in_world[:, 1]))
 
 
 def pads(carried: Sequence[Carried]) -> list[tuple[np.ndarray, np.ndarray, float]]:

@@ -18,6 +18,8 @@ NAME = re.compile(r"[A-Za-z0-9_.\-]+")
 READ_MESHES = (".obj", ".stl", ".ply", ".glb")
 LARGEST_REACH = 1e5
 """Metres, of a mesh's vertices from its origin: engines compute in float32."""
+SMALLEST_EXTENT = 1e-9
+"""Metres."""
 
 
 @dataclass(frozen=True)
@@ -205,7 +207,9 @@ def _mesh_fault_of(path: str, changed_ns: int, size: int) -> str:
     except BadInput as error:
         return error.message.removeprefix(f"{path}: ")
     reach = float(np.abs(mesh.vertices).max())
-    return f"reaches {reach:.3g} m from its origin" if reach > LARGEST_REACH else ""
+    if reach > LARGEST_REACH:
+        return f"reaches {reach:.3g} m from its origin"
+    return "is a single point" if float(np.ptp(mesh.vertices, axis=0).max()) < SMALLEST_EXTENT else ""
 
 
 def _check_joint(joint: UrdfJoint) -> list[Problem]:

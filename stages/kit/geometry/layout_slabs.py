@@ -12,8 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
+from schemas.base import as_vector
 from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import Box, SurfacePlane
+from stages.kit.geometry.boxes import box_corners, box_rotation
 from stages.kit.geometry.transforms import transform_from, transform_from_quaternion
 
 FLOOR_THICKNESS = 0.2
@@ -49,7 +51,7 @@ def slabs_of_layout(
     if class_name in ("floor", "ceiling"):
         upwards = class_name == "floor"
         height = level_of_layout(name, class_name, planes, box, mesh, graph)
-        return [level_slab(box, height, downwards=upwards)]
+        return [level_slab(box_under(name, box, graph), height, downwards=upwards)]
     thickness = THIN_THICKNESS if class_name in THIN_LAYOUT else WALL_THICKNESS
     return wall_slabs(planes, mesh, box, room_center, thickness)
 
@@ -67,6 +69,22 @@ def level_of_layout(
     carrying = {link.plane for link in graph.links if link.source == name}
     used = [plane for k, plane in enumerate(planes) if k in carrying]
     return surface_height(used or planes, mesh, box, upwards=class_name == "floor")
+
+
+def box_under(name: str, box: Box, graph: ContactGraphFile) -> Box:
+    """Return the box of a floor, as wide as what the graph says stands on it: the floor goes on under what was seen
+    standing beyond its mapped edge."""
+    standing = {link.target for link in graph.links if link.source == name and link.relation == "supports"}
+    boxes = [node.box for node in graph.nodes if node.id in standing and node.box is not None]
+    if not boxes:
+        return box
+    turn = box_rotation(box)
+    corners = (np.concatenate([box_corners(other) for other in boxes]) - np.array(box.center)) @ turn
+    half = 0.5 * np.array(box.size)
+    low, high = np.minimum(corners.min(axis=0), -half), np.maximum(corners.max(axis=0), half)
+    low[2], high[2] = -half[2], half[2]
+    center = np.array(box.center) + turn @ (0.5 * (low + high))
+    return box.model_copy(update={"center": as_vector(center), "size": as_vector(high - low)})
 
 
 def level_slab(box: Box, height: float, *, downwards: bool) -> Slab:

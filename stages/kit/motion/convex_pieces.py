@@ -35,7 +35,10 @@ class ConvexPiece:
     @cached_property
     def box(self) -> tuple[np.ndarray, np.ndarray]:
         """link_from_box (4, 4) and half sides (3,) of a box around it: upright or along its principal axes."""
-        principal = np.linalg.svd(self.vertices - self.vertices.mean(axis=0), full_matrices=False)[2]
+        around = self.vertices - self.vertices.mean(axis=0)
+        if len(around) < 3:  # a point or a line has principal axes too
+            around = np.vstack([around, np.zeros((3 - len(around), 3))])
+        principal = np.linalg.svd(around, full_matrices=False)[2]
         if np.linalg.det(principal) < 0:
             principal[2] *= -1
         best: tuple[np.ndarray, np.ndarray] | None = None

@@ -201,6 +201,13 @@ def test_a_board_lies_on_a_post_that_is_narrower_than_itself():
     assert not [c for c in baseline if c.parent == "object_2"]
 
 
+@pytest.mark.parametrize(("gap", "carried"), [(0.45, True), (0.62, False)])
+def test_a_hood_does_not_stand_on_the_hob(gap: float, carried: bool) -> None:
+    counter = solid("counter_1", (0, 0, 0), (2, 0.6, 0.9), class_name="counter", movable=False)
+    hood = solid("object_2", (0.5, 0, 0.9 + gap), (1.1, 0.5, 1.2 + gap), class_name="object", movable=False)
+    assert bool(candidates_for(hood, [counter, hood], GraphParameters())) == carried
+
+
 @pytest.mark.parametrize(("gap", "parent"), [(0.0, "object_2"), (0.09, "object_2"), (0.13, "table_1")])
 def test_what_juts_out_hides_the_top_of_what_carries_it(gap, parent):
     """A board that is 10 cm wider than its post, seen from 45 degrees above at most, hides 10 cm of it."""

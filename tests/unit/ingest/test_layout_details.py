@@ -587,6 +587,16 @@ def test_marked_names_in_one_folder(tmp_path: Path) -> None:
     np.testing.assert_allclose(found[1].depth, millimetres(frames(2)[1][1]), atol=1)
 
 
+def test_colour_may_be_what_is_not_marked_as_depth(tmp_path: Path) -> None:
+    for index, (color, depth, _) in enumerate(frames(2)):
+        (tmp_path / f"{index}.png").write_bytes(png(color))
+        (tmp_path / f"{index}_depth.png").write_bytes(png(millimetres(depth)))
+    (tmp_path / "map.png").write_bytes(png(frames(1)[0][0]))
+    source, found = loaded_frames(tmp_path, fx=CAMERA.fx, fy=CAMERA.fy, cx=CAMERA.cx, cy=CAMERA.cy)
+    assert [entry.name for entry in source.entries] == ["0", "1"]
+    np.testing.assert_allclose(found[1].depth, millimetres(frames(2)[1][1]), atol=1)
+
+
 def test_colour_alone(tmp_path: Path) -> None:
     (tmp_path / "images").mkdir()
     for index in range(12):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +55,26 @@ def test_symbols_of_the_kitchen(kitchen_model: tuple[WorldModel, ContactGraphFil
     assert ("closed", "fridge_2__hinge") not in atoms
     assert default_goals(model, atoms, 0.08) == [("on(bottle_7, table_3)", "closed(fridge_2)")]
     assert default_goals(model, frozenset(atom for atom in atoms if atom[0] != "in"), 0.08) == []
+
+
+def test_a_table_that_could_be_pushed_is_no_item(tmp_path: Path) -> None:
+    """Free furniture is laden, stood on and left where it is: the plan is that of a table that is fixed."""
+    bodies = [replace(body, movable=True, furniture=True) if body.name == "table_3" else body for body in kitchen()]
+    found = []
+    for number, scene in enumerate((kitchen(), bodies)):
+        model, graph = model_of(tmp_path / str(number), scene)
+        objects, atoms = symbolic_state(model, graph)
+        found.append((objects, atoms, default_goals(model, atoms, 0.08)))
+        model.close()
+    assert found[0] == found[1] and found[1][0]["table_3"] == "surface"
+
+
+def test_what_the_fingers_cannot_hold_is_not_graspable(tmp_path: Path) -> None:
+    heavy = [replace(body, mass=30.0) if body.name == "cup_5" else body for body in kitchen()]
+    model, graph = model_of(tmp_path, heavy)
+    _, atoms = symbolic_state(model, graph)
+    model.close()
+    assert ("graspable", "cup_5") not in atoms and ("graspable", "bottle_7") in atoms
 
 
 def test_goal_literals(kitchen_model: tuple[WorldModel, ContactGraphFile]) -> None:

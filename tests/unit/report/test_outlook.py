@@ -41,6 +41,18 @@ def test_each_fault_is_named_with_what_to_do() -> None:
         assert any(advised in text for text in found.advice), advised
 
 
+def test_what_is_up_is_that_of_the_path_where_one_was_estimated() -> None:
+    unposed = GOOD | {"sequence": Facts("ok", {"frames": 9, "gravity": "none"})}
+    assert any("which way is up" in text for text in outlook(unposed).doubtful)
+    path = Facts("ok", {"frames": 9, "posed": 9, "gravity": "floor_plane"})
+    assert not outlook(unposed | {"trajectory": path}).doubtful
+    lost = outlook(
+        unposed | {"trajectory": Facts("tracking_lost", {"frames": 9, "posed": 3, "gravity": "mean_camera_up"})}
+    )
+    assert "6 frames whose place was not found" in lost.missing
+    assert any("held upright" in text for text in lost.doubtful) and any("slowly" in text for text in lost.advice)
+
+
 def test_what_was_not_measured_is_not_praised() -> None:
     """The sentence on collisions stands only where they were counted and are none."""
     apart = "nothing stands more than 5 mm in anything else"

@@ -28,6 +28,7 @@ class HandmadeBody:
     parent: str
     relation: str = "supports"
     movable: bool = False
+    furniture: bool = False
     mass: float = 10.0
     door: Boxes = field(default_factory=list)
     door_origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -105,6 +106,7 @@ def _record(body: HandmadeBody) -> SceneBody:
         name=body.name,
         class_name=body.class_name,
         movable=body.movable,
+        furniture=body.furniture,
         file=f"bodies/{body.name}.urdf" if body.movable else None,
         parent=body.parent,
         relation=body.relation,

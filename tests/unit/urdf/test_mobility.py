@@ -1,4 +1,4 @@
-"""What is free to move: what an arm carries, and furniture that stands on a plane and carries nothing."""
+"""What is free to move: what an arm carries, and furniture that stands on a plane, laden or not."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def graph_with(
         (graph_with("chair"), FREE),
         (graph_with("chair", gap=0.03), FREE),
         (graph_with("chair", gap=0.3), Mobility(False)),  # it stands on nothing that is known
-        (graph_with("chair", on_top=True), Mobility(False)),
+        (graph_with("chair", on_top=True), FREE),
         (graph_with("chair", relation="hangs_from"), Mobility(False)),
         (graph_with("cabinet"), Mobility(False)),
         (graph_with("sink"), Mobility(False)),
@@ -85,19 +85,23 @@ def chair_mesh() -> trimesh.Trimesh:
     return trimesh.util.concatenate([part.subdivide().subdivide() for part in parts])
 
 
-def test_a_chair_without_a_model_is_a_body_of_pieces_that_stands(tmp_path: Path) -> None:
-    root = tmp_path / "cad_scene"
+def scene_of(root: Path, graph: ContactGraphFile, cup: tuple[float, float, float]) -> CadScene:
+    """A scene without models: a floor, a chair, and a box `cup` that is named so, all by their meshes."""
     for folder in ("models", "meshes", "layout"):
         (root / folder).mkdir(parents=True)
     trimesh.creation.box((6, 6, 0.02)).apply_translation([0, 0, -0.01]).export(root / "layout" / "floor_1.ply")
     chair_mesh().export(root / "meshes" / "thing_2.ply")
-    trimesh.creation.box((0.1, 0.1, 0.1)).apply_translation([2, 0, 0.05]).export(root / "meshes" / "cup_3.ply")
-    graph = graph_with("chair")
-    box = Box(center=(2.0, 0.0, 0.05), size=(0.1, 0.1, 0.1))
+    trimesh.creation.box((0.1, 0.1, 0.1)).apply_translation(cup).export(root / "meshes" / "cup_3.ply")
+    box = Box(center=cup, size=(0.1, 0.1, 0.1))
     moved = tuple(node.model_copy(update={"box": box}) if node.id == "cup_3" else node for node in graph.nodes)
     graph.model_copy(update={"nodes": moved}).write(root / "graph.json")
     CadSceneFile(replacements=(), conflicts_before=0, conflicts_after=0, iterations=0).write(root / "scene.json")
-    made = run(CadScene(root), parameters=UrdfParameters(), context=context(tmp_path / "out"))
+    return CadScene(root)
+
+
+def test_a_chair_without_a_model_is_a_body_of_pieces_that_stands(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path / "cad_scene", graph_with("chair"), (2.0, 0.0, 0.05))
+    made = run(scene, parameters=UrdfParameters(), context=context(tmp_path / "out"))
     assert made.outcome == "ok" and made.summary["movable"] == 2
     chair = next(body for body in made.info.bodies if body.name == "thing_2")
     assert chair.movable and chair.furniture and not chair.carriable and 1.0 < chair.mass < 10.0
@@ -109,6 +113,29 @@ def test_a_chair_without_a_model_is_a_body_of_pieces_that_stands(tmp_path: Path)
     under_seat = np.array([0.0, 0.0, 0.2]) - np.array(chair.world_from_body)[:3, 3]
     pieces = [trimesh.load(made.root / str(shape.mesh), force="mesh") for shape in link.collisions]
     assert not any(piece.contains([under_seat])[0] for piece in pieces), "a hull would fill what is under the seat"
+
+
+def test_a_laden_chair_is_free_and_keeps_its_load(tmp_path: Path) -> None:
+    """The mesh of the seat bulges under the cup; its body ends at the plane that carries the cup."""
+    graph = graph_with("chair", on_top=True)
+    seat = SurfacePlane(normal=(0, 0, 1), offset=-0.44, area=0.25, center=(0, 0, 0.44), horizontal=True)
+    nodes = tuple(node.model_copy(update={"planes": (seat,)}) if node.id == "thing_2" else node for node in graph.nodes)
+    links = tuple(link.model_copy(update={"plane": 0}) if link.target == "cup_3" else link for link in graph.links)
+    graph = ContactGraphFile(nodes=nodes, links=links)
+    scene = scene_of(tmp_path / "cad_scene", graph, (0.0, -0.1, 0.49))
+    made = run(scene, parameters=UrdfParameters(), context=context(tmp_path / "out"))
+    assert made.outcome == "ok" and made.summary["movable"] == 2 and made.summary["held"] == 0
+    assert {body.name for body in made.info.bodies if body.carriable} == {"cup_3"}
+
+
+def test_a_chair_in_the_wall_is_held(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path / "cad_scene", graph_with("chair"), (2.0, 0.0, 0.05))
+    block = trimesh.creation.box((1.0, 0.3, 1.0)).apply_translation([0, 0.35, 0.5])
+    block.subdivide().export(scene.root / "meshes" / "surroundings.ply")
+    made = run(scene, parameters=UrdfParameters(), context=context(tmp_path / "out"))
+    assert made.summary["held"] == 1 and made.summary["movable"] == 1
+    assert not (made.root / "bodies" / "thing_2.urdf").exists()
+    assert not list((made.root / "meshes" / "thing_2").glob("collision_*"))
 
 
 def test_pieces_hold_all_of_a_mesh_and_a_convex_one_is_one() -> None:

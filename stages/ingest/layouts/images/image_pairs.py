@@ -25,7 +25,8 @@ DEPTH_FOLDERS = ("depth", "depths")
 MARKED = re.compile(
     r"(?:(color|rgb|depth|left|right)[._-]?(.*)|(.*?)[._-]?(color|rgb|depth|left|right))", re.IGNORECASE
 )
-"""Names in one folder that say what an image is: `NAME.color.png`, `NAME_depth.png`, `left_0001.png`."""
+"""Names in one folder that say what an image is: `NAME.color.png`, `NAME_depth.png`, `left_0001.png`. Beside
+`NAME_depth.png` an image `NAME.png` is colour."""
 MIDDLEBURY = {"im0": ("left", ""), "im1": ("right", ""), "disp0": ("disparity", "")}
 DEPTH_ENDINGS = (*DEPTH_SUFFIXES, *ARRAY_SUFFIXES, ".exr")
 ROLES = {
@@ -142,17 +143,21 @@ def _by_number(images: dict[str, Path]) -> dict[str, Path] | None:
 def _marked(root: Path) -> FolderImages | None:
     """Return the images of a folder whose names say what they are."""
     roles: dict[str, dict[str, Path]] = {"color": {}, "depth": {}, "right": {}, "disparity": {}}
+    plain: dict[str, Path] = {}
     for path in files_of(root, (*COLOR_SUFFIXES, ".pfm", ".npy")):
         match = MARKED.fullmatch(path.stem)
         word, name = MIDDLEBURY.get(path.stem.lower(), (None, ""))
         if word is None and match is not None:
             word, name = (match[1], match[2]) if match[1] else (match[4], match[3])
         if word is None:
+            plain[path.stem] = path
             continue
         images = roles[ROLES[word.lower()]]
         if name in images:
             raise BadInput(f"{path}: {images[name].name} is the same image", hint="keep one of the two")
         images[name] = path
+    if not roles["color"]:
+        roles["color"] = {name: path for name, path in plain.items() if name in roles["depth"]}
     if not roles["color"] or not (roles["depth"] or roles["right"] or roles["disparity"]):
         return None
     names = sorted({name for images in roles.values() for name in images}, key=natural_key)

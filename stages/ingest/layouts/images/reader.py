@@ -166,8 +166,8 @@ def _eyes(calibration: FolderCalibration, size: tuple[int, int] | None, has_righ
         width //= 2
     if not width * height:  # no image can be decoded, so there will be no frame; the log is described all the same
         matrix = calibration.left.K
-        numbers = {"fx": matrix[0], "fy": matrix[4], "cx": matrix[2], "cy": matrix[5]}
-        return _Eyes(Lens(Camera.of_outside(root, width=0, height=0, **numbers), (0, 0)))
+        fx, _, cx, _, fy, cy, *_ = matrix
+        return _Eyes(Lens(Camera.of_outside(root, width=0, height=0, fx=fx, fy=fy, cx=cx, cy=cy), (0, 0)))
     sized = [_sized(one, width, height) for one in (calibration.left, calibration.right) if one is not None]
     if has_right and len(sized) < 2:
         raise BadInput(f"{root}: the calibration is of one camera, the images are pairs", hint=PAIR_HINT)

@@ -94,8 +94,8 @@ def _camera(root: Path, size: tuple[int, int] | None) -> tuple[Camera, tuple[str
         matrix = read_matrix(path, 3, 3)
         if not np.isfinite(matrix).all() or matrix[0, 0] <= 0 or matrix[1, 1] <= 0:
             raise BadInput(f"{path}: focal lengths {matrix[0, 0]:g}, {matrix[1, 1]:g} are not positive")
-        numbers = {"fx": matrix[0, 0], "fy": matrix[1, 1], "cx": matrix[0, 2], "cy": matrix[1, 2]}
-        camera = Camera.of_outside(path, width=width, height=height, **numbers)
+        (fx, _, cx), (_, fy, cy), _ = matrix
+        camera = Camera.of_outside(path, width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)
         return camera, (f"intrinsics read from {path.name}",)
     if size is not None and size != (640, 480):
         raise BadInput(

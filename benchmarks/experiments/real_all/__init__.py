@@ -1,0 +1,1 @@
+"""Every real log through every backend that runs here."""

@@ -1,0 +1,139 @@
+"""Kinds `cutting_plan` (cuts towards a goal, or why not), `cutting_trial` (on a board), `cutting_evaluation`."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pydantic import Field, model_validator
+
+from schemas.artifact import Artifact, Document
+from schemas.base import Model, Vector3
+from schemas.cutting_demonstrations import CuttingPlane, PieceNumber
+from schemas.plan import Failure
+
+
+class WantedFragment(Model):
+    """A fragment of the goal: edges of the box with its moments, shortest first [m], volume [m^3]."""
+
+    edges: Vector3
+    volume: float = Field(gt=0.0)
+    name: str = ""
+    """What it is called, where the goal was given in words."""
+
+
+class PlannedCut(Model):
+    """A cut of one piece, in the world frame and in the piece's canonical frame [m]."""
+
+    piece: PieceNumber
+    plane: CuttingPlane
+    in_fragment: CuttingPlane
+    results: tuple[PieceNumber, ...]
+    said: str
+    likeness: float | None
+    """About the overlap that this piece's fragments were expected to reach with what is wanted."""
+
+
+class CuttingScores(Model):
+    """How the fragments match those of the goal."""
+
+    iou_thesis: float
+    """Mean best-matched intersection over union, unmatched fragments left out."""
+    iou: float
+    """Unmatched fragments counted as zero."""
+    count_error: int
+    volume_error: float
+    shape_distance: float
+
+
+class CuttingPlanFile(Model):
+    """plan.json."""
+
+    method: str
+    goal: str
+    """Where the goal comes from, in words."""
+    objects: int = Field(ge=1)
+    wanted: tuple[WantedFragment, ...] = Field(min_length=1, max_length=256)
+    goal_bodies: int = Field(ge=0)
+    """Fragments of the goal that are there as bodies."""
+    cuts: tuple[PlannedCut, ...]
+    refusals: tuple[Failure, ...]
+    stopped: Failure | None
+    scores: CuttingScores | None
+    """None for a goal in words."""
+    sure: float | None
+    """Likeness that was expected before the first cut."""
+    notes: tuple[str, ...] = ()
+    """What was mended of the user's meshes."""
+    statement: str
+
+    @model_validator(mode="after")
+    def _goal_bodies_are_wanted(self) -> CuttingPlanFile:
+        if self.goal_bodies not in (0, len(self.wanted)):
+            raise ValueError(f"{self.goal_bodies} bodies of {len(self.wanted)} wanted fragments")
+        return self
+
+
+class CuttingPlan(Artifact):
+    """`plan.json`, `plan.txt`, `bodies.npz` (objects, then the goal's fragments where they are bodies, then what the
+    cuts leave), `fragments.png` (before, after, and the goal, fragments apart), `cuts.gif`."""
+
+    kind: ClassVar[str] = "cutting_plan"
+    description: ClassVar[str] = "cuts towards a goal"
+    undigested: ClassVar[tuple[str, ...]] = ("timings.json",)
+    info = Document(CuttingPlanFile, "plan.json")
+
+
+class CuttingTrialFile(Model):
+    """trial.json."""
+
+    method: str
+    goal: str
+    cuts: int = Field(ge=0)
+    fragments: int = Field(ge=1)
+    wanted: int = Field(ge=1)
+    refusals: tuple[Failure, ...]
+    stopped: Failure | None
+    scores: CuttingScores | None
+    fallen: int = Field(ge=0)
+    """Fragments that rolled off the board."""
+    turned: float
+    """Angle through which fragments turned as they came to rest, mean over fragments and cuts [rad]."""
+    statement: str
+
+
+class CuttingTrial(Artifact):
+    """`trial.json`, `bodies.npz` (the fragments as they lie), `board.png` (before, after), `board.gif`."""
+
+    kind: ClassVar[str] = "cutting_trial"
+    description: ClassVar[str] = "things being cut on a board"
+    info = Document(CuttingTrialFile, "trial.json")
+
+
+class EvaluatedCutting(Model):
+    """Means over the goals of a cell."""
+
+    method: str
+    cell: str
+    goals: int
+    iou: float
+    iou_interval: tuple[float, float]
+    iou_thesis: float
+    count_exact: float
+    count_error: float
+    volume_error: float
+    shape_distance: float
+
+
+class CuttingEvaluationFile(Model):
+    """results.json."""
+
+    first_goal: int
+    rows: tuple[EvaluatedCutting, ...]
+
+
+class CuttingEvaluation(Artifact):
+    """`results.json`, `table.md`."""
+
+    kind: ClassVar[str] = "cutting_evaluation"
+    description: ClassVar[str] = "methods of cutting compared over many goals"
+    info = Document(CuttingEvaluationFile, "results.json")

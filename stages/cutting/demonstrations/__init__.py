@@ -1,0 +1,1 @@
+"""People who cut, scripted: goals, their recipes, trials."""

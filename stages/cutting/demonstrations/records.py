@@ -1,0 +1,82 @@
+"""Demonstrations as records, and records carried out again: fragments follow from objects and planes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from schemas.base import as_vector
+from schemas.cutting_demonstrations import CuttingDemonstrations, CuttingPlane, DemonstratedCut, DemonstrationRecord
+from schemas.errors import BadInput
+from stages.cutting.bodies_file import read_bodies
+from stages.cutting.demonstrations.cutter import Cut, Demonstration
+from stages.cutting.world.body import Body, Plane
+from stages.cutting.world.knife import Knife, Refused, cut
+
+
+def plane_record(plane: Plane) -> CuttingPlane:
+    """Return a plane as a record."""
+    return CuttingPlane(normal=as_vector(plane.normal), d=float(plane.d))
+
+
+def record_of(demonstration: Demonstration, training: bool) -> DemonstrationRecord:
+    """Return a demonstration without its meshes."""
+    return DemonstrationRecord(
+        cell=demonstration.cell,  # type: ignore[arg-type]
+        families=demonstration.families,
+        cuts=tuple(
+            DemonstratedCut(
+                piece=each.piece,
+                plane=plane_record(each.plane),
+                shifts=tuple(as_vector(shift) for shift in each.shifts),  # type: ignore[arg-type]
+            )
+            for each in demonstration.cuts
+        ),
+        categories=dict(demonstration.categories),
+        finished=demonstration.finished,
+        training=training,
+    )
+
+
+def replay(record: DemonstrationRecord, objects: Sequence[Body], where: str) -> Demonstration:
+    """Return a demonstration carried out again. Raises BadInput where its planes do not cut what they did."""
+    done = Demonstration(record.cell, record.families, list(objects), finished=record.finished)
+    for number, each in enumerate(record.cuts):
+        plane = Plane(np.array(each.plane.normal), each.plane.d)
+        try:
+            parts = cut(done.pieces[each.piece], plane, Knife())
+        except Refused as refused:
+            raise BadInput(f"{where}: cut {number}: {refused.failure.message}", hint="record it again") from None
+        if len(parts) != len(each.shifts):
+            raise BadInput(
+                f"{where}: cut {number} gives {len(parts)} pieces, {len(each.shifts)} were recorded",
+                hint="record it again",
+            )
+        first = len(done.pieces)
+        shifts = tuple(np.array(shift) for shift in each.shifts)
+        done.pieces += [part.shifted(shift) for part, shift in zip(parts, shifts, strict=True)]
+        done.cuts.append(Cut(each.piece, plane, tuple(range(first, len(done.pieces))), shifts))
+    done.categories |= record.categories
+    return done
+
+
+def read_demonstrations(artifact: CuttingDemonstrations, *, only: int | None = None) -> list[Demonstration]:
+    """Return the demonstrations of an artifact, or the one trial `only`. Raises BadInput."""
+    records = artifact.info.trials
+    path: Path = artifact.path("objects.npz")
+    bodies = read_bodies(path)
+    if len(bodies) != sum(len(record.families) for record in records):
+        raise BadInput(f"{path}: {len(bodies)} objects, the trials have others", hint="make the artifact again")
+    if only is not None and only >= len(records):
+        raise BadInput(
+            f"{artifact.root}: has {len(records)} trials, none of number {only}", hint="take another --trial"
+        )
+    demonstrations, first = [], 0
+    for number, record in enumerate(records):
+        objects = bodies[first : first + len(record.families)]
+        first += len(objects)
+        if only is None or number == only:
+            demonstrations.append(replay(record, objects, f"{artifact.root}: trial {number}"))
+    return demonstrations

@@ -1,0 +1,1 @@
+"""How well fragments match a goal."""

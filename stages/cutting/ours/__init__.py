@@ -1,0 +1,1 @@
+"""Our method: types and rules by description length, planes that are computed."""

@@ -1,0 +1,172 @@
+"""Which of the wanted fragments each piece is to become, where there are several pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from stages.cutting.ours.cells import Cloud, Tree, cells
+from stages.cutting.ours.grammar import Grammar
+from stages.cutting.ours.items import Item, features, likeness
+from stages.cutting.ours.structures import MOST_BITS, best_trees, groupings, match, misfits, proposals, rule_bits
+
+MOST_PIECES = 4
+"""Beyond these, pieces are filled one by one."""
+MOST_GROUPS = 6
+BEAM, FINALISTS = 60, 6
+"""Ways to share groups among the pieces that are judged on points, and then by whole trees."""
+UNLIKE = 0.5
+"""Distance of the middles of groups, in deviations of alike fragments, from which pieces may share them apart: like
+fragments of two pieces differ by little."""
+SLACK = 0.3
+"""By how much of a piece's volume a way may miss it, by the groups' mean volumes."""
+SETTLED = 12
+"""Ways that are settled by volumes."""
+VOLUME_DEVIATION = 0.02
+"""Of the volume of a piece beside that of its fragments, as a share: what seeing adds."""
+DONE = 0.9
+"""Likeness at which a piece is taken for a fragment that is wanted."""
+
+
+def allocate(clouds: Sequence[Cloud], items: Sequence[Item], grammar: Grammar) -> list[list[Item]]:
+    """Return the items of each piece. Every piece gets at least one where there are enough."""
+    if len(clouds) == 1:
+        return [list(items)]
+    if len(clouds) > MOST_PIECES:
+        return _one_by_one(clouds, items)
+    wanted = features(items)
+    foreseen: dict[tuple[int, tuple[int, ...]], tuple[np.ndarray, float]] = {}
+    ways = []
+    for groups in groupings(wanted, grammar, MOST_GROUPS, UNLIKE):
+        means = [wanted[group].mean(axis=0) for group in groups]
+        foreseen.clear()
+        for counts in sharings([len(g) for g in groups], np.exp([m[3] for m in means]), clouds):
+            made, bits = [], 0.0
+            for k, cloud in enumerate(clouds):
+                key = (k, tuple(counts[:, k].tolist()))
+                if key not in foreseen:
+                    foreseen[key] = _sketch(cloud, means, counts[:, k], grammar)
+                made.append(foreseen[key][0])
+                bits += foreseen[key][1]
+            foreseen_by_piece = np.concatenate(made)
+            misfit, order = match(foreseen_by_piece, wanted, grammar.scatter)
+            ways.append((misfit + bits, counts.sum(axis=0), order, foreseen_by_piece))
+    if not ways:
+        return _one_by_one(clouds, items)
+    ways.sort(key=lambda way: way[0])
+    room = np.array([cloud.body.volume for cloud in clouds])
+    volumes = np.array([item.volume for item in items])
+    finalists: dict[tuple[tuple[int, ...], ...], None] = {}
+    for _, counts, order, made_by_piece in ways[:SETTLED]:
+        owner = np.repeat(np.arange(len(clouds)), counts)
+        order = settle(misfits(made_by_piece, wanted, grammar.scatter), order, owner, volumes, room)
+        finalists[tuple(tuple(sorted(order[owner == k].tolist())) for k in range(len(clouds)))] = None
+        if len(finalists) == FINALISTS:
+            break
+
+    def bits_of(way: tuple[tuple[int, ...], ...]) -> float:
+        trees = (
+            best_trees(cloud, [items[n] for n in part], grammar)[0] for cloud, part in zip(clouds, way, strict=True)
+        )
+        held = np.array([volumes[list(part)].sum() for part in way])
+        return sum(tree.bits for tree in trees) + float(volume_bits(held, room))
+
+    return [[items[n] for n in part] for part in min(finalists, key=bits_of)]
+
+
+def volume_bits(held: np.ndarray, room: np.ndarray) -> np.ndarray:
+    """Return what it costs (...) [bits] that items of these volumes (..., pieces) come out of these pieces."""
+    off = (held - room) / (VOLUME_DEVIATION * room)
+    return np.asarray(np.minimum(0.5 * off**2 / np.log(2), MOST_BITS).sum(axis=-1))
+
+
+def settle(
+    table: np.ndarray, order: np.ndarray, owner: np.ndarray, volumes: np.ndarray, room: np.ndarray
+) -> np.ndarray:
+    """Return which item each fragment becomes, after items changed places between pieces as long as that saves bits.
+
+    `table` (fragments, items) [bits], `order` the items to begin with, `owner` the piece of each fragment.
+    """
+    order = order.copy()
+    pieces = np.arange(len(room))
+    fragments = np.arange(len(order))
+    for _ in range(len(order)):
+        held = np.bincount(owner, volumes[order], len(room))
+        mine = table[fragments, order]
+        swapped = table[:, order]  # what a fragment would cost with the item of another
+        change = swapped + swapped.T - mine[:, None] - mine[None]
+        moved = volumes[order][None] - volumes[order][:, None]
+        to, away = owner[:, None, None] == pieces, owner[None, :, None] == pieces
+        after = held + moved[..., None] * (to.astype(float) - away)
+        change += volume_bits(after, room) - volume_bits(held, room)
+        change[owner[:, None] == owner[None]] = 0.0
+        i, j = np.unravel_index(int(change.argmin()), change.shape)
+        if change[i, j] > -1e-6:
+            break
+        order[i], order[j] = order[j], order[i]
+    return order
+
+
+def sharings(counts: Sequence[int], volumes: np.ndarray, clouds: Sequence[Cloud]) -> list[np.ndarray]:
+    """Return ways (groups, pieces) to share groups of so many items of a mean volume [m^3] among the pieces, those
+    first that fill the pieces best with the fewest groups in each."""
+    room = np.array([cloud.body.volume for cloud in clouds])
+    partial: list[tuple[np.ndarray, ...]] = [()]
+    filled = np.zeros((1, len(clouds)))
+    for count, volume in zip(counts, volumes, strict=True):
+        rows = np.array(list(_compositions(count, len(clouds))))
+        both = (filled[:, None] + volume * rows[None]).reshape(-1, len(clouds))
+        keep = np.flatnonzero((both <= (1.0 + SLACK) * room).all(axis=1))
+        keep = (
+            keep[np.argsort(np.abs(both[keep] - 0.5 * room).sum(axis=1), kind="stable")[:4000]]
+            if len(keep) > 4000
+            else keep
+        )
+        partial = [(*partial[k // len(rows)], rows[k % len(rows)]) for k in keep.tolist()]
+        filled = both[keep]
+    ways = [np.stack(way) for way in partial]
+    misfit = np.abs(filled - room).sum(axis=1) / room.sum()
+    ranked = sorted(
+        (float(off) + 0.05 * float((way > 0).sum()), k)
+        for k, (off, way) in enumerate(zip(misfit, ways, strict=True))
+        if (way.sum(axis=0) > 0).all()
+    )
+    return [ways[k] for _, k in ranked[:BEAM]]
+
+
+def _compositions(count: int, parts: int) -> Iterator[tuple[int, ...]]:
+    if parts == 1:
+        yield (count,)
+        return
+    for first in range(count + 1):
+        for rest in _compositions(count - first, parts - 1):
+            yield (first, *rest)
+
+
+def _sketch(
+    cloud: Cloud, means: Sequence[np.ndarray], counts: np.ndarray, grammar: Grammar
+) -> tuple[np.ndarray, float]:
+    """Return the features and the rules' bits of the first proposal for so many items of each group."""
+    groups = [np.tile(mean, (count, 1)) for mean, count in zip(means, counts, strict=True) if count]
+    tree: Tree = next(iter(proposals(cloud.edges, groups, grammar)))
+    return cells(cloud.coarse, tree), rule_bits(grammar, cloud.edges, tree)
+
+
+def _one_by_one(clouds: Sequence[Cloud], items: Sequence[Item]) -> list[list[Item]]:
+    """Take pieces that are wanted as they are for what they are; fill the others, largest item first, where most room
+    is left."""
+    shared: list[list[Item]] = [[] for _ in clouds]
+    left = list(items)
+    pieces = np.stack([cells(cloud, None)[0] for cloud in clouds])
+    alike = np.nan_to_num(likeness(pieces[:, None], features(items)[None]))
+    for k, n in sorted(np.argwhere(alike >= DONE).tolist(), key=lambda pair: -alike[pair[0], pair[1]]):
+        if not shared[k] and items[n] in left:
+            shared[k].append(items[n])
+            left.remove(items[n])
+    room = np.array([cloud.body.volume for cloud in clouds]) - [sum(item.volume for item in part) for part in shared]
+    for item in sorted(left, key=lambda item: -item.volume):
+        k = int(room.argmax())
+        shared[k].append(item)
+        room[k] -= item.volume
+    return shared

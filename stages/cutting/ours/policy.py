@@ -1,0 +1,133 @@
+"""Our policy: share the wanted fragments among the pieces, foresee trees, cut the middle of the best, look again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.plan import Failure
+from stages.cutting.ours.allocation import allocate
+from stages.cutting.ours.cells import Cloud, Split, cloud_of, leaves
+from stages.cutting.ours.grammar import Grammar
+from stages.cutting.ours.items import Item
+from stages.cutting.ours.structures import Foreseen, best_trees
+from stages.cutting.policy import Action, Stop
+from stages.cutting.world.body import Body, Plane
+from stages.cutting.world.knife import Knife
+
+MORE_VOLUME = 1.02
+"""Of what is there that a goal may ask for: rounding, and what a camera adds."""
+REST = 0.02
+"""Of what is there that may be left over without being a fragment of its own."""
+
+
+@dataclass(frozen=True)
+class _Planned:
+    """A cut, and which items the pieces below and above the plane are to become."""
+
+    action: Action
+    below: tuple[Item, ...]
+    above: tuple[Item, ...]
+
+
+class OursPolicy:
+    """Plans for items that are wanted."""
+
+    def __init__(self, grammar: Grammar, items: Sequence[Item], knife: Knife | None = None) -> None:
+        self._grammar, self._items, self._knife = grammar, list(items), knife or Knife()
+        self._jobs: dict[int, list[Item]] | None = None
+        self._ahead: list[_Planned] = []
+        """The cuts that may come next for the piece at hand, best first."""
+
+    def decide(self, board: Mapping[int, Body]) -> Action | Stop:
+        """Return the next cut: of the largest piece that is still to become several fragments."""
+        if self._jobs is None:
+            failure = self._impossible(board)
+            if failure is not None:
+                return Stop(failure)
+            clouds = [cloud_of(body) for body in board.values()]
+            shared = allocate(clouds, self._with_rest(board), self._grammar)
+            self._jobs = dict(zip(board, shared, strict=True))
+        if not self._ahead:
+            waiting = [number for number, items in self._jobs.items() if len(items) > 1]
+            if not waiting:
+                return Stop()
+            piece = max(waiting, key=lambda number: board[number].volume)
+            cloud = cloud_of(board[piece])
+            self._ahead = _cuts(piece, cloud, best_trees(cloud, self._jobs[piece], self._grammar))
+        return self._ahead[0].action
+
+    def done(self, action: Action, results: Mapping[int, Body], above: frozenset[int]) -> None:
+        """Hand the items on: to the larger piece on each side of the plane."""
+        assert self._jobs is not None
+        planned, self._ahead = self._ahead[0], []
+        del self._jobs[action.piece]
+        sides: dict[bool, list[int]] = {False: [], True: []}
+        for number in results:
+            sides[number in above].append(number)
+            self._jobs[number] = []
+        for side, items in ((False, planned.below), (True, planned.above)):
+            if sides[side]:
+                self._jobs[max(sides[side], key=lambda number: results[number].volume)] = list(items)
+
+    def refused(self, action: Action, failure: Failure) -> None:
+        """Try the next best; where none is left, leave the piece."""
+        assert self._jobs is not None
+        self._ahead = self._ahead[1:]
+        if not self._ahead:
+            self._jobs[action.piece] = self._jobs[action.piece][:1]
+
+    def _impossible(self, board: Mapping[int, Body]) -> Failure | None:
+        there, asked = sum(body.volume for body in board.values()), sum(item.volume for item in self._items)
+        thinnest = min(item.edges[0] for item in self._items)
+        if asked > MORE_VOLUME * there:
+            return Failure(
+                kind="too_much_volume",
+                message=f"the goal holds {1e6 * asked:.1f} cm3, there are {1e6 * there:.1f} cm3",
+                numbers={"asked": asked, "there": there},
+            )
+        if len(self._items) < len(board):
+            return Failure(
+                kind="too_few_fragments",
+                message=f"{len(board)} pieces lie there, the goal has {len(self._items)} fragments: cuts make more",
+                numbers={"there": len(board), "asked": len(self._items)},
+            )
+        if thinnest < self._knife.thinnest:
+            return Failure(
+                kind="too_thin",
+                message=f"a wanted fragment is {1e3 * thinnest:.2f} mm thin, the thinnest that can be cut is "
+                f"{1e3 * self._knife.thinnest:.1f} mm",
+                numbers={"asked": thinnest, "thinnest": self._knife.thinnest},
+            )
+        return None
+
+    def _with_rest(self, board: Mapping[int, Body]) -> list[Item]:
+        """Return the items, with what is left over as one more, of any shape."""
+        left = sum(body.volume for body in board.values()) - sum(item.volume for item in self._items)
+        if left < REST * sum(body.volume for body in board.values()):
+            return self._items
+        return [*self._items, Item(len(self._items), (np.nan, np.nan, np.nan), left)]
+
+
+def _cuts(piece: int, cloud: Cloud, trees: Sequence[Foreseen]) -> list[_Planned]:
+    """Return the middle cut of each tree, best tree first."""
+    ahead = trees[1].bits - trees[0].bits if len(trees) > 1 else 0.0
+    return [_middle_cut(piece, cloud, tree, ahead) for tree in trees]
+
+
+def _middle_cut(piece: int, cloud: Cloud, foreseen: Foreseen, ahead: float) -> _Planned:
+    tree = foreseen.tree
+    assert isinstance(tree, Split)
+    half = len(tree.parts) // 2
+    count = sum(leaves(part) for part in tree.parts[:half])
+    below, above = foreseen.items[:count], foreseen.items[count:]
+    share = sum(item.volume for item in below) / sum(item.volume for item in foreseen.items)
+    normal = np.eye(3)[tree.axis]
+    place = float(np.quantile(cloud.points[:, tree.axis], share))
+    plane = Plane(normal, -place).moved(cloud.frame)
+    said = (
+        f"{len(foreseen.items)} fragments: {len(below)} below, {len(above)} above, {ahead:.0f} bits ahead of the next"
+    )
+    return _Planned(Action(piece, plane, said, foreseen.likeness), below, above)

@@ -1,0 +1,168 @@
+"""Declarations of the steps `cutting demonstrate`, `learn`, `plan`, `simulate` and `evaluate`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import Field
+
+from schemas.cutting_demonstrations import CuttingDemonstrations
+from schemas.cutting_model import CuttingModel
+from schemas.cutting_plan import CuttingEvaluation, CuttingPlan, CuttingTrial
+from schemas.errors import UsageError
+from stages.cutting.words import read_words
+from stages.kit.stage import External, Optionally, Parameters, Stage
+
+MethodName = Literal["ours", "thesis", "bc", "qnet"]
+METHODS: tuple[MethodName, ...] = ("ours", "thesis", "bc", "qnet")
+CELL_NAMES = ("n1m1", "n1m2", "n2m1", "n2m2", "n2m3", "n3m4")
+FoodName = Literal["bread", "carrot", "cheese", "cucumber", "potato", "sausage"]
+LIBRARIES = ("numpy", "scipy", "numba", "trimesh", "manifold3d")
+
+
+class DemonstrateParameters(Parameters):
+    """Options of `cutting demonstrate`."""
+
+    share: float = Field(1.0, gt=0.0, le=10.0, description="Of 110 trials; every cell keeps at least one")
+    tilt: float = Field(0.07, ge=0.0, le=0.5, description="Scatter of a plane's angle [rad]")
+    spacing: float = Field(0.12, ge=0.0, le=0.5, description="Scatter of a plane's place, over what it cuts off")
+    image_width: int = Field(1200, ge=300, le=4000, description="Width of the picture [px]")
+
+
+class LearnParameters(Parameters):
+    """Options of `cutting learn`."""
+
+    methods: tuple[str, ...] = Field(
+        ("ours",), description="ours alone, or also thesis, bc, qnet, whose networks take a minute to train"
+    )
+
+
+class PlanParameters(Parameters):
+    """Options of `cutting plan`."""
+
+    method: MethodName = Field("ours", description="Who plans; the model must have learned it")
+    goal: str = Field("", description='What is wanted in words, e.g. "6 slices, 8 cubes"; else --goal-meshes, --trial')
+    trial: int = Field(0, ge=0, le=2000, description="Trial of --demonstrations whose objects and fragments are taken")
+    food: FoodName = Field("carrot", description="What is cut without --mesh and --demonstrations, made from --seed")
+    unit: Literal["m", "mm"] = Field("m", description="Unit of --mesh and --goal-meshes")
+    image_width: int = Field(1200, ge=300, le=4000, description="Width of the pictures [px]")
+
+
+class SimulateParameters(Parameters):
+    """Options of `cutting simulate`."""
+
+    method: MethodName = Field("ours", description="Who plans each cut from what lies on the board")
+    image_width: int = Field(1200, ge=300, le=4000, description="Width of the pictures [px]")
+
+
+class EvaluateParameters(Parameters):
+    """Options of `cutting evaluate`. Goals are trials of seeds `first_goal` and up."""
+
+    cells: tuple[str, ...] = Field(CELL_NAMES, description="Cells of the thesis's table")
+    methods: tuple[str, ...] = Field(
+        ("scatter", "ours"), description="scatter (the scripted cutter), and what was learned"
+    )
+    goals: int = Field(10, ge=1, le=1000, description="Goals in each cell")
+    first_goal: int = Field(0, ge=0, le=2**31, description="Seed of the first goal")
+
+
+def check_learn(parameters: LearnParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError for an unknown method."""
+    _check_names("--methods", parameters.methods, METHODS)
+
+
+def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError for an unknown method or cell."""
+    _check_names("--methods", parameters.methods, ("scatter", *METHODS))
+    _check_names("--cells", parameters.cells, CELL_NAMES)
+
+
+def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError unless there is one goal, and words that can be read."""
+    given = [name for name in ("goal_meshes", "demonstrations") if inputs.get(name) is not None]
+    if parameters.goal:
+        read_words(parameters.goal)
+        if "goal_meshes" in given:
+            raise UsageError("--goal and --goal-meshes both say what is wanted", hint="give one of them")
+        if parameters.method != "ours":
+            raise UsageError(f"--method {parameters.method} plans for fragments, not for words", hint="--method ours")
+    elif not given:
+        raise UsageError(
+            "cutting plan: nothing is wanted", hint='give --goal "6 slices", --goal-meshes or --demonstrations'
+        )
+    if "demonstrations" in given and inputs.get("mesh") is not None:
+        raise UsageError("--mesh and --demonstrations both say what is cut", hint="give one of them")
+
+
+def _check_names(option: str, names: tuple[str, ...], known: tuple[str, ...]) -> None:
+    for name in names:
+        if name not in known:
+            raise UsageError(f"{option}: there is no {name!r}", hint=f"choose of {', '.join(known)}")
+
+
+DEMONSTRATE = Stage(
+    name="cutting demonstrate",
+    version=1,
+    summary="Record a scripted cutter, who misses as people do: foods cut into chunks, slices, strips, cubes",
+    parameters=DemonstrateParameters,
+    reads={},
+    writes=CuttingDemonstrations,
+    libraries=(*LIBRARIES, "open3d", "pillow"),
+    module="demonstrate_stage",
+    example="scenewright cutting demonstrate --seed 1 --out outputs/cutting/demonstrations",
+)
+LEARN = Stage(
+    name="cutting learn",
+    version=1,
+    summary="Learn types of fragments and rules of cutting from demonstrations",
+    parameters=LearnParameters,
+    reads={"demonstrations": CuttingDemonstrations},
+    writes=CuttingModel,
+    libraries=(*LIBRARIES, "torch"),
+    module="learn_stage",
+    check=check_learn,
+    example="scenewright cutting learn --demonstrations outputs/cutting/demonstrations --out outputs/cutting/model",
+)
+PLAN = Stage(
+    name="cutting plan",
+    version=1,
+    summary="Plan cuts towards fragments that are wanted, or say why that cannot be",
+    parameters=PlanParameters,
+    reads={
+        "model": CuttingModel,
+        "demonstrations": Optionally(CuttingDemonstrations),
+        "mesh": Optionally(External("closed mesh of what is cut (PLY, OBJ, STL, GLB)")),
+        "goal_meshes": Optionally(External("folder of closed meshes, the fragments that are wanted")),
+    },
+    writes=CuttingPlan,
+    libraries=(*LIBRARIES, "torch", "open3d", "pillow"),
+    module="plan_stage",
+    check=check_plan,
+    example='scenewright cutting plan --model outputs/cutting/model --goal "6 slices, 8 cubes" --out outputs/cut',
+)
+SIMULATE = Stage(
+    name="cutting simulate",
+    version=1,
+    summary="Cut on a board in physics, planning anew after each cut from what lies there",
+    parameters=SimulateParameters,
+    reads={"plan": CuttingPlan, "model": CuttingModel},
+    writes=CuttingTrial,
+    libraries=(*LIBRARIES, "torch", "pybullet", "open3d", "pillow"),
+    module="simulate_stage",
+    example="scenewright cutting simulate --plan outputs/cutting/plan --model outputs/cutting/model "
+    "--out outputs/cutting/trial",
+)
+EVALUATE = Stage(
+    name="cutting evaluate",
+    version=1,
+    summary="Compare methods of cutting over many seeded goals, with intervals",
+    parameters=EvaluateParameters,
+    reads={"model": CuttingModel},
+    writes=CuttingEvaluation,
+    libraries=(*LIBRARIES, "torch"),
+    module="evaluate_stage",
+    check=check_evaluate,
+    example="scenewright cutting evaluate --model outputs/cutting/model --goals 20 --out outputs/cutting/evaluation",
+)
+STAGES = [DEMONSTRATE, LEARN, PLAN, SIMULATE, EVALUATE]

@@ -1,0 +1,200 @@
+"""The step `cutting plan`: cuts towards a goal of bodies or words, each planned from what the last one left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from schemas.base import as_vector
+from schemas.cutting_demonstrations import CuttingDemonstrations
+from schemas.cutting_model import CuttingModel
+from schemas.cutting_plan import CuttingPlan, CuttingPlanFile, CuttingScores, PlannedCut, WantedFragment
+from stages.cutting.bodies_file import write_bodies
+from stages.cutting.demonstrations.records import plane_record, read_demonstrations
+from stages.cutting.measure.scores import Scores, score
+from stages.cutting.methods import Learned, read_learned
+from stages.cutting.ours.imagining import imagine
+from stages.cutting.ours.items import Item, item_of
+from stages.cutting.parameters import PlanParameters
+from stages.cutting.pictures import animate, apart, draw, strip
+from stages.cutting.policy import Carving, Goal, carry_out
+from stages.cutting.words import read_words
+from stages.cutting.world.body import Body
+from stages.cutting.world.canonical import canonical
+from stages.cutting.world.foods import make_food
+from stages.cutting.world.mending import read_bodies_of, read_body
+from stages.kit.geometry.transforms import inverse
+from stages.kit.stage import Context
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What is cut into what."""
+
+    objects: list[Body]
+    goal: list[Body]
+    """Empty for words."""
+    items: list[Item]
+    names: list[str]
+    said: str
+    notes: tuple[str, ...]
+
+
+def run(
+    model: CuttingModel,
+    demonstrations: CuttingDemonstrations | None,
+    mesh: Path | None,
+    goal_meshes: Path | None,
+    *,
+    parameters: PlanParameters,
+    context: Context,
+) -> CuttingPlan:
+    """Plan, in a model of the world that cuts exactly."""
+    learned = read_learned(model)
+    task = _task(learned, demonstrations, mesh, goal_meshes, parameters, context)
+    if task.goal:
+        policy = learned.policy(parameters.method, Goal(tuple(task.goal)), context.seed)
+    else:
+        policy = learned.policy_for(task.items)
+    with context.progress.step("plan"):
+        carving = carry_out(policy, task.objects, most=_most(parameters.method, task))
+    scores = score(carving.fragments, task.goal) if task.goal else None
+    reached = carving.stopped is None and len(carving.board) >= len(task.items)
+    file = _file(task, carving, scores, parameters.method, reached)
+    file.write(context.output / "plan.json")
+    context.output.joinpath("plan.txt").write_text(plan_text(file), encoding="utf-8")
+    write_bodies(context.output / "bodies.npz", [*task.objects, *task.goal, *carving.fragments])
+    with context.progress.step("pictures"):
+        _draw(context.output, task, carving, parameters.image_width)
+    summary: dict[str, object] = {"method": parameters.method, "cuts": len(carving.steps), "wanted": len(task.items)}
+    if scores is not None:
+        summary["iou"] = round(scores.iou, 3)
+    if not reached:
+        summary["reason"] = file.statement
+    return CuttingPlan(root=context.output, outcome="ok" if reached else "not_reached", summary=summary)
+
+
+def _most(method: str, task: _Task) -> int:
+    """Ours stops by itself, with a piece more where something is left over; the others cut until there are enough."""
+    return len(task.items) + 1 if method == "ours" else len(task.items)
+
+
+def _task(
+    learned: Learned,
+    demonstrations: CuttingDemonstrations | None,
+    mesh: Path | None,
+    goal_meshes: Path | None,
+    parameters: PlanParameters,
+    context: Context,
+) -> _Task:
+    notes: list[str] = []
+    goal: list[Body] = []
+    said = parameters.goal
+    if demonstrations is not None:
+        (trial,) = read_demonstrations(demonstrations, only=parameters.trial)
+        objects = trial.objects
+        if not parameters.goal and goal_meshes is None:
+            goal, said = trial.fragments, f"the fragments of trial {parameters.trial}"
+    elif mesh is not None:
+        body, mended = read_body(mesh, parameters.unit)
+        objects, notes = [body], [f"{mesh.name}: {text}" for text in mended]
+    else:
+        objects = [make_food(parameters.food, context.random(0))]
+    if goal_meshes is not None:
+        goal, mended = read_bodies_of(goal_meshes, parameters.unit)
+        said, notes = f"{len(goal)} meshes of {goal_meshes.name}", notes + mended
+    if parameters.goal:
+        items, names = imagine(objects, read_words(parameters.goal), learned.grammar)
+    else:
+        items, names = [item_of(body, k) for k, body in enumerate(goal)], [""] * len(goal)
+    return _Task(objects, goal, items, names, said, tuple(notes))
+
+
+def _file(task: _Task, carving: Carving, scores: Scores | None, method: str, reached: bool) -> CuttingPlanFile:
+    cuts = []
+    for step in carving.steps:
+        frame = canonical(carving.pieces[step.action.piece]).world_from_fragment
+        cuts.append(
+            PlannedCut(
+                piece=step.action.piece,
+                plane=plane_record(step.action.plane),
+                in_fragment=plane_record(step.action.plane.moved(inverse(frame))),
+                results=step.results,
+                said=step.action.said,
+                likeness=step.action.likeness,
+            )
+        )
+    alike = [cut.likeness for cut in cuts if cut.likeness is not None]
+    statement = f"{len(cuts)} cuts make {len(carving.board)} fragments, {len(task.items)} are wanted"
+    if carving.stopped is not None:
+        statement += f"; stopped: {carving.stopped.message}"
+    elif not reached and carving.refusals:
+        statement += f"; the knife refused: {carving.refusals[-1].message}"
+    return CuttingPlanFile(
+        method=method,
+        goal=task.said,
+        objects=len(task.objects),
+        wanted=tuple(
+            WantedFragment(edges=as_vector(np.array(item.edges)), volume=item.volume, name=name)
+            for item, name in zip(task.items, task.names, strict=True)
+        ),
+        goal_bodies=len(task.goal),
+        cuts=tuple(cuts),
+        refusals=tuple(carving.refusals),
+        stopped=carving.stopped,
+        scores=None if scores is None else scores_record(scores),
+        sure=float(np.mean(alike[: len(task.objects)])) if alike else None,
+        notes=task.notes,
+        statement=statement,
+    )
+
+
+def scores_record(scores: Scores) -> CuttingScores:
+    """Return scores as a record."""
+    return CuttingScores(**vars(scores))
+
+
+def plan_text(file: CuttingPlanFile) -> str:
+    """Return a plan as people read it: the statement, and the parse tree of cuts."""
+    lines = [file.statement, f"goal: {file.goal}, planned by {file.method}"]
+    if file.sure is not None:
+        lines.append(f"expected overlap with what is wanted: {file.sure:.2f}")
+    if file.scores is not None:
+        lines.append(f"overlap: {file.scores.iou:.3f}, unmatched left out {file.scores.iou_thesis:.3f}")
+    lines += [f"mended: {note}" for note in file.notes]
+    lines.append("")
+    by_piece = {cut.piece: cut for cut in file.cuts}
+    waiting = [(number, 0) for number in reversed(range(file.objects))]
+    while waiting:
+        piece, depth = waiting.pop()
+        cut = by_piece.get(piece)
+        if cut is None:
+            lines.append(f"{'  ' * depth}{piece}")
+            continue
+        n, d = cut.in_fragment.normal, cut.in_fragment.d
+        sure = "" if cut.likeness is None else f", expected overlap {cut.likeness:.2f}"
+        lines.append(
+            f"{'  ' * depth}{piece}: cut at ({n[0]:.3f}, {n[1]:.3f}, {n[2]:.3f}) . x = {-1e3 * d:.1f} mm, "
+            f"{cut.said}{sure}"
+        )
+        waiting += [(result, depth + 1) for result in reversed(cut.results)]
+    return "\n".join(lines) + "\n"
+
+
+def _draw(output: Path, task: _Task, carving: Carving, width: int) -> None:
+    images = [
+        draw(dict(enumerate(task.objects)), width // 3, "before"),
+        draw(apart(carving.board), width // 3, f"after {len(carving.steps)} cuts, fragments apart"),
+    ]
+    if task.goal:
+        images.append(draw(apart(dict(enumerate(task.goal))), width // 3, "wanted, fragments apart"))
+    strip(images).save(output / "fragments.png")
+    there = dict(enumerate(task.objects))
+    frames = [dict(there)]
+    for step in carving.steps:
+        del there[step.action.piece]
+        there |= {number: carving.pieces[number] for number in step.results}
+        frames.append(apart(there))
+    animate(output / "cuts.gif", frames, width // 3, [f"{k} cuts" for k in range(len(frames))])

@@ -1,0 +1,92 @@
+"""The step `cutting simulate`: objects and goal of a plan, cut on a board, each cut planned from what lies there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from schemas.cutting_model import CuttingModel
+from schemas.cutting_plan import CuttingPlan, CuttingPlanFile, CuttingTrial, CuttingTrialFile
+from schemas.errors import BadInput, UsageError
+from stages.cutting.board import Board, laid_out
+from stages.cutting.bodies_file import read_bodies, write_bodies
+from stages.cutting.measure.scores import score
+from stages.cutting.methods import Learned, read_learned
+from stages.cutting.ours.items import Item
+from stages.cutting.parameters import SimulateParameters
+from stages.cutting.pictures import animate, apart, draw, strip
+from stages.cutting.plan_stage import scores_record
+from stages.cutting.policy import Goal, Policy, carry_out
+from stages.cutting.world.body import Body
+from stages.kit.stage import Context
+
+
+def run(plan: CuttingPlan, model: CuttingModel, *, parameters: SimulateParameters, context: Context) -> CuttingTrial:
+    """Cut in physics."""
+    file = plan.info
+    bodies = read_bodies(plan.path("bodies.npz"))
+    if len(bodies) < file.objects + file.goal_bodies:
+        raise BadInput(f"{plan.root}: has {len(bodies)} bodies, fewer than its objects and goal", hint="plan again")
+    objects, goal = laid_out(bodies[: file.objects]), bodies[file.objects : file.objects + file.goal_bodies]
+    policy = _policy(read_learned(model), file, goal, parameters.method, context.seed)
+    board = Board()
+    frames: list[Mapping[int, Body]] = []
+
+    def lie(there: dict[int, Body]) -> None:
+        board.rest(there)
+        frames.append(dict(there))
+
+    try:
+        with context.progress.step("cut"):
+            start = dict(enumerate(objects))
+            lie(start)
+            most = len(file.wanted) + (parameters.method == "ours")
+            carving = carry_out(policy, list(start.values()), most=most, lie=lie)
+    finally:
+        board.close()
+    scores = scores_record(score(carving.fragments, goal)) if goal else None
+    reached = carving.stopped is None and len(carving.board) >= len(file.wanted) and not board.fallen
+    statement = f"{len(carving.steps)} cuts left {len(carving.board)} fragments, {len(file.wanted)} were wanted"
+    if board.fallen:
+        statement += f"; {len(board.fallen)} fell off the board"
+    if carving.stopped is not None:
+        statement += f"; stopped: {carving.stopped.message}"
+    CuttingTrialFile(
+        method=parameters.method,
+        goal=file.goal,
+        cuts=len(carving.steps),
+        fragments=len(carving.board),
+        wanted=len(file.wanted),
+        refusals=tuple(carving.refusals),
+        stopped=carving.stopped,
+        scores=scores,
+        fallen=len(board.fallen),
+        turned=float(np.mean(board.turned)) if board.turned else 0.0,
+        statement=statement,
+    ).write(context.output / "trial.json")
+    write_bodies(context.output / "bodies.npz", carving.fragments)
+    with context.progress.step("pictures"):
+        width = parameters.image_width // 3
+        images = [draw(frames[0], width, "before"), draw(frames[-1], width, "as the fragments lie")]
+        images.append(draw(apart(carving.board), width, "fragments apart"))
+        strip(images).save(context.output / "board.png")
+        animate(context.output / "board.gif", frames, width, [f"{k} cuts" for k in range(len(frames))])
+    summary: dict[str, object] = {
+        "method": parameters.method,
+        "cuts": len(carving.steps),
+        "fragments": len(carving.board),
+    }
+    if scores is not None:
+        summary["iou"] = round(scores.iou, 3)
+    if not reached:
+        summary["reason"] = statement
+    return CuttingTrial(root=context.output, outcome="ok" if reached else "not_reached", summary=summary)
+
+
+def _policy(learned: Learned, file: CuttingPlanFile, goal: list[Body], method: str, seed: int) -> Policy:
+    if goal:
+        return learned.policy(method, Goal(tuple(goal)), seed)
+    if method != "ours":
+        raise UsageError(f"--method {method} cuts towards fragments, the plan's goal is words", hint="--method ours")
+    return learned.policy_for([Item(k, wanted.edges, wanted.volume) for k, wanted in enumerate(file.wanted)])

@@ -1,0 +1,1 @@
+"""What is cut: closed bodies, planes, the knife and the board."""

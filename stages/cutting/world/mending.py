@@ -1,0 +1,86 @@
+"""Closed bodies out of a user's meshes: mended where the libraries can, which is said; else refused with the reason."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import trimesh
+
+from schemas.errors import BadInput
+from stages.cutting.world.body import Body
+from stages.cutting.world.canonical import canonical
+from stages.kit.formats.mesh_files import read_mesh
+
+LONGEST, SHORTEST = 1.0, 0.004
+"""Edge of what lies on a board [m]."""
+MOST_FACES = 200_000
+UNLIKE = 0.05
+"""Share by which the volume that faces enclose may differ from the space inside: overlaps count twice."""
+SUFFIXES = (".ply", ".obj", ".stl", ".glb")
+
+
+def read_body(path: Path, unit: Literal["m", "mm"]) -> tuple[Body, list[str]]:
+    """Return the closed body in a mesh file, centred, and what was mended of it.
+
+    Raises BadInput: no mesh, open, self-intersecting, in pieces, of a size that is no food's.
+    """
+    mesh = read_mesh(path, hint="give a closed mesh (PLY, OBJ, STL, GLB)")
+    if len(mesh.faces) > MOST_FACES:
+        raise BadInput(f"{path}: {len(mesh.faces)} triangles, at most {MOST_FACES} are cut", hint="decimate it")
+    if unit == "mm":
+        mesh.apply_scale(1e-3)
+    _check_size(float(np.ptp(mesh.vertices, axis=0).max()), path, unit)
+    body, mended = _closed(mesh, path)
+    shape = canonical(body)
+    grid, filled = shape.voxels(float(shape.size.max()) / 64)
+    inside = float(filled.sum()) * grid.voxel**3
+    if abs(inside - body.volume) > UNLIKE * max(inside, body.volume):
+        raise BadInput(
+            f"{path}: self-intersecting: its faces enclose {1e6 * body.volume:.2f} cm3, the space inside is "
+            f"{1e6 * inside:.2f} cm3",
+            hint="unite its parts in a mesh editor",
+        )
+    return body.shifted(-body.moments[0]), mended
+
+
+def _check_size(longest: float, path: Path, unit: str) -> None:
+    if longest > LONGEST:
+        hint = "is it in millimetres? give --unit mm" if unit == "m" else "give a mesh of what lies on a board"
+        raise BadInput(f"{path}: {longest:.1f} m long, at most {LONGEST:.0f} m are cut", hint=hint)
+    if longest < SHORTEST:
+        hint = "is it in metres? give --unit m" if unit == "mm" else "give a mesh in metres"
+        raise BadInput(f"{path}: {1e3 * longest:.2f} mm long, at least {1e3 * SHORTEST:.0f} mm are cut", hint=hint)
+
+
+def _closed(mesh: trimesh.Trimesh, path: Path) -> tuple[Body, list[str]]:
+    mended = []
+    whole = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)  # files like STL repeat vertices: not a fault
+    whole.update_faces(whole.nondegenerate_faces() & whole.unique_faces())
+    if not whole.is_watertight:
+        whole.fill_holes()
+        if not whole.is_watertight:
+            edges = len(trimesh.grouping.group_rows(whole.edges_sorted, require_count=1))
+            raise BadInput(f"{path}: open: {edges} edges have one face", hint="close it in a mesh editor")
+        mended.append("holes filled")
+    if not whole.is_winding_consistent or whole.volume < 0:
+        trimesh.repair.fix_normals(whole)
+        mended.append("faces turned outwards")
+    parts = whole.split(only_watertight=False)
+    if len(parts) > 1:
+        raise BadInput(f"{path}: {len(parts)} bodies that do not hang together", hint="give them one by one")
+    try:
+        return Body.of_mesh(whole.vertices, whole.faces), mended
+    except ValueError as error:
+        raise BadInput(f"{path}: no closed body: {error}", hint="repair it in a mesh editor") from None
+
+
+def read_bodies_of(folder: Path, unit: Literal["m", "mm"]) -> tuple[list[Body], list[str]]:
+    """Return the bodies of the mesh files of a folder by name, or of one file. Raises BadInput."""
+    folder = Path(folder)
+    paths = [folder] if folder.is_file() else sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES)
+    if not paths:
+        raise BadInput(f"{folder}: holds no meshes", hint=f"known: {', '.join(SUFFIXES)}")
+    read = [(path, *read_body(path, unit)) for path in paths]
+    return [body for _, body, _ in read], [f"{path.name}: {text}" for path, _, mended in read for text in mended]

@@ -1,0 +1,157 @@
+"""The commands of cutting on a small corpus, and what they refuse in one line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from cli.main import run
+from schemas.cutting_demonstrations import CuttingDemonstrationsFile
+from schemas.cutting_plan import CuttingPlanFile, CuttingTrialFile
+from schemas.errors import BadInput, UsageError
+from stages.cutting.demonstrations.cutter import follow
+from stages.cutting.demonstrations.trials import make_trial
+from stages.cutting.measure.scores import score, volume_error
+from stages.cutting.ours.grammar import Grammar, learn
+from stages.cutting.ours.imagining import imagine
+from stages.cutting.ours.items import Item, item_of
+from stages.cutting.ours.policy import OursPolicy
+from stages.cutting.policy import Stop, carry_out
+from stages.cutting.words import read_words
+from stages.cutting.world.mending import read_body
+
+SMALL = ["--image-width", "300", "--quiet"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("cutting")
+    made = str(out / "demonstrations")
+    assert run(["cutting", "demonstrate", "--share", "0.3", "--seed", "1", "--out", made, *SMALL]) == 0
+    assert run(["cutting", "learn", "--demonstrations", made, "--out", str(out / "model"), "--quiet"]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def grammar() -> Grammar:
+    return learn([make_trial("n1m1", (0, k)) for k in range(12)], 0)
+
+
+def test_a_goal_in_words_is_planned_and_cut_on_a_board(folder: Path) -> None:
+    model, plan, trial = (str(folder / name) for name in ("model", "plan", "trial"))
+    words = ["--goal", "4 slices, 2 chunks", "--out", plan]
+    assert run(["cutting", "plan", "--model", model, *words, *SMALL]) == 0
+    planned = CuttingPlanFile.read(folder / "plan" / "plan.json")
+    assert len(planned.cuts) == 5 and [w.name for w in planned.wanted].count("slices") == 4
+    assert run(["cutting", "simulate", "--plan", plan, "--model", model, "--out", trial, *SMALL]) == 0
+    assert CuttingTrialFile.read(folder / "trial" / "trial.json").fragments == 6
+
+
+def test_ours_makes_the_fragments_of_a_trial(grammar: Grammar) -> None:
+    trial = make_trial("n1m1", (9, 1))
+    items = [item_of(body, k) for k, body in enumerate(trial.fragments)]
+    carving = carry_out(OursPolicy(grammar, items), trial.objects, most=99)
+    found = score(carving.fragments, trial.fragments)
+    assert found.count_exact and found.iou > 0.6 and found.iou == found.iou_thesis
+
+
+def test_the_measure_is_one_for_the_same_and_counts_what_is_missing() -> None:
+    fragments = follow("n1m1", ("carrot",), make_trial("n1m1", (3, 0)).objects, ("chunks",), np.random.default_rng(0))
+    halves = make_trial("n1m1", (3, 1)).fragments
+    same = score(halves, halves)
+    assert same.iou == 1.0 and same.shape_distance == 0.0 and same.volume_error == 0.0
+    fewer = score(halves[1:], halves)
+    assert fewer.iou_thesis == 1.0 and fewer.iou == pytest.approx(1 - 1 / len(halves)) and fewer.count_error == 1
+    assert volume_error([2.0], [1.0, 1.0]) == 1.0 and len(fragments.fragments) == 1
+
+
+def test_more_volume_than_there_is_stops_with_the_numbers(grammar: Grammar) -> None:
+    body = make_trial("n1m1", (3, 0)).objects[0]
+    items = [Item(k, (0.02, 0.03, 0.04), body.volume) for k in range(2)]
+    decided = OursPolicy(grammar, items).decide({0: body})
+    assert isinstance(decided, Stop) and decided.failure is not None
+    assert decided.failure.kind == "too_much_volume"
+    assert decided.failure.numbers["asked"] == pytest.approx(2 * decided.failure.numbers["there"])
+    thin = [Item(0, (0.0005, 0.02, 0.03), body.volume / 9), Item(1, (0.02, 0.02, 0.03), body.volume / 9)]
+    decided = OursPolicy(grammar, thin).decide({0: body})
+    assert isinstance(decided, Stop) and decided.failure is not None and decided.failure.kind == "too_thin"
+
+
+def test_trials_that_stop_midway_teach_cuts_but_no_names(folder: Path) -> None:
+    records = CuttingDemonstrationsFile.read(folder / "demonstrations" / "demonstrations.json").trials
+    assert sum(record.training for record in records) == 6
+    trials = [make_trial("n1m1", (0, k)) for k in range(6)]
+    trials[0].finished = False
+    assert learn(trials, 0).named.sum() == sum(len(trial.final) for trial in trials[1:])
+    with pytest.raises(ValueError, match="cuts anything"):
+        learn([], 0)
+
+
+def _mesh(tmp_path: Path, mesh: trimesh.Trimesh) -> Path:
+    mesh.export(tmp_path / "body.stl")
+    return tmp_path / "body.stl"
+
+
+def test_meshes_are_mended_where_that_can_be_and_it_is_said(tmp_path: Path) -> None:
+    inverted = trimesh.creation.box((0.04, 0.05, 0.1))
+    inverted.invert()
+    body, mended = read_body(_mesh(tmp_path, inverted), "m")
+    assert body.volume == pytest.approx(2e-4, rel=1e-5) and mended == ["faces turned outwards"]
+    holed = trimesh.creation.box((40, 50, 100))
+    holed.update_faces(np.arange(len(holed.faces)) > 0)
+    body, mended = read_body(_mesh(tmp_path, holed), "mm")
+    assert body.volume == pytest.approx(2e-4, rel=1e-5) and mended == ["holes filled"]
+
+
+def _cut_open() -> trimesh.Trimesh:
+    mesh = trimesh.creation.icosphere(radius=0.04)
+    mesh.update_faces(mesh.triangles_center[:, 2] < 0.01)
+    return mesh
+
+
+def _pushed_through() -> trimesh.Trimesh:
+    """A ball whose top comes out of its bottom."""
+    mesh = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
+    z = mesh.vertices[:, 2]
+    mesh.vertices[:, 2] = np.where(z > 0.01, 0.01 - 2.2 * (z - 0.01), z)
+    return mesh
+
+
+@pytest.mark.parametrize(
+    ("mesh", "said"),
+    [
+        (trimesh.creation.box((40, 50, 100)), "--unit mm"),
+        (trimesh.creation.box((1e-4, 1e-4, 1e-4)), "at least 4 mm"),
+        (_cut_open(), "open: "),
+        (_pushed_through(), "self-intersecting"),
+    ],
+)
+def test_meshes_that_cannot_be_cut_are_refused(tmp_path: Path, mesh: trimesh.Trimesh, said: str) -> None:
+    with pytest.raises(BadInput) as refused:
+        read_body(_mesh(tmp_path, mesh), "m")
+    assert said in str(refused.value) and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("text", ["", "slices", "0 cubes", "3 wedges", "2 cubes, 3 cubes", "999999 cubes", "-1 cubes"])
+def test_words_that_are_no_goal_are_refused(text: str) -> None:
+    with pytest.raises(UsageError):
+        read_words(text)
+    assert read_words("6 slices and 8 cubes") == [(6, "slices"), (8, "cubes")]
+
+
+def test_a_category_that_was_never_shown_is_refused() -> None:
+    trial = next(t for k in range(20) if set((t := make_trial("n1m1", (0, k))).categories.values()) == {"chunks"})
+    with pytest.raises(BadInput, match="not been shown strips"):
+        imagine(trial.objects, [(4, "strips")], learn([trial] * 4, 0))
+
+
+def test_a_cut_of_what_does_not_lie_there_is_refused(folder: Path) -> None:
+    path = folder / "demonstrations" / "demonstrations.json"
+    data = json.loads(path.read_text())
+    data["trials"][0]["cuts"][0]["piece"] = 7
+    with pytest.raises(ValueError, match="does not lie there"):
+        CuttingDemonstrationsFile.model_validate_json(json.dumps(data))
