@@ -1,0 +1,18 @@
+"""The agent: an episode as its transcript and the map that grew, an evaluation as its table."""
+
+from __future__ import annotations
+
+from cli.viewing.canvas import Canvas
+from schemas.agent_episode import AgentEpisode, AgentEvaluation
+from schemas.outside import LARGEST_SHOWN, file_content, file_text
+
+
+def draw_agent_episode(episode: AgentEpisode, canvas: Canvas) -> None:
+    """Show what was thought, done and seen, and the last map."""
+    canvas.document("episode", file_text(episode.path("episode.txt"), LARGEST_SHOWN))
+    canvas.picture("map", file_content(episode.path("map.png"), LARGEST_SHOWN))
+
+
+def draw_agent_evaluation(evaluation: AgentEvaluation, canvas: Canvas) -> None:
+    """Show the table."""
+    canvas.document("table", file_text(evaluation.path("table.md"), LARGEST_SHOWN))
