@@ -13,7 +13,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchema
 from pydantic_core import CoreSchema
 
 from schemas.errors import BadInput
-from schemas.outside import LARGEST_DOCUMENT, check_integers, file_content
+from schemas.outside import LARGEST_DOCUMENT, LARGEST_INTEGER, check_integers, file_content
 
 
 def canonical_json(value: Any) -> str:
@@ -71,6 +71,8 @@ LARGEST_NUMBER = 1e12
 LARGEST_SEED = 2**31 - 1
 """Of a command; those that follow from it are larger by a few."""
 Seed = Annotated[int, Field(ge=0, le=2**53)]
+Count = Annotated[int, Field(ge=0, le=LARGEST_INTEGER)]
+"""Of bytes and the like, which no array of 32 bits has to hold."""
 
 
 def bounded(schema: Any, above_zero: float = 0.0) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from schemas.artifact import Artifact, Document
-from schemas.base import Model
+from schemas.base import Count, Model
 
 
 class ExportFile(Model):
@@ -24,7 +24,7 @@ class ExportFile(Model):
     frames_in_sequence: int
     left_out: dict[str, int] = {}
     """Reason -> frames of the sequence that are not in the export."""
-    depth_pixels_zeroed: int = 0
+    depth_pixels_zeroed: Count = 0
     """Pixels whose depth is too large for the layout's unit; they are 0 = invalid."""
     depth_limit: float | None = None
     """Largest depth that the layout holds [m]."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from schemas.artifact import Artifact, Document
-from schemas.base import Model, Name, Seed, Transform, Vector3
+from schemas.base import Count, Model, Name, Seed, Transform, Vector3
 from schemas.contact_graph import ContactGraphFile
 from schemas.scene_parts import Box, Camera
 
@@ -29,7 +29,7 @@ class TrueObject(Model):
     scan, and where a model lies across its axes, the one of least footprint."""
     round: bool = False
     """Turning it about the vertical changes nothing that matters (a bottle): the yaw of its box says nothing."""
-    visible_pixels: int = 0
+    visible_pixels: Count = 0
     """Pixels over all frames, in a scan points of visible.npz; 0 for what the camera never saw."""
 
 

@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
 
-from schemas.base import Model
+from schemas.base import Count, Model
 from schemas.errors import BadInput
-from schemas.outside import LARGEST_INTEGER, check_bounds
+from schemas.outside import check_bounds
 
 MANIFEST_NAME = "manifest.json"
 FORMAT_VERSION = 1
@@ -47,7 +47,6 @@ def _check_values(values: dict[str, Any]) -> dict[str, Any]:
 
 
 AnyPath = Annotated[str, AfterValidator(_check_path)]
-Count = Annotated[int, Field(ge=0, le=LARGEST_INTEGER)]
 Values = Annotated[dict[str, Any], AfterValidator(_check_values)]
 
 

@@ -87,7 +87,7 @@ for given in ({"backend": "two-spot"}, {"backend": "geometric", "spot_size": 4})
     assert "`two-spots`: two spots a frame" in words and "--spot-size" in words and "Diameter of a spot" in words
     assert "a file of spots (two-spots)" in words
     assert "['segment --backend two-spots: make some spots']" in words
-    assert words.count("spots of 5 {'spotlib': 'absent'}") == 2
+    assert words.count("spots of 5 {'spotlib': 'absent'") == 2
     assert "did you mean two-spots? one of two-spots, " in words
     assert "--spot-size is for --backend two-spots alone" in words
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.base import Model
+from schemas.base import Count, Model, Seed
 
 
 class Job(Model):
@@ -12,7 +12,7 @@ class Job(Model):
     """`<scene>[/<parameters>][/seed-<n>]`, also the run folder inside the batch folder."""
     scene: str
     parameters: str | None = None
-    seed: int | None = None
+    seed: Seed | None = None
     folder: str
     command: tuple[str, ...]
     """What runs the scene: argument words, no shell. Standard error goes into the scene's log."""
@@ -24,9 +24,9 @@ class Job(Model):
     """Set for the scene where the user's environment does not set it."""
     time_limit: float | None = None
     """Wall clock [s]."""
-    memory_limit: int | None = None
+    memory_limit: Count | None = None
     """Resident memory of all its processes together [bytes]."""
-    address_space: int | None = None
+    address_space: Count | None = None
     """RLIMIT_AS of each of its processes [bytes]."""
     grace: float = 10.0
     """Between SIGTERM and SIGKILL [s]."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import Field, ValidationError
 
-from schemas.base import Model, canonical_json
+from schemas.base import Count, Model, Seed, canonical_json
 from schemas.errors import BadInput, MachineFailure
 from schemas.outside import file_content
 from stages.engine.batch.outcomes import Outcome
@@ -28,7 +28,7 @@ class SceneResult(Model):
     job: str
     scene: str
     parameters: str | None = None
-    seed: int | None = None
+    seed: Seed | None = None
     fingerprint: str
     outcome: Outcome
     exit_code: int
@@ -38,7 +38,7 @@ class SceneResult(Model):
     """One line; empty when all went well."""
     seconds: float = Field(ge=0)
     """Wall clock [s] of the attempt that counts."""
-    peak_memory_bytes: int = Field(0, ge=0)
+    peak_memory_bytes: Count = 0
     """The most resident memory seen over all processes together, or of the largest one, whichever is more."""
     host: str = ""
     started: str = ""

@@ -472,7 +472,7 @@ def names_within(path: Path) -> list[str]:
 
 @cache
 def _arrays(path: Path) -> dict[str, int]:
-    with np.load(path) as archive:
+    with np.load(path, allow_pickle=False) as archive:
         return {name: archive[name].size for name in archive.files}
 
 

@@ -120,9 +120,9 @@ def _renamed(value: Any, before: str, after: str) -> Any:
 def array(path: Path, name: str, what: str, value: Any = 0, index: int = 0) -> None:
     """Change an array of an NPZ or NPY file."""
     if path.suffix == ".npy":
-        np.save(path, _changed(np.load(path), what, value, index))
+        np.save(path, _changed(np.load(path, allow_pickle=False), what, value, index))
         return
-    with np.load(path) as archive:
+    with np.load(path, allow_pickle=False) as archive:
         arrays = dict(archive)
     if what == "gone":
         del arrays[name]

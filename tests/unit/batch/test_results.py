@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from schemas.base import LARGEST_NUMBER
 from schemas.errors import BadInput, MachineFailure
 from stages.engine.batch.results import ResultsFile, SceneResult, latest_by_job, parse_line, read_results
 from tests.unit.batch.batches import result
@@ -65,7 +66,7 @@ def test_any_line_is_a_result_or_bad_input(line: bytes) -> None:
         assert str(error).startswith("line 1")
 
 
-@given(st.text(max_size=50), st.dictionaries(st.text(max_size=8), st.floats(allow_nan=False, allow_infinity=False)))
+@given(st.text(max_size=50), st.dictionaries(st.text(max_size=8), st.floats(-LARGEST_NUMBER, LARGEST_NUMBER)))
 def test_results_survive_the_round_trip(reason: str, measures: dict[str, float]) -> None:
     one = result("a", "crash", reason=reason, measures=measures)
     line = one.as_line()

@@ -169,7 +169,7 @@ def test_bodies_that_are_held_are_counted(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def bomb(width: int, height: int, **parts: Any) -> tuple[bytes, str]:
-    camera = Camera(width=width, height=height, fx=20, fy=20, cx=8, cy=6)
+    camera = Camera.model_construct(width=width, height=height, fx=20.0, fy=20.0, cx=8.0, cy=6.0)
     frame = Frame(0, 0.0, parts.get("color"), parts.get("depth"), None, None)
     return encode_request(SegmentRequest(frame, camera, 0), ("color", "depth"))
 
