@@ -130,7 +130,7 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, progre
         entities, labelled = extract_entities(
             surface, merged[surface.segment], grouping, mapper.sightings, mapper.merging.things, settings
         )
-        if parameters.unnamed_area > 0:
+        if parameters.unnamed_area > 0 and parameters.merging == "ours":
             layout = frozenset(entry.id for entry in vocabulary.classes if entry.name in LAYOUT)
             floor = vocabulary.by_name("floor").id
             entities, labelled = with_unnamed_pieces(surface, entities, labelled, layout, floor, unnamed, parameters)

@@ -70,17 +70,16 @@ def unnamed_pieces(
     members = np.flatnonzero(free & ~of_walls(vertices, normals, free | layout, voxel))
     points = vertices[members]
     parts = _cut_above_tops(points, normals[members], _components(points, voxel), voxel)
-    parts = _joined(points, normals[members], parts, voxel)
     named = [vertices[instance == name] for name in np.unique(instance[(instance > 0) & ~layout])]
-    outlines = [(cKDTree(thing[:, :2]), float(np.quantile(thing[:, 2], TOP))) for thing in named]
+    alone = ~_of_named(points, parts, named)
+    members, points, parts = members[alone], points[alone], parts[alone]
+    parts = _joined(points, normals[members], parts, voxel)
     kept = []
     for part in np.unique(parts):
         own = members[parts == part]
         low, high = vertices[own].min(axis=0), vertices[own].max(axis=0)
         large = len(own) * voxel**2 >= minimum_area and (high - low)[:2].max() >= SMALLEST
-        if not large or high[2] - low[2] < LEAST_HEIGHT or low[2] > CEILING:
-            continue
-        if not any(low[2] < top - SAME_LEVEL and _within(vertices[own], outline) for outline, top in outlines):
+        if large and high[2] - low[2] >= LEAST_HEIGHT and low[2] < CEILING:
             kept.append(own)
     for number, own in enumerate(sorted(kept, key=lambda own: (-len(own), own[0])), 1):
         piece[own] = number
@@ -155,9 +154,16 @@ def _common(first: np.ndarray, second: np.ndarray) -> float:
     return len(np.intersect1d(first, second, assume_unique=True)) / len(first)
 
 
-def _within(points: np.ndarray, outline: cKDTree) -> bool:
-    """Whether most of the points (N, 3) lie over or under the seen surface of a thing, or shortly beside it."""
-    return bool(np.mean(outline.query(points[:, :2], distance_upper_bound=BESIDE)[0] < BESIDE) >= WITHIN)
+def _of_named(points: np.ndarray, parts: np.ndarray, named: list[np.ndarray]) -> np.ndarray:
+    """Return which points (N,) are of parts that lie over or under a named thing (M, 3) and begin below its top."""
+    result = np.zeros(len(points), bool)
+    for thing in named:
+        beside = cKDTree(thing[:, :2]).query(points[:, :2], distance_upper_bound=BESIDE)[0] < BESIDE
+        top = float(np.quantile(thing[:, 2], TOP))
+        for part in np.unique(parts[beside]):
+            own = parts == part
+            result |= own & bool(points[own, 2].min() < top - SAME_LEVEL and beside[own].mean() >= WITHIN)
+    return result
 
 
 def _joined(points: np.ndarray, normals: np.ndarray, parts: np.ndarray, voxel: float) -> np.ndarray:
