@@ -88,18 +88,25 @@ def inputs(bench: Bench, trial: Trial) -> list[Path]:
     return [scan_folder(bench), Path(bench.parameters.data) / "aws_furniture"]
 
 
+def read_raw(file: Path) -> trimesh.Trimesh:
+    """Return all surfaces of a file of ShapeNet as one mesh, its numbers as they are."""
+    mesh = trimesh.load(file, force="mesh", process=False)
+    assert isinstance(mesh, trimesh.Trimesh)
+    return mesh
+
+
 def write_models(sample: Path, out: Path) -> Path:
     """Write the models of ShapeNet in metres, named by class, into `out`: their usual height instead of a unit box."""
     shutil.rmtree(out, ignore_errors=True)
     for source in sorted(sample.glob("shapenet-sample/*/*/models/model_normalized.obj")):
         category, identity = source.parts[-4], source.parts[-3]
         name, height = USUAL_HEIGHT[category]
-        mesh = trimesh.load(source, force="mesh", process=False)
+        mesh = read_raw(source)
         mesh.apply_scale(height / float(np.ptp(mesh.vertices[:, 1])))
         folder = out / f"{name}_{identity}"
         folder.mkdir(parents=True)
         bare = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-        (folder / f"{folder.name}.obj").write_text(bare.export(file_type="obj"))
+        (folder / f"{folder.name}.obj").write_text(str(bare.export(file_type="obj")))
     return out
 
 
@@ -169,7 +176,7 @@ def compare(sample: Path, models: Path, panoptic_map: PanopticMap, scene: CadSce
     for entry in told["aligned_models"]:
         name = f"{USUAL_HEIGHT[entry['catid_cad']][0]}_{entry['id_cad']}"
         file = next(sample.glob(f"shapenet-sample/*/{entry['id_cad']}/models/model_normalized.obj"))
-        raw = trimesh.load(file, force="mesh", process=False)
+        raw = read_raw(file)
         shape = model_shape(models / "models" / name)
         true = true_shape(shape, raw, RAW_FROM_LIBRARY_FRONT[fronts[name]], entry["trs"])
         true = PlacedShape(true.shape, np.linalg.inv(world_from_scan) @ true.world_from_model)
@@ -207,7 +214,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Scan
 
 def share(right: Any) -> Measure:
     """Share of the annotated models for which `right` holds."""
-    return Measure(lambda records: float(np.mean([right(o) for r in records for o in r.objects])), interval=False)
+    return Measure(lambda records: 100 * float(np.mean([right(o) for r in records for o in r.objects])), "%", False)
 
 
 def middle(name: str, unit: str) -> Measure:

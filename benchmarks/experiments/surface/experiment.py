@@ -15,7 +15,7 @@ import numpy as np
 import open3d as o3d
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Trial, mean, median
+from benchmarks.experiment import Bench, Experiment, Measure, Trial, mean, median, statistic
 from benchmarks.experiments.surface.measuring import Surfaced, judge, seen_level_points
 from benchmarks.experiments.surface.scenes import FARTHEST, Scene, board_at, camera_of, room_at
 from stages.fuse.integration import integrate
@@ -30,7 +30,7 @@ RECIPES = ("room", "kitchen", "office", "bedroom")
 BOARDS = tuple(f"board-{seed}" for seed in range(7100, 7105))
 ROOMS = tuple(f"{recipe}-{seed}" for seed in (7100, 7101, 7102) for recipe in RECIPES)
 TUNING_BOARDS, TUNING_ROOMS = ("board-0",), ("office-40", "kitchen-40", "room-40", "bedroom-41")
-FUSE = FuseParameters()
+FUSE = FuseParameters.model_validate({})
 NEAREST = FUSE.minimum_depth
 
 
@@ -108,15 +108,15 @@ def mapped(scene: Scene) -> tuple[VoxelBlocks, float]:
 
 def of_open3d(scene: Scene, points: np.ndarray) -> Surfaced:
     """Return what Open3D's voxel block grid (Dong et al. 2022) makes of a scene."""
-    grid = o3d.t.geometry.VoxelBlockGrid(
-        ("tsdf", "weight"), (o3d.core.float32, o3d.core.float32), ((1,), (1,)), FUSE.voxel_size, 8, 20000
-    )
+    one = o3d.core.SizeVector([1])
+    kinds = (o3d.core.float32, o3d.core.float32)
+    grid = o3d.t.geometry.VoxelBlockGrid(("tsdf", "weight"), kinds, (one, one), FUSE.voxel_size, 8, 20000)
     camera = scene.camera
-    matrix = o3d.core.Tensor(np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]]))
+    matrix = o3d.core.Tensor.from_numpy(np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]]))
     started = time.process_time()
     for frame in scene.frames:
         image = o3d.t.geometry.Image(np.ascontiguousarray(frame.depth))
-        pose = o3d.core.Tensor(np.linalg.inv(frame.world_from_camera))
+        pose = o3d.core.Tensor.from_numpy(np.linalg.inv(frame.world_from_camera))
         touched = grid.compute_unique_block_coordinates(
             image, matrix, pose, 1.0, FARTHEST, trunc_voxel_multiplier=FUSE.truncation_voxels
         )
@@ -126,6 +126,12 @@ def of_open3d(scene: Scene, points: np.ndarray) -> Surfaced:
     mesh = grid.extract_triangle_mesh(weight_threshold=1.0)
     vertices, faces = mesh.vertex.positions.numpy(), mesh.triangle.indices.numpy()
     return judge(scene, points, vertices, faces, seconds, time.process_time() - started)
+
+
+def times(factor: float, name: str, unit: str) -> Measure:
+    """Return the mean over scenes, in a unit that reads well."""
+    figure = statistic(name, np.mean)
+    return Measure(lambda records: None if (value := figure(records)) is None else factor * value, unit)
 
 
 EXPERIMENT = Experiment(
@@ -144,9 +150,9 @@ EXPERIMENT = Experiment(
     measure=measure,
     record=Surfaced,
     measures={
-        "level_mapped": mean("level_mapped"),
-        "off_truth": mean("off_truth"),
-        "error": mean("error", "m"),
+        "level_mapped": times(100, "level_mapped", "%"),
+        "off_truth": times(100, "off_truth", "%"),
+        "error": times(1000, "error", "mm"),
         "vertices": mean("vertices", interval=False),
         "frame_ms": median("frame_ms", "ms", interval=False),
         "draw_ms": median("draw_ms", "ms", interval=False),

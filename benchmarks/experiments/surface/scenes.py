@@ -17,6 +17,7 @@ import trimesh
 from benchmarks.generated_rooms import make_library
 from benchmarks.steps import made
 from schemas.scene_parts import Camera
+from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.trajectories import read_tum
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import apply, look_at
@@ -115,6 +116,7 @@ def board_at(angle: float, camera: Camera, random: np.random.Generator, noisy: b
     wall = trimesh.creation.box((4.0, 0.1, 3.0), trimesh.transformations.translation_matrix((0, 1.5, 0.6)))
     floor = trimesh.creation.box((4.0, 4.0, 0.1), trimesh.transformations.translation_matrix((0, 0, -height - 0.05)))
     whole = trimesh.util.concatenate([board, wall, floor])
+    assert isinstance(whole, trimesh.Trimesh)
     world_from_board = trimesh.transformations.rotation_matrix(heading, (0, 0, 1))
     world_from_board[:3, 3] = [*random.uniform(-0.5, 0.5, 2), height]
     poses = []
@@ -140,7 +142,7 @@ def room_at(
         *("--library", library, "--recipe", recipe, "--seed", seed, "--clutter", "high"),
         *("--frames", frames, "--width", 64, "--height", 48),
     )
-    mesh = trimesh.load_mesh(truth / "mesh.ply", process=False)
+    mesh = read_mesh(truth / "mesh.ply")
     scene = raycasting(mesh.vertices, mesh.faces)
     _, walk = read_tum(truth / "trajectory.tum")
     rays = np.concatenate([walk[:, :3, 3], walk[:, :3, 2]], axis=1).astype(np.float32)
