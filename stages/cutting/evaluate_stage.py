@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 import numpy as np
 
 from schemas.cutting_model import CuttingModel
 from schemas.cutting_plan import CuttingEvaluation, CuttingEvaluationFile, EvaluatedCutting
 from stages.cutting.measure.scores import Scores
 from stages.cutting.methods import Learned, read_learned
+from stages.cutting.ours.items import item_of
 from stages.cutting.parameters import EvaluateParameters
 from stages.cutting.policy import Goal
+from stages.cutting.sight.perceiving import Hand, PerceivingPolicy
 from stages.cutting.trying import Reached, again, goal_trial, reach
 from stages.kit.measurement.bootstrap import bootstrap_interval
 from stages.kit.stage import Context
@@ -37,8 +41,13 @@ def attempt(learned: Learned, method: str, cell: str, seed: int) -> Reached:
     trial = goal_trial(cell, seed)
     if method == "scatter":
         return again(trial, seed)
+    most = len(trial.fragments) + method.startswith("ours")
+    if method == "ours_perceived":
+        items = [item_of(body, k) for k, body in enumerate(trial.fragments)]
+        with closing(Hand()) as hand:
+            return reach(PerceivingPolicy(learned.grammar, items, seed), trial, most=most, lie=hand.lay)
     policy = learned.policy(method, Goal(tuple(trial.fragments)), seed)
-    return reach(policy, trial, most=len(trial.fragments) + method.startswith("ours"))
+    return reach(policy, trial, most=most)
 
 
 def _row(method: str, cell: str, scores: list[Scores]) -> EvaluatedCutting:

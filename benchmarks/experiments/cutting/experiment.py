@@ -131,7 +131,7 @@ EXPERIMENT = Experiment(
     together=lambda trial: trial.seed.split("-")[0],
     measure=measure,
     record=Run,
-    code=dict.fromkeys(ARMS, SHARED) | {"ours_perceived": (*SHARED, "stages.cutting.sight")},
+    code=dict.fromkeys(ARMS, SHARED) | {"ours_perceived": (*SHARED, "stages.cutting.sight.perceiving")},
     measures={
         "iou": mean("iou"),
         "iou_thesis": mean("iou_thesis"),
