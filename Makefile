@@ -112,6 +112,10 @@ bench-preflight: setup ## What `inspect` makes of planted faults (QUICK=1: three
 bench-poses: setup ## Estimated camera paths: error, speed, effect on the map (QUICK=1: one room, two arms)
 	$(EXPERIMENT) poses --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-poses$(if $(QUICK),-quick) $(ASKED)
 
+.PHONY: bench-surface
+bench-surface: setup ## Seen surface that is in the map, at any angle, beside Open3D (QUICK=1: one board and room a case)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) surface --out $(OUTPUTS)/experiments/bench-surface$(if $(QUICK),-quick) $(ASKED)
+
 .PHONY: bench-mapping
 # Twenty generated rooms (three of fewer frames with QUICK=1), every arm on the same frames and masks.
 bench-mapping: setup ## The panoptic map beside the thesis and Voxblox++, tables 2.1 to 2.4 (QUICK=1: three rooms)

@@ -15,6 +15,15 @@ from numba import njit, prange
 
 from stages.fuse.voxel_blocks import FIXED_POINT, SIDE, VOXELS, VoxelBlocks, find, pack
 
+SMALL_STEPS, ALL = 0b000111, 0b111111
+"""Bits of a voxel's crossings."""
+BEHIND = np.float32(-1.0)
+"""Value of a voxel behind what was seen [truncation distances]."""
+OWN_HITS = 2
+"""A step that is large makes a surface in cells in which at least so many points were measured."""
+NEAR_HITS = 4
+"""Any surface needs so many points measured in a cell or those around it: else it was interpolated into thin air."""
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -36,9 +45,52 @@ def voxel_at(neighbours: np.ndarray, rank: int, x: int, y: int, z: int) -> int:
     return slot * VOXELS + (x % SIDE) + SIDE * (y % SIDE) + SIDE * SIDE * (z % SIDE)
 
 
-@njit(cache=True, inline="always")
-def _crosses(first: float, second: float, jump: float) -> bool:
-    return (first < 0) != (second < 0) and abs(first - second) <= jump
+@njit(parallel=True, cache=True)
+def _crossings(
+    order: np.ndarray,
+    neighbours: np.ndarray,
+    tsdf: np.ndarray,
+    weight: np.ndarray,
+    minimum_weight: float,
+    jump: float,
+    crossings: np.ndarray,
+) -> None:
+    """Tell of every voxel in `crossings` (C * 512,) uint8 which of its edges in x, y, z cross zero: bit 0, 1, 2 where
+    the step is at most `jump`, bit 3, 4, 5 where it is larger or ends behind what was seen."""
+    for rank in prange(order.shape[0]):
+        for cell in range(VOXELS):
+            x, y, z = cell % SIDE, (cell // SIDE) % SIDE, cell // (SIDE * SIDE)
+            here = order[rank] * VOXELS + cell
+            here_seen = weight[here] >= minimum_weight
+            for axis in range(3):
+                a, b, c = int(axis == 0), int(axis == 1), int(axis == 2)
+                there = voxel_at(neighbours, rank, x + a, y + b, z + c)
+                there_seen = there >= 0 and weight[there] >= minimum_weight
+                if here_seen and there_seen:
+                    if (tsdf[here] < 0) != (tsdf[there] < 0):
+                        crossings[here] |= 1 << axis if abs(tsdf[here] - tsdf[there]) <= jump else 8 << axis
+                elif here_seen or there_seen:
+                    last = here if here_seen else there
+                    if 0 <= tsdf[last] <= jump:
+                        # From the last voxel that was seen, one more towards where it was seen from.
+                        away = -1 if here_seen else 2
+                        last = voxel_at(neighbours, rank, x + away * a, y + away * b, z + away * c)
+                    if last >= 0 and weight[last] >= minimum_weight and tsdf[last] > jump:
+                        crossings[here] |= 8 << axis
+
+
+@njit(cache=True)
+def _measured_near(neighbours: np.ndarray, rank: int, x: int, y: int, z: int, hits: np.ndarray) -> bool:
+    total = 0
+    for k in range(z - 1, z + 2):
+        for j in range(y - 1, y + 2):
+            for i in range(x - 1, x + 2):
+                voxel = voxel_at(neighbours, rank, i, j, k)
+                if voxel >= 0:
+                    total += hits[voxel]
+                    if total >= NEAR_HITS:
+                        return True
+    return False
 
 
 @njit(parallel=True, cache=True)
@@ -47,13 +99,14 @@ def _vertices(
     order: np.ndarray,
     neighbours: np.ndarray,
     coordinates: np.ndarray,
+    crossings: np.ndarray,
+    hits: np.ndarray,
     tsdf: np.ndarray,
     weight: np.ndarray,
     color: np.ndarray,
     segment: np.ndarray,
     voxel_size: float,
     minimum_weight: float,
-    jump: float,
     offsets: np.ndarray,
     index: np.ndarray,
     vertices: np.ndarray,
@@ -67,24 +120,23 @@ def _vertices(
         origin = coordinates[order[rank]]
         value = np.empty(8, dtype=np.float32)
         voxels = np.empty(8, dtype=np.int64)
+        edges = np.empty(8, dtype=np.uint8)
         for cell in range(VOXELS):
             x, y, z = cell % SIDE, (cell // SIDE) % SIDE, cell // (SIDE * SIDE)
-            below = 0
-            above = 0
+            wanted = ALL if hits[order[rank] * VOXELS + cell] >= OWN_HITS else SMALL_STEPS
+            found = 0
             for corner in range(8):
                 voxel = voxel_at(neighbours, rank, x + (corner & 1), y + ((corner >> 1) & 1), z + (corner >> 2))
-                if voxel >= 0 and weight[voxel] < minimum_weight:
-                    voxel = -1
                 voxels[corner] = voxel
-                if voxel >= 0:
-                    value[corner] = tsdf[voxel]
-                    if value[corner] < 0:
-                        below += 1
-                    else:
-                        above += 1
-            if below == 0 or above == 0:
+                edges[corner] = crossings[voxel] & wanted if voxel >= 0 else 0
+                found |= edges[corner]
+            if found == 0 or not _measured_near(neighbours, rank, x, y, z, hits):
                 continue
-            crossings = 0
+            for corner in range(8):
+                if voxels[corner] >= 0 and weight[voxels[corner]] < minimum_weight:
+                    voxels[corner] = -1
+                value[corner] = tsdf[voxels[corner]] if voxels[corner] >= 0 else BEHIND
+            count_of_edges = 0
             sum_x = 0.0
             sum_y = 0.0
             sum_z = 0.0
@@ -94,30 +146,29 @@ def _vertices(
             for axis in range(3):
                 bit = 1 << axis
                 for corner in range(8):
-                    if corner & bit or voxels[corner] < 0 or voxels[corner | bit] < 0:
+                    if corner & bit or not edges[corner] & (9 << axis):
                         continue
                     first, second = value[corner], value[corner | bit]
-                    if not _crosses(first, second, jump):
-                        continue
                     along = first / (first - second)
-                    crossings += 1
+                    count_of_edges += 1
                     sum_x += (corner & 1) + (along if axis == 0 else 0.0)
                     sum_y += ((corner >> 1) & 1) + (along if axis == 1 else 0.0)
                     sum_z += (corner >> 2) + (along if axis == 2 else 0.0)
                     if write:
-                        nearest = voxels[corner | bit] if along > 0.5 else voxels[corner]
+                        near, far = (corner | bit, corner) if along > 0.5 else (corner, corner | bit)
+                        nearest = voxels[near] if voxels[near] >= 0 else voxels[far]
                         red += color[nearest, 0]
                         green += color[nearest, 1]
                         blue += color[nearest, 2]
-            if crossings == 0:
+            if count_of_edges == 0:
                 continue
             if write:
                 place = start + count
                 index[rank * VOXELS + cell] = place
-                vertices[place, 0] = (origin[0] * SIDE + x + 0.5 + sum_x / crossings) * voxel_size
-                vertices[place, 1] = (origin[1] * SIDE + y + 0.5 + sum_y / crossings) * voxel_size
-                vertices[place, 2] = (origin[2] * SIDE + z + 0.5 + sum_z / crossings) * voxel_size
-                scale = 1.0 / (crossings * FIXED_POINT)
+                vertices[place, 0] = (origin[0] * SIDE + x + 0.5 + sum_x / count_of_edges) * voxel_size
+                vertices[place, 1] = (origin[1] * SIDE + y + 0.5 + sum_y / count_of_edges) * voxel_size
+                vertices[place, 2] = (origin[2] * SIDE + z + 0.5 + sum_z / count_of_edges) * voxel_size
+                scale = 1.0 / (count_of_edges * FIXED_POINT)
                 colors[place, 0] = np.uint8(min(255.0, red * scale + 0.5))
                 colors[place, 1] = np.uint8(min(255.0, green * scale + 0.5))
                 colors[place, 2] = np.uint8(min(255.0, blue * scale + 0.5))
@@ -137,10 +188,11 @@ def _faces(
     order: np.ndarray,
     rank_of_slot: np.ndarray,
     neighbours: np.ndarray,
+    crossings: np.ndarray,
+    hits: np.ndarray,
     tsdf: np.ndarray,
     weight: np.ndarray,
     minimum_weight: float,
-    jump: float,
     index: np.ndarray,
     vertices: np.ndarray,
     offsets: np.ndarray,
@@ -154,12 +206,12 @@ def _faces(
         for cell in range(VOXELS):
             x, y, z = cell % SIDE, (cell // SIDE) % SIDE, cell // (SIDE * SIDE)
             here = order[rank] * VOXELS + cell
-            if weight[here] < minimum_weight:
+            if crossings[here] == 0:
                 continue
             for axis in range(3):
-                there = voxel_at(neighbours, rank, x + (axis == 0), y + (axis == 1), z + (axis == 2))
-                if there < 0 or weight[there] < minimum_weight or not _crosses(tsdf[here], tsdf[there], jump):
+                if not crossings[here] & (9 << axis):
                     continue
+                least = OWN_HITS if crossings[here] & (8 << axis) else 0
                 # The four cells around the edge, counter-clockwise seen from its far end.
                 complete = True
                 for turn in range(4):
@@ -177,13 +229,13 @@ def _faces(
                         complete = False
                         break
                     quad[turn] = index[rank_of_slot[around // VOXELS] * VOXELS + around % VOXELS]
-                    if quad[turn] < 0:
+                    if quad[turn] < 0 or hits[around] < least:
                         complete = False
                         break
                 if not complete:
                     continue
                 if write:
-                    if tsdf[here] >= 0:
+                    if weight[here] >= minimum_weight and tsdf[here] >= 0:
                         quad[1], quad[3] = quad[3], quad[1]
                     first = 0.0
                     second_diagonal = 0.0
@@ -229,8 +281,9 @@ def extract_surface(
     """Return the zero surface of the map, or of other values `tsdf` (C, 512) float32 for its voxels.
 
     Voxels under `minimum_weight` count as unobserved. Neighbouring voxels whose values [truncation distances] differ by
-    more than `jump` do not make a surface: such steps stand between what lies behind a silhouette and the free space
-    beside it, not on anything that was measured.
+    more than `jump` make a surface only where points were measured (hits.py): on a plane that was seen at a flat angle,
+    not between what lies behind a silhouette and the free space beside it. Such a plane may also be where what was seen
+    ends, its other side hidden by itself. Ours; the published systems draw every step or none.
     """
     order = blocks.canonical_order()
     neighbours = find_neighbours(order, blocks)
@@ -238,6 +291,9 @@ def extract_surface(
     rank_of_slot[order] = np.arange(len(order), dtype=np.int32)
     tsdf, weight = (blocks.tsdf if tsdf is None else tsdf).reshape(-1), blocks.weight.reshape(-1)
     fields = (blocks.color.reshape(-1, 3), blocks.segment.reshape(-1))
+    crossings = np.zeros(blocks.capacity * VOXELS, dtype=np.uint8)
+    _crossings(order, neighbours, tsdf, weight, minimum_weight, jump, crossings)
+    found = crossings, blocks.hits.reshape(-1)
     index = np.full(len(order) * VOXELS, -1, dtype=np.int32)
 
     def vertex_pass(write: bool, offsets: np.ndarray, count: int) -> Surface:
@@ -247,12 +303,12 @@ def extract_surface(
             order,
             neighbours,
             blocks.coordinates,
+            *found,
             tsdf,
             weight,
             *fields,
             blocks.voxel_size,
             minimum_weight,
-            jump,
             offsets,
             index,
             *arrays,
@@ -270,10 +326,10 @@ def extract_surface(
             order,
             rank_of_slot,
             neighbours,
+            *found,
             tsdf,
             weight,
             minimum_weight,
-            jump,
             index,
             surface.vertices,
             offsets,

@@ -14,6 +14,8 @@ SIDE = 8
 VOXELS = SIDE**3
 COORDINATE_LIMIT = 1 << 20
 """Block and voxel coordinates lie within +-2^20: three of them fit into one 64-bit key."""
+AWAY = 1 << 24
+"""Added before fractions are cut off, so that this rounds down on both sides of zero."""
 FIXED_POINT = 256
 """Colours are kept as 8.8 fixed point, so that late observations still move the mean."""
 
@@ -23,6 +25,7 @@ FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "color": (np.uint16, (VOXELS, 3)),
     "segment": (np.int32, (VOXELS,)),
     "votes": (np.int16, (VOXELS,)),
+    "hits": (np.uint8, (VOXELS,)),
     "coordinates": (np.int32, (3,)),
     "last_touched": (np.int32, ()),
 }
@@ -91,26 +94,31 @@ def _touch(
     height, width = depth.shape
     fx, fy, cx, cy = intrinsics
     capacity = coordinates.shape[0]
+    turn = world_from_camera[:3, :3] / block_size
+    start_x, start_y, start_z = world_from_camera[:3, 3] / block_size + AWAY
     touched_count = 0
     last_key = -1
     for row in range(stride // 2, height, stride):
+        y = (row - cy) / fy
         for column in range(stride // 2, width, stride):
             distance = depth[row, column]
             if not (near <= distance <= far):
                 continue
             x = (column - cx) / fx
-            y = (row - cy) / fy
-            ray_x = world_from_camera[0, 0] * x + world_from_camera[0, 1] * y + world_from_camera[0, 2]
-            ray_y = world_from_camera[1, 0] * x + world_from_camera[1, 1] * y + world_from_camera[1, 2]
-            ray_z = world_from_camera[2, 0] * x + world_from_camera[2, 1] * y + world_from_camera[2, 2]
+            ray_x = turn[0, 0] * x + turn[0, 1] * y + turn[0, 2]
+            ray_y = turn[1, 0] * x + turn[1, 1] * y + turn[1, 2]
+            ray_z = turn[2, 0] * x + turn[2, 1] * y + turn[2, 2]
             first = max(distance - truncation, 0.0)
             length = (distance + truncation - first) * np.sqrt(x * x + y * y + 1.0)
-            steps = int(np.ceil(length / (0.5 * block_size)))
-            for step in range(steps + 1):
-                along = first + (distance + truncation - first) * step / steps
-                block_x = int(np.floor((world_from_camera[0, 3] + along * ray_x) / block_size))
-                block_y = int(np.floor((world_from_camera[1, 3] + along * ray_y) / block_size))
-                block_z = int(np.floor((world_from_camera[2, 3] + along * ray_z) / block_size))
+            steps = int(np.ceil(length * 2.0 / block_size))
+            stretch = (distance + truncation - first) / steps
+            for step in range(steps + 2):
+                along, shift = first + stretch * step, 0.0
+                if step > steps:  # the cell with the measured point is numbered like its first voxel
+                    along, shift = distance, 0.5 / SIDE
+                block_x = int(start_x + along * ray_x - shift) - AWAY
+                block_y = int(start_y + along * ray_y - shift) - AWAY
+                block_z = int(start_z + along * ray_z - shift) - AWAY
                 key = pack(block_x, block_y, block_z)
                 if key == last_key:
                     continue
@@ -137,7 +145,9 @@ class VoxelBlocks:
     """The arrays of the map. `count` blocks are in use; every array has room for `capacity` of them.
 
     tsdf (C, 512) float32 in truncation distances, positive before the surface; weight (C, 512) float32; color
-    (C, 512, 3) uint16, 8.8 fixed point; segment (C, 512) int32, 0 none; votes (C, 512) int16; coordinates (C, 3) int32.
+    (C, 512, 3) uint16, 8.8 fixed point; segment (C, 512) int32, 0 none; votes (C, 512) int16; hits (C, 512)
+    uint8: measured points in the cell between a voxel's centre and the next ones in x, y and z; coordinates (C, 3)
+    int32.
     Fresh memory is zero and is only backed by the machine once it is used, so spare capacity costs nothing.
     """
 
@@ -146,6 +156,7 @@ class VoxelBlocks:
     color: np.ndarray
     segment: np.ndarray
     votes: np.ndarray
+    hits: np.ndarray
     coordinates: np.ndarray
     last_touched: np.ndarray
 

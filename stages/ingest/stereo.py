@@ -66,7 +66,7 @@ def stereo_lenses(
     if abs(right.P[7] - left.P[7]) > abs(right.P[3] - left.P[3]):
         raise _one_above_the_other(names, where)
     matrix, _ = scaled_matrix(left, tuple(left.P[i] for i in (0, 1, 2, 4, 5, 6, 8, 9, 10)), sizes[0], where, names[0])
-    camera = _pinhole(matrix, sizes[0], left)
+    camera = _pinhole(matrix, sizes[0], left, where)
     lenses = []
     for calibration, size, flat, name in zip(calibrations, sizes, rectified, names, strict=True):
         turn = np.eye(3) if flat or len(calibration.R) != 9 else np.array(calibration.R, dtype=float).reshape(3, 3)
@@ -113,10 +113,10 @@ def rectifying_rotation(left_from_right: np.ndarray) -> np.ndarray:
     return np.stack([x, np.cross(z, x), z])
 
 
-def _pinhole(matrix: np.ndarray, size: tuple[int, int], record: CalibrationRecord) -> Camera:
+def _pinhole(matrix: np.ndarray, size: tuple[int, int], record: CalibrationRecord, where: str) -> Camera:
     width, height = size if size != (0, 0) else (record.width, record.height)
     fx, fy, cx, cy = (float(matrix[i]) for i in ((0, 0), (1, 1), (0, 2), (1, 2)))
-    return Camera(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)
+    return Camera.of_outside(where, width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)
 
 
 def _check_baseline(baseline: float, names: tuple[str, str], where: str) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, field_validator
 from pydantic_core import CoreSchema
 
 from schemas.artifact import Artifact
@@ -41,6 +41,12 @@ class Parameters(BaseModel):
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Bound every number."""
         return bounded(handler(source), SMALLEST_ABOVE_ZERO)
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _without_minus_zero(cls, value: Any) -> Any:
+        """-0.0 passes for at least 0 and is below it to some libraries."""
+        return value + 0.0 if isinstance(value, float) else value
 
 
 @dataclass(frozen=True)

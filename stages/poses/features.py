@@ -18,6 +18,8 @@ RATIO = 0.85
 """A match must be better than the second best by this factor (Lowe 2004)."""
 LARGEST_DISTANCE = 70
 """Descriptors that differ in more of their 256 bits are no match."""
+SMALLEST_SIDE = 32
+"""Images of fewer pixels a side have no corner: a descriptor reaches 15 pixels around it."""
 TRIALS = 400
 """Triples of matches that are tried."""
 
@@ -52,10 +54,11 @@ def _detector() -> Any:
 def find_features(color: np.ndarray | None, depth: np.ndarray, camera: Camera, maximum_depth: float) -> Features:
     """Return the ORB corners (Rublee 2011) of a frame that have depth below `maximum_depth` [m].
 
-    `color` is (H, W, 3) uint8 RGB or None, which gives no features; `depth` is (H, W) float32 [m], 0 invalid.
+    `color` is (H, W, 3) uint8 RGB or None, which gives no features, as does an image too small for one; `depth` is
+    (H, W) float32 [m], 0 invalid.
     """
     empty = Features(np.zeros((0, 2), np.float32), np.zeros((0, 3), np.float32), np.zeros((0, 32), np.uint8))
-    if color is None:
+    if color is None or min(color.shape[:2]) < SMALLEST_SIDE:
         return empty
     corners, descriptors = _detector().detectAndCompute(cv2.cvtColor(color, cv2.COLOR_RGB2GRAY), None)
     if descriptors is None or not len(corners):

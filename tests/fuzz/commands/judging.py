@@ -71,7 +71,8 @@ def _fault(case: Case, ended: forking.Ended) -> str:
         return "memory"
     if "Traceback" in ended.error or "internal error" in ended.error:
         return f"traceback, exit {ended.code}" if ended.code != 1 else "exit 1"
-    if ended.code not in CODES and not (case.long and ended.code == 6):
+    too_long = ended.code == 6 and "File name too long" in ended.error
+    if ended.code not in CODES and not (case.long and ended.code == 6) and not too_long:
         return f"exit {ended.code}"
     if "\x1b" in ended.error + ended.output:
         return "said an escape sequence"

@@ -69,8 +69,8 @@ def _word(word: str, places: dict[str, Path], base: Path, root: Path) -> str:
     if not word.startswith("@"):
         return word
     name, slash, rest = word[1:].partition("/")
-    if name == OUT:
-        return str(root / OUT) + slash + rest
+    if name.partition(".")[0] == OUT:
+        return str(root / name) + slash + rest
     if name == "":
         return str(root / "in")
     return str(places.get(name, place_of(base, name))) + slash + rest

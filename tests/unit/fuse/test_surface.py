@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
-from stages.fuse.surface import extract_surface
+from schemas.scene_parts import Camera
+from stages.fuse.integration import integrate
+from stages.fuse.surface import Surface, extract_surface
 from stages.fuse.voxel_blocks import SIDE, VoxelBlocks, _insert, pack
+from stages.kit.geometry.cameras import back_project
 
 VOXEL = 0.05
+CAMERA = Camera(width=320, height=240, fx=262.0, fy=262.0, cx=159.5, cy=119.5)
 
 
-def filled(extent: int, value: object, seed: int | None = None) -> VoxelBlocks:
+def filled(extent: int, value: object, seed: int | None = None, hits: int = 1) -> VoxelBlocks:
     """Blocks at -extent .. extent - 1 on every axis, set to value(points) in truncation distances, all observed."""
     axis = np.arange(-extent, extent)
     coordinates = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3).astype(np.int32)
@@ -27,6 +33,7 @@ def filled(extent: int, value: object, seed: int | None = None) -> VoxelBlocks:
         blocks.weight[slot] = 1
         blocks.segment[slot] = np.where(points[:, 0] < 0, 1, 2)
         blocks.color[slot] = 256 * 100
+        blocks.hits[slot] = hits
         _insert(blocks.keys, blocks.slots, pack(*(int(c) for c in block)), slot)
     blocks.count = len(coordinates)
     return blocks
@@ -81,6 +88,49 @@ def test_steps_are_no_surface() -> None:
 
     assert len(extract_surface(filled(1, step), minimum_weight=0.5).vertices) == 0
     assert len(extract_surface(filled(1, step), minimum_weight=0.5, jump=2).vertices) > 0
+    assert len(extract_surface(filled(1, step, hits=2), minimum_weight=0.5).vertices) > 0, "measured there"
+    assert len(extract_surface(filled(1, sphere, hits=0), minimum_weight=0.5).vertices) == 0, "measured nowhere"
+
+
+def mapped(frames: list[tuple[np.ndarray, np.ndarray]], voxel: float) -> Surface:
+    """Return the surface of depth images with their poses."""
+    blocks = VoxelBlocks(voxel)
+    for depth, pose in frames:
+        integrate(blocks, depth, CAMERA, pose, truncation=4 * voxel, near=0.1, far=4.0)
+    return extract_surface(blocks, minimum_weight=0.1)
+
+
+@pytest.mark.parametrize("angle", [5, 10, 20, 45, 90])
+def test_planes_are_whole_at_any_angle(angle: float) -> None:
+    """A plane through (0, 0, 1.5) that the optical axis meets at the angle [deg], from twenty places close by."""
+    normal = np.array([0.0, -np.cos(np.radians(angle)), -np.sin(np.radians(angle))])
+    rays = back_project(np.ones((CAMERA.height, CAMERA.width), np.float32), CAMERA)
+    facing = np.minimum(rays @ normal, -1e-3)
+    frames, seen = [], []
+    for place in np.random.default_rng(0).uniform(-0.03, 0.03, (20, 3)):
+        pose = np.eye(4)
+        pose[:3, 3] = place
+        depth = (([0, 0, 1.5] - place) @ normal / facing).astype(np.float32)
+        depth[(depth < 0.8) | (depth > 2.2)] = 0
+        frames.append((depth, pose))
+        seen.append((rays * depth[..., None])[(depth > 1.0) & (depth < 2.0)][::7] + place)
+    surface = mapped(frames, 0.02)
+    points = np.concatenate(seen)
+    points = points[(np.abs(points[:, 0]) < 0.4) & (np.abs(points[:, 1]) < 0.4)]
+    assert (cKDTree(surface.vertices).query(points)[0] < 0.02).mean() > 0.98
+    assert np.abs((surface.vertices - [0, 0, 1.5]) @ normal).max() < 0.02
+
+
+def test_silhouettes_are_no_surface() -> None:
+    """A board 1 m away before a wall at 2 m, from three places: nothing was measured between them."""
+    depth = np.full((CAMERA.height, CAMERA.width), 2.0, np.float32)
+    depth[:, : CAMERA.width // 2] = 1.0
+    poses = [np.eye(4) for _ in range(3)]
+    for shift, pose in zip((-0.004, 0.0, 0.004), poses, strict=True):
+        pose[2, 3] = shift
+    z = mapped([(depth, pose) for pose in poses], 0.02).vertices[:, 2]
+    assert (np.abs(z - 1) < 0.03).any() and (np.abs(z - 2) < 0.03).any()
+    assert ((np.abs(z - 1) < 0.03) | (np.abs(z - 2) < 0.03)).all()
 
 
 def test_nothing_gives_nothing() -> None:
