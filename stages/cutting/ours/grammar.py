@@ -74,7 +74,7 @@ class Grammar:
 
     def type_of_box(self, edges: Sequence[float]) -> int:
         """Return the likeliest type of one box with these edges [m], in any order."""
-        return int(_type_of_box(*edges, *self._plain))
+        return int(_type_of_box(*edges, *self._plain))  # type: ignore[call-arg, arg-type]
 
     @cached_property
     def _plain(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -71,7 +71,9 @@ def _true_depth(bodies: Sequence[Body], camera: Camera, pose: np.ndarray) -> tup
     rays = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(u.shape)], axis=-1)
     rays = rays @ pose[:3, :3].T
     hits = scene.cast_rays(
-        o3d.core.Tensor(np.concatenate([np.broadcast_to(pose[:3, 3], rays.shape), rays], axis=-1).astype(np.float32))
+        o3d.core.Tensor(  # type: ignore[call-overload]
+            np.concatenate([np.broadcast_to(pose[:3, 3], rays.shape), rays], axis=-1).astype(np.float32)
+        )
     )
     depth, normals = hits["t_hit"].numpy(), hits["primitive_normals"].numpy()
     cosine = np.abs((normals * rays).sum(axis=-1)) / np.linalg.norm(rays, axis=-1)
