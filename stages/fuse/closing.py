@@ -10,12 +10,22 @@ from schemas.base import as_vector
 from schemas.panoptic_map import EntitiesFile, Entity
 from schemas.vocabulary import Vocabulary
 from stages.fuse.counts import TripleCounts
-from stages.fuse.extraction import ExtractedEntity, ExtractionSettings, LabelledSurface, extract_entities
+from stages.fuse.extraction import (
+    ExtractedEntity,
+    ExtractionSettings,
+    LabelledSurface,
+    cut_mesh,
+    extract_entities,
+    face_labels,
+)
 from stages.fuse.mapping import PanopticMapper
+from stages.fuse.parameters import FuseParameters
 from stages.fuse.smoothing import smoothed_tsdf
 from stages.fuse.surface import Surface, extract_surface
+from stages.fuse.unnamed_pieces import unnamed_pieces
 from stages.kit.stage import Progress
 
+LAYOUT = ("floor", "wall", "ceiling")
 UNNAMED = "object"
 """The class of things that masks found and did not recognise."""
 
@@ -54,6 +64,43 @@ def describe(entity: ExtractedEntity, vocabulary: Vocabulary) -> Entity:
     )
 
 
+def with_unnamed_pieces(
+    surface: Surface,
+    entities: list[ExtractedEntity],
+    labelled: LabelledSurface,
+    layout: frozenset[int],
+    floor: int,
+    unnamed: int,
+    parameters: FuseParameters,
+) -> tuple[list[ExtractedEntity], LabelledSurface]:
+    """Return the entities and labels with the pieces of unnamed surface among them; as they are without a floor.
+
+    `layout`, `floor`, `unnamed`: class ids. Nobody voted for a piece: it has no segments, and no confidence.
+    """
+    level = surface.vertices[labelled.class_id == floor, 2]
+    if not len(level):
+        return entities, labelled
+    piece = unnamed_pieces(
+        surface.vertices - [0.0, 0.0, float(np.median(level))],
+        surface.faces,
+        labelled.instance,
+        np.isin(labelled.class_id, sorted(layout)),
+        voxel=parameters.voxel_size,
+        minimum_area=parameters.unnamed_area,
+    )
+    of_face, first = face_labels(piece, surface.faces), 1 + int(labelled.instance.max(initial=0))
+    found, number = list(entities), np.zeros(int(piece.max(initial=0)) + 1, np.int32)
+    for label in range(1, len(number)):
+        mesh = cut_mesh(surface, np.flatnonzero(of_face == label))
+        if len(mesh.faces):
+            number[label] = first + label
+            found.append(ExtractedEntity(first + label, unnamed, (), mesh, 0.0, 0))
+    new = number[piece] > 0
+    instance = np.where(new, number[piece], labelled.instance).astype(np.int32)
+    class_id = np.where(new, np.int32(unnamed), labelled.class_id)
+    return found, LabelledSurface(labelled.segment, class_id, instance)
+
+
 def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, progress: Progress) -> ClosedMap:
     """Merge what is one instance, draw the surface and cut it into entities. `label` says whose masks these are.
 
@@ -83,6 +130,10 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, progre
         entities, labelled = extract_entities(
             surface, merged[surface.segment], grouping, mapper.sightings, mapper.merging.things, settings
         )
+        if parameters.unnamed_area > 0 and parameters.merging == "ours":
+            layout = frozenset(entry.id for entry in vocabulary.classes if entry.name in LAYOUT)
+            floor = vocabulary.by_name("floor").id
+            entities, labelled = with_unnamed_pieces(surface, entities, labelled, layout, floor, unnamed, parameters)
     file = EntitiesFile(
         voxel_size=parameters.voxel_size,
         truncation_distance=mapper.truncation_distance,

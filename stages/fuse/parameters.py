@@ -100,6 +100,12 @@ class FuseParameters(Parameters):
     piece_share: float = Field(
         0.2, ge=0, lt=1, description="Things under this share of one of their class that they touch are a part of it"
     )
+    unnamed_area: float = Field(
+        0.2,
+        ge=0,
+        description="`ours`: surface that no mask named, stands free of walls and has this area is an `object` in one "
+        "piece [m^2] (0: it stays surroundings)",
+    )
     part_distance: float = Field(
         0.2, gt=0, description="Parts of a thing farther than this from its largest part are left unlabelled [m]"
     )

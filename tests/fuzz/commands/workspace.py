@@ -73,7 +73,8 @@ def _word(word: str, places: dict[str, Path], base: Path, root: Path) -> str:
         return str(root / name) + slash + rest
     if name == "":
         return str(root / "in")
-    return str(places.get(name, place_of(base, name))) + slash + rest
+    source = place_of(base, name)  # what is not there must not come to be there
+    return str(places.get(name, source if source.exists() else root / name)) + slash + rest
 
 
 def _manifest(folder: Path) -> dict[str, Any] | None:

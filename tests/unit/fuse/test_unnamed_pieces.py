@@ -1,0 +1,92 @@
+"""Unnamed surface: a box on the floor is a piece, a wall is none, what stands on a counter is one of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from stages.fuse.unnamed_pieces import unnamed_pieces
+
+VOXEL = 0.02
+
+
+Corners = tuple[tuple[float, float, float], tuple[float, float, float]]
+
+
+def sheet(low: np.ndarray, high: np.ndarray, axis: int, outwards: int) -> trimesh.Trimesh:
+    """A rectangle of one vertex a voxel: the side of a box that lies low (-1) or high (1) on an axis."""
+    first, second = [k for k in range(3) if k != axis]
+    u, v = (np.arange(low[k], high[k] + 1e-9, VOXEL) for k in (first, second))
+    points = np.zeros((len(u), len(v), 3))
+    points[..., first], points[..., second] = u[:, None], v[None]
+    points[..., axis] = high[axis] if outwards > 0 else low[axis]
+    corner = np.arange(len(u) * len(v)).reshape(len(u), len(v))
+    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    turned = (outwards > 0) == (axis == 1)
+    return trimesh.Trimesh(points.reshape(-1, 3), faces[:, ::-1] if turned else faces, process=False)
+
+
+def room(*boxes: Corners) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return vertices, faces, and the part of every vertex: floor 0, wall 1, then the boxes in order, without feet."""
+    sides = [[sheet(np.array([-2.0, -2, 0]), np.array([2.0, 2, 0]), 2, 1)]]
+    sides.append([sheet(np.array([-2.0, 2, 0]), np.array([2.0, 2, 2.4]), 1, -1)])
+    for low, high in boxes:
+        ends = [(axis, way) for axis in range(3) for way in (-1, 1) if (axis, way) != (2, -1)]
+        sides.append([sheet(np.array(low), np.array(high), axis, way) for axis, way in ends])
+    owner = np.repeat(np.arange(len(sides)), [sum(len(s.vertices) for s in part) for part in sides])
+    whole = trimesh.util.concatenate([side for part in sides for side in part])
+    return np.asarray(whole.vertices), np.asarray(whole.faces), owner
+
+
+def pieces(
+    scene: tuple[np.ndarray, np.ndarray, np.ndarray], named: tuple[int, ...] = (0,), area: float = 0.05
+) -> np.ndarray:
+    vertices, faces, owner = scene
+    instance = np.where(np.isin(owner, named), owner + 1, 0)
+    return unnamed_pieces(vertices, faces, instance, owner == 0, voxel=VOXEL, minimum_area=area)
+
+
+def of_part(piece: np.ndarray, owner: np.ndarray, part: int) -> int:
+    """The piece that most of a part is of."""
+    return int(np.bincount(piece[owner == part]).argmax())
+
+
+BOX = ((-1.0, -1.0, 0.0), (-0.5, -0.5, 0.4))
+COUNTER, ON_IT = ((0.0, 1.4, 0.0), (1.5, 2.0, 0.9)), ((0.5, 1.6, 0.92), (0.8, 1.8, 1.2))
+
+
+def test_what_stands_free_is_a_piece_and_a_wall_is_none() -> None:
+    scene = room(BOX, COUNTER, ON_IT)
+    piece, owner = pieces(scene), scene[2]
+    found = [of_part(piece, owner, part) for part in range(5)]
+    assert found[:2] == [0, 0] and sorted(found[2:]) == [1, 2, 3]
+    assert found[3] == 1, "the largest first"
+    assert (piece[owner == 2] == found[2]).mean() > 0.75, "but for its foot"
+
+
+def test_legs_are_left_to_the_named_thing_above() -> None:
+    table = ((-1.0, -1.0, 0.7), (0.5, 0.0, 0.75))
+    leg = ((-0.9, -0.9, 0.0), (-0.7, -0.7, 0.66))
+    on_it = ((-0.3, -0.7, 0.78), (0.1, -0.3, 1.0))
+    scene = room(table, leg, on_it)
+    piece, owner = pieces(scene, (0, 2)), scene[2]
+    assert of_part(piece, owner, 3) == 0 and of_part(piece, owner, 4) == 1
+    assert set(np.unique(piece)) == {0, 1}
+
+
+def test_parts_above_each_other_are_one_unless_one_carries_the_other() -> None:
+    lower, upper = ((-1.0, -1.0, 0.1), (-0.6, -0.6, 0.3)), ((-1.0, -1.0, 0.5), (-0.6, -0.6, 0.8))
+    scene = room(lower, upper)
+    piece, owner = pieces(scene), scene[2]
+    assert of_part(piece, owner, 2) == of_part(piece, owner, 3) == 1
+
+
+def test_small_and_empty() -> None:
+    scene = room(BOX)
+    assert pieces(scene, area=5.0).max() == 0
+    nothing = unnamed_pieces(
+        np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros(0, int), np.zeros(0, bool), voxel=VOXEL, minimum_area=0.1
+    )
+    assert nothing.shape == (0,)
+    assert pieces(scene, named=(0, 1, 2)).max() == 0, "all is named"
