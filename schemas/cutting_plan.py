@@ -29,6 +29,8 @@ class PlannedCut(Model):
     in_fragment: CuttingPlane
     results: tuple[PieceNumber, ...]
     said: str
+    stroke: int | None = None
+    """Which time the knife went down: one stroke may cut several pieces."""
     likeness: float | None
     """About the overlap that this piece's fragments were expected to reach with what is wanted."""
 

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 import numpy as np
 
 from schemas.cutting_model import CuttingModel
 from schemas.cutting_plan import CuttingEvaluation, CuttingEvaluationFile, EvaluatedCutting
-from stages.cutting.demonstrations.cutter import follow
-from stages.cutting.demonstrations.trials import make_trial
-from stages.cutting.measure.scores import Scores, score
+from stages.cutting.measure.scores import Scores
 from stages.cutting.methods import Learned, read_learned
+from stages.cutting.ours.items import item_of
 from stages.cutting.parameters import EvaluateParameters
-from stages.cutting.policy import Goal, carry_out
+from stages.cutting.policy import Goal
+from stages.cutting.sight.perceiving import Hand, PerceivingPolicy
+from stages.cutting.trying import Reached, again, goal_trial, reach
 from stages.kit.measurement.bootstrap import bootstrap_interval
 from stages.kit.stage import Context
-
-GOALS = 1_000_003
-"""Stream of goals: they share nothing with demonstrations."""
 
 
 def run(model: CuttingModel, *, parameters: EvaluateParameters, context: Context) -> CuttingEvaluation:
@@ -26,7 +26,7 @@ def run(model: CuttingModel, *, parameters: EvaluateParameters, context: Context
     for cell in context.progress.track(parameters.cells, total=len(parameters.cells), description="cells"):
         for method in parameters.methods:
             seeds = range(parameters.first_goal, parameters.first_goal + parameters.goals)
-            scores = [reach(learned, method, cell, seed)[0] for seed in seeds]
+            scores = [attempt(learned, method, cell, seed).scores for seed in seeds]
             rows.append(_row(method, cell, scores))
     file = CuttingEvaluationFile(first_goal=parameters.first_goal, rows=tuple(rows))
     file.write(context.output / "results.json")
@@ -35,17 +35,19 @@ def run(model: CuttingModel, *, parameters: EvaluateParameters, context: Context
     return CuttingEvaluation(root=context.output, summary=summary)
 
 
-def reach(learned: Learned, method: str, cell: str, seed: int) -> tuple[Scores, float]:
-    """Return how well a method reaches the goal of a seed, and the CPU seconds of its decisions. `scatter` is the
-    scripted cutter, who knows the recipe that the goal was cut after and follows it a second time."""
-    trial = make_trial(cell, (GOALS, seed))
-    goal = trial.fragments
+def attempt(learned: Learned, method: str, cell: str, seed: int) -> Reached:
+    """Return how well a method reaches the goal of a seed. `scatter` is the scripted cutter, who knows the recipe that
+    the goal was cut after and follows it a second time."""
+    trial = goal_trial(cell, seed)
     if method == "scatter":
-        again = follow(cell, trial.families, trial.objects, trial.recipes, np.random.default_rng([GOALS, seed, 1]))
-        return score(again.fragments, goal), 0.0
-    policy = learned.policy(method, Goal(tuple(goal)), seed)
-    carving = carry_out(policy, trial.objects, most=len(goal) + (method == "ours"))
-    return score(carving.fragments, goal), carving.seconds
+        return again(trial, seed)
+    most = len(trial.fragments) + method.startswith("ours")
+    if method == "ours_perceived":
+        items = [item_of(body, k) for k, body in enumerate(trial.fragments)]
+        with closing(Hand()) as hand:
+            return reach(PerceivingPolicy(learned.grammar, items, seed), trial, most=most, lie=hand.lay)
+    policy = learned.policy(method, Goal(tuple(trial.fragments)), seed)
+    return reach(policy, trial, most=most)
 
 
 def _row(method: str, cell: str, scores: list[Scores]) -> EvaluatedCutting:

@@ -41,8 +41,9 @@ class Learned:
 
     def policy(self, method: str, goal: Goal, seed: int) -> Policy:
         """Return a policy for fragments that are wanted. Raises UsageError for a method that was not learned."""
-        if method == "ours":
-            return OursPolicy(self.grammar, [item_of(body, k) for k, body in enumerate(goal.fragments)])
+        if method in ("ours", "ours_together"):
+            items = [item_of(body, k) for k, body in enumerate(goal.fragments)]
+            return self.policy_for(items, together=method == "ours_together")
         if method == "thesis" and self.thesis is not None:
             return ThesisPolicy(self.thesis, goal, seed)
         if method in self.choices:
@@ -51,9 +52,9 @@ class Learned:
             f"the model has not learned {method}", hint=f"scenewright cutting learn --methods ours --methods {method}"
         )
 
-    def policy_for(self, items: Sequence[Item]) -> Policy:
-        """Return our policy for items without bodies: goals in words."""
-        return OursPolicy(self.grammar, items)
+    def policy_for(self, items: Sequence[Item], *, together: bool = False) -> Policy:
+        """Return our policy for items; it needs no bodies."""
+        return OursPolicy(self.grammar, items, together=together)
 
 
 def learn_methods(

@@ -46,6 +46,7 @@ class PlanParameters(Parameters):
     trial: int = Field(0, ge=0, le=2000, description="Trial of --demonstrations whose objects and fragments are taken")
     food: FoodName = Field("carrot", description="What is cut without --mesh and --demonstrations, made from --seed")
     unit: Literal["m", "mm"] = Field("m", description="Unit of --mesh and --goal-meshes")
+    together: bool = Field(False, description="One stroke may pass through several pieces; ours")
     image_width: int = Field(1200, ge=300, le=4000, description="Width of the pictures [px]")
 
 
@@ -61,7 +62,9 @@ class EvaluateParameters(Parameters):
 
     cells: tuple[str, ...] = Field(CELL_NAMES, description="Cells of the thesis's table")
     methods: tuple[str, ...] = Field(
-        ("scatter", "ours"), description="scatter (the scripted cutter), and what was learned"
+        ("scatter", "ours"),
+        description="scatter (the scripted cutter), what was learned, ours_perceived (by two depth cameras), "
+        "ours_together (through several pieces at once)",
     )
     goals: int = Field(10, ge=1, le=1000, description="Goals in each cell")
     first_goal: int = Field(0, ge=0, le=2**31, description="Seed of the first goal")
@@ -74,7 +77,7 @@ def check_learn(parameters: LearnParameters, inputs: Mapping[str, Any]) -> None:
 
 def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for an unknown method or cell."""
-    _check_names("--methods", parameters.methods, ("scatter", *METHODS))
+    _check_names("--methods", parameters.methods, ("scatter", *METHODS, "ours_perceived", "ours_together"))
     _check_names("--cells", parameters.cells, CELL_NAMES)
 
 
@@ -91,6 +94,8 @@ def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
         raise UsageError(
             "cutting plan: nothing is wanted", hint='give --goal "6 slices", --goal-meshes or --demonstrations'
         )
+    if parameters.together and parameters.method != "ours":
+        raise UsageError(f"--together: {parameters.method} cuts one piece at a time", hint="--method ours")
     if "demonstrations" in given and inputs.get("mesh") is not None:
         raise UsageError("--mesh and --demonstrations both say what is cut", hint="give one of them")
 
@@ -126,7 +131,7 @@ LEARN = Stage(
 )
 PLAN = Stage(
     name="cutting plan",
-    version=1,
+    version=2,
     summary="Plan cuts towards fragments that are wanted, or say why that cannot be",
     parameters=PlanParameters,
     reads={
@@ -143,7 +148,7 @@ PLAN = Stage(
 )
 SIMULATE = Stage(
     name="cutting simulate",
-    version=1,
+    version=2,
     summary="Cut on a board in physics, planning anew after each cut from what lies there",
     parameters=SimulateParameters,
     reads={"plan": CuttingPlan, "model": CuttingModel},
@@ -155,7 +160,7 @@ SIMULATE = Stage(
 )
 EVALUATE = Stage(
     name="cutting evaluate",
-    version=1,
+    version=2,
     summary="Compare methods of cutting over many seeded goals, with intervals",
     parameters=EvaluateParameters,
     reads={"model": CuttingModel},

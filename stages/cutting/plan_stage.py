@@ -54,10 +54,10 @@ def run(
     """Plan, in a model of the world that cuts exactly."""
     learned = read_learned(model)
     task = _task(learned, demonstrations, mesh, goal_meshes, parameters, context)
-    if task.goal:
-        policy = learned.policy(parameters.method, Goal(tuple(task.goal)), context.seed)
+    if parameters.method == "ours":
+        policy = learned.policy_for(task.items, together=parameters.together)
     else:
-        policy = learned.policy_for(task.items)
+        policy = learned.policy(parameters.method, Goal(tuple(task.goal)), context.seed)
     with context.progress.step("plan"):
         carving = carry_out(policy, task.objects, most=_most(parameters.method, task))
     scores = score(carving.fragments, task.goal) if task.goal else None
@@ -123,11 +123,13 @@ def _file(task: _Task, carving: Carving, scores: Scores | None, method: str, rea
                 in_fragment=plane_record(step.action.plane.moved(inverse(frame))),
                 results=step.results,
                 said=step.action.said,
+                stroke=step.stroke,
                 likeness=step.action.likeness,
             )
         )
     alike = [cut.likeness for cut in cuts if cut.likeness is not None]
-    statement = f"{len(cuts)} cuts make {len(carving.board)} fragments, {len(task.items)} are wanted"
+    strokes = "" if carving.strokes == len(cuts) else f" in {carving.strokes} strokes"
+    statement = f"{len(cuts)} cuts{strokes} make {len(carving.board)} fragments, {len(task.items)} are wanted"
     if carving.stopped is not None:
         statement += f"; stopped: {carving.stopped.message}"
     elif not reached and carving.refusals:

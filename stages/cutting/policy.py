@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -36,6 +36,8 @@ class Action:
     """What it is for, and how sure the policy is."""
     likeness: float | None = None
     """About the overlap that fragments are expected to reach with what is wanted."""
+    also: tuple[int, ...] = ()
+    """Further pieces that the same stroke passes through where they lie."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,7 @@ class Step:
 
     action: Action
     results: tuple[int, ...]
+    stroke: int = 0
 
 
 @dataclass
@@ -80,6 +83,8 @@ class Carving:
     steps: list[Step] = field(default_factory=list)
     refusals: list[Failure] = field(default_factory=list)
     stopped: Failure | None = None
+    strokes: int = 0
+    """Times that the knife went down; one stroke may cut several pieces."""
     seconds: float = 0.0
     """CPU time of the policy."""
 
@@ -112,26 +117,36 @@ def carry_out(
         if isinstance(action, Stop):
             carving.stopped = action.failure
             break
-        try:
-            parts = cut(board[action.piece], action.plane, knife)
-        except Refused as refused:
-            carving.refusals.append(refused.failure)
-            policy.refused(action, refused.failure)
-            in_a_row += 1
-            if in_a_row == MOST_REFUSALS:
-                carving.stopped = refused.failure
-                break
-            continue
-        in_a_row = 0
-        del board[action.piece]
-        first = len(carving.pieces)
-        sides = action.plane.height(np.array([part.moments[0] for part in parts])) > 0
-        for number, (part, up) in enumerate(zip(parts, sides, strict=True), start=first):
-            board[number] = part.shifted((0.5 if up else -0.5) * GAP * action.plane.normal)
-        if lie is not None:
-            lie(board)
-        results = {number: board[number] for number in range(first, first + len(parts))}
-        carving.pieces |= results
-        carving.steps.append(Step(action, tuple(results)))
-        policy.done(action, results, frozenset(n for n, up in zip(results, sides, strict=True) if up))
+        before = len(carving.steps)
+        for piece in (action.piece, *action.also):
+            _make(replace(action, piece=piece, also=()), policy, carving, knife, lie)
+        in_a_row = 0 if len(carving.steps) > before else in_a_row + 1
+        carving.strokes += len(carving.steps) > before
+        if in_a_row == MOST_REFUSALS:
+            carving.stopped = carving.refusals[-1]
+            break
     return carving
+
+
+def _make(
+    action: Action, policy: Policy, carving: Carving, knife: Knife, lie: Callable[[dict[int, Body]], None] | None
+) -> None:
+    """Cut one piece, and tell the policy what came of it."""
+    board = carving.board
+    try:
+        parts = cut(board[action.piece], action.plane, knife)
+    except Refused as refused:
+        carving.refusals.append(refused.failure)
+        policy.refused(action, refused.failure)
+        return
+    del board[action.piece]
+    first = len(carving.pieces)
+    sides = action.plane.height(np.array([part.moments[0] for part in parts])) > 0
+    for number, (part, up) in enumerate(zip(parts, sides, strict=True), start=first):
+        board[number] = part.shifted((0.5 if up else -0.5) * GAP * action.plane.normal)
+    if lie is not None:
+        lie(board)
+    results = {number: board[number] for number in range(first, first + len(parts))}
+    carving.pieces |= results
+    carving.steps.append(Step(action, tuple(results), carving.strokes))
+    policy.done(action, results, frozenset(n for n, up in zip(results, sides, strict=True) if up))

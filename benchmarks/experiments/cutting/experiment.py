@@ -11,7 +11,7 @@ from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, co
 from benchmarks.tabulation import markdown
 from stages.cutting.demonstrations.recipes import CELLS, TRAINING_SHARE
 from stages.cutting.demonstrations.trials import make_trial
-from stages.cutting.evaluate_stage import reach
+from stages.cutting.evaluate_stage import attempt
 from stages.cutting.methods import Learned, learn_methods
 from stages.cutting.ours.imagining import imagine
 from stages.cutting.policy import carry_out
@@ -20,7 +20,16 @@ from stages.cutting.world.foods import make_food
 TRAININGS, GOALS = 5, 20
 GROWTH = {f"cubes{n}": n for n in (8, 16, 32, 64, 128, 200)}
 NETWORKS = ("thesis", "bc", "qnet")
-ARMS = {"scatter": "the scripted cutter again", "ours": "ours", "thesis": "thesis", "bc": "BC", "qnet": "QNet"}
+ARMS = {
+    "scatter": "the scripted cutter again",
+    "ours": "ours",
+    "ours_perceived": "ours, seen by two depth cameras",
+    "ours_together": "ours, through several pieces at once",
+    "thesis": "thesis",
+    "bc": "BC",
+    "qnet": "QNet",
+}
+SHARED = ("stages.cutting.trying", "stages.cutting.methods", "stages.cutting.ours.imagining")
 
 
 def seeds(first: int) -> tuple[str, ...]:
@@ -42,6 +51,7 @@ class Run:
     iou_thesis: float | None = None
     volume_error: float | None = None
     shape_distance: float | None = None
+    strokes: int | None = None
 
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Run]]:
@@ -54,17 +64,19 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Run]
         if trial.case in GROWTH:
             yield trial, grown(learned, GROWTH[trial.case], goal)
             continue
-        scores, seconds = reach(learned, trial.arm, trial.case, goal)
+        reached = attempt(learned, trial.arm, trial.case, goal)
+        scores = reached.scores
         yield (
             trial,
             Run(
                 scores.count_exact,
                 scores.count_error,
-                seconds,
+                reached.seconds,
                 scores.iou,
                 scores.iou_thesis,
                 scores.volume_error,
                 scores.shape_distance,
+                reached.strokes,
             ),
         )
 
@@ -107,9 +119,11 @@ EXPERIMENT = Experiment(
     name="cutting",
     title="Cutting towards goals that were cut by somebody else",
     simulated="Foods, planes, and the cutter who demonstrates and who cuts the goals; fragments are cut exactly and "
-    "pushed apart, without physics.",
-    knows="Every fragment's whole shape; `scatter` also knows the recipe after which the goal was cut.",
-    does_not_show="What people would do: `scatter` is a script that misses by chance. Nothing is seen by a camera.",
+    "pushed apart, without physics. For `ours_perceived` they are laid apart on a board in physics, and two depth "
+    "cameras with noise are rendered.",
+    knows="Every fragment's whole shape, but `ours_perceived` only what its cameras see; the goal's fragments as "
+    "bodies; `scatter` also knows the recipe after which the goal was cut.",
+    does_not_show="What people would do: `scatter` is a script that misses by chance. No real camera.",
     arms=ARMS,
     cases=(*CELLS, *GROWTH),
     runs=runs,
@@ -119,6 +133,7 @@ EXPERIMENT = Experiment(
     together=lambda trial: trial.seed.split("-")[0],
     measure=measure,
     record=Run,
+    code=dict.fromkeys(ARMS, SHARED) | {"ours_perceived": (*SHARED, "stages.cutting.sight.perceiving")},
     measures={
         "iou": mean("iou"),
         "iou_thesis": mean("iou_thesis"),
@@ -127,6 +142,7 @@ EXPERIMENT = Experiment(
         "volume_error": mean("volume_error"),
         "shape_distance": mean("shape_distance"),
         "plan_seconds": mean("plan_seconds", "s"),
+        "strokes": mean("strokes"),
         "goals": Measure(count, interval=False),
     },
     pairs=(("ours", "scatter"), ("ours", "thesis"), ("thesis", "bc"), ("thesis", "qnet")),

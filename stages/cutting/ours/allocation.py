@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cache
 
 import numpy as np
 
@@ -19,6 +20,8 @@ BEAM, FINALISTS = 60, 6
 UNLIKE = 0.5
 """Distance of the middles of groups, in deviations of alike fragments, from which pieces may share them apart: like
 fragments of two pieces differ by little."""
+MOST_WAYS = 4000
+"""Partly shared out, that are gone on with."""
 SLACK = 0.3
 """By how much of a piece's volume a way may miss it, by the groups' mean volumes."""
 SETTLED = 12
@@ -65,12 +68,13 @@ def allocate(clouds: Sequence[Cloud], items: Sequence[Item], grammar: Grammar) -
         if len(finalists) == FINALISTS:
             break
 
+    @cache
+    def tree_bits(k: int, part: tuple[int, ...]) -> float:
+        return best_trees(clouds[k], [items[n] for n in part], grammar)[0].bits
+
     def bits_of(way: tuple[tuple[int, ...], ...]) -> float:
-        trees = (
-            best_trees(cloud, [items[n] for n in part], grammar)[0] for cloud, part in zip(clouds, way, strict=True)
-        )
         held = np.array([volumes[list(part)].sum() for part in way])
-        return sum(tree.bits for tree in trees) + float(volume_bits(held, room))
+        return sum(tree_bits(k, part) for k, part in enumerate(way)) + float(volume_bits(held, room))
 
     return [[items[n] for n in part] for part in min(finalists, key=bits_of)]
 
@@ -112,27 +116,20 @@ def sharings(counts: Sequence[int], volumes: np.ndarray, clouds: Sequence[Cloud]
     """Return ways (groups, pieces) to share groups of so many items of a mean volume [m^3] among the pieces, those
     first that fill the pieces best with the fewest groups in each."""
     room = np.array([cloud.body.volume for cloud in clouds])
-    partial: list[tuple[np.ndarray, ...]] = [()]
+    ways = np.zeros((1, 0, len(clouds)), dtype=int)
     filled = np.zeros((1, len(clouds)))
     for count, volume in zip(counts, volumes, strict=True):
         rows = np.array(list(_compositions(count, len(clouds))))
         both = (filled[:, None] + volume * rows[None]).reshape(-1, len(clouds))
         keep = np.flatnonzero((both <= (1.0 + SLACK) * room).all(axis=1))
-        keep = (
-            keep[np.argsort(np.abs(both[keep] - 0.5 * room).sum(axis=1), kind="stable")[:4000]]
-            if len(keep) > 4000
-            else keep
-        )
-        partial = [(*partial[k // len(rows)], rows[k % len(rows)]) for k in keep.tolist()]
+        if len(keep) > MOST_WAYS:
+            keep = keep[np.argsort(np.abs(both[keep] - 0.5 * room).sum(axis=1), kind="stable")[:MOST_WAYS]]
+        ways = np.concatenate([ways[keep // len(rows)], rows[keep % len(rows)][:, None]], axis=1)
         filled = both[keep]
-    ways = [np.stack(way) for way in partial]
-    misfit = np.abs(filled - room).sum(axis=1) / room.sum()
-    ranked = sorted(
-        (float(off) + 0.05 * float((way > 0).sum()), k)
-        for k, (off, way) in enumerate(zip(misfit, ways, strict=True))
-        if (way.sum(axis=0) > 0).all()
-    )
-    return [ways[k] for _, k in ranked[:BEAM]]
+    whole = (ways.sum(axis=1) > 0).all(axis=1)
+    misfit = np.abs(filled - room).sum(axis=1) / room.sum() + 0.05 * (ways > 0).sum(axis=(1, 2))
+    ranked = np.flatnonzero(whole)[np.argsort(misfit[whole], kind="stable")[:BEAM]]
+    return list(ways[ranked])
 
 
 def _compositions(count: int, parts: int) -> Iterator[tuple[int, ...]]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numba
 import numpy as np
 
 from stages.cutting.world.body import Body
@@ -26,6 +27,11 @@ class Split:
     parts: tuple[Tree, ...]
     weights: tuple[float, ...]
 
+    @cached_property
+    def count(self) -> int:
+        """How many fragments it makes."""
+        return sum(leaves(part) for part in self.parts)
+
 
 Tree = Split | None
 """None: a fragment, left as it is."""
@@ -33,7 +39,7 @@ Tree = Split | None
 
 def leaves(tree: Tree) -> int:
     """Return how many fragments a tree makes."""
-    return 1 if tree is None else sum(leaves(part) for part in tree.parts)
+    return 1 if tree is None else tree.count
 
 
 @dataclass(frozen=True)
@@ -79,40 +85,78 @@ def cells(cloud: Cloud, tree: Tree, volumes: Sequence[float] | None = None) -> n
     Planes stand by thickness, after the weights; with `volumes` [m^3] of the leaves they stand so that each part has
     the volume of its leaves.
     """
-    labels = np.zeros(len(cloud.points), dtype=np.int64)
-    _label(
-        cloud.points, np.arange(len(cloud.points)), tree, 0, None if volumes is None else np.asarray(volumes), labels
-    )
     count = leaves(tree)
-    number = np.bincount(labels, minlength=count).astype(float)
-    some = np.maximum(number, 1.0)
-    mean = np.stack([np.bincount(labels, cloud.points[:, k], count) for k in range(3)], axis=1) / some[:, None]
-    off = cloud.points - mean[labels]
-    covariance = np.zeros((count, 3, 3))
-    for i in range(3):
-        for j in range(i, 3):
-            covariance[:, i, j] = covariance[:, j, i] = np.bincount(labels, off[:, i] * off[:, j], count) / some
+    number, covariance = _moments(
+        cloud.points, *_flat(tree), np.zeros(0) if volumes is None else np.asarray(volumes, float), count
+    )
     edges = np.maximum(box_edges(covariance), 1e-6)
     return np.column_stack([np.log(edges), np.log(np.maximum(number, 0.1) * cloud.share)])
 
 
-def _label(
-    points: np.ndarray, inside: np.ndarray, tree: Tree, first: int, volumes: np.ndarray | None, labels: np.ndarray
-) -> None:
-    if tree is None:
-        labels[inside] = first
-        return
-    counts = [leaves(part) for part in tree.parts]
-    starts = first + np.concatenate([[0], np.cumsum(counts)]).astype(int)
-    along = points[inside, tree.axis]
-    if volumes is None:
-        marks = np.cumsum(tree.weights)[:-1] / np.sum(tree.weights)
-        low, high = (along.min(), along.max()) if len(along) else (0.0, 0.0)
-        places = low + (high - low) * marks
-    else:
-        wanted = np.array([volumes[a:b].sum() for a, b in zip(starts[:-1], starts[1:], strict=True)])
-        marks = np.minimum((np.cumsum(wanted)[:-1] / wanted.sum() * len(along)).astype(int), len(along) - 1)
-        places = np.partition(along, marks)[marks] if len(along) else np.zeros(len(counts) - 1)
-    which = np.searchsorted(places, along)
-    for number, part in enumerate(tree.parts):
-        _label(points, inside[which == number], part, int(starts[number]), volumes, labels)
+def _flat(tree: Tree) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes of a tree, breadth first: rows (axis, first child, children, first leaf, leaves), weights."""
+    nodes: list[tuple[Tree, int]] = [(tree, 0)]
+    rows, weights = [], [1.0]
+    for node, leaf in nodes:  # grows as it is walked
+        if node is None:
+            rows.append((0, 0, 0, leaf, 1))
+            continue
+        rows.append((node.axis, len(nodes), len(node.parts), leaf, node.count))
+        weights += node.weights
+        for part in node.parts:
+            nodes.append((part, leaf))
+            leaf += leaves(part)
+    return np.array(rows, dtype=np.int64), np.array(weights)
+
+
+@numba.njit(cache=True)
+def _moments(
+    points: np.ndarray, nodes: np.ndarray, weights: np.ndarray, volumes: np.ndarray, leaves: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how many points each leaf gets, and their covariance (leaves, 3, 3)."""
+    order, spare = np.arange(len(points)), np.empty(len(points), dtype=np.int64)
+    start, end = np.zeros(len(nodes), dtype=np.int64), np.zeros(len(nodes), dtype=np.int64)
+    end[0] = len(points)
+    number, mean, covariance = np.zeros(leaves), np.zeros((leaves, 3)), np.zeros((leaves, 3, 3))
+    for node in range(len(nodes)):
+        axis, child, parts, leaf, _ = nodes[node]
+        inside = order[start[node] : end[node]]
+        if parts == 0:
+            number[leaf] = len(inside)
+            for i in inside:
+                for j in range(3):
+                    mean[leaf, j] += points[i, j]
+            mean[leaf] /= max(len(inside), 1)
+            for i in inside:
+                for j in range(3):
+                    off = points[i, j] - mean[leaf, j]
+                    for k in range(j + 1):
+                        covariance[leaf, j, k] += off * (points[i, k] - mean[leaf, k])
+            for j in range(3):
+                for k in range(j + 1):
+                    covariance[leaf, j, k] /= max(len(inside), 1)
+                    covariance[leaf, k, j] = covariance[leaf, j, k]
+            continue
+        share = weights[child : child + parts].copy()
+        if len(volumes):
+            for k in range(parts):
+                share[k] = volumes[nodes[child + k, 3] : nodes[child + k, 3] + nodes[child + k, 4]].sum()
+        marks = np.cumsum(share)[:-1] / share.sum()
+        along = points[inside, axis]
+        if len(along):
+            if len(volumes):
+                ranked = np.sort(along)
+                places = ranked[np.minimum((marks * len(along)).astype(np.int64), len(along) - 1)]
+            else:
+                places = along.min() + (along.max() - along.min()) * marks
+            which = np.searchsorted(places, along)
+            at = start[node]
+            for k in range(parts):
+                start[child + k] = at
+                for i in range(len(inside)):
+                    if which[i] == k:
+                        spare[at] = inside[i]
+                        at += 1
+                end[child + k] = at
+            order[start[node] : end[node]] = spare[start[node] : end[node]]
+    return number, covariance

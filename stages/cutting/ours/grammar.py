@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numba
 import numpy as np
 from scipy.cluster.vq import kmeans2
 
@@ -72,19 +73,12 @@ class Grammar:
         return np.asarray(self.log_likelihoods(edges).argmax(axis=1))
 
     def type_of_box(self, edges: Sequence[float]) -> int:
-        """Return the likeliest type of one box with these edges [m], in any order (asked often: no arrays)."""
-        logs = [math.log(edge) for edge in sorted(edges)]
-        best, found = -math.inf, 0
-        for number, (constant, middle, width) in enumerate(self._plain):
-            value = constant - 0.5 * sum(((x - m) / d) ** 2 for x, m, d in zip(logs, middle, width, strict=True))
-            if value > best:
-                best, found = value, number
-        return found
+        """Return the likeliest type of one box with these edges [m], in any order."""
+        return int(_type_of_box(*edges, *self._plain))  # type: ignore[call-arg, arg-type]
 
     @cached_property
-    def _plain(self) -> list[tuple[float, list[float], list[float]]]:
-        constants = np.log(self.shares) - np.log(self.deviations).sum(axis=1)
-        return list(zip(constants.tolist(), self.means.tolist(), self.deviations.tolist(), strict=True))
+    def _plain(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return np.log(self.shares) - np.log(self.deviations).sum(axis=1), self.means, self.deviations
 
     @cached_property
     def _seen(self) -> dict[int, dict[tuple[int, tuple[int, int]], int]]:
@@ -106,6 +100,12 @@ class Grammar:
         weights = np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
         chances = (self.named + 0.1) / (self.named + 0.1).sum(axis=1, keepdims=True)
         return np.asarray((weights @ chances).argmax(axis=1))
+
+
+@numba.njit(cache=True)
+def _type_of_box(a: float, b: float, c: float, constants: np.ndarray, means: np.ndarray, deviations: np.ndarray) -> int:
+    logs = np.log(np.sort(np.array([a, b, c])))
+    return int(np.argmax(constants - 0.5 * (((logs - means) / deviations) ** 2).sum(axis=1)))
 
 
 @dataclass(frozen=True)

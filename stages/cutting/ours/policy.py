@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,12 +15,13 @@ from stages.cutting.ours.items import Item
 from stages.cutting.ours.structures import Foreseen, best_trees
 from stages.cutting.policy import Action, Stop
 from stages.cutting.world.body import Body, Plane
-from stages.cutting.world.knife import Knife
+from stages.cutting.world.knife import Knife, face_edges
 
-MORE_VOLUME = 1.02
-"""Of what is there that a goal may ask for: rounding, and what a camera adds."""
-REST = 0.02
-"""Of what is there that may be left over without being a fragment of its own."""
+DOUBT = 0.02
+"""Of what is there that a goal may ask for beyond it, or leave over without that being a fragment of its own."""
+TILT, ASIDE = 0.12, 0.12
+"""Angle [rad] and distance, as a share of a part's thickness, by which one cut through several pieces may miss the
+planes that each would get alone: about what the scripted cutter misses."""
 
 
 @dataclass(frozen=True)
@@ -30,16 +31,28 @@ class _Planned:
     action: Action
     below: tuple[Item, ...]
     above: tuple[Item, ...]
+    thickness: float
+    """Of the parts that the tree makes along the plane's normal, their mean [m]."""
 
 
 class OursPolicy:
-    """Plans for items that are wanted."""
+    """Plans for items that are wanted. `doubt` is by which share volumes may be off; with `together` one cut passes
+    through all pieces that would be cut nearly there anyway, as far as the blade reaches."""
 
-    def __init__(self, grammar: Grammar, items: Sequence[Item], knife: Knife | None = None) -> None:
+    def __init__(
+        self,
+        grammar: Grammar,
+        items: Sequence[Item],
+        knife: Knife | None = None,
+        *,
+        doubt: float = DOUBT,
+        together: bool = False,
+    ) -> None:
         self._grammar, self._items, self._knife = grammar, list(items), knife or Knife()
+        self._doubt, self._together = doubt, together
         self._jobs: dict[int, list[Item]] | None = None
-        self._ahead: list[_Planned] = []
-        """The cuts that may come next for the piece at hand, best first."""
+        self._plans: dict[int, list[_Planned]] = {}
+        """Of pieces that are still to be cut: what may come next, best first."""
 
     def decide(self, board: Mapping[int, Body]) -> Action | Stop:
         """Return the next cut: of the largest piece that is still to become several fragments."""
@@ -50,19 +63,40 @@ class OursPolicy:
             clouds = [cloud_of(body) for body in board.values()]
             shared = allocate(clouds, self._with_rest(board), self._grammar)
             self._jobs = dict(zip(board, shared, strict=True))
-        if not self._ahead:
-            waiting = [number for number, items in self._jobs.items() if len(items) > 1]
-            if not waiting:
-                return Stop()
-            piece = max(waiting, key=lambda number: board[number].volume)
-            cloud = cloud_of(board[piece])
-            self._ahead = _cuts(piece, cloud, best_trees(cloud, self._jobs[piece], self._grammar))
-        return self._ahead[0].action
+        waiting = [number for number, items in self._jobs.items() if len(items) > 1]
+        if not waiting:
+            return Stop()
+        waiting.sort(key=lambda number: -board[number].volume)
+        for number in waiting if self._together else waiting[:1]:
+            if number not in self._plans:
+                cloud = cloud_of(board[number])
+                self._plans[number] = _cuts(number, cloud, best_trees(cloud, self._jobs[number], self._grammar))
+        action = self._plans[waiting[0]][0].action
+        return replace(action, also=self._beside(action, waiting[1:], board)) if self._together else action
+
+    def _beside(self, action: Action, others: Sequence[int], board: Mapping[int, Body]) -> tuple[int, ...]:
+        """Return the pieces through whose own planes a cut goes as well, as far as the blade reaches."""
+        chosen, face = [], board[action.piece].section(action.plane)
+        for number in others:
+            planned = self._plans[number][0]
+            own, center = planned.action.plane, board[number].moments[0]
+            cosine = float(action.plane.normal @ own.normal)
+            there = center - own.height(center) * own.normal
+            if abs(cosine) < np.cos(TILT) or abs(action.plane.height(there)) > ASIDE * planned.thickness:
+                continue
+            both = np.concatenate([face, board[number].section(action.plane)])
+            if face_edges(both)[0] > self._knife.length:
+                continue
+            chosen.append(number)
+            face = both
+            if cosine < 0:
+                self._plans[number][0] = replace(planned, below=planned.above, above=planned.below)
+        return tuple(chosen)
 
     def done(self, action: Action, results: Mapping[int, Body], above: frozenset[int]) -> None:
         """Hand the items on: to the larger piece on each side of the plane."""
         assert self._jobs is not None
-        planned, self._ahead = self._ahead[0], []
+        planned = self._plans.pop(action.piece)[0]
         del self._jobs[action.piece]
         sides: dict[bool, list[int]] = {False: [], True: []}
         for number in results:
@@ -75,14 +109,14 @@ class OursPolicy:
     def refused(self, action: Action, failure: Failure) -> None:
         """Try the next best; where none is left, leave the piece."""
         assert self._jobs is not None
-        self._ahead = self._ahead[1:]
-        if not self._ahead:
+        del self._plans[action.piece][0]
+        if not self._plans[action.piece]:
             self._jobs[action.piece] = self._jobs[action.piece][:1]
 
     def _impossible(self, board: Mapping[int, Body]) -> Failure | None:
         there, asked = sum(body.volume for body in board.values()), sum(item.volume for item in self._items)
         thinnest = min(item.edges[0] for item in self._items)
-        if asked > MORE_VOLUME * there:
+        if asked > (1.0 + self._doubt) * there:
             return Failure(
                 kind="too_much_volume",
                 message=f"the goal holds {1e6 * asked:.1f} cm3, there are {1e6 * there:.1f} cm3",
@@ -104,11 +138,12 @@ class OursPolicy:
         return None
 
     def _with_rest(self, board: Mapping[int, Body]) -> list[Item]:
-        """Return the items, with what is left over as one more, of any shape."""
-        left = sum(body.volume for body in board.values()) - sum(item.volume for item in self._items)
-        if left < REST * sum(body.volume for body in board.values()):
-            return self._items
-        return [*self._items, Item(len(self._items), (np.nan, np.nan, np.nan), left)]
+        """Return the items, with what is left over as one more, of any shape; where that is within the doubt, the
+        items' volumes, made to add up to what is there."""
+        there, asked = sum(body.volume for body in board.values()), sum(item.volume for item in self._items)
+        if there - asked < self._doubt * there:
+            return [replace(item, volume=item.volume * there / asked) for item in self._items]
+        return [*self._items, Item(len(self._items), (np.nan, np.nan, np.nan), there - asked)]
 
 
 def _cuts(piece: int, cloud: Cloud, trees: Sequence[Foreseen]) -> list[_Planned]:
@@ -130,4 +165,5 @@ def _middle_cut(piece: int, cloud: Cloud, foreseen: Foreseen, ahead: float) -> _
     said = (
         f"{len(foreseen.items)} fragments: {len(below)} below, {len(above)} above, {ahead:.0f} bits ahead of the next"
     )
-    return _Planned(Action(piece, plane, said, foreseen.likeness), below, above)
+    thickness = float(np.ptp(cloud.points[:, tree.axis])) / len(tree.parts)
+    return _Planned(Action(piece, plane, said, foreseen.likeness), below, above, thickness)

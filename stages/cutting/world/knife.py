@@ -64,7 +64,7 @@ def cut(body: Body, plane: Plane, knife: Knife) -> list[Body]:
             thickness=thinner,
             thinnest=knife.thinnest,
         )
-    long, wide = _face_edges(body.section(plane), plane.normal)
+    long, wide = face_edges(body.section(plane))
     if long > knife.length:
         raise _refused(
             "blade_too_short",
@@ -83,8 +83,8 @@ def cut(body: Body, plane: Plane, knife: Knife) -> list[Body]:
     return [*first, *second]
 
 
-def _face_edges(points: np.ndarray, normal: np.ndarray) -> tuple[float, float]:
-    """Return the longer and the shorter edge of the box around a cut face, along its principal axes [m]."""
+def face_edges(points: np.ndarray) -> tuple[float, float]:
+    """Return the longer and the shorter edge [m] of the box around a cut face's points (N, 3), along principal axes."""
     if len(points) < 2:
         return 0.0, 0.0
     centred = points - points.mean(axis=0)
