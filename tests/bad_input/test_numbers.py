@@ -19,6 +19,8 @@ from schemas.scene_parts import Camera
 from stages.engine.discovery import all_stages
 from stages.engine.json_schemas import json_schemas
 from stages.engine.machine_faults import is_machines
+from stages.ingest.messages.records import CalibrationRecord
+from stages.ingest.stereo import _pinhole
 from stages.kit.configuration import parameters_for
 from stages.kit.geometry.point_clouds import sample_large_triangles
 
@@ -73,6 +75,12 @@ def test_values_of_a_file_of_others() -> None:
     with pytest.raises(BadInput, match=r"^a.mcap: cx = 1e.20: .*less than .* .give --cx.$"):
         Camera.of_outside("a.mcap", hint="give --cx", width=1, height=1, fx=1.0, fy=1.0, cx=1e20, cy=0.0)
     assert Camera.of_outside("a", width=1, height=2, fx=1.0, fy=1.0, cx=0.0, cy=0.0).height == 2
+
+
+def test_focal_lengths_of_a_pair() -> None:
+    record = CalibrationRecord(0, "", 640, 480, "", (), (), (), ())
+    with pytest.raises(BadInput, match=r"^a.mcap: fx = 1e.20: "):
+        _pinhole(np.diag([1e20, 1e20, 1.0]), (640, 480), record, "a.mcap")
 
 
 @pytest.mark.parametrize("size", [1e9, 1e18])
