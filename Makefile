@@ -134,6 +134,11 @@ mosd: setup ## Objects of real tabletop frames against their labels (QUICK=1: ev
 real-supports: setup ## Contact graphs of the real logs against what stands on what there, after `make real`
 	$(EXPERIMENT) real_supports --runs $(OUTPUTS)/experiments/real --out $(OUTPUTS)/experiments/real-supports $(ASKED)
 
+.PHONY: real-plan
+# Twenty plans, about a minute each.
+real-plan: setup ## A cup put on the counter of the real kitchen, in its reconstruction, after `make real` (QUICK=1: one seed)
+	$(EXPERIMENT) real_plan --runs $(OUTPUTS)/experiments/real --out $(OUTPUTS)/experiments/real-plan$(if $(QUICK),-quick) $(ASKED)
+
 .PHONY: mosd-supports
 mosd-supports: setup ## Which object rests on which on real tabletop frames (QUICK=1: every fifth frame; REAL_DATA=folder)
 	$(EXPERIMENT) mosd_supports --data $(REAL_DATA) --out $(OUTPUTS)/experiments/mosd-supports$(if $(QUICK),-quick) $(ASKED)
