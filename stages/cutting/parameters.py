@@ -109,9 +109,9 @@ def _check_names(option: str, names: tuple[str, ...], known: tuple[str, ...]) ->
 DEMONSTRATE = Stage(
     name="cutting demonstrate",
     version=1,
-    summary="Record a scripted cutter, who misses as people do: foods cut into chunks, slices, strips, cubes",
+    summary="Demonstrations: of a scripted cutter, who misses as people do, or what a person recorded",
     parameters=DemonstrateParameters,
-    reads={},
+    reads={"record": Optionally(External("what was cut by clicking on pictures (scenewright cutting record FILE)"))},
     writes=CuttingDemonstrations,
     libraries=(*LIBRARIES, "open3d", "pillow"),
     module="demonstrate_stage",
