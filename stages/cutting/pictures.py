@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from schemas.scene_parts import Camera
 from stages.cutting.world.body import Body
@@ -59,7 +59,13 @@ def draw(
     middle = 0.5 * (low + high)
     eye = middle + VIEW / np.linalg.norm(VIEW) * radius * 4.3
     meshes = [(number + 1, colored(body, number)) for number, body in bodies.items()]
-    image = Image.fromarray(SceneRenderer(meshes).render(camera, look_at(eye, middle)).color)
+    return captioned(Image.fromarray(SceneRenderer(meshes).render(camera, look_at(eye, middle)).color), width, caption)
+
+
+def captioned(image: Image.Image, width: int, caption: str) -> Image.Image:
+    """Return a picture of the size of the others, with words below it."""
+    height = round(0.7 * width)
+    image = ImageOps.pad(image, (width, height), color="white")
     size = max(11, width // 24)
     sheet = Image.new("RGB", (width, height + 2 * size), "white")
     sheet.paste(image, (0, 0))
