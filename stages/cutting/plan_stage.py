@@ -30,7 +30,7 @@ from stages.cutting.sight.seeing import DOUBT as SEEN_DOUBT
 from stages.cutting.sight.seeing import DOUBT_OF_ONE, see
 from stages.cutting.words import read_words
 from stages.cutting.world.body import Body
-from stages.cutting.world.canonical import canonical
+from stages.cutting.world.canonical import axis_across, canonical
 from stages.cutting.world.foods import make_food
 from stages.cutting.world.mending import read_bodies_of, read_body
 from stages.kit.geometry.transforms import inverse
@@ -189,8 +189,7 @@ def _rule(grammar: Grammar, carving: Carving, step: Step) -> tuple[tuple[int, ..
     largest = sorted(step.results, key=lambda number: -carving.pieces[number].volume)[:2]
     bodies = [carving.pieces[number] for number in (step.action.piece, *largest)]
     parent, first, second = (int(k) for k in grammar.type_of(features([item_of(b, 0) for b in bodies])[:, :3]))
-    frame = canonical(bodies[0]).world_from_fragment
-    axis = int(np.argmax(np.abs(frame[:3, :3].T @ step.action.plane.normal)))
+    axis = axis_across(bodies[0], step.action.plane.normal)
     low, high = sorted((first, second))
     return (parent, low, high), 2.0 ** -grammar.rule_bits(parent, axis, (low, high))
 

@@ -127,8 +127,3 @@ def pieces(solid: manifold3d.Manifold) -> list[Body]:
 def unite(bodies: Sequence[Body]) -> list[Body]:
     """Return the connected pieces of the union of bodies, largest first."""
     return pieces(manifold3d.Manifold.batch_boolean([body.solid for body in bodies], manifold3d.OpType.Add))
-
-
-def total_volume(bodies: Sequence[Body]) -> float:
-    """Return the volume of bodies together [m^3]."""
-    return float(sum(body.volume for body in bodies))
