@@ -39,7 +39,7 @@ def draw_tree(file: CuttingPlanFile, width: int) -> Image.Image:
         words = str(number)
         if mine is not None and mine.chance is not None:
             words += f"  type {mine.types[0]} into {mine.types[1]}, {mine.types[2]}  p {mine.chance:.2f}"
-        color = np.append(instance_color(number + 1), 0.35)
+        color = 1.0 - 0.35 * (1.0 - np.array(instance_color(number + 1)))  # opaque: lines end at the box
         box = {"boxstyle": "round,pad=0.25", "facecolor": tuple(color), "edgecolor": EDGE, "linewidth": 0.6}
         axes.text(x, y, words, fontsize=7, va="center", ha="left", bbox=box)
     axes.set_xlim(-0.05, deepest + 0.45)
