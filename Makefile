@@ -242,6 +242,7 @@ llm3: setup ## Box packing by proposals and motion feedback: tables 4.1 and 4.2,
 # A hundred goals a cell and five trainings of the networks; a stopped run goes on where it was.
 cutting: setup ## Cutting towards goals: table 6.1, the thesis's arms and ours (QUICK=1: two goals a cell)
 	OMP_NUM_THREADS=1 $(EXPERIMENT) cutting --out $(OUTPUTS)/experiments/cutting$(if $(QUICK),-quick) $(ASKED)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) cutting_touching --out $(OUTPUTS)/experiments/cutting_touching$(if $(QUICK),-quick)
 
 .PHONY: come-robot
 # A hundred reporting seeds a task, twelve tasks, ablations and curves: about four minutes of two cores.

@@ -15,6 +15,7 @@ from cli.comparison_command import diff
 from cli.inspect_command import inspect
 from cli.output import out as _out
 from cli.output import say as _say
+from cli.record_command import record
 from cli.serve_command import serve
 from cli.timeline_command import timeline
 from cli.urdf_check_command import urdf_check
@@ -293,3 +294,5 @@ GROUPS: tuple[tuple[str, Callable[..., Any], tuple[Callable[..., Any], ...], str
     ("models", models, (serve,), "Installation"),
 )
 """Commands that do something by themselves and have commands below them."""
+BESIDE_STEPS: tuple[tuple[str, Callable[..., Any]], ...] = (("cutting", record),)
+"""Commands of a group of steps that are no steps."""

@@ -66,10 +66,25 @@ class CuttingDemonstrationsFile(Model):
     """demonstrations.json."""
 
     seed: Seed
-    tilt: float
-    spacing: float
+    tilt: float | None
+    spacing: float | None
+    """How far the scripted cutter misses; None where a person cut."""
     trials: tuple[DemonstrationRecord, ...] = Field(min_length=1, max_length=2000)
     statement: str
+
+
+class RecordedTrial(Model):
+    """A trial that a person cut; the object is the food of this name made from this seed."""
+
+    food: Name
+    seed: Seed
+    trial: DemonstrationRecord
+
+
+class CuttingRecording(Model):
+    """What `cutting record` writes after every cut, and `cutting demonstrate --record` reads."""
+
+    trials: tuple[RecordedTrial, ...] = Field(max_length=2000)
 
 
 class CuttingDemonstrations(Artifact):

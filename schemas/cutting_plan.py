@@ -29,6 +29,10 @@ class PlannedCut(Model):
     in_fragment: CuttingPlane
     results: tuple[PieceNumber, ...]
     said: str
+    types: tuple[int, ...] = ()
+    """Types, by our grammar, of the piece and of the two largest fragments."""
+    chance: float | None = None
+    """Probability of that rule, given the type of the piece."""
     stroke: int | None = None
     """Which time the knife went down: one stroke may cut several pieces."""
     likeness: float | None
@@ -64,6 +68,8 @@ class CuttingPlanFile(Model):
     """None for a goal in words."""
     sure: float | None
     """Likeness that was expected before the first cut."""
+    doubt: float | None = Field(None, ge=0.0, le=1.0)
+    """By which share the volumes of the goal may be off, where it was seen on pictures."""
     notes: tuple[str, ...] = ()
     """What was mended of the user's meshes."""
     statement: str
@@ -77,7 +83,8 @@ class CuttingPlanFile(Model):
 
 class CuttingPlan(Artifact):
     """`plan.json`, `plan.txt`, `bodies.npz` (objects, then the goal's fragments where they are bodies, then what the
-    cuts leave), `fragments.png` (before, after, and the goal, fragments apart), `cuts.gif`."""
+    cuts leave), `fragments.png` (before, after, and the goal, fragments apart),
+    `tree.png` (the parse tree with the probabilities of its rules), `cuts.gif`."""
 
     kind: ClassVar[str] = "cutting_plan"
     description: ClassVar[str] = "cuts towards a goal"
@@ -98,13 +105,16 @@ class CuttingTrialFile(Model):
     scores: CuttingScores | None
     fallen: int = Field(ge=0)
     """Fragments that rolled off the board."""
+    missed: int | None = None
+    """With cameras: pieces that none of them saw."""
     turned: float
     """Angle through which fragments turned as they came to rest, mean over fragments and cuts [rad]."""
     statement: str
 
 
 class CuttingTrial(Artifact):
-    """`trial.json`, `bodies.npz` (the fragments as they lie), `board.png` (before, after), `board.gif`."""
+    """`trial.json`, `bodies.npz` (the fragments as they lie), `board.png` (before, after), `board.gif`; with cameras
+    `seen/` (pictures of the fragments laid apart, which `cutting plan --goal-pictures` reads)."""
 
     kind: ClassVar[str] = "cutting_trial"
     description: ClassVar[str] = "things being cut on a board"

@@ -39,6 +39,7 @@ def draw_cutting_plan(plan: CuttingPlan, canvas: Canvas) -> None:
     """Show the tree of cuts and the fragments."""
     canvas.document("plan", file_text(plan.path("plan.txt"), LARGEST_SHOWN))
     _picture(plan, "fragments", canvas)
+    _picture(plan, "tree", canvas)
     _bodies(plan, canvas, plan.info.objects + plan.info.goal_bodies)
 
 

@@ -1,37 +1,46 @@
-"""The step `cutting demonstrate`: the trials of all cells, as planes."""
+"""The step `cutting demonstrate`: trials as planes, the scripted cutter's of all cells or a person's."""
 
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 
 from PIL import Image
 
-from schemas.cutting_demonstrations import CuttingDemonstrations, CuttingDemonstrationsFile
+from schemas.cutting_demonstrations import CuttingDemonstrations, CuttingDemonstrationsFile, DemonstrationRecord
+from schemas.errors import BadInput
 from stages.cutting.bodies_file import write_bodies
 from stages.cutting.demonstrations.cutter import Demonstration, Scatter
-from stages.cutting.demonstrations.recipes import CELLS
 from stages.cutting.demonstrations.records import record_of
 from stages.cutting.demonstrations.trials import is_for_training, make_trials
 from stages.cutting.parameters import DemonstrateParameters
 from stages.cutting.pictures import apart, draw, strip
+from stages.cutting.recording.session import read_recording
 from stages.kit.stage import Context
 
 
-def run(*, parameters: DemonstrateParameters, context: Context) -> CuttingDemonstrations:
-    """Let the scripted cutter cut."""
+def run(record: Path | None, *, parameters: DemonstrateParameters, context: Context) -> CuttingDemonstrations:
+    """Let the scripted cutter cut, or carry out again what a person cut."""
     with context.progress.step("cut"):
-        scatter = Scatter(tilt=parameters.tilt, spacing=parameters.spacing)
-        trials = make_trials(context.seed, scatter, parameters.share)
-    of_cell = Counter(trial.cell for trial in trials)
-    seen: Counter[str] = Counter()
-    records = []
-    for trial in trials:
-        records.append(record_of(trial, is_for_training(trial.cell, seen[trial.cell], of_cell[trial.cell])))
-        seen[trial.cell] += 1
-    training = sum(record.training for record in records)
+        if record is not None:
+            recorded, trials = read_recording(record)
+            if not trials:
+                raise BadInput(f"{record}: nothing was cut", hint="cut something (scenewright cutting record FILE)")
+            records = [each.trial for each in recorded]
+        else:
+            scatter = Scatter(tilt=parameters.tilt, spacing=parameters.spacing)
+            trials = make_trials(context.seed, scatter, parameters.share)
+            records = _scripted(trials)
+    training = sum(each.training for each in records)
     statement = f"{len(trials)} trials, {training} of them to learn from, {sum(len(t.cuts) for t in trials)} cuts"
+    if record is not None:
+        statement += f"; cut by a person, {sum(not trial.finished for trial in trials)} not finished"
     CuttingDemonstrationsFile(
-        seed=context.seed, tilt=parameters.tilt, spacing=parameters.spacing, trials=tuple(records), statement=statement
+        seed=context.seed,
+        tilt=parameters.tilt if record is None else None,
+        spacing=parameters.spacing if record is None else None,
+        trials=tuple(records),
+        statement=statement,
     ).write(context.output / "demonstrations.json")
     write_bodies(context.output / "objects.npz", [body for trial in trials for body in trial.objects])
     with context.progress.step("pictures"):
@@ -40,12 +49,24 @@ def run(*, parameters: DemonstrateParameters, context: Context) -> CuttingDemons
     return CuttingDemonstrations(root=context.output, summary=summary)
 
 
+def _scripted(trials: list[Demonstration]) -> list[DemonstrationRecord]:
+    of_cell = Counter(trial.cell for trial in trials)
+    seen: Counter[str] = Counter()
+    records = []
+    for trial in trials:
+        records.append(record_of(trial, is_for_training(trial.cell, seen[trial.cell], of_cell[trial.cell])))
+        seen[trial.cell] += 1
+    return records
+
+
 def _draw(trials: list[Demonstration], width: int) -> Image.Image:
     """Return the first trial of each cell, before and after."""
     images = []
-    for cell in CELLS:
-        trial = next(trial for trial in trials if trial.cell == cell)
-        names = ", ".join(sorted(set(trial.categories.values())))
-        images.append(draw(dict(enumerate(trial.objects)), width, f"{cell}: {', '.join(trial.families)}"))
+    first: dict[str, Demonstration] = {}
+    for trial in trials:
+        first.setdefault(trial.cell, trial)
+    for trial in first.values():
+        names = ", ".join(sorted(set(trial.categories.values()))) or "not finished"
+        images.append(draw(dict(enumerate(trial.objects)), width, f"{trial.cell}: {', '.join(trial.families)}"))
         images.append(draw(apart({n: trial.pieces[n] for n in trial.final}), width, f"{len(trial.final)}: {names}"))
     return strip(images)

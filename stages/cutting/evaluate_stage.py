@@ -13,7 +13,8 @@ from stages.cutting.methods import Learned, read_learned
 from stages.cutting.ours.items import item_of
 from stages.cutting.parameters import EvaluateParameters
 from stages.cutting.policy import Goal
-from stages.cutting.sight.perceiving import Hand, PerceivingPolicy
+from stages.cutting.sight.laying import Hand
+from stages.cutting.sight.perceiving import PerceivingPolicy
 from stages.cutting.trying import Reached, again, goal_trial, reach
 from stages.kit.measurement.bootstrap import bootstrap_interval
 from stages.kit.stage import Context

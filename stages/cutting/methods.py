@@ -16,7 +16,7 @@ from stages.cutting.demonstrations.cutter import Demonstration
 from stages.cutting.learning import MixtureOfPlanes, layers
 from stages.cutting.ours.grammar import Grammar, learn
 from stages.cutting.ours.items import Item, item_of
-from stages.cutting.ours.policy import OursPolicy
+from stages.cutting.ours.policy import DOUBT, OursPolicy
 from stages.cutting.ours.records import grammar_of
 from stages.cutting.policy import Goal, Policy
 from stages.cutting.rivals import cloning
@@ -52,9 +52,9 @@ class Learned:
             f"the model has not learned {method}", hint=f"scenewright cutting learn --methods ours --methods {method}"
         )
 
-    def policy_for(self, items: Sequence[Item], *, together: bool = False) -> Policy:
+    def policy_for(self, items: Sequence[Item], *, together: bool = False, doubt: float = DOUBT) -> Policy:
         """Return our policy for items; it needs no bodies."""
-        return OursPolicy(self.grammar, items, together=together)
+        return OursPolicy(self.grammar, items, together=together, doubt=doubt)
 
 
 def learn_methods(

@@ -42,7 +42,10 @@ class PlanParameters(Parameters):
     """Options of `cutting plan`."""
 
     method: MethodName = Field("ours", description="Who plans; the model must have learned it")
-    goal: str = Field("", description='What is wanted in words, e.g. "6 slices, 8 cubes"; else --goal-meshes, --trial')
+    goal: str = Field(
+        "",
+        description='What is wanted in words, e.g. "6 slices, 8 cubes"; else --goal-meshes, --goal-pictures, --trial',
+    )
     trial: int = Field(0, ge=0, le=2000, description="Trial of --demonstrations whose objects and fragments are taken")
     food: FoodName = Field("carrot", description="What is cut without --mesh and --demonstrations, made from --seed")
     unit: Literal["m", "mm"] = Field("m", description="Unit of --mesh and --goal-meshes")
@@ -54,6 +57,7 @@ class SimulateParameters(Parameters):
     """Options of `cutting simulate`."""
 
     method: MethodName = Field("ours", description="Who plans each cut from what lies on the board")
+    cameras: bool = Field(False, description="Plan from what two depth cameras see of pieces laid apart; ours")
     image_width: int = Field(1200, ge=300, le=4000, description="Width of the pictures [px]")
 
 
@@ -81,18 +85,27 @@ def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) ->
     _check_names("--cells", parameters.cells, CELL_NAMES)
 
 
+def check_simulate(parameters: SimulateParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError for cameras with a method that does not look through them."""
+    if parameters.cameras and parameters.method != "ours":
+        raise UsageError(f"--cameras: {parameters.method} knows whole shapes", hint="--method ours")
+
+
 def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError unless there is one goal, and words that can be read."""
-    given = [name for name in ("goal_meshes", "demonstrations") if inputs.get(name) is not None]
+    given = [name for name in ("goal_meshes", "goal_pictures", "demonstrations") if inputs.get(name) is not None]
+    goals = [f"--{name.replace('_', '-')}" for name in given if name.startswith("goal")]
+    goals += ["--goal"] if parameters.goal else []
+    if len(goals) > 1:
+        raise UsageError(f"{' and '.join(goals)} both say what is wanted", hint="give one of them")
     if parameters.goal:
         read_words(parameters.goal)
-        if "goal_meshes" in given:
-            raise UsageError("--goal and --goal-meshes both say what is wanted", hint="give one of them")
         if parameters.method != "ours":
             raise UsageError(f"--method {parameters.method} plans for fragments, not for words", hint="--method ours")
     elif not given:
         raise UsageError(
-            "cutting plan: nothing is wanted", hint='give --goal "6 slices", --goal-meshes or --demonstrations'
+            "cutting plan: nothing is wanted",
+            hint='give --goal "6 slices", --goal-meshes, --goal-pictures or --demonstrations',
         )
     if parameters.together and parameters.method != "ours":
         raise UsageError(f"--together: {parameters.method} cuts one piece at a time", hint="--method ours")
@@ -108,10 +121,10 @@ def _check_names(option: str, names: tuple[str, ...], known: tuple[str, ...]) ->
 
 DEMONSTRATE = Stage(
     name="cutting demonstrate",
-    version=1,
-    summary="Record a scripted cutter, who misses as people do: foods cut into chunks, slices, strips, cubes",
+    version=2,
+    summary="Demonstrations: of a scripted cutter, who misses as people do, or what a person recorded",
     parameters=DemonstrateParameters,
-    reads={},
+    reads={"record": Optionally(External("what was cut by clicking on pictures (scenewright cutting record FILE)"))},
     writes=CuttingDemonstrations,
     libraries=(*LIBRARIES, "open3d", "pillow"),
     module="demonstrate_stage",
@@ -131,7 +144,7 @@ LEARN = Stage(
 )
 PLAN = Stage(
     name="cutting plan",
-    version=2,
+    version=3,
     summary="Plan cuts towards fragments that are wanted, or say why that cannot be",
     parameters=PlanParameters,
     reads={
@@ -139,6 +152,7 @@ PLAN = Stage(
         "demonstrations": Optionally(CuttingDemonstrations),
         "mesh": Optionally(External("closed mesh of what is cut (PLY, OBJ, STL, GLB)")),
         "goal_meshes": Optionally(External("folder of closed meshes, the fragments that are wanted")),
+        "goal_pictures": Optionally(External("folder of colour and depth pictures of the fragments that are wanted")),
     },
     writes=CuttingPlan,
     libraries=(*LIBRARIES, "torch", "open3d", "pillow"),
@@ -148,13 +162,14 @@ PLAN = Stage(
 )
 SIMULATE = Stage(
     name="cutting simulate",
-    version=2,
+    version=3,
     summary="Cut on a board in physics, planning anew after each cut from what lies there",
     parameters=SimulateParameters,
     reads={"plan": CuttingPlan, "model": CuttingModel},
     writes=CuttingTrial,
     libraries=(*LIBRARIES, "torch", "pybullet", "open3d", "pillow"),
     module="simulate_stage",
+    check=check_simulate,
     example="scenewright cutting simulate --plan outputs/cutting/plan --model outputs/cutting/model "
     "--out outputs/cutting/trial",
 )

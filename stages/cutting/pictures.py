@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from schemas.scene_parts import Camera
 from stages.cutting.world.body import Body
@@ -38,6 +38,14 @@ def bounds_of(bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray]:
     return low, high
 
 
+def colored(body: Body, number: int) -> trimesh.Trimesh:
+    """Return the mesh of a body in the colour of its number."""
+    color = np.append(np.round(255 * np.array(instance_color(number + 1))), 255).astype(np.uint8)
+    mesh = trimesh.Trimesh(body.vertices, body.faces, process=False)
+    mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=np.tile(color, (len(body.faces), 1)))
+    return mesh
+
+
 def draw(
     bodies: Mapping[int, Body], width: int, caption: str, bounds: tuple[np.ndarray, np.ndarray] | None = None
 ) -> Image.Image:
@@ -50,13 +58,14 @@ def draw(
     )
     middle = 0.5 * (low + high)
     eye = middle + VIEW / np.linalg.norm(VIEW) * radius * 4.3
-    meshes = []
-    for number, body in bodies.items():
-        color = np.append(np.round(255 * np.array(instance_color(number + 1))), 255).astype(np.uint8)
-        mesh = trimesh.Trimesh(body.vertices, body.faces, process=False)
-        mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=np.tile(color, (len(body.faces), 1)))
-        meshes.append((number + 1, mesh))
-    image = Image.fromarray(SceneRenderer(meshes).render(camera, look_at(eye, middle)).color)
+    meshes = [(number + 1, colored(body, number)) for number, body in bodies.items()]
+    return captioned(Image.fromarray(SceneRenderer(meshes).render(camera, look_at(eye, middle)).color), width, caption)
+
+
+def captioned(image: Image.Image, width: int, caption: str) -> Image.Image:
+    """Return a picture of the size of the others, with words below it."""
+    height = round(0.7 * width)
+    image = ImageOps.pad(image, (width, height), color="white")
     size = max(11, width // 24)
     sheet = Image.new("RGB", (width, height + 2 * size), "white")
     sheet.paste(image, (0, 0))

@@ -6,23 +6,31 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from schemas.base import as_vector
 from schemas.cutting_demonstrations import CuttingDemonstrations
 from schemas.cutting_model import CuttingModel
 from schemas.cutting_plan import CuttingPlan, CuttingPlanFile, CuttingScores, PlannedCut, WantedFragment
+from schemas.errors import BadInput
 from stages.cutting.bodies_file import write_bodies
 from stages.cutting.demonstrations.records import plane_record, read_demonstrations
 from stages.cutting.measure.scores import Scores, score
 from stages.cutting.methods import Learned, read_learned
+from stages.cutting.ours.grammar import Grammar
 from stages.cutting.ours.imagining import imagine
-from stages.cutting.ours.items import Item, item_of
+from stages.cutting.ours.items import Item, features, item_of
+from stages.cutting.ours.policy import DOUBT
 from stages.cutting.parameters import PlanParameters
-from stages.cutting.pictures import animate, apart, draw, strip
-from stages.cutting.policy import Carving, Goal, carry_out
+from stages.cutting.parse_tree import draw_tree
+from stages.cutting.pictures import animate, apart, captioned, draw, strip
+from stages.cutting.policy import Carving, Goal, Step, carry_out
+from stages.cutting.sight.pictured import read_pictures
+from stages.cutting.sight.seeing import DOUBT as SEEN_DOUBT
+from stages.cutting.sight.seeing import DOUBT_OF_ONE, see
 from stages.cutting.words import read_words
 from stages.cutting.world.body import Body
-from stages.cutting.world.canonical import canonical
+from stages.cutting.world.canonical import axis_across, canonical
 from stages.cutting.world.foods import make_food
 from stages.cutting.world.mending import read_bodies_of, read_body
 from stages.kit.geometry.transforms import inverse
@@ -40,6 +48,9 @@ class _Task:
     names: list[str]
     said: str
     notes: tuple[str, ...]
+    doubt: float | None = None
+    pictures: tuple[np.ndarray, ...] = ()
+    """Colour pictures of the goal."""
 
 
 def run(
@@ -47,27 +58,28 @@ def run(
     demonstrations: CuttingDemonstrations | None,
     mesh: Path | None,
     goal_meshes: Path | None,
+    goal_pictures: Path | None,
     *,
     parameters: PlanParameters,
     context: Context,
 ) -> CuttingPlan:
     """Plan, in a model of the world that cuts exactly."""
     learned = read_learned(model)
-    task = _task(learned, demonstrations, mesh, goal_meshes, parameters, context)
+    task = _task(learned, demonstrations, mesh, goal_meshes, goal_pictures, parameters, context)
     if parameters.method == "ours":
-        policy = learned.policy_for(task.items, together=parameters.together)
+        policy = learned.policy_for(task.items, together=parameters.together, doubt=task.doubt or DOUBT)
     else:
         policy = learned.policy(parameters.method, Goal(tuple(task.goal)), context.seed)
     with context.progress.step("plan"):
         carving = carry_out(policy, task.objects, most=_most(parameters.method, task))
     scores = score(carving.fragments, task.goal) if task.goal else None
     reached = carving.stopped is None and len(carving.board) >= len(task.items)
-    file = _file(task, carving, scores, parameters.method, reached)
+    file = _file(task, carving, learned.grammar, scores, parameters.method, reached)
     file.write(context.output / "plan.json")
     context.output.joinpath("plan.txt").write_text(plan_text(file), encoding="utf-8")
     write_bodies(context.output / "bodies.npz", [*task.objects, *task.goal, *carving.fragments])
     with context.progress.step("pictures"):
-        _draw(context.output, task, carving, parameters.image_width)
+        _draw(context.output, task, carving, file, parameters.image_width)
     summary: dict[str, object] = {"method": parameters.method, "cuts": len(carving.steps), "wanted": len(task.items)}
     if scores is not None:
         summary["iou"] = round(scores.iou, 3)
@@ -86,16 +98,18 @@ def _task(
     demonstrations: CuttingDemonstrations | None,
     mesh: Path | None,
     goal_meshes: Path | None,
+    goal_pictures: Path | None,
     parameters: PlanParameters,
     context: Context,
 ) -> _Task:
     notes: list[str] = []
     goal: list[Body] = []
-    said = parameters.goal
+    said, doubt = parameters.goal, None
+    pictures: tuple[np.ndarray, ...] = ()
     if demonstrations is not None:
         (trial,) = read_demonstrations(demonstrations, only=parameters.trial)
         objects = trial.objects
-        if not parameters.goal and goal_meshes is None:
+        if not parameters.goal and goal_meshes is None and goal_pictures is None:
             goal, said = trial.fragments, f"the fragments of trial {parameters.trial}"
     elif mesh is not None:
         body, mended = read_body(mesh, parameters.unit)
@@ -105,17 +119,31 @@ def _task(
     if goal_meshes is not None:
         goal, mended = read_bodies_of(goal_meshes, parameters.unit)
         said, notes = f"{len(goal)} meshes of {goal_meshes.name}", notes + mended
+    if goal_pictures is not None:
+        seen = read_pictures(goal_pictures)
+        goal, pictures = see([view for view, _ in seen]), tuple(color for _, color in seen)
+        if not goal:
+            raise BadInput(
+                f"{goal_pictures}: nothing lies on the board", hint="is the board's top z = 0 in camera.json?"
+            )
+        said, doubt = (
+            f"{len(goal)} fragments seen by {len(seen)} cameras",
+            SEEN_DOUBT if len(seen) > 1 else DOUBT_OF_ONE,
+        )
     if parameters.goal:
         items, names = imagine(objects, read_words(parameters.goal), learned.grammar)
     else:
         items, names = [item_of(body, k) for k, body in enumerate(goal)], [""] * len(goal)
-    return _Task(objects, goal, items, names, said, tuple(notes))
+    return _Task(objects, goal, items, names, said, tuple(notes), doubt, pictures)
 
 
-def _file(task: _Task, carving: Carving, scores: Scores | None, method: str, reached: bool) -> CuttingPlanFile:
+def _file(
+    task: _Task, carving: Carving, grammar: Grammar, scores: Scores | None, method: str, reached: bool
+) -> CuttingPlanFile:
     cuts = []
     for step in carving.steps:
         frame = canonical(carving.pieces[step.action.piece]).world_from_fragment
+        types, chance = _rule(grammar, carving, step)
         cuts.append(
             PlannedCut(
                 piece=step.action.piece,
@@ -123,6 +151,8 @@ def _file(task: _Task, carving: Carving, scores: Scores | None, method: str, rea
                 in_fragment=plane_record(step.action.plane.moved(inverse(frame))),
                 results=step.results,
                 said=step.action.said,
+                types=types,
+                chance=chance,
                 stroke=step.stroke,
                 likeness=step.action.likeness,
             )
@@ -148,9 +178,20 @@ def _file(task: _Task, carving: Carving, scores: Scores | None, method: str, rea
         stopped=carving.stopped,
         scores=None if scores is None else scores_record(scores),
         sure=float(np.mean(alike[: len(task.objects)])) if alike else None,
+        doubt=task.doubt,
         notes=task.notes,
         statement=statement,
     )
+
+
+def _rule(grammar: Grammar, carving: Carving, step: Step) -> tuple[tuple[int, ...], float]:
+    """Return the types of a piece and of what it mainly became, and how probable that is of its type."""
+    largest = sorted(step.results, key=lambda number: -carving.pieces[number].volume)[:2]
+    bodies = [carving.pieces[number] for number in (step.action.piece, *largest)]
+    parent, first, second = (int(k) for k in grammar.type_of(features([item_of(b, 0) for b in bodies])[:, :3]))
+    axis = axis_across(bodies[0], step.action.plane.normal)
+    low, high = sorted((first, second))
+    return (parent, low, high), 2.0 ** -grammar.rule_bits(parent, axis, (low, high))
 
 
 def scores_record(scores: Scores) -> CuttingScores:
@@ -177,6 +218,8 @@ def plan_text(file: CuttingPlanFile) -> str:
             continue
         n, d = cut.in_fragment.normal, cut.in_fragment.d
         sure = "" if cut.likeness is None else f", expected overlap {cut.likeness:.2f}"
+        if cut.chance is not None:
+            sure += f", type {cut.types[0]} into {cut.types[1]} and {cut.types[2]} with probability {cut.chance:.2f}"
         lines.append(
             f"{'  ' * depth}{piece}: cut at ({n[0]:.3f}, {n[1]:.3f}, {n[2]:.3f}) . x = {-1e3 * d:.1f} mm, "
             f"{cut.said}{sure}"
@@ -185,14 +228,16 @@ def plan_text(file: CuttingPlanFile) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _draw(output: Path, task: _Task, carving: Carving, width: int) -> None:
+def _draw(output: Path, task: _Task, carving: Carving, file: CuttingPlanFile, width: int) -> None:
     images = [
         draw(dict(enumerate(task.objects)), width // 3, "before"),
         draw(apart(carving.board), width // 3, f"after {len(carving.steps)} cuts, fragments apart"),
     ]
     if task.goal:
         images.append(draw(apart(dict(enumerate(task.goal))), width // 3, "wanted, fragments apart"))
+    images += [captioned(Image.fromarray(color), width // 3, "wanted, its picture") for color in task.pictures[:1]]
     strip(images).save(output / "fragments.png")
+    draw_tree(file, width).save(output / "tree.png")
     there = dict(enumerate(task.objects))
     frames = [dict(there)]
     for step in carving.steps:

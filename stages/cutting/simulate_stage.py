@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import closing
 
 import numpy as np
 
@@ -14,10 +15,16 @@ from stages.cutting.bodies_file import read_bodies, write_bodies
 from stages.cutting.measure.scores import score
 from stages.cutting.methods import Learned, read_learned
 from stages.cutting.ours.items import Item
+from stages.cutting.ours.policy import DOUBT
 from stages.cutting.parameters import SimulateParameters
 from stages.cutting.pictures import animate, apart, draw, strip
 from stages.cutting.plan_stage import scores_record
 from stages.cutting.policy import Goal, Policy, carry_out
+from stages.cutting.sight.laying import BETWEEN, ROW, Hand, in_rows
+from stages.cutting.sight.perceiving import PerceivingPolicy
+from stages.cutting.sight.pictured import write_pictures
+from stages.cutting.sight.seeing import DOUBT as SEEN_DOUBT
+from stages.cutting.sight.views import look
 from stages.cutting.world.body import Body
 from stages.kit.stage import Context
 
@@ -29,27 +36,33 @@ def run(plan: CuttingPlan, model: CuttingModel, *, parameters: SimulateParameter
     if len(bodies) < file.objects + file.goal_bodies:
         raise BadInput(f"{plan.root}: has {len(bodies)} bodies, fewer than its objects and goal", hint="plan again")
     objects, goal = laid_out(bodies[: file.objects]), bodies[file.objects : file.objects + file.goal_bodies]
-    policy = _policy(read_learned(model), file, goal, parameters.method, context.seed)
-    board = Board()
+    policy = _policy(read_learned(model), file, goal, parameters, context.seed)
     frames: list[Mapping[int, Body]] = []
+    with closing(Hand() if parameters.cameras else Board()) as place, context.progress.step("cut"):
+        board = place.board if isinstance(place, Hand) else place
 
-    def lie(there: dict[int, Body]) -> None:
-        board.rest(there)
-        frames.append(dict(there))
+        def lie(there: dict[int, Body]) -> None:
+            if isinstance(place, Hand):
+                place.lay(there)
+                frames.append(dict(zip(there, in_rows(list(there.values()), ROW, BETWEEN), strict=True)))
+            else:
+                place.rest(there)
+                frames.append(dict(there))
 
-    try:
-        with context.progress.step("cut"):
-            start = dict(enumerate(objects))
-            lie(start)
-            most = len(file.wanted) + (parameters.method == "ours")
-            carving = carry_out(policy, list(start.values()), most=most, lie=lie)
-    finally:
-        board.close()
+        start = dict(enumerate(objects))
+        lie(start)
+        most = len(file.wanted) + (parameters.method == "ours")
+        carving = carry_out(policy, list(start.values()), most=most, lie=lie)
+        if isinstance(place, Hand):
+            laid = place.lay_out(carving.fragments)
+            write_pictures(context.output / "seen", look(laid, context.random(2)), laid)
     scores = scores_record(score(carving.fragments, goal)) if goal else None
     reached = carving.stopped is None and len(carving.board) >= len(file.wanted) and not board.fallen
     statement = f"{len(carving.steps)} cuts left {len(carving.board)} fragments, {len(file.wanted)} were wanted"
     if board.fallen:
         statement += f"; {len(board.fallen)} fell off the board"
+    if parameters.cameras:
+        statement += "; planned from what two depth cameras saw"
     if carving.stopped is not None:
         statement += f"; stopped: {carving.stopped.message}"
     CuttingTrialFile(
@@ -62,14 +75,19 @@ def run(plan: CuttingPlan, model: CuttingModel, *, parameters: SimulateParameter
         stopped=carving.stopped,
         scores=scores,
         fallen=len(board.fallen),
+        missed=policy.missed if isinstance(policy, PerceivingPolicy) else None,
         turned=float(np.mean(board.turned)) if board.turned else 0.0,
         statement=statement,
     ).write(context.output / "trial.json")
     write_bodies(context.output / "bodies.npz", carving.fragments)
     with context.progress.step("pictures"):
         width = parameters.image_width // 3
-        images = [draw(frames[0], width, "before"), draw(frames[-1], width, "as the fragments lie")]
-        images.append(draw(apart(carving.board), width, "fragments apart"))
+        images = [
+            draw(frames[0], width, "before"),
+            draw(frames[-1], width, "laid apart to be seen" if parameters.cameras else "as the fragments lie"),
+        ]
+        if not parameters.cameras:
+            images.append(draw(apart(carving.board), width, "fragments apart"))
         strip(images).save(context.output / "board.png")
         animate(context.output / "board.gif", frames, width, [f"{k} cuts" for k in range(len(frames))])
     summary: dict[str, object] = {
@@ -84,9 +102,15 @@ def run(plan: CuttingPlan, model: CuttingModel, *, parameters: SimulateParameter
     return CuttingTrial(root=context.output, outcome="ok" if reached else "not_reached", summary=summary)
 
 
-def _policy(learned: Learned, file: CuttingPlanFile, goal: list[Body], method: str, seed: int) -> Policy:
-    if goal:
+def _policy(
+    learned: Learned, file: CuttingPlanFile, goal: list[Body], parameters: SimulateParameters, seed: int
+) -> Policy:
+    method = parameters.method
+    if goal and method != "ours":
         return learned.policy(method, Goal(tuple(goal)), seed)
     if method != "ours":
         raise UsageError(f"--method {method} cuts towards fragments, the plan's goal is words", hint="--method ours")
-    return learned.policy_for([Item(k, wanted.edges, wanted.volume) for k, wanted in enumerate(file.wanted)])
+    items = [Item(k, wanted.edges, wanted.volume) for k, wanted in enumerate(file.wanted)]
+    if parameters.cameras:
+        return PerceivingPolicy(learned.grammar, items, seed, doubt=max(SEEN_DOUBT, file.doubt or 0.0))
+    return learned.policy_for(items, doubt=file.doubt or DOUBT)

@@ -69,10 +69,14 @@ class Demonstration:
 
     def do(self, piece: int, plane: Plane, parts: list[Body], gap: float) -> list[int]:
         """Enter a cut; the parts are pushed apart by a gap [m]. Return their numbers."""
-        shifts = tuple(np.sign(plane.height(part.moments[0][None])[0]) * 0.5 * gap * plane.normal for part in parts)
+        shifts = [np.sign(plane.height(part.moments[0][None])[0]) * 0.5 * gap * plane.normal for part in parts]
+        return self.enter(piece, plane, parts, shifts)
+
+    def enter(self, piece: int, plane: Plane, parts: list[Body], shifts: list[np.ndarray]) -> list[int]:
+        """Enter a cut whose parts are each pushed aside by (3,) [m]. Return their numbers."""
         numbers = tuple(range(len(self.pieces), len(self.pieces) + len(parts)))
         self.pieces += [part.shifted(shift) for part, shift in zip(parts, shifts, strict=True)]
-        self.cuts.append(Cut(piece, plane, numbers, shifts))
+        self.cuts.append(Cut(piece, plane, numbers, tuple(shifts)))
         return list(numbers)
 
 

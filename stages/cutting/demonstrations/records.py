@@ -11,7 +11,7 @@ from schemas.base import as_vector
 from schemas.cutting_demonstrations import CuttingDemonstrations, CuttingPlane, DemonstratedCut, DemonstrationRecord
 from schemas.errors import BadInput
 from stages.cutting.bodies_file import read_bodies
-from stages.cutting.demonstrations.cutter import Cut, Demonstration
+from stages.cutting.demonstrations.cutter import Demonstration
 from stages.cutting.world.body import Body, Plane
 from stages.cutting.world.knife import Knife, Refused, cut
 
@@ -54,10 +54,7 @@ def replay(record: DemonstrationRecord, objects: Sequence[Body], where: str) -> 
                 f"{where}: cut {number} gives {len(parts)} pieces, {len(each.shifts)} were recorded",
                 hint="record it again",
             )
-        first = len(done.pieces)
-        shifts = tuple(np.array(shift) for shift in each.shifts)
-        done.pieces += [part.shifted(shift) for part, shift in zip(parts, shifts, strict=True)]
-        done.cuts.append(Cut(each.piece, plane, tuple(range(first, len(done.pieces))), shifts))
+        done.enter(each.piece, plane, parts, [np.array(shift) for shift in each.shifts])
     done.categories |= record.categories
     return done
 

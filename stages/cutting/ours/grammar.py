@@ -19,7 +19,7 @@ from scipy.cluster.vq import kmeans2
 from stages.cutting.demonstrations.cutter import Demonstration
 from stages.cutting.demonstrations.recipes import CATEGORIES
 from stages.cutting.ours.items import features, item_of
-from stages.cutting.world.canonical import canonical
+from stages.cutting.world.canonical import axis_across
 
 MOST_TYPES = 12
 LEAST_DEVIATION = 0.05
@@ -139,8 +139,7 @@ def _corpus(demonstrations: Sequence[Demonstration]) -> _Corpus:
         rows += list(features([item_of(body, k) for k, body in enumerate(demonstration.pieces)]))
         roots += [start + k for k in range(len(demonstration.objects))]
         for cut in demonstration.cuts:
-            frame = canonical(demonstration.pieces[cut.piece]).world_from_fragment
-            axis = int(np.argmax(np.abs(frame[:3, :3].T @ cut.plane.normal)))
+            axis = axis_across(demonstration.pieces[cut.piece], cut.plane.normal)
             largest = sorted(cut.results, key=lambda n: -demonstration.pieces[n].volume)[:2]
             cuts.append((start + cut.piece, axis, start + largest[0], start + largest[1]))
     return _Corpus(np.array(rows).reshape(-1, 4), np.array(roots, int), np.array(cuts, int).reshape(-1, 4))

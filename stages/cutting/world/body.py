@@ -38,7 +38,7 @@ class Body:
     """A closed body of one piece, in metres. Cutting and moving give new bodies."""
 
     def __init__(self, solid: manifold3d.Manifold) -> None:
-        self._solid = solid
+        self.solid = solid
 
     @staticmethod
     def of_mesh(vertices: np.ndarray, faces: np.ndarray) -> Body:
@@ -59,11 +59,11 @@ class Body:
     @cached_property
     def volume(self) -> float:
         """Volume [m^3]."""
-        return float(self._solid.volume())
+        return float(self.solid.volume())
 
     @cached_property
     def _mesh(self) -> tuple[np.ndarray, np.ndarray]:
-        mesh = self._solid.to_mesh64()
+        mesh = self.solid.to_mesh64()
         return np.array(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts).astype(np.int64)
 
     @property
@@ -95,15 +95,15 @@ class Body:
 
     def moved(self, target_from_source: np.ndarray) -> Body:
         """Return the body under a rigid (4, 4) transform."""
-        return Body(self._solid.transform(np.asarray(target_from_source, dtype=float)[:3, :]))
+        return Body(self.solid.transform(np.asarray(target_from_source, dtype=float)[:3, :]))
 
     def shifted(self, by: np.ndarray) -> Body:
         """Return the body moved by (3,) [m]."""
-        return Body(self._solid.translate(np.asarray(by, dtype=float)))
+        return Body(self.solid.translate(np.asarray(by, dtype=float)))
 
     def halves(self, plane: Plane) -> tuple[list[Body], list[Body]]:
         """Return the pieces on the side of the normal and on the other; a bent body may fall into more than two."""
-        sides = self._solid.split_by_plane(plane.normal, -plane.d)
+        sides = self.solid.split_by_plane(plane.normal, -plane.d)
         return pieces(sides[0]), pieces(sides[1])
 
     def section(self, plane: Plane) -> np.ndarray:
@@ -124,6 +124,6 @@ def pieces(solid: manifold3d.Manifold) -> list[Body]:
     return sorted(parts, key=lambda body: -body.volume)
 
 
-def total_volume(bodies: Sequence[Body]) -> float:
-    """Return the volume of bodies together [m^3]."""
-    return float(sum(body.volume for body in bodies))
+def unite(bodies: Sequence[Body]) -> list[Body]:
+    """Return the connected pieces of the union of bodies, largest first."""
+    return pieces(manifold3d.Manifold.batch_boolean([body.solid for body in bodies], manifold3d.OpType.Add))

@@ -63,6 +63,12 @@ def canonical(body: Body) -> Canonical:
     return Canonical(transform_from(axes * turn, center), vertices * turn, body.faces, body.volume)
 
 
+def axis_across(body: Body, normal: np.ndarray) -> int:
+    """Return the axis of a body (0 the shortest) that a plane with this normal (3,) cuts across."""
+    axes = canonical(body).world_from_fragment[:3, :3]
+    return int(np.argmax(np.abs(axes.T @ normal)))
+
+
 def _octant(filled: np.ndarray, middle: np.ndarray, signs: np.ndarray) -> int:
     parts = tuple(slice(m, None) if s > 0 else slice(0, m) for m, s in zip(middle, signs, strict=True))
     return int(filled[parts].sum())

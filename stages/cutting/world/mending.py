@@ -9,8 +9,9 @@ import numpy as np
 import trimesh
 
 from schemas.errors import BadInput
-from stages.cutting.world.body import Body
+from stages.cutting.world.body import Body, unite
 from stages.cutting.world.canonical import canonical
+from stages.cutting.world.voxels import Grid, occupancy
 from stages.kit.formats.mesh_files import read_mesh
 
 LONGEST, SHORTEST = 1.0, 0.004
@@ -18,6 +19,8 @@ LONGEST, SHORTEST = 1.0, 0.004
 MOST_FACES = 200_000
 UNLIKE = 0.05
 """Share by which the volume that faces enclose may differ from the space inside: overlaps count twice."""
+LATTICE = 64
+"""Steps along each edge of the box around a mesh, at which it is asked what is inside."""
 SUFFIXES = (".ply", ".obj", ".stl", ".glb")
 
 
@@ -33,9 +36,7 @@ def read_body(path: Path, unit: Literal["m", "mm"]) -> tuple[Body, list[str]]:
         mesh.apply_scale(1e-3)
     _check_size(float(np.ptp(mesh.vertices, axis=0).max()), path, unit)
     body, mended = _closed(mesh, path)
-    shape = canonical(body)
-    grid, filled = shape.voxels(float(shape.size.max()) / 64)
-    inside = float(filled.sum()) * grid.voxel**3
+    inside = _space_inside(body)
     if abs(inside - body.volume) > UNLIKE * max(inside, body.volume):
         raise BadInput(
             f"{path}: self-intersecting: its faces enclose {1e6 * body.volume:.2f} cm3, the space inside is "
@@ -43,6 +44,16 @@ def read_body(path: Path, unit: Literal["m", "mm"]) -> tuple[Body, list[str]]:
             hint="unite its parts in a mesh editor",
         )
     return body.shifted(-body.moments[0]), mended
+
+
+def _space_inside(body: Body) -> float:
+    """Return the volume [m^3] of the space that is inside by the parity of faces, on a lattice that is as fine along
+    thin edges as along long ones."""
+    shape = canonical(body)
+    low, high = shape.bounds
+    step = (high - low) / LATTICE
+    filled = occupancy((shape.vertices - low) / step, shape.faces, Grid(np.zeros(3), 1.0, (LATTICE,) * 3))
+    return float(filled.sum() * step.prod())
 
 
 def _check_size(longest: float, path: Path, unit: str) -> None:
@@ -68,12 +79,15 @@ def _closed(mesh: trimesh.Trimesh, path: Path) -> tuple[Body, list[str]]:
         trimesh.repair.fix_normals(whole)
         mended.append("faces turned outwards")
     parts = whole.split(only_watertight=False)
-    if len(parts) > 1:
-        raise BadInput(f"{path}: {len(parts)} bodies that do not hang together", hint="give them one by one")
     try:
-        return Body.of_mesh(whole.vertices, whole.faces), mended
+        if len(parts) == 1:
+            return Body.of_mesh(whole.vertices, whole.faces), mended
+        united = unite([Body.of_mesh(part.vertices, part.faces) for part in parts])
     except ValueError as error:
         raise BadInput(f"{path}: no closed body: {error}", hint="repair it in a mesh editor") from None
+    if len(united) > 1:
+        raise BadInput(f"{path}: {len(united)} bodies that do not hang together", hint="give them one by one")
+    return united[0], [*mended, f"{len(parts)} bodies that pass through each other united"]
 
 
 def read_bodies_of(folder: Path, unit: Literal["m", "mm"]) -> tuple[list[Body], list[str]]:

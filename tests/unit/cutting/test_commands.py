@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from cli.main import run
 from schemas.cutting_demonstrations import CuttingDemonstrationsFile
@@ -22,6 +23,7 @@ from stages.cutting.ours.items import Item, item_of
 from stages.cutting.ours.policy import OursPolicy
 from stages.cutting.policy import Stop, carry_out
 from stages.cutting.words import read_words
+from stages.cutting.world.foods import make_food
 from stages.cutting.world.mending import read_body
 
 SMALL = ["--image-width", "300", "--quiet"]
@@ -155,3 +157,63 @@ def test_a_cut_of_what_does_not_lie_there_is_refused(folder: Path) -> None:
     data["trials"][0]["cuts"][0]["piece"] = 7
     with pytest.raises(ValueError, match="does not lie there"):
         CuttingDemonstrationsFile.model_validate_json(json.dumps(data))
+
+
+def test_bodies_that_pass_through_each_other_are_united_and_it_is_said(tmp_path: Path) -> None:
+    first, second = trimesh.creation.box((0.04, 0.04, 0.1)), trimesh.creation.box((0.04, 0.1, 0.04))
+    body, mended = read_body(_mesh(tmp_path, trimesh.util.concatenate([first, second])), "m")
+    assert body.volume == pytest.approx(1.6e-4 * 2 - 6.4e-5, rel=1e-5)
+    assert mended == ["2 bodies that pass through each other united"]
+    second.apply_translation((1e-1, 0.0, 0.0))
+    with pytest.raises(BadInput, match="2 bodies that do not hang together"):
+        read_body(_mesh(tmp_path, trimesh.util.concatenate([first, second])), "m")
+
+
+@pytest.mark.parametrize(
+    ("mesh", "code", "said"),
+    [
+        (_cut_open(), 3, "open: "),
+        (_pushed_through(), 3, "self-intersecting"),
+        (trimesh.creation.box((40, 50, 100)), 3, "--unit mm"),
+        (trimesh.creation.box((0.002, 0.05, 0.05)), 4, "cm3, there are"),
+    ],
+)
+def test_bad_goals_are_one_line_and_lose_nothing(
+    folder: Path, tmp_path: Path, mesh: trimesh.Trimesh, code: int, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Meshes as what is cut and as what is wanted; the last holds less than is wanted of it. A plan that lies there
+    stays, but for one that says why not."""
+    out, model = str(tmp_path / "plan"), str(folder / "model")
+    words = ["--model", model, "--goal", "2 chunks", "--out", out]
+    assert run(["cutting", "plan", *words, *SMALL]) == 0
+    before = {path.name: path.read_bytes() for path in (tmp_path / "plan").iterdir()}
+    capsys.readouterr()
+    broken = str(_mesh(tmp_path, mesh))
+    wanted = tmp_path / "wanted"
+    wanted.mkdir()
+    trimesh.creation.box((0.06, 0.06, 0.06)).export(wanted / "cube.stl")
+    asked = ["--model", model, "--mesh", broken, "--goal-meshes", str(wanted), "--out", out, *SMALL]
+    assert run(["cutting", "plan", *asked]) == code
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert sum(line.startswith("error: ") for line in lines) == 1 and said in lines[-1]
+    if code == 3:
+        assert before == {path.name: path.read_bytes() for path in (tmp_path / "plan").iterdir()}
+
+
+def test_a_plan_of_64_fragments_has_all_of_them(grammar: Grammar) -> None:
+    objects = [make_food("bread", np.random.default_rng(1))]
+    items, _ = imagine(objects, [(64, "cubes")], grammar)
+    carving = carry_out(OursPolicy(grammar, items), objects, most=65)
+    assert len(carving.board) == 64 and carving.stopped is None
+    volume = sum(body.volume for body in carving.board.values())
+    assert volume == pytest.approx(objects[0].volume, rel=1e-6)
+    assert max(body.volume for body in carving.board.values()) < 4 * volume / 64
+
+
+def test_the_tree_says_how_probable_each_rule_is(folder: Path, tmp_path: Path) -> None:
+    out = ["--goal", "3 slices", "--out", str(tmp_path / "plan")]
+    assert run(["cutting", "plan", "--model", str(folder / "model"), *out, *SMALL]) == 0
+    cuts = CuttingPlanFile.read(tmp_path / "plan" / "plan.json").cuts
+    assert len(cuts) == 2 and all(cut.chance is not None and 0.0 < cut.chance < 1.0 for cut in cuts)
+    picture = np.asarray(Image.open(tmp_path / "plan" / "tree.png").convert("RGB"))
+    assert picture.std() > 5 and "with probability" in (tmp_path / "plan" / "plan.txt").read_text()

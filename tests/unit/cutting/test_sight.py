@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Callable
 from contextlib import closing
+from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
+from cli.main import run
+from schemas.cutting_plan import CuttingPlanFile, CuttingTrialFile
+from schemas.errors import BadInput
 from stages.cutting.demonstrations.trials import make_trial
 from stages.cutting.evaluate_stage import attempt
+from stages.cutting.measure.scores import score
 from stages.cutting.methods import Learned
 from stages.cutting.ours.grammar import learn
 from stages.cutting.ours.imagining import imagine
 from stages.cutting.policy import carry_out
-from stages.cutting.sight.perceiving import Hand
+from stages.cutting.sight.laying import Hand, in_rows
+from stages.cutting.sight.pictured import read_pictures, write_pictures
 from stages.cutting.sight.seeing import see
 from stages.cutting.sight.surface import zero_surface
 from stages.cutting.sight.views import look
@@ -76,3 +84,75 @@ def test_one_stroke_through_several_pieces_saves_strokes(learned: Learned) -> No
         assert len(carving.board) == 12 and len(carving.steps) == 11
         strokes.append(carving.strokes)
     assert strokes[0] == 11 > strokes[1]
+
+
+@pytest.fixture(scope="module")
+def pictured(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Body]]:
+    fragments = make_trial("n1m1", (3, 2)).fragments
+    with closing(Hand()) as hand:
+        laid = hand.lay_out(fragments)
+    folder = tmp_path_factory.mktemp("pictured") / "goal"
+    write_pictures(folder, look(laid, np.random.default_rng(0)), laid)
+    return folder, fragments
+
+
+def test_a_goal_on_pictures_is_seen_from_the_files(pictured: tuple[Path, list[Body]]) -> None:
+    folder, fragments = pictured
+    views = read_pictures(folder)
+    assert len(views) == 2 and all(color.shape == (*view.depth.shape, 3) for view, color in views)
+    found = score(see([view for view, _ in views]), fragments)
+    assert found.count_exact and found.iou > 0.7 and found.volume_error < 0.15
+    assert len(read_pictures(folder / "camera_1")) == 1
+
+
+def test_fragments_in_rows_lie_apart() -> None:
+    fragments = make_trial("n3m4", (3, 1)).fragments
+    laid = in_rows(fragments, 0.3, 0.02)
+    boxes = np.array([(body.vertices.min(axis=0)[:2], body.vertices.max(axis=0)[:2]) for body in laid])
+    gaps = np.maximum(boxes[:, None, 0] - boxes[None, :, 1], boxes[None, :, 0] - boxes[:, None, 1]).max(axis=2)
+    assert (gaps[~np.eye(len(laid), dtype=bool)] > 0.02 - 1e-9).all()
+    assert np.allclose([body.volume for body in laid], [body.volume for body in fragments])
+
+
+def _change(path: Path, text: str, by: str) -> None:
+    path.write_text(path.read_text().replace(text, by))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda f: (f / "depth.png").unlink(), "file is missing"),
+        (lambda f: (f / "depth.png").write_bytes(b"no picture"), "no picture"),
+        (lambda f: (f / "depth.png").write_bytes((f / "color.png").read_bytes()), "depth has 16 bits"),
+        (lambda f: (f / "camera.json").unlink(), "holds no pictures"),
+        (lambda f: (f / "camera.json").write_text("{"), "camera.json"),
+        (lambda f: _change(f / "camera.json", '"width": ', '"width": 1'), "the camera"),
+        (lambda f: _change(f / "camera.json", '"width": ', '"width": -'), "no camera"),
+    ],
+)
+def test_pictures_that_cannot_be_read_are_refused(
+    pictured: tuple[Path, list[Body]], tmp_path: Path, change: Callable[[Path], object], said: str
+) -> None:
+    folder = Path(shutil.copytree(pictured[0] / "camera_0", tmp_path / "goal"))
+    change(folder)
+    with pytest.raises(BadInput) as refused:
+        read_pictures(folder)
+    assert said in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_a_trial_through_cameras_is_a_goal_on_pictures(tmp_path: Path) -> None:
+    shown, model, plan, trial, again = (str(tmp_path / name) for name in ("shown", "model", "plan", "trial", "again"))
+    small = ["--image-width", "300", "--quiet"]
+    assert run(["cutting", "demonstrate", "--share", "0.3", "--seed", "1", "--out", shown, *small]) == 0
+    assert run(["cutting", "learn", "--demonstrations", shown, "--out", model, "--quiet"]) == 0
+    goal = ["--goal", "3 chunks", "--food", "cucumber"]
+    assert run(["cutting", "plan", "--model", model, *goal, "--out", plan, *small]) == 0
+    asked = ["--plan", plan, "--model", model, "--cameras"]
+    assert run(["cutting", "simulate", *asked, "--out", trial, *small]) == 0
+    done = CuttingTrialFile.read(tmp_path / "trial" / "trial.json")
+    assert done.fragments == 3 and done.missed == 0 and "cameras saw" in done.statement
+    goal = ["--goal-pictures", f"{trial}/seen", "--food", "cucumber", "--out", again]
+    assert run(["cutting", "plan", "--model", model, *goal, *small]) == 0
+    file = CuttingPlanFile.read(tmp_path / "again" / "plan.json")
+    assert file.goal == "3 fragments seen by 2 cameras" and file.scores is not None and file.scores.iou > 0.7
+    assert run(["cutting", "simulate", *asked, "--method", "bc", "--out", trial, *small]) == 2

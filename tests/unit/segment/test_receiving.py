@@ -18,10 +18,11 @@ from schemas.base import LARGEST_INT32
 from schemas.errors import BadInput, MachineFailure, UsageError
 from schemas.scene_parts import Camera
 from stages.kit.formats.frames import Frame
+from stages.kit.services import receiving
 from stages.kit.services.connection import Connection, GivenUp
-from stages.segment.backends.service import receiving, server
+from stages.kit.services.receiving import BoundedServer
+from stages.segment.backends.service import server
 from stages.segment.backends.service.protocol import LARGEST_PART, SegmentRequest, encode_request, split_multipart
-from stages.segment.backends.service.receiving import BoundedServer
 from tests.unit.segment.test_service import reference_server, serving
 
 OK = b"GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n"

@@ -24,6 +24,7 @@ def view(page: Page) -> dict[str, Any] | None:
         "trial": trial.info if trial is not None else None,
         "tree": file_text(plan.path("plan.txt"), LARGEST_SHOWN) if plan is not None else "",
         "fragments": _picture(plan, "fragments", "Before, after, and what is wanted, fragments apart"),
+        "parse": _picture(plan, "tree", "The parse tree, with the probability of each rule"),
         "board": _picture(trial, "board", "On the board: before, as the fragments lie, and apart"),
     }
 

@@ -15,6 +15,7 @@ from schemas.base import canonical_json
 from schemas.errors import ScenewrightError
 from schemas.vocabulary import load_vocabulary
 from stages.kit.digests import sha256_of_text
+from stages.kit.services.receiving import BoundedHandler, BoundedServer
 from stages.segment.backends.service.protocol import (
     HEALTH_PATH,
     INFO_PATH,
@@ -29,7 +30,6 @@ from stages.segment.backends.service.protocol import (
     encode_reply,
     parse_request,
 )
-from stages.segment.backends.service.receiving import BoundedHandler, BoundedServer
 from stages.segment.choice import Backend
 from stages.segment.geometric import GeometricSettings, segment_depth
 

@@ -196,6 +196,9 @@ class BoundedHandler(BaseHTTPRequestHandler):
 
     server: BoundedServer
     routes: Mapping[str, Mapping[str, Callable[[Any], None]]] = {}
+    largest_body = LARGEST_BODY
+    tells_routes = True
+    """Whether who asks for another path is told which there are."""
     protocol_version = "HTTP/1.1"
     server_version = "scenewright"
     sys_version = ""
@@ -244,7 +247,8 @@ class BoundedHandler(BaseHTTPRequestHandler):
         elif hosts and not self.server.is_meant(hosts[0]):
             self._refuse_unread(421, "this server is for this machine alone, under a name of it (localhost, 127.0.0.1)")
         elif (methods := self.routes.get(self.path)) is None:
-            self._refuse_unread(404, f"no {self.path:.80}; there are {', '.join(self.routes)}")
+            there = f"; there are {', '.join(self.routes)}" if self.tells_routes else ""
+            self._refuse_unread(404, f"no {self.path:.80}{there}")
         elif self.command not in methods:
             allowed = ", ".join(methods)
             self._refuse_unread(405, f"{self.path} takes {allowed}", {"Allow": allowed})
@@ -271,8 +275,8 @@ class BoundedHandler(BaseHTTPRequestHandler):
             self._refuse_unread(411, "a Content-Length is needed")
         elif len(lengths) > 1 or not (declared.isascii() and declared.isdigit()):
             self._refuse_unread(400, "Content-Length is no number")
-        elif len(declared) > 15 or int(declared) > LARGEST_BODY:
-            self._refuse_unread(413, f"more than {LARGEST_BODY} bytes")
+        elif len(declared) > 15 or int(declared) > self.largest_body:
+            self._refuse_unread(413, f"more than {self.largest_body} bytes")
         else:
             return self._read(int(declared))
         return None
@@ -281,7 +285,7 @@ class BoundedHandler(BaseHTTPRequestHandler):
         if self.headers.get("Expect", "").lower() == "100-continue" and self.request_version == "HTTP/1.1":
             self.send_response_only(100)
             self.end_headers()
-        self._stream.allow(BODY_SECONDS, LARGEST_BODY + 1)
+        self._stream.allow(BODY_SECONDS, self.largest_body + 1)
         self._stream.begun = True
         parts: list[bytes] = []
         received = 0
@@ -321,11 +325,11 @@ class BoundedHandler(BaseHTTPRequestHandler):
         """Answer with a reason."""
         self.answer(status, json.dumps({"error": reason}).encode(), headers)
 
-    def answer(self, status: int, body: bytes, headers: Mapping[str, str] | None = None) -> None:
-        """Answer with JSON."""
+    def answer(self, status: int, body: bytes, headers: Mapping[str, str] | None = None, *, kind: str = JSON) -> None:
+        """Answer with JSON, or a body of another media type `kind`."""
         self.connection.settimeout(SEND_SECONDS)
         self.send_response(status)
-        self.send_header("Content-Type", JSON)
+        self.send_header("Content-Type", kind)
         self.send_header("Content-Length", str(len(body)))
         for name, value in (headers or {}).items():
             self.send_header(name, value)

@@ -1,0 +1,1 @@
+"""A person cuts: two clicks on a picture are a plane."""
