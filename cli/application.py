@@ -34,7 +34,8 @@ def build_application() -> Callable[..., Any]:
             parent = groups[group]
         parent.command(name=command, help=stage.summary, rich_help_panel="Steps")(make_command(stage))
     for group, function in housekeeping.BESIDE_STEPS:
-        groups[group].command()(function)
+        if group in groups:
+            groups[group].command()(function)
     for function, help_panel in housekeeping.COMMANDS:
         application.command(rich_help_panel=help_panel)(function)
     for name, alone, below, help_panel in housekeeping.GROUPS:

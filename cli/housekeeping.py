@@ -295,4 +295,4 @@ GROUPS: tuple[tuple[str, Callable[..., Any], tuple[Callable[..., Any], ...], str
 )
 """Commands that do something by themselves and have commands below them."""
 BESIDE_STEPS: tuple[tuple[str, Callable[..., Any]], ...] = (("cutting", record),)
-"""Commands of a group of steps that are no steps."""
+"""Commands of a group of steps that are no steps; they are there where the group's steps are."""
