@@ -215,6 +215,10 @@ stitch: setup ## Suturing (STITCH): scene to disparity, needle, thread; trials, 
 stitch-needle: setup ## The needle's pose: the thesis's estimator and ours on rendered views (QUICK=1: ten a case)
 	$(EXPERIMENT) stitch_needle --out $(OUTPUTS)/experiments/stitch-needle$(if $(QUICK),-quick) $(ASKED)
 
+.PHONY: stitch-absent
+stitch-absent: setup ## Is there a needle at all: rendered views with and without one, recorded tissue (QUICK=1; REAL_DATA=folder)
+	$(EXPERIMENT) stitch_absent --data $(REAL_DATA) --out $(OUTPUTS)/experiments/stitch-absent$(if $(QUICK),-quick) $(ASKED)
+
 .PHONY: stitch-trials
 # A hundred reporting seeds an arm, about three CPU minutes; a stopped run goes on where it was.
 stitch-trials: setup ## Whole suture trials in the simulator: table 4.1, the thesis's arms and ours (QUICK=1: ten trials)

@@ -11,6 +11,7 @@ from stages.suture.needle.estimator import Estimator
 from stages.suture.needle.evidence import Evidence, evidence_of, left_over
 from stages.suture.needle.filter import difference, either_way, fuse
 from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
+from stages.suture.needle.presence import presence_features, presence_probability
 from stages.suture.needle.silhouette import Outline, Sheet, fit_outline, sheet_of
 from stages.suture.needle.starts import FARTHEST, NEAREST, starts
 from stages.suture.needle.windows import EyeMask, needle_masks, windows
@@ -33,6 +34,8 @@ VARIANCE = 0.36
 """Of a pixel's misfit, neighbours that err alike counted in; chosen so that ellipsoids hold what they should."""
 LEAST_PROBABILITY = 0.45
 """Of being within TOLERANCE, below which the pose is not answered."""
+LEAST_PRESENCE = 0.5
+"""Probability that there is a needle, below which none is answered: no needle is then the likelier explanation."""
 MOST_OF_IT = 0.8
 """Of the probability, about one pose: what is not known then is where in its neighbourhood the needle is."""
 LEAST_SEEN = 0.1
@@ -83,7 +86,9 @@ def estimate(observation: NeedleObservation, seed: int = 0, guess: NeedlePose | 
     rivals = _hypotheses(observation, eyes, sheets, seed, guess)
     if not rivals:
         return NeedleEstimate.none("No circle of the needle's radius passes through what both eyes see.")
-    answer = _answer(rivals, np.random.default_rng(seed))
+    features = presence_features(observation.rig, sheets, rivals[0].outline, rivals[0].evidence)
+    answer = _answer(rivals, presence_probability(features), np.random.default_rng(seed))
+    answer = replace(answer, presence_features=tuple(features.tolist()))
     if not answer.abstained:
         rest = left_over(observation.rig, eyes, sheets, rivals[0].outline)
         return replace(answer, abstained=_second_needle(observation, rivals[0], rest, seed))
@@ -226,8 +231,9 @@ def _disparity_points(observation: NeedleObservation, random: np.random.Generato
     return points[usable]
 
 
-def _answer(rivals: list[Hypothesis], random: np.random.Generator) -> NeedleEstimate:
-    """Return the pose about which most of the probability lies, with its covariance, or abstain."""
+def _answer(rivals: list[Hypothesis], presence: float, random: np.random.Generator) -> NeedleEstimate:
+    """Return the pose about which most of the probability lies, with its covariance, or abstain. `presence`: how
+    probable it is that there is a needle."""
     draws = random.standard_normal((DRAWS, 6))
     chances = [_chance(rival, rivals, draws) for rival in rivals]
     chance = max(chances)
@@ -238,7 +244,7 @@ def _answer(rivals: list[Hypothesis], random: np.random.Generator) -> NeedleEsti
     everything = sum(other.probability for other in about)
     pose = best.pose if 2.0 * along >= everything else best.pose.swapped()
     sure = max(along, everything - along) / everything
-    why = _why_abstain(best, chance, about)
+    why = _why_abstain(best, chance, presence, about)
     near = [other for other in about if _near(either_way(best.pose, other.pose)[0], BASIN)]
     covariance = _covariance(best, rivals if why else near)
     return NeedleEstimate(pose, covariance, float(np.clip(sure, 0.5, MOST_SURE)), why)
@@ -270,8 +276,10 @@ def _covariance(best: Hypothesis, others: list[Hypothesis]) -> np.ndarray:
     return total / sum(other.probability for other in others)
 
 
-def _why_abstain(best: Hypothesis, chance: float, about: list[Hypothesis]) -> str:
+def _why_abstain(best: Hypothesis, chance: float, presence: float, about: list[Hypothesis]) -> str:
     """Return why the pose should not be used, or nothing."""
+    if presence < LEAST_PRESENCE:
+        return f"What both eyes show is hardly a needle: the best outline is one with {100 * presence:.0f} %."
     seen = float(best.evidence.seen.mean(axis=1).min())
     if seen < LEAST_SEEN:
         return f"One eye sees {100 * seen:.0f} % of the needle where it best fits."

@@ -65,13 +65,15 @@ class NeedleEstimate:
 
     `covariance` (6, 6): of the centre's error [m] (camera frame) and of the rotation vector [rad] (camera frame) that
     turns the estimate into the truth. `tip_probability`: that tip and swage are not exchanged. `abstained`: empty, or
-    one sentence that says why the pose should not be used; `pose` is then the best guess or None.
+    one sentence that says why the pose should not be used; `pose` is then the best guess or None. `presence_features`:
+    what the test of presence looked at; empty where there was nothing to test, and of estimators without one.
     """
 
     pose: NeedlePose | None
     covariance: np.ndarray
     tip_probability: float
     abstained: str
+    presence_features: tuple[float, ...] = ()
 
     @staticmethod
     def none(reason: str) -> NeedleEstimate:

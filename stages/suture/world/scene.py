@@ -65,6 +65,8 @@ class NeedleScene:
     right_eye_turn: np.ndarray
     holder: str
     place: str
+    without_needle: bool = False
+    """Everything but the needle; `pose` is where it would be."""
 
     def tubes(self) -> Tubes:
         """Return every tube of the scene in the left camera's frame."""
@@ -73,7 +75,8 @@ class NeedleScene:
             parts.append(chain(self.crossing, np.full(len(self.crossing), THREAD_RADIUS), THREAD))
         for body, (grip, approach, across, opening) in self.grips.items():
             parts.append(driver_tube(grip, approach, across, opening, body))
-        return joined([needle_tube(self.pose), joined(parts).moved(self.camera_from_world)])
+        others = joined(parts).moved(self.camera_from_world)
+        return others if self.without_needle else joined([needle_tube(self.pose), others])
 
 
 def camera_place(rig: StereoRig, random: np.random.Generator) -> np.ndarray:

@@ -1,0 +1,160 @@
+"""Whether the needle's estimator says that there is no needle where there is none, and sees it where there is one.
+
+Cases: `empty_pictures`, rendered scenes without a needle, with highlights and blood, by the network's masks;
+`empty_masks`, masks made of thread and jaws; `needle_pictures` and `needle_masks`, the same with a needle (every second
+picture cluttered, masks spoiled); `endoscope`, recorded frames of tissue without a needle (../shared/data). A third of
+the rendered scenes is an endoscope's. `python -m benchmarks.training.needle_presence` fits the test on tuning seeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from pydantic import Field
+
+from benchmarks.experiment import Bench, Experiment, Measure, Trial
+from benchmarks.steps import made, opened
+from schemas.suture_needle import SutureNeedle
+from stages.kit.stage import Parameters
+from stages.suture.evaluation.judgement import judged
+from stages.suture.masks import learned_masks, spoiled_masks
+from stages.suture.needle.estimate import estimate
+from stages.suture.needle.observation import NeedleEstimate, NeedleObservation
+from stages.suture.rig import ENDOSCOPE, TWO_CAMERAS
+from stages.suture.segmentation.infer import Segmenter
+from stages.suture.world.clutter import cluttered, false_masks
+from stages.suture.world.render import StereoView, render
+from stages.suture.world.sampling import seen_scene
+
+TUNING, REPORTING = range(100), range(2000, 2500)
+RECORDED = "endoscope"
+FRAMES = 10
+VIEWS = {"empty_pictures": 500, "empty_masks": 500, "needle_pictures": 150, "needle_masks": 500}
+CALIBRATION_ERROR = 0.15
+SEED_OF_CLUTTER = 91
+
+
+class AbsentParameters(Parameters):
+    """Options of the experiment."""
+
+    data: Path = Field(Path("../shared/data"), description="Folder with surgt_stereo")
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What the estimator said of one view. `found`: its best guess is right, `right`: and the answer; `visible`: the
+    needle's plane is more than 15 degrees from edge-on; `presence`: the features of the test of presence (empty
+    where no outline came that far)."""
+
+    answered: bool
+    found: bool
+    right: bool
+    visible: bool
+    reason: str
+    presence: tuple[float, ...] = ()
+
+
+def sight_of(answer: NeedleEstimate, view: StereoView | None = None) -> Sight:
+    """Return the record of one answer; `view` where there is a needle."""
+    answered = answer.pose is not None and not answer.abstained
+    found = right = visible = False
+    if view is not None:
+        judgement = judged("ours", "", 0, view, answer)
+        found, right, visible = judgement.right, judgement.within, judgement.visible
+    return Sight(answered, found, right, visible, answer.abstained, answer.presence_features)
+
+
+def _learned(view: StereoView) -> NeedleObservation:
+    segmenter = Segmenter.load()
+    assert view.left.image is not None and view.right.image is not None
+    masks = learned_masks(segmenter.masks(view.left.image), segmenter.masks(view.right.image))
+    return masks.observation(view.rig, None)
+
+
+def observe(case: str, seed: int) -> tuple[NeedleObservation, StereoView]:
+    """Return what the estimator is given of a rendered scene, and the scene's view."""
+    torch.set_num_threads(1)
+    rig = TWO_CAMERAS if seed % 3 else ENDOSCOPE
+    scene, view = seen_scene(seed, rig, calibration_error=CALIBRATION_ERROR)
+    random = np.random.default_rng([SEED_OF_CLUTTER, seed])
+    if case == "needle_masks":
+        return spoiled_masks(view.left, view.right, seed)[0].observation(rig, None), view
+    if case == "needle_pictures":
+        pictured = render(scene)
+        return _learned(cluttered(pictured, random) if seed % 2 else pictured), view
+    empty = replace(scene, without_needle=True)
+    if case == "empty_pictures":
+        return _learned(cluttered(render(empty), random)), view
+    bare = render(empty, pictures=False)
+    left, right = false_masks(bare, random)
+    others = spoiled_masks(bare.left, bare.right, seed)[0]
+    return replace(others, needle=(left, right)).observation(rig, None), view
+
+
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Sight]]:
+    """Estimate one view, or all recorded frames."""
+    if trials[0].case == RECORDED:
+        sequence = made("ingest", bench.out / "recorded", "--log", bench.parameters.data / "surgt_stereo")
+        needle = opened(SutureNeedle, made("suture needle", bench.out / "needles", "--sequence", sequence))
+        for trial in trials:
+            said = needle.info.frames[int(trial.seed)].estimate
+            yield trial, Sight(not said.abstained, False, False, False, said.abstained)
+        return
+    for trial in trials:
+        observation, view = observe(trial.case, int(trial.seed))
+        answer = estimate(observation)
+        yield trial, sight_of(answer, view if trial.case.startswith("needle") else None)
+
+
+def seeds_of(bench: Bench, case: str) -> Sequence[str]:
+    """Views, or frames where the recording is there; nothing is tuned on it."""
+    if case != RECORDED:
+        return tuple(map(str, (TUNING if bench.tuning else REPORTING)[: VIEWS[case]]))
+    there = not bench.tuning and (bench.parameters.data / "surgt_stereo").is_dir()
+    return tuple(map(str, range(FRAMES))) if there else ()
+
+
+def share(name: str) -> Measure:
+    """Share of the views of which something holds [%]."""
+    return Measure(lambda records: 100 * float(np.mean([getattr(r, name) for r in records])) if records else None, "%")
+
+
+def _visible(record: Sight) -> Sight | None:
+    return record if record.visible else None
+
+
+def _all(record: Sight) -> Sight:
+    return record
+
+
+SUBCASES: dict[str, tuple[str, Callable[[Sight], Sight | None]]] = {
+    **{case: (case, _all) for case in (*VIEWS, RECORDED)},
+    **{f"{case}_visible": (case, _visible) for case in VIEWS if case.startswith("needle")},
+}
+
+
+EXPERIMENT = Experiment(
+    name="stitch_absent",
+    title="A needle, or none",
+    simulated="Needle, thread, drivers, pad, highlights and blood are rendered; masks are the network's, or made of "
+    "what is no needle; `endoscope` is recorded.",
+    knows="The needle's radius; the rig; no disparity is given.",
+    does_not_show="Needles in real pictures: there are none to be had. The test of presence was fitted on the same "
+    "rendered world; ten frames of one recording are few.",
+    arms={"ours": "ours"},
+    cases=(*VIEWS, RECORDED),
+    seeds_of=seeds_of,
+    together=lambda trial: (trial.case, "" if trial.case == RECORDED else trial.seed),
+    measure=measure,
+    record=Sight,
+    subcases=SUBCASES,
+    measures={"answered": share("answered"), "right": share("right")},
+    quick_seeds=10,
+    parameters=AbsentParameters,
+    places=frozenset({"data"}),
+    steps=("ingest", "suture needle"),
+)

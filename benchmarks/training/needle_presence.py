@@ -1,0 +1,77 @@
+"""The weights of the test whether there is a needle, by logistic regression on tuning views.
+
+    python -m benchmarks stitch_absent --tuning --out RUN
+    python -m benchmarks.training.needle_presence --run RUN
+
+Prints the constants of stages/suture/needle/presence.py, and the errors by leaving out blocks of seeds. Views with a
+needle count where the best guess is right (a wrong outline should not be called a needle); both kinds weigh the same. The ridge is that of the least logarithmic loss, left out, of three.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from pydantic import Field
+from scipy.optimize import minimize
+
+from benchmarks.keeping import kept_records
+from benchmarks.options import asked
+from stages.kit.stage import Parameters
+from stages.suture.needle.presence import FEATURES
+
+RIDGE, FOLDS = 0.1, 10
+
+
+class Options(Parameters):
+    """Options."""
+
+    run: Path = Field(description="Folder of the tuning views")
+
+
+def samples(run: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return FEATURES (N, F), whether there is a needle (N,), and the view's seed (N,)."""
+    rows, answers, seeds = [], [], []
+    for trial, record in kept_records("stitch_absent", run).items():
+        needle = trial.case.startswith("needle")
+        if record.presence and (record.found or not needle):
+            rows.append(record.presence)
+            answers.append(float(needle))
+            seeds.append(int(trial.seed))
+    return np.array(rows), np.array(answers), np.array(seeds)
+
+
+def fitted(features: np.ndarray, answers: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return weights (F,) and bias of a logistic function, with a ridge on standardised features."""
+    mean, spread = features.mean(axis=0), features.std(axis=0)
+    scaled = (features - mean) / spread
+    shares = np.where(answers > 0, 0.5 / answers.mean(), 0.5 / (1 - answers.mean()))
+
+    def loss(weights: np.ndarray) -> float:
+        margins = (2 * answers - 1) * (scaled @ weights[1:] + weights[0])
+        return float(shares @ np.logaddexp(0.0, -margins) + RIDGE * weights[1:] @ weights[1:])
+
+    found = minimize(loss, np.zeros(features.shape[1] + 1)).x
+    weights = found[1:] / spread
+    return weights, float(found[0] - weights @ mean)
+
+
+def main() -> None:
+    """Fit, and say how well."""
+    features, answers, seeds = samples(asked(Options).run)
+    margins = np.empty(len(answers))
+    for fold in range(FOLDS):
+        left_out = seeds % FOLDS == fold
+        weights, bias = fitted(features[~left_out], answers[~left_out])
+        margins[left_out] = features[left_out] @ weights + bias
+    chances = 1 / (1 + np.exp(-margins))
+    for least in (0.5, 0.8, 0.9):
+        false, missed = (chances[answers == 0] >= least).mean(), (chances[answers == 1] < least).mean()
+        print(f"from {least}: {100 * false:.1f} % false, {100 * missed:.1f} % missed, left out")
+    weights, bias = fitted(features, answers)
+    print(f"{len(answers)} views, {int(answers.sum())} with a needle")
+    print("WEIGHTS =", dict(zip(FEATURES, np.round(weights, 2).tolist(), strict=True)), "BIAS =", round(bias, 2))
+
+
+if __name__ == "__main__":
+    main()
