@@ -4,7 +4,8 @@
     python -m benchmarks.training.needle_presence --run RUN
 
 Prints the constants of stages/suture/needle/presence.py, and the errors by leaving out blocks of seeds. Views with a
-needle count where the best guess is right (a wrong outline should not be called a needle); both kinds weigh the same. The ridge is that of the least logarithmic loss, left out, of three.
+needle count where the best guess is right (a wrong outline should not be called a needle); both kinds weigh the same.
+The ridge is that of the least logarithmic loss, left out, of three.
 """
 
 from __future__ import annotations
