@@ -98,6 +98,13 @@ def test_what_is_explained_is_not_explained_again() -> None:
     assert first > 200 and len(trainer.gaussians) - first < 0.5 * first
 
 
+def test_pictures_bring_no_more_gaussians_than_there_may_be() -> None:
+    trainer = Trainer(ours.METHOD, CompiledRasterizer(), np.random.default_rng(0), most=150)
+    for view in views()[:2]:
+        trainer.add_view(view)
+    assert len(trainer.gaussians) == 150
+
+
 def test_a_pose_that_is_off_is_mended() -> None:
     """Five views are right, one stands 3 cm and a degree off: it is brought back, and the first stays where it is."""
     seen = views(WALK[:6])
