@@ -25,7 +25,7 @@ from stages.kit.stage import Parameters
 
 ARM = "masks"
 TUNING = ("0",)
-REPORTING = ("7000", "7001")
+REPORTING = ("7000",)
 LIBRARY_SEED = 1
 STEPS = ("library build", "library add", "ingest", "segment", "fuse", "graph", "cad", "urdf")
 

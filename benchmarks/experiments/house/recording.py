@@ -15,6 +15,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 from scipy.ndimage import distance_transform_edt, label
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 from benchmarks.experiments.house.furnishing import House
 from benchmarks.experiments.house.models import MODELS
@@ -31,7 +33,8 @@ NEAREST, FARTHEST = 0.4, 4.0
 BODY = 0.3
 """A walker keeps so far from things [m]."""
 CELL = 0.05
-TURNS = 4
+STOPS = 7
+TURNS = 5
 """How often the walker looks around on the way."""
 DISPARITY = 351.30
 """Disparity levels times metres: 35130 in centimetres."""
@@ -63,7 +66,28 @@ def class_of(name: str) -> str:
 
 
 def walk(house: House, frames: int, random: np.random.Generator) -> list[np.ndarray]:
-    """Return poses world_from_camera (4, 4): around the room where a walker has room, looking around and down."""
+    """Return poses world_from_camera (4, 4): a round through the places where a walker has room, looking around and
+    down."""
+    places = free_places(house)
+    stops = [int(random.integers(len(places)))]
+    while len(stops) < STOPS:  # each the farthest from those before
+        apart = np.min([np.linalg.norm(places - places[stop], axis=1) for stop in stops], axis=0)
+        stops.append(int(np.argmax(apart)))
+    path = places[round_trip(places, stops)]
+    lengths = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    at = np.linspace(0, lengths[-1], frames, endpoint=False)
+    poses = []
+    for k in range(frames):
+        eye = np.array([*(np.interp(at[k], lengths, path[:, axis]) for axis in (0, 1)), EYE + random.normal(0, 0.015)])
+        heading = 2 * np.pi * TURNS * k / frames
+        tilt = np.radians(30 + 14 * np.sin(2 * np.pi * 7 * k / frames))
+        ahead = np.array([np.cos(heading) * np.cos(tilt), np.sin(heading) * np.cos(tilt), -np.sin(tilt)])
+        poses.append(look_at(eye, eye + ahead))
+    return poses
+
+
+def free_places(house: House) -> np.ndarray:
+    """Return the places (N, 2) [m] on a grid that are BODY away from walls and things, the largest connected part."""
     cells = np.ceil(house.size[:2] / CELL).astype(int)
     x, y = ((np.arange(n) + 0.5) * CELL for n in cells)
     free = np.ones(cells, bool)
@@ -72,27 +96,26 @@ def walk(house: House, frames: int, random: np.random.Generator) -> list[np.ndar
         if thing.parent == "floor":
             (x_low, y_low, _), (x_high, y_high, _) = thing.bounds
             free &= ~((x[:, None] > x_low) & (x[:, None] < x_high) & (y > y_low) & (y < y_high))
-    room = distance_transform_edt(free) * CELL
-    parts, _ = label(room > BODY)
+    parts, _ = label(distance_transform_edt(free) * CELL > BODY)
     largest = np.argmax(np.bincount(parts.ravel())[1:]) + 1
-    places = np.argwhere(parts == largest) * CELL + CELL / 2
-    middle = places.mean(axis=0)
-    # Around the middle of where there is room: in every direction the farthest place that is free.
-    angles = np.arctan2(*(places - middle).T[::-1])
-    far = np.linalg.norm(places - middle, axis=1)
-    start = random.uniform(0, 2 * np.pi)
-    poses = []
-    for k in range(frames):
-        around = start + 2 * np.pi * k / frames
-        near = np.abs((angles - around + np.pi) % (2 * np.pi) - np.pi) < 0.15
-        chosen = np.flatnonzero(near) if near.any() else np.arange(len(places))
-        reach = np.quantile(far[chosen], 0.8)
-        eye = np.array([*places[chosen[np.argmin(np.abs(far[chosen] - reach))]], EYE + random.normal(0, 0.015)])
-        heading = around + np.pi + 2 * np.pi * TURNS * k / frames
-        tilt = np.radians(30 + 14 * np.sin(2 * np.pi * 7 * k / frames))
-        ahead = np.array([np.cos(heading) * np.cos(tilt), np.sin(heading) * np.cos(tilt), -np.sin(tilt)])
-        poses.append(look_at(eye, eye + ahead))
-    return poses
+    return (np.argwhere(parts == largest) + 0.5) * CELL
+
+
+def round_trip(places: np.ndarray, stops: list[int]) -> np.ndarray:
+    """Return numbers of places (M,) of a way from stop to nearest stop and back to the first, from cell to cell."""
+    close = cKDTree(places).sparse_distance_matrix(cKDTree(places), 1.5 * CELL, output_type="coo_matrix")
+    lengths, before = dijkstra(close.tocsr(), indices=stops, return_predecessors=True)
+    left, here, way = set(range(1, len(stops))), 0, [stops[0]]
+    while left or here:
+        following = min(left, key=lambda k: lengths[here, stops[k]]) if left else 0
+        left.discard(following)
+        back, place = [], stops[following]
+        while place != stops[here]:
+            back.append(place)
+            place = int(before[here, place])
+        way += back[::-1]
+        here = following
+    return np.array(way)
 
 
 def record(house: House, folder: Path, camera: Camera, frames: int, random: np.random.Generator) -> Recording:
