@@ -79,7 +79,8 @@ def judge(house: House, recording: Recording, run: Path) -> Judged:
     seen = {k: int(np.count_nonzero(recording.instance == k)) for k in true_names}
     things = {k for k, name in true_names.items() if class_of(name) not in stuff and seen[k] >= LEAST_POINTS}
     true_labels = np.where(np.isin(recording.instance, sorted(things)), recording.instance, 0)
-    classes = dict.fromkeys(predicted.classes(), ANY_CLASS)
+    classes = {p: ANY_CLASS for p, name in predicted.classes().items() if name not in stuff}
+    labels = np.where(np.isin(labels, sorted(classes)), labels, 0)  # a wall is no clock
     quality = panoptic_quality(true_labels, labels, dict.fromkeys(things, ANY_CLASS), classes, frozenset(), SAME)
     whole = quality.get(ANY_CLASS, ClassQuality())
     ious = intersection_over_union(true_labels, labels)
