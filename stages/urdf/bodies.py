@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from stages.kit.formats.cad_models import read_model
 from stages.kit.formats.mesh_files import read_mesh
 from stages.kit.formats.scene_bundle import BundleBody
 from stages.kit.geometry.boxes import box_from_bounds
-from stages.urdf.mobility import NAMELESS, Mobility, mobility
+from stages.urdf.mobility import NAMELESS, STANDS, Mobility, mobility
 
 
 def scene_bodies(
@@ -34,6 +35,7 @@ def scene_bodies(
         for node in graph.nodes
         if node.id != SCENE_NODE
     ]
+    bodies = held_under_fixed(bodies)
     nameless = cad_scene.path("meshes") / f"{SURROUNDINGS}.ply"
     return [*bodies, _surroundings(nameless)] if nameless.is_file() else bodies
 
@@ -86,6 +88,20 @@ def _body(
         box=bounds,
         mesh=mesh,
     )
+
+
+def held_under_fixed(bodies: list[BundleBody]) -> list[BundleBody]:
+    """Return the bodies, with those fixed that carry what is fixed: a free table under a microwave that hangs in the
+    world would be squeezed out between it and the floor."""
+    by_name = {body.name: body for body in bodies}
+    fixed = [body for body in bodies if not body.movable and body.relation in STANDS]
+    held: set[str] = set()
+    while fixed:
+        carrier = by_name.get(fixed.pop().parent or "")
+        if carrier is not None and carrier.movable and carrier.name not in held:
+            held.add(carrier.name)
+            fixed.append(carrier)
+    return [replace(body, movable=False, furniture=False) if body.name in held else body for body in bodies]
 
 
 def _surroundings(file: Path) -> BundleBody:

@@ -47,10 +47,11 @@ class JointRange:
 def sweep_joints(world: PhysicsWorld) -> list[JointRange]:
     """Return one entry a moving joint of a scene, in the order of its bodies. The world is left as it was.
 
-    Each joint goes alone from where it is closed to its limits in steps of a hundredth of its range; every other joint
-    stays at its value. A part meets a neighbour when it lies more than 5 mm in it. Neighbours are all other bodies and
-    the links of the own body that the joint does not connect, except what rides along: bodies that the own body
-    contains, and what stands on those.
+    Each joint goes alone from where it is closed to its limits in steps of a hundredth of its range; other joints
+    stay at their values. A part meets a neighbour when it lies more than 5 mm in it. Neighbours are all other bodies
+    and the links of the own body that the joint does not connect, except what rides along: bodies that the own body
+    contains, and what stands on those. Where a part meets a door of its own body at the start of its motion (a rack
+    behind the door of a dishwasher), the door is opened first, as a hand would do.
     """
     ranges = []
     for body in world.bodies.values():
@@ -76,14 +77,50 @@ def _contents(world: PhysicsWorld, name: str) -> set[str]:
 
 
 def _sweep(world: PhysicsWorld, body: LoadedBody, joint: str, riding: set[str]) -> JointRange:
+    before = {name: world.joint_value(body.name, name) for name in body.joints}
+    opened: set[str] = set()
+    while True:
+        found = _swept(world, body, joint, riding)
+        door = None if found.free_at_start else _door_of(world, body, joint, found.hit_link)
+        if door is None or door in opened:
+            break
+        opened.add(door)
+        world.set_joint(body.name, door, _open_value(world, body, door))
+    for name, value in before.items():
+        world.set_joint(body.name, name, value)
+    return found
+
+
+def _door_of(world: PhysicsWorld, body: LoadedBody, joint: str, link: str | None) -> str | None:
+    """Return the other joint of a body that moves the link, None where it is of another body, or moved by none."""
+    index = next((k for k in body.links.values() if world.link_name(body.body_id, k) == link), None)
+    moving = _moving_links(world, body, body.joints[joint])
+    for name, place in body.joints.items():
+        if index is not None and index not in moving and index in _moving_links(world, body, place):
+            # A joint that carries the part too (a tray that hangs on the door) would take it along.
+            return None if body.joints[joint] in _moving_links(world, body, place) else name
+    return None
+
+
+def _open_value(world: PhysicsWorld, body: LoadedBody, joint: str) -> float:
+    """Return the limit of a joint that is farther from where it is closed."""
+    lower, upper = _limits(world, body, joint)
+    closed = min(max(0.0, lower), upper)
+    return upper if upper - closed >= closed - lower else lower
+
+
+def _limits(world: PhysicsWorld, body: LoadedBody, joint: str) -> tuple[float, float]:
+    info = engine.getJointInfo(body.body_id, body.joints[joint], physicsClientId=world.client)
+    return (-np.pi, np.pi) if info[9] < info[8] else (info[8], info[9])  # without limits: once around
+
+
+def _swept(world: PhysicsWorld, body: LoadedBody, joint: str, riding: set[str]) -> JointRange:
+    """Sweep a joint with every other one where it is."""
     index = body.joints[joint]
-    info = engine.getJointInfo(body.body_id, index, physicsClientId=world.client)
-    lower, upper = info[8], info[9]
-    if upper < lower:  # a joint without limits
-        lower, upper = -np.pi, np.pi
+    lower, upper = _limits(world, body, joint)
     closed = min(max(0.0, lower), upper)
     moving = _moving_links(world, body, index)
-    parent = info[16]
+    parent = engine.getJointInfo(body.body_id, index, physicsClientId=world.client)[16]
     still = [
         (other.body_id, link, np.array(engine.getAABB(other.body_id, link, physicsClientId=world.client)))
         for other in world.bodies.values()
@@ -91,10 +128,8 @@ def _sweep(world: PhysicsWorld, body: LoadedBody, joint: str, riding: set[str]) 
         for link in sorted(other.links.values())
         if other.name != body.name or (link not in moving and link != parent)
     ]
-    before = world.joint_value(body.name, joint)
     step = (upper - lower) / STEPS
     stretches = [_stretch(world, body, joint, closed, limit, step, moving, still) for limit in (upper, lower)]
-    world.set_joint(body.name, joint, before)
     free = sum(length for length, _ in stretches)
     hit = next((met for _, met in stretches if met is not None), None)
     share = 1.0 if upper == lower else free / (upper - lower)

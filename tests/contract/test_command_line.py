@@ -104,3 +104,10 @@ def test_packages_from_elsewhere_are_refused(tmp_path: Path) -> None:
         env={**os.environ, "PYTHONPATH": f"{tmp_path}:{REPOSITORY}"},
     )
     assert done.returncode == 5 and "comes from" in done.stderr
+
+
+def test_a_python_without_the_libraries_says_what_to_do() -> None:
+    bare = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    words = [sys.executable, "-S", "-m", "cli", "--help"]  # -S: nothing that is installed
+    done = subprocess.run(words, cwd=REPOSITORY, capture_output=True, text=True, env=bare)
+    assert done.returncode == 5 and done.stderr.count("\n") == 1 and "make setup" in done.stderr

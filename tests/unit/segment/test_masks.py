@@ -29,12 +29,13 @@ from stages.kit.formats.masks import encode_panoptic_png
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.segment.backends.masks.formats import npz_stacks
-from stages.segment.backends.masks.given import GivenMask, Picture, ReadSettings
+from stages.segment.backends.masks.given import GivenFrame, GivenMask, Picture, ReadSettings
 from stages.segment.backends.masks.matching import match_pictures
 from stages.segment.backends.masks.overlapping import flatten
 from stages.segment.backends.masks.run_lengths import decode_rle, encode_rle
 from stages.segment.backends.service import reply_cache
 from stages.segment.backends.service.protocol import PROTOCOL
+from stages.segment.geometric import pixels_at
 from stages.segment.parameters import SegmentParameters, check
 from stages.segment.stage import run
 from tests.unit.segment.test_service import FAST, FakeServer, serving
@@ -42,6 +43,7 @@ from tests.unit.segment.test_stage import NAMES, Written, payload, write_sequenc
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 FRAMES = 3
+LEAST_PIXELS = SegmentParameters().small_object_pixels
 KINDS = {entry.name: entry.kind for entry in load_vocabulary().classes}
 CATEGORIES = [{"id": 10 * k, "name": name, "isthing": int(KINDS[name] == "thing")} for k, name in NAMES.items()]
 SCORES = {10 * k: round(1 - 0.0625 * k, 4) for k in NAMES}
@@ -333,6 +335,130 @@ def test_overlaps_are_reported(room: Written, tmp_path: Path, caplog: pytest.Log
         np.savez(folder / f"{k}.npz", masks=masks)
     segment(room, tmp_path / "out", folder)
     assert "masks overlap in 3 frames" in caplog.text and "smaller ones lie over larger" in caplog.text
+
+
+# ---- masks without classes, and masks that overlap, are treated alike whatever holds them ---------------------------
+
+
+def stacks(room: Written) -> list[np.ndarray]:
+    """(N, H, W) bool a frame: the true masks, and three that lie over others: a patch, a twin of the first that is half
+    a pixel off, and one of which little is left."""
+    found = []
+    for image in truth(room):
+        masks = [image == v for v in ids_of(image)]
+        patch, hidden = np.zeros(image.shape, bool), np.zeros(image.shape, bool)
+        patch[10:30, 10:40], hidden[11:29, 11:43] = True, True
+        found.append(np.array([*masks, patch, np.roll(masks[0], 1, axis=1), hidden]))
+    return found
+
+
+def score_of_mask(k: int) -> float:
+    return round(0.95 - 0.04 * k, 4)
+
+
+def write_overlapping(root: Path, kind: str, given: list[np.ndarray], classes: bool) -> None:
+    """One folder of masks that may overlap, of a category each or of none."""
+    names = list(NAMES.values())
+    rows = []
+    for k, masks in enumerate(given):
+        encode = compressed if kind == "COCO, compressed" else encode_rle
+        told = [{"category_id": 10 + 10 * (n % len(names))} if classes else {} for n in range(len(masks))]
+        listed = [
+            {"segmentation": encode(mask), "score": score_of_mask(n), **said}
+            for n, (mask, said) in enumerate(zip(masks, told, strict=True))
+        ]
+        rows += [{"image_id": k, **row} for row in listed]
+        if kind == "SAM":
+            sam = [{"segmentation": row["segmentation"], "predicted_iou": row["score"]} for row in listed]
+            (root / f"{k:06d}.json").write_text(json.dumps(sam))
+        if kind == "NPZ":
+            said = {"classes": np.array([row["category_id"] for row in told])} if classes else {}
+            scores = np.array([score_of_mask(n) for n in range(len(masks))])
+            np.savez(root / f"{k:06d}.npz", masks=masks, scores=scores, **said)
+    if kind == "NPZ" and classes:
+        (root / "classes.json").write_text(json.dumps(CATEGORIES))
+    if kind.startswith("COCO"):
+        pictures = [{"id": k, "file_name": f"{k:06d}.png"} for k in range(len(given))]
+        data = {"images": pictures, "annotations": rows, **({"categories": CATEGORIES} if classes else {})}
+        (root / "instances.json").write_text(json.dumps(data))
+
+
+def write_flat(root: Path, kind: str, frames: list[GivenFrame]) -> None:
+    """One folder of id images, without classes, as masks that overlapped are when a network has flattened them."""
+    rows = []
+    for k, frame in enumerate(frames):
+        told = [{"id": v, "score": mask.score} for v, mask in frame.masks.items()]
+        rows.append({"image_id": k, "file_name": f"{k:06d}.png", "segments_info": told})
+        if kind == "COCO panoptic":
+            (root / f"{k:06d}.png").write_bytes(encode_panoptic_png(frame.ids))
+        else:
+            values = np.array(sorted(frame.masks))
+            scores = np.array([frame.masks[v].score for v in values.tolist()])
+            np.savez(root / f"{k:06d}.npz", ids=frame.ids, id=values, scores=scores)
+    if kind == "COCO panoptic":
+        (root / "panoptic.json").write_text(json.dumps({"annotations": rows}))
+
+
+def flattened(room: Written) -> list[GivenFrame]:
+    frames = []
+    for masks in stacks(room):
+        told = [GivenMask(None, score_of_mask(k)) for k in range(len(masks))]
+        shape = (masks.shape[1], masks.shape[2])
+        frames.append(flatten(list(masks), told, ReadSettings(0.3, pixels_at(LEAST_PIXELS, shape)), shape))
+    return frames
+
+
+def test_overlapping_masks_with_classes_are_the_same_artifact(room: Written, tmp_path: Path) -> None:
+    made = {}
+    for kind in ("NPZ", "COCO, compressed", "COCO, uncompressed"):
+        folder = tmp_path / kind
+        folder.mkdir()
+        write_overlapping(folder, kind, stacks(room), classes=True)
+        made[kind] = payload(segment(room, tmp_path / f"out {kind}", folder, masks_model="mine"))
+    assert made["NPZ"] == made["COCO, compressed"] == made["COCO, uncompressed"]
+
+
+def test_masks_without_classes_are_the_same_artifact_in_every_format_and_through_a_service(
+    room: Written, tmp_path: Path
+) -> None:
+    frames = flattened(room)
+    assert any(frame.overlapping for frame in frames)  # the patch lies over others, the twin and the hidden are dropped
+    category = [{"id": 1, "name": "object", "isthing": 1}]
+    info = {"protocol": PROTOCOL, "name": "mine", "revision": "1", "streams": ["color"], "required": ["color"]}
+
+    def answer(k: int) -> tuple[int, dict[str, str], bytes]:
+        told = [{"id": v, "category_id": 1, "score": mask.score} for v, mask in frames[k].masks.items()]
+        png = base64.b64encode(encode_panoptic_png(frames[k].ids)).decode()
+        body = {"protocol": PROTOCOL, "segments_info": told, "panoptic_png": png}
+        return 200, {}, json.dumps(body).encode()
+
+    with serving(FakeServer(answer, json.dumps({**info, "categories": category}).encode())) as address:
+        service = segment(room, tmp_path / "service", None, address)
+    model = service.info.label.removeprefix("masks of ")
+    assert {s.score for frame in service.info.frames for s in frame.segments if s.category_id} - {1.0}
+    for kind in ("NPZ", "COCO, compressed", "COCO, uncompressed", "SAM", "COCO panoptic", "NPZ ids"):
+        folder = tmp_path / kind
+        folder.mkdir()
+        if kind in ("COCO panoptic", "NPZ ids"):
+            write_flat(folder, kind, frames)
+        else:
+            write_overlapping(folder, kind, stacks(room), classes=False)
+        made = segment(room, tmp_path / f"out {kind}", folder, masks_model=model)
+        assert payload(made) == payload(service), kind
+
+
+def test_instance_images_without_a_class_file_differ_by_their_scores_alone(room: Written, tmp_path: Path) -> None:
+    frames = [GivenFrame(frame.ids, dict.fromkeys(frame.masks, GivenMask(None))) for frame in flattened(room)]
+    (tmp_path / "panoptic").mkdir()
+    write_flat(tmp_path / "panoptic", "COCO panoptic", frames)
+    (tmp_path / "png").mkdir()
+    for k, frame in enumerate(frames):
+        cv2.imwrite(str(tmp_path / "png" / f"{k:06d}.png"), frame.ids.astype(np.uint16))
+    first, second = (
+        payload(segment(room, tmp_path / f"out {name}", tmp_path / name, masks_model="mine"))
+        for name in ("panoptic", "png")
+    )
+    assert first == second
 
 
 # ---- run lengths ---------------------------------------------------------------------------------------------------

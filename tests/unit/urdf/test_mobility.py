@@ -11,8 +11,10 @@ import trimesh
 from schemas.cad_scene import CadScene, CadSceneFile
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from schemas.scene_parts import Box, Relation, SurfacePlane
+from stages.kit.formats.scene_bundle import BundleBody
 from stages.kit.formats.urdf_file import parse_urdf
 from stages.kit.geometry.convex_pieces import convex_pieces
+from stages.urdf.bodies import held_under_fixed
 from stages.urdf.mobility import Mobility, mobility
 from stages.urdf.parameters import UrdfParameters
 from stages.urdf.stage import run
@@ -144,3 +146,21 @@ def test_pieces_hold_all_of_a_mesh_and_a_convex_one_is_one() -> None:
     assert set(map(tuple, np.concatenate(pieces))) == set(map(tuple, np.asarray(mesh.vertices)[np.unique(mesh.faces)]))
     ball = trimesh.creation.icosphere(subdivisions=3)
     assert len(convex_pieces(ball.vertices, ball.faces)) == 1
+
+
+def test_what_carries_something_fixed_is_fixed_too() -> None:
+    """A table under a tray under a microwave that no arm carries; another table is free."""
+
+    def piece(name: str, parent: str | None, movable: bool, relation: str = "supports") -> BundleBody:
+        box = Box(center=(0, 0, 0.5), size=(1, 1, 1))
+        return BundleBody(name, "table", parent, relation, np.eye(4), movable, box, furniture=movable)
+
+    bodies = [
+        piece("table_1", "floor_9", True),
+        piece("tray_2", "table_1", True),
+        piece("microwave_3", "tray_2", False),
+        piece("table_4", "floor_9", True),
+        piece("picture_5", "table_4", False, "carries_on_wall"),
+        piece("floor_9", None, False),
+    ]
+    assert [body.name for body in held_under_fixed(bodies) if body.movable] == ["table_4"]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from schemas.cad_library import CadModel
 from schemas.errors import BadInput
@@ -17,6 +18,7 @@ from stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
 from stages.kit.geometry.solids import box, mass_properties
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.simulation.world import load_scene
+from stages.urdf.joint_sweep import sweep_joints
 from tests.unit.urdf.small_room import graph_of
 
 VALUES = {"hinge": 0.7, "slide": 0.2}
@@ -131,3 +133,62 @@ def test_a_joint_that_hangs_on_nothing_or_itself_is_bad_input(
     model.model_copy(update={"joints": joints}).write(tmp_path / "model.json")
     with pytest.raises(BadInput, match=message):
         read_model(tmp_path)
+
+
+def behind_a_door(root: Path) -> Path:
+    """A cupboard with a rack that slides out to the front (-y), and a door right before it that turns about z."""
+    joints = (
+        Joint(name="rack", type="prismatic", part="rack", origin=(0, 0, 0.4), axis=(0, -1, 0), lower=0.0, upper=0.4),
+        Joint(
+            name="hinge", type="revolute", part="door", origin=(-0.3, -0.26, 0.0), axis=(0, 0, -1), lower=0.0, upper=1.6
+        ),
+    )
+    model = CadModel(
+        id="cupboard",
+        class_name="cabinet",
+        articulated=True,
+        mass=100.0,
+        states=(),
+        joints=joints,
+        movable=False,
+        parts=("body", "rack", "door"),
+    )
+    blocks = {
+        "body": box((-0.3, 0.3), (0.22, 0.25), (0.0, 1.0)),
+        "rack": box((-0.2, 0.2), (-0.25, 0.2), (0.0, 0.05)),
+        "door": box((0.0, 0.6), (-0.02, 0.0), (0.0, 1.0)),
+    }
+    parts = [
+        PartGeometry(name, [solid], [(200, 180, 160)], mass_properties([solid], [300.0]))
+        for name, solid in blocks.items()
+    ]
+    write_model_folder(root, model, parts)
+    return root
+
+
+def test_a_rack_behind_a_closed_door_is_not_blocked_but_one_before_a_wall_is(tmp_path: Path) -> None:
+    """The door is opened first, and is closed again afterwards."""
+    cupboard = body(behind_a_door(tmp_path / "model"), 1.0)
+    cupboard = replace(cupboard, joint_values={})
+    write_scene_bundle(tmp_path / "open", [cupboard], graph_of([cupboard]))
+    with load_scene(tmp_path / "open") as world:
+        ranges = {entry.joint.rsplit("__", 1)[-1]: entry for entry in sweep_joints(world)}
+        assert all(entry.free_at_start for entry in ranges.values()), ranges
+        assert ranges["rack"].free_share > 0.9
+        assert all(world.joint_value("cabinet_1", name) == 0.0 for name in world.bodies["cabinet_1"].joints)
+    front = cupboard.world_from_body @ np.array([0.0, -0.45, 0.5, 1.0])
+    wall = trimesh.creation.box((2.0, 0.1, 1.0), trimesh.transformations.translation_matrix(front[:3]))
+    other = BundleBody(
+        name="wall_2",
+        class_name="wall",
+        parent=None,
+        relation="supports",
+        world_from_body=np.eye(4),
+        movable=False,
+        box=Box(center=tuple(front[:3]), size=(2.0, 0.1, 1.0)),
+        mesh=wall,
+    )
+    write_scene_bundle(tmp_path / "shut", [cupboard, other], graph_of([cupboard, other]))
+    with load_scene(tmp_path / "shut") as world:
+        ranges = {entry.joint.rsplit("__", 1)[-1]: entry for entry in sweep_joints(world)}
+        assert ranges["rack"].free_share < 0.6

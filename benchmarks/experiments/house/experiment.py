@@ -1,0 +1,150 @@
+"""A house of others: is reconstruction sound where the masks are?
+
+Rooms are furnished with models that others made, walked through at head height, rendered by another renderer than ours
+with another camera's noise; their true masks are brought as a folder of pictures. Then the chain runs as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, mean
+from benchmarks.experiments.house.furnishing import RECIPES, furnish
+from benchmarks.experiments.house.models import FOLDERS, MODELS, absent, imported, mesh_of
+from benchmarks.experiments.house.recording import record
+from benchmarks.experiments.house.scoring import Judged, judge
+from benchmarks.experiments.surface.scenes import camera_of
+from benchmarks.steps import made
+from benchmarks.tabulation import markdown
+from stages.kit.stage import Parameters
+
+ARM = "masks"
+TUNING = ("0",)
+REPORTING = ("7000",)
+LIBRARY_SEED = 1
+STEPS = ("library build", "library add", "ingest", "segment", "fuse", "graph", "cad", "urdf")
+
+
+class HouseParameters(Parameters):
+    """Options of the experiment."""
+
+    data: Path = Field(Path("../shared/data"), description="Folder with the models of others")
+    frames: int = Field(100, ge=8, description="Of a walk through a room")
+    width: int = Field(640, ge=160, le=1920, description="Of the images [pixels]")
+
+
+def seeds_of(bench: Bench, case: str) -> Sequence[str]:
+    """Seeds of rooms; none where models are missing."""
+    if absent(bench.parameters.data):
+        return ()
+    return TUNING if bench.tuning else REPORTING[: 1 if bench.quick else None]
+
+
+def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
+    """Import the models and make the library that all rooms share."""
+    imported(bench.parameters.data, bench.out / "models")
+    made("library build", bench.out / "cad_library", "--seed", LIBRARY_SEED)
+
+
+def inputs(bench: Bench, trial: Trial) -> list[Path]:
+    """The models."""
+    return [bench.parameters.data / place for place, _ in FOLDERS.values()]
+
+
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Judged]]:
+    """Furnish a room, record it, run the chain, judge what came out."""
+    libraries = imported(bench.parameters.data, bench.out / "models")
+    meshes = {name: mesh_of(libraries, model) for name, model in MODELS.items()}
+    for trial in trials:
+        random = np.random.default_rng([int(trial.seed), sorted(RECIPES).index(trial.case)])
+        house = furnish(RECIPES[trial.case], meshes, random)
+        run = bench.out / "rooms" / f"{trial.case}-{trial.seed}"
+        camera = camera_of(bench.parameters.width)
+        recording = record(house, run, camera, bench.parameters.frames, random)
+        made("ingest", run / "sequence", "--log", recording.log)
+        brought = ("--backend", "masks", "--masks", recording.masks)
+        made("segment", run / "segments", "--sequence", run / "sequence", *brought)
+        both = ("--sequence", run / "sequence", "--segments", run / "segments")
+        made("fuse", run / "panoptic_map", *both)
+        made("graph", run / "contact_graph", "--panoptic-map", run / "panoptic_map")
+        parts = ("--panoptic-map", run / "panoptic_map", "--contact-graph", run / "contact_graph")
+        made("cad", run / "cad_scene", *parts, "--library", bench.out / "cad_library")
+        made("urdf", run / "interactive_scene", "--cad-scene", run / "cad_scene")
+        yield trial, judge(house, recording, run)
+
+
+def pooled(figure: Callable[[Sequence[Judged]], float], unit: str = "") -> Measure:
+    """A figure over all rooms of a case."""
+    return Measure(figure, unit)
+
+
+def _total(records: Sequence[Judged], name: str) -> int:
+    return sum(getattr(record, name) for record in records)
+
+
+def notes(results: Results) -> str:
+    """What was missed in which room."""
+    rows = []
+    for trial, room in results.records.items():
+        wrong = (*room.missed, *room.wrong_supports, *room.holes, *room.restless)
+        rows.append([trial.case, trial.seed, f"{100 * room.pq:.1f}", str(room.movable), "; ".join(wrong)])
+    return markdown("Rooms", ("room", "seed", "PQ", "movable", "wrong"), rows)
+
+
+def more_figures(results: Results) -> dict[str, float | None]:
+    """All rooms together."""
+    rooms: list[Any] = list(results.records.values())
+    if not rooms:
+        return {}
+    return {f"{ARM}/all/{name}": figure.of(rooms) for name, figure in EXPERIMENT.measures.items()}
+
+
+EXPERIMENT = Experiment(
+    name="house",
+    title="A house of others, with true masks",
+    simulated="Rooms furnished at random with models that others made; a rasteriser's pictures, flat colours; depth "
+    "with the noise of Barron and Malik's camera; exact poses.",
+    knows="Colour, depth, camera and poses; the true masks with their classes; a generated CAD library.",
+    does_not_show="Anything of finding masks; errors of poses and of calibration; textures, mirrors and glass; rooms "
+    "that people have lived in.",
+    arms={ARM: "true masks"},
+    cases=tuple(RECIPES),
+    tuning=TUNING,
+    reporting=REPORTING,
+    seeds_of=seeds_of,
+    prepare=prepare,
+    inputs=inputs,
+    measure=measure,
+    record=Judged,
+    measures={
+        "pq": Measure(lambda rooms: 100 * float(np.mean([room.pq for room in rooms])), "%"),
+        "support_f1": pooled(
+            lambda rooms: (
+                2
+                * _total(rooms, "support_hits")
+                / max(_total(rooms, "supports_true") + _total(rooms, "supports_found"), 1)
+            )
+        ),
+        "tops_whole": pooled(lambda rooms: 100 * _total(rooms, "tops_whole") / max(_total(rooms, "tops"), 1), "%"),
+        "least_top": Measure(lambda rooms: 100 * min(room.least_top for room in rooms), "%", interval=False),
+        "level_mapped": Measure(lambda rooms: 100 * float(np.mean([room.level_mapped for room in rooms])), "%"),
+        "things": mean("things", interval=False),
+        "matched": mean("matched", interval=False),
+        "movable": mean("movable", interval=False),
+        "least_movable": Measure(lambda rooms: float(min(room.movable for room in rooms)), interval=False),
+        "at_rest": pooled(lambda rooms: 100 * _total(rooms, "at_rest") / max(_total(rooms, "movable"), 1), "%"),
+        "settled": Measure(lambda rooms: 100 * float(np.mean([room.settled for room in rooms])), "%", interval=False),
+        "deepest": Measure(lambda rooms: max(room.penetration_mm for room in rooms), "mm", interval=False),
+    },
+    parameters=HouseParameters,
+    places=frozenset({"data"}),
+    quick={"frames": 60},
+    steps=STEPS,
+    more_figures=more_figures,
+    notes=notes,
+)
