@@ -1,4 +1,4 @@
-"""Tasks: where objects stand at the beginning, and what is wanted. The sets of the thesis, and a hundred goals of ours."""
+"""Tasks: where objects stand at the beginning and what is wanted: the sets of the thesis, and a hundred goals."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.kit.tasks.strips import Atom, apply_action, ground
-from stages.kit.tasks.strips import Problem
+from stages.kit.tasks.strips import Atom, Problem, apply_action, ground
 from stages.predicates.language.evaluating import Evaluator
 from stages.predicates.state import State
 from stages.predicates.truth import true_domain, true_predicates, truth_file
@@ -16,9 +15,7 @@ from stages.predicates.world.catalogue import DomainSetup, kitchen_file
 from stages.predicates.world.kitchen import Kitchen
 
 SETS = ("canonical", "more_objects", "novel_goals", "combined", "hundred_goals")
-THESIS_TASKS = 10
-STACKED = 0.3
-"""How often a movable thing stands on another one at the beginning, where that may be."""
+LAYOUTS = 20
 LONGEST_WALK = 14
 """Actions of the walk whose end a generated goal is taken from."""
 MOST_LITERALS = 6
@@ -75,7 +72,12 @@ def tasks_of(domain: str, which: str, count: int, seed: int) -> list[Task]:
         random = np.random.default_rng([seed, stream, number])
         while True:
             goal = _goal(setup, which, number, random)
-            task = Task(f"{domain}/{which}/{number + 1}", layout(names, random), goal, int(random.integers(2**31)))
+            task = Task(
+                f"{domain}/{which}/{number + 1}",
+                layout(names, random, setup.stacked),
+                goal,
+                int(random.integers(2**31)),
+            )
             if not set(goal) <= true_atoms(open_kitchen(task).state(), domain):
                 break
         tasks.append(task)
@@ -92,9 +94,23 @@ def _goal(setup: DomainSetup, which: str, number: int, random: np.random.Generat
     return tuple(tuple(text.split()) for text in texts)
 
 
-def layout(names: tuple[str, ...], random: np.random.Generator) -> dict[str, tuple[float, float]]:
+def layout(names: tuple[str, ...], random: np.random.Generator, stacked: float) -> dict[str, tuple[float, float]]:
+    """Return where objects stand, drawn up to LAYOUTS times until they fit. Raises ValueError when they never do."""
+    for _ in range(LAYOUTS):
+        try:
+            return _drawn_layout(names, random, stacked)
+        except ValueError as error:
+            reason = str(error)
+    raise ValueError(reason)
+
+
+def _drawn_layout(
+    names: tuple[str, ...], random: np.random.Generator, stacked: float
+) -> dict[str, tuple[float, float]]:
     """Return where objects stand: the anchored ones at their place, the plate beside the placemat, others on free
-    places of the table or, now and then, on a thing that carries them. Raises ValueError when they don't fit."""
+    places of the table or, a share `stacked` of them, on a thing that carries them.
+
+    Raises ValueError when they don't fit."""
     kinds = kitchen_file().objects
     places: dict[str, tuple[float, float]] = {}
     taken: list[tuple[float, float]] = []
@@ -107,7 +123,7 @@ def layout(names: tuple[str, ...], random: np.random.Generator) -> dict[str, tup
             x, y = kind.at, 0.0
         elif kind.shape == "plate" and "placemat" in names:
             x, y = kinds["placemat"].at + 8.2 * (1 if random.random() < 0.5 else -1), 0.0  # type: ignore[operator]
-        elif kind.shape == "block" and carriers and random.random() < STACKED:
+        elif kind.shape == "block" and carriers and random.random() < stacked:
             under = carriers[int(random.integers(len(carriers)))]
             free.remove(under)
             x, y = places[under][0], places[under][1] + kinds[under].height
@@ -133,7 +149,7 @@ def _generated(domain: str, setup: DomainSetup, count: int, seed: int) -> list[T
         if number > 200 * count:
             raise ValueError(f"there are not {count} different goals")
         chosen = tuple(name for name in names if kitchen_file().objects[name].at is not None or random.random() < 0.85)
-        places, chance = layout(chosen, random), int(random.integers(2**31))
+        places, chance = layout(chosen, random, setup.stacked), int(random.integers(2**31))
         task = Task(f"{domain}/hundred_goals/{len(tasks) + 1}", places, (), chance)
         goal = _walked_goal(domain, task, random)
         if goal and frozenset(goal) not in goals:
@@ -149,6 +165,8 @@ def _walked_goal(domain: str, task: Task, random: np.random.Generator) -> tuple[
     state = start
     for _ in range(int(random.integers(4, LONGEST_WALK + 1))):
         possible = [action for action in actions if action.preconditions <= state]
+        if not possible:
+            break
         state = apply_action(state, possible[int(random.integers(len(possible)))])
     if any(atom[0] == "in_gripper" for atom in state):
         return ()

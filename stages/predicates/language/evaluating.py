@@ -54,7 +54,9 @@ class Evaluator:
     def _truth(self, tree: Tree, binding: dict[str, str]) -> bool:
         self._steps += 1
         if self._steps > LIMIT:
-            raise BadInput(f"a predicate takes more than {LIMIT} steps to evaluate", hint="fewer nested `some`, `every`")
+            raise BadInput(
+                f"a predicate takes more than {LIMIT} steps to evaluate", hint="fewer nested `some`, `every`"
+            )
         head = tree[0]
         if head == "and":
             return all(self._truth(part, binding) for part in tree[1:])  # type: ignore[arg-type]

@@ -2,7 +2,7 @@
 
     (and (near (bottom ?a) (top ?b)) (less (left ?a) (right ?b)) (less (left ?b) (right ?a)))
 
-An expression is a tree of tuples. Numbers come of perception (`CALLS`) and arithmetic, truth of comparisons, `and`, `or`,
+An expression is a tree of tuples. Numbers come of perception and arithmetic, truth of comparisons, `and`, `or`,
 `not`, `some` and `every` over the other objects, and of predicates by name. Nothing of it is ever run as code.
 """
 
@@ -153,9 +153,7 @@ def _words(tree: Tree) -> int:
     return sum(_words(part) if isinstance(part, tuple) else 1 for part in tree)
 
 
-def _type_of(
-    tree: Tree | str | float, bound: frozenset[str], predicates: Mapping[str, Predicate], where: str
-) -> str:
+def _type_of(tree: Tree | str | float, bound: frozenset[str], predicates: Mapping[str, Predicate], where: str) -> str:
     """Return `number`, `truth`, `object` or `word`."""
     if isinstance(tree, float):
         return "number"

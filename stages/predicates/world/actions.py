@@ -12,15 +12,7 @@ import numpy as np
 
 from stages.kit.tasks.strips import Atom
 from stages.predicates.state import LARGEST_OPENING, TABLE_LEFT, TABLE_RIGHT
-from stages.predicates.world.kitchen import (
-    FAUCET_HEIGHT,
-    FINGER,
-    MARGIN,
-    PUSH_SPEED,
-    SINK_X,
-    Kitchen,
-    Thing,
-)
+from stages.predicates.world.kitchen import FAUCET_HEIGHT, FINGER, MARGIN, PUSH_SPEED, SINK_X, Kitchen, Thing
 
 CLEARANCE = 2.0
 """Between things on the table."""

@@ -37,6 +37,8 @@ class DomainSetup(Model):
     more: tuple[str, ...]
     goals: tuple[tuple[Goal, ...], ...]
     more_goals: tuple[tuple[Goal, ...], ...]
+    stacked: float = Field(ge=0.0, le=1.0)
+    """How often a block stands on another thing at the beginning, where that may be."""
     novel: Goal
     combined: Goal
 

@@ -112,7 +112,7 @@ class Kitchen:
             shape.friction = 1.0
             self.space.add(shape)
         self.things = {name: Thing(name, kind, self.space, x, y) for name, kind, x, y in things}
-        self.drops: list[pymunk.Circle] = []
+        self.drops: list[tuple[pymunk.Body, pymunk.Circle]] = []
         self.x, self.y, self.opening, self.angle = HOME_X, HOME_Y, LARGEST_OPENING, 0.0
         self.held: Thing | None = None
         self.fingers = [self._finger(), self._finger()]
@@ -222,7 +222,7 @@ class Kitchen:
         if thing.kind.shape != "container":
             return 0
         left, bottom, right, top = thing.box()
-        places = (drop.body.position for drop in self.drops)
+        places = (body.position for body, _ in self.drops)
         return sum(left < place.x < right and bottom < place.y < top for place in places)
 
     def state(self) -> State:
@@ -239,10 +239,10 @@ class Kitchen:
                 corners = [thing.body.local_to_world(corner) for corner in shape.get_vertices()]
                 drawn.append((name, [(corner.x, corner.y) for corner in corners]))
         for body in self.fingers:
-            for shape in body.shapes:
-                corners = [body.local_to_world(corner) for corner in shape.get_vertices()]  # type: ignore[attr-defined]
-                drawn.append(("gripper", [(corner.x, corner.y) for corner in corners]))
-        drawn += [("water", [(drop.body.position.x, drop.body.position.y)]) for drop in self.drops]
+            w, h = FINGER / 2, FINGER_HEIGHT / 2
+            corners = [body.local_to_world(corner) for corner in ((-w, -h), (w, -h), (w, h), (-w, h))]
+            drawn.append(("gripper", [(corner.x, corner.y) for corner in corners]))
+        drawn += [("water", [(body.position.x, body.position.y)]) for body, _ in self.drops]
         return drawn
 
     # ---- water -------------------------------------------------------------------------------------------------
@@ -256,20 +256,19 @@ class Kitchen:
                 shape.density, shape.friction = DROP_DENSITY, 0.0
                 body.position = (SINK_X + float(self.random.uniform(-0.4, 0.4)), FAUCET_HEIGHT)
                 self.space.add(body, shape)
-                self.drops.append(shape)
+                self.drops.append((body, shape))
             self._step()
 
     def drain(self) -> None:
         """Take away drops that fell beside."""
+        boxes = [thing.box() for thing in self.things.values() if thing.kind.shape == "container"]
         kept = []
-        for drop in self.drops:
-            if drop.body.position.y < 0.0 or not any(
-                box[0] <= drop.body.position.x <= box[2] and box[1] <= drop.body.position.y <= box[3]
-                for box in (t.box() for t in self.things.values() if t.kind.shape == "container")
-            ):
-                self.space.remove(drop.body, drop)
+        for body, shape in self.drops:
+            x, y = body.position
+            if any(box[0] <= x <= box[2] and box[1] <= y <= box[3] for box in boxes):
+                kept.append((body, shape))
             else:
-                kept.append(drop)
+                self.space.remove(body, shape)
         self.drops = kept
 
     def pour_over(self, x: float, y: float, side: int) -> None:
