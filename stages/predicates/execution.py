@@ -53,7 +53,8 @@ def attempt(task: Task, name: str, domain: Domain, see: Abstraction, goal: froze
     plan: list[GroundAction] = []
     expected: frozenset[Atom] = frozenset()
     avoided: set[Atom] = set()
-    """What failed since something last changed."""
+    """What failed since something last changed, and what was done and changed nothing."""
+    useless: set[Atom] = set()
     while len(result.steps) < MOST_STEPS and failures < MOST_FAILURES:
         if not plan or (replan and expected != see(kitchen.state())):
             atoms = see(kitchen.state())
@@ -80,8 +81,12 @@ def attempt(task: Task, name: str, domain: Domain, see: Abstraction, goal: froze
                 break
         else:
             failures, plan = 0, plan[1:]
-            expected = apply_action(expected, operator) if operator.preconditions <= expected else expected
-            avoided.clear()
+            avoided = set(useless)
+            before, expected = expected, apply_action(expected, operator)
+            if replan and see(kitchen.state()) == before != expected:
+                useless.add(action_atom(operator))
+                avoided.add(action_atom(operator))
+                plan = []
     result.success = set(task.goal) <= true_atoms(kitchen.state(), name)
     return result
 
