@@ -84,7 +84,7 @@ def _next_action(learner: OursLearner, domain: str, state: State, goal: frozense
     if curious:
         return tried
     planned = first_action(learner.memory.domain(domain), list(state.objects), learner.memory.see(state), goal)
-    return planned or tried
+    return planned or learner.doubtful(state) or tried
 
 
 def first_action(domain: Domain, objects: Sequence[str], atoms: frozenset[Atom], goal: frozenset[Atom]) -> Atom | None:

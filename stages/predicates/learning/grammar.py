@@ -7,7 +7,7 @@ meanings are tried first; labels decide.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
 from stages.predicates.language.expressions import Predicate, Tree, read, size_of
@@ -42,7 +42,7 @@ MEASURES = ("width", "height", "water", "x", "y")
 SIDES = {"width": {"width", "size"}, "height": {"height", "size"}, "water": {"water"}, "x": {"place"}, "y": {"place"}}
 
 
-def candidates(phrase: Phrase, margins: dict[str, Sequence[float]]) -> list[tuple[float, Tree]]:
+def candidates(phrase: Phrase, margins: Mapping[str, Sequence[float]]) -> list[tuple[float, Tree]]:
     """Return meanings (cost, expression), cheapest first; `margins` are thresholds that the labels suggest."""
     found: dict[Tree, float] = {}
     for tree, uses, extra, side in _proposed(phrase, margins):
@@ -68,7 +68,7 @@ Proposed = Iterator[tuple[Tree, set[str], float, int]]
 """Expression, perceptions it uses, costs of its own, and side: -1 when it contradicts the phrase's negation."""
 
 
-def _proposed(phrase: Phrase, margins: dict[str, Sequence[float]]) -> Proposed:
+def _proposed(phrase: Phrase, margins: Mapping[str, Sequence[float]]) -> Proposed:
     sided = 1 if phrase.denies else -1
     for tree, uses in _relations(phrase.arguments):
         yield tree, uses, 0.0, sided
@@ -105,7 +105,7 @@ def _side(tree: Tree, phrase: Phrase) -> int:
 
 
 def _comparisons(
-    measure: str, call: Tree, uses: set[str], phrase: Phrase, margins: dict[str, Sequence[float]]
+    measure: str, call: Tree, uses: set[str], phrase: Phrase, margins: Mapping[str, Sequence[float]]
 ) -> Iterator[tuple[Tree, set[str], float]]:
     """Yield comparisons of one measure with numbers that are said, with the example's tolerance, with the gripper's
     largest opening, and with what the labels suggest."""

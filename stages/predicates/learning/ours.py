@@ -221,6 +221,27 @@ class OursLearner:
                     best.append(action)
         return best[int(self.random.integers(len(best)))] if best else None
 
+    def doubtful(self, state: State) -> Atom | None:
+        """Return an action that was never allowed, and that only preconditions which were said once speak against."""
+        names, held = self.memory.names(), self.memory.see(state)
+        done = {transition.action[0] for transition in self.memory.transitions}
+        said: Counter[tuple[str, Atom]] = Counter()
+        for (action, phrase, variables), count in self.memory.stated.items():
+            said[action, (names[phrase], *variables)] += count
+        found = []
+        for name in self.actions:
+            for objects in itertools.permutations(state.objects, ARITY[name]):
+                binding = dict(zip(("?a", "?b"), objects, strict=False))
+                against = [
+                    count
+                    for (action, atom), count in said.items()
+                    if action == name and (atom[0], *(binding[term] for term in atom[1:])) not in held
+                ]
+                if name not in done and against and max(against) == 1:
+                    found.append((len(against), (name, *objects)))
+        fewest = [action for count, action in found if count == min(found)[0]]
+        return fewest[int(self.random.integers(len(fewest)))] if fewest else None
+
     def curious(self, state: State) -> bool:
         """Whether there is an action that was never tried in such a situation."""
         action = self.explore(state)

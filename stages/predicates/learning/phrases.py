@@ -21,6 +21,8 @@ CONCEPTS: dict[str, tuple[str, ...]] = {
 CATEGORIES = ("food", "can", "coaster", "shelf", "cup", "pot", "basket", "placemat", "plate")
 """The categories that perception knows."""
 GREATER, SMALLER = ("wide", "large", "larger", "greater", "tall", "high"), ("small", "smaller", "less", "narrow")
+_REASON = re.compile(r" so you| because |, thus| as it|, only| and can")
+"""Where a reason or a consequence begins."""
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
@@ -55,7 +57,8 @@ class Phrase:
     @property
     def denies(self) -> bool:
         """Whether it says that something is not so."""
-        return bool({"not", "nt"} & self.words)
+        main = _REASON.split(self.text)[0]
+        return bool(re.search(r"n't|\bnot\b", main))
 
     @property
     def direction(self) -> int:

@@ -67,9 +67,7 @@ class SimulatedTeacher:
         """Name one of the preconditions, common to her operators for the action, that do not hold."""
         sets = [set(each.preconditions) for each in self._operators.schemas if action_of(each.name) == action[0]]
         binding = dict(zip(("?a", "?b"), action[1:], strict=False))
-        shared = [
-            tuple(binding[term] if term in binding else term for term in atom) for atom in set.intersection(*sets)
-        ]
+        shared = [tuple(binding.get(term, term) for term in atom) for atom in set.intersection(*sets)]
         atoms = true_atoms(state, self.domain)
         violated = sorted(atom for atom in shared if atom not in atoms)
         if self._random.random() < self.wrong:
