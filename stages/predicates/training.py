@@ -81,7 +81,7 @@ def _next_action(learner: OursLearner, domain: str, state: State, goal: frozense
     """Return what to do: something never tried while there is time, or whenever there is no plan; else the plan's
     start."""
     tried = learner.explore(state)
-    if curious:
+    if curious or not learner.plans:
         return tried
     planned = first_action(learner.memory.domain(domain), list(state.objects), learner.memory.see(state), goal)
     return planned or learner.doubtful(state) or tried

@@ -33,6 +33,9 @@ ASKED_AGAIN = 2.0
 class OursLearner:
     """Learns from a teacher; `memory` may hold what another domain taught."""
 
+    plans = True
+    """Whether it follows plans while it is taught."""
+
     def __init__(self, teacher: Teacher, actions: Sequence[str], seed: int, memory: Memory | None = None) -> None:
         self.memory = memory or Memory()
         self.teacher, self.actions = teacher, tuple(actions)
@@ -40,7 +43,6 @@ class OursLearner:
         self._synthesiser = Synthesiser(self.memory.states)
         self._tried: Counter[tuple[str, ...]] = Counter()
         self._asked: Counter[Phrase] = Counter()
-        self.language_calls = 0
 
     # ---- what it hears -----------------------------------------------------------------------------------------
 
@@ -222,7 +224,8 @@ class OursLearner:
         return best[int(self.random.integers(len(best)))] if best else None
 
     def doubtful(self, state: State) -> Atom | None:
-        """Return an action that was never allowed, and that only preconditions which were said once speak against."""
+        """Return an action that was never allowed and whose preconditions, as named, were never seen to hold together:
+        one of them, said once, may be wrong. The one with the fewest of them against it."""
         names, held = self.memory.names(), self.memory.see(state)
         done = {transition.action[0] for transition in self.memory.transitions}
         said: Counter[tuple[str, Atom]] = Counter()
@@ -230,17 +233,24 @@ class OursLearner:
             said[action, (names[phrase], *variables)] += count
         found = []
         for name in self.actions:
+            wanted = [(atom, count) for (action, atom), count in said.items() if action == name]
+            if name in done or not wanted or self._seen_together(name, [atom for atom, _ in wanted]):
+                continue
             for objects in itertools.permutations(state.objects, ARITY[name]):
-                binding = dict(zip(("?a", "?b"), objects, strict=False))
-                against = [
-                    count
-                    for (action, atom), count in said.items()
-                    if action == name and (atom[0], *(binding[term] for term in atom[1:])) not in held
-                ]
-                if name not in done and against and max(against) == 1:
+                against = [count for atom, count in wanted if _bound(atom, objects) not in held]
+                if against and max(against) == 1:
                     found.append((len(against), (name, *objects)))
         fewest = [action for count, action in found if count == min(found)[0]]
         return fewest[int(self.random.integers(len(fewest)))] if fewest else None
+
+    def _seen_together(self, name: str, wanted: list[Atom]) -> bool:
+        """Whether all of what was named for an action held at once, for some objects, in a state that was seen."""
+        for state in self.memory.states:
+            held = self.memory.see(state)
+            for objects in itertools.permutations(state.objects, ARITY[name]):
+                if all(_bound(atom, objects) in held for atom in wanted):
+                    return True
+        return False
 
     def curious(self, state: State) -> bool:
         """Whether there is an action that was never tried in such a situation."""
@@ -265,3 +275,8 @@ class OursLearner:
             category = state.objects[name].category
             seen.append(f"{category}:{''.join('01'[fact] for fact in facts)}")
         return tuple(seen)
+
+
+def _bound(atom: Atom, objects: Sequence[str]) -> Atom:
+    binding = dict(zip(("?a", "?b"), objects, strict=False))
+    return (atom[0], *(binding[term] for term in atom[1:]))
