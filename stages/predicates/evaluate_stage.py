@@ -1,0 +1,63 @@
+"""The step `predicates evaluate`: sets of tasks with what was learned, beside the teacher's own operators."""
+
+from __future__ import annotations
+
+from schemas.kitchen_plan import EvaluatedSet, KitchenEvaluation, KitchenEvaluationFile
+from schemas.learned_domain import LearnedDomain
+from stages.kit.stage import Context
+from stages.kit.tasks.strips import Domain
+from stages.predicates.execution import Attempt, attempt, oracle
+from stages.predicates.learning.memory import Memory
+from stages.predicates.learning.phrases import goal_phrases
+from stages.predicates.learning.records import memory_of
+from stages.predicates.measure.accuracy import accuracies
+from stages.predicates.parameters import EvaluateParameters
+from stages.predicates.tasks import Task, tasks_of
+
+
+def run(learned: LearnedDomain, *, parameters: EvaluateParameters, context: Context) -> KitchenEvaluation:
+    """Count."""
+    name = learned.info.domain
+    memory = memory_of(learned.info, str(learned.root))
+    domain = memory.domain(name)
+    rows = []
+    for which in context.progress.track(parameters.sets, total=len(parameters.sets), description="sets"):
+        tasks = tasks_of(name, which, parameters.tasks, context.seed)
+        tried = [try_task(memory, domain, task) for task in tasks]
+        rows.append(
+            EvaluatedSet(
+                which=which,
+                tasks=len(tasks),
+                reached=sum(each.success for each in tried),
+                ceiling=sum(oracle(task, name).success for task in tasks),
+                unplanned=sum(bool(each.unplanned) for each in tried),
+                failed_actions=sum(bool(reason) for each in tried for _, reason in each.steps),
+            )
+        )
+    accuracy = accuracies(memory, name, parameters.states, context.seed)
+    file = KitchenEvaluationFile(domain=name, seed=context.seed, rows=tuple(rows), accuracy=accuracy)
+    file.write(context.output / "results.json")
+    (context.output / "table.md").write_text(as_markdown(file), encoding="utf-8")
+    summary = {row.which: f"{row.reached} of {row.tasks}" for row in rows}
+    return KitchenEvaluation(root=context.output, summary=summary)
+
+
+def try_task(memory: Memory, domain: Domain, task: Task) -> Attempt:
+    """Try a task with what a memory has learned; a goal that nobody explained is not tried."""
+    wanted, unknown = memory.goal_atoms(goal_phrases(task.sentence, task.objects))
+    if unknown:
+        return Attempt(unplanned=f"nobody has said what {unknown[0]!r} means")
+    return attempt(task, task.name.split("/")[0], domain, memory.see, wanted, replan=True)
+
+
+def as_markdown(file: KitchenEvaluationFile) -> str:
+    """Return the results as tables."""
+    lines = [f"{file.domain}, tasks of seed {file.seed}.", "", "| set | reached | teacher's own operators | no plan |"]
+    lines.append("|---|--:|--:|--:|")
+    lines += [
+        f"| {row.which} | {row.reached}/{row.tasks} | {row.ceiling}/{row.tasks} | {row.unplanned} |"
+        for row in file.rows
+    ]
+    lines += ["", "| predicate | balanced accuracy |", "|---|--:|"]
+    lines += [f"| {name} | {value:.3f} |" for name, value in file.accuracy.items()]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,1 @@
+"""Checked expressions over what is perceived: reading, evaluating, saying."""

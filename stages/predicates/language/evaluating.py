@@ -1,0 +1,141 @@
+"""Evaluating checked expressions in a state, with a limit on the steps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import permutations
+
+from schemas.errors import BadInput
+from stages.kit.tasks.strips import Atom
+from stages.predicates.language.expressions import Predicate, Tree
+from stages.predicates.state import FINGER_HEIGHT, LARGEST_OPENING, TABLE_HEIGHT, TABLE_LEFT, TABLE_RIGHT, State
+
+LIMIT = 200_000
+"""Steps of the evaluation of one atom, those of the predicates that it names included."""
+TOLERANCE = 0.2
+"""What `near` allows; it is that of the example which every learner is given."""
+
+
+class Evaluator:
+    """Truth of atoms in one state; what was evaluated is remembered."""
+
+    def __init__(self, state: State, predicates: Mapping[str, Predicate]) -> None:
+        self.state, self.predicates = state, predicates
+        self._known: dict[Atom, bool] = {}
+        self._steps = 0
+
+    def holds(self, atom: Atom) -> bool:
+        """Whether an atom holds. Raises BadInput when its meaning divides by zero or takes too many steps."""
+        self._steps = 0
+        return self._atom(atom)
+
+    def truth(self, tree: Tree, binding: Mapping[str, str]) -> bool:
+        """Whether an expression holds for objects. Raises BadInput as `holds` does."""
+        self._steps = 0
+        return self._truth(tree, dict(binding))
+
+    def atoms(self, names: Mapping[str, int] | None = None) -> frozenset[Atom]:
+        """Return all atoms of predicates (name -> arguments; all, where none are given) that hold."""
+        wanted = names if names is not None else {name: each.arguments for name, each in self.predicates.items()}
+        found = [
+            (name, *objects)
+            for name, count in wanted.items()
+            for objects in permutations(self.state.objects, count)
+            if self.holds((name, *objects))
+        ]
+        return frozenset(found)
+
+    def _atom(self, atom: Atom) -> bool:
+        if atom not in self._known:
+            predicate = self.predicates[atom[0]]
+            self._known[atom] = self._truth(predicate.means, dict(zip(predicate.variables, atom[1:], strict=True)))
+        return self._known[atom]
+
+    def _truth(self, tree: Tree, binding: dict[str, str]) -> bool:
+        self._steps += 1
+        if self._steps > LIMIT:
+            raise BadInput(
+                f"a predicate takes more than {LIMIT} steps to evaluate", hint="fewer nested `some`, `every`"
+            )
+        head = tree[0]
+        if head == "and":
+            return all(self._truth(part, binding) for part in tree[1:])  # type: ignore[arg-type]
+        if head == "or":
+            return any(self._truth(part, binding) for part in tree[1:])  # type: ignore[arg-type]
+        if head == "not":
+            return not self._truth(tree[1], binding)  # type: ignore[arg-type]
+        if head in ("some", "every"):
+            variable, body = str(tree[1]), tree[2]
+            others = [name for name in self.state.objects if name not in binding.values()]
+            values = (self._truth(body, {**binding, variable: name}) for name in others)  # type: ignore[arg-type]
+            return any(values) if head == "some" else all(values)
+        if head == "is":
+            return self._word(tree[1], binding) == self._word(tree[2], binding)
+        if head in ("less", "at_most", "near"):
+            one, two = self._number(tree[1], binding), self._number(tree[2], binding)
+            if head == "less":
+                return one < two
+            return one <= two if head == "at_most" else abs(one - two) < TOLERANCE
+        return self._atom((str(head), *(binding[str(part)] for part in tree[1:])))
+
+    def _word(self, tree: Tree | str | float, binding: dict[str, str]) -> str:
+        if isinstance(tree, tuple):
+            return self.state.objects[binding[str(tree[1])]].category
+        return str(tree)
+
+    def _number(self, tree: Tree | str | float, binding: dict[str, str]) -> float:
+        self._steps += 1
+        if isinstance(tree, float):
+            return tree
+        assert isinstance(tree, tuple)
+        head = str(tree[0])
+        if len(tree) == 2 and head != "abs":
+            return of_object(self.state, binding[str(tree[1])], head)
+        if len(tree) == 1:
+            return of_scene(self.state, head)
+        numbers = [self._number(part, binding) for part in tree[1:]]
+        if head == "abs":
+            return abs(numbers[0])
+        one, two = numbers
+        if head == "plus":
+            return one + two
+        if head == "minus":
+            return one - two
+        if head == "times":
+            return one * two
+        if two == 0.0:
+            raise BadInput("a predicate divides by zero", hint="docs/INTERPRET.md has the language of predicates")
+        return one / two
+
+
+def of_object(state: State, name: str, call: str) -> float:
+    """Return what a perception call says of an object."""
+    seen = state.objects[name]
+    if call == "left":
+        return seen.x - seen.width / 2
+    if call == "right":
+        return seen.x + seen.width / 2
+    if call == "bottom":
+        return seen.y
+    if call == "top":
+        return seen.y + seen.height
+    return float(getattr(seen, call))
+
+
+def of_scene(state: State, call: str) -> float:
+    """Return what a perception call says of the table or the gripper."""
+    half = state.opening / 2
+    return {
+        "table_height": TABLE_HEIGHT,
+        "table_left": TABLE_LEFT,
+        "table_right": TABLE_RIGHT,
+        "gripper_x": state.gripper_x,
+        "gripper_left": state.gripper_x - half,
+        "gripper_right": state.gripper_x + half,
+        "gripper_bottom": state.gripper_y,
+        "gripper_top": state.gripper_y + FINGER_HEIGHT,
+        "gripper_height": FINGER_HEIGHT,
+        "gripper_mass": state.mass,
+        "gripper_opening": state.opening,
+        "largest_opening": LARGEST_OPENING,
+    }[call]

@@ -1,0 +1,203 @@
+"""The language of predicates: typed expressions over the perception calls, read from text and checked before use.
+
+    (and (near (bottom ?a) (top ?b)) (less (left ?a) (right ?b)) (less (left ?b) (right ?a)))
+
+An expression is a tree of tuples. Numbers come of perception and arithmetic, truth of comparisons, `and`, `or`,
+`not`, `some` and `every` over the other objects, and of predicates by name. Nothing of it is ever run as code.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from schemas.errors import BadInput
+from stages.kit.tasks.pddl_expressions import Expression as Listed
+from stages.kit.tasks.pddl_expressions import parse_expression
+
+Tree = tuple["Tree | str | float", ...]
+OF_OBJECT = ("x", "y", "left", "right", "bottom", "top", "width", "height", "water")
+OF_SCENE = (
+    "table_height",
+    "table_left",
+    "table_right",
+    "gripper_x",
+    "gripper_left",
+    "gripper_right",
+    "gripper_bottom",
+    "gripper_top",
+    "gripper_height",
+    "gripper_mass",
+    "gripper_opening",
+    "largest_opening",
+)
+ARITHMETIC = {"plus": 2, "minus": 2, "times": 2, "over": 2, "abs": 1}
+COMPARISONS = ("less", "at_most", "near")
+CONNECTIVES = ("and", "or")
+QUANTIFIERS = ("some", "every")
+WORDS = {*OF_OBJECT, *OF_SCENE, *ARITHMETIC, *COMPARISONS, *CONNECTIVES, *QUANTIFIERS, "not", "is", "category"}
+DEEPEST = 24
+LARGEST = 400
+"""Words of one expression."""
+HINT = "docs/INTERPRET.md has the language of predicates"
+
+
+@dataclass(frozen=True)
+class Predicate:
+    """A predicate: name, how many objects it is about (?a, ?b, ...) and what it means."""
+
+    name: str
+    arguments: int
+    means: Tree
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """`?a`, `?b`, ..."""
+        return variables_of(self.arguments)
+
+
+def variables_of(arguments: int) -> tuple[str, ...]:
+    """Return the names of so many arguments."""
+    return tuple(f"?{chr(97 + place)}" for place in range(arguments))
+
+
+def text_of(tree: Tree | str | float) -> str:
+    """Return an expression as text that `read` reads back."""
+    if isinstance(tree, tuple):
+        return f"({' '.join(text_of(part) for part in tree)})"
+    return tree if isinstance(tree, str) else f"{tree:.12g}"
+
+
+def read(text: str, where: str) -> Tree:
+    """Return an expression. Raises BadInput naming `where` for text that is none; names and types are not looked at."""
+    try:
+        listed = parse_expression(text)
+    except BadInput as error:
+        raise refuse(where, str(error).removeprefix("PDDL: ")) from None
+    return _tree(listed, where, 0)
+
+
+def refuse(where: str, message: str) -> BadInput:
+    """Return the error for an expression that can't be used."""
+    return BadInput(f"{where}: {message}", hint=HINT)
+
+
+def _tree(listed: list[Listed], where: str, depth: int) -> Tree:
+    if depth > DEEPEST:
+        raise refuse(where, f"nested deeper than {DEEPEST}")
+    parts: list[Tree | str | float] = []
+    for part in listed:
+        if not isinstance(part, str):
+            parts.append(_tree(part, where, depth + 1))
+        elif part[0].isdigit():
+            try:
+                number = float(part)
+            except ValueError:
+                raise refuse(where, f"{part[:30]!r} is no number") from None
+            if not math.isfinite(number) or abs(number) > 1e9:
+                raise refuse(where, f"{part[:30]!r} is too large")
+            parts.append(number)
+        else:
+            parts.append(part)
+    return tuple(parts)
+
+
+def check(predicates: Mapping[str, Predicate]) -> None:
+    """Raise BadInput for an expression of wrong types, with free variables or unknown names, and for predicates that
+    are defined by each other."""
+    for predicate in predicates.values():
+        where = f"predicate {predicate.name}"
+        if predicate.name in WORDS:
+            raise refuse(where, "the name is a word of the language")
+        if _words(predicate.means) > LARGEST:
+            raise refuse(where, f"more than {LARGEST} words")
+        kind = _type_of(predicate.means, frozenset(predicate.variables), predicates, where)
+        if kind != "truth":
+            raise refuse(where, f"is a {kind}, a truth is wanted")
+    _check_circles(predicates)
+
+
+def _check_circles(predicates: Mapping[str, Predicate]) -> None:
+    done: set[str] = set()
+    for start in predicates:
+        path: list[tuple[str, list[str]]] = [(start, sorted(used_in(predicates[start].means, predicates)))]
+        while path:
+            name, left = path[-1]
+            if name in done or not left:
+                done.add(name)
+                path.pop()
+                continue
+            following = left.pop()
+            if following in [each for each, _ in path]:
+                circle = " -> ".join([*(each for each, _ in path), following])
+                raise refuse(f"predicate {following}", f"is defined by itself: {circle}")
+            path.append((following, sorted(used_in(predicates[following].means, predicates))))
+
+
+def used_in(tree: Tree, predicates: Mapping[str, Predicate]) -> set[str]:
+    """Return the predicates that an expression names."""
+    found = {str(tree[0])} & set(predicates) if tree else set()
+    for part in tree[1:]:
+        if isinstance(part, tuple):
+            found |= used_in(part, predicates)
+    return found
+
+
+def size_of(tree: Tree | str | float) -> int:
+    """Return how many words an expression has."""
+    return _words(tree) if isinstance(tree, tuple) else 1
+
+
+def _words(tree: Tree) -> int:
+    return sum(_words(part) if isinstance(part, tuple) else 1 for part in tree)
+
+
+def _type_of(tree: Tree | str | float, bound: frozenset[str], predicates: Mapping[str, Predicate], where: str) -> str:
+    """Return `number`, `truth`, `object` or `word`."""
+    if isinstance(tree, float):
+        return "number"
+    if isinstance(tree, str):
+        if not tree.startswith("?"):
+            return "word"
+        if tree not in bound:
+            raise refuse(where, f"{tree} is not bound")
+        return "object"
+    if not tree or not isinstance(tree[0], str):
+        raise refuse(where, "an expression begins with a word")
+    head, parts = tree[0], tree[1:]
+    if head in QUANTIFIERS:
+        if len(parts) != 2 or not isinstance(parts[0], str) or not parts[0].startswith("?"):
+            raise refuse(where, f"`{head}` takes a variable and a truth")
+        if parts[0] in bound:
+            raise refuse(where, f"{parts[0]} is bound twice")
+        if _type_of(parts[1], bound | {parts[0]}, predicates, where) != "truth":
+            raise refuse(where, f"`{head}` takes a variable and a truth")
+        return "truth"
+    kinds = [_type_of(part, bound, predicates, where) for part in parts]
+    wanted, result = _signature(head, len(parts), predicates, where)
+    if kinds != wanted:
+        raise refuse(where, f"`{head}` takes {', '.join(wanted) or 'nothing'}, not {', '.join(kinds) or 'nothing'}")
+    return result
+
+
+def _signature(head: str, count: int, predicates: Mapping[str, Predicate], where: str) -> tuple[list[str], str]:
+    if head in OF_OBJECT:
+        return ["object"], "number"
+    if head in OF_SCENE:
+        return [], "number"
+    if head in ARITHMETIC:
+        return ["number"] * ARITHMETIC[head], "number"
+    if head in COMPARISONS:
+        return ["number"] * 2, "truth"
+    if head in CONNECTIVES:
+        return ["truth"] * max(1, count), "truth"
+    if head == "not":
+        return ["truth"], "truth"
+    if head == "category":
+        return ["object"], "word"
+    if head == "is":
+        return ["word", "word"], "truth"
+    if head in predicates:
+        return ["object"] * predicates[head].arguments, "truth"
+    raise refuse(where, f"there is no `{head[:40]}`")

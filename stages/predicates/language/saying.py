@@ -1,0 +1,72 @@
+"""Expressions as sentences that people read."""
+
+from __future__ import annotations
+
+from stages.predicates.language.expressions import Predicate, Tree
+
+_NAMES = {
+    "x": "the middle",
+    "y": "the height above the table",
+    "left": "the left edge",
+    "right": "the right edge",
+    "bottom": "the bottom",
+    "top": "the top",
+    "width": "the width",
+    "height": "the height",
+    "water": "the water",
+    "category": "the category",
+    "table_height": "the table's top",
+    "table_left": "the table's left end",
+    "table_right": "the table's right end",
+    "gripper_x": "the gripper's middle",
+    "gripper_left": "the left finger",
+    "gripper_right": "the right finger",
+    "gripper_bottom": "the fingers' tips",
+    "gripper_top": "the fingers' upper ends",
+    "gripper_height": "the fingers' height",
+    "gripper_mass": "the mass in the gripper",
+    "gripper_opening": "the gripper's opening",
+    "largest_opening": "the gripper's largest opening",
+}
+_BETWEEN = {
+    "less": "is less than",
+    "at_most": "is at most",
+    "near": "is near",
+    "is": "is",
+    "plus": "plus",
+    "minus": "minus",
+    "times": "times",
+    "over": "over",
+}
+
+
+def say(predicate: Predicate) -> str:
+    """Return what a predicate means, as a sentence."""
+    objects = f" ({', '.join(letter[1:] for letter in predicate.variables)})" if predicate.arguments else ""
+    return f"{predicate.name}{objects}: {_said(predicate.means)}."
+
+
+def _said(tree: Tree | str | float) -> str:
+    if isinstance(tree, float):
+        return f"{tree:.4g}"
+    if isinstance(tree, str):
+        return tree.removeprefix("?")
+    head, parts = str(tree[0]), tree[1:]
+    if head in ("and", "or"):
+        return f" {head} ".join(_said(part) if _simple(part) else f"({_said(part)})" for part in parts)
+    if head == "not":
+        return f"it is not so that {_said(parts[0])}"
+    if head in ("some", "every"):
+        start = "there is another object" if head == "some" else "for every other object"
+        return f"{start} {_said(parts[0])} {'with' if head == 'some' else 'holds'}: {_said(parts[1])}"
+    if head in _BETWEEN:
+        return f"{_said(parts[0])} {_BETWEEN[head]} {_said(parts[1])}"
+    if head == "abs":
+        return f"the size of ({_said(parts[0])})"
+    if head in _NAMES:
+        return f"{_NAMES[head]} of {_said(parts[0])}" if parts else _NAMES[head]
+    return f"{head}({', '.join(_said(part) for part in parts)})"
+
+
+def _simple(tree: Tree | str | float) -> bool:
+    return not isinstance(tree, tuple) or tree[0] not in ("and", "or", "some", "every")

@@ -1,0 +1,118 @@
+"""What a learner has seen and heard, and what it makes of it: states, phrases with labels, goals, operators."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+
+from stages.kit.tasks.strips import Atom, Domain
+from stages.predicates.language.evaluating import Evaluator
+from stages.predicates.language.expressions import Predicate, Tree
+from stages.predicates.learning.grammar import GIVEN
+from stages.predicates.learning.operators import Transition, learn_operators
+from stages.predicates.learning.phrases import Phrase
+from stages.predicates.learning.synthesis import Label
+from stages.predicates.state import State
+
+
+@dataclass
+class Turn:
+    """One line of the dialogue."""
+
+    speaker: str
+    """`teacher` or `robot`."""
+    text: str
+    about: str = ""
+    believed: bool = True
+
+
+@dataclass
+class Memory:
+    """Everything that a learner keeps; `meanings` are set by whoever learns them."""
+
+    states: list[State] = field(default_factory=list)
+    labels: dict[Phrase, list[Label]] = field(default_factory=lambda: defaultdict(list))
+    meanings: dict[Phrase, Tree] = field(default_factory=dict)
+    stated: dict[tuple[str, Phrase, tuple[str, ...]], int] = field(default_factory=dict)
+    """Action, phrase and its variables -> how often it was named as a precondition."""
+    goals: dict[str, list[tuple[Phrase, tuple[int, ...]]]] = field(default_factory=lambda: defaultdict(list))
+    """Part of a goal sentence -> what the teacher missed of it: phrase, and which of the part's objects."""
+    transitions: list[Transition] = field(default_factory=list)
+    dialogue: list[Turn] = field(default_factory=list)
+    disbelieved: list[str] = field(default_factory=list)
+    questions: int = 0
+
+    def remember(self, state: State) -> int:
+        """Return the number of a state, kept from now on."""
+        if not self.states or self.states[-1] != state:
+            self.states.append(state)
+        return len(self.states) - 1
+
+    @property
+    def sentences(self) -> int:
+        """Sentences of the teacher's feedback, answers to questions included."""
+        return sum(turn.speaker == "teacher" and turn.about != "goal" for turn in self.dialogue)
+
+    def names(self) -> dict[Phrase, str]:
+        """Return the predicate of every phrase; phrases that mean the same have the same."""
+        by_meaning: dict[Tree, str] = {each.means: name for name, each in GIVEN.items()}
+        by_meaning |= {(name, *each.variables): name for name, each in GIVEN.items()}
+        taken = set(GIVEN)
+        found = {}
+        for phrase, means in self.meanings.items():
+            if means not in by_meaning:
+                name = phrase.name
+                while name in taken:
+                    name += "_too"
+                by_meaning[means] = name
+                taken.add(name)
+            found[phrase] = by_meaning[means]
+        return found
+
+    def predicates(self) -> dict[str, Predicate]:
+        """Return what was learned, with the given predicates that it uses."""
+        found = dict(GIVEN)
+        for phrase, name in self.names().items():
+            if name not in found:
+                found[name] = Predicate(name, phrase.arguments, self.meanings[phrase])
+        return found
+
+    def used(self) -> dict[str, int]:
+        """Return the predicates that plans are made with: those of phrases, and of the worked example."""
+        learned = {name: phrase.arguments for phrase, name in self.names().items()}
+        return {"in_gripper": 1, **learned}
+
+    def see(self, state: State) -> frozenset[Atom]:
+        """Return which atoms hold in a state."""
+        return Evaluator(state, self.predicates()).atoms(self.used())
+
+    def preconditions(self) -> dict[str, frozenset[Atom]]:
+        """Return what the teacher named for each action."""
+        names, found = self.names(), defaultdict(set)
+        for action, phrase, variables in self.stated:
+            if phrase in names:
+                found[action].add((names[phrase], *variables))
+        return {action: frozenset(atoms) for action, atoms in found.items()}
+
+    def domain(self, name: str) -> Domain:
+        """Return the operators learned from scratch from all that was seen."""
+        predicates, used = self.predicates(), self.used()
+        wanted = {each.before for each in self.transitions} | {each.after for each in self.transitions}
+        nothing: frozenset[Atom] = frozenset()
+        atoms = [
+            Evaluator(state, predicates).atoms(used) if number in wanted else nothing
+            for number, state in enumerate(self.states)
+        ]
+        return learn_operators(name, used, self.transitions, atoms, self.preconditions())
+
+    def goal_atoms(self, parts: list[tuple[str, tuple[str, ...]]]) -> tuple[frozenset[Atom], tuple[str, ...]]:
+        """Return what a goal sentence's parts want, and the parts that nobody has explained."""
+        names = self.names()
+        atoms, unknown = set(), []
+        for part, objects in parts:
+            if part not in self.goals:
+                unknown.append(part)
+            for phrase, places in self.goals.get(part, []):
+                if phrase in names:
+                    atoms.add((names[phrase], *(objects[place] for place in places)))
+        return frozenset(atoms), tuple(unknown)

@@ -1,0 +1,282 @@
+"""Our learner: a synthesiser over the grammar, a set of all old labels, questions, and a search for what is not known.
+
+It hears a sentence, takes it for a phrase with a meaning, and keeps what it says as a label. Whatever follows from an
+action that was allowed, or a goal that was reached, is a label too. A meaning is the cheapest that agrees with all
+labels; where one label stands against cheap meanings, the learner asks again, and says what it no longer believes.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from stages.kit.tasks.strips import Atom
+from stages.predicates.language.evaluating import Evaluator
+from stages.predicates.learning.grammar import GIVEN
+from stages.predicates.learning.memory import Memory, Turn
+from stages.predicates.learning.operators import Transition
+from stages.predicates.learning.phrases import Phrase, phrase_of
+from stages.predicates.learning.synthesis import Label, Synthesiser
+from stages.predicates.state import State
+from stages.predicates.teacher.simulated import Teacher
+from stages.predicates.world.actions import ARITY
+
+MOST_QUESTIONS = 3
+"""About one phrase, told apart from its rivals."""
+ASKED_AGAIN = 2.0
+"""Weight of a sentence that was confirmed."""
+
+
+class OursLearner:
+    """Learns from a teacher; `memory` may hold what another domain taught."""
+
+    plans = True
+    """Whether it follows plans while it is taught."""
+
+    def __init__(self, teacher: Teacher, actions: Sequence[str], seed: int, memory: Memory | None = None) -> None:
+        self.memory = memory or Memory()
+        self.teacher, self.actions = teacher, tuple(actions)
+        self.random = np.random.default_rng([seed, 11])
+        self._synthesiser = Synthesiser(self.memory.states)
+        self._tried: Counter[tuple[str, ...]] = Counter()
+        self._asked: Counter[Phrase] = Counter()
+
+    # ---- what it hears -----------------------------------------------------------------------------------------
+
+    def refused(self, state: State, action: Atom, sentence: str) -> None:
+        """Take in that an action was not allowed, and what was said about it."""
+        self._tried[self._situation(state, action)] += 1
+        if not sentence:
+            return
+        phrase, objects = self._heard(state, sentence, f"{' '.join(action)}")
+        variables = dict(zip(action[1:], ("?a", "?b"), strict=False))
+        if all(name in variables for name in objects):
+            key = (action[0], phrase, tuple(variables[name] for name in objects))
+            self.memory.stated[key] = self.memory.stated.get(key, 0) + 1
+            for transition in self.memory.transitions:
+                if transition.action[0] == action[0]:
+                    self._follows(phrase, key[2], transition)
+        self._understand(phrase, state)
+
+    def allowed(self, before: State, action: Atom, after: State) -> None:
+        """Take in that an action was allowed and done: what the teacher named for it held."""
+        self._tried[self._situation(before, action)] += 1
+        transition = Transition(action, self.memory.remember(before), self.memory.remember(after))
+        self.memory.transitions.append(transition)
+        for name, phrase, variables in list(self.memory.stated):
+            if name == action[0]:
+                self._follows(phrase, variables, transition)
+                self._understand(phrase, before)
+
+    def _follows(self, phrase: Phrase, variables: tuple[str, ...], transition: Transition) -> None:
+        binding = dict(zip(("?a", "?b"), transition.action[1:], strict=False))
+        objects = tuple(binding[variable] for variable in variables)
+        source = f"accepted {transition.action[0]} {' '.join(variables)}"
+        self.memory.labels[phrase].append(Label(transition.before, objects, True, source, 1.0))
+
+    def unmet(self, state: State, parts: list[tuple[str, tuple[str, ...]]], sentence: str) -> None:
+        """Take in what the teacher misses of a goal."""
+        if not sentence:
+            return
+        phrase, objects = self._heard(state, sentence, "done")
+        fitting = [(part, named) for part, named in parts if set(objects) <= set(named)]
+        # The part that speaks of the same things; of several, one that nobody has explained yet.
+        fitting.sort(
+            key=lambda entry: (
+                -len(Phrase(entry[0], 0).concepts & phrase.concepts),
+                len(self.memory.goals.get(entry[0], [])),
+            )
+        )
+        self._understand(phrase, state)
+        if not fitting:
+            return
+        part, named = fitting[0]
+        places = tuple(named.index(name) for name in objects)
+        meanings, known = self.memory.meanings, self.memory.goals[part]
+        if all(meanings.get(other) != meanings[phrase] or at != places for other, at in known):
+            known.append((phrase, places))
+
+    def reached(self, state: State, parts: list[tuple[str, tuple[str, ...]]]) -> None:
+        """Take in that a goal was reached: all that was missed of it holds."""
+        number = self.memory.remember(state)
+        for part, objects in parts:
+            for phrase, places in self.memory.goals.get(part, []):
+                named = tuple(objects[place] for place in places)
+                self.memory.labels[phrase].append(Label(number, named, True, "goal"))
+                self._understand(phrase, state)
+
+    def _heard(self, state: State, sentence: str, about: str) -> tuple[Phrase, tuple[str, ...]]:
+        self.memory.dialogue.append(Turn("teacher", sentence, about))
+        phrase, objects = phrase_of(sentence, state.objects)
+        turn = len(self.memory.dialogue) - 1
+        label = Label(self.memory.remember(state), objects, False, "sentence", 1.0, turn)
+        self.memory.labels[phrase].append(label)
+        return phrase, objects
+
+    # ---- what it makes of it -----------------------------------------------------------------------------------
+
+    def _understand(self, phrase: Phrase, state: State) -> None:
+        """Find the meaning anew; ask again about a sentence that stands against it, and between rivals."""
+        labels = self.memory.labels[phrase]
+        meaning = self._synthesiser.best(phrase, labels)
+        for _ in range(4):
+            if not meaning.violated:
+                break
+            self._mend(phrase, labels, [labels[place] for place in meaning.violated])
+            meaning = self._synthesiser.best(phrase, labels)
+        self.memory.meanings[phrase] = meaning.means
+        while meaning.rivals and self._asked[phrase] < MOST_QUESTIONS:
+            question = self._telling(meaning.means, meaning.rivals, phrase, state)
+            if question is None:
+                break
+            self._asked[phrase] += 1
+            self._ask(phrase, question, state)
+            meaning = self._synthesiser.best(phrase, labels)
+            self.memory.meanings[phrase] = meaning.means
+
+    def _mend(self, phrase: Phrase, labels: list[Label], violated: list[Label]) -> None:
+        """Do something about labels that a cheap meaning contradicts: ask again, or stop believing a precondition."""
+        for label in violated:
+            if label.source in ("sentence", "answer") and label.weight < ASKED_AGAIN:
+                if self._question(phrase, label.objects, self.memory.states[label.state]) != label.holds:
+                    labels.remove(label)
+                    self._disbelieve(phrase, label)
+                else:
+                    label.weight = ASKED_AGAIN
+                return
+        for label in violated:
+            if label.source.startswith("accepted"):
+                _, action, *variables = label.source.split()
+                self.memory.stated.pop((action, phrase, tuple(variables)), None)
+                labels[:] = [each for each in labels if each.source != label.source]
+                said = phrase.text.replace("object ", "")
+                self.memory.disbelieved.append(f"that {action} fails when {said}: it was done all the same")
+                return
+            if label.source == "goal":
+                labels.remove(label)
+                return
+
+    def _disbelieve(self, phrase: Phrase, label: Label) -> None:
+        turn = self.memory.dialogue[label.turn]
+        turn.believed = False
+        self.memory.disbelieved.append(turn.text)
+        action, *objects = turn.about.split() or [""]
+        variables = dict(zip(objects, ("?a", "?b"), strict=False))
+        key = (action, phrase, tuple(variables.get(name, name) for name in label.objects))
+        if self.memory.stated.get(key, 0) > 1:
+            self.memory.stated[key] -= 1
+        else:
+            self.memory.stated.pop(key, None)
+
+    def _telling(
+        self, means: object, rivals: tuple[object, ...], phrase: Phrase, state: State
+    ) -> tuple[str, ...] | None:
+        """Return objects, now, for which rivals disagree most evenly; None when they agree on all that is here."""
+        evaluator = Evaluator(state, GIVEN)
+        trees = [means, *rivals]
+        best, asked = 0, None
+        for objects in itertools.permutations(state.objects, phrase.arguments):
+            binding = dict(zip(("?a", "?b"), objects, strict=False))
+            held = sum(evaluator.truth(tree, binding) for tree in trees)  # type: ignore[arg-type]
+            if min(held, len(trees) - held) > best:
+                best, asked = min(held, len(trees) - held), objects
+        return asked
+
+    def _ask(self, phrase: Phrase, objects: tuple[str, ...], state: State) -> None:
+        holds = self._question(phrase, objects, state)
+        turn = len(self.memory.dialogue) - 1
+        self.memory.labels[phrase].append(Label(self.memory.remember(state), objects, holds, "answer", 1.0, turn))
+
+    def _question(self, phrase: Phrase, objects: tuple[str, ...], state: State) -> bool:
+        """Ask whether a complaint is right of objects in a state; returns whether its predicate holds."""
+        text = phrase.text
+        for place, name in enumerate(objects, start=1):
+            text = text.replace(f"<{place}>", name)
+        wrong = self.teacher.answer(state, phrase.text, objects)
+        self.memory.questions += 1
+        self.memory.dialogue.append(Turn("robot", f"Is it so that {text}?"))
+        self.memory.dialogue.append(Turn("teacher", "yes" if wrong else "no", "question"))
+        return not wrong
+
+    # ---- what it tries -----------------------------------------------------------------------------------------
+
+    def explore(self, state: State) -> Atom | None:
+        """Return the action in the situation that was tried least, of those that nothing is known against."""
+        stated = self.memory.preconditions()
+        held = self.memory.see(state)
+        best: list[Atom] = []
+        fewest = 10**9
+        for name in self.actions:
+            for objects in itertools.permutations(state.objects, ARITY[name]):
+                action = (name, *objects)
+                binding = dict(zip(("?a", "?b"), objects, strict=False))
+                wanted = {(atom[0], *(binding[term] for term in atom[1:])) for atom in stated.get(name, ())}
+                if not wanted <= held:
+                    continue
+                count = self._tried[self._situation(state, action)]
+                if count < fewest:
+                    best, fewest = [], count
+                if count == fewest:
+                    best.append(action)
+        return best[int(self.random.integers(len(best)))] if best else None
+
+    def doubtful(self, state: State) -> Atom | None:
+        """Return an action that was never allowed and whose preconditions, as named, were never seen to hold together:
+        one of them, said once, may be wrong. The one with the fewest of them against it."""
+        names, held = self.memory.names(), self.memory.see(state)
+        done = {transition.action[0] for transition in self.memory.transitions}
+        said: Counter[tuple[str, Atom]] = Counter()
+        for (action, phrase, variables), count in self.memory.stated.items():
+            said[action, (names[phrase], *variables)] += count
+        found = []
+        for name in self.actions:
+            wanted = [(atom, count) for (action, atom), count in said.items() if action == name]
+            if name in done or not wanted or self._seen_together(name, [atom for atom, _ in wanted]):
+                continue
+            for objects in itertools.permutations(state.objects, ARITY[name]):
+                against = [count for atom, count in wanted if _bound(atom, objects) not in held]
+                if against and max(against) == 1:
+                    found.append((len(against), (name, *objects)))
+        fewest = [action for count, action in found if count == min(found)[0]]
+        return fewest[int(self.random.integers(len(fewest)))] if fewest else None
+
+    def _seen_together(self, name: str, wanted: list[Atom]) -> bool:
+        """Whether all of what was named for an action held at once, for some objects, in a state that was seen."""
+        for state in self.memory.states:
+            held = self.memory.see(state)
+            for objects in itertools.permutations(state.objects, ARITY[name]):
+                if all(_bound(atom, objects) in held for atom in wanted):
+                    return True
+        return False
+
+    def curious(self, state: State) -> bool:
+        """Whether there is an action that was never tried in such a situation."""
+        action = self.explore(state)
+        return action is not None and self._tried[self._situation(state, action)] == 0
+
+    def _situation(self, state: State, action: Atom) -> tuple[str, ...]:
+        """Return what matters of a state for an action, as far as one can see: categories, what is held, what rests on
+        or within what, and water."""
+        evaluator = Evaluator(state, GIVEN)
+        full = any(evaluator.holds(("in_gripper", name)) for name in state.objects)
+        seen = [action[0], f"full:{full}"]
+        for name in action[1:]:
+            others = [other for other in state.objects if other != name]
+            facts = (
+                evaluator.holds(("in_gripper", name)),
+                any(evaluator.holds(("rests_on", other, name)) for other in others),
+                any(evaluator.holds(("within", name, other)) for other in others),
+                any(evaluator.holds(("within", other, name)) for other in others),
+                state.objects[name].water > 0,
+            )
+            category = state.objects[name].category
+            seen.append(f"{category}:{''.join('01'[fact] for fact in facts)}")
+        return tuple(seen)
+
+
+def _bound(atom: Atom, objects: Sequence[str]) -> Atom:
+    binding = dict(zip(("?a", "?b"), objects, strict=False))
+    return (atom[0], *(binding[term] for term in atom[1:]))

@@ -1,0 +1,149 @@
+"""A learner's memory as a document, and back."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any
+
+from schemas.errors import BadInput
+from schemas.learned_domain import (
+    DialogueTurn,
+    DoneAction,
+    GoalMeaning,
+    HeardPhrase,
+    LabelledExample,
+    LearnedDomainFile,
+    LearnedPredicate,
+    SeenObject,
+    SeenState,
+    StatedPrecondition,
+)
+from stages.predicates.language.expressions import Predicate, check, read, text_of
+from stages.predicates.language.saying import say
+from stages.predicates.learning.grammar import GIVEN
+from stages.predicates.learning.memory import Memory, Turn
+from stages.predicates.learning.operators import Transition
+from stages.predicates.learning.phrases import Phrase
+from stages.predicates.learning.synthesis import Label
+from stages.predicates.state import Seen, State
+
+
+def document_of(memory: Memory, **rest: Any) -> LearnedDomainFile:
+    """Return domain.json; `rest` are its fields that the memory does not hold."""
+    names = memory.names()
+    phrases = list(memory.meanings)
+    place = {phrase: number for number, phrase in enumerate(phrases)}
+    return LearnedDomainFile(
+        predicates=tuple(
+            LearnedPredicate(name=each.name, arguments=each.arguments, means=text_of(each.means), said=say(each))
+            for each in memory.predicates().values()
+        ),
+        phrases=tuple(
+            HeardPhrase(
+                text=phrase.text,
+                arguments=phrase.arguments,
+                predicate=names[phrase],
+                examples=tuple(
+                    LabelledExample(
+                        state=label.state,
+                        objects=label.objects,
+                        holds=label.holds,
+                        source=label.source,
+                        weight=label.weight,
+                        turn=label.turn,
+                    )
+                    for label in memory.labels[phrase]
+                ),
+            )
+            for phrase in phrases
+        ),
+        preconditions=tuple(
+            StatedPrecondition(action=action, phrase=place[phrase], variables=variables, times=times)
+            for (action, phrase, variables), times in memory.stated.items()
+        ),
+        goals=tuple(
+            GoalMeaning(text=text, phrase=place[phrase], places=places)
+            for text, entries in memory.goals.items()
+            for phrase, places in entries
+        ),
+        transitions=tuple(
+            DoneAction(action=each.action, before=each.before, after=each.after) for each in memory.transitions
+        ),
+        states=tuple(
+            SeenState(
+                objects={name: SeenObject(**vars(seen)) for name, seen in state.objects.items()},
+                gripper_x=state.gripper_x,
+                gripper_y=state.gripper_y,
+                opening=state.opening,
+                mass=state.mass,
+            )
+            for state in memory.states
+        ),
+        dialogue=tuple(
+            DialogueTurn(speaker=turn.speaker, text=turn.text, about=turn.about, believed=turn.believed)
+            for turn in memory.dialogue
+        ),
+        disbelieved=tuple(memory.disbelieved),
+        sentences=memory.sentences,
+        questions=memory.questions,
+        **rest,
+    )
+
+
+def memory_of(document: LearnedDomainFile, where: str) -> Memory:
+    """Return the memory of a document. Raises BadInput naming what refers to nothing, or is no expression."""
+    predicates = {
+        each.name: Predicate(each.name, each.arguments, read(each.means, f"{where}: {each.name}"))
+        for each in document.predicates
+    }
+    check(predicates)
+    memory = Memory()
+    memory.states = [
+        State(
+            {name: Seen(**seen.model_dump()) for name, seen in state.objects.items()},
+            state.gripper_x,
+            state.gripper_y,
+            state.opening,
+            state.mass,
+        )
+        for state in document.states
+    ]
+    phrases = [Phrase(each.text, each.arguments) for each in document.phrases]
+    for phrase, heard in zip(phrases, document.phrases, strict=True):
+        if heard.predicate not in predicates:
+            raise _refuse(where, f"there is no predicate {heard.predicate!r}")
+        if predicates[heard.predicate].arguments != heard.arguments:
+            raise _refuse(where, f"{heard.predicate} is not about {heard.arguments} objects")
+        predicate = predicates[heard.predicate]
+        given = GIVEN.get(heard.predicate)
+        memory.meanings[phrase] = (predicate.name, *predicate.variables) if given == predicate else predicate.means
+        for example in heard.examples:
+            if example.state >= len(memory.states) or len(example.objects) != heard.arguments:
+                raise _refuse(where, f"an example of {heard.text!r} names no state, or other objects")
+            if not set(example.objects) <= set(memory.states[example.state].objects):
+                raise _refuse(where, f"an example of {heard.text!r} names objects that its state has not")
+            memory.labels[phrase].append(Label(**example.model_dump()))
+    for stated in document.preconditions:
+        phrase = _phrase(phrases, stated.phrase, where)
+        memory.stated[stated.action, phrase, stated.variables] = stated.times
+    memory.goals = defaultdict(list)
+    for goal in document.goals:
+        memory.goals[goal.text].append((_phrase(phrases, goal.phrase, where), goal.places))
+    for done in document.transitions:
+        if max(done.before, done.after) >= len(memory.states):
+            raise _refuse(where, "an action refers to a state that is not there")
+        memory.transitions.append(Transition(done.action, done.before, done.after))
+    memory.dialogue = [Turn(**turn.model_dump()) for turn in document.dialogue]
+    memory.disbelieved = list(document.disbelieved)
+    memory.questions = document.questions
+    return memory
+
+
+def _phrase(phrases: list[Phrase], number: int, where: str) -> Phrase:
+    if number >= len(phrases):
+        raise _refuse(where, f"there is no phrase {number}")
+    return phrases[number]
+
+
+def _refuse(where: str, message: str) -> BadInput:
+    return BadInput(f"{where}: {message}", hint="teach it again (scenewright predicates teach)")

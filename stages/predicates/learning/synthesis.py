@@ -1,0 +1,98 @@
+"""Choosing what a phrase means: the cheapest expression that agrees with the labels; rivals are kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from stages.predicates.language.evaluating import Evaluator, of_object, of_scene
+from stages.predicates.language.expressions import Tree
+from stages.predicates.learning.grammar import GIVEN, MEASURES, candidates
+from stages.predicates.learning.phrases import Phrase
+from stages.predicates.state import State
+
+VIOLATION = 6.0
+"""What a label that a meaning contradicts adds to its cost, times the label's weight."""
+RIVAL = 0.5
+"""Meanings within this of the cheapest are its rivals."""
+MOST_TRIED = 400
+
+
+@dataclass
+class Label:
+    """A phrase's predicate is said to hold, or not to hold, for objects in a state."""
+
+    state: int
+    objects: tuple[str, ...]
+    holds: bool
+    source: str
+    """`sentence`, `answer`, or what followed: `accepted <action>`, `goal`."""
+    weight: float = 1.0
+    turn: int = 0
+    """Of the dialogue."""
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a phrase is taken to mean."""
+
+    means: Tree
+    cost: float
+    violated: tuple[int, ...]
+    """Places, among the labels, of those that it contradicts."""
+    rivals: tuple[Tree, ...]
+
+
+class Synthesiser:
+    """Finds meanings over remembered states; truths of expressions are kept."""
+
+    def __init__(self, states: list[State]) -> None:
+        self.states = states
+        self._evaluators: dict[int, Evaluator] = {}
+        self._known: dict[tuple[Tree, int, tuple[str, ...]], bool] = {}
+
+    def truth(self, tree: Tree, state: int, objects: tuple[str, ...]) -> bool:
+        """Whether an expression holds for objects in a remembered state."""
+        key = (tree, state, objects)
+        if key not in self._known:
+            if state not in self._evaluators:
+                self._evaluators[state] = Evaluator(self.states[state], GIVEN)
+            binding = dict(zip(("?a", "?b"), objects, strict=False))
+            self._known[key] = self._evaluators[state].truth(tree, binding)
+        return self._known[key]
+
+    def best(self, phrase: Phrase, labels: list[Label]) -> Meaning:
+        """Return the cheapest meaning; contradicted labels are paid for, so that one wrong sentence does not undo what
+        many right ones say."""
+        found: list[tuple[float, Tree, tuple[int, ...]]] = []
+        least = float("inf")
+        for cost, tree in candidates(phrase, self._margins(phrase, labels))[:MOST_TRIED]:
+            if cost > least + RIVAL:
+                break
+            violated = tuple(
+                place
+                for place, label in enumerate(labels)
+                if self.truth(tree, label.state, label.objects) != label.holds
+            )
+            whole = cost + VIOLATION * sum(labels[place].weight for place in violated)
+            least = min(least, whole)
+            found.append((whole, tree, violated))
+        found.sort(key=lambda entry: (entry[0], str(entry[1])))
+        cost, tree, violated = found[0]
+        rivals = tuple(other for whole, other, _ in found[1:] if whole <= cost + RIVAL)
+        return Meaning(tree, cost, violated, rivals)
+
+    def _margins(self, phrase: Phrase, labels: list[Label]) -> dict[str, list[float]]:
+        """Return, for each measure, middles between values with and without the predicate."""
+        margins: dict[str, list[float]] = {}
+        measures = MEASURES if phrase.arguments == 1 else ("gripper_mass",) if phrase.arguments == 0 else ()
+        for measure in measures:
+            values: dict[bool, set[float]] = {True: set(), False: set()}
+            for label in labels:
+                state = self.states[label.state]
+                value = of_object(state, label.objects[0], measure) if label.objects else of_scene(state, measure)
+                values[label.holds].add(round(value, 3))
+            if values[True] and values[False] and not values[True] & values[False]:
+                both = sorted([(v, True) for v in values[True]] + [(v, False) for v in values[False]])
+                changes = [(a + b) / 2 for (a, x), (b, y) in zip(both, both[1:], strict=False) if x != y]
+                margins[measure] = [round(value, 3) for value in changes[:2]]
+        return margins

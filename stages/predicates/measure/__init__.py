@@ -1,0 +1,1 @@
+"""How right what was learned is: predicates on states near their boundaries."""

@@ -1,0 +1,132 @@
+"""Balanced accuracy of predicates over drawn states, half of them near the boundary of what the teacher means.
+
+States need not be such as physics leaves behind: sizes, places, heights and water are drawn freely, so that a meaning
+that is right only of tidy kitchens is found out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+import numpy as np
+
+from stages.predicates.language.evaluating import Evaluator
+from stages.predicates.language.expressions import Predicate, Tree
+from stages.predicates.learning.grammar import GIVEN
+from stages.predicates.learning.memory import Memory
+from stages.predicates.state import Seen, State
+from stages.predicates.teacher.simulated import meant_by
+from stages.predicates.truth import true_predicates
+from stages.predicates.world.catalogue import DomainSetup, kitchen_file
+
+HALVINGS = 7
+"""Of the way between a state where a predicate holds and one where it does not."""
+DRAWS = 30
+"""Of a state on the other side of a predicate."""
+Case = tuple[State, tuple[str, ...], bool]
+"""A state, objects, and whether the teacher's predicate holds of them."""
+
+
+def drawn_state(setup: DomainSetup, random: np.random.Generator) -> State:
+    """Return a state of a domain's objects, things on, in and beside each other more often than chance would have."""
+    kinds = kitchen_file().objects
+    objects: dict[str, Seen] = {}
+    for name in (*setup.objects, *setup.more):
+        kind = kinds[name]
+        stretch = float(random.choice([1.0, random.uniform(0.3, 4.0)]))
+        width, height = kind.width * stretch, kind.height * float(random.choice([1.0, random.uniform(0.2, 2.0)]))
+        x, y = float(random.uniform(-45.0, 30.0)), float(random.choice([0.0, random.uniform(-1.0, 25.0)]))
+        others = list(objects.values())
+        if others and random.random() < 0.5:
+            under = others[int(random.integers(len(others)))]
+            x = under.x + float(random.uniform(-0.7, 0.7)) * under.width
+            y = under.y + (under.height if random.random() < 0.6 else float(random.uniform(0.0, 1.0)))
+        water = float(random.choice([0.0, random.uniform(0.0, 1.0)])) if kind.shape == "container" else 0.0
+        objects[name] = Seen(x, y, width, height, kind.category, water)
+    if random.random() < 0.5:
+        return State(objects, float(random.uniform(-40, 30)), 25.0, float(random.uniform(0, 5)), 0.0)
+    held = objects[list(objects)[int(random.integers(len(objects)))]]
+    tips = held.y + held.height - min(2.0, held.height)
+    return State(objects, held.x, tips, held.width, float(random.uniform(0.1, 1.0)))
+
+
+def between(one: State, two: State, share: float) -> State:
+    """Return a state on the straight way from `one` (0) to `two` (1)."""
+
+    def mix(a: float, b: float) -> float:
+        return a + share * (b - a)
+
+    objects = {
+        name: Seen(
+            mix(a.x, b.x),
+            mix(a.y, b.y),
+            mix(a.width, b.width),
+            mix(a.height, b.height),
+            a.category,
+            mix(a.water, b.water),
+        )
+        for (name, a), b in zip(one.objects.items(), two.objects.values(), strict=True)
+    }
+    return State(
+        objects,
+        mix(one.gripper_x, two.gripper_x),
+        mix(one.gripper_y, two.gripper_y),
+        mix(one.opening, two.opening),
+        mix(one.mass, two.mass),
+    )
+
+
+def cases_of(name: str, setup: DomainSetup, count: int, seed: int) -> list[Case]:
+    """Return `count` cases of a predicate of the teacher, every second one near its boundary where it has one."""
+    random = np.random.default_rng([seed, sorted(true_predicates()).index(name)])
+    cases: list[Case] = []
+    for number in range(count):
+        state = drawn_state(setup, random)
+        names = list(state.objects)
+        chosen = random.permutation(len(names))[: true_predicates()[name].arguments]
+        objects = tuple(names[place] for place in chosen.tolist())
+        holds = _holds(name, state, objects)
+        for _ in range(DRAWS if number % 2 else 0):
+            other = drawn_state(setup, random)
+            if _holds(name, other, objects) != holds:
+                low, high = 0.0, 1.0
+                for _ in range(HALVINGS):
+                    middle = (low + high) / 2
+                    same = _holds(name, between(state, other, middle), objects) == holds
+                    low, high = (middle, high) if same else (low, middle)
+                state = between(state, other, low if random.random() < 0.5 else high)
+                break
+        cases.append((state, objects, _holds(name, state, objects)))
+    return cases
+
+
+def _holds(name: str, state: State, objects: tuple[str, ...]) -> bool:
+    return Evaluator(state, true_predicates()).holds((name, *objects))
+
+
+def balanced_accuracy(cases: Sequence[Case], means: Tree, given: Mapping[str, Predicate]) -> float:
+    """Return the mean of the shares, of what holds and of what does not, that an expression tells rightly."""
+    right: dict[bool, list[bool]] = {True: [], False: []}
+    for state, objects, holds in cases:
+        binding = dict(zip(("?a", "?b"), objects, strict=False))
+        right[holds].append(Evaluator(state, given).truth(means, binding) == holds)
+    shares = [float(np.mean(each)) for each in right.values() if each]
+    return float(np.mean(shares))
+
+
+def accuracies(memory: Memory, domain: str, count: int, seed: int) -> dict[str, float]:
+    """Return, by the teacher's predicate, how right the worst meaning of a phrase about it is."""
+    found: dict[str, float] = {}
+    for phrase, means in memory.meanings.items():
+        name = meant_by(phrase.text)
+        if name is not None:
+            value = balanced_accuracy(drawn_cases(name, domain, count, seed), means, GIVEN)
+            found[name] = min(value, found.get(name, 1.0))
+    return dict(sorted(found.items()))
+
+
+@cache
+def drawn_cases(name: str, domain: str, count: int, seed: int) -> tuple[Case, ...]:
+    """Return `cases_of`, drawn once."""
+    return tuple(cases_of(name, kitchen_file().domains[domain], count, seed))

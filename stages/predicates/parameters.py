@@ -1,0 +1,111 @@
+"""Declarations of the steps `predicates teach`, `plan` and `evaluate`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import Field
+
+from schemas.errors import UsageError
+from schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
+from schemas.learned_domain import LearnedDomain
+from stages.kit.stage import Optionally, Parameters, Stage
+
+DomainName = Literal["store_objects", "set_table", "cook_meal"]
+SetName = Literal["canonical", "more_objects", "novel_goals", "combined", "hundred_goals"]
+SET_NAMES: tuple[SetName, ...] = ("canonical", "more_objects", "novel_goals", "combined", "hundred_goals")
+LIBRARIES = ("numpy", "pymunk", "numba")
+
+
+class TeachParameters(Parameters):
+    """Options of `predicates teach`."""
+
+    domain: DomainName = Field("store_objects", description="Which kitchen")
+    tasks: int = Field(10, ge=1, le=100, description="Training tasks")
+    wording: Literal["plain", "diverse"] = Field("plain", description="One sentence for each thing amiss, or several")
+    wrong: float = Field(0.0, ge=0.0, le=0.5, description="Share of corrections that are wrong or missing")
+
+
+class PlanParameters(Parameters):
+    """Options of `predicates plan`."""
+
+    goal: str = Field(
+        "", description='What is wanted, e.g. "stack bread on plate and put cup on the table"; else that of the task'
+    )
+    which: SetName = Field("combined", description="Set of tasks that the kitchen is taken from")
+    task: int = Field(1, ge=1, le=1000, description="Which of them")
+    image_width: int = Field(700, ge=200, le=2000, description="Width of the pictures [px]")
+
+
+class EvaluateParameters(Parameters):
+    """Options of `predicates evaluate`."""
+
+    sets: tuple[str, ...] = Field(("canonical", "more_objects", "novel_goals", "combined"), description="Sets of tasks")
+    tasks: int = Field(10, ge=1, le=200, description="Tasks of each")
+    states: int = Field(1000, ge=10, le=20_000, description="States that each predicate is judged on")
+
+
+def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError for a goal that is too long to read."""
+    if len(parameters.goal) > 2000:
+        raise UsageError("--goal: more than 2000 characters", hint="say less at a time")
+
+
+def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError for an unknown set."""
+    for name in parameters.sets:
+        if name not in SET_NAMES:
+            raise UsageError(f"--sets: there is no {name!r}", hint=f"choose of {', '.join(SET_NAMES)}")
+
+
+def kitchen_files(parameters: Any) -> tuple[str, ...]:
+    """Return the files of `data/` that are read."""
+    return (
+        "kitchen/kitchen.toml",
+        "kitchen/truth.toml",
+        "kitchen/store_objects.pddl",
+        "kitchen/set_table.pddl",
+        "kitchen/cook_meal.pddl",
+    )
+
+
+TEACH = Stage(
+    name="predicates teach",
+    version=1,
+    summary="Learn predicates and operators from a simulated teacher's corrections in a planar kitchen",
+    parameters=TeachParameters,
+    reads={"learned": Optionally(LearnedDomain)},
+    writes=LearnedDomain,
+    libraries=(*LIBRARIES, "pillow"),
+    module="teach_stage",
+    data_files=kitchen_files,
+    example="scenewright predicates teach --domain set_table --seed 1 --out outputs/predicates/table",
+)
+PLAN = Stage(
+    name="predicates plan",
+    version=1,
+    summary="Plan for a goal in words with what was learned, and try it in the kitchen",
+    parameters=PlanParameters,
+    reads={"learned": LearnedDomain},
+    writes=KitchenPlan,
+    libraries=(*LIBRARIES, "pillow"),
+    module="plan_stage",
+    check=check_plan,
+    data_files=kitchen_files,
+    example="scenewright predicates plan --learned outputs/predicates/table --out outputs/predicates/plan",
+)
+EVALUATE = Stage(
+    name="predicates evaluate",
+    version=1,
+    summary="Count what is reached of sets of tasks with what was learned, beside the teacher's own operators",
+    parameters=EvaluateParameters,
+    reads={"learned": LearnedDomain},
+    writes=KitchenEvaluation,
+    libraries=LIBRARIES,
+    module="evaluate_stage",
+    check=check_evaluate,
+    data_files=kitchen_files,
+    example="scenewright predicates evaluate --learned outputs/predicates/table --out outputs/predicates/evaluation",
+)
+STAGES = [TEACH, PLAN, EVALUATE]

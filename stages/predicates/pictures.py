@@ -1,0 +1,93 @@
+"""Pictures of the kitchen, short animations, and plots of where a predicate holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from stages.predicates.language.evaluating import Evaluator
+from stages.predicates.language.expressions import Predicate
+from stages.predicates.state import TABLE_LEFT, TABLE_RIGHT, State
+from stages.predicates.world.kitchen import FAUCET_HEIGHT, SINK_DEPTH, SINK_WIDTH, SINK_X
+
+Polygons = Sequence[tuple[str, Sequence[tuple[float, float]]]]
+LEFT, RIGHT, BOTTOM, TOP = -42.0, 40.0, -12.0, 30.0
+COLORS = {
+    "gripper": (70, 70, 80),
+    "water": (60, 130, 220),
+    "shelf": (150, 110, 70),
+    "placemat": (120, 170, 120),
+    "plate": (210, 210, 220),
+    "pot": (110, 120, 140),
+    "cup": (170, 120, 170),
+    "tallcup": (140, 90, 160),
+    "coaster": (190, 160, 90),
+}
+USUAL = (205, 110, 80)
+GRID = 60
+"""Cells along an edge of a plot."""
+
+
+def draw_kitchen(polygons: Polygons, width: int, title: str = "") -> Image.Image:
+    """Return a picture of a kitchen, (RIGHT - LEFT) wide."""
+    scale = width / (RIGHT - LEFT)
+    image = Image.new("RGB", (width, round((TOP - BOTTOM) * scale)), (250, 249, 246))
+    draw = ImageDraw.Draw(image)
+
+    def at(point: tuple[float, float]) -> tuple[float, float]:
+        return (point[0] - LEFT) * scale, (TOP - point[1]) * scale
+
+    wood = (214, 196, 170)
+    draw.rectangle((*at((TABLE_LEFT, 0.0)), *at((TABLE_RIGHT, BOTTOM))), fill=wood)
+    draw.rectangle((*at((TABLE_RIGHT, -SINK_DEPTH)), *at((TABLE_RIGHT + SINK_WIDTH + 1, BOTTOM))), fill=wood)
+    draw.rectangle((*at((SINK_X - 0.8, FAUCET_HEIGHT + 2)), *at((SINK_X + 6, FAUCET_HEIGHT))), fill=(150, 155, 160))
+    for name, corners in polygons:
+        if name == "water":
+            x, y = at((corners[0][0], corners[0][1]))
+            radius = max(1.0, 0.12 * scale)
+            draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill=COLORS["water"])
+        else:
+            draw.polygon([at((x, y)) for x, y in corners], fill=COLORS.get(name, USUAL), outline=(60, 50, 45))
+    if title:
+        draw.text((6, 4), title, fill=(40, 40, 40))
+    return image
+
+
+def draw_predicates(predicates: Sequence[Predicate], state: State, vocabulary: dict[str, Predicate]) -> Image.Image:
+    """Return plots, one a predicate, of where the middle of its first object may be for it to hold, green, in a state;
+    each is about the first objects of the state."""
+    size, line = 3 * GRID, 16
+    columns = 4
+    rows = -(-len(predicates) // columns)
+    sheet = Image.new("RGB", (columns * (size + 8), max(1, rows) * (size + line + 8)), (255, 255, 255))
+    draw = ImageDraw.Draw(sheet)
+    for number, predicate in enumerate(predicates):
+        held = _held(predicate, state, vocabulary)
+        colors = np.where(held[:, :, None], (130, 190, 130), (232, 232, 232)).astype(np.uint8)
+        place = (number % columns * (size + 8), number // columns * (size + line + 8))
+        sheet.paste(Image.fromarray(colors).resize((size, size), Image.Resampling.NEAREST), (place[0], place[1] + line))
+        draw.text(place, predicate.name[:30], fill=(30, 30, 30))
+    return sheet
+
+
+def _held(predicate: Predicate, state: State, vocabulary: dict[str, Predicate]) -> np.ndarray:
+    """Return (GRID, GRID) where the predicate holds, rows from above."""
+    names = list(state.objects)[: max(1, predicate.arguments)]
+    moved = names[0]
+    held = np.zeros((GRID, GRID), dtype=bool)
+    for row, y in enumerate(np.linspace(TOP - 10, -4.0, GRID).tolist()):
+        for column, x in enumerate(np.linspace(LEFT, RIGHT, GRID).tolist()):
+            seen = replace(state.objects[moved], x=x, y=y)
+            there = replace(state, objects={**state.objects, moved: seen})
+            held[row, column] = Evaluator(there, vocabulary).holds((predicate.name, *names[: predicate.arguments]))
+    return held
+
+
+def animate(path: Path, frames: Sequence[Polygons], width: int) -> None:
+    """Write an animation of kitchens."""
+    images = [draw_kitchen(frame, width).quantize(64) for frame in frames]
+    images[0].save(path, save_all=True, append_images=images[1:], duration=80, loop=0)

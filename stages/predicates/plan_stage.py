@@ -1,0 +1,80 @@
+"""The step `predicates plan`: a goal in words, planned for with what was learned and tried in the kitchen."""
+
+from __future__ import annotations
+
+from schemas.kitchen_plan import KitchenPlan, KitchenPlanFile, KitchenStep
+from schemas.learned_domain import LearnedDomain
+from stages.kit.stage import Context
+from stages.predicates.execution import Attempt, Live, attempt
+from stages.predicates.learning.memory import Memory
+from stages.predicates.learning.phrases import goal_phrases
+from stages.predicates.learning.records import memory_of
+from stages.predicates.parameters import PlanParameters
+from stages.predicates.pictures import animate, draw_kitchen
+from stages.predicates.tasks import Task, open_kitchen, tasks_of
+
+
+def run(learned: LearnedDomain, *, parameters: PlanParameters, context: Context) -> KitchenPlan:
+    """Plan and try."""
+    name = learned.info.domain
+    memory = memory_of(learned.info, str(learned.root))
+    task = tasks_of(name, parameters.which, parameters.task, context.seed)[-1]
+    sentence = parameters.goal or task.sentence
+    parts = goal_phrases(sentence, task.objects)
+    wanted, unknown = memory.goal_atoms(parts)
+    kitchen = open_kitchen(task)
+    before = kitchen.polygons()
+    kitchen.frames = [before]
+    result = Attempt()
+    missing = "; ".join(f"nobody has said what {part!r} means" for part in unknown)
+    if not missing:
+        domain = memory.domain(name)
+        result = attempt(task, name, domain, memory.see, wanted, replan=True, world=Live(kitchen))
+        missing = missing_of(memory, result)
+    reached = not missing and wanted <= memory.see(kitchen.state())
+    if not parameters.goal:
+        reached = reached and result.success
+    statement = _statement(task, sentence, result, reached, missing)
+    KitchenPlanFile(
+        domain=name,
+        goal=sentence,
+        wanted=tuple(sorted(wanted)),
+        success=reached,
+        steps=tuple(KitchenStep(action=action, failed=reason) for action, reason in result.steps),
+        missing=missing,
+        statement=statement,
+    ).write(context.output / "plan.json")
+    width = parameters.image_width
+    after = kitchen.polygons()
+    sheet = draw_kitchen(before, width, "before")
+    both = sheet.resize((sheet.width, 2 * sheet.height))
+    both.paste(sheet, (0, 0))
+    both.paste(draw_kitchen(after, width, sentence[:100]), (0, sheet.height))
+    both.save(context.output / "kitchen.png")
+    animate(context.output / "kitchen.gif", kitchen.frames[:: max(1, len(kitchen.frames) // 60)], width // 2)
+    context.logger.info(statement)
+    return KitchenPlan(
+        root=context.output,
+        outcome="ok" if reached else "not_reached",
+        summary={"steps": len(result.steps), "reached": reached},
+    )
+
+
+def missing_of(memory: Memory, result: Attempt) -> str:
+    """Return which predicate nothing that was learned can make true, when that is why there is no plan."""
+    if not result.unreachable:
+        return ""
+    names = sorted({atom[0] for atom in result.unreachable})
+    added = {atom[0] for schema in memory.domain("learned").schemas for atom in schema.add}
+    never = [name for name in names if name not in added]
+    if never:
+        return "; ".join(f"no operator was learned that makes {name} true" for name in never)
+    said = ", ".join(" ".join(atom) for atom in result.unreachable)
+    return f"no operator that was learned can make this true here: {said}"
+
+
+def _statement(task: Task, sentence: str, result: Attempt, reached: bool, missing: str) -> str:
+    if missing:
+        return f"{sentence}: {missing}"
+    outcome = "reached" if reached else result.unplanned or "not reached"
+    return f"{sentence}: {outcome} in {len(result.steps)} actions, from task {task.name}"

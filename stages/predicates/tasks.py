@@ -1,0 +1,180 @@
+"""Tasks: where objects stand at the beginning and what is wanted: the sets of the thesis, and a hundred goals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.kit.tasks.strips import Atom, Problem, apply_action, ground
+from stages.predicates.language.evaluating import Evaluator
+from stages.predicates.state import State
+from stages.predicates.truth import true_domain, true_predicates, truth_file
+from stages.predicates.world.actions import free_place
+from stages.predicates.world.catalogue import DomainSetup, kitchen_file
+from stages.predicates.world.kitchen import Kitchen
+
+SETS = ("canonical", "more_objects", "novel_goals", "combined", "hundred_goals")
+LAYOUTS = 20
+LONGEST_WALK = 14
+"""Actions of the walk whose end a generated goal is taken from."""
+MOST_LITERALS = 6
+FRUITLESS = 40
+"""Walks, for each goal that is asked for, after which there are taken to be no more."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """Objects at (middle x, bottom y), what is wanted, and the seed of the kitchen's chance."""
+
+    name: str
+    objects: dict[str, tuple[float, float]]
+    goal: tuple[Atom, ...]
+    seed: int
+
+    @property
+    def sentence(self) -> str:
+        """The goal in words."""
+        return " and ".join(goal_phrase(atom) for atom in self.goal)
+
+
+def goal_phrase(atom: Atom) -> str:
+    """Return what the teacher says of one literal that she wants."""
+    text = truth_file().goals[atom[0]]
+    for place, name in enumerate(atom[1:], start=1):
+        text = text.replace(f"<{place}>", name)
+    return text
+
+
+def open_kitchen(task: Task) -> Kitchen:
+    """Return the kitchen as a task begins."""
+    kinds = kitchen_file().objects
+    return Kitchen([(name, kinds[name], x, y) for name, (x, y) in task.objects.items()], task.seed)
+
+
+def true_atoms(state: State, domain: str) -> frozenset[Atom]:
+    """Return which of the teacher's atoms hold."""
+    names = {name: len(kinds) for name, kinds in true_domain(domain).predicates.items()}
+    return Evaluator(state, true_predicates()).atoms(names)
+
+
+def tasks_of(domain: str, which: str, count: int, seed: int) -> list[Task]:
+    """Return the tasks of a set: `train`, or one of SETS. The same seed gives the same tasks.
+
+    Goals cycle through the groups of the domain, as in the thesis; a goal that holds at the beginning is drawn anew.
+    Raises ValueError when the objects don't fit on the table.
+    """
+    setup = kitchen_file().domains[domain]
+    if which == "hundred_goals":
+        return _generated(domain, setup, count, seed)
+    names = setup.objects if which in ("train", "canonical", "novel_goals") else (*setup.objects, *setup.more)
+    stream = ("train", *SETS).index(which)
+    tasks = []
+    for number in range(count):
+        random = np.random.default_rng([seed, stream, number])
+        while True:
+            goal = _goal(setup, which, number, random)
+            task = Task(
+                f"{domain}/{which}/{number + 1}",
+                layout(names, random, setup.stacked),
+                goal,
+                int(random.integers(2**31)),
+            )
+            if not set(goal) <= true_atoms(open_kitchen(task).state(), domain):
+                break
+        tasks.append(task)
+    return tasks
+
+
+def _goal(setup: DomainSetup, which: str, number: int, random: np.random.Generator) -> tuple[Atom, ...]:
+    if which in ("novel_goals", "combined"):
+        texts = setup.novel if which == "novel_goals" else setup.combined
+    else:
+        group = number % len(setup.goals)
+        goals = list(setup.goals[group]) + (list(setup.more_goals[group]) if which == "more_objects" else [])
+        texts = goals[int(random.integers(len(goals)))]
+    return tuple(tuple(text.split()) for text in texts)
+
+
+def layout(names: tuple[str, ...], random: np.random.Generator, stacked: float) -> dict[str, tuple[float, float]]:
+    """Return where objects stand, drawn up to LAYOUTS times until they fit. Raises ValueError when they never do."""
+    for _ in range(LAYOUTS):
+        try:
+            return _drawn_layout(names, random, stacked)
+        except ValueError as error:
+            reason = str(error)
+    raise ValueError(reason)
+
+
+def _drawn_layout(
+    names: tuple[str, ...], random: np.random.Generator, stacked: float
+) -> dict[str, tuple[float, float]]:
+    """Return where objects stand: the anchored ones at their place, the plate beside the placemat, others on free
+    places of the table or, a share `stacked` of them, on a thing that carries them.
+
+    Raises ValueError when they don't fit."""
+    kinds = kitchen_file().objects
+    places: dict[str, tuple[float, float]] = {}
+    taken: list[tuple[float, float]] = []
+    free: list[str] = []
+    """What may still be stood on."""
+    for name in sorted(names, key=lambda name: (kinds[name].at is None, kinds[name].shape != "plate")):
+        kind = kinds[name]
+        carriers = [each for each in free if kinds[each].width >= kind.width]
+        if kind.at is not None:
+            x, y = kind.at, 0.0
+        elif kind.shape == "plate" and "placemat" in names:
+            x, y = kinds["placemat"].at + 8.2 * (1 if random.random() < 0.5 else -1), 0.0  # type: ignore[operator]
+        elif kind.shape == "block" and carriers and random.random() < stacked:
+            under = carriers[int(random.integers(len(carriers)))]
+            free.remove(under)
+            x, y = places[under][0], places[under][1] + kinds[under].height
+        else:
+            x, y = free_place(random, kind.width / 2, taken), 0.0
+        places[name] = (x, y)
+        taken.append((x - kind.width / 2, x + kind.width / 2))
+        if kind.shape != "container":
+            free.append(name)
+    return places
+
+
+def _generated(domain: str, setup: DomainSetup, count: int, seed: int) -> list[Task]:
+    """Return tasks with goals that differ from each other: what holds at the end of a random walk with the teacher's
+    operators, and did not at its beginning; so a plan exists. Fewer where no more were found."""
+    names = (*setup.objects, *setup.more)
+    tasks: list[Task] = []
+    goals: set[frozenset[Atom]] = set()
+    number = 0
+    while len(tasks) < count:
+        random = np.random.default_rng([seed, 99, number])
+        number += 1
+        if number > FRUITLESS * count:
+            break
+        chosen = tuple(name for name in names if kitchen_file().objects[name].at is not None or random.random() < 0.85)
+        places, chance = layout(chosen, random, setup.stacked), int(random.integers(2**31))
+        task = Task(f"{domain}/hundred_goals/{len(tasks) + 1}", places, (), chance)
+        goal = _walked_goal(domain, task, random)
+        if goal and frozenset(goal) not in goals:
+            goals.add(frozenset(goal))
+            tasks.append(Task(task.name, places, goal, chance))
+    return tasks
+
+
+def _walked_goal(domain: str, task: Task, random: np.random.Generator) -> tuple[Atom, ...]:
+    start = true_atoms(open_kitchen(task).state(), domain)
+    problem = Problem("walk", dict.fromkeys(task.objects, ""), start, frozenset())
+    actions = ground(true_domain(domain), problem)
+    state = start
+    for _ in range(int(random.integers(4, LONGEST_WALK + 1))):
+        possible = [action for action in actions if action.preconditions <= state]
+        if not possible:
+            break
+        state = apply_action(state, possible[int(random.integers(len(possible)))])
+    if any(atom[0] == "in_gripper" for atom in state):
+        return ()
+    said = truth_file().goals
+    new = sorted(atom for atom in state - start if atom[0] in said)
+    if not new:
+        return ()
+    kept = random.permutation(len(new))[: int(random.integers(1, MOST_LITERALS + 1))]
+    return tuple(new[place] for place in sorted(kept.tolist()))

@@ -1,0 +1,1 @@
+"""Who corrects: a simulated person with ground truth, or a person in the terminal."""

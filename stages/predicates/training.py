@@ -1,0 +1,94 @@
+"""Training: episodes with a teacher, in which a learner plans with what it knows and tries what it does not know."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from stages.kit.tasks.strips import Atom, Domain, Problem, ground
+from stages.kit.tasks.task_planner import plan_task
+from stages.predicates.execution import MOST_FAILURES, MOST_STEPS, PLANNING_LIMIT, action_atom
+from stages.predicates.learning.ours import OursLearner
+from stages.predicates.learning.phrases import goal_phrases
+from stages.predicates.state import State
+from stages.predicates.tasks import Task, open_kitchen, true_atoms
+from stages.predicates.world.actions import act
+
+LEFT_FOR_THE_GOAL = 8
+"""Steps of an episode that are kept for its goal; before them whatever was never tried comes first."""
+
+
+@dataclass
+class Training:
+    """How training went."""
+
+    episodes: int = 0
+    reached: int = 0
+    actions: int = 0
+    refused: int = 0
+    physics: list[str] = field(default_factory=list)
+    """Actions that the teacher allowed and physics failed."""
+
+
+def train(learner: OursLearner, domain: str, tasks: Sequence[Task]) -> Training:
+    """Let a learner work through tasks with its teacher."""
+    training = Training()
+    for task in tasks:
+        _episode(learner, domain, task, training)
+        training.episodes += 1
+    return training
+
+
+def _episode(learner: OursLearner, domain: str, task: Task, training: Training) -> None:
+    kitchen = open_kitchen(task)
+    memory = learner.memory
+    parts = goal_phrases(task.sentence, task.objects)
+    failures = 0
+    for step in range(MOST_STEPS):
+        if failures >= MOST_FAILURES:
+            return
+        state = kitchen.state()
+        goal, _ = memory.goal_atoms(parts)
+        curious = step < MOST_STEPS - LEFT_FOR_THE_GOAL and learner.curious(state)
+        if goal <= memory.see(state) and not (
+            goal and curious
+        ):  # also when nothing is known of the goal: then it is asked for
+            if set(task.goal) <= true_atoms(state, domain):
+                learner.reached(state, parts)
+                training.reached += 1
+                return
+            learner.unmet(state, parts, learner.teacher.unmet(state, task.goal))
+            continue
+        action = _next_action(learner, domain, state, goal, curious)
+        if action is None:
+            return
+        training.actions += 1
+        if not learner.teacher.allows(state, action):
+            training.refused += 1
+            failures += 1
+            learner.refused(state, action, learner.teacher.correct(state, action))
+            continue
+        reason = act(kitchen, action)
+        if reason:
+            training.physics.append(f"{' '.join(action)}: {reason}")
+            failures += 1
+            continue
+        failures = 0
+        learner.allowed(state, action, kitchen.state())
+
+
+def _next_action(learner: OursLearner, domain: str, state: State, goal: frozenset[Atom], curious: bool) -> Atom | None:
+    """Return what to do: something never tried while there is time, or whenever there is no plan; else the plan's
+    start."""
+    tried = learner.explore(state)
+    if curious or not learner.plans:
+        return tried
+    planned = first_action(learner.memory.domain(domain), list(state.objects), learner.memory.see(state), goal)
+    return planned or learner.doubtful(state) or tried
+
+
+def first_action(domain: Domain, objects: Sequence[str], atoms: frozenset[Atom], goal: frozenset[Atom]) -> Atom | None:
+    """Return the first action of a plan, None without one."""
+    problem = Problem("task", dict.fromkeys(objects, ""), atoms, goal)
+    found = plan_task(problem, ground(domain, problem), limit=PLANNING_LIMIT)
+    return action_atom(found.actions[0]) if found.actions else None

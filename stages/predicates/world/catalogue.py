@@ -1,0 +1,64 @@
+"""Objects and domains of the kitchen (data/kitchen/kitchen.toml)."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from schemas.base import Model
+from schemas.outside import LARGEST_SETTINGS, file_toml
+
+KITCHEN = Path(__file__).resolve().parents[3] / "data" / "kitchen" / "kitchen.toml"
+DOMAINS = ("store_objects", "set_table", "cook_meal")
+Goal = tuple[str, ...]
+"""Literals as `on bread plate`."""
+
+
+class Kind(Model):
+    """A kind of object, lengths in the kitchen's units."""
+
+    category: str
+    width: float = Field(gt=0.0, le=60.0)
+    height: float = Field(gt=0.0, le=60.0)
+    shape: Literal["block", "container", "mat", "plate"]
+    wall: float = Field(0.5, gt=0.0)
+    at: float | None = None
+    """Where it always stands at the beginning."""
+
+
+class DomainSetup(Model):
+    """A domain: actions, objects and goals of its sets of tasks."""
+
+    actions: tuple[str, ...]
+    objects: tuple[str, ...]
+    more: tuple[str, ...]
+    goals: tuple[tuple[Goal, ...], ...]
+    more_goals: tuple[tuple[Goal, ...], ...]
+    stacked: float = Field(ge=0.0, le=1.0)
+    """How often a block stands on another thing at the beginning, where that may be."""
+    novel: Goal
+    combined: Goal
+
+
+class KitchenFile(Model):
+    """kitchen.toml."""
+
+    objects: dict[str, Kind]
+    domains: dict[str, DomainSetup]
+
+    @model_validator(mode="after")
+    def _objects_are_known(self) -> KitchenFile:
+        for name, domain in self.domains.items():
+            for thing in (*domain.objects, *domain.more):
+                if thing not in self.objects:
+                    raise ValueError(f"domain {name}: there is no object {thing!r}")
+        return self
+
+
+@cache
+def kitchen_file() -> KitchenFile:
+    """Return the kitchen's catalogue."""
+    return KitchenFile.model_validate(file_toml(KITCHEN, LARGEST_SETTINGS))

@@ -1,0 +1,76 @@
+"""`predicates teach | plan | evaluate`, as a user runs them, and what they refuse."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.main import run as run_command
+from stages.predicates.learning.records import document_of, memory_of
+
+
+def run(*words: str) -> int:
+    return run_command(["predicates", *words, "--quiet"])
+
+
+@pytest.fixture(scope="module")
+def learned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("predicates") / "learned"
+    assert run("teach", "--domain", "store_objects", "--tasks", "4", "--seed", "2", "--out", str(folder)) == 0
+    return folder
+
+
+def test_a_tower_is_built_and_what_is_missing_is_said(learned: Path, tmp_path: Path) -> None:
+    given = ("--learned", str(learned), "--which", "novel_goals", "--image-width", "240")
+    assert run("plan", *given, "--out", str(tmp_path / "plan")) == 0
+    plan = json.loads((tmp_path / "plan" / "plan.json").read_text())
+    assert plan["success"] and plan["steps"] and (tmp_path / "plan" / "kitchen.gif").is_file()
+    assert run("plan", *given, "--goal", "pour water into coaster", "--out", str(tmp_path / "odd")) == 4
+    assert "nobody has said what 'pour water into <1>' means" in (tmp_path / "odd" / "plan.json").read_text()
+
+
+def test_what_was_learned_is_counted(learned: Path, tmp_path: Path) -> None:
+    out = tmp_path / "evaluation"
+    assert run("evaluate", "--learned", str(learned), "--tasks", "1", "--states", "20", "--out", str(out)) == 0
+    results = json.loads((out / "results.json").read_text())
+    assert [row["ceiling"] for row in results["rows"]] == [1, 1, 1, 1]
+    assert min(results["accuracy"].values()) > 0.9
+
+
+def test_a_memory_comes_back_from_its_document(learned: Path) -> None:
+    from schemas.learned_domain import LearnedDomain
+
+    document = LearnedDomain(root=learned).info
+    memory = memory_of(document, "here")
+    rest = {name: getattr(document, name) for name in ("domain", "teacher", "physics", "statement")}
+    assert document_of(memory, **rest) == document
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda d: d["predicates"][0].update(means="(less (width ?a) (width ?a))", name="less"),
+            "word of the language",
+        ),
+        (lambda d: d["predicates"][-1].update(means="(less (over 1 "), "brackets"),
+        (lambda d: d["phrases"][0].update(predicate="nothing"), "no predicate"),
+        (lambda d: d["transitions"][0].update(before=10**6), "not there"),
+        (lambda d: d["goals"][0].update(phrase=999), "no phrase"),
+    ],
+)
+def test_a_damaged_document_is_refused_in_one_line(learned: Path, change, message: str) -> None:  # type: ignore[no-untyped-def]
+    from schemas.errors import BadInput
+    from schemas.learned_domain import LearnedDomainFile
+
+    document = json.loads((learned / "domain.json").read_text())
+    change(document)
+    with pytest.raises(BadInput, match=message) as refused:
+        memory_of(LearnedDomainFile.model_validate(document), "domain.json")
+    assert "\n" not in str(refused.value)
+
+
+def test_an_unknown_set_is_refused(learned: Path, tmp_path: Path) -> None:
+    assert run("evaluate", "--learned", str(learned), "--sets", "odd", "--out", str(tmp_path / "none")) == 2
