@@ -8,8 +8,9 @@ from math import hypot
 
 from stages.agent.goals import NEAR_MIDDLE, Among, Description, Gather, Goal, Move, Shut
 from stages.agent.session import Session
+from stages.agent.world.events import Event
 from stages.agent.world.failures import TABLE_3_4
-from stages.agent.world.fast import Event, FastWorld
+from stages.agent.world.fast import FastWorld
 
 CAUSES = tuple(TABLE_3_4)
 """Rows of the failure table."""

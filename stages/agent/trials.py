@@ -15,9 +15,10 @@ from stages.agent.brains.slips import Slips
 from stages.agent.brains.words import NotUnderstood, understood
 from stages.agent.goals import Goal, sought
 from stages.agent.session import Limits, Session, Turn, run_session
-from stages.agent.world.failures import Luck, Rates
+from stages.agent.world.failures import Rates
 from stages.agent.world.fast import FastWorld
 from stages.agent.world.floor import Floor
+from stages.kit.rendering.segmenter_errors import Luck
 
 
 @dataclass(frozen=True)
