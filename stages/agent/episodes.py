@@ -29,7 +29,7 @@ from stages.agent.pictures import Panel, draw_growing_map
 from stages.agent.scene_map import SceneMap
 from stages.agent.session import Session, Turn
 from stages.agent.trials import Setting, run_trial
-from stages.agent.world.fast import FastWorld
+from stages.agent.world.truth import World
 from stages.kit.language.failures import LanguageFailed
 
 
@@ -63,7 +63,7 @@ class Watching:
         self._turn = 0
         self._way: list[tuple[float, float]] = []
 
-    def see(self, turn: Turn, skills: CommonSkills, world: FastWorld) -> None:
+    def see(self, turn: Turn, skills: CommonSkills, world: World) -> None:
         """Look at one turn."""
         self._turn += 1
         scene = skills.scene

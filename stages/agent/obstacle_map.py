@@ -106,6 +106,24 @@ class ObstacleMap:
         at = self._in_window(*goal)
         return float(self.distances_from(start.x, start.y)[at]) if at is not None else float("inf")
 
+    def path(self, start: Base, goal: tuple[float, float]) -> list[tuple[float, float]] | None:
+        """Return points [m] from a pose to a point, down the slope of the distances; None where no way is known."""
+        field = self.distances_from(start.x, start.y)
+        at = self._in_window(*goal)
+        if at is None or not np.isfinite(field[at]):
+            return None
+        points = [goal]
+        while field[at] > 0:
+            around = [(at[0] + i, at[1] + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+            inside = [p for p in around if 0 <= p[0] < field.shape[0] and 0 <= p[1] < field.shape[1]]
+            best = min(inside, key=lambda p: float(field[p]))
+            if best == at:
+                return None
+            at = best
+            points.append((at[0] * CELL + self.origin[0], at[1] * CELL + self.origin[1]))
+        points[-1] = (start.x, start.y)
+        return points[::-1] if len(points) > 1 else [(start.x, start.y), goal]
+
     def frontiers(self) -> np.ndarray:
         """Return (N, 2) points [m]: drivable cells next to which something is unknown."""
         near_unknown = binary_dilation(self.window == UNKNOWN, iterations=CLEARANCE + 1)

@@ -56,6 +56,8 @@ class Body:
 class FastWorld:
     """One episode's world. `sought`: classes that the eyes are prompted with; `floor`: if it is worked out already."""
 
+    same_thing, stand_off = 0.04, 0.45
+
     def __init__(
         self, apartment: Apartment, sought: tuple[str, ...], rates: Rates, seed: int, floor: Floor | None = None
     ) -> None:
@@ -63,13 +65,16 @@ class FastWorld:
         self._errors = SegmenterErrors(rates, self._luck, sought)
         self.bodies = {thing.name: Body(thing, thing.on, thing.at) for thing in apartment.things}
         self.furniture = {piece.name: piece for piece in apartment.furniture}
-        self.opened = {piece.name for piece in apartment.furniture if piece.opened}
+        self.opened: set[str] = {piece.name for piece in apartment.furniture if piece.opened}
         self.held: str | None = None
         self._log = EventLog()
         self._grasps = 0
         self._base = Base(*apartment.start)
         self._seconds = self.metres = 0.0
         self._floor = floor or Floor(apartment)
+
+    def close(self) -> None:
+        """Nothing is held open."""
 
     # ---- what the robot may ask ----
 
@@ -172,8 +177,8 @@ class FastWorld:
         self._done("grasp", step, right, "" if right else "false_positive")
         return Felt(True)
 
-    def release(self, at: Position, label: str) -> Felt:
-        """Let go over a position; it may roll off unseen."""
+    def release(self, at: Position, label: str, *, gently: bool = False) -> Felt:
+        """Let go over a position; it may roll off unseen, from however low."""
         self._seconds += SECONDS["release"]
         carrier = self._carrier(at)
         onto = self._label_of(carrier) if carrier else "floor"

@@ -59,6 +59,13 @@ class PhysicalRobot:
                 {"depth": contact.depth},
             )
 
+    def put(self, configuration: Configuration) -> None:
+        """Put the robot at a configuration, at rest; nothing moves on the way there."""
+        self.robot.set(configuration)
+        self._target, self._opening = configuration.body, configuration.opening
+        self._trail = [configuration.body]
+        self.robot.command(configuration.body, configuration.opening)
+
     # --- control ----------------------------------------------------------------------------------------------
 
     def _control(self, target: np.ndarray, opening: float, velocity: np.ndarray | None = None) -> None:
