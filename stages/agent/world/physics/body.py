@@ -37,6 +37,7 @@ from stages.agent.world.physics.hands import (
     Box,
     Hold,
     Motion,
+    Target,
     plan_grasp,
     plan_release,
     reachable,
@@ -433,9 +434,11 @@ class PhysicsBody:
             raise MotionFailed("no_grasp", "no surface was seen there", (), {"distance": min(away, default=9.0)})
         self._beliefs.hold(None)
         self._beliefs.show(self._boxes())
-        motion = plan_grasp(
-            self._beliefs, self._believed, self._arm, self._surfaces[number], f"thing_{number}", candidate, self._random
-        )
+        piece = self._piece_at(at)
+        surface = self._surfaces[number]
+        floor = self._tops.get(piece, float(surface.low[2])) if piece is not None else float(surface.low[2])
+        target = Target(surface, f"thing_{number}", candidate, floor)
+        motion = plan_grasp(self._beliefs, self._believed, self._arm, target, self._random)
         self._grasps += 1
         self._carry_out(motion.there)
         self._close_hand()

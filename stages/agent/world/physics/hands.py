@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.agent.world.physics.eyes import Surface
+from stages.agent.world.physics.grasps import antipodal_grasps
 from stages.agent.world.physics.shapes import record_of, slab, urdf_of
 from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.arm_motion import ArmPlanner, Tally
 from stages.kit.motion.base_placement import shoulder_distance
 from stages.kit.motion.collision import CollisionChecker
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.grasps import narrowest_width, sample_grasps
+from stages.kit.motion.grasps import narrowest_width
 from stages.kit.motion.kinematics import arm_chain
 from stages.kit.motion.segments import Segment, whole_body
 from stages.kit.simulation.robot import Configuration, Robot
@@ -22,6 +23,8 @@ from stages.kit.simulation.world import PhysicsWorld
 
 CANDIDATES = 20
 """Grasps that are tried, those from above first (Han 2024, 3.3.3)."""
+NEXT = 3
+"""Grasps that are left out after one slipped."""
 APPROACH, LIFT = 0.08, 0.10
 """Of the hand before and after it closes [m]."""
 DROP = 0.15
@@ -31,9 +34,6 @@ JUST_OVER = 0.008
 SLOW = 0.35
 SAMPLES = 500
 """Of one path search."""
-PITCHES = (np.pi / 2, 1.1, 0.7)
-SINKS = 0.012
-"""A box of noisy points may overlap what it stands on by this much [m]."""
 Box = tuple[np.ndarray, np.ndarray]
 
 
@@ -47,6 +47,18 @@ class Hold:
     """Height of the tool point over the foot of what is held [m], the hand as it grasped."""
     rotation: np.ndarray
     """Of the hand then, base frame."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is to be grasped: a fused surface, its box among the beliefs."""
+
+    surface: Surface
+    name: str
+    rank: int
+    """How often a grasp of it has slipped already: other ones are tried."""
+    floor: float
+    """Height of what it stands on [m]."""
 
 
 @dataclass(frozen=True)
@@ -127,35 +139,27 @@ def _pointing(heading: float, pitch: float) -> np.ndarray:
 
 
 def plan_grasp(
-    beliefs: Beliefs,
-    base: np.ndarray,
-    arm: np.ndarray,
-    surface: Surface,
-    name: str,
-    rank: int,
-    random: np.random.Generator,
+    beliefs: Beliefs, base: np.ndarray, arm: np.ndarray, target: Target, random: np.random.Generator
 ) -> Motion:
-    """Return the motion that takes a fused surface, which is the box `name` among the beliefs; its first `rank`
-    grasps are left out. Raises MotionFailed: `no_grasp`, or what ended most attempts."""
+    """Return the motion that takes a fused surface. Raises MotionFailed: `no_grasp`, or what ended most attempts."""
     opening = beliefs.description.opening
+    surface, name, rank = target.surface, target.name, target.rank
     keep = _inside(surface)
     points, normals = surface.points[keep], surface.normals[keep]
-    grasps = sample_grasps(points, normals, np.eye(4), opening=opening, random=random, angles=8, pitches=PITCHES)
-    grasps.sort(key=lambda grasp: -grasp.pitch)
-    grasps = grasps[rank * 4 :][:CANDIDATES]
+    grasps = antipodal_grasps(points, normals, opening, target.floor)[rank * NEXT :][:CANDIDATES]
     if not grasps:
         width = narrowest_width(points)
         raise MotionFailed(
             "no_grasp",
             f"no grasp left on {name}, seen {width:.3f} m wide at its narrowest; the gripper opens {opening:.3f} m",
             (name,),
-            {"width": width, "opening": opening, "left_out": 4 * rank},
+            {"width": width, "opening": opening, "left_out": NEXT * rank},
         )
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
     searches = 2
     for grasp in grasps:
         try:
-            motion = _one_grasp(planner, base, arm, surface, name, grasp.body_from_tool, tally)
+            motion = _one_grasp(planner, base, arm, surface, name, grasp, tally)
         except MotionFailed as failed:
             tally.failed(failed)
             searches -= 1
