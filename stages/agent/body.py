@@ -108,6 +108,16 @@ class Body(Protocol):
         """Of the middle of the base from the edge of furniture on which it works [m]."""
         ...
 
+    @property
+    def clearance(self) -> float:
+        """Cells of the obstacle map that the base keeps from what is occupied."""
+        ...
+
+    @property
+    def short_armed(self) -> bool:
+        """Whether its arm ends short of the far side of a table, so that other sides have to be known."""
+        ...
+
     def sweep(self) -> Sweep:
         """Turn the head camera around once."""
         ...

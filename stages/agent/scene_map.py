@@ -66,7 +66,7 @@ class SceneMap:
     def __init__(self, body: Body) -> None:
         self.furniture: dict[str, SeenFurniture] = {}
         self.items: dict[str, Item] = {}
-        self.obstacles = ObstacleMap(body.base)
+        self.obstacles = ObstacleMap(body.base, body.clearance)
         self._named: Counter[str] = Counter()
         self._same_thing = body.same_thing
 

@@ -14,6 +14,7 @@ from schemas.plan import Failure
 from stages.agent.arms.skills import CommonSkills
 from stages.agent.arms.stations import around, drivable, other_sides
 from stages.agent.body import Base, Body, Position
+from stages.agent.exploration import explore
 from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
 from stages.agent.scene_map import Item, quarter
 
@@ -59,6 +60,7 @@ class OwnSkills(CommonSkills):
         self._off: list[Position] = []
         """Spots from which something rolled off."""
         self._looked: dict[str, set[int]] = {}
+        self._explored = False
 
     # ---- eyes ----
 
@@ -174,7 +176,11 @@ class OwnSkills(CommonSkills):
                 and (not self._use.reachability or self._body.reaches(base, at))
             ]
             if not fresh:
-                return
+                if not self._body.short_armed or self._explored:
+                    return
+                self._explored = True
+                explore(self._body, self.scene)
+                continue
             tried.append(fresh[0])
             yield fresh[0]
 

@@ -56,7 +56,7 @@ class Body:
 class FastWorld:
     """One episode's world. `sought`: classes that the eyes are prompted with; `floor`: if it is worked out already."""
 
-    same_thing, stand_off = 0.04, 0.45
+    same_thing, stand_off, clearance, short_armed = 0.04, 0.45, 3.0, False
 
     def __init__(
         self, apartment: Apartment, sought: tuple[str, ...], rates: Rates, seed: int, floor: Floor | None = None
@@ -67,6 +67,7 @@ class FastWorld:
         self.furniture = {piece.name: piece for piece in apartment.furniture}
         self.opened: set[str] = {piece.name for piece in apartment.furniture if piece.opened}
         self.held: str | None = None
+        self.pictures: list[tuple[str, np.ndarray]] = []
         self._log = EventLog()
         self._grasps = 0
         self._base = Base(*apartment.start)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
+import numpy as np
+
 from schemas.apartment import Apartment, Furniture, Thing
 from stages.agent.body import Body
 from stages.agent.world.events import Event
@@ -34,6 +36,8 @@ class World(Body, Protocol):
 
     apartment: Apartment
     metres: float
+    pictures: list[tuple[str, np.ndarray]]
+    """What the wrist camera took last, (H, W, 3) uint8, with a name each; none in a world without pictures."""
 
     @property
     def bodies(self) -> Mapping[str, Lying]:

@@ -82,8 +82,7 @@ NEARER = 0.1
 class PhysicsBody:
     """One episode's world in pybullet. `sought`: classes that the eyes are asked for. `close` it."""
 
-    same_thing = 0.07
-    stand_off = 0.35
+    same_thing, stand_off, clearance, short_armed = 0.07, 0.38, 2.7, True
 
     def __init__(self, apartment: Apartment, sought: tuple[str, ...], rates: Rates, seed: int) -> None:
         self.apartment, self._rates, self._luck = apartment, rates, Luck(seed)
@@ -110,12 +109,12 @@ class PhysicsBody:
         self._pieces: list[head.SeenPiece] = []
         self._tops: dict[int, float] = {}
         self._surfaces: list[Surface] = []
-        self._obstacles = ObstacleMap(self.base)
+        self._obstacles = ObstacleMap(self.base, self.clearance)
         self._log = EventLog()
         self._seconds = self.metres = 0.0
         self._grasps = 0
         self.pictures: list[tuple[str, np.ndarray]] = []
-        """What the wrist camera took last at every look, for people."""
+        """What the wrist camera took last, for people."""
 
     def close(self) -> None:
         """End both pybullet worlds."""
@@ -256,7 +255,7 @@ class PhysicsBody:
         toward = (toward + pi) % (2 * pi) - pi
         found: list[Surface] = []
         renderer = None
-        for turn in SIDEWAYS[:1] if close else SIDEWAYS:
+        for turn in (0.0,) if close else SIDEWAYS:
             arm = VIEW.copy()
             arm[0] = np.clip(toward + turn, -2.7, 2.7)
             self._arm_to(arm)
