@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -70,17 +71,17 @@ class Surface:
     stain: float
     views: int
 
-    @property
+    @cached_property
     def low(self) -> np.ndarray:
         """Lower corner (3,)."""
         return np.percentile(self.points, 2, axis=0)
 
-    @property
+    @cached_property
     def high(self) -> np.ndarray:
         """Upper corner (3,)."""
         return np.percentile(self.points, 98, axis=0)
 
-    @property
+    @cached_property
     def middle(self) -> np.ndarray:
         """Of the box around it (3,)."""
         return (self.low + self.high) / 2

@@ -16,7 +16,7 @@ MARGIN = 0.012
 """Room between the open fingers and the thing, both sides together [m]."""
 ENDS = 0.008
 """Points this near to the outermost are where a finger touches [m]."""
-FACES = 0.5
+FACES = 0.25
 """Least mean cosine between normals there and the closing direction on the side that was seen better."""
 LEAST = 10
 """Points between the fingers."""

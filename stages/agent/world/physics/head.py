@@ -55,17 +55,21 @@ class SeenPiece:
 
     label: str
     cubes: set[tuple[int, ...]] = field(default_factory=set)
+    _box: tuple[np.ndarray, np.ndarray] | None = None
 
     def add(self, points: np.ndarray) -> None:
         """Enter points (N, 3) of one turn."""
+        self._box = None
         self.cubes |= set(map(tuple, np.rint(points / GRAIN).astype(int).tolist()))
 
     @property
     def box(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper corner (3,) [m]."""
-        points = np.array(sorted(self.cubes)) * GRAIN
-        points = points[clusters(points, 0.2) == 0]
-        return np.percentile(points, 1, axis=0), np.percentile(points, 99, axis=0)
+        if self._box is None:
+            points = np.array(sorted(self.cubes)) * GRAIN
+            points = points[clusters(points, 0.2) == 0]
+            self._box = np.percentile(points, 1, axis=0), np.percentile(points, 99, axis=0)
+        return self._box
 
 
 def enter(pieces: list[SeenPiece], label: str, points: np.ndarray) -> None:
