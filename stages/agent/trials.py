@@ -63,7 +63,7 @@ def open_world(setting: Setting, arm: str) -> World:
         if any(set(each.labels) & set(DOORS) for goal in setting.goals for each in descriptions(goal)) or any(
             isinstance(goal, Move) and goal.start in DOORS for goal in setting.goals
         ):
-            raise UsageError("doors of the physics world do not move", hint="give --world-kind fast")
+            raise UsageError("doors of the physics world do not move", hint="give --simulation fast")
         return PhysicsBody(setting.apartment, sought(setting.goals), replace(rates, hidden=0.0), setting.seed)
     return FastWorld(setting.apartment, sought(setting.goals), rates, setting.seed, setting.floor)
 

@@ -367,8 +367,14 @@ class PhysicsBody:
             self._driver.put(Configuration(base, arm + self._joint_error, opening))
         else:
             rows = whole_body(base, np.array([self._arm, arm]) + self._joint_error)
-            self._carefully(Segment(rows, 0.0, 0.6))
+            try:
+                self._carefully(Segment(rows, 0.0, 0.6))
+            except MotionFailed:
+                arm = self._measured_arm()  # something is in the way: it looks from where it got to
         self._arm = arm
+
+    def _measured_arm(self) -> np.ndarray:
+        return self._driver.robot.configuration().arm - self._joint_error
 
     def _carefully(self, segment: Segment) -> None:
         """Follow a segment; what slips out of the hand is not noticed. Raises MotionFailed `path_blocked`."""
@@ -443,7 +449,12 @@ class PhysicsBody:
         self._close_hand()
         self._surfaces.pop(number)
         self._hold = motion.hold
-        self._carry_out(motion.away)
+        try:
+            self._carry_out(motion.away)
+        except MotionFailed:
+            self._driver.release()  # lifting is blocked: let go
+            self._hold = None
+            raise
         if self._driver.robot.configuration().opening < CLOSED_ON_NOTHING:
             self._hold = None
             self._driver.held = None
@@ -472,11 +483,14 @@ class PhysicsBody:
             self._arm = arms[-1]
 
     def _recover(self) -> None:
-        """Draw the arm in after a motion that could not be planned or was stopped."""
-        if self._hold is None:
-            opening = self._description.opening
-            self._arm = self._description.carry
-            self._driver.put(Configuration(self._true_base(), self._arm + self._joint_error, opening))
+        """Draw the arm in after a motion that could not be planned or was stopped, with what it holds."""
+        if self._hold is not None:
+            self._arm = self._measured_arm()
+            self._arm_to(self._description.carry)
+            return
+        self._arm = self._description.carry
+        start = Configuration(self._true_base(), self._arm + self._joint_error, self._description.opening)
+        self._driver.put(start)
 
     def release(self, at: Position, label: str, *, gently: bool = False) -> Felt:
         """Let go 15 cm over a position, or gently: down to contact."""
@@ -493,6 +507,7 @@ class PhysicsBody:
             motion = plan_release(self._beliefs, self._believed, self._arm, self._hold, here, height, self._random)
             self._let_go(motion, gently)
         except MotionFailed as failed:
+            self._recover()
             self._log.done("release", step, False, "place", "")
             return Felt(False, "no_trajectory", failed.failure)
         body = self.room.body(name, None)
@@ -516,7 +531,10 @@ class PhysicsBody:
             self.room.moved[held] += 1
         back = np.concatenate([self._arm[None], motion.away[0].path[:, 3:]])
         rows = whole_body(self._true_base(), back)
-        self._carry_out((Segment(rows, self._description.opening, motion.away[0].pace), *motion.away[1:]))
+        try:
+            self._carry_out((Segment(rows, self._description.opening, motion.away[0].pace), *motion.away[1:]))
+        except MotionFailed:
+            self._recover()  # it let go already: what became of it is for the eyes
         self._driver.wait(0.5)
 
     def _touches(self) -> bool:
