@@ -24,10 +24,14 @@ def build_application() -> Callable[..., Any]:
         help=HELP, no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
     )
     groups: dict[str, typer.Typer] = {}
+    two_words = {("urdf", "check"), ("urdf", "settle")}
     for name, stage in all_stages().items():
         group, _, command = name.rpartition(" ")
         parent = application
-        if group:
+        if group in all_stages():
+            two_words.add((group, command))
+            command = f"{group}-{command}"
+        elif group:
             if group not in groups:
                 groups[group] = typer.Typer(help=f"Commands of {group}.", no_args_is_help=True, rich_markup_mode=None)
                 application.add_typer(groups[group], name=group)
@@ -48,9 +52,9 @@ def build_application() -> Callable[..., Any]:
     table = typer.main.get_command(application)
 
     def entry(args: list[str], **settings: Any) -> Any:
-        """`urdf` is a step by itself, so that `urdf check` and `urdf settle` cannot be a group below it."""
-        if args[:2] in (["urdf", "check"], ["urdf", "settle"]):
-            args = [f"urdf-{args[1]}", *args[2:]]
+        """`urdf` and `export` are steps by themselves, so that `urdf check` or `export scene` can't be in a group."""
+        if tuple(args[:2]) in two_words:
+            args = [f"{args[0]}-{args[1]}", *args[2:]]
         return table(args=args, **settings)
 
     return entry

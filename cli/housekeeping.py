@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cli import edit_command
 from cli.batch_command import batch
 from cli.collection_command import gc
 from cli.comparison_command import diff
@@ -294,5 +295,8 @@ GROUPS: tuple[tuple[str, Callable[..., Any], tuple[Callable[..., Any], ...], str
     ("models", models, (serve,), "Installation"),
 )
 """Commands that do something by themselves and have commands below them."""
-BESIDE_STEPS: tuple[tuple[str, Callable[..., Any]], ...] = (("cutting", record),)
+BESIDE_STEPS: tuple[tuple[str, Callable[..., Any]], ...] = (
+    ("cutting", record),
+    *(("edit", command) for command in edit_command.COMMANDS),
+)
 """Commands of a group of steps that are no steps; they are there where the group's steps are."""

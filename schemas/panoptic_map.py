@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from schemas.artifact import Artifact, Document
+from schemas.artifact import Artifact, Document, OptionalDocument
 from schemas.base import Model, RelativePath, Vector3
+from schemas.edits import AppliedEditsFile
 
 SNAPSHOTS = "snapshots"
 """Folder of the partial maps; each is named by the number of frames in it."""
@@ -50,7 +51,8 @@ class PanopticMap(Artifact):
     blocks sorted by z, y, x; over the 8^3 voxels of a block, x fastest: `tsdf` (B, 512) float16 in truncation
     distances, `weight` (B, 512) float16, `segment` (B, 512) int32, `color` (B, 512, 3) uint8). With `--snapshot-every`
     also `snapshots/<frames>/`, the map as it was after so many frames: entities.json, entities/ and mesh.ply. Of an
-    annotated scan (`--from-mesh`) there are no counts and no volume."""
+    annotated scan (`--from-mesh`) there are no counts and no volume. Of an edited map (`edit map`) `edits.json` says
+    what became of each edit."""
 
     kind: ClassVar[str] = "panoptic_map"
     description: ClassVar[str] = "labelled TSDF map: whole mesh, a mesh per entity, counts"
@@ -63,3 +65,4 @@ class PanopticMap(Artifact):
         return tuple(PanopticMap(entry) for entry in sorted(folder.iterdir()) if entry.is_dir())
 
     info = Document(EntitiesFile, "entities.json")
+    edits = OptionalDocument(AppliedEditsFile, "edits.json")

@@ -1,4 +1,4 @@
-"""Declaration of `scenewright export`."""
+"""Declarations of `export` and `export scene`."""
 
 from __future__ import annotations
 
@@ -7,18 +7,23 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import Field
 
 from schemas.errors import UsageError
+from schemas.exported_scene import ExportedScene
 from schemas.exported_sequence import ExportedSequence
+from schemas.interactive_scene import InteractiveScene
 from schemas.sequence import Sequence
 from stages.export.registry import STREAMS, all_formats, dialects, layouts
-from stages.kit.estimates import Estimate, Inputs
+from stages.export.scene_registry import scene_formats
+from stages.kit.estimates import Estimate, Inputs, grows_with
 from stages.kit.stage import Parameters, Stage
 
 if TYPE_CHECKING:
     Layout = str
     Dialect = str
+    Target = str
 else:
     Layout = Literal[layouts()]
     Dialect = Literal[dialects()]
+    Target = Literal[tuple(declared.name for declared in scene_formats())]
 
 
 class ExportParameters(Parameters):
@@ -64,7 +69,16 @@ def _estimate(parameters: ExportParameters, inputs: Inputs) -> Estimate:
     return Estimate(expected, 0.0 if cut else 0.5 * expected, 120)
 
 
-STAGE = Stage(
+class SceneExportParameters(Parameters):
+    """Options of `export scene`."""
+
+    to: Target = Field(
+        scene_formats()[0].name,
+        description="; ".join(f"`{declared.name}`: {declared.summary}" for declared in scene_formats()),
+    )
+
+
+EXPORT = Stage(
     name="export",
     version=1,
     summary="Write a sequence back as TUM RGB-D, nerfstudio or MCAP, for other tools",
@@ -76,3 +90,20 @@ STAGE = Stage(
     check=check,
     estimate=_estimate,
 )
+
+EXPORT_SCENE = Stage(
+    name="export scene",
+    version=1,
+    summary="Write a scene as USD, SDF, MoveIt planning scene or Hydra graph; MJCF and GLB stand in it already",
+    parameters=SceneExportParameters,
+    reads={"scene": InteractiveScene},
+    writes=ExportedScene,
+    module="scene_stage",
+    libraries=("numpy", "scipy", "trimesh"),
+    versions="scene_registry",
+    extras=tuple(declared.extra for declared in scene_formats() if declared.extra),
+    example="scenewright export scene --to usd --scene outputs/demo/interactive_scene --out outputs/demo/usd",
+    estimate=grows_with("scene", 0.0, 1.5, 130, 1.0),
+)
+
+STAGES = (EXPORT, EXPORT_SCENE)

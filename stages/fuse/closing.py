@@ -10,19 +10,13 @@ from schemas.base import as_vector
 from schemas.panoptic_map import EntitiesFile, Entity
 from schemas.vocabulary import Vocabulary
 from stages.fuse.counts import TripleCounts
-from stages.fuse.extraction import (
-    ExtractedEntity,
-    ExtractionSettings,
-    LabelledSurface,
-    cut_mesh,
-    extract_entities,
-    face_labels,
-)
+from stages.fuse.extraction import ExtractedEntity, ExtractionSettings, LabelledSurface, extract_entities
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.smoothing import smoothed_tsdf
 from stages.fuse.surface import Surface, extract_surface
 from stages.fuse.unnamed_pieces import unnamed_pieces
+from stages.kit.formats.map_files import cut_mesh, face_labels, mesh_name
 from stages.kit.stage import Progress
 
 LAYOUT = ("floor", "wall", "ceiling")
@@ -41,11 +35,6 @@ class ClosedMap:
     counts: TripleCounts
     merged: np.ndarray
     """Merged segment label of every segment label."""
-
-
-def mesh_name(instance: int) -> str:
-    """Return the name of an entity's mesh within the artifact."""
-    return f"entities/{instance}.ply"
 
 
 def describe(entity: ExtractedEntity, vocabulary: Vocabulary) -> Entity:

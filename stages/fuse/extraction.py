@@ -11,6 +11,7 @@ from stages.fuse.counts import TripleCounts
 from stages.fuse.merging import Grouping
 from stages.fuse.parts import absorb_pieces, absorb_specks, drop_far_parts, spread_labels
 from stages.fuse.surface import Surface
+from stages.kit.formats.map_files import cut_mesh, face_labels
 from stages.kit.formats.ply_files import ColoredMesh
 
 SPREAD_COSINE = 0.7
@@ -76,23 +77,6 @@ def confidence_of(counts: TripleCounts, segments: tuple[int, ...], class_id: int
     rows = [counts.by_segment.get(segment, {}) for segment in segments]
     total = sum(sum(row.values()) for row in rows)
     return sum(row.get((class_id, instance), 0) for row in rows) / total if total else 0.0
-
-
-def face_labels(labels: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return the label (F,) of every face: that of its vertices when they agree, else 0.
-
-    A face between two labels belongs to neither: its far vertex would widen a cup by a voxel on every side.
-    """
-    corners = labels[faces]
-    agree = (corners[:, 0] == corners[:, 1]) & (corners[:, 1] == corners[:, 2])
-    return np.where(agree, corners[:, 0], 0)
-
-
-def cut_mesh(surface: Surface | ColoredMesh, chosen: np.ndarray) -> ColoredMesh:
-    """Return the chosen faces (indices) as a mesh of their own; vertices and faces keep their order."""
-    faces = surface.faces[chosen]
-    used, places = np.unique(faces, return_inverse=True)
-    return ColoredMesh(surface.vertices[used], places.astype(np.int32).reshape(-1, 3), surface.colors[used])
 
 
 @dataclass(frozen=True)

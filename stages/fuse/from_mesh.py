@@ -14,10 +14,8 @@ from schemas.errors import BadInput
 from schemas.panoptic_map import EntitiesFile, Entity, PanopticMap
 from schemas.vocabulary import Vocabulary, load_vocabulary
 from stages.fuse.annotated_scan import AnnotatedScan, instances_by_class, read_scan
-from stages.fuse.closing import mesh_name
-from stages.fuse.extraction import cut_mesh, face_labels
 from stages.fuse.parameters import FuseParameters
-from stages.fuse.payload import write_arrays
+from stages.kit.formats.map_files import cut_mesh, face_labels, mesh_name, write_arrays
 from stages.kit.formats.ply_files import ColoredMesh, canonical_order, write_ply
 from stages.kit.labels import ANYTHING, OWN, Label, LabelSet, load_label_set, plain, read_label_file
 from stages.kit.stage import Context

@@ -2,29 +2,14 @@
 
 from __future__ import annotations
 
-import zipfile
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from stages.fuse.closing import ClosedMap, mesh_name
+from stages.fuse.closing import ClosedMap
 from stages.fuse.voxel_blocks import FIXED_POINT, VoxelBlocks
+from stages.kit.formats.map_files import mesh_name, write_arrays
 from stages.kit.formats.ply_files import ColoredMesh, write_ply
-
-FIXED_TIMESTAMP = (1980, 1, 1, 0, 0, 0)
-
-
-def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write arrays as NPZ that np.load reads: names sorted, fixed time stamps, fast compression, the same bytes."""
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        for name in sorted(arrays):
-            entry = zipfile.ZipInfo(f"{name}.npy", date_time=FIXED_TIMESTAMP)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.create_system = 3
-            entry.external_attr = 0o644 << 16
-            with archive.open(entry, "w", force_zip64=True) as file:
-                np.lib.format.write_array(file, np.ascontiguousarray(arrays[name]), allow_pickle=False)
 
 
 def volume_arrays(blocks: VoxelBlocks, merged: np.ndarray) -> dict[str, np.ndarray]:

@@ -10,7 +10,7 @@ from schemas.panoptic_map import PanopticMap
 from schemas.sequence import Sequence
 from stages.kit.formats.entity_meshes import load_entity_mesh
 from stages.kit.formats.frames import FrameReader
-from stages.kit.geometry.boxes import box_volume, points_in_box
+from stages.kit.geometry.boxes import box_volume, points_in_box, upright_box
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import apply
 from stages.truth.support_annotation import SupportAnnotation
@@ -82,11 +82,11 @@ def instances_of(
     Raises BadInput when a node has a point and there is no map.
     """
     owner = np.zeros(len(points), dtype=np.int64)
-    boxes = [(box_volume(node.find.box.box()), k) for k, node in enumerate(annotation.nodes, 1) if node.find.box]
+    boxes = [(box_volume(upright_box(node.find.box)), k) for k, node in enumerate(annotation.nodes, 1) if node.find.box]
     for _, k in sorted(boxes, reverse=True):
         where = annotation.nodes[k - 1].find.box
         assert where is not None
-        owner[points_in_box(where.box(), points)] = k
+        owner[points_in_box(upright_box(where), points)] = k
     for k, node in enumerate(annotation.nodes, 1):
         if node.find.labels:
             owner[np.isin(labels, node.find.labels)] = k

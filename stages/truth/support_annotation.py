@@ -7,7 +7,6 @@ could not tell is named too, so that nobody is measured against a guess.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Literal
@@ -17,32 +16,12 @@ from pydantic import Field
 from schemas.base import Model, Name
 from schemas.contact_graph import SCENE_NODE
 from schemas.errors import BadInput
-from schemas.scene_parts import Box
+from schemas.hand_written import Point, UprightBox
 from schemas.vocabulary import load_vocabulary
-from stages.kit.geometry.boxes import gravity_aligned_box
 
 LARGEST_FILE = 4 * 2**20
 """Bytes. A scene has a few dozen things."""
-LARGEST_LENGTH = 1e4
-"""Metres: nothing stands farther from the origin, or is larger."""
 HINT = 'docs/FORMATS.md, "Support annotations", shows one'
-
-Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
-Edge = Annotated[float, Field(gt=0, le=LARGEST_LENGTH)]
-
-
-class UprightBox(Model):
-    """A box that stands upright in the world of the sequence."""
-
-    center: tuple[Coordinate, Coordinate, Coordinate]
-    """[m]."""
-    size: tuple[Edge, Edge, Edge]
-    """Full edge lengths [m], the last one up."""
-    yaw_degrees: float = Field(0.0, ge=-360, le=360)
-
-    def box(self) -> Box:
-        """The same box as other artifacts have it."""
-        return gravity_aligned_box(self.center, self.size, math.radians(self.yaw_degrees))
 
 
 class Whereabouts(Model):
@@ -52,7 +31,7 @@ class Whereabouts(Model):
     """Values of the label images that are this thing."""
     box: UprightBox | None = None
     """World of the sequence."""
-    point: tuple[Coordinate, Coordinate, Coordinate] | None = None
+    point: Point | None = None
     """A point on its surface, world of the sequence [m]: the thing is what a map holds there."""
 
 

@@ -21,7 +21,7 @@ from schemas.sequence import Sequence
 from schemas.vocabulary import load_vocabulary
 from stages.kit.drawing.palette import instance_color
 from stages.kit.formats.ply_files import ColoredMesh, write_ply
-from stages.kit.geometry.boxes import is_round, minimum_box
+from stages.kit.geometry.boxes import is_round, minimum_box, upright_box
 from stages.kit.stage import Context
 from stages.truth.annotated_points import SPACING, instances_of, seen_points
 from stages.truth.parameters import SupportsParameters
@@ -103,7 +103,7 @@ def annotated_objects(annotation: SupportAnnotation, points: np.ndarray, owner: 
     for k, node in enumerate(annotation.nodes, 1):
         own = points[owner == k]
         where = node.find.box
-        box = where.box() if where is not None else (minimum_box(own) if len(own) else NOT_SEEN)
+        box = upright_box(where) if where is not None else (minimum_box(own) if len(own) else NOT_SEEN)
         result.append(
             TrueObject(
                 instance=k,

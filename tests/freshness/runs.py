@@ -55,8 +55,14 @@ RUNS = (
         "--cad-scene @cad --cad-library @library --interactive-scene @urdf --plan @plan --evaluation @evaluation",
     ),
     Run("poses", "poses", "--sequence @sequence"),
+    Run("splat", "splat build", "--sequence @sequence --width 80 --steps 20 --hold-out-every 8 --refine-poses"),
+    Run("splat_thesis", "splat build", "--sequence @sequence --width 80 --steps 20 --method thesis"),
+    Run("splat_views", "splat render", "--splat @splat --sequence @sequence --pictures 1"),
     Run("exported", "export", "--sequence @sequence --layout mcap --dialect ros2"),
     Run("exported_tum", "export", "--sequence @sequence --layout tum"),
+    Run("scene_sdf", "export scene", "--to sdf --scene @urdf"),
+    Run("scene_usd", "export scene", "--to usd --scene @urdf"),
+    Run("scene_moveit", "export scene", "--to moveit --scene @urdf"),
     Run("packing", "pack", "--seed 3"),
     Run("episode", "agent run", "--task move_cup_and_toy --seed 5 --image-width 300"),
     Run("episode_thesis", "agent run", "--task tidy_table --arm thesis --seed 6 --image-width 300"),
@@ -81,4 +87,5 @@ RUNS = (
     Run("cut_trial", "cutting simulate", "--plan @cut_plan --model @cut_model --image-width 300"),
     Run("cut_evaluation", "cutting evaluate", "--model @cut_model --cells n2m1 --goals 2"),
 )
-"""`library add`, `truth scenenn` and `truth supports` read what somebody downloaded: no run here."""
+"""`library add`, `truth scenenn` and `truth supports` read what somebody downloaded, `edit map` what somebody wrote: no
+run here."""

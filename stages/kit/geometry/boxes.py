@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
+from schemas.hand_written import UprightBox
 from schemas.scene_parts import Box
 
 TILT_TOLERANCE = 1e-6
@@ -29,6 +30,11 @@ def gravity_aligned_box(center: ArrayLike, size: ArrayLike, yaw: float) -> Box:
     sx, sy, sz = (float(v) for v in np.asarray(size, dtype=float))
     half = 0.5 * float(yaw)
     return Box(center=(cx, cy, cz), orientation=(0.0, 0.0, math.sin(half), math.cos(half)), size=(sx, sy, sz))
+
+
+def upright_box(written: UprightBox) -> Box:
+    """Return a box that was written by hand as other artifacts have it."""
+    return gravity_aligned_box(written.center, written.size, math.radians(written.yaw_degrees))
 
 
 def minimum_box(points: np.ndarray) -> Box:

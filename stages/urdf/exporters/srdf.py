@@ -7,7 +7,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from stages.kit.formats.urdf_file import Urdf, number
-from stages.urdf.exports import SceneExporter, WrittenScene
+from stages.kit.formats.written_scene import WrittenScene
+from stages.urdf.exports import SceneExporter
 from stages.urdf.resting_contacts import resting_contacts
 
 GROUP, STATE = "doors_and_drawers", "reconstructed"

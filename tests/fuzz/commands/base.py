@@ -43,6 +43,7 @@ RUNS = (
     Run("report", "report", f"{ALL} --evaluation @evaluation"),
     Run("poses", "poses", "--sequence @sequence"),
     Run("tum", "export", "--sequence @sequence --layout tum"),
+    Run("scene_sdf", "export scene", "--to sdf --scene @urdf"),
     Run("packing", "pack", "--proposer backtrack --seed 3"),
     Run("table", "tableware scene", "--tier tier0_cups --seed 5"),
     Run("seen", "tableware detect", "@table"),

@@ -1,0 +1,142 @@
+"""`scenewright edit rename | delete | merge | split | add`: a line more in edits.toml, which `edit map` applies."""
+
+from __future__ import annotations
+
+import getpass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cli.output import out, say
+from schemas.errors import UsageError
+from schemas.plain_text import cleaned
+
+if TYPE_CHECKING:
+    from stages.edit.map_state import MapState
+
+File = Annotated[Path, typer.Argument(help="edits.toml; it is made where there is none.")]
+ThingName = Annotated[str, typer.Argument(help="A thing of the map: its instance number, or its node's name (cup_7).")]
+Things = Annotated[list[str], typer.Argument(help="Things of the map; the first gives its class.")]
+Map = Annotated[Path, typer.Option("--panoptic-map", help="The map as it was seen, edited or not.")]
+ClassName = Annotated[str, typer.Option("--class", help="A class of data/vocabulary.toml.")]
+Center = Annotated[tuple[float, float, float], typer.Option("--center", help="Of a box: x y z in the world [m].")]
+Size = Annotated[tuple[float, float, float], typer.Option("--size", help="Of a box: its edges, the last one up [m].")]
+Yaw = Annotated[float, typer.Option("--yaw", help="Of a box: its turn about the vertical [degrees].")]
+By = Annotated[str, typer.Option("--by", help="Who edits [default: the name of your account].")]
+Note = Annotated[str, typer.Option("--note", help="Why.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+
+
+def rename(
+    file: File,
+    thing: ThingName,
+    panoptic_map: Map,
+    class_name: ClassName,
+    by: By = "",
+    note: Note = "",
+    debug: Debug = False,
+) -> int:
+    """Say that a thing of a map is of another class."""
+    return _append(file, by, note, what="rename", of=_anchors(panoptic_map, [thing])[0], **{"class": class_name})
+
+
+def delete(file: File, thing: ThingName, panoptic_map: Map, by: By = "", note: Note = "", debug: Debug = False) -> int:
+    """Say that there is no such thing; its surface stays in the map, without a name."""
+    return _append(file, by, note, what="delete", of=_anchors(panoptic_map, [thing])[0])
+
+
+def merge(file: File, things: Things, panoptic_map: Map, by: By = "", note: Note = "", debug: Debug = False) -> int:
+    """Say that several things of a map are one."""
+    if len(set(things)) < 2:
+        raise UsageError("merge takes at least two things", hint="give their instance numbers or names")
+    return _append(file, by, note, what="merge", of=_anchors(panoptic_map, things))
+
+
+def split(
+    file: File,
+    thing: ThingName,
+    panoptic_map: Map,
+    class_name: ClassName,
+    center: Center,
+    size: Size,
+    yaw: Yaw = 0.0,
+    by: By = "",
+    note: Note = "",
+    debug: Debug = False,
+) -> int:
+    """Say that what of a thing lies in a box is a thing of its own."""
+    part = {"center": center, "size": size, "yaw_degrees": yaw}
+    of = _anchors(panoptic_map, [thing])[0]
+    return _append(file, by, note, what="split", of=of, part=part, **{"class": class_name})
+
+
+def add(
+    file: File,
+    class_name: ClassName,
+    center: Center,
+    size: Size,
+    yaw: Yaw = 0.0,
+    drawn: Annotated[
+        bool, typer.Option("--drawn", help="No camera saw it (glass): the box itself is its surface.")
+    ] = False,
+    by: By = "",
+    note: Note = "",
+    debug: Debug = False,
+) -> int:
+    """Say that there is a thing in a box that the map does not name."""
+    box = {"center": center, "size": size, "yaw_degrees": yaw}
+    surface = "box" if drawn else "seen"
+    return _append(file, by, note, what="add", box=box, surface=surface, **{"class": class_name})
+
+
+COMMANDS = (rename, delete, merge, split, add)
+
+
+def _anchors(path: Path, names: list[str]) -> list[Any]:
+    from schemas.panoptic_map import PanopticMap
+    from stages.edit.anchoring import anchor_of
+    from stages.edit.map_state import read_state
+    from stages.engine.reading import open_artifact
+
+    opened = open_artifact(path, PanopticMap)
+    assert isinstance(opened, PanopticMap)
+    state, _ = read_state(opened)
+    return [anchor_of(state, _instance(state, name, path)).model_dump(by_alias=True) for name in names]
+
+
+def _instance(state: MapState, name: str, path: Path) -> int:
+    """Return the instance that is called so. Raises UsageError when the map has none with a surface."""
+    things = {thing.name: thing.instance for thing in state.things()}
+    found = things.get(name) or next((k for k in things.values() if str(k) == name), None)
+    if found is None:
+        shown = ", ".join(list(things)[:12]) + (", ..." if len(things) > 12 else "")
+        raise UsageError(f"{path}: has no thing {name!r:.80}", hint=f"it has: {shown or 'none'}")
+    return found
+
+
+def _append(file: Path, by: str, note: str, **values: Any) -> int:
+    from pydantic import TypeAdapter, ValidationError
+
+    from schemas.edits import MapEdit
+    from stages.edit.edits_file import append_edits
+
+    said = {"by": cleaned(by or _account()), "when": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}", "note": cleaned(note)}
+    try:
+        edit: MapEdit = TypeAdapter(MapEdit).validate_python({**values, **said})
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"][1:])
+        raise UsageError(f"edit {values['what']}: {where}: {first['msg']}", hint="see --help") from None
+    edits = append_edits(file, [edit])
+    say(f"edit {len(edits.edits)} of {file}; next: scenewright edit map --panoptic-map ... --edits {file} --out ...")
+    out(str(file))
+    return 0
+
+
+def _account() -> str:
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError, ImportError):
+        return ""

@@ -1,0 +1,131 @@
+"""Edits by hand: `edits.toml`, what a person put right, anchored to geometry, and what became of it in an artifact.
+
+An edit never names an instance or a node by its number: numbers change when a map is made anew with other parameters.
+It says where the thing is (a box around it, a point on its surface) and what it was called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from schemas.base import Model
+from schemas.hand_written import Point, UprightBox
+from schemas.vocabulary import load_vocabulary
+
+FORMAT = "scenewright-edits"
+MOST_EDITS = 10_000
+LONGEST_TEXT = 10_000
+"""Letters of a name or a note."""
+
+Text = Annotated[str, Field(max_length=LONGEST_TEXT)]
+
+
+def _check_class(value: str) -> str:
+    if not any(entry.name == value for entry in load_vocabulary().classes):
+        raise ValueError(f"class {value!r:.60} is not in data/vocabulary.toml")
+    return value
+
+
+ClassName = Annotated[str, AfterValidator(_check_class)]
+
+
+class Anchor(Model):
+    """Which thing is meant: what a map held when somebody pointed at it."""
+
+    class_name: ClassName = Field(alias="class")
+    box: UprightBox
+    """Around all of its surface, in the world frame."""
+    point: Point
+    """On its surface, far from whatever else is there [m]."""
+
+
+class Edit(Model):
+    """What all edits say."""
+
+    by: Text = ""
+    """Who made it."""
+    when: str = Field(default="", pattern=r"^(\d{4}-\d{2}-\d{2}T\d{2}:\d{2}:\d{2}Z)?$")
+    """Universal time."""
+    note: Text = ""
+
+
+class Rename(Edit):
+    """The thing is of another class."""
+
+    what: Literal["rename"]
+    of: Anchor
+    class_name: ClassName = Field(alias="class")
+
+
+class Delete(Edit):
+    """There is no such thing; its surface stays, without a name."""
+
+    what: Literal["delete"]
+    of: Anchor
+
+
+class Merge(Edit):
+    """These are one thing, of the class of the first one."""
+
+    what: Literal["merge"]
+    of: tuple[Anchor, ...] = Field(min_length=2, max_length=100)
+
+
+class Split(Edit):
+    """What of the thing's surface lies in the box is a thing of its own."""
+
+    what: Literal["split"]
+    of: Anchor
+    part: UprightBox
+    class_name: ClassName = Field(alias="class")
+    """Of the part."""
+
+
+class Add(Edit):
+    """There is a thing in the box that the map does not name."""
+
+    what: Literal["add"]
+    box: UprightBox
+    class_name: ClassName = Field(alias="class")
+    surface: Literal["seen", "box"] = "seen"
+    """`seen`: the surface in the box that nothing else owns. `box`: its six faces, for what no camera sees (glass)."""
+
+
+MapEdit = Annotated[Rename | Delete | Merge | Split | Add, Field(discriminator="what")]
+
+
+class EditsFile(Model):
+    """edits.toml."""
+
+    format: Literal["scenewright-edits"]
+    version: Literal[1]
+    edits: tuple[MapEdit, ...] = Field(default=(), max_length=MOST_EDITS)
+
+
+class AppliedEdit(Model):
+    """What became of one edit."""
+
+    number: int = Field(ge=1)
+    """Its place in the file, from 1."""
+    what: str
+    status: Literal["applied", "already", "conflict"]
+    """`already`: what it asks for is so without it. `conflict`: it was not applied, and `reason` says why."""
+    things: tuple[str, ...] = ()
+    """Nodes `<class>_<instance>` that it changed or made, as they are called after it."""
+    reason: Text = ""
+    by: Text = ""
+    when: str = ""
+    note: Text = ""
+
+
+class AppliedEditsFile(Model):
+    """edits.json of an edited artifact."""
+
+    edits: tuple[AppliedEdit, ...]
+
+    def conflicts(self) -> Iterator[AppliedEdit]:
+        """Yield the edits that were not applied."""
+        return (edit for edit in self.edits if edit.status == "conflict")

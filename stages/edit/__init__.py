@@ -1,0 +1,1 @@
+"""What a person puts right, applied again whenever the artifact is made anew."""

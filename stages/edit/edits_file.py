@@ -1,0 +1,109 @@
+"""Reading edits.toml, and adding a line to it: every edit is one line, so that undo is deleting a line."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from schemas.edits import FORMAT, EditsFile, MapEdit
+from schemas.errors import BadInput, MachineFailure
+from schemas.outside import LARGEST_SETTINGS, file_text, file_toml
+from schemas.plain_text import UNPRINTABLE
+
+HINT = "docs/EDIT.md shows one"
+EMPTY = f'format = "{FORMAT}"\nversion = 1\nedits = [\n]\n'
+
+
+def read_edits(path: Path) -> EditsFile:
+    """Read and check edits.toml. Raises BadInput naming the edit and the field that is wrong."""
+    values = file_toml(path, LARGEST_SETTINGS, hint=HINT)
+    try:
+        return EditsFile.model_validate(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "document"
+        raise BadInput(f"{path}: {where:.200}: {first['msg']:.200}", hint=HINT) from None
+
+
+def append_edits(path: Path, edits: Sequence[MapEdit]) -> EditsFile:
+    """Add edits to the end of edits.toml, one line each; it is made where there is none. Return what it then says.
+
+    What else stands there, comments too, stays as it is. Two programs that do this at once wait for each other. Raises
+    BadInput when the file is broken or does not end with its list of edits; it is then as it was. Raises MachineFailure
+    when it cannot be written.
+    """
+    with _one_at_a_time(path):
+        there = path.exists() or path.is_symlink()
+        before = read_edits(path) if there else EditsFile(format="scenewright-edits", version=1)
+        text = file_text(path, LARGEST_SETTINGS, hint=HINT) if there else EMPTY
+        head, bracket, tail = text.rpartition("]")
+        new = f"{head.rstrip()}\n" + "".join(f"  {line_of(edit)},\n" for edit in edits) + f"{bracket}{tail}"
+        return _replace(path, new, before.model_copy(update={"edits": (*before.edits, *edits)}))
+
+
+def _replace(path: Path, text: str, meant: EditsFile) -> EditsFile:
+    """Put `text` into the place of a file, if it says what is `meant`."""
+    target = Path(os.path.realpath(path))
+    descriptor, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    written = Path(name)
+    try:
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        try:
+            says = read_edits(written)
+        except BadInput:
+            says = None
+        if says != meant:
+            raise BadInput(
+                f"{path}: its list `edits` is not the last thing in it, or its last edit lacks a comma", hint=HINT
+            )
+        written.chmod(target.stat().st_mode & 0o777 if target.exists() else 0o644)
+        written.replace(target)
+    except BaseException:
+        written.unlink(missing_ok=True)
+        raise
+    return meant
+
+
+@contextmanager
+def _one_at_a_time(path: Path) -> Iterator[None]:
+    """Hold the lock of the folder that the file is in: the file itself is replaced."""
+    try:
+        descriptor = os.open(Path(os.path.realpath(path)).parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    except (OSError, ValueError) as error:
+        raise BadInput(f"{path}: no folder to write it into", hint="make the folder first") from error
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    except OSError as error:
+        raise MachineFailure(f"{path}: {error.strerror}", hint="choose a place that can be written") from None
+    finally:
+        os.close(descriptor)
+
+
+def line_of(edit: MapEdit) -> str:
+    """Return an edit as one line of TOML; what it leaves at its default is left out."""
+    values = edit.model_dump(by_alias=True, exclude_defaults=True)
+    return _toml({"what": values.pop("what"), **values})
+
+
+def _toml(value: Any) -> str:
+    """Return a value of numbers, text, lists and tables as inline TOML."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml(part) for part in value) + "]"
+    if isinstance(value, str):
+        quoted = json.dumps(value, ensure_ascii=False)
+        return UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", quoted)
+    return json.dumps(value)

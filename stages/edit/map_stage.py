@@ -1,0 +1,76 @@
+"""`scenewright edit map`: a panoptic map and what a person put right become another panoptic map."""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from pathlib import Path
+
+from schemas.edits import AppliedEditsFile
+from schemas.panoptic_map import PanopticMap
+from stages.edit.anchoring import Fitting
+from stages.edit.applying import apply_edits
+from stages.edit.edits_file import read_edits
+from stages.edit.map_state import MapState, read_state
+from stages.edit.parameters import EditMapParameters
+from stages.kit.formats.map_files import mesh_name, write_arrays
+from stages.kit.formats.ply_files import write_ply
+from stages.kit.stage import Context
+
+KEPT = ("counts.npz", "volume.npz")
+"""Which masks were seen where, and the voxels: edits say nothing about these."""
+EDITED = "mesh.ply"
+
+
+def run(panoptic_map: PanopticMap, edits: Path, *, parameters: EditMapParameters, context: Context) -> PanopticMap:
+    """Apply the edits in their order and write the map that results, with what became of each in edits.json.
+
+    The outcome is `conflicts` when an edit was not applied. Snapshots are left out: they are maps of before.
+    Raises BadInput when the edits or the map are broken.
+    """
+    asked = read_edits(edits)
+    with context.progress.step("read the map"):
+        state, info = read_state(panoptic_map)
+    with context.progress.step("apply the edits"):
+        vertices_before = len(state.surface.vertices)
+        records = apply_edits(state, asked.edits, Fitting(**parameters.model_dump()))
+        entities, meshes = state.finished()
+    for record in records:
+        if record.status == "conflict":
+            context.logger.warning("edit %d (%s): %s", record.number, record.what, record.reason)
+    with context.progress.step("write the map"):
+        root = context.output
+        (root / "entities").mkdir(parents=True, exist_ok=True)
+        info.model_copy(update={"entities": tuple(entities)}).write(root / "entities.json")
+        AppliedEditsFile(edits=tuple(records)).write(root / "edits.json")
+        for entity in entities:
+            if entity.instance in meshes:
+                write_ply(root / mesh_name(entity.instance), meshes[entity.instance])
+            else:
+                shutil.copyfile(panoptic_map.path(entity.mesh), root / entity.mesh)
+        if len(state.surface.vertices) == vertices_before:
+            shutil.copyfile(panoptic_map.path(EDITED), root / EDITED)
+        else:
+            write_ply(root / EDITED, state.surface)
+        _write_labels(root, state)
+        for name in KEPT:
+            if panoptic_map.path(name).is_file():
+                shutil.copyfile(panoptic_map.path(name), root / name)
+    counted = Counter(record.status for record in records)
+    summary: dict[str, int | str] = {
+        "edits": len(records),
+        "applied": counted["applied"],
+        "already": counted["already"],
+        "conflicts": counted["conflict"],
+        "entities": len(entities),
+        "vertices": len(state.surface.vertices),
+    }
+    if counted["conflict"]:
+        first = next(record for record in records if record.status == "conflict")
+        summary["reason"] = f"edit {first.number} ({first.what}): {first.reason}"
+    return PanopticMap(root, outcome="conflicts" if counted["conflict"] else "ok", summary=summary)
+
+
+def _write_labels(root: Path, state: MapState) -> None:
+    labels = {"instance": state.instance, "segment": state.segment, "class_id": state.class_ids()}
+    write_arrays(root / "mesh_labels.npz", labels)

@@ -1,0 +1,44 @@
+"""Declaration of `scenewright edit map`."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from schemas.panoptic_map import PanopticMap
+from stages.kit.stage import External, Parameters, Stage
+
+
+class EditMapParameters(Parameters):
+    """When a thing is the one that an edit means."""
+
+    minimum_overlap: float = Field(
+        0.5,
+        ge=0.1,
+        le=1,
+        description="A thing fits an edit when the boxes, grown by --margin, share this much of their union",
+    )
+    margin: float = Field(
+        0.03, ge=0, le=1, description="Boxes are compared grown by this on every side [m]: flat things have no volume"
+    )
+    reach: float = Field(
+        0.06, gt=0, le=1, description="... and when its surface comes this near to the edit's point [m]"
+    )
+    clear_share: float = Field(
+        0.7, gt=0, le=1, description="A second thing that fits by this share of the best fit makes the edit a conflict"
+    )
+
+
+MAP = Stage(
+    name="edit map",
+    version=1,
+    summary="Apply edits (edits.toml) to a panoptic map; what no longer fits is a conflict, and not applied",
+    parameters=EditMapParameters,
+    reads={"panoptic_map": PanopticMap, "edits": External("edits.toml, as `edit rename` and the like write it")},
+    writes=PanopticMap,
+    libraries=("numpy", "scipy", "trimesh"),
+    module="map_stage",
+    example="scenewright edit map --panoptic-map outputs/demo/panoptic_map --edits edits.toml "
+    "--out outputs/demo/edited_map",
+)
+
+STAGES = (MAP,)

@@ -1,0 +1,1 @@
+"""Formats of `export scene`: a folder each, found by its place."""

@@ -1,0 +1,241 @@
+"""Edits of maps: each does what it says, again on maps that number and cut things otherwise, or says that it cannot."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter
+
+from cli.main import run as scenewright
+from schemas.edits import AppliedEdit, MapEdit
+from schemas.errors import BadInput
+from schemas.panoptic_map import PanopticMap
+from stages.edit.anchoring import Fitting, anchor_of
+from stages.edit.applying import apply_edits, box_surface
+from stages.edit.edits_file import append_edits, line_of, read_edits
+from stages.edit.map_state import MapState, read_state
+from stages.edit.parameters import EditMapParameters
+from stages.kit.formats.entity_meshes import load_entity_mesh
+from stages.kit.geometry.boxes import gravity_aligned_box
+from tests.unit.edit.maps import room_map
+
+FITTING = Fitting(**EditMapParameters().model_dump())
+CUP, TWIN, TABLE, CABINET = 3, 4, 2, 5
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> PanopticMap:
+    """The map on which somebody made the edits."""
+    return room_map(tmp_path_factory.mktemp("seen") / "map")
+
+
+def edit(what: str, seen: PanopticMap, *instances: int, **values: Any) -> MapEdit:
+    """An edit of things of a map, with anchors."""
+    state, _ = read_state(seen)
+    anchors = [anchor_of(state, k).model_dump(by_alias=True) for k in instances]
+    of = {} if not anchors else {"of": anchors if what == "merge" else anchors[0]}
+    return TypeAdapter(MapEdit).validate_python({"what": what, **of, **values})
+
+
+def applied(panoptic_map: PanopticMap, *edits: MapEdit) -> tuple[MapState, list[AppliedEdit]]:
+    state, _ = read_state(panoptic_map)
+    records = apply_edits(state, edits, FITTING)
+    state.finished()
+    return state, records
+
+
+def names(state: MapState) -> list[str]:
+    return [thing.name for thing in state.things()]
+
+
+def box(center: tuple[float, float, float], size: tuple[float, float, float]) -> dict[str, Any]:
+    return {"center": center, "size": size}
+
+
+def test_edits_land_on_the_same_things_whatever_their_numbers(seen: PanopticMap, tmp_path: Path) -> None:
+    other = room_map(tmp_path / "other", spacing=0.04, number={3: 40, 4: 3, 2: 5, 5: 2})
+    asked = [
+        edit("rename", seen, CUP, **{"class": "bottle"}),
+        edit("delete", seen, TWIN),
+        edit("merge", seen, TABLE, CABINET),
+    ]
+    here, records = applied(seen, *asked)
+    assert [record.status for record in records] == ["applied"] * 3
+    assert names(here) == ["floor_1", "table_2", "bottle_3"] and records[2].things == ("table_2",)
+    there, records = applied(other, *asked)
+    assert [record.status for record in records] == ["applied"] * 3
+    assert names(there) == ["floor_1", "table_5", "bottle_40"]
+    assert there.entities[40].confidence == 1.0
+    # The surface of the deleted cup stays, without a name.
+    assert len(there.instance) == len(read_state(other)[0].instance) and (there.instance == 0).sum() > 20
+
+
+def test_what_no_longer_fits_is_a_conflict_and_changes_nothing(seen: PanopticMap, tmp_path: Path) -> None:
+    asked = edit("rename", seen, CUP, **{"class": "bottle"})
+    gone = room_map(tmp_path / "gone", without=(CUP,))
+    as_one = room_map(tmp_path / "as_one", joined={CUP: TABLE})
+    otherwise = room_map(tmp_path / "otherwise", classes={CUP: "book"})
+    for where, words in (
+        (gone, "lies no thing"),
+        (as_one, "table_2, whose box"),
+        (otherwise, "book_3, which is no cup"),
+    ):
+        state, (record,) = applied(where, asked)
+        assert record.status == "conflict" and words in record.reason, record
+        assert not state.touched and state.entities == read_state(where)[0].entities
+
+
+def test_two_things_that_fit_alike_are_a_conflict(seen: PanopticMap, tmp_path: Path) -> None:
+    asked = edit("delete", seen, CUP)
+    state, _ = read_state(room_map(tmp_path / "double"))
+    # A second cup in the place of the first: the map is of two minds.
+    own = state.instance == CUP
+    vertices, faces = box_surface(gravity_aligned_box((0.24, 0.04, 0.80), (0.09, 0.09, 0.11), 0.0), 0.02)
+    state.add_surface(vertices, faces, state.new_entity("cup", 3))
+    (record,) = apply_edits(state, [asked], FITTING)
+    assert record.status == "conflict" and "more than one" in record.reason and "cup_3" in record.reason
+    assert (state.instance[: len(own)] == CUP).sum() == own.sum()
+
+
+def test_what_is_so_already_is_said_and_left(seen: PanopticMap, tmp_path: Path) -> None:
+    renamed = room_map(tmp_path / "renamed", classes={CUP: "bottle"})
+    merged = room_map(tmp_path / "merged", joined={CABINET: TABLE})
+    for where, asked in (
+        (renamed, edit("rename", seen, CUP, **{"class": "bottle"})),
+        (merged, edit("merge", seen, TABLE, CABINET)),
+        (seen, edit("add", seen, box=box((0.24, 0.04, 0.8), (0.08, 0.08, 0.1)), **{"class": "cup"})),
+    ):
+        state, (record,) = applied(where, asked)
+        assert record.status == "already", record
+        assert not state.touched
+
+
+def test_a_part_becomes_a_thing_of_its_own(seen: PanopticMap, tmp_path: Path) -> None:
+    upper = box((-0.6, 0.95, 0.7), (0.9, 0.4, 0.42))
+    asked = edit("split", seen, CABINET, part=upper, **{"class": "shelf"})
+    for where in (seen, room_map(tmp_path / "coarse", spacing=0.05)):
+        state, (record,) = applied(where, asked)
+        assert record.status == "applied" and record.things == ("cabinet_5", "shelf_6")
+        points = state.surface.vertices
+        assert points[state.instance == 6, 2].min() > 0.48 and points[state.instance == 5, 2].max() < 0.5
+    beside = edit("split", seen, CABINET, part=box((0.5, 0.5, 0.5), (0.1, 0.1, 0.1)), **{"class": "shelf"})
+    _, (record,) = applied(seen, beside)
+    assert record.status == "conflict" and "0 of the" in record.reason
+
+
+def test_a_thing_is_added_from_unnamed_surface_or_drawn(seen: PanopticMap, tmp_path: Path) -> None:
+    where = room_map(tmp_path / "unnamed", unnamed=(CUP,))
+    cup = box((0.24, 0.04, 0.8), (0.1, 0.1, 0.12))
+    state, (record,) = applied(where, edit("add", seen, box=cup, **{"class": "cup"}))
+    assert record.things == ("cup_6",) and state.entities[6].triangles > 20
+    glass = edit("add", seen, box=box((0.0, -0.2, 0.82), (0.06, 0.06, 0.14)), surface="box", **{"class": "cup"})
+    state, (record,) = applied(seen, glass)
+    assert record.status == "applied"
+    low, high = (np.array(state.entities[6].box_minimum), np.array(state.entities[6].box_maximum))
+    assert np.allclose(high - low, (0.06, 0.06, 0.14), atol=1e-5)
+    _, (record,) = applied(seen, edit("add", seen, box=box((0.9, -0.9, 1.5), (0.1, 0.1, 0.1)), **{"class": "cup"}))
+    assert record.status == "conflict" and "0 vertices without a name" in record.reason
+
+
+def test_a_drawn_box_is_closed_and_looks_outwards() -> None:
+    import trimesh
+
+    vertices, faces = box_surface(gravity_aligned_box((1, 2, 3), (0.3, 0.2, 0.1), 0.4), 0.05)
+    mesh = trimesh.Trimesh(vertices, faces, process=True)
+    assert mesh.is_watertight and mesh.volume == pytest.approx(0.3 * 0.2 * 0.1)
+
+
+def test_the_point_of_an_anchor_is_far_from_other_things(seen: PanopticMap) -> None:
+    anchor = anchor_of(read_state(seen)[0], CUP)
+    assert anchor.point[2] == pytest.approx(0.85) and anchor.class_name == "cup"
+    assert anchor.box.size == pytest.approx((0.08, 0.08, 0.1), abs=1e-3)
+
+
+def test_the_step_writes_a_whole_map_and_says_conflicts(seen: PanopticMap, tmp_path: Path, capsys) -> None:
+    edits, out = tmp_path / "edits.toml", tmp_path / "edited"
+    command = ["--panoptic-map", str(seen.root), "--by", 'An"na <b>', "--note", "a\nb\x7f"]
+    assert scenewright(["edit", "rename", str(edits), "cup_3", "--class", "bottle", *command]) == 0
+    assert scenewright(["edit", "merge", str(edits), "2", "5", *command]) == 0
+    apply = ["edit", "map", "--edits", str(edits), "--panoptic-map"]
+    assert scenewright([*apply, str(seen.root), "--out", str(out)]) == 0
+    made = PanopticMap(out)
+    assert [f"{e.class_name}_{e.instance}" for e in made.info.entities] == ["floor_1", "table_2", "bottle_3", "cup_4"]
+    assert made.edits is not None and [record.status for record in made.edits.edits] == ["applied", "applied"]
+    assert made.edits.edits[0].by == 'An"na <b>' and len(made.edits.edits[0].when) == 20
+    for entity in made.info.entities:
+        mesh = load_entity_mesh(made.path(entity.mesh))
+        assert (len(mesh.vertices), len(mesh.faces)) == (entity.vertices, entity.triangles)
+    with np.load(made.path("mesh_labels.npz"), allow_pickle=False) as labels:
+        assert set(np.unique(labels["instance"]).tolist()) == {1, 2, 3, 4} and len(np.unique(labels["class_id"])) == 4
+    assert made.path("entities/1.ply").read_bytes() == seen.path("entities/1.ply").read_bytes()
+    # An edited map is edited further, and undo is deleting a line.
+    assert scenewright(["edit", "delete", str(edits), "bottle_3", "--panoptic-map", str(out)]) == 0
+    lines = edits.read_text().splitlines()
+    edits.write_text("\n".join(line for line in lines if "rename" not in line) + "\n")
+    capsys.readouterr()
+    assert scenewright([*apply, str(seen.root), "--out", str(out)]) == 4
+    manifest = json.loads((out / "manifest.json").read_text())
+    assert manifest["outcome"] == "conflicts" and manifest["summary"]["conflicts"] == 1
+    assert "which is no bottle" in manifest["summary"]["reason"] and "no bottle" in capsys.readouterr().err
+    # The graph is built from an edited map as from any other.
+    assert scenewright(["graph", "--panoptic-map", str(out), "--out", str(tmp_path / "graph")]) == 0
+
+
+def test_lines_are_added_to_a_file_that_people_write_too(seen: PanopticMap, tmp_path: Path) -> None:
+    path = tmp_path / "edits.toml"
+    first = edit("delete", seen, TWIN, by='quotes " and \\ and <b>', note="x" * 10_000)
+    append_edits(path, [first])
+    path.write_text(path.read_text().replace("edits = [", "# which are mine\nedits = [") + "# the end ]\n")
+    with pytest.raises(BadInput, match="last thing"):
+        append_edits(path, [first])
+    path.write_text(path.read_text().replace("# the end ]\n", "# the end\n"))
+    said = append_edits(path, [edit("delete", seen, CUP)])
+    assert said == read_edits(path) and said.edits[0] == first and len(said.edits) == 2
+    assert "# which are mine" in path.read_text() and path.read_text().endswith("# the end\n")
+    assert line_of(first) in path.read_text() and not list(tmp_path.glob(".edits*"))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("edits = [", "edits.toml"),
+        ('format = "scenewright-edits"\nversion = 2\n', "version"),
+        ('format = "scenewright-edits"\nversion = 1\nedits = [{ what = "explode" }]\n', "edits.0"),
+        ('format = "scenewright-edits"\nversion = 1\nwhere = 3\n', "where"),
+        (
+            'format = "scenewright-edits"\nversion = 1\nedits = [{ what = "add", class = "unicorn", '
+            "box = { center = [0, 0, 0], size = [1, 1, 1] } }]\n",
+            "unicorn",
+        ),
+        (
+            'format = "scenewright-edits"\nversion = 1\nedits = [{ what = "add", class = "cup", '
+            "box = { center = [nan, 0, 0], size = [1, 1, 1] } }]\n",
+            "center",
+        ),
+    ],
+)
+def test_a_broken_file_is_refused_by_name_and_left(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "edits.toml"
+    path.write_text(text)
+    with pytest.raises(BadInput, match=words):
+        read_edits(path)
+    with pytest.raises(BadInput, match=words):
+        append_edits(path, [])
+    assert path.read_text() == text
+
+
+def test_commands_refuse_what_is_not_there(seen: PanopticMap, tmp_path: Path, capsys) -> None:
+    edits = str(tmp_path / "edits.toml")
+    where = ["--panoptic-map", str(seen.root)]
+    assert scenewright(["edit", "delete", edits, "cup_99", *where]) == 2 and "cup_3" in capsys.readouterr().err
+    assert scenewright(["edit", "rename", edits, "cup_3", *where, "--class", "unicorn"]) == 2
+    assert scenewright(["edit", "merge", edits, "3", "3", *where]) == 2
+    assert (
+        scenewright(["edit", "add", edits, "--class", "cup", "--center", "0", "0", "0", "--size", "0", "1", "1"]) == 2
+    )
+    assert scenewright(["edit", "delete", str(tmp_path / "no" / "edits.toml"), "3", *where]) == 3
+    assert list(tmp_path.iterdir()) == []
