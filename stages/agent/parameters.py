@@ -97,7 +97,7 @@ EVALUATE = Stage(
     writes=AgentEvaluation,
     libraries=("numpy", "scipy", "numba"),
     module="evaluate_stage",
-    data_files=lambda parameters: (RECIPE,),
+    data_files=lambda parameters: (RECIPE, SHAPES),
     example="scenewright agent evaluate --trials 20 --out outputs/agent/evaluation",
 )
 STAGES = [RUN, REPLAY, EVALUATE]
