@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -66,6 +66,8 @@ class EpisodeFile(Model):
     brain: str
     """`rules`, `open loop rules`: no language model; or the label of the language backend."""
     seed: Seed
+    simulation: Literal["fast", "physics"] = Field("fast", exclude_if=lambda world: world == "fast")
+    """The world it happened in. Absent: the fast one."""
     failures: float
     """Factor of the rates at which executions fail, and of those of the eyes."""
     perception: float
@@ -115,7 +117,8 @@ class EpisodeMaps(Model):
 
 class AgentEpisode(Artifact):
     """`episode.json`, `episode.txt`, `apartment.json` (the true one), `maps.json`, `map.png` (what the robot knew as it
-    grew); `transcript.jsonl` when a language model was asked."""
+    grew), in physics `views.png` (what the wrist camera
+    saw last); `transcript.jsonl` when a language model was asked."""
 
     kind: ClassVar[str] = "agent_episode"
     description: ClassVar[str] = "a robot told in words: programs, calls, maps, and what came of it"

@@ -11,6 +11,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from schemas.plan import Failure
+
 Position = tuple[float, float, float]
 
 
@@ -79,6 +81,8 @@ class Felt:
 
     ok: bool
     kind: FeltKind = ""
+    failure: Failure | None = None
+    """What motion planning or control said, with its numbers, where there is motion."""
 
 
 class Body(Protocol):
@@ -92,6 +96,26 @@ class Body(Protocol):
     @property
     def seconds(self) -> float:
         """Since the beginning."""
+        ...
+
+    @property
+    def same_thing(self) -> float:
+        """Two sightings this near are of one thing [m]: how well its eyes and localisation measure."""
+        ...
+
+    @property
+    def stand_off(self) -> float:
+        """Of the middle of the base from the edge of furniture on which it works [m]."""
+        ...
+
+    @property
+    def clearance(self) -> float:
+        """Cells of the obstacle map that the base keeps from what is occupied."""
+        ...
+
+    @property
+    def short_armed(self) -> bool:
+        """Whether its arm ends short of the far side of a table, so that other sides have to be known."""
         ...
 
     def sweep(self) -> Sweep:
@@ -118,8 +142,8 @@ class Body(Protocol):
         """Close the hand at a position by the grasp of a rank (0 first). `label`: what is believed to be there."""
         ...
 
-    def release(self, at: Position, label: str) -> Felt:
-        """Let go over a position. `label`: what is believed to be below."""
+    def release(self, at: Position, label: str, *, gently: bool = False) -> Felt:
+        """Let go over a position, 15 cm above it or, gently, at contact. `label`: what is believed to be below."""
         ...
 
     def pull(self, at: Position, *, opening: bool) -> Felt:

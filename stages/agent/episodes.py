@@ -25,11 +25,11 @@ from stages.agent.judging import score
 from stages.agent.language.interpreter import Called, Ran
 from stages.agent.language.values import as_text
 from stages.agent.obstacle_map import CELL, UNKNOWN
-from stages.agent.pictures import Panel, draw_growing_map
+from stages.agent.pictures import Panel, draw_growing_map, write_views
 from stages.agent.scene_map import SceneMap
 from stages.agent.session import Session, Turn
 from stages.agent.trials import Setting, run_trial
-from stages.agent.world.fast import FastWorld
+from stages.agent.world.truth import World
 from stages.kit.language.failures import LanguageFailed
 
 
@@ -63,7 +63,7 @@ class Watching:
         self._turn = 0
         self._way: list[tuple[float, float]] = []
 
-    def see(self, turn: Turn, skills: CommonSkills, world: FastWorld) -> None:
+    def see(self, turn: Turn, skills: CommonSkills, world: World) -> None:
         """Look at one turn."""
         self._turn += 1
         scene = skills.scene
@@ -97,12 +97,15 @@ def write_episode(
     watching = Watching()
     session, world = run_trial(setting, arm, brain, one_program=one_program, watch=watching.see)
     made = score(setting.goals, impossible, session, world)
+    write_views(output / "views.png", world.pictures)
+    world.close()
     file = EpisodeFile(
         words=setting.words,
         task=task,
         arm=arm,
         brain=label,
         seed=setting.seed,
+        simulation=setting.world,
         failures=scales[0],
         perception=scales[1],
         most_turns=setting.limits.turns,

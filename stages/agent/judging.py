@@ -8,8 +8,9 @@ from math import hypot
 
 from stages.agent.goals import NEAR_MIDDLE, Among, Description, Gather, Goal, Move, Shut
 from stages.agent.session import Session
+from stages.agent.world.events import Event
 from stages.agent.world.failures import TABLE_3_4
-from stages.agent.world.fast import Event, FastWorld
+from stages.agent.world.truth import World
 
 CAUSES = tuple(TABLE_3_4)
 """Rows of the failure table."""
@@ -37,7 +38,7 @@ class Score:
     """Cause -> failures that nothing made good in a trial that failed, and the others."""
 
 
-def score(goals: tuple[Goal, ...], impossible: str, session: Session, world: FastWorld) -> Score:
+def score(goals: tuple[Goal, ...], impossible: str, session: Session, world: World) -> Score:
     """Judge a session. `impossible`: the word that a right refusal names, empty for a task that can be done."""
     holds = goals_hold(goals, world)
     success = holds and session.end == "done"
@@ -76,12 +77,12 @@ def _failures(events: list[Event], wrong_calls: int, success: bool) -> dict[str,
     return {cause: (direct[cause], recovered[cause]) for cause in CAUSES}
 
 
-def goals_hold(goals: tuple[Goal, ...], world: FastWorld) -> bool:
+def goals_hold(goals: tuple[Goal, ...], world: World) -> bool:
     """Whether all goals are truly met."""
     return all(_holds(goal, world) for goal in goals)
 
 
-def _holds(goal: Goal, world: FastWorld) -> bool:
+def _holds(goal: Goal, world: World) -> bool:
     match goal:
         case Shut(what=what, opened=opened):
             doors = [f.name for f in world.furniture.values() if f.label in what.labels]
@@ -97,16 +98,16 @@ def _holds(goal: Goal, world: FastWorld) -> bool:
             return bool(names) and (all(on) if every else any(on))
 
 
-def _things(what: Description, world: FastWorld) -> list[str]:
+def _things(what: Description, world: World) -> list[str]:
     things = (body.thing for body in world.bodies.values())
     return [t.name for t in things if what.fits(t.label, t.color, t.used)]
 
 
-def _label(name: str, world: FastWorld) -> str:
+def _label(name: str, world: World) -> str:
     return world.furniture[name].label if name in world.furniture else name
 
 
-def _root_before(name: str, world: FastWorld) -> str:
+def _root_before(name: str, world: World) -> str:
     """Return the furniture on or in which a thing was at the beginning."""
     before = {thing.name: thing.on for thing in world.apartment.things}
     at = before[name]
@@ -115,7 +116,7 @@ def _root_before(name: str, world: FastWorld) -> str:
     return at
 
 
-def _carried(name: str, onto: Description, world: FastWorld) -> bool:
+def _carried(name: str, onto: Description, world: World) -> bool:
     """Whether a thing is on something of a description, or on what that carries."""
     on = world.bodies[name].on
     while on:
@@ -129,7 +130,7 @@ def _carried(name: str, onto: Description, world: FastWorld) -> bool:
     return False
 
 
-def _in_the_middle(name: str, around: Description, world: FastWorld) -> bool:
+def _in_the_middle(name: str, around: Description, world: World) -> bool:
     others = [world.bodies[n] for n in _things(around, world) if world.root(n) == world.root(name)]
     if not others or not world.bodies[name].on:
         return False

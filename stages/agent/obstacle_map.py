@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import ceil
 
 import numpy as np
 from scipy.ndimage import binary_dilation
@@ -13,11 +14,8 @@ from stages.agent.fast_marching import distances
 
 CELL = 0.1
 """Edge of a cell [m]; cell (i, j) has its middle at (i, j) * CELL of the map frame."""
-CLEARANCE = 3
-"""Cells that the base keeps from what is occupied."""
 UNKNOWN, FREE, OCCUPIED = 0, 1, 2
 HALF = int(LARGEST_SIDE / CELL) + 20
-_DISK = np.hypot(*np.mgrid[-CLEARANCE : CLEARANCE + 1, -CLEARANCE : CLEARANCE + 1]) <= CLEARANCE
 
 
 def cell_of(x: float, y: float) -> tuple[int, int]:
@@ -30,6 +28,8 @@ class ObstacleMap:
     """Grows by sweeps. Only the rectangle around what is known is worked on."""
 
     start: Base
+    clearance: float
+    """Cells that the base keeps from what is occupied."""
     state: np.ndarray = field(init=False)
     _fields: dict[tuple[int, int], np.ndarray] = field(init=False, default_factory=dict)
     _drivable: np.ndarray | None = field(init=False, default=None)
@@ -74,7 +74,9 @@ class ObstacleMap:
     def drivable(self) -> np.ndarray:
         """(H, W) bool: cells of the window where the base fits."""
         if self._drivable is None:
-            blocked = binary_dilation(self.window == OCCUPIED, _DISK)
+            k = ceil(self.clearance)
+            disk = np.hypot(*np.mgrid[-k : k + 1, -k : k + 1]) <= self.clearance
+            blocked = binary_dilation(self.window == OCCUPIED, disk)
             self._drivable = (self.window == FREE) & ~blocked
         return self._drivable
 
@@ -89,14 +91,10 @@ class ObstacleMap:
         if at is None:
             return np.full(self.window.shape, np.inf)
         if at not in self._fields:
+            k = ceil(self.clearance)
             free = self.drivable.copy()
-            free[
-                max(0, at[0] - CLEARANCE) : at[0] + CLEARANCE + 1, max(0, at[1] - CLEARANCE) : at[1] + CLEARANCE + 1
-            ] |= (
-                self.window[
-                    max(0, at[0] - CLEARANCE) : at[0] + CLEARANCE + 1, max(0, at[1] - CLEARANCE) : at[1] + CLEARANCE + 1
-                ]
-                == FREE
+            free[max(0, at[0] - k) : at[0] + k + 1, max(0, at[1] - k) : at[1] + k + 1] |= (
+                self.window[max(0, at[0] - k) : at[0] + k + 1, max(0, at[1] - k) : at[1] + k + 1] == FREE
             )  # it stands here already, however near to something
             self._fields[at] = distances(free, at[0], at[1]) * CELL
         return self._fields[at]
@@ -106,8 +104,26 @@ class ObstacleMap:
         at = self._in_window(*goal)
         return float(self.distances_from(start.x, start.y)[at]) if at is not None else float("inf")
 
+    def path(self, start: Base, goal: tuple[float, float]) -> list[tuple[float, float]] | None:
+        """Return points [m] from a pose to a point, down the slope of the distances; None where no way is known."""
+        field = self.distances_from(start.x, start.y)
+        at = self._in_window(*goal)
+        if at is None or not np.isfinite(field[at]):
+            return None
+        points = [goal]
+        while field[at] > 0:
+            around = [(at[0] + i, at[1] + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+            inside = [p for p in around if 0 <= p[0] < field.shape[0] and 0 <= p[1] < field.shape[1]]
+            best = min(inside, key=lambda p: float(field[p]))
+            if best == at:
+                return None
+            at = best
+            points.append((at[0] * CELL + self.origin[0], at[1] * CELL + self.origin[1]))
+        points[-1] = (start.x, start.y)
+        return points[::-1] if len(points) > 1 else [(start.x, start.y), goal]
+
     def frontiers(self) -> np.ndarray:
         """Return (N, 2) points [m]: drivable cells next to which something is unknown."""
-        near_unknown = binary_dilation(self.window == UNKNOWN, iterations=CLEARANCE + 1)
+        near_unknown = binary_dilation(self.window == UNKNOWN, iterations=ceil(self.clearance) + 1)
         rows = np.argwhere(self.drivable & near_unknown)
         return rows * CELL + np.array(self.origin)

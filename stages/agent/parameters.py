@@ -13,7 +13,7 @@ from stages.kit.language.options import LanguageParameters
 from stages.kit.stage import External, Optionally, Parameters, Stage
 
 ArmName = Literal["open_loop", "bool_feedback", "thesis", "ours", "oracle"]
-RECIPE = "agent/apartment.toml"
+RECIPE, SHAPES, ROBOT = "agent/apartment.toml", "agent/things.toml", "robots/panda.toml"
 
 
 class RunParameters(LanguageParameters):
@@ -23,6 +23,9 @@ class RunParameters(LanguageParameters):
     arm: ArmName = Field("ours", description="How calls are carried out and checked; only `oracle` sees without errors")
     brain: Literal["rules", "language"] = Field(
         "rules", description="Who writes the programs: rules of ours, no model; or a language model (--language)"
+    )
+    simulation: Literal["fast", "physics"] = Field(
+        "fast", description="Without contact, failures at given rates; or pybullet with rendered cameras (no doors)"
     )
     failures: float = Field(1.0, ge=0, le=10, description="Factor of the rates at which executions fail")
     perception: float = Field(1.0, ge=0, le=10, description="Factor of the rates at which the eyes err")
@@ -67,9 +70,9 @@ RUN = Stage(
         "transcript": Optionally(External("transcript.jsonl of an earlier run, for --language recorded or openai")),
     },
     writes=AgentEpisode,
-    libraries=("numpy", "scipy", "numba", "matplotlib"),
+    libraries=("numpy", "scipy", "numba", "matplotlib", "pybullet", "open3d", "trimesh"),
     module="run_stage",
-    data_files=lambda parameters: (RECIPE,),
+    data_files=lambda parameters: (RECIPE, SHAPES, ROBOT) if parameters.simulation == "physics" else (RECIPE,),
     check=check_run,
     example='scenewright agent run --task "Put all the fruit onto the plate." --seed 3 --out outputs/agent/episode',
 )
@@ -80,9 +83,9 @@ REPLAY = Stage(
     parameters=ReplayParameters,
     reads={"episode": AgentEpisode},
     writes=AgentEpisode,
-    libraries=("numpy", "scipy", "numba", "matplotlib"),
+    libraries=("numpy", "scipy", "numba", "matplotlib", "pybullet", "open3d", "trimesh"),
     module="replay_stage",
-    data_files=lambda parameters: (RECIPE,),
+    data_files=lambda parameters: (RECIPE, SHAPES, ROBOT),
     example="scenewright agent replay --episode outputs/agent/episode --out outputs/agent/again",
 )
 EVALUATE = Stage(
@@ -94,7 +97,7 @@ EVALUATE = Stage(
     writes=AgentEvaluation,
     libraries=("numpy", "scipy", "numba"),
     module="evaluate_stage",
-    data_files=lambda parameters: (RECIPE,),
+    data_files=lambda parameters: (RECIPE, SHAPES),
     example="scenewright agent evaluate --trials 20 --out outputs/agent/evaluation",
 )
 STAGES = [RUN, REPLAY, EVALUATE]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -16,6 +17,7 @@ from stages.agent.body import Base
 from stages.agent.obstacle_map import CELL
 
 MOST_PANELS = 6
+VIEWS, VIEWS_ACROSS = 24, 6
 DOTS = 100
 SHADES = np.array([0.72, 1.0, 0.35])
 """Of unknown, free and occupied cells."""
@@ -65,3 +67,14 @@ def _draw(axes, panel: Panel) -> None:  # type: ignore[no-untyped-def]
     axes.set_title(panel.title[:48], fontsize=7, parse_math=False)
     axes.set_xticks([])
     axes.set_yticks([])
+
+
+def write_views(path: Path, pictures: Sequence[tuple[str, np.ndarray]]) -> None:
+    """Write the last pictures of the wrist camera (H, W, 3) uint8, all of one size, as one sheet; nothing for none."""
+    if not pictures:
+        return
+    last = [color for _, color in pictures[-VIEWS:]]
+    last += [np.full_like(last[0], 255)] * (-len(last) % VIEWS_ACROSS)
+    rows = [np.concatenate(last[k : k + VIEWS_ACROSS], axis=1) for k in range(0, len(last), VIEWS_ACROSS)]
+    sheet = np.ascontiguousarray(np.concatenate(rows)[..., ::-1])
+    path.write_bytes(cv2.imencode(".png", sheet)[1].tobytes())

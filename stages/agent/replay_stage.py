@@ -30,6 +30,7 @@ def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context
         Rates().scaled(file.failures, file.perception),
         file.seed,
         Limits(turns=file.most_turns),
+        world=file.simulation,
     )
     made = write_episode(
         context.output,

@@ -37,6 +37,7 @@ def run(world: Path | None, transcript: Path | None, *, parameters: RunParameter
         Rates().scaled(parameters.failures, parameters.perception),
         context.seed,
         Limits(turns=parameters.turns),
+        world=parameters.simulation,
     )
     chat = _chat(parameters, transcript, context) if parameters.brain == "language" else None
     brain: Brain = LanguageBrain(words, chat) if chat is not None else rules_brain(setting, parameters.arm)

@@ -11,8 +11,8 @@ from stages.agent.goals import CARRIERS
 from stages.agent.language.values import ObjectMap, SceneObject
 from stages.agent.obstacle_map import ObstacleMap
 
-SAME_FURNITURE, SAME_THING = 0.3, 0.04
-"""Two sightings this near are of one thing [m]."""
+SAME_FURNITURE = 0.3
+"""Two sightings of furniture this near are of one piece [m], and those of a class whose boxes overlap."""
 IN_FRONT = 0.7
 """Furniture whose edge is this near to the base is in front of it [m]."""
 Region = tuple[int | str, bool]
@@ -66,14 +66,15 @@ class SceneMap:
     def __init__(self, body: Body) -> None:
         self.furniture: dict[str, SeenFurniture] = {}
         self.items: dict[str, Item] = {}
-        self.obstacles = ObstacleMap(body.base)
+        self.obstacles = ObstacleMap(body.base, body.clearance)
         self._named: Counter[str] = Counter()
+        self._same_thing = body.same_thing
 
     def sweep(self, body: Body) -> int:
         """Turn the head camera around and enter what it saw; return how many cells are new."""
         sweep = body.sweep()
         for seen in sweep.furniture:
-            key = next((k for k, f in self.furniture.items() if _apart(f.centre, seen.centre) < SAME_FURNITURE), None)
+            key = next((k for k, f in self.furniture.items() if _same_piece(f, seen)), None)
             self.furniture[key or self._name(seen.label)] = seen
         return self.obstacles.add(sweep)
 
@@ -97,7 +98,7 @@ class SceneMap:
     def at(self, position: Position, place: str) -> Item | None:
         """Return the thing of a place that a sighting at a position is of."""
         near = [(_apart(i.position, position), i.key) for i in self.items.values() if i.place == place]
-        return self.items[min(near)[1]] if near and min(near)[0] <= SAME_THING else None
+        return self.items[min(near)[1]] if near and min(near)[0] <= self._same_thing else None
 
     def carrier_of(self, item: Item) -> str:
         """Return the key of the small carrier on which a thing lies, or nothing."""
@@ -136,6 +137,13 @@ class SceneMap:
 
 def _apart(a: tuple[float, ...], b: tuple[float, ...]) -> float:
     return hypot(a[0] - b[0], a[1] - b[1])
+
+
+def _same_piece(a: SeenFurniture, b: SeenFurniture) -> bool:
+    if _apart(a.centre, b.centre) < SAME_FURNITURE:
+        return True
+    sides = zip(a.centre, b.centre, a.size, b.size, strict=True)
+    return a.label == b.label and all(abs(p - q) < (s + t) / 2 for p, q, s, t in sides)
 
 
 def edge_distance(piece: SeenFurniture, x: float, y: float) -> float:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from schemas.apartment import Apartment
+from schemas.errors import UsageError
 from stages.agent.arms.registry import ARMS
 from stages.agent.arms.skills import CommonSkills
 from stages.agent.brains.brain import Brain
@@ -13,11 +15,15 @@ from stages.agent.brains.open_loop import OpenLoopBrain
 from stages.agent.brains.rules import RulesBrain
 from stages.agent.brains.slips import Slips
 from stages.agent.brains.words import NotUnderstood, understood
-from stages.agent.goals import Goal, sought
+from stages.agent.goals import Goal, Move, descriptions, sought
 from stages.agent.session import Limits, Session, Turn, run_session
-from stages.agent.world.failures import Luck, Rates
+from stages.agent.world.failures import Rates
 from stages.agent.world.fast import FastWorld
 from stages.agent.world.floor import Floor
+from stages.agent.world.truth import World
+from stages.kit.rendering.segmenter_errors import Luck
+
+WorldName = Literal["fast", "physics"]
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,7 @@ class Setting:
     limits: Limits = Limits()
     floor: Floor | None = None
     """Of the apartment, where several trials share it."""
+    world: WorldName = "fast"
 
 
 def goals_of(words: str) -> tuple[Goal, ...]:
@@ -43,9 +50,21 @@ def goals_of(words: str) -> tuple[Goal, ...]:
         return ()
 
 
-def open_world(setting: Setting, arm: str) -> FastWorld:
-    """Return the world of a trial: its eyes are prompted with the classes that the goals name."""
+def open_world(setting: Setting, arm: str) -> World:
+    """Return the world of a trial: its eyes are prompted with the classes that the goals name. Close it.
+
+    In physics what hides a thing is in the way of the camera, so that hiding is not drawn. Raises UsageError for goals
+    with doors there.
+    """
     rates = setting.rates.with_true_eyes() if ARMS[arm].true_eyes else setting.rates
+    if setting.world == "physics":
+        from stages.agent.world.physics.body import DOORS, PhysicsBody  # heavy: pybullet and Open3D
+
+        if any(set(each.labels) & set(DOORS) for goal in setting.goals for each in descriptions(goal)) or any(
+            isinstance(goal, Move) and goal.start in DOORS for goal in setting.goals
+        ):
+            raise UsageError("doors of the physics world do not move", hint="give --simulation fast")
+        return PhysicsBody(setting.apartment, sought(setting.goals), replace(rates, hidden=0.0), setting.seed)
     return FastWorld(setting.apartment, sought(setting.goals), rates, setting.seed, setting.floor)
 
 
@@ -67,9 +86,9 @@ def run_trial(
     brain: Brain | None = None,
     *,
     one_program: bool = False,
-    watch: Callable[[Turn, CommonSkills, FastWorld], None] | None = None,
-) -> tuple[Session, FastWorld]:
-    """Run one trial. A brain that is given answers turn by turn, unless it is to say `one_program`."""
+    watch: Callable[[Turn, CommonSkills, World], None] | None = None,
+) -> tuple[Session, World]:
+    """Run one trial; close its world. A brain that is given answers turn by turn, unless it is to say `one_program`."""
     world = open_world(setting, arm)
     skills = ARMS[arm].skills(world)
 

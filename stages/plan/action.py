@@ -12,11 +12,11 @@ import numpy as np
 from schemas.plan import Check
 from schemas.scene_parts import Joint
 from stages.kit.declared import declared_in
+from stages.kit.motion.physical_robot import PhysicalRobot
+from stages.kit.motion.segments import Manipulation
 from stages.kit.tasks.strips import Schema
 from stages.plan.believed_tree import TreeState
 from stages.plan.checks import GoalInRoom
-from stages.plan.execution import PhysicalRobot
-from stages.plan.motions import Manipulation
 from stages.plan.pick_place import Budgets, GraspStyle
 from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
 

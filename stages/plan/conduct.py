@@ -11,19 +11,19 @@ from schemas.interactive_scene import SceneBody
 from schemas.plan import BodyMatch, Failure
 from schemas.scene_parts import Joint, SurfacePlane
 from stages.kit.geometry.transforms import inverse
+from stages.kit.motion.arm_motion import ArmPlanner, Tally
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.kinematics import forward
+from stages.kit.motion.physical_robot import PhysicalRobot
+from stages.kit.motion.segments import Segment, whole_body
 from stages.kit.simulation.robot import base_pose
 from stages.plan.action import MotionRequest, action_named
-from stages.plan.arm_motion import ArmPlanner, Tally
 from stages.plan.carriers import NOTHING, carrier
 from stages.plan.correspondence import match_joint, renamed
-from stages.plan.execution import PhysicalRobot, true_record
 from stages.plan.level_carrying import LEVEL_PACE, levelled
-from stages.plan.motions import Segment, whole_body
 from stages.plan.pick_place import Budgets
 from stages.plan.refinement import DRIVE, Step, grasp_style, refine_action
-from stages.plan.world_model import RobotState, WorldModel
+from stages.plan.world_model import RobotState, WorldModel, true_record
 
 NOT_THERE = "not_found"
 """Failure of an action on what the room does not have: neither another attempt nor another plan helps."""

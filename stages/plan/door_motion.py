@@ -9,15 +9,15 @@ import numpy as np
 
 from schemas.scene_parts import Joint
 from stages.kit.geometry.transforms import apply, inverse
+from stages.kit.motion.arm_motion import ARM_RESOLUTION, ArmPlanner, Tally
 from stages.kit.motion.base_placement import sample_bases, shoulder_distance
 from stages.kit.motion.cartesian import follow
 from stages.kit.motion.collision import Collision
 from stages.kit.motion.doors import ContactPoint, body_from_moved, closing_direction, push_points, tool_poses
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.rrt_connect import densify
+from stages.kit.motion.segments import Manipulation, Segment, whole_body
 from stages.kit.simulation.robot import Configuration, base_pose
-from stages.plan.arm_motion import ARM_RESOLUTION, ArmPlanner, Tally
-from stages.plan.motions import Manipulation, Segment, whole_body
 from stages.plan.pick_place import Budgets
 from stages.plan.world_model import RobotState, WorldModel
 
@@ -241,7 +241,7 @@ def _try_arc(
     start = planner.reachable(base, poses[0], tally)
     if start is None:
         return None
-    arms = _arc(planner, base, arc, poses, start, tally)
+    arms = _arc(model, planner, base, arc, poses, start, tally)
     if arms is None:
         return None
     checker = model.checker
@@ -287,13 +287,19 @@ def _try_arc(
 
 
 def _arc(
-    planner: ArmPlanner, base: np.ndarray, arc: Arc, poses: list[np.ndarray], start: np.ndarray, tally: Tally
+    model: WorldModel,
+    planner: ArmPlanner,
+    base: np.ndarray,
+    arc: Arc,
+    poses: list[np.ndarray],
+    start: np.ndarray,
+    tally: Tally,
 ) -> np.ndarray | None:
     """Return arm values (K, 7) along the poses, free with the door where it is at each of them."""
-    model, body, joint, values = planner.model, arc.body, arc.joint, arc.values
+    body, joint, values = arc.body, arc.joint, arc.values
     frame = inverse(base_pose(base, model.description))
     try:
-        arms = follow(planner.model.chain, [frame @ pose for pose in poses], start)
+        arms = follow(model.chain, [frame @ pose for pose in poses], start)
     except MotionFailed as failed:
         tally.unreachable += 1
         tally.nearest = min(tally.nearest, failed.failure.numbers["distance"])

@@ -16,7 +16,7 @@ from mcap_protobuf.schema import build_file_descriptor_set
 
 from schemas.scene_parts import Camera
 from stages.kit.formats import foxglove
-from stages.plan.recording import Snapshot
+from stages.kit.motion.recording import Snapshot
 
 COLOR, CALIBRATION, TRANSFORMS = "/camera/color", "/camera/calibration", "/tf"
 _KINDS: dict[str, type[Message]] = {COLOR: CompressedImage, CALIBRATION: CameraCalibration, TRANSFORMS: FrameTransforms}

@@ -6,11 +6,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stages.kit.geometry.transforms import inverse, transform_from_yaw
+from stages.kit.motion.arm_motion import ArmPlanner, Tally
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.kinematics import forward
+from stages.kit.motion.segments import Manipulation, Segment, whole_body
 from stages.kit.simulation.robot import Configuration, base_pose
-from stages.plan.arm_motion import ArmPlanner, Tally
-from stages.plan.motions import Manipulation, Segment, whole_body
 from stages.plan.placements import Placement
 from stages.plan.world_model import RobotState, WorldModel
 

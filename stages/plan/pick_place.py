@@ -9,14 +9,14 @@ from typing import Literal
 import numpy as np
 
 from stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from stages.kit.motion.arm_motion import ArmPlanner, Tally
 from stages.kit.motion.base_placement import free_bases, sample_bases
 from stages.kit.motion.collision import RESTING_DEPTH
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.grasps import Grasp, narrowest_width, sample_grasps
+from stages.kit.motion.segments import Manipulation, Segment, whole_body
 from stages.kit.simulation.robot import Configuration
-from stages.plan.arm_motion import ArmPlanner, Tally
 from stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
-from stages.plan.motions import Manipulation, Segment, whole_body
 from stages.plan.placements import PLACES, Placement, place_regions, sample_placements
 from stages.plan.rim_grasps import rim_grasps
 from stages.plan.tray_loading import lifts_left, load_moments

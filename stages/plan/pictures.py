@@ -10,13 +10,13 @@ import trimesh
 from schemas.interactive_scene import SceneBody
 from schemas.scene_parts import Camera
 from stages.kit.geometry.transforms import apply, look_at
+from stages.kit.motion.recording import Snapshot
 from stages.kit.rendering.light_map import AreaLight
 from stages.kit.rendering.ray_casting import SceneRenderer
 from stages.kit.rendering.surfaces import TriangleSoup, build_soup
 from stages.kit.simulation.robot_description import PEDESTAL_LINK, RobotDescription, mobile_robot_urdf
 from stages.kit.simulation.shapes import has_colors, link_shapes, paint
 from stages.kit.simulation.world import PhysicsWorld
-from stages.plan.recording import Snapshot
 
 ROBOT_COLORS = {"hand": (70, 72, 78), "finger": (40, 42, 46), PEDESTAL_LINK: (58, 66, 84), "link": (236, 238, 240)}
 PALETTE = ((166, 143, 120), (139, 158, 171), (171, 139, 139), (146, 164, 136), (181, 166, 127), (150, 141, 168))

@@ -10,13 +10,13 @@ import numpy as np
 from schemas.plan import Failure, TriedPlan
 from stages.kit.motion.base_placement import plan_drive
 from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.segments import Manipulation, Segment
 from stages.kit.tasks.fast_downward import plan_with_fast_downward
 from stages.kit.tasks.strips import Atom, Domain, GroundAction, Problem, apply_action, atom_text, ground
 from stages.kit.tasks.task_planner import Heuristic, TaskPlan, plan_task
 from stages.plan.action import MotionRequest, action_named
 from stages.plan.domain import START
 from stages.plan.learning import Lessons
-from stages.plan.motions import Manipulation, Segment
 from stages.plan.pick_place import Budgets, GraspStyle
 from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
 

@@ -12,6 +12,7 @@ from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene, SceneBody
 from schemas.plan import BodyMatch, Check, Failure, TreeDifference, TriedPlan
 from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.physical_robot import PhysicalRobot
 from stages.kit.simulation.robot import Configuration
 from stages.kit.simulation.world import load_scene, read_scene_bodies
 from stages.kit.stage import Context
@@ -19,7 +20,6 @@ from stages.plan.assumptions import Belief, match_beliefs
 from stages.plan.believed_tree import TreeState
 from stages.plan.conduct import Conduct, Room, joint_pairs
 from stages.plan.correspondence import match_bodies
-from stages.plan.execution import PhysicalRobot
 from stages.plan.execution_log import write_execution
 from stages.plan.goal_checks import check_goal
 from stages.plan.parameters import PlanParameters

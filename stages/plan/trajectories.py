@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from stages.kit.geometry.transforms import transform_from_yaw
+from stages.kit.motion.recording import Snapshot
 from stages.kit.motion.timing import sample_times, time_path
 from stages.kit.simulation.robot_description import RobotDescription
-from stages.plan.recording import Snapshot
 from stages.plan.refinement import Step
 
 PERIOD = 0.05

@@ -325,3 +325,9 @@ def hold_for_checks(model: WorldModel, state: RobotState) -> None:
         model.checker.carry(state.holding, state.tool_from_item)
     else:
         model.checker.put_down()
+
+
+def true_record(world: PhysicsWorld, name: str, record: SceneBody) -> SceneBody:
+    """Return the record of a body with the pose and joint values that it has in a world now."""
+    joints = {joint: world.joint_value(name, joint) for joint in world.bodies[name].joints}
+    return moved_record(record, world.pose(name), joints)

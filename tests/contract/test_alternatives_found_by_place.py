@@ -202,7 +202,7 @@ from schemas.plan import Check
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.tasks.strips import Schema
 from stages.plan.action import PlanAction
-from stages.plan.motions import Manipulation, Segment
+from stages.kit.motion.segments import Manipulation, Segment
 class Wipe(PlanAction):
     name, order, predicates = "wipe", 90, {"wiped": ("support",)}
     goals = {"wiped": lambda goal: Check(condition=goal.literal, holds=True, detail="shines")}

@@ -127,7 +127,7 @@ CORES = (
         "segment.backends.network.grouping",
     ),
     *("poses.tracking", "poses.estimation"),
-    *("plan.world_model", "plan.pick_place", "plan.door_motion", "plan.conduct", "plan.execution", "plan.refinement"),
+    *("plan.world_model", "plan.pick_place", "plan.door_motion", "plan.conduct", "plan.refinement"),
 )
 
 

@@ -10,9 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import hypot
 
+from schemas.plan import Failure
 from stages.agent.arms.skills import CommonSkills
 from stages.agent.arms.stations import around, drivable, other_sides
 from stages.agent.body import Base, Body, Position
+from stages.agent.exploration import explore
 from stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
 from stages.agent.scene_map import Item, quarter
 
@@ -58,6 +60,7 @@ class OwnSkills(CommonSkills):
         self._off: list[Position] = []
         """Spots from which something rolled off."""
         self._looked: dict[str, set[int]] = {}
+        self._explored = False
 
     # ---- eyes ----
 
@@ -129,7 +132,10 @@ class OwnSkills(CommonSkills):
 
     def _go_round(self, place: str, seen: set[int]) -> bool:
         """Drive to another side of furniture; False where none can be got to."""
-        return any(self.drive(base, place) for _, base in other_sides(self.scene, place, self._body.base, seen)[:2])
+        return any(
+            self.drive(base, place)
+            for _, base in other_sides(self.scene, place, self._body.base, seen, self._body.stand_off)[:2]
+        )
 
     def _in_hand(self) -> str:
         """Return the class that two views of the hand agree on, empty for an empty hand."""
@@ -148,8 +154,8 @@ class OwnSkills(CommonSkills):
         """Drive before furniture, to a side from which it was not looked at yet as long as there is one."""
         place = target.key if target.key in self.scene.furniture else self.scene.items[target.key].place
         seen = self._looked.get(place, set()) if self._use.other_sides else set()
-        poses = other_sides(self.scene, place, self._body.base, seen) or drivable(
-            self.scene, self._body.base, around(self.scene.furniture[place])
+        poses = other_sides(self.scene, place, self._body.base, seen, self._body.stand_off) or drivable(
+            self.scene, self._body.base, around(self.scene.furniture[place], self._body.stand_off)
         )
         for _, base in poses[: TRIES if self._use.repair else 1]:
             if self.drive(base, place):
@@ -161,7 +167,7 @@ class OwnSkills(CommonSkills):
         tried: list[Base] = []
         while len(tried) < TRIES:
             poses = [(0.0, self._body.base)] if self.scene.in_front(self._body.base) == place else []
-            poses += drivable(self.scene, self._body.base, around(self.scene.furniture[place]))
+            poses += drivable(self.scene, self._body.base, around(self.scene.furniture[place], self._body.stand_off))
             known = tried + (self._bad.get(place, []) if self._use.memory else [])
             fresh = [
                 base
@@ -170,7 +176,11 @@ class OwnSkills(CommonSkills):
                 and (not self._use.reachability or self._body.reaches(base, at))
             ]
             if not fresh:
-                return
+                if not self._body.short_armed or self._explored:
+                    return
+                self._explored = True
+                explore(self._body, self.scene)
+                continue
             tried.append(fresh[0])
             yield fresh[0]
 
@@ -180,12 +190,13 @@ class OwnSkills(CommonSkills):
     def _failed_from(self, place: str, base: Base) -> None:
         self._bad.setdefault(place, []).append(base)
 
-    def _unreachable(self, place: str, tries: int) -> Outcome:
+    def _unreachable(self, place: str, tries: int, last: Failure | None = None) -> Outcome:
+        """Say that all base poses failed, and what motion planning or control said the last time."""
         piece = self.scene.furniture[place]
         why = f"the arm gets to nothing on {place} ({piece.label}, {piece.height:.1f} m high)"
-        return Outcome(
-            False, "unreachable", f"{why}: {tries} base poses failed", {"height": piece.height, "base_poses": tries}
-        )
+        numbers = {"height": piece.height, "base_poses": float(tries), **(last.numbers if last else {})}
+        said = f"{why}: {tries} base poses failed{f'; {last.message}' if last else ''}"
+        return Outcome(False, "unreachable", said, numbers)
 
     def grasp(self, item: Item) -> Outcome:
         """Make sure of what it is, take it, and make sure that it is held."""
@@ -197,6 +208,7 @@ class OwnSkills(CommonSkills):
             if item.label != believed:
                 return Outcome(False, "wrong_object", f"{item.key} is rather a {item.label}", label=item.label)
         place, candidate, tries = item.place, 0, 0
+        last: Failure | None = None
         for base in self._stations(place, item.position):
             if tries and not self._use.repair:
                 break
@@ -207,6 +219,7 @@ class OwnSkills(CommonSkills):
                 tries += 1
                 felt = self._body.grasp(item.position, item.label, candidate)
                 if not felt.ok:
+                    last = felt.failure
                     self._failed_from(place, base)
                     break
                 held = self._in_hand() if self._use.recheck else item.label
@@ -217,7 +230,7 @@ class OwnSkills(CommonSkills):
                     return Outcome(False, "not_held", f"{item.key} slipped out of the hand")
                 if not self._found_again(item):
                     return Outcome(False, "gone", f"{item.key} slipped and is not seen any more")
-        return self._unreachable(place, tries)
+        return self._unreachable(place, tries, last)
 
     def _holds(self, item: Item, held: str) -> Outcome:
         believed = item.label
@@ -250,6 +263,7 @@ class OwnSkills(CommonSkills):
     def place_at(self, place: str, label: str, at: list[Position]) -> Outcome:
         """Try the positions, each from base poses that reach it."""
         tries = 0
+        last: Failure | None = None
         for position in at:
             for base in self._stations(place, position):
                 if tries >= (TRIES if self._use.repair else 1):
@@ -257,10 +271,12 @@ class OwnSkills(CommonSkills):
                 tries += 1
                 if not self._there(base, place):
                     continue
-                if self._body.release(position, label).ok:
+                felt = self._body.release(position, label, gently=True)
+                if felt.ok:
                     return self._lies(place, label, position)
+                last = felt.failure
                 self._failed_from(place, base)
-        return self._unreachable(place, tries)
+        return self._unreachable(place, tries, last)
 
     def _lies(self, place: str, label: str, at: Position) -> Outcome:
         """Look at the spot from two regions of views; say where it lies if not there."""

@@ -8,8 +8,6 @@ from stages.agent.body import Base, Position, SeenFurniture
 from stages.agent.goals import NEAR_MIDDLE
 from stages.agent.scene_map import Item, SceneMap, quarter
 
-OFF = 0.45
-"""Of the middle of the base from the edge of furniture [m]."""
 APART = 0.35
 """Between neighbouring base poses along an edge [m]."""
 FINE = 0.03
@@ -25,14 +23,14 @@ def facing(x: float, y: float, at: tuple[float, ...]) -> Base:
     return Base(x, y, atan2(at[1] - y, at[0] - x))
 
 
-def middles(piece: SeenFurniture) -> list[Base]:
-    """Return the four base poses before the middles of the sides."""
-    (x, y), (w, d) = piece.centre, (piece.size[0] / 2 + OFF, piece.size[1] / 2 + OFF)
+def middles(piece: SeenFurniture, off: float) -> list[Base]:
+    """Return the four base poses before the middles of the sides, `off` [m] from them."""
+    (x, y), (w, d) = piece.centre, (piece.size[0] / 2 + off, piece.size[1] / 2 + off)
     return [facing(*p, piece.centre) for p in ((x, y - d), (x, y + d), (x - w, y), (x + w, y))]
 
 
-def around(piece: SeenFurniture) -> list[Base]:
-    """Return base poses along all four sides."""
+def around(piece: SeenFurniture, off: float) -> list[Base]:
+    """Return base poses along all four sides, `off` [m] from them."""
     (x, y), (w, d) = piece.centre, piece.size
     poses = []
     for length, across, turned in ((w, d, False), (d, w, True)):
@@ -40,7 +38,7 @@ def around(piece: SeenFurniture) -> list[Base]:
         for k in range(count):
             along = (k + 0.5) / count * length - length / 2
             for side in (-1, 1):
-                out = side * (across / 2 + OFF)
+                out = side * (across / 2 + off)
                 px, py = (x + out, y + along) if turned else (x + along, y + out)
                 look = (x, y + along) if turned else (x + along, y)
                 poses.append(facing(px, py, look))
@@ -94,8 +92,8 @@ def spots_near(scene: SceneMap, place: str, middle: Position) -> list[Position]:
     return sorted(free, key=lambda p: hypot(p[0] - x, p[1] - y)) or [middle]
 
 
-def other_sides(scene: SceneMap, place: str, base: Base, seen: set[int]) -> list[tuple[float, Base]]:
+def other_sides(scene: SceneMap, place: str, base: Base, seen: set[int], off: float) -> list[tuple[float, Base]]:
     """Return the base poses before furniture from quarters from which it was not looked at, the nearest first."""
     piece = scene.furniture[place]
-    poses = [p for p in around(piece) if quarter(p, piece.centre) not in seen]
+    poses = [p for p in around(piece, off) if quarter(p, piece.centre) not in seen]
     return drivable(scene, base, poses)

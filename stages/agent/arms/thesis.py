@@ -49,12 +49,14 @@ class ThesisSkills(CommonSkills):
         """Drive to the pose nearest to the robot of those that face furniture, or the nearest to a thing."""
         if target.key in self.scene.furniture:
             piece = self.scene.furniture[target.key]
-            poses = drivable(self.scene, self._body.base, middles(piece))
+            poses = drivable(self.scene, self._body.base, middles(piece, self._body.stand_off))
             away = [abs(p.x - piece.centre[0]) + abs(p.y - piece.centre[1]) for _, p in poses]
             poses = [pair for pair, far in zip(poses, away, strict=True) if far <= min(away) + SHORT]
         else:
             item = self.scene.items[target.key]
-            poses = drivable(self.scene, self._body.base, around(self.scene.furniture[item.place]))
+            poses = drivable(
+                self.scene, self._body.base, around(self.scene.furniture[item.place], self._body.stand_off)
+            )
             poses.sort(key=lambda pair: abs(pair[1].x - item.position[0]) + abs(pair[1].y - item.position[1]))
         return Outcome(bool(poses) and self.drive(poses[0][1], target.key))
 

@@ -13,11 +13,11 @@ something that the cause hangs on has changed (another base, another grasp, the 
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, replace
 
+from stages.kit.rendering.segmenter_errors import GRASPS, SegmenterRates
+
 EXECUTIONS = 262
-GRASPS = 140 / 2 + 122 / 4
 PLACES = 140 / 2 + 122 / 4
 DRIVES = 122 / 2
 CHECKS = GRASPS + PLACES
@@ -34,25 +34,12 @@ TABLE_3_4 = {
 """Cause -> failures that led to the failure of the task, recovered ones, as printed (rows of recovered sum to 32)."""
 COUNTS = {"false_positive": 8, "missed": 2, "feedback": 3, "api": 8, "grasp": 24, "place": 6, "navigation": 1}
 """The printed totals."""
-OTHERS_IN_VIEW = 5
-"""**Assumed**: things beside a sought one, each of which may be taken for it."""
-STAYS_CONFUSED = 3 / 8
-"""Three of eight false detections passed the look from near by and led to failure: taken as the chance that a thing
-that can be confused is confused from any one region of views."""
 
 
 @dataclass(frozen=True)
-class Rates:
+class Rates(SegmenterRates):
     """Chances, each per draw. `base`, `slip` of a grasp; `shut`, `roll` of a place (no trajectory; rolls off)."""
 
-    confusable: float = COUNTS["false_positive"] / GRASPS / OTHERS_IN_VIEW / STAYS_CONFUSED
-    """That a thing looks like another that is sought."""
-    confused: float = STAYS_CONFUSED
-    """That such a thing is taken for it, from one region of views."""
-    hidden: float = COUNTS["missed"] / GRASPS / 2
-    """That a thing is not seen from one side, near or far."""
-    missed: float = COUNTS["missed"] / GRASPS / 2
-    """That a thing is not detected from one region of views."""
     feedback: float = COUNTS["feedback"] / CHECKS
     """That one view of an outcome is misjudged."""
     api: float = COUNTS["api"] / EXECUTIONS
@@ -77,20 +64,3 @@ class Rates:
     def with_true_eyes(self) -> Rates:
         """Return the rates of the arm `oracle`: its eyes never err, and its reachability check tells everything."""
         return replace(self, confusable=0.0, hidden=0.0, missed=0.0, feedback=0.0, foreseen=1.0)
-
-
-class Luck:
-    """Draws that are the same whenever they are asked for."""
-
-    def __init__(self, seed: int) -> None:
-        self._seed = seed
-
-    def uniform(self, *key: object) -> float:
-        """Return the number in [0, 1) of a key."""
-        text = repr((self._seed, *map(str, key)))
-        digest = hashlib.blake2b(text.encode(), digest_size=8).digest()
-        return int.from_bytes(digest, "big") / 2**64
-
-    def happens(self, rate: float, *key: object) -> bool:
-        """Return whether the number of a key is below a rate: what happens at a rate happens at every higher one."""
-        return self.uniform(*key) < rate

@@ -12,8 +12,10 @@ import numpy as np
 
 from schemas.apartment import Apartment, Furniture, Thing
 from stages.agent.body import Base, Detection, Felt, Look, Position, SeenFurniture, Sweep
-from stages.agent.world.failures import Luck, Rates
+from stages.agent.world.events import Event, EventLog
+from stages.agent.world.failures import Rates
 from stages.agent.world.floor import Floor
+from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors
 
 REACH, HIGHEST = 1.3, 1.4
 """Of the arm from the middle of the base over the ground, and the highest place [m]."""
@@ -51,37 +53,29 @@ class Body:
     """How often it came to lie anew: what hangs on its pose is drawn anew then."""
 
 
-@dataclass(frozen=True)
-class Event:
-    """An execution, or a failure of the eyes, as it truly went."""
-
-    verb: str
-    """`drive`, `grasp`, `release`, `pull`; `look` for what the eyes got wrong."""
-    step: str
-    """What was to be achieved: executions of one step are tries of the same thing."""
-    ok: bool
-    cause: str = ""
-    replanned: bool = False
-    """The same step had failed before."""
-
-
 class FastWorld:
     """One episode's world. `sought`: classes that the eyes are prompted with; `floor`: if it is worked out already."""
+
+    same_thing, stand_off, clearance, short_armed = 0.04, 0.45, 3.0, False
 
     def __init__(
         self, apartment: Apartment, sought: tuple[str, ...], rates: Rates, seed: int, floor: Floor | None = None
     ) -> None:
         self.apartment, self._sought, self._rates, self._luck = apartment, sought, rates, Luck(seed)
+        self._errors = SegmenterErrors(rates, self._luck, sought)
         self.bodies = {thing.name: Body(thing, thing.on, thing.at) for thing in apartment.things}
         self.furniture = {piece.name: piece for piece in apartment.furniture}
-        self.opened = {piece.name for piece in apartment.furniture if piece.opened}
+        self.opened: set[str] = {piece.name for piece in apartment.furniture if piece.opened}
         self.held: str | None = None
-        self.events: list[Event] = []
-        self._failed: set[str] = set()
+        self.pictures: list[tuple[str, np.ndarray]] = []
+        self._log = EventLog()
         self._grasps = 0
         self._base = Base(*apartment.start)
         self._seconds = self.metres = 0.0
         self._floor = floor or Floor(apartment)
+
+    def close(self) -> None:
+        """Nothing is held open."""
 
     # ---- what the robot may ask ----
 
@@ -137,7 +131,7 @@ class FastWorld:
         self._seconds += SECONDS["hand"]
         held = self.bodies[self.held] if self.held else None
         if self._luck.happens(self._rates.feedback, "feedback", self._grasps, view):
-            self._mistaken("feedback", f"hand {self._grasps}")
+            self._log.mistaken("feedback", f"hand {self._grasps}")
             return self._named(self._other(), self._hand_position(), "", 0.04) if held is None else None
         if held is None:
             return None
@@ -184,8 +178,8 @@ class FastWorld:
         self._done("grasp", step, right, "" if right else "false_positive")
         return Felt(True)
 
-    def release(self, at: Position, label: str) -> Felt:
-        """Let go over a position; it may roll off unseen."""
+    def release(self, at: Position, label: str, *, gently: bool = False) -> Felt:
+        """Let go over a position; it may roll off unseen, from however low."""
         self._seconds += SECONDS["release"]
         carrier = self._carrier(at)
         onto = self._label_of(carrier) if carrier else "floor"
@@ -228,20 +222,13 @@ class FastWorld:
 
     # ---- how it truly is ----
 
-    def _done(self, verb: str, step: str, ok: bool, cause: str = "") -> None:
-        """Log an execution. Taking the right thing is another try of what took a wrong one of that class before."""
-        same = {step}
-        if verb == "grasp" and self.held is not None:
-            same.add(f"grasp a {self.bodies[self.held].thing.label}")
-        self.events.append(Event(verb, step, ok, "" if ok else cause, bool(same & self._failed)))
-        if ok:
-            self._failed -= same
-        else:
-            self._failed.add(step)
+    @property
+    def events(self) -> list[Event]:
+        """What was done and what the eyes got wrong, in order."""
+        return self._log.events
 
-    def _mistaken(self, cause: str, step: str) -> None:
-        if not any(e.cause == cause and e.step == step for e in self.events):
-            self.events.append(Event("look", step, False, cause))
+    def _done(self, verb: str, step: str, ok: bool, cause: str = "") -> None:
+        self._log.done(verb, step, ok, cause, self.bodies[self.held].thing.label if self.held is not None else "")
 
     def _seen(self, piece: Furniture) -> SeenFurniture:
         x, y = (c + FURNITURE_NOISE * self._normal("furniture", piece.name, k) for k, c in enumerate(piece.centre))
@@ -261,11 +248,10 @@ class FastWorld:
 
     def _detected(self, body: Body, sector: int, close: bool) -> Detection | None:
         name = body.thing.name
-        hidden = self._luck.happens(self._rates.hidden, "hidden", name, body.moved, sector)
         region = (sector, close)
-        if hidden or self._luck.happens(self._rates.missed, "missed", name, body.moved, *region):
+        if self._errors.misses(name, body.moved, *region):
             if body.thing.label in self._sought:
-                self._mistaken("missed", f"look {name}")
+                self._log.mistaken("missed", f"look {name}")
             return None
         used = body.thing.used if close else None
         if close and self._luck.happens(self._rates.feedback, "used", name, *region):
@@ -281,16 +267,7 @@ class FastWorld:
         )
 
     def _label(self, body: Body, *region: object) -> str:
-        """Return the class that the eyes see in a region of views: the true one, or for good another that is sought."""
-        thing = body.thing
-        others = [label for label in self._sought if label != thing.label]
-        if (
-            others
-            and self._luck.happens(self._rates.confusable, "confusable", thing.name)
-            and self._luck.happens(self._rates.confused, "confused", thing.name, *region)
-        ):
-            return others[int(self._luck.uniform("taken for", thing.name) * len(others))]
-        return thing.label
+        return self._errors.class_of(body.thing.name, body.thing.label, *region)
 
     def _other(self) -> str:
         return self._sought[0] if self._sought else "thing"

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from schemas.plan import Check
+from stages.kit.motion.segments import Manipulation
 from stages.kit.tasks.strips import Schema
 from stages.plan.action import Execution, MotionRequest, PlanAction
 from stages.plan.believed_tree import TreeState
 from stages.plan.carriers import HAND
 from stages.plan.checks import GoalInRoom
-from stages.plan.motions import Manipulation
 from stages.plan.pick_place import plan_pick
 from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
 

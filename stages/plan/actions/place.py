@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.segments import Manipulation
 from stages.kit.tasks.strips import Schema
 from stages.plan.action import Execution, MotionRequest, PlanAction
 from stages.plan.believed_tree import TreeState
 from stages.plan.carriers import carried_by, carrier
 from stages.plan.checks import check_in, check_on
-from stages.plan.motions import Manipulation
 from stages.plan.pick_place import GraspStyle, plan_place
 from stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level, placement_style
 from stages.plan.world_model import RobotState, WorldModel

@@ -14,8 +14,9 @@ from stages.agent.fast_marching import distances
 from stages.agent.goals import Move, Shut, kind
 from stages.agent.scene_map import SceneMap
 from stages.agent.tasks import TASKS, make_apartment
-from stages.agent.world.failures import COUNTS, EXECUTIONS, GRASPS, PLACES, TABLE_3_4, Luck, Rates
+from stages.agent.world.failures import COUNTS, EXECUTIONS, GRASPS, PLACES, TABLE_3_4, Rates
 from stages.agent.world.fast import FastWorld
+from stages.kit.rendering.segmenter_errors import Luck
 
 NOTHING_FAILS = Rates().scaled(0.0, 0.0)
 

@@ -12,11 +12,11 @@ import pytest
 from schemas.plan import BodyMatch
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.segments import Manipulation
 from stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
 from stages.plan import conduct as conduct_module
 from stages.plan.actions.place import MOST_TILT, Place
 from stages.plan.conduct import Conduct, Room
-from stages.plan.motions import Manipulation
 from stages.plan.pick_place import Budgets
 from stages.plan.refinement import Step
 from stages.plan.world_model import RobotState, WorldModel

@@ -12,6 +12,7 @@ from schemas.contact_graph import ContactGraphFile
 from schemas.errors import UsageError
 from schemas.plan import BodyMatch, Failure
 from stages.kit.geometry.transforms import inverse, transform_from_yaw
+from stages.kit.motion.segments import Manipulation
 from stages.kit.tasks.strips import GroundAction, ground
 from stages.kit.tasks.task_planner import plan_task
 from stages.plan.assumptions import believe, match_beliefs, parse_priors
@@ -19,7 +20,6 @@ from stages.plan.carriers import HAND
 from stages.plan.domain import DOMAIN
 from stages.plan.joined_bodies import _roll_pitch_yaw
 from stages.plan.learning import Lessons
-from stages.plan.motions import Manipulation
 from stages.plan.refinement import Step
 from stages.plan.symbols import parse_goal, symbolic_state, task_problem
 from stages.plan.tree_state import after_step, start_state

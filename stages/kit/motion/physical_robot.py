@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from schemas.interactive_scene import SceneBody
 from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.recording import Recording
+from stages.kit.motion.segments import Segment
 from stages.kit.motion.timing import sample_times, time_path
 from stages.kit.simulation.engine import engine
 from stages.kit.simulation.robot import Configuration, Robot
 from stages.kit.simulation.robot_description import RobotDescription
 from stages.kit.simulation.world import PhysicsWorld
-from stages.plan.motions import Segment
-from stages.plan.recording import Recording
-from stages.plan.world_model import moved_record
 
 CONTROL_STEPS = 2
 """Physics steps per control step (120 Hz)."""
@@ -60,6 +58,13 @@ class PhysicalRobot:
                 (name,),
                 {"depth": contact.depth},
             )
+
+    def put(self, configuration: Configuration) -> None:
+        """Put the robot at a configuration, at rest; nothing moves on the way there."""
+        self.robot.set(configuration)
+        self._target, self._opening = configuration.body, configuration.opening
+        self._trail = [configuration.body]
+        self.robot.command(configuration.body, configuration.opening)
 
     # --- control ----------------------------------------------------------------------------------------------
 
@@ -190,9 +195,3 @@ class PhysicalRobot:
         self.robot.finger_force = self.description.finger_force
         self._opening = self.description.opening
         self.wait(RELEASE_SECONDS)
-
-
-def true_record(world: PhysicsWorld, name: str, record: SceneBody) -> SceneBody:
-    """Return the record of a body with the pose and joint values that it has in a world now."""
-    joints = {joint: world.joint_value(name, joint) for joint in world.bodies[name].joints}
-    return moved_record(record, world.pose(name), joints)

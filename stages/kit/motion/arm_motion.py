@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
 from stages.kit.geometry.transforms import inverse, transform_from_yaw
 from stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
 from stages.kit.motion.cartesian import follow, straight_poses
-from stages.kit.motion.collision import Collision
+from stages.kit.motion.collision import Collision, CollisionChecker
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.motion.kinematics import forward, inverse_kinematics, random_starts, reach
+from stages.kit.motion.kinematics import ArmChain, forward, inverse_kinematics, random_starts, reach
 from stages.kit.motion.path_query import Query
 from stages.kit.motion.path_search import find_path
 from stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision
 from stages.kit.simulation.robot import base_pose
-from stages.plan.world_model import WorldModel
+from stages.kit.simulation.robot_description import RobotDescription
 
 ARM_RESOLUTION = np.full(7, 0.05)
 
@@ -74,10 +75,18 @@ class Tally:
         )
 
 
+class ArmModel(Protocol):
+    """What is believed of a room, as far as moving an arm in it needs it."""
+
+    description: RobotDescription
+    chain: ArmChain
+    checker: CollisionChecker
+
+
 class ArmPlanner:
     """Arm motions from one base pose in a world model."""
 
-    def __init__(self, model: WorldModel, random: np.random.Generator, samples: int) -> None:
+    def __init__(self, model: ArmModel, random: np.random.Generator, samples: int) -> None:
         self.model = model
         self.random = random
         self.samples = samples

@@ -1,0 +1,180 @@
+"""Pictures become things: masks of a segmentation backend, points of each mask, and one object of all views of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from scipy.ndimage import binary_erosion
+from scipy.spatial import cKDTree
+
+from schemas.scene_parts import Camera
+from stages.agent.world.physics.shapes import COLORS, STAIN
+from stages.kit.geometry.cameras import back_project
+from stages.kit.geometry.point_clouds import clusters
+from stages.kit.geometry.transforms import apply
+from stages.kit.rendering.depth_noise import disturb_depth
+from stages.kit.rendering.ray_casting import SceneRenderer
+
+HEAD = Camera(width=160, height=120, fx=100.0, fy=100.0, cx=79.5, cy=59.5)
+WRIST = Camera(width=240, height=180, fx=175.0, fy=175.0, cx=119.5, cy=89.5)
+NEAR_BY = Camera(width=240, height=180, fx=350.0, fy=350.0, cx=119.5, cy=89.5)
+"""The middle of the wrist camera's full resolution, of which looks at a whole surface take every second pixel."""
+LEAST_PIXELS, LEAST_POINTS = 25, 16
+"""Of a mask and of an object (ConceptGraphs)."""
+VOXEL, LINK, OVERLAP = 0.025, 0.05, 0.5
+"""Edge of a cell in which two clouds overlap, distance of points of one cluster [m], and the share from which they are
+one (ConceptGraphs)."""
+NEIGHBOURS = 14
+"""Points of which a surface normal is made."""
+STAINED = 0.04
+"""Share of a mask that is brown on a used cup."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a camera took: colour (H, W, 3) uint8, noisy z-depth (H, W) [m], and the true instances (H, W), which a
+    segmentation backend other than the oracle does not look at."""
+
+    color: np.ndarray
+    depth: np.ndarray
+    instance: np.ndarray
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class Mask:
+    """What a segmentation backend made out."""
+
+    label: str
+    mask: np.ndarray
+
+
+class Segmenter(Protocol):
+    """A segmentation backend. `view` names the region of views."""
+
+    def masks(self, picture: Picture, view: tuple[object, ...]) -> list[Mask]:
+        """Return the things of a picture."""
+        ...
+
+
+@dataclass(frozen=True)
+class Surface:
+    """An object of the robot's own map, map frame [m]."""
+
+    label: str
+    points: np.ndarray
+    normals: np.ndarray
+    color: str
+    stain: float
+    views: int
+
+    @cached_property
+    def low(self) -> np.ndarray:
+        """Lower corner (3,)."""
+        return np.percentile(self.points, 2, axis=0)
+
+    @cached_property
+    def high(self) -> np.ndarray:
+        """Upper corner (3,)."""
+        return np.percentile(self.points, 98, axis=0)
+
+    @cached_property
+    def middle(self) -> np.ndarray:
+        """Of the box around it (3,)."""
+        return (self.low + self.high) / 2
+
+
+def take(
+    renderer: SceneRenderer, camera: Camera, world_from_camera: np.ndarray, random: np.random.Generator
+) -> Picture:
+    """Take a picture with the noise of a depth camera."""
+    seen = renderer.render(camera, world_from_camera)
+    reflectance = seen.albedo.mean(axis=2)
+    depth = disturb_depth(seen.depth, seen.incidence, reflectance, np.zeros_like(reflectance), camera, random)
+    return Picture(seen.color, depth, seen.instance, camera)
+
+
+def cloud(picture: Picture, mask: np.ndarray, map_from_camera: np.ndarray) -> np.ndarray:
+    """Return the points (N, 3) of a mask (H, W) in the map frame: its largest cluster; none where too few are left."""
+    inner = binary_erosion(mask) & (picture.depth > 0)
+    if inner.sum() < LEAST_PIXELS:
+        return np.zeros((0, 3))
+    points = apply(map_from_camera, back_project(picture.depth, picture.camera)[inner].astype(float))
+    return points[clusters(points, LINK) == 0]
+
+
+def seen_in(picture: Picture, masks: list[Mask], map_from_camera: np.ndarray, eye: np.ndarray) -> list[Surface]:
+    """Return what one picture shows of each mask."""
+    found = []
+    for entry in masks:
+        points = cloud(picture, entry.mask, map_from_camera)
+        if len(points) < LEAST_POINTS:
+            continue
+        pixels = picture.color[entry.mask].astype(float) / 255
+        found.append(Surface(entry.label, points, outward(points, eye), color_name(pixels), stain_share(pixels), 1))
+    return found
+
+
+def outward(points: np.ndarray, eye: np.ndarray) -> np.ndarray:
+    """Return surface normals (N, 3) of points, from the plane of their neighbours, towards the camera."""
+    count = min(NEIGHBOURS, len(points))
+    near = points[cKDTree(points).query(points, k=count)[1]]
+    centred = near - near.mean(axis=1, keepdims=True)
+    _, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", centred, centred))
+    normals = vectors[:, :, 0]
+    towards = np.einsum("ni,ni->n", normals, eye - points) < 0
+    normals[towards] *= -1
+    return normals
+
+
+def fuse(pieces: list[Surface]) -> list[Surface]:
+    """Return one object for all pieces of a class that overlap, as ConceptGraphs joins what several views show."""
+    objects: list[Surface] = []
+    for piece in pieces:
+        best = max(range(len(objects)), key=lambda k: _overlap(piece, objects[k]), default=None)
+        if best is None or _overlap(piece, objects[best]) < OVERLAP:
+            objects.append(piece)
+            continue
+        other = objects[best]
+        objects[best] = Surface(
+            other.label,
+            np.concatenate([other.points, piece.points]),
+            np.concatenate([other.normals, piece.normals]),
+            other.color,
+            max(other.stain, piece.stain),
+            other.views + 1,
+        )
+    return objects
+
+
+def _overlap(a: Surface, b: Surface) -> float:
+    if a.label != b.label or np.any(a.low > b.high + VOXEL) or np.any(b.low > a.high + VOXEL):
+        return 0.0
+    small, large = (a, b) if len(a.points) < len(b.points) else (b, a)
+    return float((cKDTree(large.points).query(small.points[::3])[0] < VOXEL).mean())
+
+
+def color_name(pixels: np.ndarray) -> str:
+    """Return the name of the colour that is nearest to the median of sRGB pixels (N, 3), light and dark aside."""
+    middle = np.median(pixels, axis=0)
+    spread = float(middle.max() - middle.min())
+    if spread < 0.15:
+        return "white"
+    chroma = (middle - middle.min()) / spread
+    away = {}
+    for name, color in COLORS.items():
+        wanted = np.array(color)
+        if np.ptp(wanted) > 0.15:
+            away[name] = float(np.abs(chroma - (wanted - wanted.min()) / np.ptp(wanted)).sum())
+    return min(away, key=lambda name: away[name])
+
+
+def stain_share(pixels: np.ndarray) -> float:
+    """Return the share of sRGB pixels (N, 3) that have the chroma of a stain and are dark."""
+    wanted = np.array(STAIN) / max(STAIN)
+    bright = pixels.max(axis=1)
+    close = np.abs(pixels / np.maximum(bright, 1e-3)[:, None] - wanted).max(axis=1) < 0.25
+    return float((close & (bright < 0.6)).mean())

@@ -1,0 +1,293 @@
+"""What the arm believes around it, and motions in it: boxes of what was seen, grasps on fused surfaces, letting go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.agent.world.physics.eyes import Surface
+from stages.agent.world.physics.grasps import antipodal_grasps
+from stages.agent.world.physics.shapes import record_of, slab, urdf_of
+from stages.kit.geometry.transforms import inverse
+from stages.kit.motion.arm_motion import ArmPlanner, Tally
+from stages.kit.motion.base_placement import shoulder_distance
+from stages.kit.motion.collision import CollisionChecker
+from stages.kit.motion.failures import MotionFailed
+from stages.kit.motion.grasps import narrowest_width
+from stages.kit.motion.kinematics import arm_chain
+from stages.kit.motion.segments import Segment, whole_body
+from stages.kit.simulation.robot import Configuration, Robot
+from stages.kit.simulation.robot_description import RobotDescription
+from stages.kit.simulation.world import PhysicsWorld
+
+CANDIDATES = 20
+"""Grasps that are tried, those from above first (Han 2024, 3.3.3)."""
+NEXT = 3
+"""Grasps that are left out after one slipped."""
+APPROACH, LIFT = 0.08, 0.10
+"""Of the hand before and after it closes [m]."""
+DROP = 0.15
+"""Height over its target at which the thesis lets go [m]."""
+JUST_OVER = 0.008
+"""Height at which ours does, if nothing was touched before [m]."""
+SLOW = 0.35
+SAMPLES = 500
+"""Of one path search."""
+Box = tuple[np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Hold:
+    """What the robot believes to have in its hand: the box of what it grasped, and where it is in the hand."""
+
+    size: np.ndarray
+    tool_from_box: np.ndarray
+    foot: float
+    """Height of the tool point over the foot of what is held [m], the hand as it grasped."""
+    rotation: np.ndarray
+    """Of the hand then, base frame."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is to be grasped: a fused surface, its box among the beliefs."""
+
+    surface: Surface
+    name: str
+    rank: int
+    """How often a grasp of it has slipped already: other ones are tried."""
+    floor: float
+    """Height of what it stands on [m]."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A manipulation: to the place, what is done there with the fingers, and away."""
+
+    there: tuple[Segment, ...]
+    away: tuple[Segment, ...]
+    hold: Hold | None = None
+
+
+class Beliefs:
+    """Boxes around the robot, for collision checks. An `ArmModel` of the kit."""
+
+    def __init__(self, description: RobotDescription) -> None:
+        self.description = description
+        self.chain = arm_chain(description)
+        self.world = PhysicsWorld()
+        self.robot = Robot(self.world, description)
+        self.checker = CollisionChecker(self.world, self.robot, 0.004)
+        self.robot.set(Configuration(np.zeros(3), description.carry, description.opening))
+        self._boxes: dict[str, tuple[float, ...]] = {}
+
+    def close(self) -> None:
+        """End the pybullet world."""
+        self.world.close()
+
+    def show(self, boxes: dict[str, Box]) -> None:
+        """Believe in these boxes, name -> lower and upper corner (3,) [m] in the map frame, and in nothing else."""
+        wanted = {name: (*np.round(low, 3), *np.round(high, 3)) for name, (low, high) in boxes.items()}
+        for name in [name for name, box in self._boxes.items() if wanted.get(name) != box]:
+            self.world.remove_body(name)
+            del self._boxes[name]
+        for name, box in wanted.items():
+            if name not in self._boxes:
+                part = slab(box[:3], tuple(max(h, low + 0.004) for low, h in zip(box[:3], box[3:], strict=True)))  # type: ignore[arg-type]
+                self.world.add_body(record_of(name, "box", (0, 0, 0), 0), urdf_of(name, (part,), 1.0))
+                self.checker.add_body(name)
+                self._boxes[name] = box
+
+    def hold(self, hold: Hold | None) -> None:
+        """Let checks carry the box of what is held."""
+        self.checker.put_down()
+        if "held" in self._boxes:
+            self.world.remove_body("held")
+            del self._boxes["held"]
+        if hold is None:
+            return
+        half = hold.size / 2
+        part = slab(tuple(-half), tuple(half))  # type: ignore[arg-type]
+        self.world.add_body(record_of("held", "box", (0, 0, 0), 0), urdf_of("held", (part,), 1.0))
+        self.checker.add_body("held")
+        self._boxes["held"] = tuple(half)
+        self.checker.carry("held", hold.tool_from_box)
+
+
+def reachable(beliefs: Beliefs, base: np.ndarray, at: tuple[float, float, float], random: np.random.Generator) -> bool:
+    """Whether some hand pose from above or aslant at a position is free from a base pose (3,), in the map."""
+    planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
+    for pitch in (np.pi / 2, 1.1):
+        pose = _pointing(float(np.arctan2(at[1] - base[1], at[0] - base[0])), pitch)
+        pose[:3, 3] = (at[0], at[1], at[2] + 0.10)
+        if shoulder_distance(base, pose, beliefs.description) > planner.reach - 0.02:
+            continue
+        arm = planner.reachable(base, pose, tally, starts=3)
+        if arm is not None and planner.free(base, arm, tally):
+            return True
+    return False
+
+
+def _pointing(heading: float, pitch: float) -> np.ndarray:
+    """Return a tool pose (4, 4) at the origin that comes along a heading, `pitch` [rad] downwards."""
+    approach = np.array([np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)])
+    closing = np.array([-np.sin(heading), np.cos(heading), 0.0])
+    pose = np.eye(4)
+    pose[:3, :3] = np.column_stack([np.cross(closing, approach), closing, approach])
+    return pose
+
+
+def plan_grasp(
+    beliefs: Beliefs, base: np.ndarray, arm: np.ndarray, target: Target, random: np.random.Generator
+) -> Motion:
+    """Return the motion that takes a fused surface. Raises MotionFailed: `no_grasp`, or what ended most attempts."""
+    opening = beliefs.description.opening
+    surface, name, rank = target.surface, target.name, target.rank
+    keep = _inside(surface)
+    points, normals = surface.points[keep], surface.normals[keep]
+    grasps = antipodal_grasps(points, normals, opening, target.floor)[rank * NEXT :][:CANDIDATES]
+    if not grasps:
+        width = narrowest_width(points)
+        raise MotionFailed(
+            "no_grasp",
+            f"no grasp left on {name}, seen {width:.3f} m wide at its narrowest; the gripper opens {opening:.3f} m",
+            (name,),
+            {"width": width, "opening": opening, "left_out": NEXT * rank},
+        )
+    planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
+    searches = 2
+    for grasp in grasps:
+        try:
+            motion = _one_grasp(planner, base, arm, surface, name, grasp, tally)
+        except MotionFailed as failed:
+            tally.failed(failed)
+            searches -= 1
+            if not searches:
+                break
+            continue
+        finally:
+            beliefs.hold(None)
+            beliefs.checker.allow()
+        if motion is not None:
+            return motion
+    tally.raise_for(f"grasp({name})", (name,))
+    raise AssertionError("unreachable")
+
+
+def _inside(surface: Surface) -> np.ndarray:
+    """Return (N,) bool: points that are no strays of the depth camera."""
+    slack = 0.003
+    return np.all((surface.points > surface.low - slack) & (surface.points < surface.high + slack), axis=1)
+
+
+def _one_grasp(
+    planner: ArmPlanner,
+    base: np.ndarray,
+    arm: np.ndarray,
+    surface: Surface,
+    name: str,
+    map_from_tool: np.ndarray,
+    tally: Tally,
+) -> Motion | None:
+    beliefs = planner.model
+    assert isinstance(beliefs, Beliefs)
+    checker, opening = beliefs.checker, beliefs.description.opening
+    beliefs.robot.set(Configuration(base, arm, opening))
+    checker.allow(touch=(name,))
+    at = planner.reachable(base, map_from_tool, tally, starts=3)
+    if at is None or not planner.free(base, at, tally):
+        return None
+    before = map_from_tool.copy()
+    before[:3, 3] -= APPROACH * before[:3, 2]
+    approach = planner.line(base, at, before, tally)
+    if approach is None:
+        return None
+    above = map_from_tool.copy()
+    above[2, 3] += LIFT
+    lift = planner.line(base, at, above, tally)
+    if lift is None:
+        return None
+    checker.allow()
+    reach = planner.path(base, arm, approach[-1])
+    low, high = surface.low, surface.high
+    box = np.eye(4)
+    box[:3, 3] = (low + high) / 2
+    hold = Hold(high - low, inverse(map_from_tool) @ box, float(map_from_tool[2, 3] - low[2]), map_from_tool[:3, :3])
+    beliefs.world.set_pose(name, _far())
+    beliefs.hold(hold)
+    checker.allow(touch=("held",))
+    home = planner.path(base, lift[-1], beliefs.description.carry)
+    return Motion(
+        (Segment(whole_body(base, reach), opening), Segment(whole_body(base, approach[::-1]), opening, SLOW)),
+        (Segment(whole_body(base, lift), 0.0, SLOW), Segment(whole_body(base, home), 0.0, 0.6)),
+        hold,
+    )
+
+
+def _far() -> np.ndarray:
+    pose = np.eye(4)
+    pose[2, 3] = -5.0
+    return pose
+
+
+def plan_release(
+    beliefs: Beliefs,
+    base: np.ndarray,
+    arm: np.ndarray,
+    hold: Hold | None,
+    at: tuple[float, float, float],
+    height: float,
+    random: np.random.Generator,
+) -> Motion:
+    """Return the motion that lets go with the foot of what is held `height` [m] over a position in the map.
+
+    Raises MotionFailed with what ended most attempts.
+    """
+    planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
+    opening, carry = beliefs.description.opening, beliefs.description.carry
+    foot = hold.foot if hold is not None else 0.0
+    beliefs.hold(hold)
+    beliefs.robot.set(Configuration(base, arm, opening))
+    beliefs.checker.allow(touch=("held",) if hold is not None else ())
+    heading = float(np.arctan2(at[1] - base[1], at[0] - base[0]))
+    try:
+        for turn in (0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6):
+            pose = _turned(hold, heading, turn)
+            pose[:3, 3] = (at[0], at[1], at[2] + height + foot)
+            goal = planner.reachable(base, pose, tally, starts=3)
+            if goal is None or not planner.free(base, goal, tally):
+                continue
+            above = pose.copy()
+            above[2, 3] += 0.06
+            down = planner.line(base, goal, above, tally)
+            if down is None:
+                continue
+            try:
+                reach = planner.path(base, arm, down[-1])
+                back = planner.path(base, down[-1], carry)
+            except MotionFailed as failed:
+                tally.failed(failed)
+                break
+            return Motion(
+                (Segment(whole_body(base, reach), 0.0, 0.6), Segment(whole_body(base, down[::-1]), 0.0, SLOW)),
+                (Segment(whole_body(base, down), opening, SLOW), Segment(whole_body(base, back), opening)),
+            )
+        tally.raise_for("place", ("held",))
+    finally:
+        beliefs.hold(None)
+        beliefs.checker.allow()
+    raise AssertionError("unreachable")
+
+
+def _turned(hold: Hold | None, heading: float, turn: float) -> np.ndarray:
+    """Return the tool's rotation (4, 4): as it grasped but for the yaw, the hand away from the base."""
+    if hold is None:
+        return _pointing(heading + turn, np.pi / 2)
+    approach = hold.rotation[:, 2]
+    level = float(np.hypot(approach[0], approach[1]))
+    own = np.arctan2(approach[1], approach[0]) if level > 0.2 else np.arctan2(hold.rotation[1, 0], hold.rotation[0, 0])
+    c, s = np.cos(heading + turn - own), np.sin(heading + turn - own)
+    pose = np.eye(4)
+    pose[:3, :3] = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ hold.rotation
+    return pose

@@ -1,0 +1,85 @@
+"""What the head camera's turn tells: free and occupied floor, and large furniture as boxes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stages.agent.obstacle_map import CELL
+from stages.kit.geometry.point_clouds import clusters
+
+TURNS = 6
+"""Pictures of one turn."""
+HEIGHT, PITCH = 1.35, 0.55
+"""Of the camera over the floor [m], and how far it looks down [rad]."""
+FLOOR, CEILING = 0.08, 1.7
+"""What lies between is in the way of the base [m]."""
+SURE = 3.2
+"""Farther than this the depth is too coarse for cells of 10 cm [m]."""
+RAYS = 180
+ENOUGH = 3
+"""Points of an occupied cell."""
+LEAST = 60
+"""Points of a piece of furniture that is made out."""
+GRAIN = 0.04
+
+
+def cells_of(points: np.ndarray, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return free and occupied cells (N, 2) by points (M, 3) [m] and where the camera was (3,): by rays over the floor
+    that end at the first obstacle or at the farthest floor."""
+    offset = points[:, :2] - eye[:2]
+    away = np.hypot(offset[:, 0], offset[:, 1])
+    sure = away < SURE
+    points, offset, away = points[sure], offset[sure], away[sure]
+    stands = (points[:, 2] > FLOOR) & (points[:, 2] < CEILING)
+    cells, counts = np.unique(np.rint(points[stands, :2] / CELL).astype(int), axis=0, return_counts=True)
+    occupied = cells[counts >= ENOUGH]
+    ray = ((np.arctan2(offset[:, 1], offset[:, 0]) + np.pi) / (2 * np.pi) * RAYS).astype(int) % RAYS
+    floor = points[:, 2] < FLOOR / 2
+    ends = np.zeros(RAYS)
+    np.maximum.at(ends, ray[floor], away[floor])
+    blocked = np.full(RAYS, np.inf)
+    np.minimum.at(blocked, ray[stands], away[stands])
+    ends = np.minimum(ends, blocked - CELL)
+    angles = (np.arange(RAYS) + 0.5) / RAYS * 2 * np.pi - np.pi
+    steps = np.arange(0.0, SURE, CELL / 2)
+    rows = eye[None, None, :2] + steps[None, :, None] * np.stack([np.cos(angles), np.sin(angles)], -1)[:, None]
+    free = np.unique(np.rint(rows[steps[None] < ends[:, None]] / CELL).astype(int), axis=0)
+    return free.reshape(-1, 2), occupied.reshape(-1, 2)
+
+
+@dataclass
+class SeenPiece:
+    """Points of one piece of furniture so far, one for each cube of 4 cm."""
+
+    label: str
+    cubes: set[tuple[int, ...]] = field(default_factory=set)
+    _box: tuple[np.ndarray, np.ndarray] | None = None
+
+    def add(self, points: np.ndarray) -> None:
+        """Enter points (N, 3) of one turn."""
+        self._box = None
+        self.cubes |= set(map(tuple, np.rint(points / GRAIN).astype(int).tolist()))
+
+    @property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner (3,) [m]."""
+        if self._box is None:
+            points = np.array(sorted(self.cubes)) * GRAIN
+            points = points[clusters(points, 0.2) == 0]
+            self._box = np.percentile(points, 1, axis=0), np.percentile(points, 99, axis=0)
+        return self._box
+
+
+def enter(pieces: list[SeenPiece], label: str, points: np.ndarray) -> None:
+    """Enter the points of a mask: to the piece of its class that its box overlaps, or as a new piece."""
+    low, high = np.percentile(points, 2, axis=0) - 0.1, np.percentile(points, 98, axis=0) + 0.1
+    for piece in pieces:
+        other_low, other_high = piece.box
+        if piece.label == label and np.all(low[:2] < other_high[:2]) and np.all(other_low[:2] < high[:2]):
+            piece.add(points)
+            return
+    fresh = SeenPiece(label)
+    fresh.add(points)
+    pieces.append(fresh)

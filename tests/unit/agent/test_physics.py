@@ -1,0 +1,120 @@
+"""The physics world: what its cameras measure, grasps by contact, failures with numbers, the same bytes again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from schemas.apartment import Apartment, Furniture, Room, Thing
+from schemas.errors import UsageError
+from stages.agent.body import Base, Sweep
+from stages.agent.obstacle_map import ObstacleMap
+from stages.agent.tasks import TASKS, make_apartment
+from stages.agent.trials import Setting, open_world
+from stages.agent.world.failures import Rates
+from stages.agent.world.physics.body import PhysicsBody
+from stages.agent.world.physics.grasps import antipodal_grasps
+from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
+
+NO_ERRORS = Rates().with_true_eyes()
+TABLE = Furniture(name="table_0", label="table", centre=(2.0, 2.4), size=(1.4, 0.75), height=0.74)
+THINGS = (
+    Thing(name="apple_0", label="apple", on="table_0", at=(2.0, 2.3)),
+    Thing(name="cup_0", label="cup", color="blue", on="table_0", at=(1.75, 2.25)),
+    Thing(name="plate_0", label="plate", on="table_0", at=(2.3, 2.3), carries=True, radius=0.11),
+)
+APARTMENT = Apartment(
+    rooms=(Room(name="room_0", low=(0, 0), high=(4, 4)),),
+    furniture=(TABLE,),
+    things=THINGS,
+    start=(2.0, 1.575, np.pi / 2),
+)
+ABOVE = (2.0, 2.4, 0.74)
+
+
+@pytest.fixture
+def body() -> Iterator[PhysicsBody]:
+    made = PhysicsBody(APARTMENT, ("apple", "plate"), NO_ERRORS, 3)
+    yield made
+    made.close()
+
+
+def test_eyes_measure_and_the_hand_holds_by_contact(body: PhysicsBody) -> None:
+    sweep = body.sweep()
+    (table,) = sweep.furniture
+    assert table.label == "table" and np.allclose(table.centre, TABLE.centre, atol=0.06)
+    assert np.allclose(table.size, TABLE.size, atol=0.12) and len(sweep.free) > 300
+    seen = {d.label: d for d in body.look(ABOVE, close=False).detections}
+    assert set(seen) == {"apple", "cup", "plate"} and seen["cup"].color == "blue"
+    for thing in THINGS:
+        assert np.hypot(*np.subtract(seen[thing.label].position[:2], thing.at)) < 0.03
+    assert body.look_at_hand(0) is None
+    assert body.grasp(seen["apple"].position, "apple", 0).ok
+    assert body.bodies["apple_0"].on == "" and body.events[-1].ok
+    held = body.look_at_hand(0)
+    assert held is not None and held.label == "apple"
+    assert body.release(seen["plate"].position, "plate", gently=True).ok
+    assert body.bodies["apple_0"].on == "plate_0" and body.root("apple_0") == "table_0" and body.events[-1].ok
+
+
+def test_what_cannot_be_done_says_why_with_numbers(body: PhysicsBody) -> None:
+    body.sweep()
+    body.look(ABOVE, close=False)
+    nothing = body.grasp((2.6, 2.6, 0.76), "apple", 0)
+    assert not nothing.ok and nothing.failure is not None and nothing.failure.kind == "no_grasp"
+    plate = body.grasp((2.3, 2.3, 0.75), "plate", 0)
+    assert not plate.ok and plate.failure is not None
+    assert plate.failure.numbers["width"] > plate.failure.numbers["opening"]
+    assert body.bodies["plate_0"].on != "" and [e.ok for e in body.events] == [False, False]
+
+
+def test_a_world_is_its_seed() -> None:
+    looks = []
+    for _ in range(2):
+        made = PhysicsBody(APARTMENT, ("apple",), Rates(), 5)
+        made.sweep()
+        looks.append((made.look(ABOVE, close=False), made.look((2.0, 2.3, 0.76), close=True)))
+        made.close()
+    assert looks[0] == looks[1]
+
+
+def test_doors_are_refused_in_a_sentence() -> None:
+    task = TASKS["fridge_bottle"]
+    setting = Setting(make_apartment(task, 1), task.words, task.goals, NO_ERRORS, 1, world="physics")
+    with pytest.raises(UsageError, match="doors"):
+        open_world(setting, "ours")
+
+
+def test_grasps_come_from_above_first_and_across_the_narrow_side() -> None:
+    random = np.random.default_rng(0)
+    points = random.uniform((-0.08, -0.02, 0), (0.08, 0.02, 0.03), (4000, 3))
+    side = np.sign(points[:, 1])[:, None] * np.array([0.0, 1.0, 0.0])
+    grasps = antipodal_grasps(points, side, opening=0.08, floor=0.0)
+    assert np.allclose(grasps[0][:3, 2], (0, 0, -1), atol=1e-6) and abs(grasps[0][1, 1]) > 0.99
+    assert all(pose[2, 3] > 0.004 for pose in grasps)
+    wide = random.uniform(-0.08, 0.08, (4000, 3))
+    assert antipodal_grasps(wide, np.tile([0.0, 1.0, 0.0], (4000, 1)), opening=0.08, floor=-0.08) == []
+
+
+def test_errors_of_a_segmenter_persist_and_name_what_was_asked_for() -> None:
+    errors = SegmenterErrors(SegmenterRates(confusable=1.0, confused=0.5, missed=0.3), Luck(1), ("apple", "plate"))
+    regions = [(side, near) for side in range(4) for near in (False, True)]
+    labels = [errors.class_of("can_0", "can", *region) for region in regions]
+    assert labels == [errors.class_of("can_0", "can", *region) for region in regions]
+    assert len(set(labels)) == 2 and set(labels) < {"can", "apple", "plate"}
+    missed = [errors.misses(f"can_{k}", 0, 1, False) for k in range(400)]
+    assert 0.2 < np.mean(missed) < 0.4
+    assert not SegmenterErrors(SegmenterRates(0, 0, 0, 0), Luck(1), ("apple",)).misses("can_0", 0, 1, False)
+
+
+def test_a_way_goes_around_what_is_known() -> None:
+    room = ObstacleMap(Base(0.0, 0.0, 0.0), 2.7)
+    free = np.argwhere(np.ones((41, 41), bool))
+    wall = np.array([(20, row) for row in range(28)])
+    room.add(Sweep(free, wall, ()))
+    way = room.path(Base(0.5, 1.0, 0.0), (3.5, 1.0))
+    assert way is not None and way[0] == (0.5, 1.0) and way[-1] == (3.5, 1.0)
+    assert max(y for _, y in way) > 2.9
+    assert room.path(Base(0.5, 1.0, 0.0), (2.0, 1.0)) is None
