@@ -158,6 +158,7 @@ pair-rules: setup ## Fit the rules of `segment --backend objects` anew (QUICK=1:
 bench: setup ## Speed beside named peers, medians (QUICK=1: fewer runs)
 	$(PYTHON) -m benchmarks.speed.fusion $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-fusion
 	$(PYTHON) -m benchmarks.speed.segmentation $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-segmentation
+	$(PYTHON) -m benchmarks.speed.splatting $(if $(QUICK),--quick) --out $(OUTPUTS)/experiments/bench-speed-splatting
 
 .PHONY: bench-growth
 bench-growth: setup ## What a frame costs as the map grows, and what holds the memory (QUICK=1: 300 frames)

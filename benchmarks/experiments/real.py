@@ -41,6 +41,8 @@ class RealParameters(Parameters):
 
     data: Path = Field(Path("../shared/data"), description="Folder with the real logs")
     weights: Path | None = Field(None, description="ONNX detector instead of DATA/detectors/yolox_nano.onnx")
+SCENE_FACTS = ("cad_models", "bodies", "movable", "joints", "unstable", "largest_move_mm", "max_penetration_mm")
+"""What `urdf` says of the interactive scene."""
 
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, dict[str, Any]]]:
@@ -89,6 +91,7 @@ def facts_of_run(run: Path) -> dict[str, Any]:
         for link in graph.info.links
         if link.relation in TREE_RELATIONS and link.source != "scene"
     )
+    scene = read_manifest(run / "interactive_scene").summary
     steps = {}
     for folder in sorted(run.iterdir()):
         if (folder / "manifest.json").exists():
@@ -109,6 +112,7 @@ def facts_of_run(run: Path) -> dict[str, Any]:
         "supports": dict(supports.most_common()),
         "gravity": sequence.info.gravity.method,
         "steps": steps,
+        **{f"scene_{name}": float(value) for name in SCENE_FACTS if isinstance(value := scene.get(name), int | float)},
         **floor_facts(panoptic_map, trajectory[:, 3]),
     }
 

@@ -1,0 +1,1 @@
+"""Ways of building a splat: each a file with a `METHOD`."""

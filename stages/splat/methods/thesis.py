@@ -1,0 +1,40 @@
+"""LEGS (Srinivas 2024, chapter 9, and its public code): constants of docs/SPLATS.md's table."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.kit.rendering.splatting.gaussians import Gaussians
+from stages.kit.rendering.splatting.rasterizer import Picture
+from stages.splat.density import Density
+from stages.splat.losses import LossWeights
+from stages.splat.methods.method import Method, Rate
+from stages.splat.seeding import at_pixels
+from stages.splat.views import PosedView
+
+PIXELS, DEVIATION, OPACITY = 500, 0.02, 0.2
+
+
+def seed(view: PosedView, shown: Picture, camera_from_world: np.ndarray, random: np.random.Generator) -> Gaussians:
+    """Return a Gaussian of 2 cm at each of 500 random pixels with depth."""
+    depth = np.zeros(view.color.shape[:2], np.float32) if view.depth is None else view.depth
+    known = np.argwhere(depth > 0)
+    pixels = known[np.sort(random.permutation(len(known))[:PIXELS])]
+    return at_pixels(view, pixels, depth, np.full(len(pixels), DEVIATION), OPACITY, camera_from_world)
+
+
+METHOD = Method(
+    seed=seed,
+    loss=LossWeights(similarity=0.2),
+    density=Density(begin=500, every=100, gradient=0.0008, size=0.01, least_opacity=0.1, largest=0.8, reset_every=30),
+    rates={
+        "means": Rate(1.6e-4, 1.6e-6),
+        "quaternions": Rate(1e-3),
+        "log_scales": Rate(5e-3, 1e-3),
+        "logit_opacities": Rate(0.05),
+        "harmonics": Rate(2.5e-3),
+    },
+    pose_rate=Rate(1e-3, 5e-5),
+    degree_every=1000,
+    visible_alone=False,
+)

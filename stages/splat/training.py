@@ -1,0 +1,146 @@
+"""Gaussians that learn from posed pictures while these arrive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from schemas.errors import BadInput
+from stages.kit.rendering.splatting.gaussians import Gaussians
+from stages.kit.rendering.splatting.rasterizer import Drawn, Rasterizer, View
+from stages.splat.density import Pull, grown, useless
+from stages.splat.losses import loss_of
+from stages.splat.methods.method import Method
+from stages.splat.optimizer import RowAdam
+from stages.splat.views import PosedView
+
+MOMENTS = (0.9, 0.999)
+
+
+@dataclass
+class Learned:
+    """A view in training: its pose moves where poses are refined."""
+
+    view: PosedView
+    camera_from_world: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    steps: int = 0
+
+
+class Trainer:
+    """Holds the Gaussians and the views; `step` makes them agree a little better.
+
+    `refine_poses`: poses are learned too, but for that of the first view, which holds the world still.
+    """
+
+    def __init__(
+        self, method: Method, rasterizer: Rasterizer, random: np.random.Generator, *, refine_poses: bool = False
+    ) -> None:
+        self.method, self.rasterizer, self.random = method, rasterizer, random
+        self.refine_poses = refine_poses
+        self.gaussians = no_gaussians()
+        self.views: list[Learned] = []
+        self.steps = 0
+        self._adam, self._pull = RowAdam(), Pull(0)
+        self._rounds, self._was_reset = 0, False
+
+    def add_view(self, view: PosedView) -> None:
+        """Take a new picture in: Gaussians are set where the method wants them."""
+        self.views.append(Learned(view, view.camera_from_world.copy(), np.zeros(6), np.zeros(6)))
+        shown = self.draw(self.views[-1]).picture
+        self._add(self.method.seed(view, shown, view.camera_from_world, self.random))
+
+    def draw(self, learned: Learned) -> Drawn:
+        """Return what a view shows of the Gaussians now."""
+        return self.rasterizer.draw(self.gaussians, View(learned.view.camera, learned.camera_from_world))
+
+    def step(self) -> float:
+        """Compare one view, drawn at random, with what is shown of it, and improve; return the loss before.
+
+        Raises BadInput where there is nothing to learn from, or where the loss is no number any more.
+        """
+        if not self.views or not len(self.gaussians):
+            raise BadInput("no Gaussians to train: no picture has depth", hint="give a sequence with depth")
+        learned = self.views[int(self.random.integers(len(self.views)))]
+        drawn = self.draw(learned)
+        view = learned.view
+        loss, by = loss_of(drawn.picture, view.color, view.depth, self.method.loss)
+        if not np.isfinite(loss):
+            raise BadInput(
+                f"frame {view.frame}: the loss is no number after {self.steps} steps", hint="look at its depth"
+            )
+        gradients = drawn.backward(by)
+        rates = {name: rate.at(self.steps) for name, rate in self.method.rates.items()}
+        moved = drawn.visible if self.method.visible_alone else np.ones(len(self.gaussians), bool)
+        self._adam.step(self.gaussians, gradients, rates, moved)
+        self._pull.add(gradients.centers, drawn.visible, view.camera.width, view.camera.height)
+        if self.refine_poses and learned is not self.views[0]:
+            _move(learned, gradients.twist, self.method.pose_rate.at(self.steps))
+        self.steps += 1
+        if self.steps % self.method.degree_every == 0:
+            self._raise_degree()
+        density = self.method.density
+        if self.steps >= density.begin and self.steps % density.every == 0:
+            self._change_density()
+        return loss
+
+    def _raise_degree(self) -> None:
+        degree = min(3, self.steps // self.method.degree_every)
+        self.gaussians = with_harmonics(self.gaussians, (degree + 1) ** 2)
+        self._adam.extend(self.gaussians)
+
+    def _add(self, more: Gaussians) -> None:
+        self.gaussians = self.gaussians.joined(with_harmonics(more, self.gaussians.harmonics.shape[1]))
+        self._adam.extend(self.gaussians)
+        self._pull.extend(len(self.gaussians))
+
+    def _change_density(self) -> None:
+        density = self.method.density
+        self._rounds += 1
+        more, gone = grown(self.gaussians, self._pull.means(), density, self.random)
+        gone |= useless(self.gaussians, density, self._was_reset)
+        self.gaussians = self.gaussians.taken(~gone)
+        self._adam.keep(~gone)
+        self._pull = Pull(len(self.gaussians))
+        self._add(more)
+        if density.reset_every and self._rounds % density.reset_every == 0:
+            least = 2 * density.least_opacity
+            np.minimum(
+                self.gaussians.logit_opacities,
+                np.float32(np.log(least / (1 - least))),
+                out=self.gaussians.logit_opacities,
+            )
+            self._adam.forget("logit_opacities")
+            self._was_reset = True
+
+
+def no_gaussians() -> Gaussians:
+    """Return none."""
+    shapes = ((0, 3), (0, 4), (0, 3), (0,), (0, 1, 3), (0, 0))
+    return Gaussians(*(np.zeros(shape, np.float32) for shape in shapes))
+
+
+def with_harmonics(gaussians: Gaussians, count: int) -> Gaussians:
+    """Return the Gaussians with at least `count` coefficients a colour; those that are added are 0."""
+    had = gaussians.harmonics.shape[1]
+    if had >= count:
+        return gaussians
+    harmonics = np.zeros((len(gaussians), count, 3), np.float32)
+    harmonics[:, :had] = gaussians.harmonics
+    return replace(gaussians, harmonics=harmonics)
+
+
+def _move(learned: Learned, twist: np.ndarray, rate: float) -> None:
+    """Move a view's pose by one step of Adam along its twist (6,), translation and rotation."""
+    learned.steps += 1
+    learned.first = MOMENTS[0] * learned.first + (1 - MOMENTS[0]) * twist
+    learned.second = MOMENTS[1] * learned.second + (1 - MOMENTS[1]) * twist * twist
+    first = learned.first / (1 - MOMENTS[0] ** learned.steps)
+    second = learned.second / (1 - MOMENTS[1] ** learned.steps)
+    step = -rate * first / (np.sqrt(second) + 1e-12)
+    turn = np.eye(4)
+    turn[:3, :3], turn[:3, 3] = Rotation.from_rotvec(step[3:]).as_matrix(), step[:3]
+    learned.camera_from_world = turn @ learned.camera_from_world

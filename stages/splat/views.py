@@ -1,0 +1,102 @@
+"""Posed pictures of a sequence, as they are learned from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Listing
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.scene_parts import Camera
+from schemas.sequence import Sequence
+from schemas.trajectory import Trajectory
+from stages.kit.formats.frames import Frame, FrameReader
+from stages.kit.formats.trajectories import read_tum
+from stages.kit.geometry.cameras import scaled
+from stages.kit.geometry.transforms import inverse
+
+DARK = 0.02
+"""Mean brightness, of 1, below which a picture shows nothing."""
+TIME_TOLERANCE = 0.005
+"""A pose of another trajectory belongs to a frame no farther from it than this [s]."""
+
+
+@dataclass(frozen=True)
+class PosedView:
+    """One picture with its pose."""
+
+    frame: int
+    """Index in the sequence."""
+    time: float
+    camera_name: str
+    camera: Camera
+    color: np.ndarray
+    """(H, W, 3) float32, 0 to 1."""
+    depth: np.ndarray | None
+    """(H, W) float32 [m], 0 unknown."""
+    camera_from_world: np.ndarray
+
+
+def posed_frames(
+    reader: FrameReader, sequence: Sequence, trajectory: Trajectory | None
+) -> list[tuple[int, np.ndarray]]:
+    """Return (frame, world_from_camera) of every frame with colour and a pose, by time.
+
+    Raises BadInput where there is no colour, or where fewer than two frames have a pose.
+    """
+    if "color" not in reader.streams:
+        raise BadInput(f"{sequence.root}: its frames have no colour", hint="splats are learned from pictures")
+    if trajectory is None:
+        frames, poses = reader.poses()
+        found = list(zip(frames.tolist(), poses, strict=True))
+        hint = "estimate poses: scenewright poses"
+    else:
+        found, hint = _of_trajectory(reader, trajectory), "the trajectory belongs to another sequence"
+    if len(found) < 2:
+        raise BadInput(f"{sequence.root}: {len(found)} frames have a pose, two are needed", hint=hint)
+    return found
+
+
+def _of_trajectory(reader: FrameReader, trajectory: Trajectory) -> list[tuple[int, np.ndarray]]:
+    times, poses = read_tum(trajectory.path("trajectory.tum"))
+    found = []
+    for frame, time in enumerate(reader.times):
+        if len(times):
+            nearest = int(np.abs(times - time).argmin())
+            if abs(times[nearest] - time) <= TIME_TOLERANCE:
+                found.append((frame, poses[nearest]))
+    return found
+
+
+def read_view(reader: FrameReader, frame: int, world_from_camera: np.ndarray, width: int) -> PosedView | None:
+    """Return a frame at most `width` pixels wide; None without colour, or where it is dark."""
+    found: Frame = reader.read(frame, ("color", "depth"))
+    if found.color is None or float(found.color.mean()) < 255 * DARK:
+        return None
+    camera = reader.cameras[found.camera_name]
+    factor = min(1.0, width / camera.width)
+    small = scaled(camera, factor) if factor < 1 else camera
+    size = (small.width, small.height)
+    color = found.color if factor == 1 else cv2.resize(found.color, size, interpolation=cv2.INTER_AREA)
+    depth = found.depth
+    if depth is not None and factor < 1:
+        depth = cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST)
+    pose = inverse(world_from_camera)
+    return PosedView(
+        frame, found.time, found.camera_name, small, color.astype(np.float32) / np.float32(255), depth, pose
+    )
+
+
+def held_out(count: int, every: int) -> list[int]:
+    """Return which of `count` posed frames are kept from training: every `every`-th from the middle of the first
+    stretch; none for 0."""
+    return list(range(every // 2, count, every)) if every else []
+
+
+def evenly(frames: Listing[int], most: int) -> list[int]:
+    """Return at most `most` of the frames, evenly spread; all for 0."""
+    if not most or len(frames) <= most:
+        return list(frames)
+    return [frames[int(k)] for k in np.linspace(0, len(frames) - 1, most).round()]

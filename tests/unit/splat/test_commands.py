@@ -1,0 +1,135 @@
+"""`splat build` and `splat render` on a small rendered log, and what they say to bad input."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from schemas.errors import BadInput
+from schemas.sequence import Sequence
+from schemas.splat import Splat
+from schemas.trajectory import Trajectory
+from stages.kit.formats.trajectories import read_tum, write_tum
+from stages.kit.progress import SilentProgress
+from stages.kit.stage import Context
+from stages.splat import build_stage, render_stage
+from stages.splat.parameters import BuildParameters, RenderParameters
+from stages.splat.ply import COLUMNS, read_gaussians, write_gaussians
+from tests.unit.poses.textured_room import round_walk, write_sequence
+
+WALK = round_walk(49)[:13]
+
+
+def context(folder: Path, device: str = "cpu") -> Context:
+    folder.mkdir(parents=True)
+    return Context(folder, seed=3, device=device, progress=SilentProgress())
+
+
+def build(sequence: Sequence, out: Path, trajectory: Trajectory | None = None, **options: object) -> Splat:
+    given = {"width": 80, "steps": 30, "steps_per_second": 10.0, "hold_out_every": 4, **options}
+    parameters = BuildParameters.model_validate(given)
+    return build_stage.run(sequence, trajectory, parameters=parameters, context=context(out))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Sequence, Splat]:
+    folder = tmp_path_factory.mktemp("splat")
+    sequence = write_sequence(folder / "sequence", WALK, with_pose=True, blank=(5,))
+    return sequence, build(sequence, folder / "splat", refine_poses=True)
+
+
+def test_a_splat_says_what_became_of_every_picture(made: tuple[Sequence, Splat]) -> None:
+    built = made[1].built
+    uses = [view.use for view in built.views]
+    assert uses.count("held_out") == 3 and uses[5] == "dark" and uses.count("learned") == 9
+    assert built.steps == 42 and built.gaussians > 500 and built.refined
+    assert [view.arrived for view in built.views][:5] == [0, 1, None, 3, 4]
+    moved = [view.moved for view in built.views if view.moved is not None]
+    assert len(moved) == 9 and moved[0] == 0.0 and 0 < max(moved) < 0.1
+
+
+def test_the_path_can_be_read_as_a_trajectory(made: tuple[Sequence, Splat]) -> None:
+    times, poses = read_tum(made[1].path("trajectory.tum"))
+    np.testing.assert_allclose(times, 0.1 * np.arange(13), atol=1e-6)
+    assert 0 < np.abs(poses[:, :3, 3] - WALK[:, :3, 3]).max() < 0.1
+    assert issubclass(Splat, Trajectory)
+
+
+def test_the_file_is_one_that_others_read(made: tuple[Sequence, Splat], tmp_path: Path) -> None:
+    gaussians = read_gaussians(made[1].path("splat.ply"))
+    other = trimesh.load(made[1].path("splat.ply"), process=False)
+    np.testing.assert_allclose(other.vertices, gaussians.means)
+    data = other.metadata["_ply_raw"]["vertex"]
+    assert tuple(data["properties"]) == COLUMNS
+    np.testing.assert_allclose(np.asarray(data["data"]["f_rest_15"]).ravel(), gaussians.harmonics[:, 1, 1])
+    np.testing.assert_allclose(np.asarray(data["data"]["rot_0"]).ravel(), gaussians.quaternions[:, 0])
+    write_gaussians(tmp_path / "again.ply", gaussians)
+    np.testing.assert_array_equal(read_gaussians(tmp_path / "again.ply").harmonics, gaussians.harmonics)
+
+
+def test_pictures_are_compared(made: tuple[Sequence, Splat], tmp_path: Path) -> None:
+    sequence, splat = made
+    parameters = RenderParameters(pictures=1)
+    views = render_stage.run(splat, sequence, parameters=parameters, context=context(tmp_path / "views"))
+    assert views.outcome == "ok" and [view.frame for view in views.info.views] == [2, 6, 10]
+    assert views.info.psnr > 12 and 0 < (views.info.depth_error or 0) < 0.2
+    assert len(list(views.path("pictures").iterdir())) == 1
+    all_views = render_stage.run(
+        splat, sequence, parameters=RenderParameters(views="all", pictures=0), context=context(tmp_path / "all")
+    )
+    assert len(all_views.info.views) == 12
+
+
+def test_the_same_seed_gives_the_same_bytes(made: tuple[Sequence, Splat], tmp_path: Path) -> None:
+    again = build(made[0], tmp_path / "again", refine_poses=True)
+    for name in ("splat.ply", "trajectory.tum", "splat.json"):
+        assert again.path(name).read_bytes() == made[1].path(name).read_bytes()
+
+
+def test_a_splat_without_held_out_views_is_an_empty_comparison(made: tuple[Sequence, Splat], tmp_path: Path) -> None:
+    splat = build(made[0], tmp_path / "splat", hold_out_every=0, steps=0)
+    views = render_stage.run(splat, made[0], parameters=RenderParameters(), context=context(tmp_path / "views"))
+    assert views.outcome == "empty"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"with_pose": False}, "0 frames have a pose"),
+        ({"with_pose": True, "with_color": False}, "no colour"),
+        ({"with_pose": True, "with_depth": False}, "no picture has depth"),
+        ({"with_pose": True, "blank": range(13)}, "all 10 pictures are dark"),
+    ],
+)
+def test_bad_input_is_said_in_one_line(options: dict[str, object], message: str, tmp_path: Path) -> None:
+    sequence = write_sequence(tmp_path / "sequence", WALK, **options)  # type: ignore[arg-type]
+    with pytest.raises(BadInput, match=message):
+        build(sequence, tmp_path / "splat")
+    assert not list((tmp_path / "splat").iterdir())
+
+
+def test_a_path_of_another_log_is_refused(made: tuple[Sequence, Splat], tmp_path: Path) -> None:
+    (tmp_path / "path").mkdir()
+    write_tum(tmp_path / "path" / "trajectory.tum", 100.0 + np.arange(3), WALK[:3])
+    with pytest.raises(BadInput, match="0 frames have a pose"):
+        build(made[0], tmp_path / "splat", Trajectory(tmp_path / "path"))
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda data: data[:-4], "torn"),
+        (lambda data: b"ply\n" + data, "no PLY"),
+        (lambda data: data.replace(b"f_dc_0", b"f_dc_9"), "no PLY"),
+        (lambda data: data[:-4] + np.float32(np.nan).tobytes(), "no number"),
+        (lambda data: b"", "no PLY"),
+    ],
+)
+def test_damaged_files_are_refused(made: tuple[Sequence, Splat], damage, message: str, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    path = tmp_path / "splat.ply"
+    path.write_bytes(damage(made[1].path("splat.ply").read_bytes()))
+    with pytest.raises(BadInput, match=message):
+        read_gaussians(path)
