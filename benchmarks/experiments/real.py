@@ -41,6 +41,8 @@ class RealParameters(Parameters):
 
     data: Path = Field(Path("../shared/data"), description="Folder with the real logs")
     weights: Path | None = Field(None, description="ONNX detector instead of DATA/detectors/yolox_nano.onnx")
+
+
 SCENE_FACTS = ("cad_models", "bodies", "movable", "joints", "unstable", "largest_move_mm", "max_penetration_mm")
 """What `urdf` says of the interactive scene."""
 

@@ -7,13 +7,13 @@ counts when it can be carried out on the map on which it was made.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from pydantic import Field
 
-from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial
+from benchmarks.experiment import RESAMPLES, SEED_OF_INTERVALS, Bench, Experiment, Measure, Results, Trial
 from benchmarks.experiments.edits.landing import ARMS, by_geometry
 from benchmarks.experiments.edits.making import KINDS, edits_of
 from benchmarks.experiments.edits.truth import truth_of
@@ -23,6 +23,7 @@ from benchmarks.steps import opened, step
 from schemas.panoptic_map import PanopticMap
 from schemas.sequence import Sequence as SequenceArtifact
 from stages.edit.map_state import MapState, read_state
+from stages.kit.measurement.bootstrap import Interval, figure_interval
 from stages.kit.stage import Parameters
 
 SIZE = (320, 240)
@@ -39,7 +40,7 @@ FUSED: dict[str, dict[str, Any]] = {
 CORRUPTION = 0.2
 """Of the true masks."""
 TUNING = tuple(f"{recipe}-40" for recipe in RECIPES)
-REPORTING = tuple(f"{recipe}-{seed}" for seed in range(7400, 7405) for recipe in RECIPES)
+REPORTING = tuple(f"{recipe}-{seed}" for seed in range(7400, 7404) for recipe in RECIPES)
 LANDINGS = ("right", "wrong", "conflict", "absent")
 
 Landed = dict[str, float]
@@ -115,14 +116,29 @@ def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
     make_library(bench.out / "rooms")
 
 
-def all_others(results: Results) -> dict[str, float | None]:
-    """Return the figures over all maps but the one on which the edits were made."""
-    flat: dict[str, float | None] = {}
+def all_others(results: Results) -> dict[str, float | Interval | None]:
+    """Return the figures over all maps but the one on which the edits were made, with intervals over rooms."""
+    flat: dict[str, float | Interval | None] = {}
     for arm in results.arms():
-        records = [record for trial, record in results.records.items() if trial.arm == arm and trial.case != MADE_ON]
-        for name, figure in MEASURES.items():
-            flat[f"{arm}/all_others/{name}"] = figure.of(records) if records else None
+        rooms: dict[str, list[Landed]] = {}
+        for trial, record in results.records.items():
+            if trial.arm == arm and trial.case != MADE_ON:
+                rooms.setdefault(trial.seed, []).append(record)
+        groups = list(rooms.values())
+        for name, measure in MEASURES.items() if groups else ():
+            value = measure.of([record for group in groups for record in group])
+            flat[f"{arm}/all_others/{name}"] = _interval(measure, groups) if measure.interval else value
     return flat
+
+
+def _interval(measure: Measure, groups: Sequence[Sequence[Landed]]) -> Interval | None:
+    random = np.random.default_rng(SEED_OF_INTERVALS)
+    return figure_interval(
+        lambda drawn: measure.of([record for k in drawn for record in groups[k]]),
+        range(len(groups)),
+        random,
+        resamples=RESAMPLES,
+    )
 
 
 def _of_kind(kind: str) -> tuple[str, Measure]:
@@ -139,7 +155,6 @@ MEASURES: dict[str, Measure] = {
     "edits": number(*LANDINGS),
     "wrong_edits": number("wrong"),
 }
-Figure = Callable[[Sequence[Landed]], float | None]
 
 EXPERIMENT = Experiment(
     name="edits",
