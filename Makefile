@@ -112,6 +112,12 @@ bench-preflight: setup ## What `inspect` makes of planted faults (QUICK=1: three
 bench-poses: setup ## Estimated camera paths: error, speed, effect on the map (QUICK=1: one room, two arms)
 	$(EXPERIMENT) poses --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-poses$(if $(QUICK),-quick) $(ASKED)
 
+# Two real logs (REAL_DATA) and twenty generated rooms, budgets of 1, 5 and 20 processor minutes: a day of one core. QUICK=1:
+# 10 and 30 seconds, one room.
+.PHONY: legs
+legs: setup ## Rooms as Gaussians, learned while pictures arrive, beside the thesis's method (QUICK=1: seconds, one room)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) legs --data $(REAL_DATA) --out $(OUTPUTS)/experiments/legs$(if $(QUICK),-quick) $(ASKED)
+
 .PHONY: bench-surface
 bench-surface: setup ## Seen surface that is in the map, at any angle, beside Open3D (QUICK=1: one board and room a case)
 	OMP_NUM_THREADS=1 $(EXPERIMENT) surface --out $(OUTPUTS)/experiments/bench-surface$(if $(QUICK),-quick) $(ASKED)

@@ -58,6 +58,7 @@ def run(
             rasterizer_of(context.device),
             context.random(1),
             refine_poses=parameters.refine_poses,
+            most=parameters.most_gaussians,
         )
         arriving = arrivals(views, parameters.steps_per_second)
         losses: deque[float] = deque(maxlen=LAST)

@@ -28,6 +28,9 @@ class BuildParameters(Parameters):
         description="Steps of training in a second of the log: pictures arrive by their stamps",
     )
     steps: int = Field(1000, ge=0, le=1_000_000, description="Steps after the last picture has arrived")
+    most_gaussians: int = Field(
+        500_000, ge=1, le=10_000_000, description="New pictures bring no further Gaussians once there are so many"
+    )
     refine_poses: bool = Field(False, description="Learn the poses too, but for the first")
 
 
@@ -40,7 +43,7 @@ class RenderParameters(Parameters):
 
 BUILD = Stage(
     name="splat build",
-    version=1,
+    version=2,
     summary="Learn a room as 3-D Gaussians from posed pictures that arrive one after another",
     parameters=BuildParameters,
     reads={"sequence": Sequence, "trajectory": Optionally(Trajectory)},

@@ -33,14 +33,21 @@ class Learned:
 class Trainer:
     """Holds the Gaussians and the views; `step` makes them agree a little better.
 
-    `refine_poses`: poses are learned too, but for that of the first view, which holds the world still.
+    `refine_poses`: poses are learned too, but for that of the first view, which holds the world still. `most`: pictures
+    bring no further Gaussians once there are so many.
     """
 
     def __init__(
-        self, method: Method, rasterizer: Rasterizer, random: np.random.Generator, *, refine_poses: bool = False
+        self,
+        method: Method,
+        rasterizer: Rasterizer,
+        random: np.random.Generator,
+        *,
+        refine_poses: bool = False,
+        most: int = 10**7,
     ) -> None:
         self.method, self.rasterizer, self.random = method, rasterizer, random
-        self.refine_poses = refine_poses
+        self.refine_poses, self.most = refine_poses, most
         self.gaussians = no_gaussians()
         self.views: list[Learned] = []
         self.steps = 0
@@ -51,7 +58,11 @@ class Trainer:
         """Take a new picture in: Gaussians are set where the method wants them."""
         self.views.append(Learned(view, view.camera_from_world.copy(), np.zeros(6), np.zeros(6)))
         shown = self.draw(self.views[-1]).picture
-        self._add(self.method.seed(view, shown, view.camera_from_world, self.random))
+        more = self.method.seed(view, shown, view.camera_from_world, self.random)
+        room = max(0, self.most - len(self.gaussians))
+        if len(more) > room:
+            more = more.taken(np.sort(self.random.permutation(len(more))[:room]))
+        self._add(more)
 
     def draw(self, learned: Learned) -> Drawn:
         """Return what a view shows of the Gaussians now."""

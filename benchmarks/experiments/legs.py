@@ -1,0 +1,206 @@
+"""Splats of rooms, learned while pictures arrive: `ours` beside the method of LEGS (`thesis`).
+
+Same frames, same poses, every eighth held out. The clock starts with the first picture: those that follow arrive by
+their stamps, training goes on all the while, and a step costs the processor time that it takes (one thread). Cases
+`<scene>/<budget>` look at the held-out pictures when the clock shows the budget; `<scene>/drifting` and
+`<scene>/mended` have poses that drift as odometry does, without and with `--refine-poses`, at the last budget, where
+the held-out pictures stand where the drifting path has them, moved as the nearest learned one was.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numba
+import numpy as np
+from pydantic import Field
+
+from benchmarks.experiment import Bench, Experiment, Trial, mean
+from benchmarks.experiments.mapping.drift import drifting_poses
+from benchmarks.generated_rooms import STEPS, make_room
+from benchmarks.steps import made, opened
+from schemas.scene_parts import Camera
+from schemas.sequence import Sequence as SequenceArtifact
+from stages.kit.formats.frames import FrameReader
+from stages.kit.geometry.transforms import inverse
+from stages.kit.rendering.splatting.rasterizer import View
+from stages.kit.stage import Parameters
+from stages.splat.build_stage import method_of, rasterizer_of
+from stages.splat.building import carried_poses
+from stages.splat.render_stage import figures_of
+from stages.splat.training import Trainer
+from stages.splat.views import PosedView, evenly, held_out, posed_frames, read_view
+
+REAL = {"office": "hololens_office", "livingroom": "redwood_livingroom1"}
+"""The red kitchen was looked at while `ours` was made."""
+ROOMS = ("kitchen", "office", "bedroom", "room")
+REPORTING = tuple(f"{ROOMS[k % 4]}-{1400 + k}" for k in range(20))
+"""In the reporting range of the recipes."""
+GENERATED = "rooms"
+BUDGETS = {"10s": 10.0, "30s": 30.0, "1min": 60.0, "5min": 300.0, "20min": 1200.0}
+QUICK_BUDGETS, WHOLE_BUDGETS = ("10s", "30s"), ("1min", "5min", "20min")
+POSES = ("drifting", "mended")
+HOLD_OUT_EVERY = 8
+GOOD = 20.0
+"""PSNR at which a splat counts as made (Srinivas 2024, section 10.1) [dB]."""
+LOOK_EVERY = 3.0
+"""Between two looks at the held-out pictures until they are good [s]."""
+
+
+class LegsParameters(Parameters):
+    """Options of the experiment."""
+
+    data: Path = Field(Path("../shared/data"), description="Folder with the real logs")
+    frames: int = Field(120, ge=16, description="Frames of a generated room")
+    views: int = Field(200, ge=16, description="Pictures of a log, at most")
+    width: int = Field(320, ge=32, description="Width of the pictures [px]")
+
+
+@dataclass(frozen=True)
+class Splatted:
+    """What was measured of a splat."""
+
+    psnr: float
+    ssim: float
+    depth_error: float | None
+    gaussians: int
+    steps: int
+    seconds_to_20: float
+    """From the first picture on; the budget where it was not reached."""
+    reached_20: bool
+
+
+def sequence_of(bench: Bench, seed: str) -> SequenceArtifact:
+    """Ingest a real log, or make a room."""
+    folder = bench.out / "logs"
+    if seed in REAL:
+        return opened(SequenceArtifact, made("ingest", folder / seed, "--log", bench.parameters.data / REAL[seed]))
+    return opened(SequenceArtifact, make_room(folder, seed, bench.parameters.frames, size=(320, 240)).sequence)
+
+
+def seeds_of(bench: Bench, case: str) -> Sequence[str]:
+    """The rooms, or the one log of that name, where it is there."""
+    scene = case.split("/")[0]
+    if scene == GENERATED:
+        return REPORTING[: 1 if bench.quick else None]
+    return [scene] if (bench.parameters.data / REAL[scene]).is_dir() else []
+
+
+def default_cases(bench: Bench) -> list[str]:
+    """Short budgets with `--quick`."""
+    budgets = QUICK_BUDGETS if bench.quick else WHOLE_BUDGETS
+    return [f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*budgets, *POSES)]
+
+
+def split_views(bench: Bench, seed: str, drifting: bool) -> tuple[list[PosedView], list[PosedView]]:
+    """Return the views to learn from and those held out."""
+    with FrameReader(sequence_of(bench, seed).path("frames.mcap")) as reader:
+        posed = posed_frames(reader, sequence_of(bench, seed), None)
+        if drifting:
+            drifted = drifting_poses(np.array([pose for _, pose in posed]), np.random.default_rng(0))
+            posed = [(frame, pose) for (frame, _), pose in zip(posed, drifted, strict=True)]
+        poses = dict(posed)
+        frames = evenly([frame for frame, _ in posed], bench.parameters.views)
+        read = {frame: read_view(reader, frame, poses[frame], bench.parameters.width) for frame in frames}
+    kept = {frames[k] for k in held_out(len(frames), HOLD_OUT_EVERY)}
+    learned = [view for frame, view in read.items() if view is not None and frame not in kept]
+    return learned, [view for frame, view in read.items() if view is not None and frame in kept]
+
+
+def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Splatted]]:
+    """Train once up to the greatest budget asked for and yield what the clock's stops show."""
+    numba.set_num_threads(1)
+    warm_up()
+    part = {trial: trial.case.split("/")[1] for trial in trials}
+    poses = next((each for each in part.values() if each in POSES), "exact")
+    last = BUDGETS[(QUICK_BUDGETS if bench.quick else WHOLE_BUDGETS)[-1]]
+    stops = {trial: BUDGETS.get(each, last) for trial, each in part.items()}
+    learned, kept = split_views(bench, trials[0].seed, poses != "exact")
+    trainer = Trainer(
+        method_of(trials[0].arm), rasterizer_of("cpu"), np.random.default_rng(0), refine_poses=poses == "mended"
+    )
+    waiting, start, clock, looked, reached = list(learned), learned[0].time, 0.0, 0.0, float("inf")
+    for trial in sorted(trials, key=lambda each: stops[each]):
+        while clock < stops[trial]:
+            began = time.process_time()
+            while waiting and waiting[0].time - start <= clock:
+                trainer.add_view(waiting.pop(0))
+            trainer.step()
+            clock += time.process_time() - began
+            if reached == float("inf") and clock - looked >= LOOK_EVERY:
+                looked = clock
+                if looks(trainer, kept)[0] >= GOOD:
+                    reached = clock
+        psnr, ssim, depth_error = looks(trainer, kept)
+        good = reached <= stops[trial]
+        seconds = reached if good else stops[trial]
+        yield trial, Splatted(psnr, ssim, depth_error, len(trainer.gaussians), trainer.steps, seconds, good)
+
+
+@cache
+def warm_up() -> None:
+    """Compile what training calls, which is on nobody's clock."""
+    camera = Camera(width=16, height=16, fx=16.0, fy=16.0, cx=7.5, cy=7.5)
+    blank = PosedView(
+        0, 0.0, "camera", camera, np.ones((16, 16, 3), np.float32), np.ones((16, 16), np.float32), np.eye(4)
+    )
+    trainer = Trainer(method_of("ours"), rasterizer_of("cpu"), np.random.default_rng(0))
+    trainer.add_view(blank)
+    trainer.step()
+
+
+def looks(trainer: Trainer, views: Sequence[PosedView]) -> tuple[float, float, float | None]:
+    """Return mean PSNR [dB], SSIM and depth error [m] of pictures that were not learned."""
+    poses = dict(carried_poses(trainer, [(view.frame, inverse(view.camera_from_world)) for view in views]))
+    found = []
+    for view in views:
+        placed = replace(view, camera_from_world=inverse(poses[view.frame]))
+        picture = trainer.rasterizer.draw(trainer.gaussians, View(view.camera, placed.camera_from_world)).picture
+        found.append(figures_of(placed, picture, "held_out"))
+    errors = [each.depth_error for each in found if each.depth_error is not None]
+    means = [float(np.mean([getattr(each, name) for each in found])) for name in ("psnr", "ssim")]
+    return means[0], means[1], float(np.mean(errors)) if errors else None
+
+
+def together(trial: Trial) -> object:
+    """Budgets of one scene with the same poses are one training."""
+    part = trial.case.split("/")[1]
+    return (trial.arm, trial.seed, part if part in POSES else "exact")
+
+
+EXPERIMENT = Experiment(
+    name="legs",
+    title="Rooms as Gaussians, learned while pictures arrive",
+    simulated="The generated rooms, their pictures and noisy depth; the drift of poses; the clock, which counts "
+    "processor time of one thread beside the stamps of the log.",
+    knows="Colour, depth, calibration and poses (exact, given, or drifting) of every picture that has arrived.",
+    does_not_show="Language: nothing is asked. LERF, LangSplat and entities. A GPU, on which the thesis's method makes "
+    "far more steps in the same time. Several cameras, and pictures without depth.",
+    arms={"ours": "ours", "thesis": "thesis's method"},
+    cases=tuple(f"{scene}/{part}" for scene in (*REAL, GENERATED) for part in (*BUDGETS, *POSES)),
+    default_cases=default_cases,
+    seeds_of=seeds_of,
+    reporting=REPORTING,
+    together=together,
+    measure=measure,
+    record=Splatted,
+    measures={
+        "psnr": mean("psnr", "dB"),
+        "ssim": mean("ssim"),
+        "depth_error": mean("depth_error", "m"),
+        "seconds_to_20": mean("seconds_to_20", "s"),
+        "reached_20": mean("reached_20"),
+        "gaussians": mean("gaussians", interval=False),
+        "steps": mean("steps", interval=False),
+    },
+    pairs=(("ours", "thesis"),),
+    compared=("psnr", "ssim", "seconds_to_20"),
+    parameters=LegsParameters,
+    places=frozenset({"data"}),
+    quick={"frames": 60, "views": 60},
+    steps=STEPS,
+)
