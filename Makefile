@@ -127,6 +127,10 @@ legs: setup ## Rooms as Gaussians, learned while pictures arrive, beside the the
 bench-surface: setup ## Seen surface that is in the map, at any angle, beside Open3D (QUICK=1: one board and room a case)
 	OMP_NUM_THREADS=1 $(EXPERIMENT) surface --out $(OUTPUTS)/experiments/bench-surface$(if $(QUICK),-quick) $(ASKED)
 
+.PHONY: bench-edits
+bench-edits: setup ## Edits by hand, applied again to maps fused with other parameters (QUICK=1: four rooms)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) edits --out $(OUTPUTS)/experiments/bench-edits$(if $(QUICK),-quick) $(ASKED)
+
 .PHONY: bench-mapping
 # Twenty generated rooms (three of fewer frames with QUICK=1), every arm on the same frames and masks.
 bench-mapping: setup ## The panoptic map beside the thesis and Voxblox++, tables 2.1 to 2.4 (QUICK=1: three rooms)

@@ -184,10 +184,10 @@ def migrate(
 
 def view(
     path: Annotated[Path, typer.Argument(help="Artifact folder of any kind.")],
-    save: Annotated[Path | None, typer.Option("--save", help="Write a .rrd file instead of opening a window.")] = None,
+    save: Annotated[Path | None, typer.Option("--save", help="Write an .html page, or an .rrd file.")] = None,
     debug: Debug = False,
 ) -> int:
-    """Open an artifact in Rerun (an extra: pip install rerun-sdk), or write an .rrd file."""
+    """Open an artifact in Rerun (an extra: pip install rerun-sdk), or write it as a page for any browser."""
     from cli.viewing.view import view_artifact
 
     view_artifact(path, save)

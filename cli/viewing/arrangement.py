@@ -10,6 +10,9 @@ import numpy as np
 EYE_DIRECTION = np.array([-0.45, -0.75, 0.95])
 """From the middle of the scene to the eye: high enough to look into a room over the walls."""
 
+SIDE_BY_SIDE = 2
+"""More views than these are tabs."""
+
 
 @dataclass
 class Arrangement:
@@ -48,7 +51,8 @@ class Arrangement:
                 )
                 for name, hidden in views
             ]
-            columns.append(spatial[0] if len(spatial) == 1 else rrb.Vertical(*spatial))
+            together = rrb.Vertical if len(spatial) == SIDE_BY_SIDE else rrb.Tabs
+            columns.append(spatial[0] if len(spatial) == 1 else together(*spatial))
         aside: list[Any] = []
         if self.pictures:
             aside.append(

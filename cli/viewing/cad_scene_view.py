@@ -13,12 +13,15 @@ from cli.viewing.inputs import input_artifact
 from cli.viewing.meshes import load_mesh
 from schemas.cad_library import CadLibrary
 from schemas.cad_scene import SURROUNDINGS, CadCandidate, CadScene, Replacement
+from schemas.panoptic_map import PanopticMap
 from stages.kit.formats.cad_models import read_model
 from stages.kit.formats.painted_models import painted_mesh
 from stages.kit.measurement.cad_candidates import candidates_of
 
 CANDIDATES = "candidates"
 """Candidates that were not chosen lie below this path: drawn, but hidden at first, as they stand in the chosen ones."""
+MAP = "map"
+"""What the scene was made from: hidden at first, to be compared."""
 DRAWN_CANDIDATES = 3
 """Of each object, beside the chosen one."""
 
@@ -49,7 +52,10 @@ def draw_cad_scene(cad_scene: CadScene, canvas: Canvas) -> None:
     nameless = cad_scene.path("meshes") / f"{SURROUNDINGS}.ply"
     if nameless.exists():
         canvas.mesh(SURROUNDINGS, load_mesh(nameless), front_only=True)
-    draw_graph(cad_scene.graph, canvas, CANDIDATES)
+    panoptic_map = input_artifact(cad_scene, PanopticMap)
+    if panoptic_map is not None and panoptic_map.path("mesh.ply").exists():
+        canvas.mesh(MAP, load_mesh(panoptic_map.path("mesh.ply")), front_only=True)
+    draw_graph(cad_scene.graph, canvas, CANDIDATES, MAP)
     canvas.document("replacements", "\n".join(rows))
     canvas.document(CANDIDATES, candidate_table(cad_scene))
 

@@ -1,95 +1,63 @@
-"""What the viewers draw on: arrays in our conventions, Rerun behind it. Rerun is imported only here."""
+"""What the viewers draw on: arrays in our conventions. Behind it are a Rerun recording, or a page for a browser."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from types import ModuleType
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
 
-import cv2
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from cli.viewing.arrangement import Arrangement
-from cli.viewing.viewer_process import viewer_address
-from schemas.errors import BadInput, MissingDependency
 from schemas.scene_parts import Box, Camera
-from stages.kit.formats.foxglove import PNG_START
-from stages.kit.geometry.cameras import intrinsic_matrix
-from stages.kit.geometry.transforms import quaternion_of
 
-WORLD = "world"
 SHELL = "shell"
 """Walls and ceilings that are solid, below this path: hidden at first, as one looks from outside."""
-DISTRIBUTION = "rerun-sdk"
 Color = tuple[float, float, float]
 """(r, g, b) in 0..1."""
 
 
-def import_rerun() -> ModuleType:
-    """Return the rerun module. Raises MissingDependency with the command that installs it."""
-    try:
-        import rerun
-    except ImportError:
-        raise MissingDependency(
-            f"the viewer needs {DISTRIBUTION}, which is not installed", hint=f'pip install "{DISTRIBUTION}>=0.41"'
-        ) from None
-    return rerun
+@dataclass(frozen=True)
+class JointedLink:
+    """A link of a kinematic tree, and the joint that it hangs on."""
+
+    path: str
+    """Where it is drawn, or a name of its own where it has no shape."""
+    parent: str
+    """Path of the link that it hangs on; empty: the world."""
+    parent_from_link: np.ndarray
+    """(4, 4) with the joint at 0."""
+    kind: Literal["fixed", "turning", "sliding"] = "fixed"
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    """In the link's frame."""
+    name: str = ""
+    """Of the joint."""
+    lower: float = 0.0
+    """[rad, m]"""
+    upper: float = 0.0
+    value: float = 0.0
+    """Where it was seen."""
 
 
-def bytes_of(color: Color) -> list[int]:
-    """Return a colour as three bytes."""
-    return [round(255 * min(max(channel, 0.0), 1.0)) for channel in color]
+class Canvas(Protocol):
+    """Lengths in metres, z up, times in seconds. Paths name what is drawn, their parts separated by /.
 
-
-class Canvas:
-    """One Rerun recording, shown in a window or written to a file. Lengths in metres, z up, times in seconds.
-
-    Paths are entity paths below `world/`. What is drawn before `time` was called is there all the time.
+    What is drawn before `time` was called is there all the time; something that is drawn again at the same path takes
+    the place of what was there until then.
     """
-
-    def __init__(self, name: str, save: Path | None) -> None:
-        self._rerun: Any = import_rerun()
-        self._recording = self._rerun.RecordingStream("scenewright", send_properties=False)
-        self._recording.send_recording_name(name)
-        self._static = True
-        self._arrangement = Arrangement(WORLD)
-        if save is None:
-            self._recording.connect_grpc(viewer_address())
-        else:
-            try:
-                save.parent.mkdir(parents=True, exist_ok=True)
-                self._recording.save(save)
-            except (OSError, RuntimeError) as error:
-                raise BadInput(f"{save}: cannot be written: {error}") from None
-        self._log(WORLD, self._rerun.ViewCoordinates.RIGHT_HAND_Z_UP)
-
-    def __enter__(self) -> Canvas:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
-            self._recording.send_blueprint(self._arrangement.blueprint())
-        self._recording.flush()
-        self._recording.disconnect()
 
     def time(self, seconds: float, timeline: str = "time") -> None:
         """Set the time [s] of what is drawn from now on."""
-        self._static = False
-        self._recording.set_time(timeline, duration=float(seconds))
 
     def always(self) -> None:
         """What is drawn from now on is there all the time."""
-        self._static = True
 
     def enclose(self, minimum: ArrayLike, maximum: ArrayLike) -> None:
-        """Keep the box from `minimum` to `maximum` (3,) [m] in sight when the recording is opened."""
-        self._arrangement.enclose(np.asarray(minimum, dtype=float), np.asarray(maximum, dtype=float))
+        """Keep the box from `minimum` to `maximum` (3,) [m] in sight at first."""
 
     def view(self, name: str, *hidden: str) -> None:
-        """Open a 3D view of everything but what lies under the hidden paths; without any there is one of all."""
-        self._arrangement.views.append((name, hidden))
+        """Have a 3D view of everything but what lies under the hidden paths; without any there is one of all."""
 
     def mesh(
         self, path: str, mesh: trimesh.Trimesh, colors: np.ndarray | None = None, *, front_only: bool = False
@@ -98,34 +66,9 @@ class Canvas:
 
         `front_only` leaves out faces that look away, so that one looks into a room through its walls.
         """
-        if len(mesh.faces) == 0:
-            return
-        self._arrangement.drawn = True
-        visual = mesh.visual
-        if colors is None and isinstance(visual, trimesh.visual.ColorVisuals) and visual.kind == "face":
-            face_colors = np.asarray(visual.face_colors)
-            mesh = mesh.copy()
-            mesh.unmerge_vertices()
-            colors = np.repeat(face_colors, 3, axis=0)
-        elif colors is None:
-            colors = _vertex_colors(mesh)
-        self._log(
-            f"{WORLD}/{path}",
-            self._rerun.Mesh3D(
-                vertex_positions=np.asarray(mesh.vertices, dtype=np.float32),
-                triangle_indices=np.asarray(mesh.faces, dtype=np.uint32),
-                vertex_normals=np.asarray(mesh.vertex_normals, dtype=np.float32),
-                vertex_colors=colors,
-                face_rendering=self._rerun.components.MeshFaceRendering.Front if front_only else None,
-            ),
-        )
 
     def points(self, path: str, points: np.ndarray, colors: np.ndarray | None = None, radius: float = 0.005) -> None:
         """Draw points (N, 3) with colours (N, 3) uint8."""
-        self._arrangement.drawn = True
-        self._log(
-            f"{WORLD}/{path}", self._rerun.Points3D(np.asarray(points, dtype=np.float32), colors=colors, radii=radius)
-        )
 
     def line(
         self,
@@ -136,114 +79,59 @@ class Canvas:
         labels: list[str] | None = None,
     ) -> None:
         """Draw polylines, each (N, 3), in one colour each; `labels` are shown for what is selected."""
-        self._arrangement.drawn = True
-        strips = [np.asarray(strip, dtype=np.float32) for strip in strips]
-        self._log(
-            f"{WORLD}/{path}",
-            self._rerun.LineStrips3D(
-                strips,
-                colors=[bytes_of(color) for color in colors],
-                radii=radius,
-                labels=labels,
-                show_labels=None if labels is None else False,
-            ),
-        )
 
     def boxes(
         self, path: str, boxes: list[Box], labels: list[str], colors: list[Color], *, show_labels: bool = True
     ) -> None:
         """Draw oriented boxes with labels."""
-        if boxes:
-            self._arrangement.drawn = True
-            self._log(
-                f"{WORLD}/{path}",
-                self._rerun.Boxes3D(
-                    centers=[box.center for box in boxes],
-                    sizes=[box.size for box in boxes],
-                    quaternions=[self._rerun.Quaternion(xyzw=box.orientation) for box in boxes],
-                    colors=[bytes_of(color) for color in colors],
-                    labels=labels,
-                    show_labels=show_labels,
-                ),
-            )
 
     def transform(self, path: str, parent_from_child: np.ndarray, scale: float = 1.0) -> None:
         """Place what lies under `path` with a rigid (4, 4) transform, after scaling it."""
-        self._log(
-            f"{WORLD}/{path}",
-            self._rerun.Transform3D(
-                translation=parent_from_child[:3, 3],
-                quaternion=self._rerun.Quaternion(xyzw=quaternion_of(parent_from_child)),
-                scale=None if scale == 1.0 else scale,
-            ),
-        )
+
+    def joints(self, links: Sequence[JointedLink]) -> None:
+        """Say how links that are drawn hang on each other, parents first, so that joints can be tried."""
 
     def camera(self, path: str, camera: Camera) -> None:
         """Say that `path` is a pinhole camera (OpenCV axes)."""
-        self._arrangement.drawn = True
-        self._log(
-            f"{WORLD}/{path}",
-            self._rerun.Pinhole(
-                image_from_camera=intrinsic_matrix(camera),
-                width=camera.width,
-                height=camera.height,
-                camera_xyz=self._rerun.ViewCoordinates.RDF,
-                image_plane_distance=0.3,
-            ),
-        )
 
     def picture(self, path: str, data: bytes) -> None:
-        """Show a JPEG or PNG as it is, in the 2D view of the path above."""
-        self._picture(path)
-        kind = "image/png" if data.startswith(PNG_START) else "image/jpeg"
-        self._log(f"{WORLD}/{path}", self._rerun.EncodedImage(contents=data, media_type=kind))
+        """Show a JPEG or PNG as it is."""
 
     def depth(self, path: str, depth: np.ndarray) -> None:
-        """Show depth (H, W) float [m], 0 = invalid; under a camera Rerun draws it as points."""
-        millimetres = np.clip(np.rint(depth * 1000), 0, 65535).astype(np.uint16)
-        data = cv2.imencode(".png", millimetres, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()
-        image = self._rerun.EncodedDepthImage(
-            blob=data, media_type="image/png", meter=1000.0, depth_range=(0.0, 5000.0)
-        )
-        self._log(f"{WORLD}/{path}", image)
+        """Show depth (H, W) float [m], 0 = invalid."""
 
     def label_names(self, path: str, rows: list[tuple[int, str, Color]]) -> None:
         """Say what the ids of the label images under `path` mean."""
-        infos = [
-            self._rerun.AnnotationInfo(id=number, label=name, color=[*bytes_of(color), 255])
-            for number, name, color in rows
-        ]
-        self._log(f"{WORLD}/{path}", self._rerun.AnnotationContext(infos))
 
     def labels(self, path: str, ids: np.ndarray) -> None:
         """Show ids (H, W) 0..65535 over the picture; 0 is void."""
-        self._picture(path)
-        self._log(f"{WORLD}/{path}", self._rerun.SegmentationImage(ids.astype(np.uint16), opacity=0.5))
 
     def graph(self, names: list[str], colors: list[Color], edges: list[tuple[str, str]]) -> None:
         """Show a directed graph in a view of its own."""
-        self._arrangement.graph = True
-        nodes = self._rerun.GraphNodes(names, labels=names, colors=[bytes_of(color) for color in colors])
-        self._log("graph", nodes, self._rerun.GraphEdges(edges, graph_type="directed"))
 
     def document(self, path: str, markdown: str) -> None:
         """Show a text in Markdown."""
-        if path not in self._arrangement.documents:
-            self._arrangement.documents.append(path)
-        self._log(path, self._rerun.TextDocument(markdown, media_type="text/markdown"))
-
-    def _picture(self, path: str) -> None:
-        group = path.rpartition("/")[0] or path
-        if group not in self._arrangement.pictures:
-            self._arrangement.pictures.append(group)
-
-    def _log(self, path: str, *what: Any) -> None:
-        self._recording.log(path, *what, static=self._static)
 
 
-def _vertex_colors(mesh: trimesh.Trimesh) -> np.ndarray | None:
+def bytes_of(color: Color) -> list[int]:
+    """Return a colour as three bytes."""
+    return [round(255 * min(max(channel, 0.0), 1.0)) for channel in color]
+
+
+def vertex_colors(mesh: trimesh.Trimesh, colors: np.ndarray | None) -> tuple[trimesh.Trimesh, np.ndarray | None]:
+    """Return a mesh and colours (V, 3 or 4) uint8 of its vertices, its own where none are given; None: it has none.
+
+    Faces that have a colour each get vertices of their own.
+    """
+    if colors is not None:
+        return mesh, colors
     visual: Any = mesh.visual
+    if isinstance(visual, trimesh.visual.ColorVisuals) and visual.kind == "face":
+        face_colors = np.asarray(visual.face_colors)
+        mesh = mesh.copy()
+        mesh.unmerge_vertices()
+        return mesh, np.repeat(face_colors, 3, axis=0)
     if isinstance(visual, trimesh.visual.TextureVisuals):
         visual = visual.to_color()
-    colors = np.asarray(visual.vertex_colors)
-    return colors if colors.shape == (len(mesh.vertices), 4) else None
+    own = np.asarray(visual.vertex_colors)
+    return mesh, own if own.shape == (len(mesh.vertices), 4) else None

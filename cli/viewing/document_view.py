@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from cli.viewing.canvas import Canvas
 from schemas.evaluation import Evaluation, Report
+from schemas.exported_scene import ExportedScene
 from schemas.exported_sequence import ExportedSequence
 from schemas.outside import LARGEST_SHOWN, file_content, file_text
 
@@ -31,4 +32,11 @@ def draw_exported_sequence(export: ExportedSequence, canvas: Canvas) -> None:
     """Say what was written: it is made for other tools."""
     info = export.info
     rows = [f"{info.frame_count} frames as {info.layout}: open `{export.path(info.log)}`", ""]
+    canvas.document("export", "\n".join([*rows, *(f"- {note}" for note in info.notes)]))
+
+
+def draw_exported_scene(export: ExportedScene, canvas: Canvas) -> None:
+    """Say what was written: it is made for other tools."""
+    info = export.info
+    rows = [f"{info.bodies} bodies, {info.joints} joints as {info.target}: open `{export.path(info.file)}`", ""]
     canvas.document("export", "\n".join([*rows, *(f"- {note}" for note in info.notes)]))

@@ -1,4 +1,4 @@
-"""Open any artifact in Rerun: which viewer draws which kind."""
+"""Open any artifact in Rerun, or write it as a page: which viewer draws which kind."""
 
 from __future__ import annotations
 
@@ -9,10 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import cli.viewing
-from cli.viewing.canvas import Canvas, import_rerun
+from cli.viewing.canvas import Canvas
+from cli.viewing.page.page_canvas import PageCanvas
+from cli.viewing.rerun_canvas import RerunCanvas, import_rerun
 from schemas.artifact import Artifact
 from schemas.errors import BadInput, UsageError
 from stages.engine.reading import open_artifact
+
+PAGE, RECORDING = ".html", ".rrd"
 
 
 def viewer_of(kind: type[Artifact]) -> Callable[[Any, Canvas], None] | None:
@@ -31,16 +35,25 @@ def viewer_of(kind: type[Artifact]) -> Callable[[Any, Canvas], None] | None:
 
 
 def view_artifact(path: Path, save: Path | None = None) -> None:
-    """Show an artifact in a Rerun window, or write it to `save` (an .rrd file).
+    """Show an artifact in a Rerun window, or write it to `save`: an .rrd file for Rerun, or an .html page that any
+    browser shows.
 
-    Raises BadInput (no artifact, or nothing to draw), UsageError (`save` is no .rrd file), MissingDependency.
+    Raises BadInput (no artifact, or nothing to draw), UsageError (`save` is neither), MissingDependency.
     """
-    if save is not None and save.suffix != ".rrd":
-        raise UsageError(f"{save}: the file to write must end in .rrd")
-    import_rerun()
+    if save is not None and save.suffix not in (PAGE, RECORDING):
+        raise UsageError(f"{save}: the file to write must end in {PAGE} or {RECORDING}")
+    as_page = save is not None and save.suffix == PAGE
+    if not as_page:
+        import_rerun()
     artifact = open_artifact(path)
     draw = viewer_of(type(artifact))
     if draw is None:
         raise BadInput(f"{path}: a {artifact.kind!r} artifact has no view", hint="open its files in Foxglove or Rerun")
-    with Canvas(f"{artifact.kind} {Path(path).name}", save) as canvas:
-        draw(artifact, canvas)
+    name = f"{artifact.kind} {Path(path).resolve().name}"
+    if as_page:
+        assert save is not None
+        with PageCanvas(name, save) as page:
+            draw(artifact, page)
+    else:
+        with RerunCanvas(name, save) as recording:
+            draw(artifact, recording)

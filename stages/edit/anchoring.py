@@ -1,8 +1,9 @@
 """Which thing of a map an anchor means, and the anchor of a thing.
 
-A thing fits when it is of the class, its box is much the same (intersection over union of the two boxes, grown so that
-flat things have a volume), and its surface passes the anchor's point. Where nothing fits, or two fit nearly alike, the
-answer is a conflict in words: a wrong guess would be applied in silence, a conflict is seen.
+A thing fits when it is of the class, or of none that the masks knew; when its surface passes the anchor's point; and
+when its box is much the same (intersection over union of the two boxes, grown so that flat things have a volume), or
+lies within the anchor's as the only one of its class: less was seen of it. Where nothing fits, or two things fit nearly
+alike, the answer is a conflict in words: a wrong guess would be applied in silence, a conflict is seen.
 """
 
 from __future__ import annotations
@@ -18,10 +19,28 @@ from schemas.edits import Anchor
 from schemas.hand_written import UprightBox
 from schemas.scene_parts import Box
 from stages.edit.map_state import MapState, Thing
-from stages.kit.geometry.boxes import box_corners, box_iou, box_yaw, gravity_aligned_box, minimum_box, upright_box
+from stages.kit.geometry.boxes import (
+    box_corners,
+    box_iou,
+    box_volume,
+    box_yaw,
+    boxes_overlap_volume,
+    gravity_aligned_box,
+    minimum_box,
+    points_in_box,
+    upright_box,
+)
 
 MILLIMETRES = 3
 """Decimals of what is written into edits.toml."""
+NAMELESS = "object"
+"""The class of things that masks found and did not recognise, or that no mask named: such a thing may be any."""
+AROUND = 0.05
+"""Surface this near to a point is around it [m]."""
+MOST_TRIED = 5000
+"""Vertices of a thing that may be an anchor's point."""
+MOSTLY_WITHIN = 0.8
+"""A box lies in another one by this share of its volume."""
 
 
 class Conflict(Exception):
@@ -33,6 +52,7 @@ class Fitting:
     """When a thing is the one that is meant (parameters of `edit map`)."""
 
     minimum_overlap: float
+    minimum_part: float
     margin: float
     """[m]"""
     reach: float
@@ -43,26 +63,48 @@ class Fitting:
         """Return the intersection over union, 0 to 1, of two upright boxes grown by the margin."""
         return box_iou(self._grown(a), self._grown(b))
 
+    def within(self, inner: Box, outer: Box) -> float:
+        """Return the share, 0 to 1, of the first of two upright boxes grown by the margin that lies in the second."""
+        small = self._grown(inner)
+        return boxes_overlap_volume(small, self._grown(outer)) / box_volume(small)
+
     def _grown(self, box: Box) -> Box:
         return gravity_aligned_box(box.center, np.asarray(box.size) + 2 * self.margin, box_yaw(box))
 
 
 def find(anchor: Anchor, things: Sequence[Thing], fitting: Fitting, also: Sequence[str] = ()) -> Thing:
     """Return the one thing that fits an anchor, of its class or one of `also`. Raises Conflict."""
-    box = upright_box(anchor.box)
-    fits = sorted(
+    box, classes = upright_box(anchor.box), (anchor.class_name, *also, NAMELESS)
+    there = sorted(
         ((fitting.overlap(box, thing.box), thing) for thing in things if passes(thing, anchor, fitting)),
         key=lambda pair: (-pair[0], pair[1].instance),
     )
-    good = [(overlap, thing) for overlap, thing in fits if overlap >= fitting.minimum_overlap]
-    named = [(overlap, thing) for overlap, thing in good if thing.class_name in (anchor.class_name, *also)]
+    good = [(overlap, thing) for overlap, thing in there if overlap >= fitting.minimum_overlap]
+    named = [(overlap, thing) for overlap, thing in good if _may_be(thing, anchor, classes)]
+    if not named and not good:
+        good = named = [pair for pair in there if _is_part(pair, anchor, things, fitting, classes)]
     if not named:
-        raise Conflict(_why_none(anchor, fits, good))
+        raise Conflict(_why_none(anchor, there, good))
     rivals = [thing for overlap, thing in good if overlap >= fitting.clear_share * named[0][0]]
     if len(rivals) > 1:
         both = ", ".join(f"{thing.name} ({overlap:.2f})" for overlap, thing in good[:2])
         raise Conflict(f"{_place(anchor)} more than one thing fits: {both}")
     return named[0][1]
+
+
+def _may_be(thing: Thing, anchor: Anchor, classes: Sequence[str]) -> bool:
+    return thing.class_name in classes or anchor.class_name == NAMELESS
+
+
+def _is_part(
+    pair: tuple[float, Thing], anchor: Anchor, things: Sequence[Thing], fitting: Fitting, classes: Sequence[str]
+) -> bool:
+    """Whether a thing is what a map that saw less has of the anchor's, and nothing else could be more of it."""
+    (overlap, thing), box = pair, upright_box(anchor.box)
+    if not _may_be(thing, anchor, classes) or overlap < fitting.minimum_part:
+        return False
+    inside = [k for k in things if _may_be(k, anchor, classes) and fitting.within(k.box, box) >= MOSTLY_WITHIN]
+    return [k.instance for k in inside] == [thing.instance]
 
 
 def passes(thing: Thing, anchor: Anchor, fitting: Fitting) -> bool:
@@ -86,16 +128,20 @@ def _why_none(anchor: Anchor, fits: list[tuple[float, Thing]], good: list[tuple[
 def anchor_of(state: MapState, instance: int) -> Anchor:
     """Return the anchor of a thing of a map, rounded to millimetres. Raises KeyError when it has no surface.
 
-    Its point is the vertex farthest from the surface of everything else, so that it stays on the thing when borders
-    move.
+    Its point is the vertex with most of the thing's own surface around it and least of others', so that it stays on
+    the thing when borders and fringes move.
     """
     thing = next((thing for thing in state.things() if thing.instance == instance), None)
     if thing is None:
         raise KeyError(instance)
-    own = state.instance == instance
-    points, others = state.surface.vertices[own].astype(float), state.surface.vertices[~own]
-    inner = int(np.argmax(cKDTree(others).query(points)[0])) if len(others) else 0
-    x, y, z = (round(float(value), MILLIMETRES) for value in points[inner])
+    points = np.asarray(thing.surface.data)
+    tried = points[:: -(-len(points) // MOST_TRIED)]
+    near = thing.surface.query_ball_point(tried, AROUND, return_length=True)
+    others = state.surface.vertices[state.instance != instance].astype(float)
+    others = others[points_in_box(thing.box, others, AROUND)]
+    if len(others):
+        near = near - cKDTree(others).query_ball_point(tried, AROUND, return_length=True)
+    x, y, z = (round(float(value), MILLIMETRES) for value in tried[int(np.argmax(near))])
     return Anchor.model_validate({"class": thing.class_name, "box": written_box(thing.box), "point": (x, y, z)})
 
 

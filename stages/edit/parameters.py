@@ -17,6 +17,9 @@ class EditMapParameters(Parameters):
         le=1,
         description="A thing fits an edit when the boxes, grown by --margin, share this much of their union",
     )
+    minimum_part: float = Field(
+        0.25, ge=0.05, le=1, description="... or this much, and it lies in the edit's box as the only one of its class"
+    )
     margin: float = Field(
         0.03, ge=0, le=1, description="Boxes are compared grown by this on every side [m]: flat things have no volume"
     )
@@ -30,7 +33,7 @@ class EditMapParameters(Parameters):
 
 MAP = Stage(
     name="edit map",
-    version=1,
+    version=2,
     summary="Apply edits (edits.toml) to a panoptic map; what no longer fits is a conflict, and not applied",
     parameters=EditMapParameters,
     reads={"panoptic_map": PanopticMap, "edits": External("edits.toml, as `edit rename` and the like write it")},

@@ -20,7 +20,7 @@ from schemas.errors import BadInput
 from stages.cutting.recording.panels import HEIGHT, WIDTH, NoCut
 from stages.cutting.recording.server import RecordingServer
 from stages.cutting.recording.session import Session, object_of, read_recording
-from tests.unit.cutting.browser import browser, needs_browser
+from tests.browser import browser, needs_browser
 
 MIDDLE = 0.5 * WIDTH
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import builtins
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cli.viewing.canvas import import_rerun
+from cli.main import run as scenewright
 from cli.viewing.graph_view import relation_table
 from cli.viewing.library_view import row_places
+from cli.viewing.page.library import three_js
+from cli.viewing.page.page_canvas import LARGEST_PAGE
+from cli.viewing.rerun_canvas import import_rerun
 from cli.viewing.segments_view import segment_images
 from cli.viewing.sequence_view import draw_sequence
 from cli.viewing.view import view_artifact, viewer_of
@@ -29,6 +33,7 @@ from stages.kit.measurement.relation_evidence import evidence
 from tests.unit.viewing import artifacts
 from tests.unit.viewing.suture_artifacts import make_suture
 from tests.unit.viewing.tableware_artifacts import make_tableware
+from tests.unit.viewing.test_page import document_of
 
 
 @pytest.fixture(scope="module")
@@ -319,3 +324,24 @@ def test_wrong_requests_are_refused(run: Path, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="cannot be written"):
         (tmp_path / "file").write_text("")
         view_artifact(run / "report", tmp_path / "file" / "a.rrd")
+
+
+def test_artifacts_become_pages_of_the_same_drawing(run: Path, tmp_path: Path) -> None:
+    for kind, paths in {
+        "panoptic_map": {"color", "instance", "class", "trust"},
+        "contact_graph": {"meshes/table_3"},
+        "cad_scene": {"cad/table_3", "candidates/table_3/1_table_00", "layout/floor_1"},
+        "interactive_scene": {"scene/table_3"},
+        "plan": set(),
+        "sequence": set(),
+    }.items():
+        page = tmp_path / f"{kind}.html"
+        assert scenewright(["view", str(run / kind), "--save", str(page)]) == 0
+        drawn = document_of(page)
+        assert paths <= {item["path"] for item in drawn["meshes"]}, kind
+        assert page.stat().st_size < LARGEST_PAGE
+        assert not re.search(r"(src|href)=[\"']?http", page.read_text().replace(three_js(), ""))
+    assert document_of(tmp_path / "plan.html")["transforms"] and document_of(tmp_path / "sequence.html")["pictures"]
+    assert any(link["kind"] == "turning" for link in document_of(tmp_path / "interactive_scene.html")["joints"])
+    assert document_of(tmp_path / "contact_graph.html")["graph"]["edges"]
+    assert scenewright(["view", str(run / "plan"), "--save", str(tmp_path / "plan.txt")]) == 2

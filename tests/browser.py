@@ -19,14 +19,22 @@ DRIVER = shutil.which("chromedriver")
 needs_browser = pytest.mark.skipif(DRIVER is None, reason="no browser here: install chromium and chromium-driver")
 
 
+WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""WebGL by the processor."""
+
+
 class Browser:
     """One window."""
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, arguments: tuple[str, ...]) -> None:
         self._base = address
-        arguments = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
-        options = {"args": [*arguments, "--window-size=1600,1000"]}
-        wanted = {"capabilities": {"alwaysMatch": {"browserName": "chrome", "goog:chromeOptions": options}}}
+        always = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--window-size=1600,1000"]
+        wanted = {
+            "browserName": "chrome",
+            "goog:chromeOptions": {"args": [*always, *arguments]},
+            "goog:loggingPrefs": {"browser": "ALL"},
+        }
+        wanted = {"capabilities": {"alwaysMatch": wanted}}
         self._base = f"{address}/session/{self.ask('POST', '/session', wanted)['sessionId']}"
 
     def ask(self, method: str, path: str, body: Any = None) -> Any:
@@ -68,14 +76,28 @@ class Browser:
             time.sleep(0.05)
         return text
 
+    def run(self, script: str, *given: Any) -> Any:
+        """Return what a script of the page returns."""
+        return self.ask("POST", "/execute/sync", {"script": script, "args": list(given)})
+
+    def keys(self, text: str) -> None:
+        """Press keys, one after the other, wherever the focus is."""
+        actions = [{"type": kind, "value": key} for key in text for kind in ("keyDown", "keyUp")]
+        self.ask("POST", "/actions", {"actions": [{"type": "key", "id": "keys", "actions": actions}]})
+
+    def complaints(self) -> list[str]:
+        """Return the warnings and errors of the console since it was asked last."""
+        entries = self.ask("POST", "/se/log", {"type": "browser"})
+        return [entry["message"] for entry in entries if entry["level"] in ("WARNING", "SEVERE")]
+
     def screenshot(self) -> str:
         """Return the page as PNG, in base 64."""
         return str(self.ask("GET", "/screenshot"))
 
 
 @contextlib.contextmanager
-def browser() -> Iterator[Browser]:
-    """Start a browser."""
+def browser(*arguments: str) -> Iterator[Browser]:
+    """Start a browser, by default without a graphics card."""
     assert DRIVER is not None
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
@@ -88,7 +110,7 @@ def browser() -> Iterator[Browser]:
                 break
             assert time.monotonic() < deadline, "the driver does not answer"
             time.sleep(0.05)
-        opened = Browser(f"http://127.0.0.1:{port}")
+        opened = Browser(f"http://127.0.0.1:{port}", arguments or ("--disable-gpu",))
         try:
             yield opened
         finally:

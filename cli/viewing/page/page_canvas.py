@@ -1,0 +1,283 @@
+"""What viewers draw, recorded, and written as one page when they are done."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike
+
+from cli.viewing.canvas import Color, JointedLink, bytes_of, vertex_colors
+from cli.viewing.page.library import three_js
+from cli.viewing.page.packing import Block, thinned_mesh
+from schemas.errors import BadInput, MachineFailure
+from schemas.plain_text import cleaned
+from schemas.scene_parts import Box, Camera
+from stages.kit.formats.foxglove import PNG_START
+from stages.kit.geometry.boxes import box_corners
+
+FOLDER = Path(__file__).resolve().parent
+LARGEST_PAGE = 15_000_000
+"""Bytes."""
+MOST_VERTICES = 240_000
+"""Of all meshes together; more are thinned."""
+EDGES = (0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.5, 1.0, 5.0)
+"""Cubes that hold one vertex, the least that suffice [m]."""
+SMALL = 500
+"""Vertices of meshes that are never thinned."""
+MOST_POINTS = 60_000
+"""Of a cloud."""
+MOST_PICTURE_BYTES = 4_000_000
+"""Of all pictures together; of more, every second one, every third one and so on is kept."""
+SKIPPED = "not in a page: open the artifact in Rerun"
+
+
+@dataclass
+class _Mesh:
+    path: str
+    time: float | None
+    vertices: np.ndarray
+    faces: np.ndarray
+    colors: np.ndarray | None
+    front_only: bool
+
+
+class PageCanvas:
+    """A page that is written to `save` when nothing went wrong. Raises BadInput when it would be too large."""
+
+    def __init__(self, name: str, save: Path) -> None:
+        self._name, self._save = name, save
+        self._time: float | None = None
+        self._block = Block()
+        self._meshes: list[_Mesh] = []
+        self._pictures: list[tuple[str, float | None, bytes]] = []
+        self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
+        self._said: dict[str, list[Any]] = {
+            kind: [] for kind in ("lines", "points", "boxes", "transforms", "documents", "views", "joints")
+        }
+        self._graph: dict[str, Any] | None = None
+        self._left_out: set[str] = set()
+
+    def __enter__(self) -> PageCanvas:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self._write()
+
+    def time(self, seconds: float, timeline: str = "time") -> None:
+        """See Canvas."""
+        self._time = float(seconds)
+
+    def always(self) -> None:
+        """See Canvas."""
+        self._time = None
+
+    def enclose(self, minimum: ArrayLike, maximum: ArrayLike) -> None:
+        """See Canvas."""
+        self._low = np.minimum(self._low, np.asarray(minimum, dtype=float))
+        self._high = np.maximum(self._high, np.asarray(maximum, dtype=float))
+
+    def view(self, name: str, *hidden: str) -> None:
+        """See Canvas."""
+        self._said["views"].append({"name": name, "hidden": list(hidden)})
+
+    def mesh(
+        self, path: str, mesh: trimesh.Trimesh, colors: np.ndarray | None = None, *, front_only: bool = False
+    ) -> None:
+        """See Canvas."""
+        if len(mesh.faces) == 0:
+            return
+        mesh, colors = vertex_colors(mesh, colors)
+        painted = None if colors is None else np.asarray(colors)[:, :3].astype(np.uint8)
+        vertices, faces = np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
+        self._meshes.append(_Mesh(path, self._time, vertices, faces, painted, front_only))
+
+    def points(self, path: str, points: np.ndarray, colors: np.ndarray | None = None, radius: float = 0.005) -> None:
+        """See Canvas."""
+        points = np.asarray(points, dtype=float).reshape(-1, 3)
+        every = max(1, -(-len(points) // MOST_POINTS))
+        entry = {**self._entry(path), **self._block.positions(points[::every]), "radius": float(radius)}
+        if colors is not None and np.asarray(colors).ndim == 2:
+            entry["colors"] = self._block.put(np.asarray(colors)[::every, :3].astype(np.uint8))
+        self._said["points"].append(entry)
+
+    def line(
+        self,
+        path: str,
+        strips: list[np.ndarray],
+        colors: list[Color],
+        radius: float = 0.004,
+        labels: list[str] | None = None,
+    ) -> None:
+        """See Canvas."""
+        arrays = [np.asarray(strip, dtype=float).reshape(-1, 3) for strip in strips]
+        if not sum(map(len, arrays)):
+            return
+        self._said["lines"].append(
+            {
+                **self._entry(path),
+                **self._block.positions(np.concatenate(arrays)),
+                "lengths": [len(strip) for strip in arrays],
+                "colors": [bytes_of(color) for color in colors],
+                "labels": labels,
+            }
+        )
+
+    def boxes(
+        self, path: str, boxes: list[Box], labels: list[str], colors: list[Color], *, show_labels: bool = True
+    ) -> None:
+        """See Canvas."""
+        if boxes:
+            corners = np.concatenate([box_corners(box) for box in boxes])
+            rows = {"labels": labels, "colors": [bytes_of(color) for color in colors]}
+            self._said["boxes"].append({**self._entry(path), **self._block.positions(corners), **rows})
+
+    def transform(self, path: str, parent_from_child: np.ndarray, scale: float = 1.0) -> None:
+        """See Canvas."""
+        matrix = np.asarray(parent_from_child, dtype=float).copy()
+        matrix[:3, :3] *= scale
+        rows = [round(float(value), 6) for value in matrix[:3].ravel()]
+        self._said["transforms"].append({**self._entry(path), "rows": rows})
+
+    def joints(self, links: Sequence[JointedLink]) -> None:
+        """See Canvas."""
+        self._said["joints"] += [
+            {**vars(link), "parent_from_link": np.asarray(link.parent_from_link)[:3].ravel().tolist()} for link in links
+        ]
+
+    def camera(self, path: str, camera: Camera) -> None:
+        """See Canvas; drawn as the pyramid of what it sees."""
+        x = np.array([0, camera.width, camera.width, 0]) - camera.cx
+        y = np.array([0, 0, camera.height, camera.height]) - camera.cy
+        far = 0.3 * np.column_stack([x / camera.fx, y / camera.fy, np.ones(4)])
+        strips = [np.concatenate([far, far[:1]]), *(np.array([np.zeros(3), corner]) for corner in far)]
+        moment, self._time = self._time, None
+        self.line(f"{path}/seen", strips, [(0.2, 0.4, 0.8)] * len(strips))
+        self._time = moment
+
+    def picture(self, path: str, data: bytes) -> None:
+        """See Canvas."""
+        self._pictures.append((path, self._time, data))
+
+    def depth(self, path: str, depth: np.ndarray) -> None:
+        """See Canvas; left out, which is said."""
+        self._left_out.add("depth images")
+
+    def label_names(self, path: str, rows: list[tuple[int, str, Color]]) -> None:
+        """See Canvas; left out with the label images."""
+
+    def labels(self, path: str, ids: np.ndarray) -> None:
+        """See Canvas; left out, which is said."""
+        self._left_out.add("label images")
+
+    def graph(self, names: list[str], colors: list[Color], edges: list[tuple[str, str]]) -> None:
+        """See Canvas."""
+        self._graph = {"names": names, "colors": [bytes_of(color) for color in colors], "edges": edges}
+
+    def document(self, path: str, markdown: str) -> None:
+        """See Canvas."""
+        self._said["documents"].append({**self._entry(path), "text": cleaned(markdown)})
+
+    def _entry(self, path: str) -> dict[str, Any]:
+        return {"path": path, "time": self._time}
+
+    def _drawn_meshes(self) -> list[dict[str, Any]]:
+        shapes = {shape_key(mesh.vertices): mesh.vertices for mesh in self._meshes}
+        total = sum(map(len, shapes.values()))
+        edge = next((edge for edge in EDGES if _thinned_to(shapes.values(), edge) <= MOST_VERTICES), EDGES[-1])
+        drawn = []
+        for mesh in self._meshes:
+            vertices, faces, colors = mesh.vertices, mesh.faces, mesh.colors
+            if total > MOST_VERTICES and len(vertices) > SMALL:
+                vertices, faces, first = thinned_mesh(vertices, faces, edge)
+                colors = None if colors is None else colors[first]
+            entry = {"path": mesh.path, "time": mesh.time, **self._block.positions(vertices)}
+            entry |= {"faces": self._block.put(faces.astype("<u4")), "front": mesh.front_only}
+            drawn.append(entry if colors is None else {**entry, "colors": self._block.put(colors)})
+        if total > MOST_VERTICES:
+            self._left_out.add(f"detail below {1000 * edge:g} mm")
+        return drawn
+
+    def _kept_pictures(self) -> list[dict[str, Any]]:
+        total = sum(len(data) for _, _, data in self._pictures)
+        every = max(1, -(-total // MOST_PICTURE_BYTES))
+        if every > 1:
+            self._left_out.add(f"all but each {every}th picture")
+        kept = []
+        for path, moment, data in self._pictures[::every]:
+            kind = "image/png" if data.startswith(PNG_START) else "image/jpeg"
+            address = f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
+            kept.append({"path": path, "time": moment, "address": address})
+        return kept
+
+    def _document(self) -> dict[str, Any]:
+        meshes = self._drawn_meshes()
+        for mesh in self._meshes:
+            if not np.isfinite(self._low).all():
+                self.enclose(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))
+        low, high = (self._low, self._high) if np.isfinite(self._low).all() else (-np.ones(3), np.ones(3))
+        return {
+            "name": cleaned(self._name),
+            "bounds": [low.tolist(), high.tolist()],
+            "meshes": meshes,
+            "pictures": self._kept_pictures(),
+            "graph": self._graph,
+            "left_out": sorted(self._left_out),
+            **self._said,
+        }
+
+    def _write(self) -> None:
+        page = page_text(self._document(), self._block)
+        if len(page) > LARGEST_PAGE:
+            raise BadInput(f"the page would have {len(page) / 1e6:.0f} MB", hint="save a .rrd file instead")
+        partial = self._save.with_name(f".{self._save.name}.partial-{os.getpid()}")
+        try:
+            self._save.parent.mkdir(parents=True, exist_ok=True)
+            partial.write_bytes(page)
+            partial.replace(self._save)
+        except OSError as error:
+            partial.unlink(missing_ok=True)
+            raise MachineFailure(f"{self._save}: {error.strerror}", hint="choose another --save") from None
+
+
+def shape_key(vertices: np.ndarray) -> bytes:
+    """Return a digest of vertices: a surface that is drawn in several colours is held once."""
+    return hashlib.sha256(vertices.tobytes()).digest()
+
+
+def _thinned_to(shapes: Iterable[np.ndarray], edge: float) -> int:
+    """Return how many vertices are left of all shapes with cubes of `edge` [m]."""
+    return sum(
+        len(vertices) if len(vertices) <= SMALL else len(np.unique(np.floor(vertices / edge).astype(np.int64), axis=0))
+        for vertices in shapes
+    )
+
+
+def page_text(document: dict[str, Any], block: Block) -> bytes:
+    """Return the page of a document. Everything in it that came from outside is data: JSON without a `<`, which the
+    script shows as text. The policy in its head lets nothing run but the two scripts that stand in it."""
+    scripts = (three_js(), (FOLDER / "page.js").read_text(encoding="utf-8"))
+    hashes = " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in scripts)
+    policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'"
+    text = json.dumps(document, sort_keys=True, allow_nan=False, ensure_ascii=True, separators=(",", ":"))
+    page = (FOLDER / "page.html").read_text(encoding="utf-8")
+    for mark, value in (
+        ("@policy@", policy),
+        ("@style@", (FOLDER / "page.css").read_text(encoding="utf-8")),
+        ("@library@", scripts[0]),
+        ("@script@", scripts[1]),
+        ("@block@", block.text()),
+        ("@document@", text.replace("<", "\\u003c")),
+    ):
+        before, _, after = page.partition(mark)
+        page = before + value + after
+    return page.encode("utf-8")
