@@ -1,4 +1,4 @@
-"""A house of others: is reconstruction sound where the masks are?
+"""A house of others: whether reconstruction is sound where the masks are.
 
 Rooms are furnished with models that others made, walked through at head height, rendered by another renderer than ours
 with another camera's noise; their true masks are brought as a folder of pictures. Then the chain runs as it is.
