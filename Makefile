@@ -119,6 +119,11 @@ bench-poses: setup ## Estimated camera paths: error, speed, effect on the map (Q
 
 # Two real logs (REAL_DATA) and twenty generated rooms, budgets of 1, 5 and 20 processor minutes: a day of one core. QUICK=1:
 # 10 and 30 seconds, one room.
+.PHONY: interpret
+# Ten training seeds an arm, three domains, five sets; a stopped run goes on where it was.
+interpret: setup ## Words learned from corrections (InterPreT): the thesis's sets, a hundred goals (QUICK=1: one seed, ten goals)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) interpret --out $(OUTPUTS)/experiments/interpret$(if $(QUICK),-quick) $(ASKED)
+
 .PHONY: legs
 legs: setup ## Rooms as Gaussians, learned while pictures arrive, beside the thesis's method (QUICK=1: seconds, one room)
 	OMP_NUM_THREADS=1 $(EXPERIMENT) legs --data $(REAL_DATA) --out $(OUTPUTS)/experiments/legs$(if $(QUICK),-quick) $(ASKED)
