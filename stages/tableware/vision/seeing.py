@@ -22,7 +22,7 @@ from stages.tableware.vision.detections import Detection, statement
 from stages.tableware.vision.height_map import HeightMap, check_color, check_depth, height_map
 from stages.tableware.vision.rectifying import rectify, table_plane
 from stages.tableware.vision.size_estimation import estimated_dishes
-from stages.tableware.world.items import TABLE_SIDES
+from stages.tableware.world.items import DISHES, TABLE_SIDES
 from stages.tableware.world.overhead import OverheadCamera
 
 Sizes = Literal["known", "estimated"]
@@ -138,7 +138,7 @@ def see(
         detections = estimated_dishes(heights, seed)
         notes.append("sizes are estimated: utensils and what stacks hold were not looked for")
     if rectified and -normal[2] < np.cos(OBLIQUE):
-        detections = tuple(_doubted(detection) for detection in detections)
+        detections = _seen_from_the_side(detections)
     notes += _unhandled(heights)
     plane = ((float(normal[0]), float(normal[1]), float(normal[2])), float(offset))
     return Sight(detections, tuple(notes), intrinsics, world, plane, sides, rectified, heights)
@@ -197,14 +197,20 @@ def _check_pose(pose: np.ndarray, normal: np.ndarray, offset: float) -> None:
         )
 
 
-def _doubted(detection: Detection) -> Detection:
-    """Return a detection of an oblique view: confidences are calibrated from above, and a tall cup seen from the side
-    passes for two."""
-    if detection.kind is None:
-        return detection
-    return replace(
-        detection, confidence=OBLIQUE_TRUST * detection.confidence, unsure=(*detection.unsure, "oblique view")
-    )
+def _seen_from_the_side(detections: tuple[Detection, ...]) -> tuple[Detection, ...]:
+    """Return the detections of an oblique view with less trust, as confidences are calibrated from above, and with none
+    in what belongs to a stack: its lower rims are hidden, so that a tall mug is two cups nested, a can in a bowl a cup."""
+    carrying = {detection.on for detection in detections if detection.kind in DISHES}
+    seen = []
+    for index, detection in enumerate(detections):
+        if detection.kind is None:
+            seen.append(detection)
+            continue
+        stacked = index in carrying or (detection.kind in DISHES and detection.on is not None)
+        reasons = ("oblique view", "a stack seen from the side") if stacked else ("oblique view",)
+        trust = 0.0 if stacked else OBLIQUE_TRUST
+        seen.append(replace(detection, confidence=trust * detection.confidence, unsure=(*detection.unsure, *reasons)))
+    return tuple(seen)
 
 
 def _unhandled(heights: HeightMap) -> list[str]:

@@ -8,7 +8,8 @@ import trimesh
 
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
-from stages.tableware.vision.seeing import see, see_image
+from stages.tableware.vision.detections import Detection
+from stages.tableware.vision.seeing import _seen_from_the_side, see, see_image
 from stages.tableware.world.items import MEASURES, Table, make_item
 from stages.tableware.world.overhead import OverheadCamera, overhead_camera, render_overhead
 
@@ -112,3 +113,18 @@ def test_without_a_pose_the_table_is_found(oblique):
     apart = np.subtract(found["bowl"].position, found["cup"].position)
     assert np.hypot(*apart[:2]) == pytest.approx(np.hypot(0.26, 0.07), abs=5e-3)
     assert "stacks hold were not looked for" in sight.statement
+
+
+def test_stacks_seen_from_the_side_are_not_trusted():
+    """A tall mug seen from the side reads as two nested cups: no plan may lift or build on that."""
+    seen = (
+        Detection(kind="cup", position=(0.0, 0.0, 0.0), hidden=True, confidence=0.9),
+        Detection(kind="cup", position=(0.0, 0.0, 0.02), on=0, confidence=0.9),
+        Detection(kind="bowl", position=(0.2, 0.0, 0.0), confidence=0.9),
+        Detection(kind="fork", position=(0.2, 0.0, 0.0), on=2, confidence=0.9),
+        Detection(kind=None, position=(0.0, 0.2, 0.0), confidence=0.0, unsure=("unknown object",)),
+    )
+    doubted = _seen_from_the_side(seen)
+    assert [one.confidence for one in doubted] == pytest.approx([0.0, 0.0, 0.72, 0.72, 0.0])
+    assert all("a stack seen from the side" in one.unsure for one in doubted[:2])
+    assert doubted[2].unsure == ("oblique view",) and doubted[4] == seen[4]
