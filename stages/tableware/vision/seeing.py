@@ -198,8 +198,10 @@ def _check_pose(pose: np.ndarray, normal: np.ndarray, offset: float) -> None:
 
 
 def _seen_from_the_side(detections: tuple[Detection, ...]) -> tuple[Detection, ...]:
-    """Return the detections of an oblique view with less trust, as confidences are calibrated from above, and with none
-    in what belongs to a stack: its lower rims are hidden, so that a tall mug is two cups nested, a can in a bowl a cup."""
+    """Return the detections of an oblique view with less trust, as confidences are calibrated from above.
+
+    What belongs to a stack gets none: lower rims are hidden, so that a tall mug is two cups, a can in a bowl a cup.
+    """
     carrying = {detection.on for detection in detections if detection.kind in DISHES}
     seen = []
     for index, detection in enumerate(detections):
