@@ -27,7 +27,7 @@ def handle_height(leaf: Leaf, seen: Seen) -> float | None:
     """Return how far the handle that stands out of a leaf does so [m], None where there is none."""
     if seen.flat < LEAST_FLAT or seen.noise > MOST_NOISE or _seen_share(leaf, seen) < LEAST_SEEN:
         return None
-    out = (seen.heights > max(LEAST_HEIGHT, NOISES * seen.noise)) & (seen.heights < MOST_HEIGHT)
+    out = seen.within & (seen.heights > max(LEAST_HEIGHT, NOISES * seen.noise)) & (seen.heights < MOST_HEIGHT)
     points = np.column_stack([seen.places[out], seen.heights[out]])
     if len(points) < FEWEST:
         return None

@@ -22,8 +22,8 @@ LEAST_FACE = 0.3
 """A face of a part has this share of its largest face's area; the outermost of them is the leaf."""
 BEFORE, BEHIND = 0.12, 0.08
 """What the map shows so far before and behind a leaf is looked at [m]."""
-RIM = 0.01
-"""... and so far beside it [m]."""
+RIM, BESIDE = 0.01, 0.07
+"""What lies so far beside it is of it; what lies so far is its neighbourhood, where seams are looked for [m]."""
 FLATNESS = 0.012
 """Farther from the plane of the front is not of it [m]."""
 FEWEST = 30
@@ -65,6 +65,8 @@ class Seen:
     """(N, 2) from the leaf's least corner, along its axes [m]."""
     heights: np.ndarray
     """(N,) over the plane of the front, outwards [m]."""
+    within: np.ndarray
+    """(N,) bool: on the leaf, not beside it."""
     front: np.ndarray
     """(N,) bool: lies on that plane and faces its way."""
     flat: float
@@ -134,9 +136,10 @@ def seen_on(leaf: Leaf, points: np.ndarray, normals: np.ndarray, colors: np.ndar
     """
     places = points[:, leaf.others] - leaf.low
     heights = leaf.sign * points[:, leaf.axis] - leaf.level
-    near = np.all((places > -RIM) & (places < leaf.size + RIM), axis=1) & (heights > -BEHIND) & (heights < BEFORE)
+    near = np.all((places > -BESIDE) & (places < leaf.size + BESIDE), axis=1) & (heights > -BEHIND) & (heights < BEFORE)
     places, heights = places[near], heights[near]
-    outward = leaf.sign * normals[near][:, leaf.axis] > FACES
+    within = np.all((places > -RIM) & (places < leaf.size + RIM), axis=1)
+    outward = within & (leaf.sign * normals[near][:, leaf.axis] > FACES)
     if np.count_nonzero(outward) < FEWEST:
         return None
     levels, counts = np.unique(np.round(heights[outward] / LEVEL_BIN).astype(int), return_counts=True)
@@ -151,6 +154,7 @@ def seen_on(leaf: Leaf, points: np.ndarray, normals: np.ndarray, colors: np.ndar
     return Seen(
         places=places,
         heights=over,
+        within=within,
         front=front,
         flat=float(np.count_nonzero(front) / np.count_nonzero(outward)),
         noise=float(1.4826 * np.median(np.abs(over[front]))),

@@ -146,7 +146,7 @@ def room(library):
 
 def test_the_step_holds_what_nothing_speaks_for(room, replace_objects):
     assert decisions(replace_objects(*room))["fridge_2"].held == {"door_hinge"}
-    told = replace_objects(*room, vouched=("fridge",))
+    told = replace_objects(*room, name="told", vouched=("fridge",))
     assert decisions(told)["fridge_2"].joint_evidence["door_hinge"].grounds == ("user",)
     with pytest.raises(UsageError, match="--vouched gate: no thing"):
-        replace_objects(*room, vouched=("gate",))
+        replace_objects(*room, name="wrong", vouched=("gate",))
