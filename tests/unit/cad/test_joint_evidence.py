@@ -51,7 +51,9 @@ def looked_at(library, shown, joints=None, color=None):
     random = np.random.default_rng(3)
     points, faces = mesh.sample(12000, return_index=True, seed=3)
     normals = np.asarray(mesh.face_normals)[faces]
-    seen = np.abs(points[:, 1] - FRONT) > 0.004 if joints is None else np.ones(len(points), bool)  # not behind doors
+    seen = np.ones(len(points), bool)
+    if joints is None:  # neither behind the doors nor between them
+        seen = (np.abs(points[:, 1] - FRONT) > 0.004) & ((np.abs(normals[:, 0]) < 0.5) | (np.abs(points[:, 0]) > 0.01))
     points, normals = points[seen], normals[seen]
     colors = np.full((len(points), 3), 150) if color is None else color(points)
     return Looked(points + 0.002 * random.normal(size=points.shape), normals, colors.astype(np.uint8))
