@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
+from pydantic import Field
+
 from schemas.artifact import Artifact, Document
 from schemas.base import Model, Name, Transform
 from schemas.contact_graph import ContactGraphFile
@@ -23,6 +25,22 @@ class CadCandidate(Model):
     """Root mean square distance from object vertices to the CAD surface [m]."""
 
 
+Ground = Literal["user", "open", "handle", "seam", "thing"]
+"""Why a joint is believed: somebody vouched for it; its part was seen open; a handle stands out of its leaf; a seam
+runs where its leaf ends; or another joint of the same thing has one of these, and this one was not seen."""
+
+
+class JointEvidence(Model):
+    """What the map says for a joint of a chosen model."""
+
+    grounds: tuple[Ground, ...] = ()
+    """None: the joint is not believed, its part stays where it is."""
+    handle_height: float | None = None
+    """How far the handle that was found stands out of the leaf [m]."""
+    seam_contrast: float | None = None
+    """Share of the leaf's clearest inner edge along which a seam was found."""
+
+
 class Replacement(Model):
     """What stands for one graph node."""
 
@@ -40,6 +58,14 @@ class Replacement(Model):
     alternatives: tuple[CadCandidate, ...] = ()
     rejected: dict[str, int] = {}
     """Reason -> number of candidates discarded."""
+    joint_evidence: dict[str, JointEvidence] | None = Field(default=None, exclude_if=lambda evidence: evidence is None)
+    """Joint of the chosen model -> why it is believed. Absent where nobody asked (older scenes, `--method thesis`):
+    then all joints are."""
+
+    @property
+    def held(self) -> frozenset[str]:
+        """Joints of the chosen model that are not believed."""
+        return frozenset(name for name, entry in (self.joint_evidence or {}).items() if not entry.grounds)
 
 
 SURROUNDINGS = "surroundings"

@@ -39,6 +39,11 @@ class CadMethod(Protocol):
         """Whether what the map shows and nothing has a name for becomes a part of the scene."""
         ...
 
+    @property
+    def asks_grounds(self) -> bool:
+        """Whether joints of a model that nothing in the map speaks for are held."""
+        ...
+
     def free_space(self, panoptic_map: PanopticMap) -> FreeSpace:
         """Return what the method wants to know of seen empty space."""
         ...

@@ -51,6 +51,11 @@ class Ours:
         """As the options say."""
         return self.parameters.surroundings
 
+    @property
+    def asks_grounds(self) -> bool:
+        """A class name says what such things can do, not that this one does."""
+        return True
+
     def free_space(self, panoptic_map: PanopticMap) -> FreeSpace:
         """What the cameras saw empty, a model must not fill."""
         return load_free_space(panoptic_map)

@@ -108,6 +108,11 @@ class CadParameters(Parameters):
     resting_tolerance: float = Field(
         0.002, ge=0.0, description="ours: penetration that is left in the finished scene where there is any way [m]"
     )
+    vouched: tuple[str, ...] = Field(
+        (),
+        description="ours: things (nodes, as fridge_3) and classes that somebody knows to move as their models do; "
+        "joints of others need a ground in the map: open, a handle, a seam",
+    )
     surroundings: bool = Field(
         True, description="ours: what the map shows and nothing has a name for becomes a static body of the scene"
     )
@@ -121,7 +126,7 @@ class CadParameters(Parameters):
 
 STAGE = Stage(
     name="cad",
-    version=5,
+    version=6,
     summary="Replace objects by CAD models that fit, stand on their supports and do not collide",
     parameters=CadParameters,
     reads={"contact_graph": ContactGraph, "panoptic_map": PanopticMap, "library": CadLibrary},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from schemas.base import as_transform
-from schemas.cad_scene import CadCandidate, CadSceneFile, Replacement
+from schemas.cad_scene import CadCandidate, CadSceneFile, JointEvidence, Replacement
 from schemas.contact_graph import ContactGraphFile, GraphNode
 from schemas.scene_parts import TREE_RELATIONS
 from stages.cad.arranging import Arrangement
@@ -32,10 +32,12 @@ def scene_file(
     shortlists: dict[str, Shortlist],
     arranged: Arrangement,
     colors: dict[str, dict[str, tuple[int, int, int]]],
+    evidence: dict[str, dict[str, JointEvidence]],
     selection: Selection,
     conflicts_after: int,
 ) -> CadSceneFile:
-    """Return scene.json: the decision on every node. `colors`: node -> part -> colour in the map."""
+    """Return scene.json: the decision on every node. `colors`: node -> part -> colour in the map; `evidence`: node ->
+    joint -> why it is believed, for the nodes where that was asked."""
     replacements = []
     for node in graph.nodes:
         if node.node_type == "layout":
@@ -55,6 +57,7 @@ def scene_file(
                     part_colors=colors[node.id],
                     alternatives=tuple(others),
                     rejected=entry.rejected,
+                    joint_evidence=evidence.get(node.id),
                 )
             )
         elif node.id in shortlists:

@@ -8,15 +8,17 @@ from collections.abc import Callable, Collection
 import numpy as np
 
 from schemas.cad_library import CadLibrary
-from schemas.cad_scene import SURROUNDINGS, CadScene
+from schemas.cad_scene import SURROUNDINGS, CadScene, JointEvidence
 from schemas.contact_graph import ContactGraph, ContactGraphFile
 from schemas.errors import BadInput, UsageError
 from schemas.panoptic_map import PanopticMap
+from schemas.vocabulary import load_vocabulary
 from stages.cad.arranging import Arrangement
 from stages.cad.candidates import Shortlist, models_for, object_points, shortlist
 from stages.cad.choosing import adjust, select
 from stages.cad.coloring import part_colors
 from stages.cad.conflicts import convex_solid, placed_pieces
+from stages.cad.joint_evidence import Looked, joint_evidence
 from stages.cad.method import CadMethod
 from stages.cad.model_surfaces import ModelSurface, load_surface
 from stages.cad.obstacles import floor_levels, obstacles_of
@@ -88,7 +90,8 @@ def choose_and_write(
         if nameless is not None:
             write_surroundings(nameless, context.output / "meshes" / f"{SURROUNDINGS}.ply")
         colors = colors_of_parts(graph, arranged, surfaces, panoptic_map)
-        scene = scene_file(graph, shortlists, arranged, colors, selection, conflicts_after)
+        evidence = grounds_of_joints(graph, arranged, surfaces, panoptic_map, method)
+        scene = scene_file(graph, shortlists, arranged, colors, evidence, selection, conflicts_after)
         scene.write(context.output / "scene.json")
         cad_graph(graph, arranged, surfaces).write(context.output / "graph.json")
         copy_models(arranged, library, context)
@@ -102,6 +105,8 @@ def choose_and_write(
         "conflicts_before": scene.conflicts_before,
         "conflicts_after": scene.conflicts_after,
         "surroundings_m2": 0.0 if nameless is None else round(area_of(nameless), 2),
+        "joints": sum(len(found) for found in evidence.values()),
+        "joints_held": sum(not entry.grounds for found in evidence.values() for entry in found.values()),
         "alignment_error_median": round(float(np.median(errors)), 4) if errors else None,
     }
     return CadScene(context.output, outcome="ok" if decisions else "empty", summary=summary)
@@ -180,3 +185,29 @@ def colors_of_parts(
         surface = surfaces[placement.shape.model.id]
         colors[name] = part_colors(surface, placement, mesh.vertices[used], normals[used], mesh.colors[used])
     return colors
+
+
+def grounds_of_joints(
+    graph: ContactGraphFile,
+    arranged: Arrangement,
+    surfaces: dict[str, ModelSurface],
+    panoptic_map: PanopticMap,
+    method: CadMethod,
+) -> dict[str, dict[str, JointEvidence]]:
+    """Return node -> joint -> why it is believed, for every placed model with joints; nothing where the method does
+    not ask. Raises UsageError for a vouched name that is neither a node nor a class."""
+    vouched = set(method.parameters.vouched)
+    known = {node.id for node in graph.nodes} | {entry.name for entry in load_vocabulary().classes}
+    if unknown := sorted(vouched - known):
+        raise UsageError(f"--vouched {unknown[0]}: no thing of the contact graph, and no class", hint="see graph.json")
+    evidence = {}
+    for name, placement in arranged.placements.items():
+        node = graph.node(name)
+        if node.mesh is None or not placement.shape.model.joints or not method.asks_grounds:
+            continue
+        mesh = load_entity_mesh(panoptic_map.path(node.mesh))
+        looked = Looked(mesh.vertices, vertex_normals(mesh.vertices, mesh.faces), mesh.colors)
+        known_to_move = bool(vouched & {name, node.class_name})
+        surface = surfaces[placement.shape.model.id]
+        evidence[name] = joint_evidence(surface, placement, looked, vouched=known_to_move)
+    return evidence

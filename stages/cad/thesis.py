@@ -30,6 +30,11 @@ class Thesis:
         """Only what has a node is in the scene."""
         return False
 
+    @property
+    def asks_grounds(self) -> bool:
+        """What the model can do, the thing can."""
+        return False
+
     def free_space(self, panoptic_map: PanopticMap) -> FreeSpace:
         """Seen empty space has no say."""
         return NOTHING_KNOWN

@@ -78,15 +78,16 @@ class Equivalence:
         return self.class_and_relations and self.affordance and self.size_and_shape and self.appearance
 
 
-def affordance_of(shape: ModelShape, scale: float = 1.0) -> Affordance:
-    """Return what a model offers; whether it carries is read off its closed surface."""
-    kinds = {joint.type for joint in shape.joints}
+def affordance_of(placed: PlacedShape) -> Affordance:
+    """Return what a placed model offers; whether it carries is read off its closed surface."""
+    shape = placed.shape
+    kinds = {joint.type for joint in placed.joints}
     return Affordance(
         carried=shape.movable,
         swings="revolute" in kinds,
         slides="prismatic" in kinds,
         contains=shape.contains,
-        carries=supporting_area(shape, scale) >= CARRYING_AREA,
+        carries=supporting_area(shape, placed.scale) >= CARRYING_AREA,
     )
 
 
@@ -158,7 +159,7 @@ def equivalence(
     colors: Mapping[str, tuple[int, int, int]],
 ) -> Equivalence:
     """Judge one replacement. `rotation`, `scale_ratios` as in `alignment_error`; `relation` from `same_relation`."""
-    agreement = affordance_agreement(affordance_of(true.shape, true.scale), affordance_of(placed.shape, placed.scale))
+    agreement = affordance_agreement(affordance_of(true), affordance_of(placed))
     distance = surface_distance(true, placed, rotation)
     looks = look_of(true.shape), look_of(placed.shape, colors)
     difference = None if looks[0] is None or looks[1] is None else color_difference(looks[0], looks[1])

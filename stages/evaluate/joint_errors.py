@@ -57,7 +57,7 @@ def placed_joints(placed: PlacedShape) -> list[PlacedJoint]:
     """Return the joints of a model as it stands, limits and values of sliding ones scaled with it."""
     poses = placed.shape.part_poses({})
     joints = []
-    for joint in placed.shape.joints:
+    for joint in placed.joints:
         factor = placed.scale if joint.type == "prismatic" else 1.0
         part = placed.shape.parts.get(joint.part)
         middle = np.array(joint.origin, dtype=float)

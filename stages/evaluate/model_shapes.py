@@ -88,6 +88,13 @@ class PlacedShape:
     scale: float = 1.0
     values: Mapping[str, float] = field(default_factory=dict)
     """Joint -> value [rad, m at scale 1]."""
+    held: frozenset[str] = frozenset()
+    """Joints that do not move here although the model's do."""
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """The joints that move."""
+        return tuple(joint for joint in self.shape.joints if joint.name not in self.held)
 
     @property
     def rotation(self) -> np.ndarray:

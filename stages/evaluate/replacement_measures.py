@@ -152,7 +152,7 @@ def _compare(
     chosen = replacement.chosen if replacement.decision == "cad" else None
     if chosen is None:
         return ObjectResult(true.name, true.class_name, model_id, node, replacement.decision, rank=rank)
-    placed = placed_candidate(chosen, models)
+    placed = placed_candidate(chosen, models, replacement.held)
     error = None if placed is None or shape is None else alignment_error(shape, placed, is_round=true.round)
     joints: tuple[JointError, ...] = ()
     spurious = 0
@@ -160,7 +160,7 @@ def _compare(
     model_class = None if placed is None else placed.shape.class_name
     if placed is not None and shape is not None and error is not None:
         joints = tuple(joint_errors(placed_joints(shape), placed_joints(placed)))
-        spurious = len(placed.shape.joints) - sum(joint.partner is not None for joint in joints)
+        spurious = len(placed.joints) - sum(joint.partner is not None for joint in joints)
         judged = equivalence(
             shape,
             placed,

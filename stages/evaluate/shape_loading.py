@@ -108,12 +108,15 @@ def model_shapes(model_ids: Sequence[str], roots: Sequence[Path]) -> dict[str, M
     return shapes
 
 
-def placed_candidate(candidate: CadCandidate, shapes: Mapping[str, ModelShape]) -> PlacedShape | None:
-    """Return a candidate's model where the candidate puts it; None when its model is not among `shapes`."""
+def placed_candidate(
+    candidate: CadCandidate, shapes: Mapping[str, ModelShape], held: frozenset[str] = frozenset()
+) -> PlacedShape | None:
+    """Return a candidate's model where the candidate puts it, without its joints `held`; None when its model is not
+    among `shapes`."""
     shape = shapes.get(candidate.model_id)
     if shape is None:
         return None
-    return PlacedShape(shape, np.array(candidate.world_from_model), candidate.scale, candidate.joints)
+    return PlacedShape(shape, np.array(candidate.world_from_model), candidate.scale, candidate.joints, held)
 
 
 def _part(visual: Sequence[trimesh.Trimesh], collision: Sequence[trimesh.Trimesh]) -> PartShape:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import trimesh
 
-from schemas.cad_scene import SURROUNDINGS, CadScene
+from schemas.cad_scene import SURROUNDINGS, CadScene, Replacement
 from schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from schemas.errors import BadInput
 from schemas.scene_parts import Box
@@ -29,9 +29,9 @@ def scene_bodies(
     `movable`: classes that an arm carries; `fixed`: classes that stay where they are (`mobility`).
     Raises BadInput for a missing model or mesh.
     """
-    colors = {entry.node: entry.part_colors for entry in cad_scene.info.replacements if entry.decision == "cad"}
+    replaced = {entry.node: entry for entry in cad_scene.info.replacements if entry.decision == "cad"}
     bodies = [
-        _body(cad_scene, graph, node, mobility(graph, node, movable, fixed), colors.get(node.id, {}))
+        _body(cad_scene, graph, node, mobility(graph, node, movable, fixed), replaced.get(node.id))
         for node in graph.nodes
         if node.id != SCENE_NODE
     ]
@@ -41,11 +41,7 @@ def scene_bodies(
 
 
 def _body(
-    cad_scene: CadScene,
-    graph: ContactGraphFile,
-    node: GraphNode,
-    mobile: Mobility,
-    colors: Mapping[str, tuple[int, int, int]],
+    cad_scene: CadScene, graph: ContactGraphFile, node: GraphNode, mobile: Mobility, replacement: Replacement | None
 ) -> BundleBody:
     link = graph.parent_link(node.id)
     relation = "supports" if link is None else link.relation
@@ -70,7 +66,8 @@ def _body(
             model_folder=folder,
             scale=node.scale,
             joint_values=dict(node.joints),
-            part_colors=dict(colors),
+            held=frozenset() if replacement is None else replacement.held,
+            part_colors={} if replacement is None else dict(replacement.part_colors),
         )
     mesh = _mesh(cad_scene, node)
     bounds = _box(node, mesh, cad_scene)

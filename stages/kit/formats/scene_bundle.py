@@ -58,6 +58,8 @@ class BundleBody:
     scale: float = 1.0
     joint_values: dict[str, float] = field(default_factory=dict)
     """The model's joint names -> values at scale 1."""
+    held: frozenset[str] = frozenset()
+    """Joints of the model that nobody has seen a reason for: their parts stay at their values."""
     part_colors: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
     """Part of the model -> mean colour that this body's is to have (sRGB, 0 to 255)."""
     mesh: trimesh.Trimesh | None = None
@@ -167,7 +169,7 @@ def _links(
         visual = own_visual(root, body.name, body.mesh, write=not body.mesh_is_written)
     if body.model is not None and body.model_folder is not None:
         links = model_links(
-            root, body.name, body.model, body.model_folder, body.scale, body.joint_values, body.part_colors
+            root, body.name, body.model, body.model_folder, body.scale, body.joint_values, body.part_colors, body.held
         )
     elif load_vocabulary().by_name(body.class_name).is_layout:
         links = layout_links(body.name, body.world_from_body, visual, _slabs(body, node, graph, center))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import trimesh
 from scipy.spatial import QhullError
+from scipy.spatial.transform import Rotation
 
 from schemas.cad_library import CadModel
 from schemas.errors import BadInput
@@ -23,7 +24,7 @@ from stages.kit.geometry.box_cover import cover_with_boxes
 from stages.kit.geometry.convex_pieces import convex_pieces
 from stages.kit.geometry.layout_slabs import Slab
 from stages.kit.geometry.solids import MassProperties, Solid, box, hull, mass_properties
-from stages.kit.geometry.transforms import inverse, transform_from_quaternion, transform_from_yaw
+from stages.kit.geometry.transforms import inverse, transform_from, transform_from_quaternion, transform_from_yaw
 
 LAYOUT_DENSITY = 1000.0
 FOOT_REACH, FOOT_THICKNESS = 0.10, 0.01
@@ -71,11 +72,13 @@ def model_links(
     scale: float,
     values: dict[str, float],
     part_colors: Mapping[str, tuple[int, int, int]] | None = None,
+    held: Collection[str] = (),
 ) -> BodyLinks:
     """Return the links of a CAD model under uniform scaling, and copy its meshes to `root`/meshes/<model id>/.
 
     Lengths and prismatic limits grow with the scale, angles stay, mass grows with its cube, inertia with its fifth
-    power. `part_colors`: part -> mean colour (sRGB, 0..255) that it is to have.
+    power. `part_colors`: part -> mean colour (sRGB, 0..255) that it is to have; `held`: joints that do not
+    move, whose parts are fixed at their values.
     Raises BadInput for a model folder without a sound URDF, or whose meshes lie outside.
     """
     urdf = parse_urdf(folder / URDF_FILE)
@@ -105,6 +108,12 @@ def model_links(
             raise BadInput(f"{folder / URDF_FILE}: no joint {record.name!r}", hint="build the CAD library again")
         frame = source.parent_from_child.copy()
         frame[:3, 3] *= scale
+        value = float(np.clip(values.get(record.name, 0.0), record.lower, record.upper)) * length
+        if record.name in held:
+            frame = frame @ _moved(record, value)
+            parent, child = names[record.parent or model.parts[0]], names[record.part]
+            joints.append(UrdfJoint(f"{name}__{record.name}", "fixed", parent, child, frame))
+            continue
         joints.append(
             replace(
                 source,
@@ -117,10 +126,16 @@ def model_links(
             )
         )
         records.append(scaled_joint(record, name, scale))
-        placed[f"{name}__{record.name}"] = (
-            float(np.clip(values.get(record.name, 0.0), record.lower, record.upper)) * length
-        )
+        placed[f"{name}__{record.name}"] = value
     return BodyLinks(tuple(links), tuple(joints), tuple(records), placed)
+
+
+def _moved(joint: Joint, value: float) -> np.ndarray:
+    """Return (4, 4): how a part's frame moves with its joint's value [rad, m]; it is parallel to the model's at 0."""
+    axis = np.asarray(joint.axis)
+    if joint.type == "prismatic":
+        return transform_from(np.eye(3), value * axis)
+    return transform_from(Rotation.from_rotvec(value * axis).as_matrix(), np.zeros(3))
 
 
 def scaled_joint(joint: Joint, body: str, scale: float) -> Joint:

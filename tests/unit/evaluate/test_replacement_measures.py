@@ -158,7 +158,8 @@ def test_small_judgements():
     assert similar_size((1.2, 0.8, 1.0), np.array([1.0, 1.0, 1.0]))
     assert not similar_size((1.25, 1.0, 1.0), np.array([1.0, 1.0, 1.0]))
     assert similar_size((1.25, 1.0, 1.0), np.array([0.08, 1.0, 1.0]))  # 2 cm
-    assert affordance_agreement(affordance_of(SHAPES["cup_a"]), affordance_of(SHAPES["table_a"])) == pytest.approx(0.8)
+    cup, table = (affordance_of(PlacedShape(SHAPES[name], np.eye(4))) for name in ("cup_a", "table_a"))
+    assert affordance_agreement(cup, table) == pytest.approx(0.8)
     graph = graph_of(ROOM)
     same = {t.name: t.name for t in ROOM}
     assert all(same_relation(graph, graph, same, t.name) for t in ROOM)

@@ -1,0 +1,87 @@
+"""Ours: why a joint of a chosen model is believed. A class name says what such things can do, not that this one does.
+
+A wall that a network calls a fridge gets a fridge's model; a door in it would be a promise that no robot can keep. So
+each joint needs a ground in the map: its part stands open, a handle stands out of its leaf, or a seam runs where the
+leaf ends. What the camera cannot see (a rack behind a door, a knob of two centimetres) stands by the rest of its thing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from schemas.cad_scene import Ground, JointEvidence
+from stages.cad.fitting import AJAR
+from stages.cad.leaf_handles import handle_height
+from stages.cad.leaf_seams import seam_contrast
+from stages.cad.leaves import leaf_of, seen_on
+from stages.cad.model_surfaces import ModelSurface, to_model
+from stages.cad.shapes import Placement
+from stages.kit.formats.cad_models import part_transforms
+from stages.kit.geometry.transforms import apply
+
+EXPLAINED, NEAR = 0.75, 0.02
+"""A model whose joints are believed explains this share of its thing: vertices that lie so near to it [m]. A model that
+does not fit opens its doors where that brings them nearer to anything."""
+LEAST_OPEN = 0.25
+"""Share of an open part's surface at which the map shows something (the inside of a drawer is hardly seen)."""
+REACH = 0.03
+"""... so near [m]."""
+
+
+@dataclass(frozen=True)
+class Looked:
+    """The map's surface of a thing: vertices (N, 3) [m], unit normals (N, 3), world frame, colours (N, 3) uint8."""
+
+    vertices: np.ndarray
+    normals: np.ndarray
+    colors: np.ndarray
+
+
+def joint_evidence(
+    surface: ModelSurface, placement: Placement, looked: Looked, *, vouched: bool
+) -> dict[str, JointEvidence]:
+    """Return joint -> why it is believed, for every joint of a placed model; without grounds it is not.
+
+    `vouched`: somebody says that the thing moves as its model does.
+    """
+    local = to_model(placement, looked.vertices) * placement.scale
+    facing = looked.normals @ placement.rotation
+    nearest = surface.closest(local / placement.scale, placement.shape.joints)
+    fits = float(np.mean(placement.scale * nearest.distance < NEAR)) >= EXPLAINED
+    found: dict[str, JointEvidence] = {}
+    for joint in surface.model.joints:
+        grounds: list[Ground] = ["user"] if vouched else []
+        value = abs(placement.shape.joints.get(joint.name, 0.0))
+        handle, seam = None, None
+        if fits and value >= AJAR[joint.type]:
+            grounds += ["open"] if _seen_open(surface, placement, joint.part, local) else []
+        elif fits:
+            leaf = leaf_of(surface, joint, placement.scale)
+            seen = None if leaf is None else seen_on(leaf, local, facing, looked.colors)
+            if leaf is not None and seen is not None:
+                handle, seam = handle_height(leaf, seen), seam_contrast(leaf, seen)
+                grounds += ["handle"] if handle is not None else []
+                grounds += ["seam"] if seam is not None else []
+        found[joint.name] = JointEvidence(grounds=tuple(grounds), handle_height=handle, seam_contrast=seam)
+    return with_the_rest(found)
+
+
+def _seen_open(surface: ModelSurface, placement: Placement, part: str, local: np.ndarray) -> bool:
+    """Whether the map, points (N, 3) in the model's frame, scaled [m], shows the part where its joint puts it."""
+    pose = part_transforms(surface.model, placement.shape.joints)[part]
+    samples = placement.scale * apply(pose, surface.samples[part])
+    return float(np.mean(cKDTree(local).query(samples)[0] < REACH)) >= LEAST_OPEN
+
+
+def with_the_rest(found: Mapping[str, JointEvidence]) -> dict[str, JointEvidence]:
+    """Return the evidence with the ground `thing` for joints without any, where another joint of the thing has one."""
+    if not any(entry.grounds for entry in found.values()):
+        return dict(found)
+    return {
+        name: entry if entry.grounds else entry.model_copy(update={"grounds": ("thing",)})
+        for name, entry in found.items()
+    }

@@ -1,0 +1,59 @@
+"""A handle in the map: a narrow thing that stands out of a flat leaf, on the side away from the hinge."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from stages.cad.leaves import Leaf, Seen
+
+LEAST_HEIGHT, MOST_HEIGHT, NOISES = 0.015, 0.10, 4.0
+"""A handle stands out by as much [m], and by so many times the noise of the front."""
+APART = 0.035
+"""Vertices of one handle are no farther from the next [m]."""
+FEWEST = 4
+"""Vertices of a handle."""
+NARROW = 0.09
+"""A handle is narrower than this in one direction, as the map shows it [m]."""
+LEAST_FLAT, MOST_NOISE = 0.75, 0.008
+"""A leaf is flat: this share of it lies on one plane, with no more noise than this [m]."""
+LEAST_SEEN, CELL = 0.35, 0.03
+"""So much of it was seen, counted in cells of this edge [m]."""
+
+
+def handle_height(leaf: Leaf, seen: Seen) -> float | None:
+    """Return how far the handle that stands out of a leaf does so [m], None where there is none."""
+    if seen.flat < LEAST_FLAT or seen.noise > MOST_NOISE or _seen_share(leaf, seen) < LEAST_SEEN:
+        return None
+    out = seen.within & (seen.heights > max(LEAST_HEIGHT, NOISES * seen.noise)) & (seen.heights < MOST_HEIGHT)
+    points = np.column_stack([seen.places[out], seen.heights[out]])
+    if len(points) < FEWEST:
+        return None
+    pairs = cKDTree(points).query_pairs(APART, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
+    part = connected_components(graph, directed=False)[1]
+    heights = [
+        float(own[:, 2].max())
+        for own in (points[part == number] for number in np.unique(part))
+        if len(own) >= FEWEST
+        and np.ptp(own[:, :2], axis=0).min() < NARROW
+        and _graspable(leaf, own[:, :2].mean(axis=0))
+    ]
+    return round(max(heights), 4) if heights else None
+
+
+def _seen_share(leaf: Leaf, seen: Seen) -> float:
+    cells = np.unique(np.floor(seen.places[seen.front] / CELL).astype(int), axis=0)
+    return float(len(cells) / np.prod(np.ceil(leaf.size / CELL)))
+
+
+def _graspable(leaf: Leaf, place: np.ndarray) -> bool:
+    """Whether a place (2,) of a leaf is on the half away from its hinge; anywhere, where it slides."""
+    if leaf.joint.type == "prismatic":
+        return True
+    hinge = leaf.scale * np.asarray(leaf.joint.origin)[leaf.others] - leaf.low
+    along = np.asarray(leaf.joint.axis)[leaf.others]
+    across = int(np.argmin(np.abs(along)))
+    return bool(abs(place[across] - hinge[across]) > 0.5 * leaf.size[across])

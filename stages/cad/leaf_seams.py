@@ -1,0 +1,56 @@
+"""A seam in the map: a line that is darker or deeper than both its sides, where a leaf ends within the front."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.cad.leaves import Leaf, Seen
+
+INNER = 0.04
+"""A leaf's edge that lies so far within the front's outline is no silhouette [m]."""
+BAND, SIDES = 0.012, (0.025, 0.06)
+"""Half width of the line, and where its sides begin and end [m]."""
+PIECE = 0.08
+"""Edges are looked at in pieces of this length [m]."""
+FEWEST = 3
+"""Vertices of the line, and of each side, that a piece needs."""
+DARKER, DEEPER = 10.0, 0.004
+"""A seam is darker than both sides by as much (sRGB, 0 to 255), or deeper [m]."""
+SEEN, ALONG = 0.5, 0.7
+"""Such a share of the edge's pieces was seen, and of those such a share shows the seam."""
+
+
+def seam_contrast(leaf: Leaf, seen: Seen) -> float | None:
+    """Return the share of an inner edge along which a seam is seen, of the edge with the clearest; None where no edge
+    has one along most of it."""
+    shares = [share for axis in (0, 1) for end in (0, 1) if (share := _share(leaf, seen, axis, end)) is not None]
+    best = max(shares, default=0.0)
+    return round(best, 4) if best >= ALONG else None
+
+
+def _share(leaf: Leaf, seen: Seen, axis: int, end: int) -> float | None:
+    """Return which share of the pieces of one edge show a seam: the edge across `axis` at its least (0) or greatest
+    end.
+
+    None for a silhouette, and where too little of the edge was seen.
+    """
+    place = end * leaf.size[axis]
+    inside = leaf.low[axis] + place - leaf.body_low[axis]
+    if min(inside, leaf.body_size[axis] - inside) < INNER:
+        return None
+    across, along = seen.places[:, axis] - place, seen.places[:, 1 - axis]
+    pieces = max(1, int(leaf.size[1 - axis] / PIECE))
+    number = np.floor(along / leaf.size[1 - axis] * pieces).astype(int)
+    light = seen.colors.mean(axis=1)
+    line = np.abs(across) < BAND
+    sides = [(sign * across > SIDES[0]) & (sign * across < SIDES[1]) for sign in (-1, 1)]
+    found = []
+    for piece in range(pieces):
+        own = number == piece
+        parts = [own & line, *(own & side for side in sides)]
+        if min(np.count_nonzero(part) for part in parts) < FEWEST:
+            continue
+        middle, *others = (float(np.median(light[part])) for part in parts)
+        depth, *beside = (float(np.median(seen.heights[part])) for part in parts)
+        found.append(middle < min(others) - DARKER or depth < min(beside) - DEEPER)
+    return float(np.mean(found)) if len(found) >= SEEN * pieces and len(found) >= 2 else None
