@@ -39,6 +39,9 @@ class SegmentsFile(Model):
     label: str
     """Name to print beside every figure, e.g. `ground-truth masks, corruption 0.2`."""
     corruption: float = 0.0
+    recognised: float | None = None
+    """Share of the area of masks of things that got a name, where `object` says that the segmenter did not recognise
+    what it saw (our own network); None where `object` is a class like any other."""
     width: int
     height: int
     frames: tuple[FrameSegments, ...]

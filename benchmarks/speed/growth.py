@@ -100,6 +100,7 @@ def frame_at(frames: list[CorridorFrame], number: int, standing: bool) -> tuple[
 def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standing: bool) -> list[dict[str, float]]:
     """Fuse `count` frames; return one row of figures for each window of the walk, the last with the extraction."""
     from stages.fuse import mapping
+    from stages.fuse.closing import MaskSource
     from stages.fuse.ours import Ours
     from stages.fuse.parameters import FuseParameters
     from stages.fuse.stage import new_mapper, write_map
@@ -115,7 +116,7 @@ def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standi
     def extract(mapper: mapping.PanopticMapper) -> int:
         with tempfile.TemporaryDirectory() as folder:
             context = Context(Path(folder), seed=0, device="cpu", progress=SilentProgress())
-            return int(write_map(mapper, load_vocabulary(), "benchmark", {}, context).summary["entities"])
+            return int(write_map(mapper, load_vocabulary(), MaskSource("benchmark"), {}, context).summary["entities"])
 
     def add(mapper: mapping.PanopticMapper, number: int) -> None:
         frame, pose = frame_at(frames, number, standing)

@@ -8,20 +8,28 @@ import numpy as np
 
 from schemas.base import as_vector
 from schemas.panoptic_map import EntitiesFile, Entity
-from schemas.vocabulary import Vocabulary
+from schemas.vocabulary import UNNAMED, Vocabulary
 from stages.fuse.counts import TripleCounts
 from stages.fuse.extraction import ExtractedEntity, ExtractionSettings, LabelledSurface, extract_entities
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.parameters import FuseParameters
 from stages.fuse.smoothing import smoothed_tsdf
+from stages.fuse.strange_places import thing_score, without_names
 from stages.fuse.surface import Surface, extract_surface
 from stages.fuse.unnamed_pieces import unnamed_pieces
 from stages.kit.formats.map_files import cut_mesh, face_labels, mesh_name
 from stages.kit.stage import Progress
 
 LAYOUT = ("floor", "wall", "ceiling")
-UNNAMED = "object"
-"""The class of things that masks found and did not recognise."""
+
+
+@dataclass(frozen=True)
+class MaskSource:
+    """Whose masks a map is made of."""
+
+    label: str
+    recognised: float | None = None
+    """As in segments.json."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +98,13 @@ def with_unnamed_pieces(
     return found, LabelledSurface(labelled.segment, class_id, instance)
 
 
-def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, progress: Progress) -> ClosedMap:
-    """Merge what is one instance, draw the surface and cut it into entities. `label` says whose masks these are.
+def is_strange(source: MaskSource, parameters: FuseParameters) -> bool:
+    """Whether the segmenter recognised so little of this place that its names are not to be believed."""
+    return source.recognised is not None and source.recognised < parameters.least_recognised
+
+
+def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource, progress: Progress) -> ClosedMap:
+    """Merge what is one instance, draw the surface and cut it into entities.
 
     Labels of the mapper are merged by it.
     """
@@ -119,6 +132,10 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, progre
         entities, labelled = extract_entities(
             surface, merged[surface.segment], grouping, mapper.sightings, mapper.merging.things, settings
         )
+        if parameters.merging == "ours" and is_strange(source, parameters):
+            things, scores = mapper.merging.things, grouping.class_scores
+            score_of = {e.instance: thing_score(e.segments, scores, things, mapper.sightings) for e in entities}
+            entities, labelled = without_names(entities, labelled, score_of, things, unnamed)
         if parameters.unnamed_area > 0 and parameters.merging == "ours":
             layout = frozenset(entry.id for entry in vocabulary.classes if entry.name in LAYOUT)
             floor = vocabulary.by_name("floor").id
@@ -127,7 +144,7 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, progre
         voxel_size=parameters.voxel_size,
         truncation_distance=mapper.truncation_distance,
         frames_integrated=mapper.frames_integrated,
-        segmentation=label,
+        segmentation=source.label,
         entities=tuple(describe(entity, vocabulary) for entity in entities),
     )
     return ClosedMap(file, entities, surface, labelled, grouping.counts, merged)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from stages.fuse.association import Prediction
@@ -33,6 +33,8 @@ class Grouping:
     """Segment label -> (class, instance) where equation 2.6 has no say; (0, 0): nothing."""
     seen_in: Mapping[int, int]
     """Frames in which each instance was predicted, as bits."""
+    class_scores: Mapping[int, Mapping[int, float]] = field(default_factory=dict)
+    """By segment label and class the sum of the scores of all masks, where the rule counts them."""
 
 
 class Merging(Protocol):

@@ -100,6 +100,13 @@ class FuseParameters(Parameters):
     piece_share: float = Field(
         0.2, ge=0, lt=1, description="Things under this share of one of their class that they touch are a part of it"
     )
+    least_recognised: float = Field(
+        0.6,
+        ge=0,
+        le=1,
+        description="`ours`: where our own network recognised less than this share of what it took for things, its "
+        "names are not believed, and its masks only where most views had them (0: always believed)",
+    )
     unnamed_area: float = Field(
         0.2,
         ge=0,
@@ -139,7 +146,7 @@ def _estimate(parameters: FuseParameters, inputs: Inputs) -> Estimate:
 
 STAGE = Stage(
     name="fuse",
-    version=4,
+    version=5,
     summary="Integrate posed frames and their segments into one labelled map with a mesh per entity",
     parameters=FuseParameters,
     reads={

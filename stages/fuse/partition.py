@@ -200,7 +200,7 @@ def group_things(
             doubtful.append(segment)
     groups = attach_unseen_pairs(group_segments(pair_weights(classes, evidence), classes), evidence, counts)
     named_groups = name_groups(groups, counts, things, seen_in, scores, unnamed)
-    return replace(named_groups, best={**named_groups.best, **dict.fromkeys(doubtful, NOTHING)})
+    return replace(named_groups, best={**named_groups.best, **dict.fromkeys(doubtful, NOTHING)}, class_scores=scores)
 
 
 def _total(group: Iterable[int], counts: TripleCounts) -> int:

@@ -11,7 +11,7 @@ from schemas.segments import Segments
 from schemas.sequence import Sequence
 from schemas.trajectory import Trajectory
 from schemas.vocabulary import Vocabulary, load_vocabulary
-from stages.fuse.closing import close_map
+from stages.fuse.closing import MaskSource, close_map, is_strange
 from stages.fuse.from_mesh import run_from_mesh
 from stages.fuse.inputs import check_origin, check_segments, poses_at
 from stages.fuse.listings import Listings
@@ -57,8 +57,8 @@ def run(
     check_origin(sequence, segments)
     vocabulary = load_vocabulary()
     with context.progress.step("integrate frames"):
-        mapper, skipped, label = _integrate_frames(sequence, segments, trajectory, vocabulary, parameters, context)
-    return write_map(mapper, vocabulary, label, skipped, context)
+        mapper, skipped, source = _integrate_frames(sequence, segments, trajectory, vocabulary, parameters, context)
+    return write_map(mapper, vocabulary, source, skipped, context)
 
 
 def new_mapper(parameters: FuseParameters, vocabulary: Vocabulary) -> PanopticMapper:
@@ -68,14 +68,14 @@ def new_mapper(parameters: FuseParameters, vocabulary: Vocabulary) -> PanopticMa
 
 
 def write_map(
-    mapper: PanopticMapper, vocabulary: Vocabulary, label: str, skipped: Mapping[str, int], context: Context
+    mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource, skipped: Mapping[str, int], context: Context
 ) -> PanopticMap:
-    """Write the map that was built: its entities, meshes, counts and voxels. `label` says whose masks these are,
-    `skipped` how many frames were left out by reason."""
-    closed = close_map(mapper, vocabulary, label, context.progress)
+    """Write the map that was built: its entities, meshes, counts and voxels. `skipped`: how many frames were left out
+    by reason."""
+    closed = close_map(mapper, vocabulary, source, context.progress)
     with context.progress.step("write the map"):
         write_payload(context.output, closed, mapper.blocks)
-    summary = {
+    summary: dict[str, str | float] = {
         "frames": mapper.frames_integrated,
         **{f"skipped_{reason}": count for reason, count in sorted(skipped.items())},
         "frames_without_segments": mapper.frames_integrated - mapper.labelled_frames,
@@ -86,13 +86,16 @@ def write_map(
         "vertices": len(closed.surface.vertices),
         "blocks": mapper.blocks.count,
     }
+    if source.recognised is not None:
+        summary["recognised_share"] = round(source.recognised, 3)
+        summary["names_believed"] = not is_strange(source, mapper.parameters)
     return PanopticMap(context.output, outcome="ok" if len(closed.surface.faces) else "empty", summary=summary)
 
 
-def write_snapshot(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, context: Context) -> None:
+def write_snapshot(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource, context: Context) -> None:
     """Write the map as it would be if this frame were the last. The map that is being built does not notice."""
     with context.progress.step("snapshots"):
-        closed = close_map(mapper.held(), vocabulary, label, SilentProgress())
+        closed = close_map(mapper.held(), vocabulary, source, SilentProgress())
         folder = context.output / SNAPSHOTS / f"{mapper.frames_integrated:06d}"
         write_meshes(folder, closed)
 
@@ -104,14 +107,14 @@ def _integrate_frames(
     vocabulary: Vocabulary,
     parameters: FuseParameters,
     context: Context,
-) -> tuple[PanopticMapper, Counter[str], str]:
+) -> tuple[PanopticMapper, Counter[str], MaskSource]:
     """Return the map of all frames, how many frames were skipped by reason, and whose masks these are."""
     skipped: Counter[str] = Counter()
     require_depth(sequence)
     with FrameReader(sequence.path("frames.mcap")) as reader, PanopticReader(segments.path("panoptic.zip")) as masks:
         info = segments.info
         check_segments(info, reader.camera, len(reader), vocabulary)
-        listed, label = Listings(info), info.label
+        listed, source = Listings(info), MaskSource(info.label, info.recognised)
         del info  # the parsed file goes before the map grows
         poses = None
         if trajectory is not None:
@@ -124,7 +127,7 @@ def _integrate_frames(
             # Of the last frame the finished map is the snapshot, so one is taken when another frame comes.
             if parameters.snapshot_every and mapper.frames_integrated >= kept + parameters.snapshot_every:
                 kept = mapper.frames_integrated
-                write_snapshot(mapper, vocabulary, label, context)
+                write_snapshot(mapper, vocabulary, source, context)
             pose = frame.world_from_camera if poses is None else poses[frame.index]
             if frame.depth is None or not (frame.depth > 0).any():
                 skipped["no_depth"] += 1
@@ -135,4 +138,4 @@ def _integrate_frames(
                 ids = None if listing is None else masks.read(frame.index)
                 camera = reader.cameras[frame.camera_name]
                 mapper.add_frame(camera, frame.depth, frame.color, pose, ids, listing or ())
-    return mapper, skipped, label
+    return mapper, skipped, source

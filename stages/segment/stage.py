@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from schemas.errors import BadInput
 from schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
 from schemas.sequence import Sequence
+from schemas.vocabulary import UNNAMED, load_vocabulary
 from stages.kit.formats.frames import Frame, FrameReader, require_depth
 from stages.kit.formats.masks import write_panoptic_zip
 from stages.kit.stage import Context
@@ -73,10 +74,13 @@ def run(
 
         with context.progress.step("segment the frames"):
             write_panoptic_zip(context.output / "panoptic.zip", images())
+    doubts = getattr(backend, "says_object_in_doubt", False)
+    recognised = recognised_share(annotations, load_vocabulary().by_name(UNNAMED).id) if doubts else None
     SegmentsFile(
         backend=backend.name,
         label=backend.label,
         corruption=getattr(backend, "corruption", 0.0),
+        recognised=recognised,
         width=info.camera.width,
         height=info.camera.height,
         frames=tuple(annotations),
@@ -89,7 +93,16 @@ def run(
         "segments_per_frame": round(total / max(len(annotations), 1), 2),
         "named_share": round(named / max(total, 1), 3),
     }
+    if recognised is not None:
+        summary["recognised_share"] = round(recognised, 3)
     return Segments(context.output, outcome="ok" if named else "empty", summary=summary)
+
+
+def recognised_share(frames: Iterable[FrameSegments], unnamed: int) -> float | None:
+    """Return the share of the area of things that has another class than `unnamed`; None where no thing was found."""
+    things = [segment for frame in frames for segment in frame.segments if segment.is_thing and segment.category_id]
+    total = sum(segment.area for segment in things)
+    return sum(s.area for s in things if s.category_id != unnamed) / total if total else None
 
 
 def segment_frame(

@@ -127,16 +127,19 @@ def record(house: House, folder: Path, camera: Camera, frames: int, random: np.r
     names = tuple(meshes)
     colors = random.uniform(0.2, 0.9, (len(names), 3))
     seen, level = SeenSurface(NEAREST, FARTHEST), _LevelTops()
-    rows = []
+    rows: list[str] = []
     with TinyRenderer(list(meshes.values()), colors) as renderer:
-        for number, pose in enumerate(walk(house, frames, random)):
+        for pose in walk(house, frames, random):
             color, exact, mesh = renderer.render(camera, pose)
             depth = disturbed(exact, camera, random)
+            if not depth.any():
+                continue  # `ingest` drops a frame that is too close to see anything, and masks go by its numbers.
             instance = np.where(exact > 0, mesh + 1, 0).astype(np.int32)
             seen.add(exact, instance, pose, camera)
             level.add(exact, depth, instance, pose, camera)
-            _write_frame(log, masks, f"{number:06d}", (color, depth, instance), names)
-            rows.append(f"{number:06d} " + " ".join(f"{value:.9g}" for value in pose.ravel()))
+            stamp = f"{len(rows):06d}"
+            _write_frame(log, masks, stamp, (color, depth, instance), names)
+            rows.append(f"{stamp} " + " ".join(f"{value:.9g}" for value in pose.ravel()))
     (log / "poses.txt").write_text("\n".join(rows) + "\n", encoding="ascii")
     given = {name: getattr(camera, name) for name in ("fx", "fy", "cx", "cy", "width", "height")}
     (log / "camera.json").write_text(json.dumps(given), encoding="utf-8")

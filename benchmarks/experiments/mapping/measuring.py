@@ -32,6 +32,7 @@ from stages.evaluate.map_measures import (
 from stages.evaluate.parameters import EvaluateParameters
 from stages.evaluate.results import Part
 from stages.evaluate.truth import TrueRoom, load_truth
+from stages.fuse.closing import MaskSource
 from stages.fuse.mapping import PanopticMapper
 from stages.fuse.stage import new_mapper, write_map
 from stages.kit.formats.frames import Frame, FrameReader
@@ -167,7 +168,7 @@ def _level(case: str) -> float:
 def finish_map(mapper: PanopticMapper, output: Path, seed: int) -> PanopticMap:
     """Close the map and write it as a panoptic_map without a manifest under `output`."""
     mapper.regularize()
-    return write_map(mapper, load_vocabulary(), "benchmark", {}, context_in(output / "panoptic_map", seed))
+    return write_map(mapper, load_vocabulary(), MaskSource("benchmark"), {}, context_in(output / "panoptic_map", seed))
 
 
 def outcome_of(

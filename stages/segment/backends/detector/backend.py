@@ -8,7 +8,7 @@ import numpy as np
 
 from schemas.errors import MissingDependency
 from schemas.sequence import SequenceFile
-from schemas.vocabulary import SemanticClass, Vocabulary, load_vocabulary
+from schemas.vocabulary import UNNAMED, SemanticClass, Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame, FrameReader
 from stages.segment.backends.detector import DetectorParameters
 from stages.segment.backends.detector.agreement import HEARD, Thing, witnessed
@@ -26,7 +26,6 @@ from stages.segment.settings import geometric_settings
 LARGE_FACED = frozenset({"table", "desk", "bed", "sofa", "bench", "monitor", "fridge"})
 """A box around a part of these is still a detection of the whole: one face fills most of the box."""
 FLAT_TOPPED = frozenset({"table", "desk"})
-UNNAMED = "object"
 LARGEST_UNNAMED = 0.8
 """A detection of impossible size still points at some item when that is small; at furniture size it says nothing, and
 its votes would drown those of the frames in which the thing was recognised [m]."""

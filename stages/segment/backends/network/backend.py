@@ -13,7 +13,7 @@ import torch
 from schemas.errors import UsageError
 from schemas.scene_parts import Camera
 from schemas.sequence import SequenceFile
-from schemas.vocabulary import Vocabulary, load_vocabulary
+from schemas.vocabulary import UNNAMED, Vocabulary, load_vocabulary
 from stages.kit.formats.frames import Frame, FrameReader
 from stages.segment.backends.network.features import STRIDE, Mount, features, input_camera, mount_of_pose, resized
 from stages.segment.backends.network.grouping import GroupingSettings, Named, group, raise_to_depth
@@ -21,8 +21,6 @@ from stages.segment.backends.network.weights import BUNDLED, Checkpoint, load_ch
 from stages.segment.choice import BackendRequest
 from stages.segment.geometric import GeometricFrame
 from stages.segment.panoptic import PanopticFrame
-
-UNNAMED = "object"
 
 
 @dataclass(frozen=True)
@@ -88,6 +86,8 @@ class NetworkBackend:
     """
 
     name = "network"
+    says_object_in_doubt = True
+    """What `object` means here: see SegmentsFile.recognised."""
 
     def __init__(
         self,
