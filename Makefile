@@ -154,6 +154,10 @@ mosd: setup ## Objects of real tabletop frames against their labels (QUICK=1: ev
 real-supports: setup ## Contact graphs of the real logs against what stands on what there, after `make real`
 	$(EXPERIMENT) real_supports --runs $(OUTPUTS)/experiments/real --out $(OUTPUTS)/experiments/real-supports $(ASKED)
 
+.PHONY: real-things
+real-things: setup ## Which things of the real logs are found, in how many pieces, and how many names are wrong, after `make real`
+	$(EXPERIMENT) real_things --runs $(OUTPUTS)/experiments/real --data $(REAL_DATA) --out $(OUTPUTS)/experiments/real-things $(ASKED)
+
 .PHONY: real-plan
 # Twenty plans, about a minute each.
 real-plan: setup ## A cup put on the counter of the real kitchen, in its reconstruction, after `make real` (QUICK=1: one seed)

@@ -11,9 +11,9 @@ import pytest
 from schemas.base import as_transform
 from schemas.errors import BadInput, MissingDependency, UsageError
 from schemas.scene_parts import Camera
-from schemas.segments import Segments
+from schemas.segments import FrameSegment, FrameSegments, Segments
 from schemas.sequence import Gravity, LabelEntry, Sequence, SequenceCamera, SequenceFile
-from schemas.vocabulary import load_vocabulary
+from schemas.vocabulary import UNNAMED, load_vocabulary
 from stages.ingest.color_registration import color_in_depth_camera
 from stages.ingest.layouts.seven_scenes.reader import COLOR_CAMERA, COLOR_FROM_DEPTH
 from stages.kit.formats.frames import FrameReader, FrameWriter
@@ -22,7 +22,7 @@ from stages.kit.geometry.transforms import look_at, transform_from_quaternion
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.segment.parameters import STAGE, SegmentParameters
-from stages.segment.stage import run
+from stages.segment.stage import recognised_share, run
 from tests.real_data import real_data
 from tests.unit.segment.test_box_masks import SCENE, WIDE, world_depth
 
@@ -219,3 +219,18 @@ def test_declaration() -> None:
     assert STAGE.name == "segment" and STAGE.required() == ("sequence",)
     for name, info in SegmentParameters.model_fields.items():
         assert info.description, name
+
+
+def test_recognised_share_is_that_of_the_area_of_things() -> None:
+    chair, unnamed, wall = (load_vocabulary().by_name(name).id for name in ("chair", UNNAMED, "wall"))
+
+    def frame(*rows: tuple[int, bool, int]) -> FrameSegments:
+        segments = tuple(
+            FrameSegment(id=k, category_id=c, instance=k, is_thing=thing, score=0.5, area=area)
+            for k, (c, thing, area) in enumerate(rows, 1)
+        )
+        return FrameSegments(frame=0, segments=segments)
+
+    seen = [frame((chair, True, 100), (wall, False, 5000), (0, False, 70)), frame((unnamed, True, 300))]
+    assert recognised_share(seen, unnamed) == pytest.approx(0.25)
+    assert recognised_share([frame((wall, False, 10))], unnamed) is None
