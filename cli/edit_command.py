@@ -39,19 +39,19 @@ def rename(
     debug: Debug = False,
 ) -> int:
     """Say that a thing of a map is of another class."""
-    return _append(file, by, note, what="rename", of=_anchors(panoptic_map, [thing])[0], **{"class": class_name})
+    return append(file, by, note, what="rename", of=_anchors(panoptic_map, [thing])[0], **{"class": class_name})
 
 
 def delete(file: File, thing: ThingName, panoptic_map: Map, by: By = "", note: Note = "", debug: Debug = False) -> int:
     """Say that there is no such thing; its surface stays in the map, without a name."""
-    return _append(file, by, note, what="delete", of=_anchors(panoptic_map, [thing])[0])
+    return append(file, by, note, what="delete", of=_anchors(panoptic_map, [thing])[0])
 
 
 def merge(file: File, things: Things, panoptic_map: Map, by: By = "", note: Note = "", debug: Debug = False) -> int:
     """Say that several things of a map are one."""
     if len(set(things)) < 2:
         raise UsageError("merge takes at least two things", hint="give their instance numbers or names")
-    return _append(file, by, note, what="merge", of=_anchors(panoptic_map, things))
+    return append(file, by, note, what="merge", of=_anchors(panoptic_map, things))
 
 
 def split(
@@ -69,7 +69,7 @@ def split(
     """Say that what of a thing lies in a box is a thing of its own."""
     part = {"center": center, "size": size, "yaw_degrees": yaw}
     of = _anchors(panoptic_map, [thing])[0]
-    return _append(file, by, note, what="split", of=of, part=part, **{"class": class_name})
+    return append(file, by, note, what="split", of=of, part=part, **{"class": class_name})
 
 
 def add(
@@ -88,9 +88,11 @@ def add(
     """Say that there is a thing in a box that the map does not name."""
     box = {"center": center, "size": size, "yaw_degrees": yaw}
     surface = "box" if drawn else "seen"
-    return _append(file, by, note, what="add", box=box, surface=surface, **{"class": class_name})
+    return append(file, by, note, what="add", box=box, surface=surface, **{"class": class_name})
 
 
+APPLIED_BY = {"support": "graph --contact-graph", "mark": "graph --contact-graph"}
+"""What applies an edit that is none of a map, and to what."""
 COMMANDS = (rename, delete, merge, split, add)
 
 
@@ -116,21 +118,22 @@ def _instance(state: MapState, name: str, path: Path) -> int:
     return found
 
 
-def _append(file: Path, by: str, note: str, **values: Any) -> int:
+def append(file: Path, by: str, note: str, **values: Any) -> int:
     from pydantic import TypeAdapter, ValidationError
 
-    from schemas.edits import MapEdit
+    from schemas.edits import AnyEdit
     from stages.edit.edits_file import append_edits
 
     said = {"by": cleaned(by or _account()), "when": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}", "note": cleaned(note)}
     try:
-        edit: MapEdit = TypeAdapter(MapEdit).validate_python({**values, **said})
+        edit: AnyEdit = TypeAdapter(AnyEdit).validate_python({**values, **said})
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"][1:])
         raise UsageError(f"edit {values['what']}: {where}: {first['msg']}", hint="see --help") from None
     edits = append_edits(file, [edit])
-    say(f"edit {len(edits.edits)} of {file}; next: scenewright edit map --panoptic-map ... --edits {file} --out ...")
+    where = APPLIED_BY.get(values["what"], "map --panoptic-map")
+    say(f"edit {len(edits.edits)} of {file}; next: scenewright edit {where} ... --edits {file} --out ...")
     out(str(file))
     return 0
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli import edit_command
+from cli import edit_command, edit_node_command
 from cli.batch_command import batch
 from cli.collection_command import gc
 from cli.comparison_command import diff
@@ -297,6 +297,6 @@ GROUPS: tuple[tuple[str, Callable[..., Any], tuple[Callable[..., Any], ...], str
 """Commands that do something by themselves and have commands below them."""
 BESIDE_STEPS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("cutting", record),
-    *(("edit", command) for command in edit_command.COMMANDS),
+    *(("edit", command) for command in (*edit_command.COMMANDS, *edit_node_command.COMMANDS)),
 )
 """Commands of a group of steps that are no steps; they are there where the group's steps are."""

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
+from pydantic import Field
+
 from schemas.artifact import Artifact, Document, OptionalDocument
 from schemas.base import Model, Name, RelativePath, Transform
+from schemas.edits import AppliedEditsFile
 from schemas.scene_parts import TREE_RELATIONS, Box, Relation, SurfacePlane
 
 SCENE_NODE = "scene"
@@ -29,6 +32,8 @@ class GraphNode(Model):
     planes: tuple[SurfacePlane, ...] = ()
     """Pi, world frame."""
     confidence: float = 1.0
+    mark: Literal["fixed", "movable"] | None = Field(default=None, exclude_if=lambda mark: mark is None)
+    """What a person said (`edit mark`); absent where nobody did: the class decides then."""
     # What cg' adds (kind cad_scene): which model stands for the node.
     model_id: Name | None = None
     world_from_model: Transform | None = None
@@ -143,9 +148,11 @@ class TimelineFile(Model):
 
 
 class ContactGraph(Artifact):
-    """`graph.json`; where the map holds snapshots also `timeline.json`."""
+    """`graph.json`; where the map holds snapshots also `timeline.json`; where people put it right, `edits.json` says
+    what became of each edit."""
 
     kind: ClassVar[str] = "contact_graph"
     description: ClassVar[str] = "contact graph: support tree and proximal relations, node-link JSON"
     info = Document(ContactGraphFile, "graph.json")
     timeline = OptionalDocument(TimelineFile, "timeline.json")
+    edits = OptionalDocument(AppliedEditsFile, "edits.json")

@@ -94,7 +94,29 @@ class Add(Edit):
     """`seen`: the surface in the box that nothing else owns. `box`: its six faces, for what no camera sees (glass)."""
 
 
+class Support(Edit):
+    """What the thing stands on, in, at or below, whatever was measured."""
+
+    what: Literal["support"]
+    of: Anchor
+    on: Anchor | None = None
+    """None: nothing that the graph knows carries it."""
+    relation: Literal["supports", "contains", "carries_on_wall", "hangs_from"] = "supports"
+    """Of what carries it to the thing."""
+
+
+class Mark(Edit):
+    """Whether the thing is free to move, whatever its class says."""
+
+    what: Literal["mark"]
+    of: Anchor
+    as_: Literal["fixed", "movable"] = Field(alias="as")
+
+
 MapEdit = Annotated[Rename | Delete | Merge | Split | Add, Field(discriminator="what")]
+GraphEdit = Annotated[Support | Mark, Field(discriminator="what")]
+AnyEdit = Annotated[Rename | Delete | Merge | Split | Add | Support | Mark, Field(discriminator="what")]
+"""What a line of edits.toml may say. Each step applies the kinds that are its own and leaves the others."""
 
 
 class EditsFile(Model):
@@ -102,7 +124,7 @@ class EditsFile(Model):
 
     format: Literal["scenewright-edits"]
     version: Literal[1]
-    edits: tuple[MapEdit, ...] = Field(default=(), max_length=MOST_EDITS)
+    edits: tuple[AnyEdit, ...] = Field(default=(), max_length=MOST_EDITS)
 
 
 class AppliedEdit(Model):

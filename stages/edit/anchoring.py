@@ -108,7 +108,9 @@ def _is_part(
 
 
 def passes(thing: Thing, anchor: Anchor, fitting: Fitting) -> bool:
-    """Whether the surface of a thing comes within reach of an anchor's point."""
+    """Whether the surface of a thing, or else its box, comes within reach of an anchor's point."""
+    if thing.surface is None:
+        return bool(points_in_box(thing.box, np.array([anchor.point]), fitting.reach)[0])
     return bool(thing.surface.query(anchor.point, distance_upper_bound=fitting.reach)[0] <= fitting.reach)
 
 
@@ -134,6 +136,7 @@ def anchor_of(state: MapState, instance: int) -> Anchor:
     thing = next((thing for thing in state.things() if thing.instance == instance), None)
     if thing is None:
         raise KeyError(instance)
+    assert thing.surface is not None  # of a map
     points = np.asarray(thing.surface.data)
     tried = points[:: -(-len(points) // MOST_TRIED)]
     near = thing.surface.query_ball_point(tried, AROUND, return_length=True)
@@ -143,6 +146,12 @@ def anchor_of(state: MapState, instance: int) -> Anchor:
         near = near - cKDTree(others).query_ball_point(tried, AROUND, return_length=True)
     x, y, z = (round(float(value), MILLIMETRES) for value in tried[int(np.argmax(near))])
     return Anchor.model_validate({"class": thing.class_name, "box": written_box(thing.box), "point": (x, y, z)})
+
+
+def anchor_of_node(node: Thing) -> Anchor:
+    """Return the anchor of a node of a graph, which has no surface: its point is the middle of its box."""
+    box = written_box(node.box)
+    return Anchor.model_validate({"class": node.class_name, "box": box, "point": box.center})
 
 
 def written_box(box: Box) -> UprightBox:

@@ -6,13 +6,13 @@ edit may mean a thing that an earlier one made.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
-from schemas.edits import Add, Anchor, AppliedEdit, Delete, Edit, MapEdit, Merge, Rename, Split
+from schemas.edits import Add, Anchor, AnyEdit, AppliedEdit, Delete, Edit, Merge, Rename, Split
 from schemas.hand_written import UprightBox
 from schemas.scene_parts import Box
 from stages.edit.anchoring import Conflict, Fitting, find, joint_anchor, passes
@@ -37,21 +37,38 @@ class Done:
     reason: str = ""
 
 
-def apply_edits(state: MapState, edits: Iterable[MapEdit], fitting: Fitting) -> list[AppliedEdit]:
-    """Apply edits to the state, one after the other, and return what became of each. Conflicts leave it as it is."""
+def in_order(
+    edits: Iterable[AnyEdit], apply: Callable[[Any], Done], kinds: Collection[type[Edit]], name: Callable[[int], str]
+) -> list[AppliedEdit]:
+    """Apply the edits of some kinds, one after the other, and return what became of each; others are left out.
+
+    `name` says what a thing with an instance number is called after the edit.
+    """
     records = []
     for number, edit in enumerate(edits, 1):
+        if type(edit) not in kinds:
+            continue
         asked = AppliedEdit(
             number=number, what=edit.what, status="conflict", by=edit.by, when=edit.when, note=edit.note
         )
         try:
-            done = APPLY[type(edit)](state, edit, fitting)
+            done = apply(edit)
         except Conflict as conflict:
             records.append(asked.model_copy(update={"reason": str(conflict)}))
             continue
-        names = tuple(f"{state.entities[k].class_name}_{k}" for k in done.instances)
+        names = tuple(name(k) for k in done.instances)
         records.append(asked.model_copy(update={"status": done.status, "things": names, "reason": done.reason}))
     return records
+
+
+def apply_edits(state: MapState, edits: Iterable[AnyEdit], fitting: Fitting) -> list[AppliedEdit]:
+    """Apply the edits of maps to the state, and return what became of each. Conflicts leave it as it is."""
+    return in_order(
+        edits,
+        lambda edit: APPLY[type(edit)](state, edit, fitting),
+        APPLY,
+        lambda k: f"{state.entities[k].class_name}_{k}",
+    )
 
 
 def rename(state: MapState, edit: Rename, fitting: Fitting) -> Done:

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from schemas.edits import FORMAT, EditsFile, MapEdit
+from schemas.edits import FORMAT, AnyEdit, EditsFile
 from schemas.errors import BadInput, MachineFailure
 from schemas.outside import LARGEST_SETTINGS, file_text, file_toml
 from schemas.plain_text import UNPRINTABLE
@@ -33,7 +33,7 @@ def read_edits(path: Path) -> EditsFile:
         raise BadInput(f"{path}: {where:.200}: {first['msg']:.200}", hint=HINT) from None
 
 
-def append_edits(path: Path, edits: Sequence[MapEdit]) -> EditsFile:
+def append_edits(path: Path, edits: Sequence[AnyEdit]) -> EditsFile:
     """Add edits to the end of edits.toml, one line each; it is made where there is none. Return what it then says.
 
     What else stands there, comments too, stays as it is. Two programs that do this at once wait for each other. Raises
@@ -91,7 +91,7 @@ def _one_at_a_time(path: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
-def line_of(edit: MapEdit) -> str:
+def line_of(edit: AnyEdit) -> str:
     """Return an edit as one line of TOML; what it leaves at its default is left out."""
     values = edit.model_dump(by_alias=True, exclude_defaults=True)
     return _toml({"what": values.pop("what"), **values})

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import shutil
-from collections import Counter
 from pathlib import Path
 
-from schemas.edits import AppliedEditsFile
 from schemas.panoptic_map import PanopticMap
 from stages.edit.anchoring import Fitting
 from stages.edit.applying import apply_edits
 from stages.edit.edits_file import read_edits
 from stages.edit.map_state import MapState, read_state
+from stages.edit.outcome import outcome_of, write_records
 from stages.edit.parameters import EditMapParameters
 from stages.kit.formats.map_files import mesh_name, write_arrays
 from stages.kit.formats.ply_files import write_ply
@@ -35,14 +34,10 @@ def run(panoptic_map: PanopticMap, edits: Path, *, parameters: EditMapParameters
         vertices_before = len(state.surface.vertices)
         records = apply_edits(state, asked.edits, Fitting(**parameters.model_dump()))
         entities, meshes = state.finished()
-    for record in records:
-        if record.status == "conflict":
-            context.logger.warning("edit %d (%s): %s", record.number, record.what, record.reason)
     with context.progress.step("write the map"):
         root = context.output
         (root / "entities").mkdir(parents=True, exist_ok=True)
         info.model_copy(update={"entities": tuple(entities)}).write(root / "entities.json")
-        AppliedEditsFile(edits=tuple(records)).write(root / "edits.json")
         for entity in entities:
             if entity.instance in meshes:
                 write_ply(root / mesh_name(entity.instance), meshes[entity.instance])
@@ -56,19 +51,9 @@ def run(panoptic_map: PanopticMap, edits: Path, *, parameters: EditMapParameters
         for name in KEPT:
             if panoptic_map.path(name).is_file():
                 shutil.copyfile(panoptic_map.path(name), root / name)
-    counted = Counter(record.status for record in records)
-    summary: dict[str, int | str] = {
-        "edits": len(records),
-        "applied": counted["applied"],
-        "already": counted["already"],
-        "conflicts": counted["conflict"],
-        "entities": len(entities),
-        "vertices": len(state.surface.vertices),
-    }
-    if counted["conflict"]:
-        first = next(record for record in records if record.status == "conflict")
-        summary["reason"] = f"edit {first.number} ({first.what}): {first.reason}"
-    return PanopticMap(root, outcome="conflicts" if counted["conflict"] else "ok", summary=summary)
+    summary = write_records(records, len(asked.edits), context)
+    summary |= {"entities": len(entities), "vertices": len(state.surface.vertices)}
+    return PanopticMap(root, outcome=outcome_of(records), summary=summary)
 
 
 def _write_labels(root: Path, state: MapState) -> None:

@@ -29,13 +29,15 @@ class Thing:
     instance: int
     class_name: str
     box: Box
-    surface: cKDTree
-    """Of its vertices [m]."""
+    surface: cKDTree | None = None
+    """Of its vertices [m]; None in a graph, which knows boxes."""
+    node: str = ""
+    """Id of its node, where a graph says one."""
 
     @property
     def name(self) -> str:
         """What its node is called."""
-        return f"{self.class_name}_{self.instance}"
+        return self.node or f"{self.class_name}_{self.instance}"
 
 
 @dataclass

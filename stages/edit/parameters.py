@@ -1,9 +1,10 @@
-"""Declaration of `scenewright edit map`."""
+"""Declarations of `scenewright edit map` and `edit graph`."""
 
 from __future__ import annotations
 
 from pydantic import Field
 
+from schemas.contact_graph import ContactGraph
 from schemas.panoptic_map import PanopticMap
 from stages.kit.stage import External, Parameters, Stage
 
@@ -44,4 +45,17 @@ MAP = Stage(
     "--out outputs/demo/edited_map",
 )
 
-STAGES = (MAP,)
+GRAPH = Stage(
+    name="edit graph",
+    version=1,
+    summary="Apply edits (edits.toml) to a contact graph: supports that a person pins, things that are fixed or free",
+    parameters=EditMapParameters,
+    reads={"contact_graph": ContactGraph, "edits": External("edits.toml, as `edit support` and the like write it")},
+    writes=ContactGraph,
+    libraries=("numpy", "scipy"),
+    module="graph_stage",
+    example="scenewright edit graph --contact-graph outputs/demo/contact_graph --edits edits.toml "
+    "--out outputs/demo/edited_graph",
+)
+
+STAGES = (MAP, GRAPH)

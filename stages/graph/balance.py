@@ -7,8 +7,9 @@ import shapely
 from scipy.spatial import cKDTree
 
 from schemas.scene_parts import Relation
-from stages.graph.nodes import Entity, plane_height
+from stages.graph.nodes import Entity
 from stages.kit.geometry.boxes import convex_hull
+from stages.kit.geometry.planes import plane_height
 
 FOOT_HEIGHT = 0.03
 """Points within this height over the lowest one can touch the ground [m]."""

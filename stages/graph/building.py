@@ -12,9 +12,10 @@ from stages.graph.evidence import relation_of
 from stages.graph.method import GraphMethod
 from stages.graph.nodes import Entity
 from stages.graph.parameters import GraphParameters
-from stages.graph.refinement import proximal_relations, refined_box, register_hidden_planes
+from stages.graph.refinement import proximal_relations, register_hidden_planes
 from stages.graph.support import Candidate
 from stages.graph.tree import choose_parents
+from stages.kit.geometry.boxes import refined_box
 from stages.kit.stage import Context
 
 

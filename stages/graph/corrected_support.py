@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from schemas.scene_parts import Box
-from stages.graph.nodes import Entity, level_patch, plane_height
+from stages.graph.nodes import Entity, level_patch
 from stages.graph.parameters import GraphParameters
 from stages.graph.support import (
     ORDER_TOLERANCE,
@@ -21,6 +21,7 @@ from stages.graph.support import (
 )
 from stages.graph.touching import SINKING, hidden_reach, seam_share, smaller_share, touches
 from stages.kit.geometry.boxes import clip_polygon, footprint, polygon_area
+from stages.kit.geometry.planes import plane_height
 
 HIDDEN_FACTOR = 0.8
 """A plane that nobody saw is worth less than the same plane seen."""

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from schemas.base import Vector3, as_vector
 from schemas.scene_parts import Box, Relation
 from stages.graph.balance import LEAST_HEIGHT
-from stages.graph.nodes import Entity, Patch, plane_height
+from stages.graph.nodes import Entity, Patch
 from stages.graph.support import Candidate
 from stages.kit.geometry.boxes import (
     bottom,
@@ -21,6 +21,7 @@ from stages.kit.geometry.boxes import (
     polygon_area,
     top,
 )
+from stages.kit.geometry.planes import plane_height
 
 UPRIGHT_NORMAL = 0.5
 """Planes whose normal's z is below this are sides, those above surfaces [-]."""

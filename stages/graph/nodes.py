@@ -11,7 +11,7 @@ import numpy as np
 from schemas.base import as_vector
 from schemas.scene_parts import Box, SurfacePlane
 from stages.kit.geometry.boxes import bottom, convex_hull, polygon_area, top
-from stages.kit.geometry.planes import PlaneFit, plane_rectangle, ransac_plane, ransac_planes
+from stages.kit.geometry.planes import PlaneFit, level_plane, plane_rectangle, ransac_plane, ransac_planes
 from stages.kit.geometry.point_clouds import clusters
 
 GRAVITY = np.array([0.0, 0.0, -1.0])
@@ -82,16 +82,6 @@ class Entity:
 def is_horizontal(normal: np.ndarray, threshold: float) -> bool:
     """Equation 2.1, first line: n . g <= a_th, for a unit normal (3,)."""
     return float(np.asarray(normal) @ GRAVITY) <= threshold
-
-
-def plane_height(plane: SurfacePlane, at: np.ndarray) -> float:
-    """Return the height z [m] of a plane that is not vertical, above the ground point `at` (2,).
-
-    For a horizontal plane this is -d (equation 2.1); a_th admits slopes up to 26 degrees, for which -d would be the
-    height at the world's origin instead of under the object.
-    """
-    nx, ny, nz = plane.normal
-    return -(plane.offset + nx * float(at[0]) + ny * float(at[1])) / nz
 
 
 @dataclass(frozen=True)
@@ -291,13 +281,4 @@ def patch_from_fit(points: np.ndarray, fit: PlaneFit, horizontal_threshold: floa
 def level_patch(outline: np.ndarray, height: float, *, hidden: bool) -> Patch:
     """Return a horizontal plane at `height` [m] over a convex ground polygon (K, 2), K >= 3."""
     corners = np.column_stack([outline, np.full(len(outline), height)])
-    plane = SurfacePlane(
-        normal=(0.0, 0.0, 1.0),
-        offset=-float(height),
-        area=polygon_area(outline),
-        center=as_vector(corners.mean(axis=0)),
-        corners=tuple(as_vector(corner) for corner in corners) if len(corners) == 4 else (),
-        horizontal=True,
-        hidden=hidden,
-    )
-    return Patch(plane, corners, outline)
+    return Patch(level_plane(outline, height, hidden=hidden), corners, outline)

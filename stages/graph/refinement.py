@@ -10,7 +10,7 @@ from schemas.scene_parts import Box, Relation
 from stages.graph.evidence import Surfaces, shared_middle
 from stages.graph.nodes import SAME_HEIGHT, Entity
 from stages.graph.support import Candidate
-from stages.kit.geometry.boxes import box_volume, boxes_overlap_volume, minimum_box, top, with_extent
+from stages.kit.geometry.boxes import box_volume, boxes_overlap_volume, minimum_box
 
 LEAST_SHARED_VOLUME = 1e-6
 """Boxes that merely touch share less than this by rounding [m^3]."""
@@ -48,19 +48,6 @@ def register_hidden_planes(
             candidate = replace(candidate, patch=index, hidden=None, height=height, gap=gap)
         linked[name] = candidate
     return entities, linked
-
-
-def refined_box(box: Box, height: float, maximum_extension: float) -> Box:
-    """Return the box with its bottom on the plane at `height` [m], top and footprint kept (equation 2.1 holds).
-
-    Boxes grow downwards by at most `maximum_extension` [m] (beyond that the box stays as observed, it is no missing
-    leg any more). A bottom below the plane is raised to it: points below a supporting surface are noise. A box that
-    lies wholly below the plane stays.
-    """
-    low, high = box.center[2] - box.size[2] / 2, top(box)
-    if height >= high or low - height > maximum_extension:
-        return box
-    return with_extent(box, height, high)
 
 
 def wall_slabs(entity: Entity) -> list[tuple[int | None, Box]]:

@@ -8,10 +8,11 @@ import numpy as np
 import shapely
 
 from stages.graph.corrected_support import hull_overlap
-from stages.graph.nodes import Entity, plane_height
+from stages.graph.nodes import Entity
 from stages.graph.parameters import GraphParameters
 from stages.graph.support import Candidate, height_gap, inside_share, stands_inside, support_score
 from stages.kit.geometry.boxes import clip_polygon, footprint
+from stages.kit.geometry.planes import plane_height
 
 SAME_LEVEL = 0.02
 """Planes nearer than this in height carry one thing together [m]."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from schemas.scene_parts import Box, Relation
 from schemas.vocabulary import SemanticClass
-from stages.graph.nodes import Entity, SmallSupports, level_patch, plane_height
+from stages.graph.nodes import Entity, SmallSupports, level_patch
 from stages.graph.observed_box import BoxFit, observed_box
 from stages.graph.parameters import GraphParameters
 from stages.graph.support import (
@@ -25,6 +25,7 @@ from stages.graph.support import (
 from stages.graph.tree import fallback_candidates, level_floors, objects_of, upright_layout
 from stages.graph.walls import search_trees, wall_candidate
 from stages.kit.geometry.boxes import clip_polygon, footprint, transform_points_to_box
+from stages.kit.geometry.planes import plane_height
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """What of a scene is free to move: what an arm carries, and furniture that stands by its own weight.
 
 Free is what stands on something (what hangs would fall) and is either of a class that an arm carries, or furniture: a
-rigid thing, not built in, which the contact graph puts on a level plane within 4 cm of its bottom, laden or not.
+rigid thing, not built in, which the contact graph puts on a level plane within 4 cm of its bottom, laden or not. What a
+person marked (`edit mark`) is as they said; what hangs stays.
 """
 
 from __future__ import annotations
@@ -61,6 +62,8 @@ def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str
     stands = link is None or link.relation in STANDS
     if node.node_type == "layout" or not stands:
         return Mobility(False)
+    if node.mark is not None:
+        return Mobility(node.mark == "movable", node.mark == "movable" and node.class_name not in carriable)
     if node.class_name in carriable:
         return Mobility(True)
     if link is None or link.source == SCENE_NODE or node.node_type == "articulated" or node.joints:

@@ -95,5 +95,5 @@ RUNS = (
     Run("cut_trial", "cutting simulate", "--plan @cut_plan --model @cut_model --image-width 300"),
     Run("cut_evaluation", "cutting evaluate", "--model @cut_model --cells n2m1 --goals 2"),
 )
-"""`library add`, `truth scenenn` and `truth supports` read what somebody downloaded, `edit map` what somebody wrote: no
+"""`library add`, `truth scenenn` and `truth supports` read what somebody downloaded, `edit ...` what somebody wrote: no
 run here."""

@@ -41,7 +41,11 @@ def true_object(points: np.ndarray, room: TrueRoom, things: frozenset[int]) -> i
 def truth_of(state: MapState, room: TrueRoom) -> MapTruth:
     """Return what the things of a map are in truth."""
     things = frozenset(entry.instance for entry in room.evaluated(things_only=True))
-    found = {k.instance: true_object(np.asarray(k.surface.data), room, things) for k in state.things()}
+    found = {
+        k.instance: true_object(np.asarray(k.surface.data), room, things)
+        for k in state.things()
+        if k.surface is not None
+    }
     covered = {}
     for true in sorted(things):
         points = room.points[room.instances == true]

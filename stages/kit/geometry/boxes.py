@@ -178,6 +178,19 @@ def with_extent(box: Box, low: float, high: float) -> Box:
     )
 
 
+def refined_box(box: Box, height: float, maximum_extension: float) -> Box:
+    """Return the box with its bottom on the plane at `height` [m], top and footprint kept (equation 2.1 holds).
+
+    Boxes grow downwards by at most `maximum_extension` [m] (beyond that the box stays as observed, it is no missing
+    leg any more). A bottom below the plane is raised to it: points below a supporting surface are noise. A box that
+    lies wholly below the plane stays.
+    """
+    low, high = box.center[2] - box.size[2] / 2, top(box)
+    if height >= high or low - height > maximum_extension:
+        return box
+    return with_extent(box, height, high)
+
+
 def transform_points_to_box(box: Box, points: np.ndarray) -> np.ndarray:
     """Return world points (N, 3) [m] in the frame of the box (origin at its centre)."""
     return (np.asarray(points, dtype=float) - np.asarray(box.center)) @ box_rotation(box)

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.kit.geometry.boxes import minimum_rectangle
+from schemas.base import as_vector
+from schemas.scene_parts import SurfacePlane
+from stages.kit.geometry.boxes import minimum_rectangle, polygon_area
 
 SCREENING_POINTS = 2000
 """Hypotheses are scored on this many points first; only the best few are scored on all (LIBRARIES 3d)."""
@@ -38,6 +40,30 @@ def fit_plane(points: np.ndarray) -> tuple[np.ndarray, float]:
     centred = points - center
     normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
     return normal, -float(normal @ center)
+
+
+def plane_height(plane: SurfacePlane, at: np.ndarray) -> float:
+    """Return the height z [m] of a plane that is not vertical, above the ground point `at` (2,).
+
+    For a horizontal plane this is -d (equation 2.1); a_th admits slopes up to 26 degrees, for which -d would be the
+    height at the world's origin instead of under the object.
+    """
+    nx, ny, nz = plane.normal
+    return -(plane.offset + nx * float(at[0]) + ny * float(at[1])) / nz
+
+
+def level_plane(outline: np.ndarray, height: float, *, hidden: bool) -> SurfacePlane:
+    """Return a horizontal plane at `height` [m] over a convex ground polygon (K, 2), K >= 3."""
+    corners = np.column_stack([outline, np.full(len(outline), height)])
+    return SurfacePlane(
+        normal=(0.0, 0.0, 1.0),
+        offset=-float(height),
+        area=polygon_area(outline),
+        center=as_vector(corners.mean(axis=0)),
+        corners=tuple(as_vector(corner) for corner in corners) if len(corners) == 4 else (),
+        horizontal=True,
+        hidden=hidden,
+    )
 
 
 def ransac_plane(

@@ -8,8 +8,15 @@ import pytest
 import trimesh
 
 from schemas.contact_graph import ContactGraphFile
-from stages.graph.refinement import refined_box
-from stages.kit.geometry.boxes import bottom, box_iou, box_yaw, boxes_overlap_volume, gravity_aligned_box, top
+from stages.kit.geometry.boxes import (
+    bottom,
+    box_iou,
+    box_yaw,
+    boxes_overlap_volume,
+    gravity_aligned_box,
+    refined_box,
+    top,
+)
 from tests.panoptic_maps import box_mesh, chair_mesh, floor_mesh, placed, seen_surface, table_mesh
 
 EYES = [(-1.5, -2.0, 1.5), (1.5, -2.0, 1.6), (0.0, 1.8, 1.7)]

@@ -164,3 +164,24 @@ def test_what_carries_something_fixed_is_fixed_too() -> None:
         piece("floor_9", None, False),
     ]
     assert [body.name for body in held_under_fixed(bodies) if body.movable] == ["table_4"]
+
+
+def marked(graph: ContactGraphFile, mark: str) -> ContactGraphFile:
+    nodes = tuple(node.model_copy(update={"mark": mark}) if node.id == "thing_2" else node for node in graph.nodes)
+    return graph.model_copy(update={"nodes": nodes})
+
+
+@pytest.mark.parametrize(
+    ("graph", "mark", "expected"),
+    [
+        (graph_with("chair"), "fixed", Mobility(False)),
+        (graph_with("cup"), "fixed", Mobility(False)),
+        (graph_with("fridge"), "movable", FREE),
+        (graph_with("cup"), "movable", Mobility(True)),
+        (graph_with("chair", gap=0.3), "movable", FREE),
+        (graph_with("picture", relation="carries_on_wall"), "movable", Mobility(False)),
+    ],
+)
+def test_what_a_person_marked_is_as_they_said(graph: ContactGraphFile, mark: str, expected: Mobility) -> None:
+    graph = marked(graph, mark)
+    assert mobility(graph, graph.node("thing_2"), CARRIABLE, ()) == expected
