@@ -55,6 +55,8 @@ SERVICE = "a message of a service, cut at the largest body"
 
 WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "cli/streams.py": {"os.open": DEVICE},
+    "cli/viewing/desk/desk.py": {"read_text": OURS},
+    "cli/viewing/desk/server.py": {"model_validate_json": PARSED},
     "cli/viewing/page/library.py": {"open": OURS, "zipfile.ZipFile": OURS},
     "cli/viewing/page/page_canvas.py": {"read_text": OURS},
     "schemas/base.py": {"model_validate_json": PARSED},
