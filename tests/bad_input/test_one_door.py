@@ -62,7 +62,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "schemas/base.py": {"model_validate_json": PARSED},
     "schemas/vocabulary.py": {"open": OURS, "tomllib.load": OURS},
     "stages/cutting/recording/server.py": {"model_validate_json": PARSED, "read_bytes": OURS},
-    "stages/edit/edits_file.py": {"os.open": WRITES},
+    "stages/edit/edits_file.py": {"os.open": WRITES, "tomllib.loads": PARSED},
     "stages/engine/batch/folder_lock.py": {"os.open": WRITES},
     "stages/engine/batch/processes.py": {"open": KERNEL},
     "stages/engine/batch/ray_executor.py": {"model_validate_json": PARSED},

@@ -328,7 +328,7 @@ def settled(window: Browser) -> None:
 
 def until(window: Browser, script: str, wanted: Any) -> None:
     """Wait until a script returns what is wanted; pages that are being loaded have no answer."""
-    deadline, found = time.monotonic() + 20, None
+    deadline, found = time.monotonic() + 60, None
     while found != wanted:
         assert time.monotonic() < deadline, (found, wanted, window.text("body")[:1500])
         with contextlib.suppress(urllib.error.HTTPError):
