@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +15,7 @@ from schemas.errors import UsageError
 from schemas.plain_text import cleaned
 
 if TYPE_CHECKING:
+    from schemas.edits import AnyEdit
     from stages.edit.map_state import MapState
 
 File = Annotated[Path, typer.Argument(help="edits.toml; it is made where there is none.")]
@@ -119,10 +121,21 @@ def _instance(state: MapState, name: str, path: Path) -> int:
 
 
 def append(file: Path, by: str, note: str, **values: Any) -> int:
+    """Add the edit that somebody asks for now to the file, and say what to do next."""
+    from stages.edit.edits_file import append_edits
+
+    edits = append_edits(file, [asked_edit(by, note, values)])
+    where = APPLIED_BY.get(values["what"], "map --panoptic-map")
+    say(f"edit {len(edits.edits)} of {file}; next: scenewright edit {where} ... --edits {file} --out ...")
+    out(str(file))
+    return 0
+
+
+def asked_edit(by: str, note: str, values: Mapping[str, Any]) -> AnyEdit:
+    """Return the edit that somebody asks for now; `values` are its fields. Raises UsageError for what is none."""
     from pydantic import TypeAdapter, ValidationError
 
     from schemas.edits import AnyEdit
-    from stages.edit.edits_file import append_edits
 
     said = {"by": cleaned(by or _account()), "when": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}", "note": cleaned(note)}
     try:
@@ -130,12 +143,8 @@ def append(file: Path, by: str, note: str, **values: Any) -> int:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"][1:])
-        raise UsageError(f"edit {values['what']}: {where}: {first['msg']}", hint="see --help") from None
-    edits = append_edits(file, [edit])
-    where = APPLIED_BY.get(values["what"], "map --panoptic-map")
-    say(f"edit {len(edits.edits)} of {file}; next: scenewright edit {where} ... --edits {file} --out ...")
-    out(str(file))
-    return 0
+        raise UsageError(f"edit {values.get('what')}: {where:.200}: {first['msg']:.200}", hint="see --help") from None
+    return edit
 
 
 def _account() -> str:

@@ -21,6 +21,7 @@ from cli.serve_command import serve
 from cli.timeline_command import timeline
 from cli.urdf_check_command import urdf_check
 from cli.urdf_settle_command import urdf_settle
+from cli.view_command import view
 from cli.weights_command import convert_weights
 from schemas.errors import BadInput, UsageError
 
@@ -179,20 +180,6 @@ def migrate(
 
     migrate_artifact(path, out)
     _out(str(out))
-    return 0
-
-
-def view(
-    path: Annotated[Path, typer.Argument(help="Artifact folder of any kind.")],
-    save: Annotated[Path | None, typer.Option("--save", help="Write an .html page, or an .rrd file.")] = None,
-    debug: Debug = False,
-) -> int:
-    """Open an artifact in Rerun (an extra: pip install rerun-sdk), or write it as a page for any browser."""
-    from cli.viewing.view import view_artifact
-
-    view_artifact(path, save)
-    if save is not None:
-        _out(str(save))
     return 0
 
 

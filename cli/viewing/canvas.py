@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -40,6 +40,15 @@ class JointedLink:
     """Where it was seen."""
 
 
+@dataclass(frozen=True)
+class Parts:
+    """What the vertices of a mesh belong to, so that a click says it."""
+
+    ids: np.ndarray
+    """(V,) int, 0 none."""
+    names: Mapping[int, str]
+
+
 class Canvas(Protocol):
     """Lengths in metres, z up, times in seconds. Paths name what is drawn, their parts separated by /.
 
@@ -60,11 +69,18 @@ class Canvas(Protocol):
         """Have a 3D view of everything but what lies under the hidden paths; without any there is one of all."""
 
     def mesh(
-        self, path: str, mesh: trimesh.Trimesh, colors: np.ndarray | None = None, *, front_only: bool = False
+        self,
+        path: str,
+        mesh: trimesh.Trimesh,
+        colors: np.ndarray | None = None,
+        *,
+        front_only: bool = False,
+        parts: Parts | None = None,
     ) -> None:
         """Draw a mesh; `colors` (V, 3 or 4) uint8 per vertex override its own.
 
-        `front_only` leaves out faces that look away, so that one looks into a room through its walls.
+        `front_only` leaves out faces that look away, so that one looks into a room through its walls. `parts`: where a
+        mesh is of several things.
         """
 
     def points(self, path: str, points: np.ndarray, colors: np.ndarray | None = None, radius: float = 0.005) -> None:

@@ -2,52 +2,90 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 
-from cli.viewing.canvas import Canvas, Color, bytes_of
+from cli.viewing.canvas import Canvas, Color, Parts, bytes_of
 from cli.viewing.meshes import load_mesh
 from schemas.errors import BadInput
 from schemas.panoptic_map import EntitiesFile, PanopticMap
+from schemas.scene_parts import Box
 from schemas.vocabulary import load_vocabulary
 from stages.kit.drawing.palette import UNLABELLED, instance_color
 from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.geometry.boxes import box_from_bounds
 
 
+@dataclass(frozen=True)
+class ShownThing:
+    """A thing of a map, as it is drawn."""
+
+    instance: int
+    class_name: str
+    confidence: float
+    box: Box
+
+    @property
+    def name(self) -> str:
+        """What its node is called."""
+        return f"{self.class_name}_{self.instance}"
+
+
 def draw_panoptic_map(panoptic_map: PanopticMap, canvas: Canvas) -> None:
-    """Draw the whole mesh twice (colour, instance) and a labelled box for every entity."""
+    """Draw the whole mesh in four ways (colour, instance, class, trust) and a labelled box for every entity."""
     info = panoptic_map.info
     path = panoptic_map.path("mesh.ply")
     if not path.exists() or not info.entities:
         canvas.document("map", f"{len(info.entities)} entities from {info.frames_integrated} frames")
+    things = [
+        ShownThing(
+            entity.instance,
+            entity.class_name,
+            entity.confidence,
+            box_from_bounds(entity.box_minimum, entity.box_maximum),
+        )
+        for entity in info.entities
+    ]
     if path.exists():
         mesh = load_mesh(path)
-        instances = _vertex_instances(panoptic_map, len(mesh.vertices))
-        canvas.mesh("color", mesh, front_only=True)
-        canvas.mesh("instance", mesh, instance_colors(instances), front_only=True)
-        vocabulary = load_vocabulary()
-        class_of = {entity.instance: vocabulary.by_name(entity.class_name).id for entity in info.entities}
-        trust = {entity.instance: trust_color(entity.confidence) for entity in info.entities}
-        canvas.mesh(
-            "class", mesh, painted(instances, {k: instance_color(c) for k, c in class_of.items()}), front_only=True
-        )
-        canvas.mesh("trust", mesh, painted(instances, trust), front_only=True)
-        layers = ("color", "instance", "class", "trust")
-        canvas.view("by instance", *(name for name in layers if name != "instance"))
-        canvas.view("colour", *(name for name in layers if name != "color"), "boxes")
-        canvas.view("by class", *(name for name in layers if name != "class"))
-        canvas.view("by trust", *(name for name in layers if name != "trust"), "boxes")
+        draw_map(mesh, _vertex_instances(panoptic_map, len(mesh.vertices)), things, canvas)
         canvas.document("entities", entity_table(info))
-        if len(mesh.vertices):
-            canvas.enclose(*mesh.bounds)
+    else:
+        _draw_boxes(things, canvas)
+
+
+def draw_map(mesh: trimesh.Trimesh, instances: np.ndarray, things: Sequence[ShownThing], canvas: Canvas) -> None:
+    """Draw a mesh of labelled vertices, `instances` (V,), and the boxes of its things."""
+    vocabulary = load_vocabulary()
+    of_class = {thing.instance: instance_color(vocabulary.by_name(thing.class_name).id) for thing in things}
+    trust = {thing.instance: trust_color(thing.confidence) for thing in things}
+    parts = Parts(instances, {thing.instance: thing.name for thing in things})
+    layers = {
+        "color": None,
+        "instance": instance_colors(instances),
+        "class": painted(instances, of_class),
+        "trust": painted(instances, trust),
+    }
+    for name, colors in layers.items():
+        canvas.mesh(name, mesh, colors, front_only=True, parts=parts)
+    for view, layer in (("by instance", "instance"), ("colour", "color"), ("by class", "class"), ("by trust", "trust")):
+        without = ("boxes",) if layer in ("color", "trust") else ()
+        canvas.view(view, *(name for name in layers if name != layer), *without)
+    if len(mesh.vertices):
+        canvas.enclose(*mesh.bounds)
+    _draw_boxes(things, canvas)
+
+
+def _draw_boxes(things: Sequence[ShownThing], canvas: Canvas) -> None:
     canvas.boxes(
         "boxes",
-        [box_from_bounds(entity.box_minimum, entity.box_maximum) for entity in info.entities],
-        [f"{entity.class_name} {entity.instance}" for entity in info.entities],
-        [instance_color(entity.instance) for entity in info.entities],
-        show_labels=len(info.entities) <= 60,
+        [thing.box for thing in things],
+        [thing.name for thing in things],
+        [instance_color(thing.instance) for thing in things],
+        show_labels=len(things) <= 60,
     )
 
 

@@ -13,7 +13,7 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from cli.viewing.arrangement import Arrangement
-from cli.viewing.canvas import Color, JointedLink, bytes_of, vertex_colors
+from cli.viewing.canvas import Color, JointedLink, Parts, bytes_of, vertex_colors
 from cli.viewing.viewer_process import viewer_address
 from schemas.errors import BadInput, MissingDependency
 from schemas.scene_parts import Box, Camera
@@ -85,11 +85,18 @@ class RerunCanvas:
         self._arrangement.views.append((name, hidden))
 
     def mesh(
-        self, path: str, mesh: trimesh.Trimesh, colors: np.ndarray | None = None, *, front_only: bool = False
+        self,
+        path: str,
+        mesh: trimesh.Trimesh,
+        colors: np.ndarray | None = None,
+        *,
+        front_only: bool = False,
+        parts: Parts | None = None,
     ) -> None:
         """Draw a mesh; `colors` (V, 3 or 4) uint8 per vertex override its own.
 
-        `front_only` leaves out faces that look away, so that one looks into a room through its walls.
+        `front_only` leaves out faces that look away, so that one looks into a room through its walls. What the vertices
+        belong to is not shown: a click in Rerun says the mesh alone.
         """
         if len(mesh.faces) == 0:
             return

@@ -1,4 +1,4 @@
-"""Open any artifact in Rerun, or write it as a page: which viewer draws which kind."""
+"""Open any artifact in Rerun, or write it as a file: which viewer draws which kind."""
 
 from __future__ import annotations
 

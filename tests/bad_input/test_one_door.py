@@ -55,12 +55,14 @@ SERVICE = "a message of a service, cut at the largest body"
 
 WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "cli/streams.py": {"os.open": DEVICE},
+    "cli/viewing/desk/desk.py": {"read_text": OURS},
+    "cli/viewing/desk/server.py": {"model_validate_json": PARSED},
     "cli/viewing/page/library.py": {"open": OURS, "zipfile.ZipFile": OURS},
     "cli/viewing/page/page_canvas.py": {"read_text": OURS},
     "schemas/base.py": {"model_validate_json": PARSED},
     "schemas/vocabulary.py": {"open": OURS, "tomllib.load": OURS},
     "stages/cutting/recording/server.py": {"model_validate_json": PARSED, "read_bytes": OURS},
-    "stages/edit/edits_file.py": {"os.open": WRITES},
+    "stages/edit/edits_file.py": {"os.open": WRITES, "tomllib.loads": PARSED},
     "stages/engine/batch/folder_lock.py": {"os.open": WRITES},
     "stages/engine/batch/processes.py": {"open": KERNEL},
     "stages/engine/batch/ray_executor.py": {"model_validate_json": PARSED},

@@ -80,6 +80,7 @@
     geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(block, item.faces[0], item.faces[1]), 1));
     if (item.colors) geometry.setAttribute("color", colorsOf(item.colors));
     geometry.computeVertexNormals();
+    if (item.parts) item.of = new Uint32Array(block, item.parts[0], item.parts[1]);
     const side = item.front ? THREE.FrontSide : THREE.DoubleSide;
     const color = item.colors ? 0xffffff : 0xb8b4ac;
     add(new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({ color, vertexColors: !!item.colors, side, ...fading })), item, "mesh");
@@ -228,19 +229,47 @@
     for (const [, x, y, color] of dots) { context.fillStyle = `rgb(${color})`; context.fillRect(x - 1.5, y - 1.5, 3, 3); }
   }
 
+  // ---- who listens: the script of a page that is served ---------------------------------------------------------------
+  const listeners = new Map([["chosen", []], ["point", []]]);
+  const tellListeners = (what, value) => { for (const listener of listeners.get(what)) listener(value); };
+
   // ---- what is chosen --------------------------------------------------------------------------------------------------
   const marked = new THREE.LineSegments(segments([]), new THREE.LineBasicMaterial({ color: 0xe07a00, depthTest: false }));
   marked.renderOrder = 10;
   marked.frustumCulled = false;
   scene.add(marked);
   const mark = (points) => { marked.geometry.dispose(); marked.geometry = segments(points); draw(); };
-  function markNode(name) {
-    const box = boxes.find((one) => same(one.label, name));
-    mark(box ? EDGES.flatMap(([a, b]) => [...box.corners[a], ...box.corners[b]]) : []);
-    for (const { object, path, kind } of things)
-      if (kind === "mesh") object.material.emissive.setHex(path.split("/").some((part) => same(part, name)) ? 0x553300 : 0);
-    return box;
+  // The surface of a part of a mesh, over the mesh.
+  const glow = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ color: 0xff8a00, transparent: true, opacity: 0.5, depthWrite: false, polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -1 }));
+  glow.visible = false;
+  glow.matrixAutoUpdate = false;
+  glow.renderOrder = 9;
+  scene.add(glow);
+  function light(names) {
+    glow.visible = false;
+    const thing = names.length && things.find(({ object, item }) => item.of && object.visible);
+    if (!thing) return;
+    const wanted = new Set(Object.entries(thing.item.names).filter(([, name]) => names.some((one) => same(one, name))).map(([id]) => Number(id)));
+    const all = thing.object.geometry.index.array, of = thing.item.of, kept = [];
+    if (wanted.size) for (let k = 0; k < all.length; k += 3) if (wanted.has(of[all[k]]) && wanted.has(of[all[k + 1]]) && wanted.has(of[all[k + 2]])) kept.push(all[k], all[k + 1], all[k + 2]);
+    if (!kept.length) return;
+    glow.geometry.dispose();
+    glow.geometry = new THREE.BufferGeometry();
+    glow.geometry.setAttribute("position", thing.object.geometry.attributes.position);
+    glow.geometry.setIndex(kept);
+    glow.matrix.copy(thing.object.matrix);
+    glow.matrixWorldNeedsUpdate = glow.visible = true;
   }
+  const frameOf = (box) => EDGES.flatMap(([a, b]) => [...box.corners[a], ...box.corners[b]]);
+  function markNodes(names) {
+    const found = boxes.filter((one) => names.some((name) => same(one.label, name)));
+    light(names);
+    mark(found.flatMap(frameOf));
+    for (const { object, path, kind } of things)
+      if (kind === "mesh") object.material.emissive.setHex(path.split("/").some((part) => names.some((name) => same(part, name))) ? 0x553300 : 0);
+    return found[0];
+  }
+  const markNode = (name) => markNodes(name ? [name] : []);
   const labelled = shown.lines.flatMap((item) => (item.labels || []).map((text, k) => ({ text, points: item.ends[k] })));
   const relationsOf = (name) => labelled.filter(({ text }) => text.split(":")[0].split(" ").includes(name));
   function tell(relations) {
@@ -258,13 +287,14 @@
   function choose(name, come) {
     state.chosen = name;
     for (const button of document.querySelectorAll(".node .name")) button.classList.toggle("chosen", button.textContent === name);
-    const box = name ? markNode(name) : (mark([]), null);
+    const box = markNode(name);
     tell(name ? relationsOf(name) : []);
     if (box && come) {
       state.target = [0, 1, 2].map((k) => box.corners.reduce((sum, corner) => sum + corner[k], 0) / 8);
       state.eye[2] = Math.max(0.6, 3 * Math.hypot(...[0, 1, 2].map((k) => box.corners[7][k] - box.corners[0][k])));
     }
     remember(); draw();
+    tellListeners("chosen", name);
   }
   const ray = new THREE.Raycaster();
   let measuring = null;
@@ -294,13 +324,22 @@
       } else say("and to where?");
       return;
     }
-    const path = things.find(({ object }) => object === hit.object).path;
+    if (listeners.get("point").some((listener) => listener(point))) return;
+    const [name, path] = whatAt(hit, point);
+    choose(name, false);
+    say(`${name || path} at ${place} m`);
+  }
+  function whatAt(hit, point) {
+    const { path, item } = things.find(({ object }) => object === hit.object);
     const names = shown.graph ? shown.graph.names : boxes.map((box) => box.label);
+    if (item.of) {
+      const found = item.names[item.of[hit.face.a]] ?? "";
+      return [names.find((one) => same(one, found)) || found, found || "nothing that has a name"];
+    }
     const own = names.find((name) => path.split("/").some((part) => same(part, name)));
     const around = boxes.map((box) => [within(box, point), box.label]).sort((a, b) => a[0] - b[0])[0];
     const name = own || (around && around[0] < Infinity ? around[1] : "");
-    choose(names.find((one) => same(one, name)) || name, false);
-    say(`${name || path} at ${place} m`);
+    return [names.find((one) => same(one, name)) || name, path];
   }
 
   // ---- mouse and keys --------------------------------------------------------------------------------------------------
@@ -330,7 +369,7 @@
     m: () => { measuring = []; say("measure: from where?"); }, Escape: () => { measuring = null; say(""); choose("", false); },
   };
   document.addEventListener("keydown", (event) => {
-    if (event.target.closest("input, button, summary, a, [tabindex='0']:not(canvas)") || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.target.closest("input, textarea, select, button, summary, a, [tabindex='0']:not(canvas)") || event.ctrlKey || event.metaKey || event.altKey) return;
     const does = KEYS[event.key] || (/^[1-9]$/.test(event.key) && shown.views[event.key - 1] ? () => open(shown.views[event.key - 1]) : null);
     if (does) { event.preventDefault(); does(); }
   });
@@ -475,4 +514,9 @@
   if (state.chosen) choose(state.chosen, false);
   if (!renderer) say("This browser shows no WebGL: a coarse picture without lines; everything else works.");
   document.body.dataset.ready = "yes";
+  window.scenewright = {
+    shown, state, boxes, scene, made, element, say, mark, markNodes, choose, draw, remember, addressOf, KEYS, EDGES,
+    on: (what, listener) => listeners.get(what).push(listener),
+  };
+  window.dispatchEvent(new Event("scenewright-ready"));
 })();

@@ -6,7 +6,7 @@ import base64
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from cli.viewing.canvas import Color, JointedLink, bytes_of, vertex_colors
+from cli.viewing.canvas import Color, JointedLink, Parts, bytes_of, vertex_colors
 from cli.viewing.page.library import three_js
 from cli.viewing.page.packing import Block, thinned_mesh
 from schemas.errors import BadInput, MachineFailure
@@ -48,12 +48,24 @@ class _Mesh:
     faces: np.ndarray
     colors: np.ndarray | None
     front_only: bool
+    parts: Parts | None
+
+
+@dataclass(frozen=True)
+class ServedPage:
+    """What a page has that comes from a server of ours."""
+
+    script: str
+    """Ours; it waits for `scenewright-ready` and finds the page at `window.scenewright`."""
+    facts: Mapping[str, Any]
+    """For the script: JSON."""
 
 
 class PageCanvas:
-    """A page that is written to `save` when nothing went wrong. Raises BadInput when it would be too large."""
+    """A page that is written to `save`, if that is given, when nothing went wrong. Raises BadInput when it would be
+    too large."""
 
-    def __init__(self, name: str, save: Path) -> None:
+    def __init__(self, name: str, save: Path | None = None) -> None:
         self._name, self._save = name, save
         self._time: float | None = None
         self._block = Block()
@@ -70,8 +82,8 @@ class PageCanvas:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
-            self._write()
+        if kind is None and self._save is not None:
+            self._write(self._save)
 
     def time(self, seconds: float, timeline: str = "time") -> None:
         """See Canvas."""
@@ -91,7 +103,13 @@ class PageCanvas:
         self._said["views"].append({"name": name, "hidden": list(hidden)})
 
     def mesh(
-        self, path: str, mesh: trimesh.Trimesh, colors: np.ndarray | None = None, *, front_only: bool = False
+        self,
+        path: str,
+        mesh: trimesh.Trimesh,
+        colors: np.ndarray | None = None,
+        *,
+        front_only: bool = False,
+        parts: Parts | None = None,
     ) -> None:
         """See Canvas."""
         if len(mesh.faces) == 0:
@@ -99,7 +117,9 @@ class PageCanvas:
         mesh, colors = vertex_colors(mesh, colors)
         painted = None if colors is None else np.asarray(colors)[:, :3].astype(np.uint8)
         vertices, faces = np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
-        self._meshes.append(_Mesh(path, self._time, vertices, faces, painted, front_only))
+        if parts is not None and len(parts.ids) != len(vertices):
+            parts = None  # faces with a colour each have vertices of their own
+        self._meshes.append(_Mesh(path, self._time, vertices, faces, painted, front_only, parts))
 
     def points(self, path: str, points: np.ndarray, colors: np.ndarray | None = None, radius: float = 0.005) -> None:
         """See Canvas."""
@@ -197,11 +217,16 @@ class PageCanvas:
         drawn = []
         for mesh in self._meshes:
             vertices, faces, colors = mesh.vertices, mesh.faces, mesh.colors
+            ids = None if mesh.parts is None else np.asarray(mesh.parts.ids)
             if total > MOST_VERTICES and len(vertices) > SMALL:
                 vertices, faces, first = thinned_mesh(vertices, faces, edge)
                 colors = None if colors is None else colors[first]
-            entry = {"path": mesh.path, "time": mesh.time, **self._block.positions(vertices)}
+                ids = None if ids is None else ids[first]
+            entry: dict[str, Any] = {"path": mesh.path, "time": mesh.time, **self._block.positions(vertices)}
             entry |= {"faces": self._block.put(faces.astype("<u4")), "front": mesh.front_only}
+            if ids is not None and mesh.parts is not None:
+                names = {str(k): cleaned(name) for k, name in sorted(mesh.parts.names.items())}
+                entry |= {"parts": self._block.put(ids.astype("<u4")), "names": names}
             drawn.append(entry if colors is None else {**entry, "colors": self._block.put(colors)})
         if total > MOST_VERTICES:
             self._left_out.add(f"detail below {1000 * edge:g} mm")
@@ -235,18 +260,23 @@ class PageCanvas:
             **self._said,
         }
 
-    def _write(self) -> None:
-        page = page_text(self._document(), self._block)
+    def page(self, served: ServedPage | None = None) -> bytes:
+        """Return the page; `served`: what it needs to talk to the server that it comes from."""
+        page = page_text(self._document(), self._block, served)
         if len(page) > LARGEST_PAGE:
             raise BadInput(f"the page would have {len(page) / 1e6:.0f} MB", hint="save a .rrd file instead")
-        partial = self._save.with_name(f".{self._save.name}.partial-{os.getpid()}")
+        return page
+
+    def _write(self, save: Path) -> None:
+        page = self.page()
+        partial = save.with_name(f".{save.name}.partial-{os.getpid()}")
         try:
-            self._save.parent.mkdir(parents=True, exist_ok=True)
+            save.parent.mkdir(parents=True, exist_ok=True)
             partial.write_bytes(page)
-            partial.replace(self._save)
+            partial.replace(save)
         except OSError as error:
             partial.unlink(missing_ok=True)
-            raise MachineFailure(f"{self._save}: {error.strerror}", hint="choose another --save") from None
+            raise MachineFailure(f"{save}: {error.strerror}", hint="choose another --save") from None
 
 
 def shape_key(vertices: np.ndarray) -> bytes:
@@ -262,19 +292,24 @@ def _thinned_to(shapes: Iterable[np.ndarray], edge: float) -> int:
     )
 
 
-def page_text(document: dict[str, Any], block: Block) -> bytes:
+def page_text(document: dict[str, Any], block: Block, served: ServedPage | None = None) -> bytes:
     """Return the page of a document. Everything in it that came from outside is data: JSON without a `<`, which the
-    script shows as text. The policy in its head lets nothing run but the two scripts that stand in it."""
-    scripts = (three_js(), (FOLDER / "page.js").read_text(encoding="utf-8"))
+    script shows as text. The policy in its head lets nothing run but the scripts that stand in it, and asks nobody but
+    the server that a served page came from."""
+    scripts = [three_js(), (FOLDER / "page.js").read_text(encoding="utf-8")]
+    if served is not None:
+        scripts.append(served.script)
+        document = {**document, "served": dict(served.facts)}
     hashes = " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in scripts)
     policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'"
+    policy += "; form-action 'none'" + ("" if served is None else "; connect-src 'self'")
     text = json.dumps(document, sort_keys=True, allow_nan=False, ensure_ascii=True, separators=(",", ":"))
     page = (FOLDER / "page.html").read_text(encoding="utf-8")
     for mark, value in (
         ("@policy@", policy),
         ("@style@", (FOLDER / "page.css").read_text(encoding="utf-8")),
         ("@library@", scripts[0]),
-        ("@script@", scripts[1]),
+        ("@script@", "</script>\n<script>".join(scripts[1:])),
         ("@block@", block.text()),
         ("@document@", text.replace("<", "\\u003c")),
     ):

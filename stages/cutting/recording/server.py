@@ -77,6 +77,7 @@ class _Handler(BoundedHandler):
     routes: dict[str, dict[str, Callable[[_Handler], None]]] = {}
     largest_body = 4096
     tells_routes = False
+    own_pages_only = True
 
     def page(self) -> None:
         headers = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Frame-Options": "DENY"}

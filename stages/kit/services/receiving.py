@@ -199,6 +199,8 @@ class BoundedHandler(BaseHTTPRequestHandler):
     largest_body = LARGEST_BODY
     tells_routes = True
     """Whether who asks for another path is told which there are."""
+    own_pages_only = False
+    """Whether what a page of another origin asks for is refused, whatever it knows."""
     protocol_version = "HTTP/1.1"
     server_version = "scenewright"
     sys_version = ""
@@ -246,6 +248,8 @@ class BoundedHandler(BaseHTTPRequestHandler):
             self._refuse_unread(400, "one Host is needed")
         elif hosts and not self.server.is_meant(hosts[0]):
             self._refuse_unread(421, "this server is for this machine alone, under a name of it (localhost, 127.0.0.1)")
+        elif self.own_pages_only and not self._own_page_asks(hosts):
+            self._refuse_unread(403, "pages of other origins may not ask here")
         elif (methods := self.routes.get(self.path)) is None:
             there = f"; there are {', '.join(self.routes)}" if self.tells_routes else ""
             self._refuse_unread(404, f"no {self.path:.80}{there}")
@@ -258,6 +262,15 @@ class BoundedHandler(BaseHTTPRequestHandler):
             self._refuse_unread(400, f"{self.command} takes no body")
         else:
             methods[self.command](self)
+
+    def _own_page_asks(self, hosts: list[str]) -> bool:
+        """Whether a page that was served here asks, or no page at all; browsers say whose it is (Fetch, 3.2 and
+        Fetch Metadata). Going to an address by a link is no asking."""
+        origins = self.headers.get_all("Origin", [])
+        if origins:
+            return len(origins) == 1 and bool(hosts) and origins[0].lower() == f"http://{hosts[0]}".lower()
+        goes_there = self.command == "GET" and self.headers.get("Sec-Fetch-Mode") == "navigate"
+        return goes_there or self.headers.get("Sec-Fetch-Site", "none") in ("none", "same-origin")
 
     def handle_expect_100(self) -> bool:
         """Leave the answer to `Expect: 100-continue` until it is known that the body is wanted."""

@@ -269,6 +269,7 @@ def _other_command(name: str, rng: random.Random, base: Path) -> tuple[list[str]
         if parameter.name in ("help", "debug"):
             continue
         needed = parameter.required or parameter.param_type_name == "argument"
+        needed = needed or (name, parameter.name) == ("view", "save")  # without it, it serves until it is interrupted
         if not needed and rng.random() > 0.25:
             continue
         if name == "run" and parameter.name == "dry_run" or name == "batch" and parameter.name == "dry_run":
