@@ -26,10 +26,12 @@ def urdf_check(
 ) -> int:
     """Say what is wrong with a URDF, a line for each finding: meshes that are missing or outside, circles, dangling
     links, NaN, axes, limits, masses, inertias, and links that lie in each other at rest. Exits with 3 when anything is.
+    What is sound and seldom meant is said as advice.
     """
-    from stages.kit.formats.urdf_check import Problem, check_urdf
+    from stages.kit.formats.urdf_check import Problem, advice, check_urdf
 
     problems = check_urdf(file, root)
+    advised = [] if problems else advice(file)
     if not problems:
         from stages.urdf.rest_penetration import resting_penetrations
 
@@ -38,11 +40,17 @@ def urdf_check(
             for p in resting_penetrations(file, penetration)
         ]
     if json_output:
-        findings = [{"kind": p.kind, "element": p.element, "message": p.message} for p in problems]
-        out(json.dumps({"file": str(file), "sound": not problems, "findings": findings}))
+        told = {"findings": problems, "advice": advised}
+        rows = {
+            name: [{"kind": p.kind, "element": p.element, "message": p.message} for p in found]
+            for name, found in told.items()
+        }
+        out(json.dumps({"file": str(file), "sound": not problems, **rows}))
     else:
         for problem in problems:
             out(f"{file}: {problem}")
         if not problems:
             out(f"{file}: sound")
+        for problem in advised:
+            out(f"{file}: advice: {problem}")
     return BAD_INPUT if problems else 0

@@ -34,8 +34,9 @@ class ExportFile(Model):
 
 class ExportedSequence(Artifact):
     """`export.json` and the layout's own files: TUM `rgb/ depth/ rgb.txt depth.txt groundtruth.txt calibration.txt`,
-    nerfstudio `images/ depth/ transforms.json`, or `log.mcap`."""
+    nerfstudio `images/ depth/ transforms.json`, `log.mcap`, or COCO `images/ panoptic/ panoptic.json
+    instances.json`."""
 
     kind: ClassVar[str] = "exported_sequence"
-    description: ClassVar[str] = "a sequence written back as TUM, nerfstudio or MCAP"
+    description: ClassVar[str] = "a sequence written back as TUM, nerfstudio, MCAP or COCO"
     info = Document(ExportFile, "export.json")

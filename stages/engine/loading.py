@@ -5,13 +5,20 @@ from __future__ import annotations
 import fnmatch
 import importlib
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, overload
 
 from schemas.artifact import Artifact
 from schemas.contact_graph import ContactGraphFile
 from schemas.errors import BadInput
 from stages.engine.reading import open_artifact
 from stages.engine.run_folders import artifacts_of
+
+if TYPE_CHECKING:
+    import networkx
+
+    from stages.kit.formats.disparity_file import DisparityReader
+    from stages.kit.formats.frames import FrameReader
+    from stages.kit.formats.masks import PanopticReader
 
 READERS = {
     "frames.mcap": ("frames", "FrameReader"),
@@ -48,6 +55,14 @@ def load_run(path: Path | str) -> dict[str, Artifact]:
     return dict(sorted(found.items(), key=lambda item: (started[item[0]], item[0])))
 
 
+@overload
+def payload(artifact: Artifact, name: Literal["frames.mcap"]) -> FrameReader: ...
+@overload
+def payload(artifact: Artifact, name: Literal["disparity.mcap"]) -> DisparityReader: ...
+@overload
+def payload(artifact: Artifact, name: Literal["panoptic.zip"]) -> PanopticReader: ...
+@overload
+def payload(artifact: Artifact, name: str) -> Any: ...
 def payload(artifact: Artifact, name: str) -> Any:
     """Read a payload file with the reader of its format, the same that steps use.
 
@@ -63,7 +78,7 @@ def payload(artifact: Artifact, name: str) -> Any:
     raise BadInput(f"{path}: has no reader", hint="open it yourself: .file(name) is its path")
 
 
-def as_networkx(graph: ContactGraphFile) -> Any:
+def as_networkx(graph: ContactGraphFile) -> networkx.MultiDiGraph:
     """Return a networkx.MultiDiGraph: node id -> the fields of GraphNode, edges keyed and attributed by relation.
 
     `supports`, `contains`, `carries_on_wall` and `hangs_from` go from the carrier to what it carries, and so do

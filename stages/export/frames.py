@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,13 +12,36 @@ import numpy as np
 from schemas.scene_parts import Camera
 from schemas.sequence import SequenceFile
 from stages.kit.formats.foxglove import depth_to_millimetres
-from stages.kit.formats.frames import FrameReader
+from stages.kit.formats.frames import Frame, FrameReader
+
+
+@dataclass(frozen=True)
+class ExportMask:
+    """What a mask is of."""
+
+    class_id: int
+    """Of data/vocabulary.toml."""
+    is_thing: bool
+    score: float
+    """0..1; 1 where nothing was said."""
+
+
+@dataclass(frozen=True)
+class FrameMasks:
+    """The masks of one frame."""
+
+    ids: np.ndarray
+    """(H, W) int32, 0 = void."""
+    masks: Mapping[int, ExportMask]
+    """Id -> mask."""
 
 
 @dataclass(frozen=True)
 class ExportFrame:
     """One frame. Streams that it lacks, or that were not asked for, are None."""
 
+    index: int
+    """Its place in the sequence."""
     stamp: int
     """Time [ns]."""
     camera_name: str
@@ -32,6 +55,8 @@ class ExportFrame:
     """Right eye of a rectified stereo pair, like `color`."""
     world_from_camera: np.ndarray | None
     """(4, 4), OpenCV camera."""
+    masks: FrameMasks | None = None
+    """For layouts that hold masks."""
 
 
 @dataclass
@@ -43,6 +68,7 @@ class Tally:
     left_out: Counter[str] = field(default_factory=Counter)
     """Reason -> frames."""
     depth_pixels_zeroed: int = 0
+    masks: int = 0
 
 
 @dataclass(frozen=True)
@@ -69,12 +95,13 @@ def export_frames(
     streams: Collection[str],
     cameras: Collection[str],
     tally: Tally,
+    masks: Callable[[Frame], FrameMasks | None] | None = None,
 ) -> Iterator[ExportFrame]:
     """Yield every `every`-th of the numbered frames with the streams asked for, if it is of one of the cameras.
 
-    The others are counted in `tally`.
+    The others are counted in `tally`. `masks` gives the masks of a frame.
     """
-    pixels = tuple(stream for stream in ("depth", "labels") if stream in streams)
+    pixels = tuple(stream for stream in ("depth", "labels") if stream in streams or (masks and stream == "labels"))
     stamps = reader.stamps
     for index in numbers:
         if index % every:
@@ -85,6 +112,7 @@ def export_frames(
             tally.left_out["other_camera"] += 1
             continue
         yield ExportFrame(
+            index=index,
             stamp=int(stamps[index]),
             camera_name=frame.camera_name,
             color=reader.encoded(index, "color") if "color" in streams else None,
@@ -92,4 +120,5 @@ def export_frames(
             labels=frame.labels,
             right=reader.encoded(index, "right") if "right" in streams else None,
             world_from_camera=frame.world_from_camera if "pose" in streams else None,
+            masks=None if masks is None else masks(frame),
         )

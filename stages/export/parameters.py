@@ -10,11 +10,12 @@ from schemas.errors import UsageError
 from schemas.exported_scene import ExportedScene
 from schemas.exported_sequence import ExportedSequence
 from schemas.interactive_scene import InteractiveScene
+from schemas.segments import Segments
 from schemas.sequence import Sequence
 from stages.export.registry import STREAMS, all_formats, dialects, layouts
 from stages.export.scene_registry import scene_formats
 from stages.kit.estimates import Estimate, Inputs, grows_with
-from stages.kit.stage import Parameters, Stage
+from stages.kit.stage import Optionally, Parameters, Stage
 
 if TYPE_CHECKING:
     Layout = str
@@ -64,7 +65,11 @@ def check(parameters: ExportParameters, inputs: Any) -> None:
 
 def _estimate(parameters: ExportParameters, inputs: Inputs) -> Estimate:
     sequence = inputs["sequence"]
-    expected = sequence.megabytes / parameters.every * {"tum": 1.16, "nerfstudio": 1.08, "mcap": 1.0}[parameters.layout]
+    expected = (
+        sequence.megabytes
+        / parameters.every
+        * {"tum": 1.16, "nerfstudio": 1.08, "mcap": 1.0, "coco": 0.5}[parameters.layout]
+    )
     cut = bool(parameters.streams) or parameters.camera is not None
     return Estimate(expected, 0.0 if cut else 0.5 * expected, 120)
 
@@ -81,9 +86,9 @@ class SceneExportParameters(Parameters):
 EXPORT = Stage(
     name="export",
     version=1,
-    summary="Write a sequence back as TUM RGB-D, nerfstudio or MCAP, for other tools",
+    summary="Write a sequence back as TUM RGB-D, nerfstudio or MCAP, or with its masks as COCO, for other tools",
     parameters=ExportParameters,
-    reads={"sequence": Sequence},
+    reads={"sequence": Sequence, "segments": Optionally(Segments)},
     writes=ExportedSequence,
     libraries=("numpy", "scipy", "opencv-python-headless", "mcap", "protobuf", "zstandard", "rosbags"),
     example="scenewright export --sequence outputs/demo/sequence --layout tum --out outputs/demo/tum",

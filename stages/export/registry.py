@@ -34,6 +34,8 @@ class SequenceFormat:
     """What of the folder is to be opened."""
     one_camera: bool = False
     """Whether it holds one camera."""
+    masks: bool = False
+    """Whether it holds masks: those of `--segments`, else the labels of the sequence."""
     pose_note: str = ""
     """What a reader has to know of the poses beyond that they are world_from_camera."""
     depth_limit: float | None = None

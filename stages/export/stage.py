@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
+from contextlib import ExitStack
 from typing import Any
 
 from schemas.errors import UsageError
 from schemas.exported_sequence import ExportedSequence, ExportFile
 from schemas.scene_parts import Camera
+from schemas.segments import Segments
 from schemas.sequence import Sequence, SequenceFile
 from stages.export.frames import ExportJob, Tally, export_frames
+from stages.export.masks import masks_of
 from stages.export.parameters import ExportParameters
 from stages.export.registry import SequenceFormat, format_for
 from stages.kit.formats.frames import FrameReader
@@ -19,20 +22,35 @@ from stages.kit.stage import Context
 WORLD_NOTE = "poses are world_from_camera in the sequence's world: metres, z up, OpenCV cameras"
 
 
-def run(sequence: Sequence, *, parameters: ExportParameters, context: Context) -> ExportedSequence:
-    """Write a sequence in another tool's layout. Raises UsageError for a camera that it does not have."""
+def run(
+    sequence: Sequence, segments: Segments | None, *, parameters: ExportParameters, context: Context
+) -> ExportedSequence:
+    """Write a sequence in another tool's layout.
+
+    Raises UsageError for a camera that it does not have, or for masks that the layout does not hold, and BadInput for a
+    layout of masks where there are none.
+    """
     info = sequence.info
     target_format = format_for(parameters.layout, parameters.dialect)
+    if segments is not None and not target_format.masks:
+        raise UsageError(f"export: --segments: {parameters.layout} holds no masks", hint="add --layout coco")
     cameras = chosen_cameras(info, parameters.camera, target_format)
     streams = tuple(name for name in target_format.streams if name in (parameters.streams or target_format.streams))
     tally = Tally()
-    with FrameReader(sequence.path("frames.mcap")) as reader, context.progress.step("write frames"):
+    with ExitStack() as opened:
+        reader = opened.enter_context(FrameReader(sequence.path("frames.mcap")))
+        masks = opened.enter_context(masks_of(sequence, segments)) if target_format.masks else None
+        opened.enter_context(context.progress.step("write frames"))
         numbers = context.progress.track(range(len(reader)), total=len(reader), description="frames")
-        frames = export_frames(reader, numbers, parameters.every, streams, cameras, tally)
+        frames = export_frames(reader, numbers, parameters.every, streams, cameras, tally, masks)
         job = ExportJob(context.output, frames, cameras, info, reader.world_up, tally)
         importlib.import_module(target_format.module).write(job)
         frames_in_sequence = len(reader)
     notes = _notes(info, cameras, streams, target_format, tally)
+    if target_format.masks:
+        notes = (f"masks: {'the labels of the log' if segments is None else segments.info.label}", *notes[1:])
+        if not tally.masks:
+            notes = (*notes, "no mask has a class: a network or words name things (docs/SEGMENTATION.md)")
     for note in notes:
         context.logger.info("%s", note)
     ExportFile(
@@ -99,6 +117,8 @@ def _result(tally: Tally, frames_in_sequence: int, target_format: SequenceFormat
         "frames": tally.frames,
         "frames_in_sequence": frames_in_sequence,
     }
+    if target_format.masks:
+        summary["masks"] = tally.masks
     if tally.depth_pixels_zeroed:
         summary["depth_pixels_zeroed"] = tally.depth_pixels_zeroed
     if not tally.frames:

@@ -18,7 +18,7 @@ from cli.main import run
 from stages.engine.runner import run_stage
 from stages.ingest.parameters import STAGE as INGEST
 from stages.kit.formats.frames import FrameReader
-from stages.segment.backends.masks.run_lengths import encode_rle
+from stages.kit.formats.run_lengths import encode_rle
 from tests.unit.segment.test_stage import NAMES, write_sequence
 
 CLASSES = {str(10 * k): name for k, name in NAMES.items()}

@@ -161,7 +161,7 @@ print(made.info.layout, made.info.log, made.info.streams, made.path("p.txt").rea
 """,
     )
     words = " ".join(printed.split())
-    assert "one of tum, nerfstudio, mcap, pebbles" in words
+    assert "one of tum, nerfstudio, mcap, coco, pebbles" in words
     assert "pebbles p.txt ('pose',) True" in words
 
 

@@ -83,9 +83,9 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the code with one new thing of each sort, and the golden artifact that the new step makes."""
     root = tmp_path_factory.mktemp("tree")
     unneeded = shutil.ignore_patterns("*.nb[ic]", "json")
-    for name in ("cli", "stages", "schemas", "benchmarks"):
+    for name in ("cli", "stages", "schemas", "scenewright", "benchmarks"):
         shutil.copytree(REPOSITORY / name, root / name, ignore=unneeded)
-    for name in ("scenewright.py", "pyproject.toml", "tests/__init__.py", *(f"tests/{test}" for test in TESTS)):
+    for name in ("pyproject.toml", "tests/__init__.py", *(f"tests/{test}" for test in TESTS)):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(REPOSITORY / name, root / name)
     (root / "data").symlink_to(REPOSITORY / "data")

@@ -73,6 +73,39 @@ def test_the_map_and_the_graph_are_about_the_room(run_folder: Path) -> None:
     assert "corruption 0.2" in html and "http://" not in html and "https://" not in html
 
 
+NOTEBOOKS = sorted((REPOSITORY / "docs" / "notebooks").glob("*.ipynb"))
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebooks_run(path: Path, run_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each on the small room, in a kernel, as a reader would; what they call is this checkout."""
+    nbclient = pytest.importorskip("nbclient")
+    nbformat = pytest.importorskip("nbformat")
+    pytest.importorskip("ipykernel")
+    pytest.importorskip("pandas")
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    settings = {
+        "PYTHONPATH": REPOSITORY,
+        "SCENEWRIGHT_RUN": run_folder,
+        "LOG": run_folder / "ground_truth" / "log.mcap",
+        "OUT": tmp_path / "out",
+    }
+    for name, value in settings.items():
+        monkeypatch.setenv(name, str(value))
+    notebook = nbformat.read(path, as_version=4)
+    nbclient.NotebookClient(
+        notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}
+    ).execute()
+    pictures = [
+        output
+        for cell in notebook.cells
+        if cell.cell_type == "code"
+        for output in cell.outputs
+        if "image/png" in output.get("data", {})
+    ]
+    assert pictures, "every notebook shows something"
+
+
 def test_a_second_run_has_nothing_to_do(run_folder: Path) -> None:
     before = {path: path.stat().st_mtime_ns for path in run_folder.rglob("*")}
     settings = [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]

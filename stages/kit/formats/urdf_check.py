@@ -62,6 +62,20 @@ def check_urdf(path: Path, root: Path | None = None) -> list[Problem]:
     return problems
 
 
+def advice(path: Path) -> list[Problem]:
+    """Return what is sound and still seldom meant: things that move, can be seen, and touch nothing (`no_collision`).
+
+    Raises BadInput for a file that cannot be read.
+    """
+    urdf = parse_urdf(Path(path))
+    moving = {joint.child for joint in urdf.joints if joint.type != "fixed"}
+    return [
+        Problem("no_collision", f"link {link.name!r}", "moves and has a shape to see, and none to touch")
+        for link in urdf.links
+        if link.name in moving and link.visuals and not link.collisions
+    ]
+
+
 def require_sound(path: Path, root: Path | None = None) -> None:
     """Raise BadInput with the first problem of a URDF, and how many there are."""
     problems = check_urdf(path, root)

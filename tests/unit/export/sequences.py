@@ -9,6 +9,7 @@ import numpy as np
 
 from schemas.exported_sequence import ExportedSequence
 from schemas.scene_parts import Camera
+from schemas.segments import Segments
 from schemas.sequence import Gravity, LabelEntry, Sequence, SequenceCamera, SequenceFile
 from stages.export.parameters import ExportParameters
 from stages.export.stage import run
@@ -81,11 +82,11 @@ def write_sequence(
     return Sequence(root)
 
 
-def export(sequence: Sequence, output: Path, **options: Any) -> ExportedSequence:
+def export(sequence: Sequence, output: Path, segments: Segments | None = None, **options: Any) -> ExportedSequence:
     """Export a sequence into a new folder."""
     output.mkdir(parents=True)
     context = Context(output=output, seed=0, device="cpu", progress=SilentProgress())
-    return run(sequence, parameters=ExportParameters(**options), context=context)
+    return run(sequence, segments, parameters=ExportParameters(**options), context=context)
 
 
 def assert_same_frames(

@@ -11,14 +11,16 @@ import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
+import zipfile
 from pathlib import Path
 
 import networkx
 import numpy as np
 import pytest
 
-from scenewright import as_networkx, load, load_run, payload
-from schemas.errors import BadInput
+from scenewright import as_networkx, as_tables, load, load_run, payload
+from schemas.base import Model
+from schemas.errors import BadInput, MissingDependency
 from schemas.kinds import KINDS
 from schemas.manifest import MANIFEST_NAME
 from schemas.panoptic_map import PanopticMap
@@ -158,6 +160,87 @@ def test_arrays(run: dict) -> None:
     assert set(payload(run["packing"], "trajectory.npz")) == {"joints", "action"}
 
 
+@pytest.mark.parametrize("root", GOLDEN, ids=lambda path: path.name)
+def test_every_list_of_every_kind_is_a_table(root: Path) -> None:
+    """No cell holds a record: those are tables or columns of their own."""
+    pytest.importorskip("pandas")
+    artifact = load(root)
+    for name, table in as_tables(artifact).items():
+        assert table.columns.is_unique, name
+        for column in table.columns:
+            for cell in table[column]:
+                assert not isinstance(cell, Model), f"{name}: {column}"
+                assert not (isinstance(cell, tuple) and any(isinstance(entry, Model) for entry in cell)), name
+
+
+def test_tables_say_what_the_documents_say(run: dict) -> None:
+    pandas = pytest.importorskip("pandas")
+    found = run["panoptic_map"]
+    entities = as_tables(found)["entities"]
+    assert entities["class_name"].tolist() == [entity.class_name for entity in found.info.entities]
+    lowest = [entity.box_minimum[2] for entity in found.info.entities]
+    assert entities["box_minimum.z"].tolist() == lowest
+    rows = as_tables(run["segments"])["frames.segments"]
+    expected = [(frame.frame, entry.id) for frame in run["segments"].info.frames for entry in frame.segments]
+    assert list(zip(rows["frames.frame"], rows["id"], strict=True)) == expected
+    metrics = as_tables(run["evaluation"])["metrics"].set_index("name")["value"]
+    told = {name: None if pandas.isna(value) else value for name, value in metrics.items()}
+    assert told == run["evaluation"].info.metrics
+    graph = as_tables(run["cad_scene"])
+    assert len(graph["nodes"]) == len(run["cad_scene"].graph.nodes)
+    assert set(graph["links"]["relation"]) == {link.relation for link in run["cad_scene"].graph.links}
+
+
+def test_a_list_that_is_empty_is_an_empty_table(run_folder: Path, tmp_path: Path) -> None:
+    pytest.importorskip("pandas")
+    empty = PanopticMap(tmp_path)
+    load(run_folder / "panoptic_map", PanopticMap).info.model_copy(update={"entities": ()}).write(
+        tmp_path / "entities.json"
+    )
+    assert len(as_tables(empty)["entities"]) == 0
+
+
+def test_a_machine_without_pandas_is_told(run: dict, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(MissingDependency, match="notebooks"):
+        as_tables(run["panoptic_map"])
+
+
+@pytest.mark.slow
+def test_type_checkers_know_what_is_loaded(run_folder: Path, tmp_path: Path) -> None:
+    """As a user's mypy sees an installed copy: nothing but what the wheel holds, and py.typed."""
+    wheel = [
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--no-deps",
+        "--no-build-isolation",
+        "-q",
+        "-w",
+        tmp_path,
+        REPOSITORY,
+    ]
+    subprocess.run(wheel, check=True, capture_output=True)
+    (built,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(built) as archive:
+        held = archive.namelist()
+    assert {f"{name}/py.typed" for name in ("scenewright", "schemas", "stages")} <= set(held)
+    script = tmp_path / "user.py"
+    script.write_text(
+        "from scenewright import as_networkx, as_tables, load, payload\n"
+        "from schemas.panoptic_map import PanopticMap\n"
+        "found = load('map', PanopticMap)\n"
+        "reveal_type(found.info.entities[0].box_minimum)\n"
+        "reveal_type(payload(found, 'panoptic.zip').read(3))\n"
+        "load(3)\n"
+    )
+    command = [sys.executable, "-m", "mypy", "--config-file=", "--ignore-missing-imports", str(script)]
+    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True)
+    assert 'Revealed type is "tuple[float, float, float]"' in done.stdout.replace("builtins.", "")
+    assert "ndarray" in done.stdout and 'incompatible type "int"' in done.stdout
+
+
 def test_what_cannot_be_opened_says_what_to_do(run_folder: Path, tmp_path: Path) -> None:
     assert load(run_folder / "panoptic_map", PanopticMap).info.entities
     assert isinstance(load(run_folder / "disparity", Sequence), Sequence)
@@ -173,8 +256,8 @@ def test_what_cannot_be_opened_says_what_to_do(run_folder: Path, tmp_path: Path)
 
 
 def test_the_module_stands_on_kit_and_engine_only() -> None:
-    """The import graph is of packages; scenewright.py is a single file, so this is checked here."""
-    tree = ast.parse((REPOSITORY / "scenewright.py").read_text())
+    """It belongs to no floor of the import graph, so this is checked here."""
+    tree = ast.parse((REPOSITORY / "scenewright" / "__init__.py").read_text())
     names = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
     assert names and all(
         name.split(".")[0] == "schemas" or name.startswith(("stages.kit.", "stages.engine.")) for name in names
@@ -185,26 +268,16 @@ def test_the_module_stands_on_kit_and_engine_only() -> None:
             assert "scenewright import" not in path.read_text(), f"{path}: the API is for others"
 
 
-def notebook_cells() -> list[str]:
-    document = json.loads((REPOSITORY / "docs" / "notebook.ipynb").read_text())
-    return ["".join(cell["source"]) for cell in document["cells"] if cell["cell_type"] == "code"]
+NOTEBOOKS = sorted((REPOSITORY / "docs" / "notebooks").glob("*.ipynb"))
 
 
-def test_the_notebook_is_whole_and_carries_no_outputs() -> None:
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebooks_are_whole_and_carry_no_outputs(path: Path) -> None:
+    """tests/pipeline/test_small_chain.py executes them."""
     nbformat = pytest.importorskip("nbformat")
-    nbformat.validate(nbformat.read(REPOSITORY / "docs" / "notebook.ipynb", as_version=4))
-    document = json.loads((REPOSITORY / "docs" / "notebook.ipynb").read_text())
-    code = [cell for cell in document["cells"] if cell["cell_type"] == "code"]
-    assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)
-
-
-def test_the_notebook_runs(run_folder: Path, tmp_path: Path) -> None:
-    script = tmp_path / "notebook.py"
-    script.write_text("\n\n".join(notebook_cells()))
-    environment = {**os.environ, "SCENEWRIGHT_RUN": str(run_folder), "MPLBACKEND": "Agg", "PYTHONPATH": str(REPOSITORY)}
-    done = subprocess.run([sys.executable, script], cwd=tmp_path, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert "panoptic_map" in done.stdout and "map/pq" in done.stdout
+    nbformat.validate(nbformat.read(path, as_version=4))
+    code = [cell for cell in json.loads(path.read_text())["cells"] if cell["cell_type"] == "code"]
+    assert code and all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)
 
 
 def test_examples_of_the_docs_run(run_folder: Path, tmp_path: Path) -> None:

@@ -26,13 +26,13 @@ from stages.engine.runner import run_stage
 from stages.ingest.parameters import STAGE as INGEST
 from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.masks import encode_panoptic_png
+from stages.kit.formats.run_lengths import decode_rle, encode_rle
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.segment.backends.masks.formats import npz_stacks
 from stages.segment.backends.masks.given import GivenFrame, GivenMask, Picture, ReadSettings
 from stages.segment.backends.masks.matching import match_pictures
 from stages.segment.backends.masks.overlapping import flatten
-from stages.segment.backends.masks.run_lengths import decode_rle, encode_rle
 from stages.segment.backends.service import reply_cache
 from stages.segment.backends.service.protocol import PROTOCOL
 from stages.segment.geometric import pixels_at

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from schemas.errors import BadInput
+from stages.kit.formats.run_lengths import decode_rle
 from stages.segment.backends.masks.given import MOST_PIXELS, GivenFrame, GivenMask, ReadSettings
 from stages.segment.backends.masks.overlapping import flatten
-from stages.segment.backends.masks.run_lengths import decode_rle
 
 
 def flatten_encoded(

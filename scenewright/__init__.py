@@ -3,5 +3,6 @@
 from schemas.artifact import Artifact
 from schemas.errors import BadInput, ScenewrightError
 from stages.engine.loading import as_networkx, load, load_run, payload
+from stages.engine.tables import as_tables
 
-__all__ = ["Artifact", "BadInput", "ScenewrightError", "as_networkx", "load", "load_run", "payload"]
+__all__ = ["Artifact", "BadInput", "ScenewrightError", "as_networkx", "as_tables", "load", "load_run", "payload"]
