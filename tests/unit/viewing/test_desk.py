@@ -22,7 +22,7 @@ from cli.main import run as scenewright
 from cli.viewing.desk.desk import Desk
 from cli.viewing.desk.forms import forms_of, kinds_of
 from cli.viewing.desk.server import DeskServer
-from schemas.edits import Anchor, ClassName, Edit, MapEdit
+from schemas.edits import Anchor, ClassName, Edit, MapEdit, Mark
 from schemas.errors import BadInput, MachineFailure, UsageError
 from schemas.hand_written import Point, UprightBox
 from schemas.panoptic_map import EntitiesFile, PanopticMap
@@ -120,6 +120,19 @@ def test_a_thing_is_meant_as_the_edits_before_left_it_and_undo_deletes_a_line(tm
     file.write_text(file.read_text().replace("{ what", "# by hand\n  { what", 1) + "\n# the end\n")
     remove_edit(file, 1, as_read=revision_of(file))
     assert read_edits(file).edits == () and "# by hand" in file.read_text() and "# the end" in file.read_text()
+
+
+def test_lines_about_the_graph_are_left_alone_and_counted(tmp_path: Path) -> None:
+    seen, file = room_map(tmp_path / "map"), tmp_path / "edits.toml"
+    box = UprightBox(center=(0.0, 0.0, 0.8), size=(0.1, 0.1, 0.1), yaw_degrees=0.0)
+    anchor = Anchor.model_validate({"class": "cup", "box": box, "point": (0.0, 0.0, 0.8)})
+    append_edits(file, [Mark.model_validate({"what": "mark", "of": anchor, "as": "fixed"})])
+    with served(Desk(seen.root, file)) as server:
+        assert asked(server, "do", {**RENAME, **fresh(server)})[0] == 200
+        _, told = asked(server, "do", {"edit": {"what": "delete", "of": "cup_4"}, **fresh(server)})
+        assert [row["number"] for row in told["rows"]] == [2, 3]
+        assert asked(server, "do", {"remove": 2, **fresh(server)})[0] == 200
+    assert [edit.what for edit in read_edits(file).edits] == ["mark", "delete"]
 
 
 def test_two_editors_at_once_lose_nothing(tmp_path: Path) -> None:
