@@ -12,7 +12,7 @@ import numpy as np
 
 from stages.tableware.vision.detections import Detection
 from stages.tableware.vision.height_map import TALLEST, HeightMap
-from stages.tableware.world.items import Kind, Measures
+from stages.tableware.world.items import Kind, dish_measures
 
 LEAST_HEIGHT, LEAST_AREA = 0.010, 0.0006
 """What stands on the table rises over the first [m] on more than the second [m^2]."""
@@ -34,10 +34,6 @@ RADII = (0.028, 0.160)
 HOLLOW, HOLLOW_SHARE = 0.020, 0.4
 """What is inside of a dish's edge lies lower than it by the first [m] or by this share of its height, whichever is
 less."""
-WALL = 0.004
-"""Taken for the wall of a dish, which an image from above does not show [m]."""
-FOOT_SHARE = 0.65
-"""Taken for the foot's radius over the rim's."""
 
 
 def estimated_dishes(heights: HeightMap, seed: int = 0) -> tuple[Detection, ...]:
@@ -134,7 +130,7 @@ def _dish(
     if share < SURE_ROUND:
         reasons.append("partly hidden")
     confidence = 0.5 + 0.4 * min(1.0, (share - LEAST_ROUND) / (SURE_ROUND - LEAST_ROUND))
-    size = Measures(height=greatest, rim_radius=rim, foot_radius=FOOT_SHARE * rim, wall=WALL)
+    size = dish_measures(greatest, rim)
     return Detection(
         kind=kind,
         position=(float(x), float(y), 0.0),

@@ -10,7 +10,7 @@ from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from stages.tableware.vision.detections import Detection
 from stages.tableware.vision.seeing import _seen_from_the_side, see, see_image
-from stages.tableware.world.items import MEASURES, Table, make_item
+from stages.tableware.world.items import STANDARD, Table, make_item
 from stages.tableware.world.overhead import OverheadCamera, overhead_camera, render_overhead
 
 VIEW = overhead_camera()
@@ -107,8 +107,8 @@ def test_without_a_pose_the_table_is_found(oblique):
     found = {one.kind: one for one in sight.detections if one.kind is not None}
     assert sorted(found) == ["bowl", "cup"]
     for kind, one in found.items():
-        assert one.size.rim_radius == pytest.approx(MEASURES[kind].rim_radius, abs=4e-3)
-        assert one.size.height == pytest.approx(MEASURES[kind].height, abs=6e-3)
+        assert one.size.rim_radius == pytest.approx(STANDARD[kind].rim_radius, abs=4e-3)
+        assert one.size.height == pytest.approx(STANDARD[kind].height, abs=6e-3)
         assert "size estimated" in one.unsure
     apart = np.subtract(found["bowl"].position, found["cup"].position)
     assert np.hypot(*apart[:2]) == pytest.approx(np.hypot(0.26, 0.07), abs=5e-3)
