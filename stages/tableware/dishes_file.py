@@ -9,8 +9,8 @@ from pydantic import ValidationError
 
 from schemas.errors import BadInput
 from schemas.outside import LARGEST_SETTINGS, file_toml
-from schemas.tableware_detections import TablewareDetection
 from schemas.tableware_dishes import DishSize, TablewareDishes, UtensilSize
+from stages.tableware.vision.detections import Detection
 from stages.tableware.world.items import DISHES, STANDARD, DishSizes, Kind, Measures, dish_measures
 from stages.tableware.world.setting import Gripper, Setting
 
@@ -52,7 +52,7 @@ def setting_of(dishes: TablewareDishes | None) -> Setting:
     return Setting(sizes, gripper, stacking=known)
 
 
-def estimated_setting(items: tuple[TablewareDetection, ...], gripper: Gripper) -> Setting:
+def estimated_setting(items: tuple[Detection, ...], gripper: Gripper) -> Setting:
     """Return the setting of dishes that were each measured in an image: of a kind the median, no stacking, and side by
     side only kinds whose dishes are alike. Utensils are not looked for in such an image."""
     sizes: dict[str, Measures | None] = dict.fromkeys(("cup", "bowl", "plate", "fork", "spoon"))

@@ -117,13 +117,13 @@ def _accepted(
     least = parameters.least_confidence
     if detections is not None:
         payload = detections.info
-        setting, notes = setting_of(payload.dishes), payload.notes
+        setting, notes, found = setting_of(payload.dishes), payload.notes, from_file(payload)
         if payload.sizes == "estimated":
-            setting = estimated_setting(payload.items, setting.gripper)
+            setting = estimated_setting(found, setting.gripper)
             notes = (*notes, ESTIMATED)
         elif setting != Setting():
             notes = (*notes, OTHER_SETTING)
-        return Understood(understood(from_file(payload), least, setting), notes, setting, payload.sizes)
+        return Understood(understood(found, least, setting), notes, setting, payload.sizes)
     if scene is None:
         raise BadInput("tableware plan: nothing to plan from", hint="give --detections, or --scene")
     setting = setting_of(scene.info.dishes)

@@ -142,7 +142,7 @@ def see(
         detections = estimated_dishes(heights, seed)
         notes.append("sizes are estimated: utensils and what stacks hold were not looked for")
     if rectified and -normal[2] < np.cos(OBLIQUE):
-        detections = _seen_from_the_side(detections)
+        detections = seen_from_the_side(detections)
     notes += _unhandled(heights)
     plane = ((float(normal[0]), float(normal[1]), float(normal[2])), float(offset))
     return Sight(detections, tuple(notes), intrinsics, world, plane, sides, rectified, heights, dishes)
@@ -201,7 +201,7 @@ def _check_pose(pose: np.ndarray, normal: np.ndarray, offset: float) -> None:
         )
 
 
-def _seen_from_the_side(detections: tuple[Detection, ...]) -> tuple[Detection, ...]:
+def seen_from_the_side(detections: tuple[Detection, ...]) -> tuple[Detection, ...]:
     """Return the detections of an oblique view with less trust, as confidences are calibrated from above.
 
     What belongs to a stack gets none: lower rims are hidden, so that a tall mug is two cups, a can in a bowl a cup.

@@ -19,8 +19,8 @@ from schemas.tableware_scene import TablewareScene
 from stages.kit.progress import SilentProgress
 from stages.kit.stage import Context
 from stages.tableware import detect_stage, plan_stage, scene_stage
-from stages.tableware.dishes_file import file_of, read_dishes, setting_of
 from stages.tableware.detect_parameters import DetectParameters
+from stages.tableware.dishes_file import file_of, read_dishes, setting_of
 from stages.tableware.parameters import DETECT, PLAN, PlanParameters, SceneParameters
 from stages.tableware.planning.policy import THESIS
 from stages.tableware.planning.rules import Rules, can_hold, can_hold_two, can_stack, lips

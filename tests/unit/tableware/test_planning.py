@@ -44,8 +44,8 @@ from stages.tableware.table_pictures import draw_strip, draw_table
 from stages.tableware.vision.detections import Detection
 from stages.tableware.world.footprints import Footprint, footprint, gap, overlapped
 from stages.tableware.world.items import Table, make_item
-from stages.tableware.world.setting import Setting
 from stages.tableware.world.scenes import make_table
+from stages.tableware.world.setting import Setting
 
 MODEL = TimeModel(trip=10.0, stack=8.0, pull=5.0)
 RULES = Rules()

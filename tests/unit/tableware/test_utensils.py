@@ -64,7 +64,9 @@ def test_tines_are_seen_on_a_fork_alone():
     fork = tine_difference(heights["fork"], (120.0, 120.0, 0.3), SCALE, STANDARD["fork"])
     spoon = tine_difference(heights["spoon"], (120.0, 120.0, 0.3), SCALE, STANDARD["fork"])
     assert fork > 0.0015 > 0.0005 > abs(spoon)
-    assert np.isnan(tine_difference(np.full((240, 240), -1.0, np.float32), (120.0, 120.0, 0.3), SCALE, STANDARD["fork"]))
+    assert np.isnan(
+        tine_difference(np.full((240, 240), -1.0, np.float32), (120.0, 120.0, 0.3), SCALE, STANDARD["fork"])
+    )
 
 
 def test_an_unseen_head_leaves_the_kind_in_doubt():
