@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from schemas.artifact import Artifact, Document
 from schemas.base import Model, Transform, Vector3
 from schemas.scene_parts import Camera
+from schemas.tableware_dishes import TablewareDishes
 
 DetectedKind = Literal["cup", "bowl", "plate", "fork", "spoon"]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -89,6 +90,8 @@ class TablewareDetectionsFile(Model):
     rectified: bool = False
     """The view was not from straight above: it was resampled over the table's plane."""
     sizes: Literal["known", "estimated"] = "known"
+    dishes: TablewareDishes | None = None
+    """The user's sizes and gripper; None: the standard ones."""
 
     @model_validator(mode="after")
     def _carriers_come_first(self) -> TablewareDetectionsFile:

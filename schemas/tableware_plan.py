@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from schemas.artifact import Artifact, Document
 from schemas.base import Model, Name, Vector3
+from schemas.tableware_dishes import TablewareDishes
 from schemas.tableware_scene import MOST_ITEMS, TablewareItem, check_carriers
 
 Chance = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -143,7 +144,7 @@ class ImpossiblePair(Model):
     second: Name
     kind: str
     """`too_far_apart`, `turned`, `heights_differ`, `too_tall`, `unlike`, `in_the_way`, `off_table`, `loaded`, `wider`,
-    `on_utensil`, `too_many_utensils`."""
+    `on_utensil`, `too_many_utensils`, `sizes_estimated`."""
     message: str
     objects: tuple[Name, ...] = ()
     """What is in the way."""
@@ -181,6 +182,10 @@ class TablewarePlanFile(Model):
     chances: Literal["exact", "thesis", "thesis_spills", "thesis_failures"]
     items: tuple[TablewareItem, ...] = Field(max_length=MOST_ITEMS)
     """What is planned for."""
+    dishes: TablewareDishes | None = None
+    """The sizes and the gripper that were planned with; None: the standard ones."""
+    sizes: Literal["known", "estimated"] = "known"
+    """Estimated: `dishes` holds the medians of what was measured in the image; nothing is stacked."""
     steps: tuple[TablewareStep, ...]
     seconds: Seconds
     """When nothing slips."""

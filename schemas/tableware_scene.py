@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from schemas.artifact import Artifact, Document
 from schemas.base import Model, Name, Seed, Transform, Vector3
 from schemas.scene_parts import Camera
+from schemas.tableware_dishes import TablewareDishes
 
 TablewareKind = Literal["cup", "bowl", "plate", "fork", "spoon"]
 MOST_ITEMS = 60
@@ -58,6 +59,8 @@ class TablewareSceneFile(Model):
     camera: Camera
     world_from_camera: Transform
     items: tuple[TablewareItem, ...] = Field(max_length=MOST_ITEMS)
+    dishes: TablewareDishes | None = None
+    """The user's sizes and gripper; None: the standard ones."""
 
     @model_validator(mode="after")
     def _carriers_are_there(self) -> TablewareSceneFile:

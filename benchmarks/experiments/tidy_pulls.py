@@ -22,7 +22,7 @@ from stages.tableware.actions.pull_grasp import pull_grasp
 from stages.tableware.planning.rules import Rules
 from stages.tableware.simulation.holds import PAD, PAD_WIDTH
 from stages.tableware.simulation.physics import PhysicsTable, Speeds
-from stages.tableware.world.items import MEASURES, Kind, Table, make_item, stand_height
+from stages.tableware.world.items import STANDARD, Kind, Table, make_item, stand_height
 
 PLURAL: dict[str, Kind] = {"cups": "cup", "bowls": "bowl"}
 LENGTHS = (20, 30, 40)
@@ -37,7 +37,7 @@ def divergence(plural: str, centimetres: int, number: int) -> dict[str, float]:
     """Return initial and final distance [cm] of one placement."""
     kind = PLURAL[plural]
     random = np.random.default_rng([number, centimetres, list(PLURAL).index(plural), 75])
-    most = MEASURES[kind].inner_radius(INSIDE) - hypot(PAD, PAD_WIDTH / 2) - 0.002
+    most = STANDARD[kind].inner_radius(INSIDE) - hypot(PAD, PAD_WIDTH / 2) - 0.002
     radius, angle = most * np.sqrt(random.random()), random.uniform(-pi, pi)
     nominal, length = (-0.25, 0.05), centimetres / 100
     heading = random.uniform(-0.15, 0.15)

@@ -18,7 +18,7 @@ from benchmarks.keeping import kept_records
 from benchmarks.options import asked
 from stages.kit.stage import Parameters
 from stages.tableware.vision.error_model import FILE, ErrorModel, KindErrors
-from stages.tableware.world.items import MEASURES, UTENSILS, Kind
+from stages.tableware.world.items import STANDARD, UTENSILS, Kind
 
 
 def kind_errors(kind: Kind, matches: list[Match], images: int) -> KindErrors:
@@ -35,7 +35,7 @@ def kind_errors(kind: Kind, matches: list[Match], images: int) -> KindErrors:
         yaw_sigma=float(np.sqrt(np.mean(straight**2))) if utensil else 0.0,
         turned_rate=float(np.mean(turns > np.pi / 2)) if utensil else 0.0,
         miss_rate=sum(m.found is None for m in true) / len(true),
-        confused_as={other: confused[other] / len(true) for other in MEASURES if confused[other]},
+        confused_as={other: confused[other] / len(true) for other in STANDARD.kinds if confused[other]},
         false_rate=sum(m.kind is None and m.found == kind for m in matches) / images,
     )
 
@@ -64,7 +64,7 @@ def main() -> None:
         seeds="reporting" if min(ours) >= REPORTING[0] else "tuning",
         images=len(looks),
         conditions=f"seeds {min(ours)} to {max(ours)}, six tiers, three lights, two schemes of colour",
-        kinds={kind: kind_errors(kind, matches, len(looks)) for kind in MEASURES},
+        kinds={kind: kind_errors(kind, matches, len(looks)) for kind in STANDARD.kinds},
         unknown_rate=sum(m.found == "unknown" for m in matches) / len(looks),
     ).write(options.out)
 

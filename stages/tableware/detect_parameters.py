@@ -11,14 +11,16 @@ from schemas.errors import UsageError
 from schemas.tableware_detections import TablewareDetections
 from stages.kit.stage import External, Optionally, Parameters, Stage
 
+DISHES_FILE = External("dishes.toml: what your dishes and your gripper measure [m] (docs/TIDY.md)")
+
 
 class DetectParameters(Parameters):
     """Options of `tableware detect`."""
 
-    sizes: Literal["known", "estimated"] = Field(
-        "known",
-        description="Dishes of the known sizes with their stacks and utensils, or dishes of any size, "
-        "estimated from depth (no stacks, no utensils)",
+    sizes: Literal["auto", "known", "estimated"] = Field(
+        "auto",
+        description="Dishes of known sizes (--dishes, or the standard ones) with their stacks and utensils, or of any "
+        "size, estimated from depth (no stacks, no utensils); auto: estimated unless --dishes or a scene says sizes",
     )
     depth_scale: float | None = Field(
         None, gt=0, le=1, description="Metres a unit of the depth file; 0.001 for 16-bit images, 1 for arrays of metres"
@@ -57,13 +59,14 @@ def check_inputs(parameters: DetectParameters, inputs: Mapping[str, Any]) -> Non
 
 DETECT = Stage(
     name="tableware detect",
-    version=3,
+    version=4,
     summary="See what is on a table: dishes, stacks, forks and spoons in an RGB-D image, and what is in doubt",
     parameters=DetectParameters,
     reads={
         "image": External("colour image, or a folder with color.png, depth.png/.npy/.npz and camera.json/scene.json"),
         "depth": Optionally(External("depth image: 16-bit PNG, or .npy/.npz array")),
         "camera": Optionally(External("camera.json: intrinsics, and the pose where it is known (docs/TIDY.md)")),
+        "dishes": Optionally(DISHES_FILE),
     },
     writes=TablewareDetections,
     libraries=("numpy", "scipy", "numba", "opencv-python-headless", "trimesh"),

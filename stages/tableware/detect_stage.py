@@ -10,30 +10,42 @@ import numpy as np
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from schemas.tableware_detections import TablewareDetections, TablewareDetectionsFile, TablewareOutline
+from schemas.tableware_dishes import TablewareDishes
 from stages.kit.stage import Context
 from stages.tableware.detect_parameters import DetectParameters
+from stages.tableware.dishes_file import read_dishes, setting_of
 from stages.tableware.vision.detections_file import to_file
 from stages.tableware.vision.image_files import TableImage, read_image
 from stages.tableware.vision.overlay import draw_outlines, draw_sight
 from stages.tableware.vision.photographs import find_outlines
-from stages.tableware.vision.seeing import see
+from stages.tableware.vision.seeing import Sizes, see
+from stages.tableware.world.items import DishSizes
 from stages.tableware.world.overhead import OverheadCamera
 
 
 def run(
-    image: Path, depth: Path | None, camera: Path | None, *, parameters: DetectParameters, context: Context
+    image: Path,
+    depth: Path | None,
+    camera: Path | None,
+    dishes: Path | None,
+    *,
+    parameters: DetectParameters,
+    context: Context,
 ) -> TablewareDetections:
     """Detect tableware in the user's image, or in that of a scene's folder."""
     with context.progress.step("read"):
         read = read_image(image, depth, camera, parameters.depth_scale)
+        told = read.dishes if dishes is None else read_dishes(dishes)
+    setting = setting_of(told)
     if parameters.photograph:
-        return _photograph(read, parameters, context)
+        return _photograph(read, setting.sizes, parameters, context)
+    sizes = _sizes(parameters, read.scene, dishes, told)
     with context.progress.step("see"):
         view, sides = _view(read, parameters)
-        sight = see(read.color, read.depth, view, sides, sizes=parameters.sizes, seed=context.seed)
+        sight = see(read.color, read.depth, view, sides, sizes=sizes, dishes=setting.sizes, seed=context.seed)
     for note in sight.notes:
         context.logger.warning("%s", note)
-    payload = to_file(sight, parameters.sizes)
+    payload = to_file(sight, sizes, told)
     payload.write(context.output / "detections.json")
     with context.progress.step("pictures"):
         _save(context.output / "overlay.png", draw_sight(read.color, sight))
@@ -48,6 +60,19 @@ def run(
         "rectified": sight.rectified,
     }
     return TablewareDetections(root=context.output, outcome="ok" if kinds else "nothing_found", summary=summary)
+
+
+def _sizes(parameters: DetectParameters, scene: bool, given: Path | None, told: TablewareDishes | None) -> Sizes:
+    """Return whether sizes are known or estimated. Raises BadInput where both are asked for."""
+    has_sizes = told is not None and told.has_sizes
+    if parameters.sizes == "auto":
+        return "known" if has_sizes or scene else "estimated"
+    if parameters.sizes == "estimated" and has_sizes and given is not None:
+        raise BadInput(
+            f"{given} says what the dishes measure, and --sizes estimated not to go by it",
+            hint="leave one of them out; a file of [gripper] alone goes with estimated sizes",
+        )
+    return parameters.sizes
 
 
 def _view(read: TableImage, parameters: DetectParameters) -> tuple[OverheadCamera | Camera, tuple[float, float]]:
@@ -67,8 +92,10 @@ def _view(read: TableImage, parameters: DetectParameters) -> tuple[OverheadCamer
     return OverheadCamera(read.camera.camera, pose), sides
 
 
-def _photograph(read: TableImage, parameters: DetectParameters, context: Context) -> TablewareDetections:
-    outlines = find_outlines(read.color, parameters.picture_width)
+def _photograph(
+    read: TableImage, sizes: DishSizes, parameters: DetectParameters, context: Context
+) -> TablewareDetections:
+    outlines = find_outlines(read.color, parameters.picture_width, sizes)
     count = len(outlines)
     statement = f"{count} round thing{'s' * (count != 1)} in a photograph without depth: heights are unknown, nothing "
     statement += "can be planned from this"

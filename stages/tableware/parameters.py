@@ -14,7 +14,7 @@ from schemas.tableware_scene import TablewareScene
 from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
 from stages.kit.stage import Optionally, Parameters, Stage
 from stages.tableware import policies
-from stages.tableware.detect_parameters import DETECT
+from stages.tableware.detect_parameters import DETECT, DISHES_FILE
 from stages.tableware.found_by_place import names_in
 from stages.tableware.options import PHYSICS_TIMES, THESIS_TIMES, ActionTimes, PolicyName, TierName
 
@@ -100,10 +100,10 @@ def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) ->
 
 SCENE = Stage(
     name="tableware scene",
-    version=1,
+    version=2,
     summary="Make a seeded table with tableware and its overhead RGB-D image",
     parameters=SceneParameters,
-    reads={},
+    reads={"dishes": Optionally(DISHES_FILE)},
     writes=TablewareScene,
     libraries=("numpy", "trimesh", "embreex", "pillow"),
     module="scene_stage",
@@ -111,7 +111,7 @@ SCENE = Stage(
 )
 PLAN = Stage(
     name="tableware plan",
-    version=2,
+    version=3,
     summary="Plan how to clear a table: pulls, stackings, multi-object and single grasps (TIDY)",
     parameters=PlanParameters,
     reads={"detections": Optionally(TablewareDetections), "scene": Optionally(TablewareScene)},
@@ -124,7 +124,7 @@ PLAN = Stage(
 )
 SIMULATE = Stage(
     name="tableware simulate",
-    version=4,
+    version=5,
     summary="Let a policy, or a plan, clear a table in the fast simulator or in physics",
     parameters=SimulateParameters,
     reads={"scene": TablewareScene, "plan": Optionally(TablewarePlan)},
@@ -137,7 +137,7 @@ SIMULATE = Stage(
 )
 EVALUATE = Stage(
     name="tableware evaluate",
-    version=2,
+    version=3,
     summary="Compare policies over many seeded tables in the fast simulator, with intervals",
     parameters=EvaluateParameters,
     reads={},

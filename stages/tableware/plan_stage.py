@@ -12,6 +12,7 @@ from schemas.tableware_detections import TablewareDetections
 from schemas.tableware_plan import TablewarePlan, TablewarePlanFile, TablewareStep
 from schemas.tableware_scene import TablewareScene
 from stages.kit.stage import Context
+from stages.tableware.dishes_file import estimated_setting, file_of, setting_of
 from stages.tableware.parameters import PlanParameters
 from stages.tableware.planning.choice import as_times, chances_of, declared_policy, make_policy, time_model
 from stages.tableware.planning.reasons import impossible_pairs
@@ -26,8 +27,17 @@ from stages.tableware.simulation.trial import Done, Trial, run_in
 from stages.tableware.table_pictures import Panel, draw_strip
 from stages.tableware.vision.detections_file import from_file
 from stages.tableware.vision.overlay import draw_sight
+from stages.tableware.vision.seeing import Sizes
 from stages.tableware.world.items import Table
 from stages.tableware.world.records import as_records, as_table
+from stages.tableware.world.setting import Setting
+
+ESTIMATED = (
+    "sizes are estimated: nothing is stacked, side by side go only kinds whose dishes measure alike, and forks and "
+    "spoons were not looked for"
+)
+OTHER_SETTING = "which piles hold side by side was measured with the standard dishes and hand, not with these"
+"""Said of every plan that goes by other sizes."""
 
 
 def run(
@@ -40,19 +50,22 @@ def run(
     """Plan from what was detected, from a scene's image, or from its ground truth."""
     model, chances = time_model(parameters), chances_of(parameters.chances)
     with context.progress.step("see"):
-        accepted, notes = _accepted(detections, scene, parameters, context)
+        seen = _accepted(detections, scene, parameters, context)
+    accepted, notes, setting = seen.accepted, seen.notes, seen.setting
     table = accepted.table
     with context.progress.step("plan"):
         done: list[Done] = []
-        policy = make_policy(parameters.policy, model, chances, context.seed)
-        nominal = run_in(FastWorld(table, model, EXACT, context.seed), policy, hear=done.append)
-        expected = _expected(table, model, chances, parameters, context.seed)
+        policy = make_policy(parameters.policy, model, chances, context.seed, setting)
+        nominal = run_in(FastWorld(table, model, EXACT, context.seed, setting), policy, hear=done.append)
+        expected = _expected(table, setting, model, chances, parameters, context.seed)
     file = TablewarePlanFile(
         policy=parameters.policy,
         source="detections" if detections is not None else parameters.source,
         times=as_times(model),
         chances=parameters.chances,
         items=as_records(table),
+        dishes=file_of(setting),
+        sizes=seen.sizes,
         steps=tuple(
             TablewareStep(action=as_record(step.action, step.before, model, chances), before=as_records(step.before))
             for step in done
@@ -64,7 +77,7 @@ def run(
         expected_objects_per_trip=expected.objects_per_trip,
         risk=expected.risk,
         draws=parameters.draws,
-        impossible=impossible_pairs(table, declared_policy(parameters.policy).rules),
+        impossible=impossible_pairs(table, declared_policy(parameters.policy).rules_in(setting)),
         refused=accepted.refused,
         notes=notes,
         statement=statement(accepted, notes),
@@ -87,24 +100,43 @@ def run(
     return TablewarePlan(root=context.output, outcome=outcome, summary=summary)
 
 
+@dataclass(frozen=True)
+class Understood:
+    """What is planned for, what vision did not handle, and with which sizes and hand."""
+
+    accepted: Accepted
+    notes: tuple[str, ...]
+    setting: Setting
+    sizes: Sizes = "known"
+
+
 def _accepted(
     detections: TablewareDetections | None, scene: TablewareScene | None, parameters: PlanParameters, context: Context
-) -> tuple[Accepted, tuple[str, ...]]:
-    """Return what is planned for, and what vision did not handle. Raises BadInput for what cannot be planned from."""
-    least, rules = parameters.least_confidence, Rules()
+) -> Understood:
+    """Return what is planned for. Raises BadInput for what cannot be planned from."""
+    least = parameters.least_confidence
     if detections is not None:
         payload = detections.info
-        return understood(from_file(payload), least, rules), payload.notes
+        setting, notes, found = setting_of(payload.dishes), payload.notes, from_file(payload)
+        if payload.sizes == "estimated":
+            setting = estimated_setting(found, setting.gripper)
+            notes = (*notes, ESTIMATED)
+        elif setting != Setting():
+            notes = (*notes, OTHER_SETTING)
+        return Understood(understood(found, least, setting), notes, setting, payload.sizes)
     if scene is None:
         raise BadInput("tableware plan: nothing to plan from", hint="give --detections, or --scene")
+    setting = setting_of(scene.info.dishes)
+    notes = () if setting == Setting() else (OTHER_SETTING,)
     if parameters.source == "truth":
-        return accept(as_table(scene.info.items), {}, (), least, rules), ()
+        table = as_table(scene.info.items, setting.sizes)
+        return Understood(accept(table, {}, (), least, Rules(setting)), notes, setting)
     color, depth, view = read_image(scene)
-    seen = look(color, depth, view, least, rules)
+    seen = look(color, depth, view, least, setting)
     picture = Image.fromarray(draw_sight(color, seen.sight))
     picture.thumbnail((parameters.image_width, parameters.image_width))
     picture.save(context.output / "detections.png")
-    return seen.accepted, seen.sight.notes
+    return Understood(seen.accepted, (*seen.sight.notes, *notes), setting)
 
 
 @dataclass(frozen=True)
@@ -117,17 +149,19 @@ class Expected:
     risk: float
 
 
-def _expected(table: Table, model: TimeModel, chances: Chances, parameters: PlanParameters, seed: int) -> Expected:
+def _expected(
+    table: Table, setting: Setting, model: TimeModel, chances: Chances, parameters: PlanParameters, seed: int
+) -> Expected:
     """Return what a policy comes to on the table as it was seen."""
     if not table.items:
         return Expected(0.0, 0.0, 0.0, 0.0)
     declared = declared_policy(parameters.policy)
-    policy = declared.make(model, chances, seed)
+    policy = declared.make(model, chances, seed, setting)
     done: list[Trial] = []
     for draw in range(1 if chances.sure and not chances.noise else parameters.draws):
         if declared.draws:
-            policy = declared.make(model, chances, 1000 * seed + draw)
-        done.append(run_trial(table, policy, model, chances, (seed, draw)))
+            policy = declared.make(model, chances, 1000 * seed + draw, setting)
+        done.append(run_trial(table, policy, model, chances, (seed, draw), setting))
     return Expected(
         float(np.mean([trial.seconds for trial in done])),
         float(np.mean([trial.trips for trial in done])),

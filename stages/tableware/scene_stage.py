@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from PIL import Image
 
 from schemas.base import as_transform
 from schemas.tableware_scene import TablewareScene, TablewareSceneFile
 from stages.kit.stage import Context
+from stages.tableware.dishes_file import read_dishes, setting_of
 from stages.tableware.parameters import SceneParameters
 from stages.tableware.world.overhead import overhead_camera, render_overhead
 from stages.tableware.world.records import as_records
@@ -15,14 +18,16 @@ from stages.tableware.world.scenes import make_table
 from stages.tableware.world.shape_files import write_shapes
 
 
-def run(*, parameters: SceneParameters, context: Context) -> TablewareScene:
+def run(dishes: Path | None, *, parameters: SceneParameters, context: Context) -> TablewareScene:
     """Make the table of a tier and a seed, and its image."""
-    table, view = make_table(parameters.tier, context.seed), overhead_camera()
+    told = None if dishes is None else read_dishes(dishes)
+    sizes = setting_of(told).sizes
+    table, view = make_table(parameters.tier, context.seed, sizes), overhead_camera()
     with context.progress.step("image"):
         color, depth = render_overhead(table, context.seed, parameters.light, parameters.colors, view=view)
     Image.fromarray(color).save(context.output / "color.png")
     np.savez_compressed(context.output / "depth.npz", depth=depth.astype(np.float32))
-    write_shapes(context.output)
+    write_shapes(context.output, sizes)
     TablewareSceneFile(
         tier=parameters.tier,
         seed=context.seed,
@@ -31,6 +36,7 @@ def run(*, parameters: SceneParameters, context: Context) -> TablewareScene:
         camera=view.camera,
         world_from_camera=as_transform(view.world_from_camera),
         items=as_records(table),
+        dishes=told,
     ).write(context.output / "scene.json")
     summary = {"tier": parameters.tier, "items": len(table.items), "piles": len(table.stacks)}
     return TablewareScene(root=context.output, summary=summary)

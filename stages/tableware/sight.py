@@ -7,6 +7,7 @@ from math import hypot
 
 import numpy as np
 
+from stages.tableware.planning.policy import STANDARD_SETTING
 from stages.tableware.planning.refusals import Accepted, Doubt, Unknown, accept
 from stages.tableware.planning.rules import Rules
 from stages.tableware.simulation.trial import World
@@ -14,6 +15,7 @@ from stages.tableware.vision.detections import Detection, as_table
 from stages.tableware.vision.seeing import Sight, see
 from stages.tableware.world.items import Table
 from stages.tableware.world.overhead import OverheadCamera, Scheme, overhead_camera, render_overhead
+from stages.tableware.world.setting import Setting
 
 SAME_PLACE = 0.025
 """What is seen no farther than this [m] from where an item of its sort is, is that item: a grasp there meets it."""
@@ -27,13 +29,13 @@ class Seen:
     accepted: Accepted
 
 
-def look(color: np.ndarray, depth: np.ndarray, view: OverheadCamera, least: float, rules: Rules) -> Seen:
+def look(color: np.ndarray, depth: np.ndarray, view: OverheadCamera, least: float, setting: Setting) -> Seen:
     """Return what an image says, and what of it is planned for. Raises BadInput for an image that cannot be used."""
-    sight = see(color, depth, view)
-    return Seen(sight, understood(sight.detections, least, rules))
+    sight = see(color, depth, view, dishes=setting.sizes)
+    return Seen(sight, understood(sight.detections, least, setting))
 
 
-def understood(detections: tuple[Detection, ...], least: float, rules: Rules) -> Accepted:
+def understood(detections: tuple[Detection, ...], least: float, setting: Setting) -> Accepted:
     """Return what of some detections is planned for; items are named by their kind and their row."""
     names = {
         row: f"{detection.kind}_{row + 1}" for row, detection in enumerate(detections) if detection.kind is not None
@@ -44,7 +46,7 @@ def understood(detections: tuple[Detection, ...], least: float, rules: Rules) ->
         for row, detection in enumerate(detections)
         if detection.kind is None
     )
-    return accept(as_table(detections), doubts, unknown, least, rules)
+    return accept(as_table(detections, setting.sizes), doubts, unknown, least, Rules(setting))
 
 
 class Eyes:
@@ -52,9 +54,11 @@ class Eyes:
     of the true ones that stand there, so that a policy can follow them; what is nobody keeps a name of its own. Where
     the hand closed on nothing (`vain` of the world, as a gripper reports it) nothing is believed to be any more."""
 
-    def __init__(self, seed: int, light: str, colors: Scheme, least: float) -> None:
+    def __init__(
+        self, seed: int, light: str, colors: Scheme, least: float, setting: Setting = STANDARD_SETTING
+    ) -> None:
         self._seed, self._light, self._colors, self._least = seed, light, colors, least
-        self._rules = Rules()
+        self._setting = setting
         self.images = 0
         self.last: Seen | None = None
         self._believed = Table(())
@@ -64,7 +68,7 @@ class Eyes:
         """Return what is seen."""
         color, depth, view = self._image(world)
         self.images += 1
-        self.last = look(color, depth, view, self._least, self._rules)
+        self.last = look(color, depth, view, self._least, self._setting)
         for name in getattr(world, "vain", ()):
             if name in self._believed.by_name:
                 self._nothing.append(self._believed.by_name[name].position[:2])

@@ -9,6 +9,7 @@ from schemas.tableware_plan import TablewarePlan
 from schemas.tableware_scene import TablewareScene
 from schemas.tableware_trial import TablewareTrial, TablewareTrialFile, TrialCounts, TrialStep
 from stages.kit.stage import Context
+from stages.tableware.dishes_file import setting_of
 from stages.tableware.parameters import SimulateParameters
 from stages.tableware.plan_stage import panels
 from stages.tableware.planning.action import Action
@@ -19,7 +20,7 @@ from stages.tableware.sight import Eyes, named_as
 from stages.tableware.simulation.trial import Done, Trial, World, do_in, run_in, truth
 from stages.tableware.simulators import SIMULATORS
 from stages.tableware.table_pictures import draw_strip
-from stages.tableware.world.items import Table
+from stages.tableware.world.items import STANDARD, DishSizes, Table
 from stages.tableware.world.records import as_records, as_table
 from stages.tableware.world.shape_files import write_shapes
 
@@ -29,14 +30,15 @@ def run(
 ) -> TablewareTrial:
     """Let a policy clear the table of a scene, or carry out a plan as it stands."""
     file = scene.info
-    table = as_table(file.items)
+    setting = setting_of(file.dishes)
+    table = as_table(file.items, setting.sizes)
     simulator = SIMULATORS[parameters.simulator](parameters)
-    eyes = Eyes(context.seed, file.light, file.colors, parameters.least_confidence)
-    policy = make_policy(parameters.policy, simulator.times, simulator.chances, context.seed)
-    planned = None if plan is None else planned_actions(plan, table)
+    eyes = Eyes(context.seed, file.light, file.colors, parameters.least_confidence, setting)
+    policy = make_policy(parameters.policy, simulator.times, simulator.chances, context.seed, setting)
+    planned = None if plan is None else planned_actions(plan, table, setting.sizes)
     done: list[Done] = []
     try:
-        world = simulator.open(table, context.seed)
+        world = simulator.open(table, context.seed, setting)
         with context.progress.step("clear"):
             if planned is not None:
                 trial = carry_out(world, planned, done)
@@ -58,7 +60,7 @@ def run(
         statement=statement,
     ).write(context.output / "trial.json")
     context.output.joinpath("trial.txt").write_text(_text(done, statement), encoding="utf-8")
-    write_shapes(context.output)
+    write_shapes(context.output, setting.sizes)
     with context.progress.step("pictures"):
         draw_strip(panels(done, table), parameters.image_width).save(context.output / "keyframes.png")
         simulator.draw(done, context.output, parameters.image_width)
@@ -74,11 +76,11 @@ def run(
     return TablewareTrial(root=context.output, outcome="not_cleared" if trial.failed else "ok", summary=summary)
 
 
-def planned_actions(plan: TablewarePlan, table: Table) -> list[tuple[Action, Table]]:
+def planned_actions(plan: TablewarePlan, table: Table, sizes: DishSizes = STANDARD) -> list[tuple[Action, Table]]:
     """Return the actions of a plan with the tables on which they were decided, named as the things that stand there in
     truth. Raises BadInput when the plan is about another table."""
     file = plan.info
-    seen = as_table(file.items)
+    seen = as_table(file.items, sizes)
     renamed = named_as(seen, table)
     names = {item.name: true_item.name for item, true_item in zip(seen.items, renamed.items, strict=True)}
     if seen.items and all(name.startswith("stray_") for name in names.values()):
@@ -89,13 +91,16 @@ def planned_actions(plan: TablewarePlan, table: Table) -> list[tuple[Action, Tab
     actions = []
     for step in file.steps:
         before = as_table(
-            item.model_copy(
-                update={
-                    "name": names.get(item.name, item.name),
-                    "on": None if item.on is None else names.get(item.on, item.on),
-                }
-            )
-            for item in step.before
+            (
+                item.model_copy(
+                    update={
+                        "name": names.get(item.name, item.name),
+                        "on": None if item.on is None else names.get(item.on, item.on),
+                    }
+                )
+                for item in step.before
+            ),
+            sizes,
         )
         actions.append((as_action(step.action).renamed(names), before))
     return actions

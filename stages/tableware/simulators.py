@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from schemas.errors import MissingDependency
+from schemas.errors import BadInput, MissingDependency
 from schemas.tableware_plan import TimesOfActions
 from stages.tableware.parameters import SimulateParameters
 from stages.tableware.planning.action import Action
@@ -21,6 +21,7 @@ from stages.tableware.simulation.fast import FastWorld
 from stages.tableware.simulation.trial import Done, World
 from stages.tableware.table_pictures import write_animation
 from stages.tableware.world.items import Table
+from stages.tableware.world.setting import Gripper, Setting
 
 ANIMATION_WIDTH = 560
 SIMULATION = "stages.tableware.simulation"
@@ -41,7 +42,7 @@ class Simulator(Protocol):
     """As the artifact keeps them; None where time is what the world takes."""
     recorded_chances: str
 
-    def open(self, table: Table, seed: int) -> World:
+    def open(self, table: Table, seed: int, setting: Setting) -> World:
         """Return the world with a table in it."""
         ...
 
@@ -64,9 +65,9 @@ class FastSimulator:
         self.recorded_times: TimesOfActions | None = as_times(self.times)
         self.recorded_chances: str = parameters.chances
 
-    def open(self, table: Table, seed: int) -> World:
+    def open(self, table: Table, seed: int, setting: Setting) -> World:
         """Return the fast world."""
-        return FastWorld(table, self.times, self.chances, seed)
+        return FastWorld(table, self.times, self.chances, seed, setting)
 
     def close(self) -> None:
         """Nothing is held."""
@@ -93,8 +94,13 @@ class PhysicsSimulator:
         self._recording = physics_part("recording").Recording()
         self._world: Any = None
 
-    def open(self, table: Table, seed: int) -> World:
-        """Return the world of bodies."""
+    def open(self, table: Table, seed: int, setting: Setting) -> World:
+        """Return the world of bodies. Raises BadInput for another hand than the one that is modelled."""
+        if setting.gripper != Gripper():
+            raise BadInput(
+                "the arm in physics has the standard hand, the scene's dishes.toml has another",
+                hint="--simulator fast, or a dishes.toml without [gripper]",
+            )
         self._world = physics_part("physics").PhysicsTable(table, record=self._recording)
         world: World = self._world
         return world

@@ -15,8 +15,8 @@ from stages.tableware.actions.grasp import Grasp
 from stages.tableware.actions.pull import Pull
 from stages.tableware.actions.stack import Stack
 from stages.tableware.planning.action import Action, Primitive
-from stages.tableware.planning.rules import Rules
 from stages.tableware.world.items import TABLE_SIDES, Item, Kind, Table
+from stages.tableware.world.setting import Gripper
 
 SUPERSAMPLING = 2
 MARGIN = 0.03
@@ -136,15 +136,15 @@ def _draw_stacking(sheet: _Sheet, action: Stack) -> None:
 
 def _draw_jaws(sheet: _Sheet, action: Grasp) -> None:
     """The two fingers, open, and the line along which they close."""
-    rules = Rules()
+    hand = Gripper()
     x, y, _ = action.p_G
     dx, dy = cos(action.theta_G), sin(action.theta_G)
-    reach = rules.opening / 2
+    reach = hand.opening / 2
     sheet.line((x - reach * dx, y - reach * dy), (x + reach * dx, y + reach * dy), GRASP_INK, 0.002)
     for side in (-1, 1):
         middle = (x + side * reach * dx, y + side * reach * dy)
-        start = (middle[0] - rules.finger * dy, middle[1] + rules.finger * dx)
-        end = (middle[0] + rules.finger * dy, middle[1] - rules.finger * dx)
+        start = (middle[0] - hand.finger * dy, middle[1] + hand.finger * dx)
+        end = (middle[0] + hand.finger * dy, middle[1] - hand.finger * dx)
         sheet.line(start, end, GRASP_INK, 0.008)
 
 

@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from schemas.base import Model
 from stages.tableware.vision.detections import Detection
-from stages.tableware.world.items import MEASURES, UTENSILS, Table
+from stages.tableware.world.items import STANDARD, UTENSILS, Table
 
 NEAR = 0.020
 """A detection counts for an item of its kind no further away than this in the plane [m]."""
@@ -112,7 +112,7 @@ def measures(matches: Iterable[Match]) -> dict[str, dict[str, float]]:
     """Return class -> measure -> value; `all` and `unknown` beside the kinds. Shares of nothing are left out."""
     rows = list(matches)
     result: dict[str, dict[str, float]] = {}
-    for kind in ("all", *MEASURES, "unknown"):
+    for kind in ("all", *STANDARD.kinds, "unknown"):
         true = [m for m in rows if m.kind is not None and kind in ("all", m.kind)]
         found = [m for m in rows if m.found is not None and (kind == m.found or kind == "all" != m.found != "unknown")]
         right = [m for m in true if m.right]

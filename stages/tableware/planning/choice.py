@@ -6,8 +6,9 @@ from schemas.tableware_plan import TimesOfActions
 from stages.tableware import policies
 from stages.tableware.found_by_place import module_named
 from stages.tableware.options import ActionTimes
-from stages.tableware.planning.policy import DeclaredPolicy, Policy
+from stages.tableware.planning.policy import STANDARD_SETTING, DeclaredPolicy, Policy
 from stages.tableware.planning.time_model import WORLDS, Chances, TimeModel, fitted
+from stages.tableware.world.setting import Setting
 
 
 def chances_of(name: str) -> Chances:
@@ -37,6 +38,8 @@ def declared_policy(name: str) -> DeclaredPolicy:
     return declared
 
 
-def make_policy(name: str, model: TimeModel, chances: Chances, seed: int) -> Policy:
-    """Return a policy by its name."""
-    return declared_policy(name).make(model, chances, seed)
+def make_policy(
+    name: str, model: TimeModel, chances: Chances, seed: int, setting: Setting = STANDARD_SETTING
+) -> Policy:
+    """Return a policy by its name, for these sizes and this hand."""
+    return declared_policy(name).make(model, chances, seed, setting)

@@ -16,7 +16,7 @@ from stages.tableware.actions.pull import pull
 from stages.tableware.actions.stack import stack
 from stages.tableware.planning.action import Action, Primitive
 from stages.tableware.planning.optimum import MOST_ITEMS, Optimum, Solution, Trip
-from stages.tableware.planning.policy import Policy, liftable
+from stages.tableware.planning.policy import THESIS, Policy, liftable
 from stages.tableware.planning.rules import Rules, can_grasp_two, letters
 from stages.tableware.planning.time_model import Chances, TimeModel
 from stages.tableware.planning.trip_options import slip_cost
@@ -81,9 +81,7 @@ def plan(
     least = _cost(plans[0], worth)
     limit = least * (1.0 + (SLACK if slack is None else slack))
     if slack is None and not chances.drops:
-        limit = max(
-            least, min(limit, *(_alone(rival, portion, model, chances) for rival in (PullPolicy(), StackPolicy())))
-        )
+        limit = max(least, min(limit, *(_alone(rival, portion, model, chances) for rival in _rivals(rules))))
     if chances.sure and limit > least:
         return Plan(optimum, optimum.fewest_trips(plans[0].solution, limit + 1e-9))
     for charge in CHARGES if limit > least else ():
@@ -92,6 +90,12 @@ def plan(
             break
         plans.append(other)
     return min(plans, key=lambda plan: (round(plan.expected_trips, 6), _cost(plan, worth)))
+
+
+def _rivals(rules: Rules) -> tuple[Policy, ...]:
+    """Return the thesis's policies with the sizes and the hand of our rules."""
+    theirs = replace(THESIS, setting=rules.setting)
+    return PullPolicy(theirs), *((StackPolicy(theirs),) if rules.setting.stacking else ())
 
 
 def _alone(policy: Policy, table: Table, model: TimeModel, chances: Chances, likely: float = 1.0) -> float:
@@ -142,6 +146,7 @@ class JointPolicy:
         rules: Rules,
         model: TimeModel,
         chances: Chances,
+        seed: int = 0,
         slack: float | None = None,
         worth: float = WORTH,
         made: Plan | None = None,

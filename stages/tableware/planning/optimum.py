@@ -144,7 +144,7 @@ class Optimum:
             split = split_over_two(first.kinds, second.kinds, tuple(part.kinds for part in rest), self._rules)
             assert split is not None  # an option is only made where a split exists
             sides, bases = split, (first.items[0].name, second.items[0].name)
-        going = sorted(zip(rest, sides, strict=True), key=lambda pair: pile_order(pair[0].kinds))
+        going = sorted(zip(rest, sides, strict=True), key=lambda pair: pile_order(pair[0].kinds, self._rules))
         stacks = tuple((part.items[0].name, bases[1] if side else bases[0]) for part, side in going)
         pull = (bases[0], bases[1]) if options.pulled[option] else None
         taken = frozenset(item.name for part in parts for item in part.items)

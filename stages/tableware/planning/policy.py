@@ -10,9 +10,13 @@ from stages.tableware.planning.action import Action
 from stages.tableware.planning.rules import Rules, can_hold, letters
 from stages.tableware.planning.time_model import Chances, TimeModel
 from stages.tableware.world.items import Item, Table
+from stages.tableware.world.setting import Setting
 
 THESIS = replace(Rules(), utensils_in_cups=True, both_piles=False)
 """What section 6.2 (Srinivas 2024) allows."""
+
+
+STANDARD_SETTING = Setting()
 
 
 class Policy(Protocol):
@@ -27,14 +31,22 @@ class Policy(Protocol):
 class DeclaredPolicy:
     """POLICY of a policy's file; the command line calls it as the file."""
 
-    make: Callable[[TimeModel, Chances, int], Policy]
-    """From the times and chances that it may plan by, and a seed."""
+    decides: Callable[[Rules, TimeModel, Chances, int], Policy]
+    """From its rules in a setting, the times and chances that it may plan by, and a seed."""
     rules: Rules = THESIS
     """What it allows itself."""
     draws: bool = False
     """Whether it decides by chance: it is then made anew, with another seed, for every draw of what goes wrong."""
     rivals: tuple[str, ...] = ()
     """Policies that it aims to be no slower than, table by table."""
+
+    def rules_in(self, setting: Setting) -> Rules:
+        """Return what it allows itself with these sizes and this hand."""
+        return replace(self.rules, setting=setting)
+
+    def make(self, model: TimeModel, chances: Chances, seed: int, setting: Setting = STANDARD_SETTING) -> Policy:
+        """Return the policy for these sizes and this hand."""
+        return self.decides(self.rules_in(setting), model, chances, seed)
 
 
 def liftable(table: Table, stack: tuple[Item, ...], rules: Rules) -> str:

@@ -42,13 +42,16 @@ def _two_piles(pile: tuple[Item, ...], other: tuple[Item, ...], rules: Rules) ->
     if pile[0].is_dish != other[0].is_dish:
         return "unlike", "a dish and a utensil are not grasped side by side"
     if not (can_hold(first, rules) and can_hold(second, rules)):
-        return "too_tall", f"a pile of them is higher than jaws of {1e3 * rules.jaw_height:.0f} mm hold"
+        return "too_tall", f"a pile of them is higher than jaws of {1e3 * rules.setting.gripper.jaw_height:.0f} mm hold"
     if can_hold_two(first, second, rules):
         return None
-    apart = abs(lips(first)[0] - lips(second)[0])
+    alike = rules.setting.alike
+    if alike is not None and not alike.issuperset(first + second):
+        return "sizes_estimated", "dishes of a kind here measure differently, by estimate"
+    apart = abs(lips(first, rules)[0] - lips(second, rules)[0])
     if apart > rules.similar:
         return "heights_differ", f"their grasp heights differ by {1e3 * apart:.0f} mm, over {1e3 * rules.similar:.0f}"
-    return "too_tall", f"their lips are more than {1e3 * rules.jaw_height:.0f} mm apart in height"
+    return "too_tall", f"their lips are more than {1e3 * rules.setting.gripper.jaw_height:.0f} mm apart in height"
 
 
 def _blocked(covers: tuple[Footprint, ...], table: Table, names: set[str]) -> tuple[str, str, tuple[str, ...]] | None:
@@ -67,9 +70,9 @@ def _multi_grasp(table: Table, pile: tuple[Item, ...], other: tuple[Item, ...], 
         between = 1e3 * gap(footprint(first), footprint(second))
         why = (
             "too_far_apart",
-            f"{between:.0f} mm between them do not fit between jaws {1e3 * rules.opening:.0f} mm open",
+            f"{between:.0f} mm between them do not fit between jaws {1e3 * rules.setting.gripper.opening:.0f} mm open",
         )
-        if not first.is_dish and between < 1e3 * rules.opening / 2:
+        if not first.is_dish and between < 1e3 * rules.setting.gripper.opening / 2:
             why = "turned", "two utensils that lie at too great an angle for one grasp"
     if why is None:
         why = _blocked((jaws(first, second, rules),), table, {first.name, second.name})
@@ -93,8 +96,10 @@ def _stack(pile: tuple[Item, ...], other: tuple[Item, ...], rules: Rules) -> Imp
     upper, lower = letters(pile), letters(other)
     if can_stack(upper, lower, rules):
         return None
-    why = "too_tall", f"the pile would be higher than jaws of {1e3 * rules.jaw_height:.0f} mm hold"
-    if first.is_dish and not top.is_dish:
+    why = "too_tall", f"the pile would be higher than jaws of {1e3 * rules.setting.gripper.jaw_height:.0f} mm hold"
+    if not rules.setting.stacking:
+        why = "sizes_estimated", "nothing is stacked whose wall and foot are guessed"
+    elif first.is_dish and not top.is_dish:
         why = "on_utensil", f"a dish does not stand on {top.name}"
     elif first.is_dish and first.measures.rim_radius > top.measures.rim_radius:
         why = "wider", f"it is wider than {top.name}"

@@ -11,7 +11,8 @@ from schemas.tableware_plan import RefusedItem
 from schemas.tableware_scene import MOST_ITEMS
 from stages.tableware.planning.rules import Rules, can_hold, letters
 from stages.tableware.world.footprints import Footprint, footprint
-from stages.tableware.world.items import MEASURES, Item, Table
+from stages.tableware.world.items import Item, Table
+from stages.tableware.world.setting import Setting
 
 EDGE = 0.005
 """What stands on the table may be seen to hang over its edge by this [m]; what lies on a dish goes with the dish."""
@@ -66,7 +67,11 @@ def accept(
     ]
     kept: list[Item] = []
     for pile in table.stacks:
-        wrong = [refusal for item in pile if (refusal := _wrong(item, doubts.get(item.name), least)) is not None]
+        wrong = [
+            refusal
+            for item in pile
+            if (refusal := _wrong(item, doubts.get(item.name), least, rules.setting)) is not None
+        ]
         if not wrong and not can_hold(letters(pile[-1:]), rules):
             wrong = [_refusal(pile[-1], "too_tall_to_lift", "the jaws do not hold it")]
         if not wrong:
@@ -84,13 +89,14 @@ def accept(
     return Accepted(Table(tuple(sorted(kept, key=lambda item: order[item.name])), circles), tuple(refused))
 
 
-def _wrong(item: Item, doubt: Doubt | None, least: float) -> RefusedItem | None:
+def _wrong(item: Item, doubt: Doubt | None, least: float, setting: Setting) -> RefusedItem | None:
     place = footprint(item)
     if item.on is None and not Footprint(place.start, place.end, place.radius - EDGE).on_table:
         where = f"at ({item.position[0]:.3f}, {item.position[1]:.3f}) m"
         return _refusal(item, "outside_workspace", f"{where}, hangs over the edge of the workspace")
-    usual = MEASURES[item.kind]
-    if abs(item.measures.rim_radius - usual.rim_radius) > SIZE or abs(item.measures.height - usual.height) > SIZE:
+    usual, size = setting.sizes[item.kind], item.measures
+    other = abs(size.rim_radius - usual.rim_radius) > SIZE or abs(size.height - usual.height) > SIZE
+    if setting.alike is None and other:
         return _refusal(item, "other_size", f"not of the size that a {item.kind} has here: it may not fit the jaws")
     if doubt is not None and doubt.confidence < least:
         why = f" ({', '.join(doubt.reasons)})" if doubt.reasons else ""

@@ -14,25 +14,18 @@ from math import atan2, cos, hypot, pi, sin
 import numpy as np
 
 from stages.tableware.world.footprints import Footprint, footprint, gap, overlapped, swept_disc
-from stages.tableware.world.items import MEASURES, Item, Kind, Measures, Table, rise
+from stages.tableware.world.items import Item, Kind, Measures, Table, rise
+from stages.tableware.world.setting import Setting
 
 LETTERS: dict[Kind, str] = {"plate": "p", "bowl": "b", "cup": "c", "fork": "u", "spoon": "u"}
-_MEASURES: dict[str, Measures] = {
-    "p": MEASURES["plate"],
-    "b": MEASURES["bowl"],
-    "c": MEASURES["cup"],
-    "u": MEASURES["fork"],
-}
+_KINDS: dict[str, Kind] = {"p": "plate", "b": "bowl", "c": "cup", "u": "fork"}
 
 
 @dataclass(frozen=True)
 class Rules:
-    """The gripper [m, rad] and what a policy dares."""
+    """The sizes of things and the hand, and what a policy dares [m, rad]."""
 
-    opening: float = 0.085
-    jaw_height: float = 0.045
-    finger: float = 0.011
-    """Half the width of a finger; what lies under the jaws when they come down is in the way (ours)."""
+    setting: Setting = Setting()
     similar: float = 0.005
     """Greatest difference of two grasp heights in a multi-object grasp: the thesis's adjustable threshold, without a
     number there. At 0.005 (like with like) Pull comes nearer to the thesis's times of tiers 1 and 2 than at 0.02
@@ -66,20 +59,24 @@ class Rules:
         return self._hash  # type: ignore[attr-defined, no-any-return]
 
 
+def _measures(letter: str, rules: Rules) -> Measures:
+    return rules.setting.sizes[_KINDS[letter]]
+
+
 def letters(items: Iterable[Item]) -> str:
     """Return the pile of some items, lower things first."""
     return "".join(LETTERS[item.kind] for item in items)
 
 
 @lru_cache(maxsize=4096)
-def lips(pile: str) -> tuple[float, ...]:
+def lips(pile: str, rules: Rules) -> tuple[float, ...]:
     """Return the heights [m] of the dishes' lips over the lowest one's foot."""
     foot, heights = 0.0, []
     for number, kind in enumerate(pile):
         if number:
-            foot += rise(_MEASURES[kind], _MEASURES[pile[number - 1]])
+            foot += rise(_measures(kind, rules), _measures(pile[number - 1], rules))
         if kind != "u":
-            heights.append(foot + _MEASURES[kind].height)
+            heights.append(foot + _measures(kind, rules).height)
     return tuple(heights)
 
 
@@ -88,9 +85,9 @@ def can_hold(pile: str, rules: Rules) -> bool:
     """Return whether one grasp lifts the whole pile: its lips differ by no more than the jaws' height (section 6.4)."""
     if rules.plates_alone and "p" in pile and len(pile) > 1:
         return False
-    heights = lips(pile)
+    heights = lips(pile, rules)
     spread = max(heights) - min(heights) if heights else 0.0
-    return spread <= rules.jaw_height and pile.count("u") <= rules.most_utensils
+    return spread <= rules.setting.gripper.jaw_height and pile.count("u") <= rules.most_utensils
 
 
 @lru_cache(maxsize=65536)
@@ -99,17 +96,21 @@ def can_hold_two(first: str, second: str, rules: Rules) -> bool:
     all lips between the jaws. Utensils go with utensils only."""
     if not (can_hold(first, rules) and can_hold(second, rules)):
         return False
+    alike = rules.setting.alike
+    if alike is not None and not alike.issuperset(first + second):
+        return False
     if any(pile[0] != "u" and "u" in pile for pile in (first, second)):
         if not rules.laden_beside:
             return False
     elif rules.beside is not None and (min(first, second), max(first, second)) not in rules.beside:
         return False
-    lips_of_first, lips_of_second = lips(first), lips(second)
+    lips_of_first, lips_of_second = lips(first, rules), lips(second, rules)
     if not lips_of_first or not lips_of_second:
         return not lips_of_first and not lips_of_second
     heights = (*lips_of_first, *lips_of_second)
     return (
-        abs(lips_of_first[0] - lips_of_second[0]) <= rules.similar and max(heights) - min(heights) <= rules.jaw_height
+        abs(lips_of_first[0] - lips_of_second[0]) <= rules.similar
+        and max(heights) - min(heights) <= rules.setting.gripper.jaw_height
     )
 
 
@@ -121,16 +122,17 @@ def can_stack(upper: str, lower: str, rules: Rules) -> bool:
     if bottom == "u":
         fits = top != "c" or rules.utensils_in_cups
     else:
-        fits = top != "u" and _MEASURES[bottom].rim_radius <= _MEASURES[top].rim_radius
-    return fits and can_hold(upper, rules) and can_hold(lower + upper, rules)
+        fits = top != "u" and _measures(bottom, rules).rim_radius <= _measures(top, rules).rim_radius
+    return rules.setting.stacking and fits and can_hold(upper, rules) and can_hold(lower + upper, rules)
 
 
-def pile_order(part: str) -> tuple[bool, bool, float, float]:
+@lru_cache(maxsize=4096)
+def pile_order(part: str, rules: Rules) -> tuple[bool, bool, float, float]:
     """What goes lower sorts first: dishes, dishes that carry utensils, utensils; the wider first."""
     bare = part.rstrip("u")
     if not bare:
         return (True, True, 0.0, 0.0)
-    return (False, bare != part, -_MEASURES[bare[0]].rim_radius, -_MEASURES[bare[-1]].rim_radius)
+    return (False, bare != part, -_measures(bare[0], rules).rim_radius, -_measures(bare[-1], rules).rim_radius)
 
 
 @lru_cache(maxsize=65536)
@@ -138,7 +140,7 @@ def can_pile(base: str, parts: tuple[str, ...], rules: Rules) -> bool:
     """Return whether all parts can be stacked onto `base`, in the order of `pile_order`. No other order does better:
     widths must fall from the foot to the top, and utensils end a pile."""
     pile = base
-    for part in sorted(parts, key=pile_order):
+    for part in sorted(parts, key=lambda part: pile_order(part, rules)):
         if not can_stack(part, pile, rules):
             return False
         pile += part
@@ -153,7 +155,7 @@ def split_over_two(first: str, second: str, parts: tuple[str, ...], rules: Rules
         return None
     if parts and rules.beside is not None and rules.laden_beside:
         rules = replace(rules, laden_beside=False)
-    kinds = tuple(sorted(set(parts), key=pile_order))
+    kinds = tuple(sorted(set(parts), key=lambda part: pile_order(part, rules)))
     numbers = _share_out(first, second, kinds, tuple(parts.count(kind) for kind in kinds), rules)
     if numbers is None:
         return None
@@ -195,10 +197,13 @@ def within_jaws(first: Item, second: Item, rules: Rules) -> bool:
         return False
     if first.is_dish:
         walls = first.measures.wall + second.measures.wall
-        return gap(footprint(first), footprint(second)) + walls <= rules.opening
+        return gap(footprint(first), footprint(second)) + walls <= rules.setting.gripper.opening
     apart = hypot(first.position[0] - second.position[0], first.position[1] - second.position[1])
     turned = abs((first.yaw - second.yaw + pi / 2) % pi - pi / 2)
-    return apart + max(first.measures.width, second.measures.width) <= rules.opening and turned <= rules.parallel
+    return (
+        apart + max(first.measures.width, second.measures.width) <= rules.setting.gripper.opening
+        and turned <= rules.parallel
+    )
 
 
 def grasp_centre(first: Item, second: Item) -> tuple[float, float, float]:
@@ -212,8 +217,8 @@ def grasp_centre(first: Item, second: Item) -> tuple[float, float, float]:
 def jaws(first: Item, second: Item, rules: Rules) -> Footprint:
     """Return what open jaws cover from above as they go down over two things."""
     x, y, angle = grasp_centre(first, second)
-    dx, dy = rules.opening / 2 * cos(angle), rules.opening / 2 * sin(angle)
-    return Footprint((x - dx, y - dy), (x + dx, y + dy), rules.finger)
+    dx, dy = rules.setting.gripper.opening / 2 * cos(angle), rules.setting.gripper.opening / 2 * sin(angle)
+    return Footprint((x - dx, y - dy), (x + dx, y + dy), rules.setting.gripper.finger)
 
 
 def pull_end(item: Item, target: Item, rules: Rules) -> tuple[float, float, float]:

@@ -16,4 +16,4 @@ RULES = Rules(most_utensils=2, plates_alone=True, beside=_PAIRS)
 """What physics bears (docs/TIDY.md): two utensils a pile, plates alone, and side by side the pairs of piles
 that came whole in every grasp measured there. Dishes that carry utensils are lifted side by side as they stand only
 where the world's chances say that nothing spills."""
-POLICY = DeclaredPolicy(lambda model, chances, seed: JointPolicy(RULES, model, chances), RULES, rivals=RIVALS)
+POLICY = DeclaredPolicy(JointPolicy, RULES, rivals=RIVALS)

@@ -8,4 +8,4 @@ from stages.tableware.planning.rules import Rules
 from stages.tableware.policies import ours
 
 RULES = Rules()
-POLICY = DeclaredPolicy(lambda model, chances, seed: JointPolicy(RULES, model, chances), RULES, rivals=ours.RIVALS)
+POLICY = DeclaredPolicy(JointPolicy, RULES, rivals=ours.RIVALS)

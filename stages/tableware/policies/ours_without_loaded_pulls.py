@@ -9,4 +9,4 @@ from stages.tableware.planning.policy import DeclaredPolicy
 from stages.tableware.policies import ours
 
 RULES = replace(ours.RULES, loaded_pulls=False)
-POLICY = DeclaredPolicy(lambda model, chances, seed: JointPolicy(RULES, model, chances), RULES, rivals=ours.RIVALS)
+POLICY = DeclaredPolicy(JointPolicy, RULES, rivals=ours.RIVALS)

@@ -8,23 +8,26 @@ from stages.tableware.actions.grasp import grasp, grasp_two
 from stages.tableware.actions.pull_grasp import pull_grasp
 from stages.tableware.planning.action import Action
 from stages.tableware.planning.policy import THESIS, DeclaredPolicy, liftable
-from stages.tableware.planning.rules import can_grasp_two, can_pull
+from stages.tableware.planning.rules import Rules, can_grasp_two, can_pull
 from stages.tableware.world.items import Table
 
 
 class PullPolicy:
     """What can be grasped in pairs, then what can after a pull, then singly. Pairs in the order seen."""
 
+    def __init__(self, rules: Rules = THESIS) -> None:
+        self._rules = rules
+
     def decide(self, table: Table) -> Action:
         """Return a multi-object grasp, else a pull-grasp, else a grasp."""
         bases = [stack[0].name for stack in table.stacks]
         for first, second in permutations(bases, 2):
-            if can_grasp_two(table, first, second, THESIS):
+            if can_grasp_two(table, first, second, self._rules):
                 return grasp_two(table, first, second)
         for first, second in permutations(bases, 2):
-            if can_pull(table, first, second, THESIS):
-                return pull_grasp(table, first, second, THESIS)
-        return grasp(table, liftable(table, table.stacks[0], THESIS))
+            if can_pull(table, first, second, self._rules):
+                return pull_grasp(table, first, second, self._rules)
+        return grasp(table, liftable(table, table.stacks[0], self._rules))
 
 
-POLICY = DeclaredPolicy(lambda model, chances, seed: PullPolicy())
+POLICY = DeclaredPolicy(lambda rules, model, chances, seed: PullPolicy(rules))

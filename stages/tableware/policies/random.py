@@ -23,4 +23,4 @@ class RandomOne:
         return grasp(table, item.name, float(self._random.uniform(-pi, pi)))
 
 
-POLICY = DeclaredPolicy(lambda model, chances, seed: RandomOne(seed), draws=True)
+POLICY = DeclaredPolicy(lambda rules, model, chances, seed: RandomOne(seed), draws=True)

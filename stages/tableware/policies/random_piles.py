@@ -8,19 +8,21 @@ import numpy as np
 
 from stages.tableware.actions.grasp import Grasp, grasp
 from stages.tableware.planning.policy import THESIS, DeclaredPolicy, liftable
+from stages.tableware.planning.rules import Rules
 from stages.tableware.world.items import Table
 
 
 class RandomPile:
     """A random pile whole, or what can be lifted of it."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, rules: Rules = THESIS) -> None:
+        self._rules = rules
         self._random = np.random.default_rng([seed, 74])
 
     def decide(self, table: Table) -> Grasp:
         """Return a grasp of a random pile."""
         stack = table.stacks[int(self._random.integers(len(table.stacks)))]
-        return grasp(table, liftable(table, stack, THESIS), float(self._random.uniform(-pi, pi)))
+        return grasp(table, liftable(table, stack, self._rules), float(self._random.uniform(-pi, pi)))
 
 
-POLICY = DeclaredPolicy(lambda model, chances, seed: RandomPile(seed), draws=True)
+POLICY = DeclaredPolicy(lambda rules, model, chances, seed: RandomPile(seed, rules), draws=True)

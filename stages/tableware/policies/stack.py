@@ -6,13 +6,16 @@ from stages.tableware.actions.grasp import grasp
 from stages.tableware.actions.stack_grasp import stack_grasp
 from stages.tableware.planning.action import Action
 from stages.tableware.planning.policy import THESIS, DeclaredPolicy, liftable
-from stages.tableware.planning.rules import can_put
+from stages.tableware.planning.rules import Rules, can_put
 from stages.tableware.world.items import Table
 
 
 class StackPolicy:
     """A utensil onto a bowl and both away, one bowl a time as its six trips on tier 1 say; then any two piles; then
     singly."""
+
+    def __init__(self, rules: Rules = THESIS) -> None:
+        self._rules = rules
 
     def decide(self, table: Table) -> Action:
         """Return a stack-grasp, else a grasp."""
@@ -22,9 +25,9 @@ class StackPolicy:
         for lower in (bowls, stacks):
             for upper in lone if lower is bowls else stacks:
                 for base in lower:
-                    if upper is not base and can_put(table, upper[0].name, base[0].name, THESIS):
+                    if upper is not base and can_put(table, upper[0].name, base[0].name, self._rules):
                         return stack_grasp(table, upper[0].name, base[0].name)
-        return grasp(table, liftable(table, stacks[0], THESIS))
+        return grasp(table, liftable(table, stacks[0], self._rules))
 
 
-POLICY = DeclaredPolicy(lambda model, chances, seed: StackPolicy())
+POLICY = DeclaredPolicy(lambda rules, model, chances, seed: StackPolicy(rules))

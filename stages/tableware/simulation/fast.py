@@ -21,24 +21,32 @@ from stages.tableware.actions.grasp import Grasp, taken
 from stages.tableware.actions.pull import Pull, after_pull
 from stages.tableware.actions.stack import Stack, after_stack
 from stages.tableware.planning.action import Action, Primitive
-from stages.tableware.planning.policy import Policy
+from stages.tableware.planning.policy import STANDARD_SETTING, Policy
 from stages.tableware.planning.rules import Rules, can_grasp_two, can_hold, letters
 from stages.tableware.planning.time_model import Chances, TimeModel, placement_error
 from stages.tableware.simulation.trial import Trial, run_in
 from stages.tableware.world.footprints import footprint, gap, overlapped
 from stages.tableware.world.items import TABLE_SIDES, Item, Table
+from stages.tableware.world.setting import Setting
 
 
 class FastWorld:
     """A table that actions change."""
 
-    def __init__(self, table: Table, model: TimeModel, chances: Chances, seed: int | tuple[int, ...]) -> None:
+    def __init__(
+        self,
+        table: Table,
+        model: TimeModel,
+        chances: Chances,
+        seed: int | tuple[int, ...],
+        setting: Setting = STANDARD_SETTING,
+    ) -> None:
         self.table = table
         self.trial = Trial(left=len(table.items))
         self._model, self._chances = model, chances
         self._seed = (seed,) if isinstance(seed, int) else seed
         self._tried: Counter[str] = Counter()
-        self._rules = Rules()
+        self._rules = Rules(setting)
         self.fallen: list[str] = []
         """Everything that fell off the table, in order."""
         self.troubles: list[str] = []
@@ -164,6 +172,13 @@ class FastWorld:
         self.table = self.table.without(names)
 
 
-def run_trial(table: Table, policy: Policy, model: TimeModel, chances: Chances, seed: int | tuple[int, ...]) -> Trial:
+def run_trial(
+    table: Table,
+    policy: Policy,
+    model: TimeModel,
+    chances: Chances,
+    seed: int | tuple[int, ...],
+    setting: Setting = STANDARD_SETTING,
+) -> Trial:
     """Return what a policy came to on a table in the fast simulator, seeing everything."""
-    return run_in(FastWorld(table, model, chances, seed), policy)
+    return run_in(FastWorld(table, model, chances, seed, setting), policy)

@@ -213,7 +213,7 @@ def _dish_pair(
 
 def half_width(item: Item, along: float) -> float:
     """Return half the width [m] of a utensil at a distance from its middle towards the head, 0 beyond its ends."""
-    for corners in solid(item.kind).pieces:
+    for corners in solid(item.kind, item.measures).pieces:
         if corners[:, 0].min() - 0.0015 <= along <= corners[:, 0].max() + 0.0015:
             return float(np.abs(corners[:, 1]).max())
     return 0.0

@@ -21,7 +21,7 @@ from stages.tableware.simulation.arm import BASE
 from stages.tableware.simulation.tabletop import BIN_CENTER, BIN_SIDE
 from stages.tableware.table_pictures import captioned
 from stages.tableware.world.dish_shapes import item_mesh
-from stages.tableware.world.items import TABLE_SIDES, make_item
+from stages.tableware.world.items import TABLE_SIDES, Item, Measures
 from stages.tableware.world.shape_files import COLORS
 
 EYE, TARGET = np.array([0.62, 1.02, 0.80]), np.array([0.14, -0.12, 0.0])
@@ -48,8 +48,10 @@ class PhysicsPictures:
         self._urdf = parse_urdf(self._robot.urdf)
         self._links = link_shapes(self._robot.urdf.read_text(encoding="utf-8"), "visual")
         self._items = [
-            _painted(item_mesh(make_item(str(name), str(kind), 0.0, 0.0)), COLORS[str(kind)])  # type: ignore[arg-type, index]
-            for name, kind in zip(frames["names"], frames["kinds"], strict=True)
+            _painted(item_mesh(Item(str(name), kind, (0.0, 0.0, 0.0), measures=Measures(*measures))), COLORS[kind])
+            for name, kind, measures in zip(
+                frames["names"], frames["kinds"].tolist(), frames["measures"].tolist(), strict=True
+            )
         ]
         self._still = _table_and_bin()
 

@@ -14,7 +14,7 @@ from math import cos, pi
 import numpy as np
 
 from stages.tableware.world.dish_shapes import shell_mesh, utensil_mesh
-from stages.tableware.world.items import MEASURES, Kind, Measures
+from stages.tableware.world.items import Kind, Measures
 
 OUTER = 3
 """Facets of a wedge's outer face: nearly round, while the inner face is one facet."""
@@ -44,9 +44,8 @@ class Solid:
 
 
 @lru_cache(maxsize=16)
-def solid(kind: Kind) -> Solid:
-    """Return the body of a kind."""
-    measures = MEASURES[kind]
+def solid(kind: Kind, measures: Measures) -> Solid:
+    """Return the body of a thing of a kind that measures `measures`."""
     if measures.is_dish:
         mesh = shell_mesh(measures)
         pieces, density = shell_pieces(measures), DISH_DENSITY
@@ -111,12 +110,12 @@ def obj_text(solid_body: Solid) -> str:
     return "\n".join(lines) + "\n"
 
 
-def urdf_text(kind: Kind, mesh_path: str) -> str:
+def urdf_text(kind: Kind, measures: Measures, mesh_path: str) -> str:
     """Return the URDF of a free body of a kind; a dish's pieces lie in a Wavefront file (`obj_text`)."""
-    body = solid(kind)
+    body = solid(kind, measures)
     x, y, z = body.center
     ixx, iyy, izz = body.inertia
-    if MEASURES[kind].is_dish:
+    if measures.is_dish:
         shapes = f'<collision><geometry><mesh filename="{mesh_path}"/></geometry></collision>'
     else:
         shapes = "".join(_box(corners) for corners in body.pieces)

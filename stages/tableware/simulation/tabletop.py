@@ -14,7 +14,7 @@ from stages.kit.geometry.transforms import quaternion_of, transform_from_quatern
 from stages.kit.simulation.engine import engine, native_output_to_stderr
 from stages.kit.simulation.world import GRAVITY, PhysicsWorld
 from stages.tableware.simulation.pieces import Solid, obj_text, solid, urdf_text
-from stages.tableware.world.items import TABLE_SIDES, Item, Kind, Table
+from stages.tableware.world.items import TABLE_SIDES, Item, Table
 
 TABLE_FRICTION, ITEM_FRICTION = 0.7, 0.5
 """Bullet multiplies the two of a contact: 0.35 on the table, 0.25 dish on dish, 0.8 under rubber."""
@@ -55,10 +55,10 @@ class Tabletop:
         self.binned: list[str] = []
         self.lost: list[str] = []
         with tempfile.TemporaryDirectory() as folder:
-            for kind in sorted({item.kind for item in table.items}):
+            for kind, measures in sorted({item.kind: item.measures for item in table.items}.items()):
                 path = os.path.join(folder, f"{kind}.obj")
-                Path(path).write_text(obj_text(solid(kind)), encoding="utf-8")
-                text = urdf_text(kind, path)
+                Path(path).write_text(obj_text(solid(kind, measures)), encoding="utf-8")
+                text = urdf_text(kind, measures, path)
                 Path(folder, f"{kind}.urdf").write_text(text, encoding="utf-8")
             for item in table.items:
                 self.bodies[item.name] = self._load(os.path.join(folder, f"{item.kind}.urdf"))
@@ -107,8 +107,8 @@ class Tabletop:
         return pose
 
     def _solid(self, name: str) -> Solid:
-        kind: Kind = self.items[name].kind
-        return solid(kind)
+        item = self.items[name]
+        return solid(item.kind, item.measures)
 
     def speed(self, name: str) -> float:
         """Return the linear speed [m/s], with a tenth of the angular one [rad/s]."""

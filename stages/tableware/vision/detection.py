@@ -28,7 +28,7 @@ from stages.tableware.vision.utensil_reading import (
     utensils_on_dish,
     utensils_on_table,
 )
-from stages.tableware.world.items import MEASURES, TABLE_SIDES, UTENSILS
+from stages.tableware.world.items import STANDARD, TABLE_SIDES, UTENSILS, DishSizes
 from stages.tableware.world.overhead import OverheadCamera
 
 UNKNOWN_HEIGHT = 0.010
@@ -36,22 +36,27 @@ UNKNOWN_HEIGHT = 0.010
 
 
 def detect(
-    color: np.ndarray, depth: np.ndarray, camera: OverheadCamera, sides: tuple[float, float] = TABLE_SIDES
+    color: np.ndarray,
+    depth: np.ndarray,
+    camera: OverheadCamera,
+    sides: tuple[float, float] = TABLE_SIDES,
+    sizes: DishSizes = STANDARD,
 ) -> tuple[Detection, ...]:
     """Return the items in an image; what carries another comes before it.
 
-    `color` (H, W, 3) uint8, `depth` (H, W) z-depth [m], 0 where unknown; `sides` of the workspace along x and y [m]. An
+    `color` (H, W, 3) uint8, `depth` (H, W) z-depth [m], 0 where unknown; `sides` of the workspace along x and y [m],
+    `sizes` of what is looked for. An
     empty table gives an empty tuple. Raises BadInput when there is no depth, its scale is wrong, or the images do not
     fit the camera.
     """
-    return items_in(height_map(color, depth, camera, sides))
+    return items_in(height_map(color, depth, camera, sides), sizes)
 
 
-def items_in(heights: HeightMap) -> tuple[Detection, ...]:
+def items_in(heights: HeightMap, sizes: DishSizes) -> tuple[Detection, ...]:
     """Return the items in a map of heights, as `detect` does."""
-    rims = find_rims(heights)
-    crossed = {id(rims[index]) for index in overlapping(rims)}
-    stacks = read_stacks(rims)
+    rims = find_rims(heights, sizes)
+    crossed = {id(rims[index]) for index in overlapping(rims, sizes)}
+    stacks = read_stacks(rims, sizes)
     covered = np.zeros(heights.smooth.shape, dtype=np.uint8)
     for index, stack in enumerate(stacks):
         cover_stack(covered, heights, stack, index + 1)
@@ -59,15 +64,15 @@ def items_in(heights: HeightMap) -> tuple[Detection, ...]:
     for index, stack in enumerate(stacks):
         carrier = len(detections) + len(stack.kinds) - 1
         detections.extend(dishes_of(stack, heights, crossed, len(detections)))
-        for level, seen in enumerate(utensils_on_dish(heights, stack, covered, index + 1)):
-            z = stack.top + level * MEASURES[seen.bar.kind].height
-            detections.append(as_detection(seen, heights, z, carrier))
+        for level, seen in enumerate(utensils_on_dish(heights, stack, covered, index + 1, sizes)):
+            z = stack.top + level * sizes[seen.bar.kind].height
+            detections.append(as_detection(seen, heights, z, carrier, sizes))
             carrier = len(detections) - 1
-            _cover_bar(covered, heights, seen.bar, z)
+            _cover_bar(covered, heights, seen.bar, z, sizes)
     hidden = covered > 0
     near = cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0
     unlike = rising(heights, unlike_table(heights, near), near) & heights.workspace()
-    lying, strange = utensils_on_table(heights, unlike, hidden)
+    lying, strange = utensils_on_table(heights, unlike, hidden, sizes)
     for seen in lying:
         here = np.array(heights.world(np.float64(seen.bar.u), np.float64(seen.bar.v), 0.0))
         below = [
@@ -75,18 +80,18 @@ def items_in(heights: HeightMap) -> tuple[Detection, ...]:
             for k, other in enumerate(detections)
             if other.on is None and other.kind in UTENSILS and np.hypot(*(here - other.position[:2])) < SAME_PLACE
         ]
-        z = MEASURES[seen.bar.kind].height if below else 0.0
-        detections.append(as_detection(seen, heights, z, below[0] if below else None))
-        _cover_bar(covered, heights, seen.bar, z)
+        z = sizes[seen.bar.kind].height if below else 0.0
+        detections.append(as_detection(seen, heights, z, below[0] if below else None, sizes))
+        _cover_bar(covered, heights, seen.bar, z, sizes)
     detections.extend(_unknown(heights, covered, strange))
-    return tuple(_outside(detection, heights.sides) for detection in detections)
+    return tuple(_outside(detection, heights.sides, sizes) for detection in detections)
 
 
-def _cover_bar(covered: np.ndarray, heights: HeightMap, bar: Bar, z: float) -> None:
-    half = 0.5 * MEASURES[bar.kind].length * float(heights.scale(z))
+def _cover_bar(covered: np.ndarray, heights: HeightMap, bar: Bar, z: float, sizes: DishSizes) -> None:
+    half = 0.5 * sizes[bar.kind].length * float(heights.scale(z))
     dx, dy = half * np.cos(bar.angle), half * np.sin(bar.angle)
     ends = [(int(round(bar.u + s * dx)), int(round(bar.v + s * dy))) for s in (-1.0, 1.0)]
-    cv2.line(covered, ends[0], ends[1], 255, int(1.5 * MEASURES[bar.kind].width * float(heights.scale(z))))
+    cv2.line(covered, ends[0], ends[1], 255, int(1.5 * sizes[bar.kind].width * float(heights.scale(z))))
 
 
 def _unknown(heights: HeightMap, covered: np.ndarray, strange: np.ndarray) -> list[Detection]:
@@ -123,9 +128,9 @@ def _unknown(heights: HeightMap, covered: np.ndarray, strange: np.ndarray) -> li
     return result
 
 
-def _outside(detection: Detection, sides: tuple[float, float]) -> Detection:
+def _outside(detection: Detection, sides: tuple[float, float], sizes: DishSizes) -> Detection:
     """Return a detection with the doubt that its middle, or a dish's rim, is not over the workspace."""
-    reach = MEASURES[detection.kind].rim_radius if detection.kind is not None else 0.0
+    reach = sizes[detection.kind].rim_radius if detection.kind is not None else 0.0
     over = [abs(detection.position[axis]) + reach - 0.5 * sides[axis] for axis in (0, 1)]
     if max(over) > 0.006:
         return replace(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stages.tableware.world.items import MEASURES, Item, Kind, Measures, Table
+from stages.tableware.world.items import STANDARD, DishSizes, Item, Kind, Measures, Table
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,9 @@ class Detection:
     """Reasons for doubt; empty when there is none."""
 
 
-def as_table(detections: tuple[Detection, ...]) -> Table:
-    """Return the table that detections describe; things that are no tableware are left out."""
+def as_table(detections: tuple[Detection, ...], sizes: DishSizes = STANDARD) -> Table:
+    """Return the table that detections describe, of `sizes` where none was estimated; things that are no
+    tableware are left out."""
     names = {
         index: f"{detection.kind}_{index + 1}"
         for index, detection in enumerate(detections)
@@ -49,7 +50,7 @@ def as_table(detections: tuple[Detection, ...]) -> Table:
                 detection.position,
                 detection.yaw,
                 None if detection.on is None else names[detection.on],
-                detection.size or MEASURES[detection.kind],
+                detection.size or sizes[detection.kind],
             )
             for index, detection in enumerate(detections)
             if detection.kind is not None

@@ -5,12 +5,13 @@ from __future__ import annotations
 from schemas.base import as_transform
 from schemas.errors import BadInput
 from schemas.tableware_detections import DetectedSize, TablePlane, TablewareDetection, TablewareDetectionsFile
+from schemas.tableware_dishes import TablewareDishes
 from stages.tableware.vision.detections import Detection
 from stages.tableware.vision.seeing import Sight, Sizes
 from stages.tableware.world.items import Measures
 
 
-def to_file(sight: Sight, sizes: Sizes) -> TablewareDetectionsFile:
+def to_file(sight: Sight, sizes: Sizes, dishes: TablewareDishes | None = None) -> TablewareDetectionsFile:
     """Return the payload of what was seen."""
     return TablewareDetectionsFile(
         statement=sight.statement,
@@ -22,6 +23,7 @@ def to_file(sight: Sight, sizes: Sizes) -> TablewareDetectionsFile:
         workspace=sight.sides,
         rectified=sight.rectified,
         sizes=sizes,
+        dishes=dishes,
     )
 
 

@@ -9,7 +9,6 @@ from stages.tableware.vision.detections import Detection
 from stages.tableware.vision.height_map import HeightMap
 from stages.tableware.vision.rim_finding import Rim
 from stages.tableware.vision.stack_reading import LIP_TOLERANCE, Stack
-from stages.tableware.world.items import MEASURES
 
 LEAST_DEPTH, MOST_GLARE = 0.45, 0.10
 """Shares of a lip's pixels with depth, and of a dish's pixels at full white, at which there is doubt."""
@@ -22,8 +21,7 @@ WEAK_SUPPORT, WEAK_DEPTH = 0.2, 0.3
 
 def cover_stack(covered: np.ndarray, heights: HeightMap, stack: Stack, label: int) -> None:
     """Write a label where dishes are seen, in place: discs of their outer radius at several heights."""
-    for kind, foot in zip(stack.kinds, stack.feet, strict=True):
-        measures = MEASURES[kind]
+    for measures, foot in zip(stack.measures, stack.feet, strict=True):
         for share in (0.0, 0.25, 0.5, 0.75, 1.0):
             z = foot + share * measures.height
             u, v = heights.pixel(np.float64(stack.x), np.float64(stack.y), z)
@@ -46,7 +44,7 @@ def dishes_of(stack: Stack, heights: HeightMap, crossed: set[int], first: int) -
             Detection(
                 kind=kind,
                 position=(*at, foot),
-                lip=foot + MEASURES[kind].height,
+                lip=foot + stack.measures[level].height,
                 hidden=hidden,
                 on=first + level - 1 if level else None,
                 confidence=confidence,
@@ -67,7 +65,7 @@ def _doubt(rim: Rim, stack: Stack, heights: HeightMap) -> tuple[float, tuple[str
     if stack.misfit > LIP_TOLERANCE:
         reasons.append("a stack of unknown height")
     u, v = (float(value) for value in heights.pixel(np.float64(rim.x), np.float64(rim.y), rim.lip))
-    radius = 0.7 * MEASURES[rim.kind].rim_radius * float(heights.scale(rim.lip))
+    radius = 0.7 * stack.measures[stack.kinds.index(rim.kind)].rim_radius * float(heights.scale(rim.lip))
     part = heights.color[max(0, int(v - radius)) : int(v + radius) + 1, max(0, int(u - radius)) : int(u + radius) + 1]
     bright = part.min(axis=2) if part.size else np.zeros((1, 1))
     if float((bright >= 253).mean()) > MOST_GLARE and float(np.median(bright)) < 250:

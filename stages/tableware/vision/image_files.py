@@ -20,6 +20,7 @@ from schemas.base import Model, Transform
 from schemas.errors import BadInput
 from schemas.outside import file_json
 from schemas.scene_parts import Camera
+from schemas.tableware_dishes import TablewareDishes
 from stages.kit.formats.numpy_files import read_array, read_arrays
 
 COLORS = ("color.png", "color.jpg", "rgb.png", "rgb.jpg")
@@ -40,6 +41,8 @@ class CameraFile(Model):
     """Sides along x and y [m]."""
     depth_scale: float | None = None
     """Metres a unit of the depth file."""
+    dishes: TablewareDishes | None = None
+    """Of a scene."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,10 @@ class TableImage:
     color: np.ndarray
     depth: np.ndarray | None
     camera: CameraFile | None
+    scene: bool = False
+    """Whether it is of `tableware scene`, whose sizes are known."""
+    dishes: TablewareDishes | None = None
+    """The user's sizes and gripper, where a scene has them."""
 
 
 def read_image(
@@ -66,7 +73,9 @@ def read_image(
     if depth is None:
         return TableImage(cv2.cvtColor(color, cv2.COLOR_BGR2RGB), None, intrinsics)
     scale = depth_scale if depth_scale is not None else None if intrinsics is None else intrinsics.depth_scale
-    return TableImage(cv2.cvtColor(color, cv2.COLOR_BGR2RGB), _depth(depth, scale), intrinsics)
+    scene = camera is not None and camera.name == "scene.json"
+    dishes = None if intrinsics is None else intrinsics.dishes
+    return TableImage(cv2.cvtColor(color, cv2.COLOR_BGR2RGB), _depth(depth, scale), intrinsics, scene, dishes)
 
 
 def read_camera(path: Path) -> CameraFile:

@@ -11,7 +11,7 @@ import numpy as np
 from stages.tableware.vision.detections import Detection
 from stages.tableware.vision.photographs import Outline
 from stages.tableware.vision.seeing import Sight
-from stages.tableware.world.items import MEASURES
+from stages.tableware.world.items import DishSizes
 
 COLORS = {
     "cup": (235, 70, 60),
@@ -34,7 +34,7 @@ def draw_sight(color: np.ndarray, sight: Sight) -> np.ndarray:
     camera_from_world = np.linalg.inv(sight.world_from_camera)
     labels: list[tuple[tuple[int, int], str, tuple[int, int, int]]] = []
     for number, detection in enumerate(sight.detections):
-        points = _projected(_outline(detection), camera_from_world, sight)
+        points = _projected(_outline(detection, sight.sizes), camera_from_world, sight)
         if points is None:
             continue
         tone = COLORS[detection.kind]
@@ -65,16 +65,16 @@ def draw_outlines(color: np.ndarray, outlines: tuple[Outline, ...], statement: s
     return _with_text(picture, statement)
 
 
-def _outline(detection: Detection) -> np.ndarray:
+def _outline(detection: Detection, sizes: DishSizes) -> np.ndarray:
     """Return world points (N, 3) [m] of a detection's outline at the height of its lip."""
     x, y, _ = detection.position
     if detection.kind in ("fork", "spoon"):
-        half = 0.5 * MEASURES[detection.kind].length
+        half = 0.5 * sizes[detection.kind].length
         along = np.linspace(-half, half, 24)
         return np.column_stack(
             [x + along * np.cos(detection.yaw), y + along * np.sin(detection.yaw), np.full(24, detection.lip)]
         )
-    radius = detection.extent if detection.kind is None else (detection.size or MEASURES[detection.kind]).rim_radius
+    radius = detection.extent if detection.kind is None else (detection.size or sizes[detection.kind]).rim_radius
     angles = np.linspace(0.0, 2.0 * np.pi, 73)
     return np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles), np.full(73, detection.lip)])
 

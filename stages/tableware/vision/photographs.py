@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from stages.tableware.world.items import DISHES, MEASURES, Kind
+from stages.tableware.world.items import STANDARD, DishSizes, Kind
 
 WIDTH = 960
 """Pictures are looked at in this width [px]."""
@@ -39,7 +39,9 @@ class Outline:
     unsure: tuple[str, ...]
 
 
-def find_outlines(color: np.ndarray, picture_width: float | None = None) -> tuple[Outline, ...]:
+def find_outlines(
+    color: np.ndarray, picture_width: float | None = None, sizes: DishSizes = STANDARD
+) -> tuple[Outline, ...]:
     """Return the round things of a photograph (H, W, 3) uint8, surest first; `picture_width` [m] is how much of the
     table the picture's width shows."""
     factor = WIDTH / color.shape[1]
@@ -63,7 +65,7 @@ def find_outlines(color: np.ndarray, picture_width: float | None = None) -> tupl
                 continue
             support, box = _support(slopes, (u, v), (axes[0], axes[1]), degrees)
             if support >= LEAST_SUPPORT:
-                kind, reasons = _kind(great, picture_width)
+                kind, reasons = _kind(great, picture_width, sizes)
                 left, top, right, bottom = (float(value / factor) for value in box)
                 outlines.append(Outline(kind, (left, top, right, bottom), 0.5 * support, reasons))
     return tuple(_apart(outlines))
@@ -93,11 +95,11 @@ def _support(
     return float(agreed.mean()), (float(u.min()), float(v.min()), float(u.max()), float(v.max()))
 
 
-def _kind(great: float, picture_width: float | None) -> tuple[Kind | None, tuple[str, ...]]:
+def _kind(great: float, picture_width: float | None, sizes: DishSizes) -> tuple[Kind | None, tuple[str, ...]]:
     if picture_width is None:
         return None, ("heights unknown", "size unknown")
     radius = 0.5 * great / WIDTH * picture_width
-    kind = min(DISHES, key=lambda kind: abs(np.log(radius / MEASURES[kind].rim_radius)))
+    kind = min(sizes.dishes, key=lambda kind: abs(np.log(radius / sizes[kind].rim_radius)))
     return kind, ("heights unknown", "size from the picture's width")
 
 

@@ -12,12 +12,11 @@ import cv2
 import numpy as np
 
 from stages.tableware.vision.height_map import HeightMap
+from stages.tableware.vision.possible_stacks import lip_range
 from stages.tableware.vision.rim_fitting import RAYS, SoughtLip, fit_circle
 from stages.tableware.vision.rim_votes import cast_votes
-from stages.tableware.world.items import DISHES, MEASURES, Kind
+from stages.tableware.world.items import DishSizes, Kind
 
-LIPS: dict[Kind, tuple[float, float]] = {"cup": (0.066, 0.170), "bowl": (0.056, 0.145), "plate": (0.014, 0.048)}
-"""Heights [m] between which a lip of the kind may be, stacks included."""
 LEAST_SLOPE = 0.0012
 """Of an edge [m/px]."""
 LEAST_VOTES, LEAST_SUPPORT = 0.22, 0.42
@@ -36,13 +35,15 @@ class Rim:
     depth_share: float
 
 
-def find_rims(heights: HeightMap) -> list[Rim]:
-    """Return the rims of all kinds, surest first, none twice."""
-    low, high = (np.array([LIPS[kind][end] for kind in DISHES]) for end in (0, 1))
+def find_rims(heights: HeightMap, sizes: DishSizes) -> list[Rim]:
+    """Return the rims of all kinds that `sizes` have, surest first, none twice."""
+    if not sizes.dishes:
+        return []
+    low, high = (np.array([lip_range(kind, sizes)[end] for kind in sizes.dishes]) for end in (0, 1))
     votes = cast_votes(
         cv2.GaussianBlur(heights.smooth, (0, 0), 2.0),
         heights.smooth,
-        np.array([MEASURES[kind].rim_radius for kind in DISHES]),
+        np.array([sizes[kind].rim_radius for kind in sizes.dishes]),
         low,
         high,
         heights.focal[0],
@@ -50,23 +51,25 @@ def find_rims(heights: HeightMap) -> list[Rim]:
         LEAST_SLOPE,
     )
     kept: list[Rim] = []
-    for kind, own in zip(DISHES, votes, strict=True):
+    for kind, own in zip(sizes.dishes, votes, strict=True):
         rims = [
-            fitted for u0, v0 in _peaks(own, heights, kind) if (fitted := fit_rim(heights, kind, u0, v0)) is not None
+            fitted
+            for u0, v0 in _peaks(own, heights, sizes[kind].rim_radius)
+            if (fitted := fit_rim(heights, kind, u0, v0, sizes)) is not None
         ]
         for rim in sorted(rims, key=lambda rim: -rim.support):
-            apart = 1.2 * MEASURES[kind].rim_radius
+            apart = 1.2 * sizes[kind].rim_radius
             if all(rim.kind != other.kind or np.hypot(rim.x - other.x, rim.y - other.y) > apart for other in kept):
                 kept.append(rim)
     return kept
 
 
-def _peaks(votes: np.ndarray, heights: HeightMap, kind: Kind) -> list[tuple[float, float]]:
+def _peaks(votes: np.ndarray, heights: HeightMap, rim_radius: float) -> list[tuple[float, float]]:
     """Return places [px] where votes (at half resolution) gather, most votes first. A pixel of edge votes once."""
     gathered = np.asarray(cv2.boxFilter(votes, -1, (7, 7), normalize=False), dtype=np.float32)
-    circumference = 2.0 * np.pi * float(heights.scale(0.05)) * MEASURES[kind].rim_radius
+    circumference = 2.0 * np.pi * float(heights.scale(0.05)) * rim_radius
     peaks = []
-    apart = int(0.5 * MEASURES[kind].rim_radius * float(heights.scale(0.05)) * 0.6)
+    apart = int(0.5 * rim_radius * float(heights.scale(0.05)) * 0.6)
     for _ in range(16):
         _, most, _, (column, row) = cv2.minMaxLoc(gathered)
         if most < LEAST_VOTES * circumference:
@@ -76,10 +79,10 @@ def _peaks(votes: np.ndarray, heights: HeightMap, kind: Kind) -> list[tuple[floa
     return peaks
 
 
-def fit_rim(heights: HeightMap, kind: Kind, u: float, v: float) -> Rim | None:
+def fit_rim(heights: HeightMap, kind: Kind, u: float, v: float, sizes: DishSizes) -> Rim | None:
     """Return the rim of a kind near pixel (u, v), or None where heights do not bear it out."""
-    measures = MEASURES[kind]
-    low, high = LIPS[kind]
+    measures = sizes[kind]
+    low, high = lip_range(kind, sizes)
     sought = SoughtLip(measures.rim_radius, low, high, heights.focal[0], heights.camera_height)
     u, v, lip, support, radius = fit_circle(heights.smooth, u, v, sought, RAYS)
     if support < LEAST_SUPPORT:
@@ -106,12 +109,12 @@ def _lip_height(heights: HeightMap, u: float, v: float, radius: float, lip: floa
     return lip, float(valid.mean())
 
 
-def overlapping(rims: list[Rim]) -> set[int]:
+def overlapping(rims: list[Rim], sizes: DishSizes) -> set[int]:
     """Return the indices of rims that cross another at like height: they cannot both be where they seem to be."""
     crossed: set[int] = set()
     for (i, a), (j, b) in ((p, q) for k, p in enumerate(enumerate(rims)) for q in list(enumerate(rims))[k + 1 :]):
         distance = np.hypot(a.x - b.x, a.y - b.y)
-        radii = MEASURES[a.kind].rim_radius, MEASURES[b.kind].rim_radius
+        radii = sizes[a.kind].rim_radius, sizes[b.kind].rim_radius
         if abs(radii[0] - radii[1]) + 0.006 < distance < sum(radii) - 0.006 and abs(a.lip - b.lip) < 0.008:
             crossed |= {i, j}
     return crossed

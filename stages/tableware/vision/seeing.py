@@ -22,7 +22,7 @@ from stages.tableware.vision.detections import Detection, statement
 from stages.tableware.vision.height_map import HeightMap, check_color, check_depth, height_map
 from stages.tableware.vision.rectifying import rectify, table_plane
 from stages.tableware.vision.size_estimation import estimated_dishes
-from stages.tableware.world.items import DISHES, TABLE_SIDES
+from stages.tableware.world.items import DISHES, STANDARD, TABLE_SIDES, DishSizes
 from stages.tableware.world.overhead import OverheadCamera
 
 Sizes = Literal["known", "estimated"]
@@ -64,6 +64,8 @@ class Sight:
     rectified: bool
     heights: HeightMap
     """The view from above in which was looked."""
+    sizes: DishSizes = STANDARD
+    """Of what was looked for."""
 
     @property
     def statement(self) -> str:
@@ -78,10 +80,11 @@ def see_image(
     sides: tuple[float, float] = TABLE_SIDES,
     *,
     sizes: Sizes = "known",
+    dishes: DishSizes = STANDARD,
 ) -> tuple[Detection, ...]:
     """Return the items that an RGB-D image shows; what carries another comes before it. Arguments and errors are those
     of `see`, which also says what was not handled."""
-    return see(color, depth, camera, sides, sizes=sizes).detections
+    return see(color, depth, camera, sides, sizes=sizes, dishes=dishes).detections
 
 
 def see(
@@ -91,14 +94,15 @@ def see(
     sides: tuple[float, float] = TABLE_SIDES,
     *,
     sizes: Sizes = "known",
+    dishes: DishSizes = STANDARD,
     seed: int = 0,
 ) -> Sight:
     """Return what an RGB-D image shows of a table.
 
     `color` (H, W, 3) uint8, `depth` (H, W) z-depth [m], 0 or NaN where unknown. `camera` with its pose over the middle
     of a workspace of `sides` [m], or intrinsics alone: then the table and the workspace are found, and the world is
-    theirs. `sizes`: dishes of the known sizes, or of any, estimated. Raises BadInput in one line for an image that
-    cannot be used.
+    theirs. `sizes`: dishes of known sizes, which `dishes` hold, or of any, estimated. Raises BadInput in one line for
+    an image that cannot be used.
     """
     intrinsics = camera if isinstance(camera, Camera) else camera.camera
     _check(color, depth, intrinsics)
@@ -133,15 +137,15 @@ def see(
     if rectified:
         heights = replace(heights, roughness=heights.measured_roughness())
     if sizes == "known":
-        detections = items_in(heights)
+        detections = items_in(heights, dishes)
     else:
         detections = estimated_dishes(heights, seed)
         notes.append("sizes are estimated: utensils and what stacks hold were not looked for")
     if rectified and -normal[2] < np.cos(OBLIQUE):
-        detections = _seen_from_the_side(detections)
+        detections = seen_from_the_side(detections)
     notes += _unhandled(heights)
     plane = ((float(normal[0]), float(normal[1]), float(normal[2])), float(offset))
-    return Sight(detections, tuple(notes), intrinsics, world, plane, sides, rectified, heights)
+    return Sight(detections, tuple(notes), intrinsics, world, plane, sides, rectified, heights, dishes)
 
 
 def _check(color: np.ndarray, depth: np.ndarray | None, camera: Camera) -> None:
@@ -197,7 +201,7 @@ def _check_pose(pose: np.ndarray, normal: np.ndarray, offset: float) -> None:
         )
 
 
-def _seen_from_the_side(detections: tuple[Detection, ...]) -> tuple[Detection, ...]:
+def seen_from_the_side(detections: tuple[Detection, ...]) -> tuple[Detection, ...]:
     """Return the detections of an oblique view with less trust, as confidences are calibrated from above.
 
     What belongs to a stack gets none: lower rims are hidden, so that a tall mug is two cups, a can in a bowl a cup.

@@ -7,12 +7,14 @@ of unknown size they are not told from other slender things.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
 from stages.tableware.vision.detections import Detection
 from stages.tableware.vision.height_map import TALLEST, HeightMap
-from stages.tableware.world.items import Kind, Measures
+from stages.tableware.world.items import Kind, dish_measures
 
 LEAST_HEIGHT, LEAST_AREA = 0.010, 0.0006
 """What stands on the table rises over the first [m] on more than the second [m^2]."""
@@ -22,25 +24,34 @@ ROUGH = 3.0
 """Times the table's roughness: less is a wave in the depth."""
 AROUND = 0.012
 """What is this near to a dish belongs to it: handles, what flies about its edge [m]."""
-EDGE_BAND = 0.012
-"""The upper edge lies within this of the greatest height [m]: dishes seen from the side are noisy."""
 DRAWS = 200
 NEAR = 0.0035
 """Points this near to a circle are on it [m]."""
-LEAST_ROUND = 0.40
-"""Share of a circle's directions in which the upper edge must lie on it."""
-SURE_ROUND = 0.70
+LEAST_TRIED, SURE_ROUND = 0.30, 0.70
+"""Shares of a circle's directions from which it is looked at, and from which more adds nothing to the confidence."""
 RADII = (0.028, 0.160)
-HOLLOW, HOLLOW_SHARE = 0.020, 0.4
-"""What is inside of a dish's edge lies lower than it by the first [m] or by this share of its height, whichever is
-less."""
-WALL = 0.004
-"""Taken for the wall of a dish, which an image from above does not show [m]."""
-FOOT_SHARE = 0.65
-"""Taken for the foot's radius over the rim's."""
+HOLLOW_SHARE = 0.4
+"""What is inside of a dish's edge lies lower than it by `hollow` or by this share of its height, whichever is less."""
 
 
-def estimated_dishes(heights: HeightMap, seed: int = 0) -> tuple[Detection, ...]:
+@dataclass(frozen=True)
+class Limits:
+    """What counts as a dish. The defaults were set while looking at nine real frames (docs/results/tidy_detect.md)."""
+
+    least_round: float = 0.40
+    """Share of a circle's directions in which the upper edge must lie on it."""
+    edge_band: float = 0.012
+    """The upper edge lies within this of the greatest height [m]: dishes seen from the side are noisy."""
+    hollow: float = 0.020
+    """[m]"""
+    slimmest: float = 10.0
+    """Greatest height over rim radius: what is slimmer is no cup but the corner of a box, or a bottle."""
+
+
+DEFAULT = Limits()
+
+
+def estimated_dishes(heights: HeightMap, seed: int = 0, limits: Limits = DEFAULT) -> tuple[Detection, ...]:
     """Return what stands on the table, dishes with their measures in `size`, the rest as unknown. No two stacked ones
     are told apart: a stack is one thing."""
     random = np.random.default_rng([seed, 74])
@@ -53,7 +64,7 @@ def estimated_dishes(heights: HeightMap, seed: int = 0) -> tuple[Detection, ...]
     for level in LEVELS:
         high = (measured & (heights.smooth > max(level, ROUGH * heights.roughness)) & (taken == 0)).astype(np.uint8)
         for window, own in _pieces(high, heights):
-            dish = _dish(heights, window, own, level, random)
+            dish = _dish(heights, window, own, limits, random)
             if dish is not None:
                 result.append(dish)
                 assert dish.size is not None
@@ -101,7 +112,7 @@ def _pieces(mask: np.ndarray, heights: HeightMap) -> list[tuple[tuple[slice, sli
 
 
 def _dish(
-    heights: HeightMap, window: tuple[slice, slice], own: np.ndarray, level: float, random: np.random.Generator
+    heights: HeightMap, window: tuple[slice, slice], own: np.ndarray, limits: Limits, random: np.random.Generator
 ) -> Detection | None:
     """Return the dish whose upper edge a piece over `level` [m] holds, or None."""
     smooth, valid = heights.smooth[window], heights.valid[window] & own
@@ -109,21 +120,21 @@ def _dish(
         return None
     corner = np.array([window[1].start, window[0].start], dtype=float)
     greatest = float(np.percentile(smooth[valid], 97))
-    edge = (valid & (smooth > greatest - EDGE_BAND)).astype(np.uint8)
+    edge = (valid & (smooth > greatest - limits.edge_band)).astype(np.uint8)
     circle = _circle(edge, float(heights.scale(greatest)), random)
-    if circle is None:
+    if circle is None or circle[3] < limits.least_round:
         return None
     u, v, radius, share = circle
     columns, rows = np.meshgrid(np.arange(own.shape[1]) - u, np.arange(own.shape[0]) - v)
     within = (np.hypot(columns, rows) < 0.55 * radius) & heights.valid[window]
     floor = float(np.median(smooth[within])) if np.count_nonzero(within) > 10 else 0.0
-    if greatest - floor < min(HOLLOW, HOLLOW_SHARE * greatest):
+    if greatest - floor < min(limits.hollow, HOLLOW_SHARE * greatest):
         return None
     rim = radius / float(heights.scale(greatest))
     kind: Kind
     if greatest < 0.035:
         kind = "plate"
-    elif rim < 0.060 and greatest > 0.7 * rim:
+    elif rim < 0.060 and 0.7 * rim < greatest <= limits.slimmest * rim:
         kind = "cup"
     elif greatest < 1.6 * rim:
         kind = "bowl"
@@ -133,8 +144,8 @@ def _dish(
     reasons = ["size estimated"]
     if share < SURE_ROUND:
         reasons.append("partly hidden")
-    confidence = 0.5 + 0.4 * min(1.0, (share - LEAST_ROUND) / (SURE_ROUND - LEAST_ROUND))
-    size = Measures(height=greatest, rim_radius=rim, foot_radius=FOOT_SHARE * rim, wall=WALL)
+    confidence = 0.5 + 0.4 * min(1.0, max(0.0, share - DEFAULT.least_round) / (SURE_ROUND - DEFAULT.least_round))
+    size = dish_measures(greatest, rim)
     return Detection(
         kind=kind,
         position=(float(x), float(y), 0.0),
@@ -171,7 +182,7 @@ def _circle(edge: np.ndarray, scale: float, random: np.random.Generator) -> tupl
         own = _share(points, circle, scale)
         if own > share:
             best, share = circle, own
-    if best is None or share < LEAST_ROUND:
+    if best is None or share < LEAST_TRIED:
         return None
     outer = _outermost(points, best, scale)
     system = np.column_stack([outer, np.ones(len(outer))])

@@ -15,7 +15,8 @@ from stages.tableware.vision.detections import Detection
 from stages.tableware.vision.height_map import HeightMap, height_map
 from stages.tableware.vision.rim_finding import Rim
 from stages.tableware.vision.stack_reading import read_stacks
-from stages.tableware.world.items import MEASURES, Kind
+from stages.tableware.world.items import STANDARD as SIZES
+from stages.tableware.world.items import Kind
 from stages.tableware.world.overhead import OverheadCamera
 
 CANNY = (60.0, 150.0)
@@ -41,13 +42,13 @@ def detect_thesis(color: np.ndarray, depth: np.ndarray, camera: OverheadCamera) 
         rims.extend(_circles(gray, heights, kind))
     detections: list[Detection] = []
     covered = np.zeros(gray.shape, dtype=np.uint8)
-    for stack in read_stacks(rims):
+    for stack in read_stacks(rims, SIZES):
         first = len(detections)
         for level, (kind, foot) in enumerate(zip(stack.kinds, stack.feet, strict=True)):
             on = first + level - 1 if level else None
-            lip = foot + MEASURES[kind].height
+            lip = foot + SIZES[kind].height
             detections.append(Detection(kind=kind, position=(stack.x, stack.y, foot), lip=lip, on=on))
-        radius = 1.12 * MEASURES[stack.kinds[0]].rim_radius * float(heights.scale(stack.top))
+        radius = 1.12 * SIZES[stack.kinds[0]].rim_radius * float(heights.scale(stack.top))
         u, v = heights.pixel(np.float64(stack.x), np.float64(stack.y), stack.top)
         cv2.circle(covered, (int(u), int(v)), int(radius), 1, -1)
     detections.extend(_bars(gray, heights, covered > 0))
@@ -55,7 +56,7 @@ def detect_thesis(color: np.ndarray, depth: np.ndarray, camera: OverheadCamera) 
 
 
 def _circles(gray: np.ndarray, heights: HeightMap, kind: Kind) -> list[Rim]:
-    expected = MEASURES[kind].rim_radius * float(heights.scale(0.0))
+    expected = SIZES[kind].rim_radius * float(heights.scale(0.0))
     circles = cv2.HoughCircles(
         gray,
         cv2.HOUGH_GRADIENT,
@@ -72,11 +73,11 @@ def _circles(gray: np.ndarray, heights: HeightMap, kind: Kind) -> list[Rim]:
         columns = np.clip(np.rint(u + 0.97 * radius * np.cos(angles)).astype(int), 0, gray.shape[1] - 1)
         rows = np.clip(np.rint(v + 0.97 * radius * np.sin(angles)).astype(int), 0, gray.shape[0] - 1)
         lip = float(np.percentile(heights.smooth[rows, columns], 75))
-        if lip < 0.6 * MEASURES[kind].height:
+        if lip < 0.6 * SIZES[kind].height:
             continue  # a shadow or an edge on the table
         x, y = (float(value) for value in heights.world(np.float64(u), np.float64(v), lip))
         # Circles come with most votes first: what is near to or overlaps one of its kind that was taken is dropped.
-        if all(np.hypot(x - r.x, y - r.y) > max(CLUSTER, 1.2 * MEASURES[kind].rim_radius) for r in rims):
+        if all(np.hypot(x - r.x, y - r.y) > max(CLUSTER, 1.2 * SIZES[kind].rim_radius) for r in rims):
             rims.append(Rim(kind, x, y, lip, 1.0, 1.0))
     return rims
 
@@ -106,7 +107,7 @@ def _bars(gray: np.ndarray, heights: HeightMap, covered: np.ndarray) -> list[Det
                 kind="fork",
                 position=(float(x), float(y), 0.0),
                 yaw=float(-angle),
-                lip=MEASURES["fork"].height,
+                lip=SIZES["fork"].height,
                 grasp=(float(gx), float(gy), float(line[k])),
             )
         )

@@ -8,13 +8,12 @@ import numpy as np
 from numba import njit
 
 from stages.tableware.world.dish_shapes import GAP_SHARE, HEAD_SHARE, TINES
-from stages.tableware.world.items import MEASURES
+from stages.tableware.world.items import Measures
 
 
 @cache
-def _comb() -> tuple[np.ndarray, np.ndarray]:
+def _comb(fork: Measures) -> tuple[np.ndarray, np.ndarray]:
     """Return points (N, 2) [m] on the middle lines of a fork's tines, and (M, 2) of its gaps; the head is at +x."""
-    fork = MEASURES["fork"]
     root = (0.5 - 0.5 * HEAD_SHARE) * fork.length
     along = np.arange(root, 0.5 * fork.length - 0.001, 0.0012)
     tine = fork.width * (1.0 - GAP_SHARE) / TINES
@@ -64,8 +63,10 @@ def _difference(
     return best
 
 
-def tine_difference(image: np.ndarray, u: float, v: float, angle: float, scale: float, sign: float = 1.0) -> float:
-    """Return how much more `image` (h, w) holds on the tines than in the gaps of a fork at (u, v) [px], `angle` [rad],
-    largest over 21 poses nearby; less where `sign` is negative. NaN where too little is known. Negative values of the
-    image are unknown."""
-    return float(_difference(image, *_comb(), u, v, angle, scale, sign))
+def tine_difference(
+    image: np.ndarray, pose: tuple[float, float, float], scale: float, fork: Measures, sign: float = 1.0
+) -> float:
+    """Return how much more `image` (h, w) holds on the tines than in the gaps of a fork at `pose` (u, v [px], angle
+    [rad]), largest over 21 poses nearby; less where `sign` is negative. NaN where too little is known. Negative values
+    of the image are unknown."""
+    return float(_difference(image, *_comb(fork), *pose, scale, sign))

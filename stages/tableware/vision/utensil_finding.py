@@ -16,7 +16,7 @@ from numba import njit
 
 from stages.tableware.vision.bar_search import bar_candidates
 from stages.tableware.world.dish_shapes import utensil_parts
-from stages.tableware.world.items import MEASURES, UTENSILS, Kind
+from stages.tableware.world.items import DishSizes, Kind
 
 LEAST_SCORE = 0.55
 """Cover of an outline less that of its border, each -1..1 and halved: 1 is perfect."""
@@ -52,9 +52,9 @@ class Bar:
 
 
 @cache
-def outline(kind: Kind) -> tuple[np.ndarray, np.ndarray]:
+def outline(kind: Kind, sizes: DishSizes) -> tuple[np.ndarray, np.ndarray]:
     """Return points (N, 2) [m] within a utensil's plan and (M, 2) in a border 2 to 5 mm around it."""
-    measures = MEASURES[kind]
+    measures = sizes[kind]
     step = 0.0015
     x, y = np.meshgrid(
         np.arange(-0.5 * measures.length - 0.006, 0.5 * measures.length + 0.006, step), np.arange(-0.015, 0.0151, step)
@@ -113,13 +113,14 @@ def _best_pose(
     scale: float,
     start: tuple[float, float, float],
     steps: tuple[float, float, float],
-    far: int = 2,
+    far: int,
+    sizes: DishSizes,
 ) -> Pose:
     """Return the best of 9 (2 far + 1) poses around a start; steps along, across [px], turn [rad]."""
     along, across, turn = (step * grid for step, grid in zip(steps, _grid(far), strict=True))
     cos, sin = np.cos(start[2]), np.sin(start[2])
     columns, rows = start[0] + along * cos - across * sin, start[1] + along * sin + across * cos
-    scores, visible = _scores(map_, *outline(kind), scale, columns, rows, start[2] + turn)
+    scores, visible = _scores(map_, *outline(kind, sizes), scale, columns, rows, start[2] + turn)
     k = int(np.argmax(scores))
     return float(scores[k]), float(columns[k]), float(rows[k]), float(start[2] + turn[k]), float(visible[k])
 
@@ -130,49 +131,52 @@ def _grid(far: int) -> tuple[np.ndarray, ...]:
     return tuple(part.reshape(-1) for part in np.meshgrid(np.arange(-far, far + 1), near, near))
 
 
-def fit_utensil(map_: np.ndarray, scale: float, u: float, v: float, angle: float) -> Bar:
-    """Return the best outline near a bar's centre [px] and direction [rad]; `scale` in pixels per metre."""
+def fit_utensil(map_: np.ndarray, scale: float, start: tuple[float, float, float], sizes: DishSizes) -> Bar:
+    """Return the best outline near a bar's centre (u, v) [px] and direction [rad]; `scale` in pixels per metre."""
+    u, v, angle = start
     fitted: list[tuple[Pose, Kind]] = []
-    part = _scores(map_, *outline("spoon"), scale, np.array([u]), np.array([v]), np.array([angle]))[1][0] < 0.9
-    for kind in UTENSILS:
+    part = _scores(map_, *outline("spoon", sizes), scale, np.array([u]), np.array([v]), np.array([angle]))[1][0] < 0.9
+    for kind in sizes.utensils:
         pose = max(
-            _best_pose(map_, kind, scale, (u, v, angle + flip), (6.0, 2.0, 0.05), 6 if part else 2)
+            _best_pose(map_, kind, scale, (u, v, angle + flip), (6.0, 2.0, 0.05), 6 if part else 2, sizes)
             for flip in (0.0, np.pi)
         )
         for steps in ((2.0, 1.0, 0.02), (1.0, 0.5, 0.008)):
-            pose = _best_pose(map_, kind, scale, pose[1:4], steps)
+            pose = _best_pose(map_, kind, scale, pose[1:4], steps, 2, sizes)
         fitted.append((pose, kind))
     fitted.sort(reverse=True)
     (score, u, v, angle, visible), kind = fitted[0]
     return Bar(kind, u, v, angle, score, visible, {kind: pose for pose, kind in fitted})
 
 
-def search_bars(map_: np.ndarray, scale: float, most: int) -> list[Bar]:
+def search_bars(map_: np.ndarray, scale: float, most: int, sizes: DishSizes) -> list[Bar]:
     """Return up to `most` utensils of a map (h, w) that lie touching, crossing or partly unknown, best first."""
     rest = map_.copy()
     bars: list[Bar] = []
+    if not sizes.utensils:
+        return bars
+    length = sizes["spoon"].length * scale
     for _ in range(most):
         rows, columns = np.nonzero(rest > 0)
-        if len(rows) < 0.25 * MEASURES["spoon"].length * scale * 0.008 * scale:
+        if len(rows) < 0.25 * length * 0.008 * scale:
             break
-        length = MEASURES["spoon"].length * scale
         best: Bar | None = None
         for start in bar_candidates(rows, columns, length, STARTS):
             if start[0] < LEAST_VOTES * length or (best is not None and best.score > GOOD_SCORE):
                 break
-            bar = fit_utensil(rest, scale, float(start[1]), float(start[2]), float(start[3]))
+            bar = fit_utensil(rest, scale, (float(start[1]), float(start[2]), float(start[3])), sizes)
             if best is None or bar.score > best.score:
                 best = bar
         if best is None or best.score < LEAST_SCORE or best.visible < LEAST_VISIBLE:
             break
         bars.append(best)
-        erase_bar(rest, best, scale)
+        erase_bar(rest, best, scale, sizes)
     return bars
 
 
-def erase_bar(map_: np.ndarray, bar: Bar, scale: float) -> None:
+def erase_bar(map_: np.ndarray, bar: Bar, scale: float, sizes: DishSizes) -> None:
     """Set a map to unknown, in place, where a bar lies."""
-    half = 0.5 * MEASURES[bar.kind].length * scale
+    half = 0.5 * sizes[bar.kind].length * scale
     dx, dy = half * np.cos(bar.angle), half * np.sin(bar.angle)
     ends = [(int(round(bar.u + s * dx)), int(round(bar.v + s * dy))) for s in (-1.0, 1.0)]
-    cv2.line(map_, ends[0], ends[1], 0, max(3, int(1.35 * MEASURES[bar.kind].width * scale)))
+    cv2.line(map_, ends[0], ends[1], 0, max(3, int(1.35 * sizes[bar.kind].width * scale)))

@@ -14,7 +14,7 @@ import numpy as np
 from stages.tableware.vision.height_map import HeightMap
 from stages.tableware.vision.tines import tine_difference
 from stages.tableware.vision.utensil_finding import Bar
-from stages.tableware.world.items import Kind
+from stages.tableware.world.items import DishSizes, Kind
 
 RANGE = 0.006
 """Heights are cut to this much above and below the utensil's underside [m]: floors of dishes are far below."""
@@ -27,7 +27,9 @@ WEIGHTS: dict[str, tuple[float, float, float]] = {"table": (26.8, 1.7, 2.2), "di
 MIDDLE: dict[str, tuple[float, float, float]] = {"table": (0.0, 1.3, 0.3), "dish": (0.0, 1.3, 0.3)}
 
 
-def kind_features(bar: Bar, heights: HeightMap, z: float, hidden: np.ndarray) -> tuple[float, float, float]:
+def kind_features(
+    bar: Bar, heights: HeightMap, z: float, hidden: np.ndarray, sizes: DishSizes
+) -> tuple[float, float, float]:
     """Return (fork's score less spoon's, height of tines over gaps [mm], their difference in grey over the handle's);
     NaN where the head is not seen. `z` [m] is the height of the utensil's underside; `hidden` (h, w) bool: where dishes
     are seen in its place."""
@@ -48,8 +50,8 @@ def kind_features(bar: Bar, heights: HeightMap, z: float, hidden: np.ndarray) ->
     contrast = float(np.median(tone - 0.5 * (_sampled(gray, handle + aside) + _sampled(gray, handle - aside))))
     sign = 1.0 if contrast > 0.0 else -1.0
     places = [(u - left + shift * scale * along[0], v - top + shift * scale * along[1]) for shift in SHIFTS]
-    steps = [tine_difference(high, x, y, angle, scale) for x, y in places]
-    tones = [tine_difference(gray, x, y, angle, scale, sign) for x, y in places]
+    steps = [tine_difference(high, (x, y, angle), scale, sizes["fork"]) for x, y in places]
+    tones = [tine_difference(gray, (x, y, angle), scale, sizes["fork"], sign) for x, y in places]
     difference = bar.poses["fork"][0] - bar.poses["spoon"][0]
     return difference, 1e3 * _most(steps), _most(tones) / max(abs(contrast), LEAST_CONTRAST)
 

@@ -21,10 +21,13 @@ from stages.tableware.vision.utensil_finding import (
     search_bars,
 )
 from stages.tableware.vision.utensil_kind import fork_chance, kind_features, told_apart
-from stages.tableware.world.items import MEASURES
+from stages.tableware.world.items import STANDARD, DishSizes
 
-UTENSIL_AREA = 0.00158
-"""Plan area of a fork or a spoon [m^2]."""
+AREA_SHARE = 0.5163
+"""Plan area of a fork or a spoon over its length times its width."""
+LEAST_REACH, LEAST_SLENDER = 0.112, 0.6875
+"""A utensil on a dish reaches this far from its middle [m]; one that is whole is longer than this share of a
+spoon."""
 BAND = 0.006
 """A utensil on a dish lies within this of the lip's height [m]."""
 LEAST_DEPTH = 0.45
@@ -62,20 +65,24 @@ class SeenUtensil:
     depth_share: float
 
 
-def _seen(bar: Bar, heights: HeightMap, z: float, place: str, hidden: np.ndarray) -> SeenUtensil:
-    chance = fork_chance(kind_features(bar, heights, z, hidden), place)
+def _seen(bar: Bar, heights: HeightMap, z: float, place: str, hidden: np.ndarray, sizes: DishSizes) -> SeenUtensil:
+    chance = fork_chance(kind_features(bar, heights, z, hidden, sizes), place)
     bar = told_apart(bar, chance)
-    return SeenUtensil(bar, max(chance, 1.0 - chance), *_relief(heights, bar, z, hidden))
+    return SeenUtensil(bar, max(chance, 1.0 - chance), *_relief(heights, bar, z, hidden, sizes))
 
 
-def utensils_on_dish(heights: HeightMap, stack: Stack, covered: np.ndarray, label: int) -> list[SeenUtensil]:
+def utensils_on_dish(
+    heights: HeightMap, stack: Stack, covered: np.ndarray, label: int, sizes: DishSizes
+) -> list[SeenUtensil]:
     """Return utensils that lie across the uppermost lip, the lowest first. `covered` (h, w) holds the labels of the
     stacks, `label` is that of this one."""
-    top = MEASURES[stack.kinds[-1]]
+    if not sizes.utensils:
+        return []
+    top = stack.measures[-1]
     z = stack.top + 0.002
     scale = float(heights.scale(z))
     u, v = (float(value) for value in heights.pixel(np.float64(stack.x), np.float64(stack.y), z))
-    reach = int(0.112 * scale)
+    reach = int(max(top.rim_radius, LEAST_REACH) * scale)
     left, up = max(0, int(u) - reach), max(0, int(v) - reach)
     window = (slice(up, max(up, int(v) + reach)), slice(left, max(left, int(u) + reach)))
     part, owner = heights.smooth[window], covered[window]
@@ -96,10 +103,10 @@ def utensils_on_dish(heights: HeightMap, stack: Stack, covered: np.ndarray, labe
     map_[(distance > hollow - 0.007) & (distance < top.rim_radius + 0.004)] = 0
     map_[(owner != label) & (owner > 0)] = 0
     map_[part > z + BAND] = 0
-    bars = [_shifted(bar, left, up) for bar in search_bars(map_, scale, 2)]
+    bars = [_shifted(bar, left, up) for bar in search_bars(map_, scale, 2, sizes)]
     nothing = np.zeros(heights.smooth.shape, dtype=bool)
-    seen = [_seen(bar, heights, stack.top, "dish", nothing) for bar in bars]
-    return sorted(seen, key=lambda utensil: _middle_height(heights, utensil.bar, z))
+    seen = [_seen(bar, heights, stack.top, "dish", nothing, sizes) for bar in bars]
+    return sorted(seen, key=lambda utensil: _middle_height(heights, utensil.bar, z, sizes))
 
 
 def _square(center: float, half: float, scale: float) -> slice:
@@ -112,27 +119,27 @@ def _shifted(bar: Bar, du: float, dv: float) -> Bar:
     return replace(bar, u=bar.u + du, v=bar.v + dv, poses=poses)
 
 
-def axis_pixels(heights: HeightMap, bar: Bar, z: float, share: float = 0.94) -> tuple[np.ndarray, np.ndarray]:
+def axis_pixels(heights: HeightMap, bar: Bar, z: float, sizes: DishSizes) -> tuple[np.ndarray, np.ndarray]:
     """Return pixel columns and rows (60,) along a bar's middle line."""
-    half = 0.5 * share * MEASURES[bar.kind].length * float(heights.scale(z))
+    half = 0.5 * 0.94 * sizes[bar.kind].length * float(heights.scale(z))
     along = np.linspace(-half, half, 60)
     columns = np.clip(np.rint(bar.u + along * np.cos(bar.angle)).astype(int), 0, heights.smooth.shape[1] - 1)
     rows = np.clip(np.rint(bar.v + along * np.sin(bar.angle)).astype(int), 0, heights.smooth.shape[0] - 1)
     return columns, rows
 
 
-def _middle_height(heights: HeightMap, bar: Bar, z: float) -> float:
-    columns, rows = axis_pixels(heights, bar, z)
+def _middle_height(heights: HeightMap, bar: Bar, z: float, sizes: DishSizes) -> float:
+    columns, rows = axis_pixels(heights, bar, z, sizes)
     return float(np.median(heights.smooth[rows, columns]))
 
 
-def _relief(heights: HeightMap, bar: Bar, z: float, hidden: np.ndarray) -> tuple[float, float]:
+def _relief(heights: HeightMap, bar: Bar, z: float, hidden: np.ndarray, sizes: DishSizes) -> tuple[float, float]:
     """Return how much higher [m] than its border a bar is, and the share of its pixels with depth, both over what is
     not `hidden` (h, w) bool; NaN where less than LEAST_DEPTH of it has depth."""
     scale = float(heights.scale(z))
     cos, sin = scale * np.cos(bar.angle), scale * np.sin(bar.angle)
     means, share = [], 0.0
-    for part, points in enumerate(outline(bar.kind)):
+    for part, points in enumerate(outline(bar.kind, sizes)):
         columns = (bar.u + points[:, 0] * cos + points[:, 1] * sin + 0.5).astype(int)
         rows = (bar.v + points[:, 0] * sin - points[:, 1] * cos + 0.5).astype(int)
         inside = (columns >= 0) & (columns < hidden.shape[1]) & (rows >= 0) & (rows < hidden.shape[0])
@@ -148,12 +155,13 @@ def _relief(heights: HeightMap, bar: Bar, z: float, hidden: np.ndarray) -> tuple
 
 
 def utensils_on_table(
-    heights: HeightMap, unlike: np.ndarray, hidden: np.ndarray
+    heights: HeightMap, unlike: np.ndarray, hidden: np.ndarray, sizes: DishSizes
 ) -> tuple[list[SeenUtensil], np.ndarray]:
     """Return the utensils on the table, those below before those that lie on them, and (h, w) bool of what looks unlike
     the table and is none. `unlike` (h, w) bool: what looks like no table; `hidden` (h, w) bool: where dishes are."""
     scale = float(heights.scale(0.003))
-    whole = UTENSIL_AREA * scale**2
+    forklike = sizes["fork"] if sizes.utensils else STANDARD["fork"]
+    whole = AREA_SHARE * forklike.length * forklike.width * scale**2
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(
         unlike.astype(np.uint8), connectivity=8, ltype=cv2.CV_16U
     )
@@ -173,9 +181,9 @@ def utensils_on_table(
         own = labels[window] == label
         map_ = np.where(own, 1, -1).astype(np.int8)
         map_[hidden[window] | ((labels[window] > 0) & ~own)] = 0
-        bars = _lone_bar(map_, own, scale, area, whole)
+        bars = _lone_bar(map_, own, scale, area, whole, sizes)
         if not bars:
-            bars = search_bars(map_, scale, min(5, int(area / whole + 1.5)))
+            bars = search_bars(map_, scale, min(5, int(area / whole + 1.5)), sizes)
         bars = [_shifted(bar, window[1].start, window[0].start) for bar in bars]
         if (
             not bars
@@ -183,43 +191,50 @@ def utensils_on_table(
             and heights.smooth[window][own].mean() > max(FLAT, ROUGH * heights.roughness)
         ):
             strange[window] |= own
-        seen.extend(_that_rise(bars, heights, hidden, rest, scale))
+        seen.extend(_that_rise(bars, heights, hidden, rest, scale, sizes))
     # What a dish cuts in two is found by its parts together.
     if np.count_nonzero(rest > 0) > LEAST_VISIBLE * 0.5 * whole:
-        seen.extend(_that_rise(search_bars(rest, scale, MOST_CUT), heights, hidden, rest, scale))
+        seen.extend(_that_rise(search_bars(rest, scale, MOST_CUT, sizes), heights, hidden, rest, scale, sizes))
     strange &= rest > 0
     return sorted(seen, key=lambda utensil: 0.0 if np.isnan(utensil.relief) else utensil.relief), strange
 
 
 def _that_rise(
-    bars: list[Bar], heights: HeightMap, hidden: np.ndarray, rest: np.ndarray, scale: float
+    bars: list[Bar], heights: HeightMap, hidden: np.ndarray, rest: np.ndarray, scale: float, sizes: DishSizes
 ) -> list[SeenUtensil]:
     """Return the bars that rise over the table, which the rim of a shadow as slender as a utensil does not, and set
     `rest` (h, w) to unknown where they lie, in place."""
-    seen = [_seen(bar, heights, 0.0, "table", hidden) for bar in bars]
+    seen = [_seen(bar, heights, 0.0, "table", hidden, sizes) for bar in bars]
     kept = [utensil for utensil in seen if not utensil.relief < max(LEAST_RELIEF, ROUGH * heights.roughness)]
     for utensil in kept:
-        erase_bar(rest, utensil.bar, scale)
+        erase_bar(rest, utensil.bar, scale, sizes)
     return kept
 
 
-def _lone_bar(map_: np.ndarray, own: np.ndarray, scale: float, area: int, whole: float) -> list[Bar]:
+def _lone_bar(map_: np.ndarray, own: np.ndarray, scale: float, area: int, whole: float, sizes: DishSizes) -> list[Bar]:
     """Return the one utensil that a component is, from its moments, or nothing where it is no slender blob."""
+    if not sizes.utensils:
+        return []
     rows, columns = np.nonzero(own)
     values, vectors = np.linalg.eigh(np.cov(np.stack([columns, rows]).astype(np.float64)))
-    if area > 1.4 * whole or values[0] > 0.02 * values[1] or np.sqrt(12.0 * values[1]) < 0.11 * scale:
+    if (
+        area > 1.4 * whole
+        or not sizes.utensils
+        or values[0] > 0.02 * values[1]
+        or np.sqrt(12.0 * values[1]) < LEAST_SLENDER * sizes["spoon"].length * scale
+    ):
         return []
     angle = float(np.arctan2(vectors[1, 1], vectors[0, 1]))
-    bar = fit_utensil(map_, scale, float(columns.mean()), float(rows.mean()), angle)
+    bar = fit_utensil(map_, scale, (float(columns.mean()), float(rows.mean()), angle), sizes)
     return [bar] if bar.score >= LEAST_SCORE and bar.visible >= LEAST_VISIBLE else []
 
 
-def as_detection(utensil: SeenUtensil, heights: HeightMap, z: float, on: int | None) -> Detection:
+def as_detection(utensil: SeenUtensil, heights: HeightMap, z: float, on: int | None, sizes: DishSizes) -> Detection:
     """Return a utensil whose underside is at height z [m]; its grasp is the highest place along its axis."""
     bar = utensil.bar
-    thick = MEASURES[bar.kind].height
+    thick = sizes[bar.kind].height
     x, y = heights.world(np.float64(bar.u), np.float64(bar.v), z + thick)
-    columns, rows = axis_pixels(heights, bar, z)
+    columns, rows = axis_pixels(heights, bar, z, sizes)
     along = np.convolve(heights.smooth[rows, columns], np.full(9, 1.0 / 9.0), mode="valid")
     k = int(np.argmax(along)) + 4
     grasp = heights.world(np.float64(columns[k]), np.float64(rows[k]), z + thick)

@@ -59,13 +59,50 @@ class Measures:
         return rise(self, self)
 
 
-MEASURES: dict[Kind, Measures] = {
-    "cup": Measures(height=0.080, rim_radius=0.045, foot_radius=0.032, wall=0.0030),
-    "bowl": Measures(height=0.070, rim_radius=0.085, foot_radius=0.060, wall=0.0055),
-    "plate": Measures(height=0.022, rim_radius=0.110, foot_radius=0.070, wall=0.0050),
-    "fork": Measures(height=0.003, length=0.170, width=0.018),
-    "spoon": Measures(height=0.003, length=0.160, width=0.018),
-}
+@dataclass(frozen=True)
+class DishSizes:
+    """What the things on a table measure, one size a kind; a kind that is None is not there and not looked for.
+
+    Indexed by kind: `sizes["cup"]` raises KeyError for one that is not there.
+    """
+
+    cup: Measures | None = Measures(height=0.080, rim_radius=0.045, foot_radius=0.032, wall=0.0030)
+    bowl: Measures | None = Measures(height=0.070, rim_radius=0.085, foot_radius=0.060, wall=0.0055)
+    plate: Measures | None = Measures(height=0.022, rim_radius=0.110, foot_radius=0.070, wall=0.0050)
+    fork: Measures | None = Measures(height=0.003, length=0.170, width=0.018)
+    spoon: Measures | None = Measures(height=0.003, length=0.160, width=0.018)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_hash", hash((self.cup, self.bowl, self.plate, self.fork, self.spoon)))
+
+    def __hash__(self) -> int:
+        """Taken once: sizes are part of the key of everything that the planner remembers."""
+        return self._hash  # type: ignore[attr-defined, no-any-return]
+
+    def __getitem__(self, kind: str) -> Measures:
+        measures = getattr(self, kind)
+        if measures is None:
+            raise KeyError(kind)
+        return measures  # type: ignore[no-any-return]
+
+    @cached_property
+    def dishes(self) -> tuple[Kind, ...]:
+        """The kinds of dishes that are there."""
+        return tuple(kind for kind in DISHES if getattr(self, kind) is not None)
+
+    @cached_property
+    def utensils(self) -> tuple[Kind, ...]:
+        """The kinds of utensils that are there."""
+        return tuple(kind for kind in UTENSILS if getattr(self, kind) is not None)
+
+    @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """All kinds that are there."""
+        return (*self.dishes, *self.utensils)
+
+
+STANDARD = DishSizes()
+"""The sizes that everything rendered and simulated has where no file says otherwise."""
 
 
 @dataclass(frozen=True)
@@ -92,10 +129,28 @@ class Item:
 
 
 def make_item(
-    name: str, kind: Kind, x: float, y: float, yaw: float = 0.0, z: float = 0.0, on: str | None = None
+    name: str,
+    kind: Kind,
+    x: float,
+    y: float,
+    yaw: float = 0.0,
+    z: float = 0.0,
+    on: str | None = None,
+    sizes: DishSizes = STANDARD,
 ) -> Item:
-    """Return an item with the standard measures of its kind."""
-    return Item(name, kind, (x, y, z), yaw, on, MEASURES[kind])
+    """Return an item that measures what its kind does."""
+    return Item(name, kind, (x, y, z), yaw, on, sizes[kind])
+
+
+FOOT_SHARE, WALL = 0.65, 0.004
+"""Taken for the foot's radius over the rim's, and for the wall [m], which an image from above does not show."""
+
+
+def dish_measures(height: float, rim_radius: float) -> Measures:
+    """Return the measures [m] of a dish of which only height and rim are known."""
+    return Measures(
+        height=height, rim_radius=rim_radius, foot_radius=FOOT_SHARE * rim_radius, wall=min(WALL, 0.3 * height)
+    )
 
 
 def rise(upper: Measures, lower: Measures) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from schemas.tableware_scene import TablewareItem
-from stages.tableware.world.items import MEASURES, Item, Table
+from stages.tableware.world.items import STANDARD, DishSizes, Item, Table
 
 
 def as_records(table: Table) -> tuple[TablewareItem, ...]:
@@ -16,8 +16,8 @@ def as_records(table: Table) -> tuple[TablewareItem, ...]:
     )
 
 
-def as_table(records: Iterable[TablewareItem]) -> Table:
-    """Return the table of an artifact, with the standard measures of each kind."""
+def as_table(records: Iterable[TablewareItem], sizes: DishSizes = STANDARD) -> Table:
+    """Return the table of an artifact, whose things measure what `sizes` say of their kinds."""
     return Table(
-        tuple(Item(item.name, item.kind, item.position, item.yaw, item.on, MEASURES[item.kind]) for item in records)
+        tuple(Item(item.name, item.kind, item.position, item.yaw, item.on, sizes[item.kind]) for item in records)
     )

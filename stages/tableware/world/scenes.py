@@ -8,14 +8,14 @@ that what comes later may always stand on what is there. Tuning takes seeds 0 to
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
 
 from schemas.errors import UsageError
 from stages.tableware.world.footprints import Footprint, footprint, gap
-from stages.tableware.world.items import MEASURES, Item, Kind, Table, make_item, radius, stand_height
+from stages.tableware.world.items import STANDARD, DishSizes, Item, Kind, Table, make_item, radius, stand_height
 
 ORDER: tuple[Kind, ...] = ("plate", "bowl", "cup", "fork", "spoon")
 APART = 0.002
@@ -45,25 +45,29 @@ TIERS: dict[str, Tier] = {
 }
 
 
-def make_table(tier: str, seed: int) -> Table:
-    """Return the table of a tier and a seed. Raises UsageError for a tier that is not in `TIERS`."""
+def make_table(tier: str, seed: int, sizes: DishSizes = STANDARD) -> Table:
+    """Return the table of a tier and a seed. Raises UsageError for a tier that is not in `TIERS`, or that needs a kind
+    which `sizes` do not have."""
     if tier not in TIERS:
         raise UsageError(f"there is no tier {tier!r}", hint=f"choose one of {', '.join(TIERS)}")
+    missing = [kind for kind in TIERS[tier].counts if kind not in sizes.kinds]
+    if missing:
+        raise UsageError(f"{tier} has {', '.join(missing)}, of which no size is known", hint="add them to --dishes")
     random = np.random.default_rng([seed, 71, list(TIERS).index(tier)])
     while True:
-        table = _draw(TIERS[tier], random)
+        table = _draw(TIERS[tier], random, sizes)
         if table is not None:
             return table
 
 
-def _draw(tier: Tier, random: np.random.Generator) -> Table | None:
+def _draw(tier: Tier, random: np.random.Generator, sizes: DishSizes) -> Table | None:
     """Return a table, or None where the last items found no place."""
     table = Table(())
     left = tier.intersections
     for kind in ORDER:
         for number in range(tier.counts.get(kind, 0)):
             for _ in range(TRIES):
-                item = _anywhere(f"{kind}_{number + 1}", kind, random)
+                item = _anywhere(f"{kind}_{number + 1}", kind, random, sizes)
                 if not footprint(item).on_table:
                     continue
                 touched = [stack for stack in table.stacks if _least_gap(footprint(item), stack) < APART]
@@ -72,7 +76,7 @@ def _draw(tier: Tier, random: np.random.Generator) -> Table | None:
                 top = touched[0][-1]
                 if left and len(touched) == 1 and len(touched[0]) < tier.highest and radius(item) <= radius(top):
                     z = stand_height(table, item, top.name)
-                    item = make_item(item.name, kind, top.position[0], top.position[1], item.yaw, z, top.name)
+                    item = replace(item, position=(top.position[0], top.position[1], z), on=top.name)
                     others = [stack for stack in table.stacks if stack is not touched[0]]
                     if all(_least_gap(footprint(item), stack) >= 0.0 for stack in others):
                         left -= 1
@@ -85,9 +89,10 @@ def _draw(tier: Tier, random: np.random.Generator) -> Table | None:
     return table
 
 
-def _anywhere(name: str, kind: Kind, random: np.random.Generator) -> Item:
+def _anywhere(name: str, kind: Kind, random: np.random.Generator, sizes: DishSizes) -> Item:
     x, y = random.uniform(-0.39, 0.39), random.uniform(-0.305, 0.305)
-    return make_item(name, kind, x, y, random.uniform(-pi / 2, pi / 2) if not MEASURES[kind].rim_radius else 0.0)
+    yaw = 0.0 if sizes[kind].is_dish else random.uniform(-pi / 2, pi / 2)
+    return make_item(name, kind, x, y, yaw, sizes=sizes)
 
 
 def _least_gap(print_: Footprint, stack: tuple[Item, ...]) -> float:
@@ -106,4 +111,4 @@ def _pushed(item: Item, table: Table) -> Item:
         if nearest <= 1e-6:
             break
         x, y = x + nearest * cos(heading), y + nearest * sin(heading)
-    return make_item(item.name, item.kind, x, y, item.yaw)
+    return replace(item, position=(x, y, 0.0))

@@ -8,7 +8,7 @@ import numpy as np
 
 from stages.kit.formats.ply_files import ColoredMesh, write_ply
 from stages.tableware.world.dish_shapes import item_mesh
-from stages.tableware.world.items import MEASURES, Kind, make_item
+from stages.tableware.world.items import STANDARD, DishSizes, Kind, make_item
 
 COLORS: dict[Kind, tuple[int, int, int]] = {
     "bowl": (91, 143, 201),
@@ -19,11 +19,11 @@ COLORS: dict[Kind, tuple[int, int, int]] = {
 }
 
 
-def write_shapes(folder: Path) -> None:
+def write_shapes(folder: Path, sizes: DishSizes = STANDARD) -> None:
     """Write `shapes/<kind>.ply`: the item at the origin, as it stands on a table."""
     (folder / "shapes").mkdir()
-    for kind in MEASURES:
-        mesh = item_mesh(make_item(kind, kind, 0.0, 0.0))
+    for kind in sizes.kinds:
+        mesh = item_mesh(make_item(kind, kind, 0.0, 0.0, sizes=sizes))
         colors = np.tile(np.array(COLORS[kind], dtype=np.uint8), (len(mesh.vertices), 1))
         shape = ColoredMesh(mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32), colors)
         write_ply(folder / "shapes" / f"{kind}.ply", shape)

@@ -26,7 +26,7 @@ from stages.tableware.vision.detections_file import from_file
 from stages.tableware.vision.error_model import ErrorModel, KindErrors, error_model, sampled_detections
 from stages.tableware.vision.image_files import read_camera, read_image
 from stages.tableware.vision.photographs import find_outlines
-from stages.tableware.world.items import MEASURES, Table, make_item
+from stages.tableware.world.items import STANDARD, Table, make_item
 from stages.tableware.world.overhead import overhead_camera
 
 VIEW = overhead_camera()
@@ -42,12 +42,19 @@ def scene(images, tmp_path_factory) -> Path:
     return folder
 
 
-def detect(folder: Path, image: Path, depth: Path | None = None, camera: Path | None = None, **options: Any):
+def detect(
+    folder: Path,
+    image: Path,
+    depth: Path | None = None,
+    camera: Path | None = None,
+    dishes: Path | None = None,
+    **options: Any,
+):
     folder.mkdir()
     context = Context(output=folder, seed=0, device="cpu", progress=SilentProgress())
     parameters = DetectParameters(**options)
     check_inputs(parameters, {"image": image, "depth": depth, "camera": camera})
-    return run(image, depth, camera, parameters=parameters, context=context)
+    return run(image, depth, camera, dishes, parameters=parameters, context=context)
 
 
 def test_a_scenes_folder_becomes_the_same_bytes_twice(scene: Path, tmp_path: Path) -> None:
@@ -203,7 +210,7 @@ def test_boxes_are_matched_by_overlap() -> None:
 
 def test_the_error_model_is_measured_and_whole() -> None:
     model = error_model()
-    assert set(model.kinds) == set(MEASURES)
+    assert set(model.kinds) == set(STANDARD.kinds)
     for kind, errors in model.kinds.items():
         assert errors.items >= 30 and 0.0 < errors.position_sigma < 0.003, kind
         assert errors.miss_rate + sum(errors.confused_as.values()) < 0.1
@@ -229,7 +236,7 @@ def test_sampled_detections_err_as_the_model_says() -> None:
         images=1,
         conditions="",
         unknown_rate=0.0,
-        kinds=dict.fromkeys(MEASURES, errors),
+        kinds=dict.fromkeys(STANDARD.kinds, errors),
     )
     table = Table((make_item("bowl_1", "bowl", 0.0, 0.0), make_item("fork_1", "fork", 0.0, 0.0, 1.0, 0.07, "bowl_1")))
     random = np.random.default_rng(0)
@@ -248,6 +255,6 @@ def test_sampled_detections_err_as_the_model_says() -> None:
         images=1,
         conditions="",
         unknown_rate=0.0,
-        kinds=dict.fromkeys(MEASURES, KindErrors(items=1, position_sigma=0.0, miss_rate=0.0, false_rate=0.0)),
+        kinds=dict.fromkeys(STANDARD.kinds, KindErrors(items=1, position_sigma=0.0, miss_rate=0.0, false_rate=0.0)),
     )
     assert as_table(sampled_detections(table, random, nothing_wrong)).items[1].position == table.items[1].position

@@ -7,7 +7,7 @@ from stages.tableware.vision.detection import detect
 from stages.tableware.vision.detections import as_table, statement
 from stages.tableware.vision.rim_finding import Rim
 from stages.tableware.vision.stack_reading import read_stacks
-from stages.tableware.world.items import MEASURES, rise
+from stages.tableware.world.items import STANDARD, rise
 from stages.tableware.world.overhead import overhead_camera
 
 VIEW = overhead_camera()
@@ -22,7 +22,7 @@ def test_items_are_where_they_stand(found):
     known = {one.kind: one for one in found if one.kind is not None}
     assert sorted(known) == ["bowl", "cup", "spoon"]
     assert known["bowl"].position == pytest.approx((-0.2, 0.1, 0.0), abs=2e-3)
-    assert known["cup"].position == pytest.approx((-0.2, 0.1, rise(MEASURES["cup"], MEASURES["bowl"])), abs=2e-3)
+    assert known["cup"].position == pytest.approx((-0.2, 0.1, rise(STANDARD["cup"], STANDARD["bowl"])), abs=2e-3)
     assert found[known["cup"].on] is known["bowl"]
     assert known["spoon"].position[:2] == pytest.approx((0.15, -0.1), abs=4e-3)
     assert known["spoon"].yaw == pytest.approx(0.6, abs=0.03)
@@ -50,10 +50,10 @@ def test_an_empty_table_is_a_statement():
 
 def test_a_stack_is_read_from_its_lips():
     """Two bowls and three cups would be five; two bowls and two cups are found from their two highest lips."""
-    bowl, cup = MEASURES["bowl"], MEASURES["cup"]
+    bowl, cup = STANDARD["bowl"], STANDARD["cup"]
     lower = bowl.nesting_rise
     foot = lower + rise(cup, bowl) + cup.nesting_rise
     rims = [Rim("cup", 0.101, 0.0, foot + cup.height + 0.001, 0.9, 1.0), Rim("bowl", 0.1, 0.0, lower + 0.07, 1.0, 1.0)]
-    (stack,) = read_stacks(rims)
+    (stack,) = read_stacks(rims, STANDARD)
     assert stack.kinds == ("bowl", "bowl", "cup", "cup")
     assert stack.misfit < 0.001

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from stages.tableware.world.dish_shapes import item_mesh, shell_mesh, utensil_mesh
-from stages.tableware.world.items import DISHES, MEASURES, UTENSILS, Measures, make_item, rise
+from stages.tableware.world.items import DISHES, STANDARD, UTENSILS, Measures, make_item, rise
 from tests.unit.tableware.volumes import shell_volume, utensil_volume
 
 
 @pytest.mark.parametrize("kind", DISHES)
 def test_shell_is_closed_and_has_its_volume(kind):
-    mesh = shell_mesh(MEASURES[kind])
+    mesh = shell_mesh(STANDARD[kind])
     assert mesh.is_watertight and mesh.is_winding_consistent
-    assert mesh.volume == pytest.approx(shell_volume(MEASURES[kind], 64), rel=1e-9)
-    fine = shell_mesh(MEASURES[kind], sides=2000)
-    assert fine.volume == pytest.approx(shell_volume(MEASURES[kind]), rel=1e-5)
+    assert mesh.volume == pytest.approx(shell_volume(STANDARD[kind], 64), rel=1e-9)
+    fine = shell_mesh(STANDARD[kind], sides=2000)
+    assert fine.volume == pytest.approx(shell_volume(STANDARD[kind]), rel=1e-5)
 
 
 def test_shell_volume_of_a_straight_can():
@@ -31,12 +31,12 @@ def test_a_dish_of_impossible_measures_is_refused():
 @pytest.mark.parametrize("kind", UTENSILS)
 @pytest.mark.parametrize("arch", [0.0, 0.01])
 def test_utensil_is_closed_and_has_its_volume(kind, arch):
-    mesh = utensil_mesh(MEASURES[kind], kind == "fork", arch)
+    mesh = utensil_mesh(STANDARD[kind], kind == "fork", arch)
     assert mesh.is_watertight and mesh.is_winding_consistent
-    assert mesh.volume == pytest.approx(utensil_volume(MEASURES[kind], kind == "fork"), rel=1e-9)
+    assert mesh.volume == pytest.approx(utensil_volume(STANDARD[kind], kind == "fork"), rel=1e-9)
     extents = mesh.bounds[1] - mesh.bounds[0]
-    assert extents[0] == pytest.approx(MEASURES[kind].length, abs=1e-9)
-    assert extents[1] == pytest.approx(MEASURES[kind].width, rel=0.01)
+    assert extents[0] == pytest.approx(STANDARD[kind].length, abs=1e-9)
+    assert extents[1] == pytest.approx(STANDARD[kind].width, rel=0.01)
     assert mesh.bounds[0, 2] == pytest.approx(0.0, abs=1e-12)
 
 
@@ -46,7 +46,7 @@ def test_utensil_is_closed_and_has_its_volume(kind, arch):
 )
 def test_stacked_dishes_touch_and_do_not_meet(upper, lower):
     """Heights by `items.rise`: every ring of the upper is inside the hollow of the lower, and one touches."""
-    above, below = MEASURES[upper], MEASURES[lower]
+    above, below = STANDARD[upper], STANDARD[lower]
     up = rise(above, below)
     z = np.linspace(up, min(up + above.height, below.height), 400)
     room = np.array([below.inner_radius(h) - above.outer_radius(h - up) for h in z])

@@ -38,7 +38,7 @@ from stages.tableware.policies.random_piles import RandomPile
 from stages.tableware.policies.stack import StackPolicy
 from stages.tableware.simulation.fast import FastWorld, run_trial
 from stages.tableware.world.footprints import Footprint, footprint, gap
-from stages.tableware.world.items import MEASURES, Item, Table, make_item, rise
+from stages.tableware.world.items import STANDARD, Item, Table, make_item, rise
 from stages.tableware.world.scenes import TIERS, make_table
 
 MODEL = TimeModel(trip=10.1, stack=8.45, pull=5.7)
@@ -47,7 +47,7 @@ DISHES = st.sampled_from(["cup", "bowl", "plate"])
 
 @given(DISHES, DISHES)
 def test_a_dish_comes_to_rest_where_walls_or_floor_touch(upper: str, lower: str) -> None:
-    one, other = MEASURES[upper], MEASURES[lower]
+    one, other = STANDARD[upper], STANDARD[lower]
     if one.rim_radius > other.rim_radius:
         return
     height = rise(one, other)
@@ -152,9 +152,9 @@ def test_pull_grasp_and_stack_grasp_name_the_fields_of_the_equations() -> None:
     assert both.u_P.p_E[0] == pytest.approx(0.1 - 0.09 - 0.01)
     assert both.u_G.p_G[0] == pytest.approx(0.1 - 0.045 - 0.005)
     put = stack_grasp(table, "b", "c")
-    assert put.u_S.p_L == pytest.approx((0.1, 0.2, MEASURES["bowl"].wall))
+    assert put.u_S.p_L == pytest.approx((0.1, 0.2, STANDARD["bowl"].wall))
     x, y, _ = put.u_G.p_G
-    assert hypot(x - 0.1, y - 0.2) == pytest.approx(0.085 - MEASURES["bowl"].wall / 2)
+    assert hypot(x - 0.1, y - 0.2) == pytest.approx(0.085 - STANDARD["bowl"].wall / 2)
 
 
 def test_what_lies_between_forbids_a_pull() -> None:

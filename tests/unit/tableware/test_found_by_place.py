@@ -28,7 +28,7 @@ class NewestFirst:
         return grasp(table, table.tops[-1].name)
 
 
-POLICY = DeclaredPolicy(lambda model, chances, seed: NewestFirst())
+POLICY = DeclaredPolicy(lambda rules, model, chances, seed: NewestFirst())
 '''
 
 

@@ -30,7 +30,7 @@ from stages.tableware.simulation.recording import Recording
 from stages.tableware.simulation.tabletop import where_it_passed
 from stages.tableware.simulation.trial import Done, Trial, most_actions, run_in
 from stages.tableware.simulators import SIMULATORS
-from stages.tableware.world.items import MEASURES, Item, Kind, Table, make_item, stand_height
+from stages.tableware.world.items import STANDARD, Item, Kind, Table, make_item, stand_height
 from tests.unit.tableware.volumes import shell_volume
 
 DENAVIT_HARTENBERG = (
@@ -64,8 +64,8 @@ def test_the_arm_moves_as_its_published_lengths_say() -> None:
 
 @pytest.mark.parametrize("kind", ["cup", "bowl", "plate"])
 def test_a_dish_weighs_what_its_volume_says_and_its_pieces_keep_within_it(kind: str) -> None:
-    measures = MEASURES[kind]  # type: ignore[index]
-    body = solid(kind)  # type: ignore[arg-type]
+    measures = STANDARD[kind]  # type: ignore[index]
+    body = solid(kind, measures)  # type: ignore[arg-type]
     assert body.mass == pytest.approx(DISH_DENSITY * shell_volume(measures), rel=0.005)
     assert body.center[2] < measures.height / 2
     assert body.inertia[0] == pytest.approx(body.inertia[1], rel=1e-6)
@@ -78,7 +78,7 @@ def test_a_dish_weighs_what_its_volume_says_and_its_pieces_keep_within_it(kind: 
 
 
 def test_a_nested_stack_stands_still_as_high_as_the_shapes_say() -> None:
-    rise = MEASURES["cup"].nesting_rise
+    rise = STANDARD["cup"].nesting_rise
     items = [make_item("a", "cup", 0.1, 0.0)]
     items.append(make_item("b", "cup", 0.1, 0.0, z=rise, on="a"))
     items.append(make_item("c", "cup", 0.1, 0.0, z=2 * rise, on="b"))
@@ -206,7 +206,7 @@ def test_cups_are_pressed_less_than_bowls_and_heavy_pairs_more(first: str, secon
 
 
 def test_after_an_idle_action_the_pile_that_was_meant_is_taken_alone_then_the_highest_things() -> None:
-    rise = MEASURES["cup"].nesting_rise
+    rise = STANDARD["cup"].nesting_rise
     cups = (
         make_item("a", "cup", 0.1, 0.0),
         make_item("b", "cup", 0.2, 0.0),
@@ -292,7 +292,7 @@ def test_a_cup_is_stacked_into_another() -> None:
     world = PhysicsTable(Table((make_item("a", "cup", -0.1, 0.1), make_item("b", "cup", 0.15, 0.05))))
     world.do(stack(world.table, "a", "b"))
     upper = world.table.by_name["a"]
-    assert upper.on == "b" and upper.position[2] == pytest.approx(MEASURES["cup"].nesting_rise, abs=0.002)
+    assert upper.on == "b" and upper.position[2] == pytest.approx(STANDARD["cup"].nesting_rise, abs=0.002)
     world.close()
 
 

@@ -45,6 +45,7 @@ from stages.tableware.vision.detections import Detection
 from stages.tableware.world.footprints import Footprint, footprint, gap, overlapped
 from stages.tableware.world.items import Table, make_item
 from stages.tableware.world.scenes import make_table
+from stages.tableware.world.setting import Setting
 
 MODEL = TimeModel(trip=10.0, stack=8.0, pull=5.0)
 RULES = Rules()
@@ -206,7 +207,7 @@ def test_detections_of_unknown_kind_and_low_confidence_are_not_planned_for() -> 
             Detection(None, (0.0, 0.2, 0.0), lip=0.05, confidence=0.0, extent=0.05, unsure=("unknown object",)),
         ),
         0.5,
-        RULES,
+        Setting(),
     )
     assert [item.name for item in seen.table.items] == ["cup_1"]
     assert [one.reason for one in seen.refused] == ["unknown_object", "unsure"]

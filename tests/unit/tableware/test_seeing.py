@@ -9,8 +9,8 @@ import trimesh
 from schemas.errors import BadInput
 from schemas.scene_parts import Camera
 from stages.tableware.vision.detections import Detection
-from stages.tableware.vision.seeing import _seen_from_the_side, see, see_image
-from stages.tableware.world.items import MEASURES, Table, make_item
+from stages.tableware.vision.seeing import see, see_image, seen_from_the_side
+from stages.tableware.world.items import STANDARD, Table, make_item
 from stages.tableware.world.overhead import OverheadCamera, overhead_camera, render_overhead
 
 VIEW = overhead_camera()
@@ -107,15 +107,15 @@ def test_without_a_pose_the_table_is_found(oblique):
     found = {one.kind: one for one in sight.detections if one.kind is not None}
     assert sorted(found) == ["bowl", "cup"]
     for kind, one in found.items():
-        assert one.size.rim_radius == pytest.approx(MEASURES[kind].rim_radius, abs=4e-3)
-        assert one.size.height == pytest.approx(MEASURES[kind].height, abs=6e-3)
+        assert one.size.rim_radius == pytest.approx(STANDARD[kind].rim_radius, abs=4e-3)
+        assert one.size.height == pytest.approx(STANDARD[kind].height, abs=6e-3)
         assert "size estimated" in one.unsure
     apart = np.subtract(found["bowl"].position, found["cup"].position)
     assert np.hypot(*apart[:2]) == pytest.approx(np.hypot(0.26, 0.07), abs=5e-3)
     assert "stacks hold were not looked for" in sight.statement
 
 
-def test_stacks_seen_from_the_side_are_not_trusted():
+def test_stacksseen_from_the_side_are_not_trusted():
     """A tall mug seen from the side reads as two nested cups: no plan may lift or build on that."""
     seen = (
         Detection(kind="cup", position=(0.0, 0.0, 0.0), hidden=True, confidence=0.9),
@@ -124,7 +124,7 @@ def test_stacks_seen_from_the_side_are_not_trusted():
         Detection(kind="fork", position=(0.2, 0.0, 0.0), on=2, confidence=0.9),
         Detection(kind=None, position=(0.0, 0.2, 0.0), confidence=0.0, unsure=("unknown object",)),
     )
-    doubted = _seen_from_the_side(seen)
+    doubted = seen_from_the_side(seen)
     assert [one.confidence for one in doubted] == pytest.approx([0.0, 0.0, 0.72, 0.72, 0.0])
     assert all("a stack seen from the side" in one.unsure for one in doubted[:2])
     assert doubted[2].unsure == ("oblique view",) and doubted[4] == seen[4]

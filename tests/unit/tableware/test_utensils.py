@@ -15,7 +15,7 @@ from stages.tableware.vision.utensil_finding import search_bars
 from stages.tableware.vision.utensil_kind import fork_chance
 from stages.tableware.vision.utensil_reading import SeenUtensil, as_detection
 from stages.tableware.world.dish_shapes import utensil_parts
-from stages.tableware.world.items import MEASURES
+from stages.tableware.world.items import STANDARD
 
 SCALE = 771.0
 
@@ -26,7 +26,7 @@ def drawn(kind, u, v, angle, size=240):
     x = ((columns - u) * np.cos(angle) + (rows - v) * np.sin(angle)) / SCALE
     y = ((columns - u) * np.sin(angle) - (rows - v) * np.cos(angle)) / SCALE
     mask = np.zeros((size, size), dtype=bool)
-    for stations, low, high in utensil_parts(MEASURES[kind], kind == "fork"):
+    for stations, low, high in utensil_parts(STANDARD[kind], kind == "fork"):
         within = (x >= stations[0]) & (x <= stations[-1])
         mask |= within & (y >= np.interp(x, stations, low)) & (y <= np.interp(x, stations, high))
     return mask
@@ -34,7 +34,7 @@ def drawn(kind, u, v, angle, size=240):
 
 def test_two_crossing_utensils_are_found_where_they_lie():
     map_ = np.where(drawn("fork", 110, 125, 0.4) | drawn("spoon", 130, 115, -1.0), 1, -1).astype(np.int8)
-    bars = sorted(search_bars(map_, SCALE, 3), key=lambda bar: bar.u)
+    bars = sorted(search_bars(map_, SCALE, 3, STANDARD), key=lambda bar: bar.u)
     assert len(bars) == 2
     for bar, (u, v, angle) in zip(bars, ((110, 125, 0.4), (130, 115, -1.0)), strict=True):
         assert (bar.u, bar.v) == pytest.approx((u, v), abs=5.0)
@@ -44,7 +44,7 @@ def test_two_crossing_utensils_are_found_where_they_lie():
 def test_a_utensil_that_is_half_unknown_is_no_longer_than_it_is():
     map_ = np.where(drawn("spoon", 120, 120, 0.0), 1, -1).astype(np.int8)
     map_[:, 120:170] = 0
-    (bar,) = search_bars(map_, SCALE, 1)
+    (bar,) = search_bars(map_, SCALE, 1, STANDARD)
     assert (bar.u, bar.v) == pytest.approx((120, 120), abs=4.0)
     assert bar.visible == pytest.approx(0.6, abs=0.15)
 
@@ -52,7 +52,7 @@ def test_a_utensil_that_is_half_unknown_is_no_longer_than_it_is():
 def test_a_patch_is_no_bar_and_nothing_has_no_candidates():
     map_ = np.full((200, 200), -1, dtype=np.int8)
     map_[60:140, 50:150] = 1
-    assert search_bars(map_, SCALE, 3) == []
+    assert search_bars(map_, SCALE, 3, STANDARD) == []
     nothing = np.zeros(0, dtype=np.int64)
     assert len(bar_candidates(nothing, nothing, 123.0, 4)) == 0
 
@@ -61,10 +61,12 @@ def test_tines_are_seen_on_a_fork_alone():
     heights = {
         kind: np.where(drawn(kind, 120, 120, 0.3), 0.009, 0.006).astype(np.float32) for kind in ("fork", "spoon")
     }
-    fork = tine_difference(heights["fork"], 120.0, 120.0, 0.3, SCALE)
-    spoon = tine_difference(heights["spoon"], 120.0, 120.0, 0.3, SCALE)
+    fork = tine_difference(heights["fork"], (120.0, 120.0, 0.3), SCALE, STANDARD["fork"])
+    spoon = tine_difference(heights["spoon"], (120.0, 120.0, 0.3), SCALE, STANDARD["fork"])
     assert fork > 0.0015 > 0.0005 > abs(spoon)
-    assert np.isnan(tine_difference(np.full((240, 240), -1.0, np.float32), 120.0, 120.0, 0.3, SCALE))
+    assert np.isnan(
+        tine_difference(np.full((240, 240), -1.0, np.float32), (120.0, 120.0, 0.3), SCALE, STANDARD["fork"])
+    )
 
 
 def test_an_unseen_head_leaves_the_kind_in_doubt():
@@ -95,12 +97,12 @@ def flat(shape=(240, 240)):
     ],
 )
 def test_a_utensils_doubts_have_reasons(change, reason):
-    (bar,) = search_bars(np.where(drawn("spoon", 120, 120, 0.3), 1, -1).astype(np.int8), SCALE, 1)
+    (bar,) = search_bars(np.where(drawn("spoon", 120, 120, 0.3), 1, -1).astype(np.int8), SCALE, 1, STANDARD)
     if "visible" in change:
         bar = type(bar)(bar.kind, bar.u, bar.v, bar.angle, bar.score, change["visible"], bar.poses)
     known = {"chance": 0.99, "relief": 0.003, "depth_share": 1.0}
     seen = SeenUtensil(bar, **(known | {name: value for name, value in change.items() if name in known}))
-    one = as_detection(seen, flat(), 0.0, None)
+    one = as_detection(seen, flat(), 0.0, None, STANDARD)
     assert one.unsure == (() if reason is None else (reason,))
     assert (one.confidence > 0.99) == (reason != "fork or spoon")
     assert one.yaw == pytest.approx(-bar.angle)
@@ -147,7 +149,7 @@ def heights_for_doubt(white=0.0):
 )
 def test_a_dishs_doubts_have_reasons_and_cost_confidence(lip, depth_share, white, crossed, reason):
     rim = Rim("cup", 0.0, 0.0, lip, 0.9, depth_share)
-    (stack,) = read_stacks([rim])
+    (stack,) = read_stacks([rim], STANDARD)
     (cup,) = dishes_of(stack, heights_for_doubt(white), {id(rim)} if crossed else set(), 0)
     assert cup.unsure == (() if reason is None else (reason,))
     assert cup.confidence == pytest.approx(1.0) if reason is None else cup.confidence < 0.9
@@ -155,6 +157,6 @@ def test_a_dishs_doubts_have_reasons_and_cost_confidence(lip, depth_share, white
 
 def test_rims_that_cross_at_one_height_cannot_both_be_there():
     cup = [Rim("cup", x, 0.0, 0.08, 0.9, 1.0) for x in (0.0, 0.06, 0.2)]
-    assert overlapping(cup) == {0, 1}
+    assert overlapping(cup, STANDARD) == {0, 1}
     high = Rim("cup", 0.06, 0.0, 0.12, 0.9, 1.0)
-    assert overlapping([cup[0], high]) == set()
+    assert overlapping([cup[0], high], STANDARD) == set()
