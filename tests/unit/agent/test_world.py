@@ -57,12 +57,12 @@ def test_exploration_finds_all_furniture_without_being_told() -> None:
 
 def test_distances_are_those_of_the_plane_and_go_around_walls() -> None:
     free = np.ones((41, 41), bool)
-    found = distances(free, 20, 20)
+    found = distances(free, np.ones(free.shape), 20, 20)
     rows, columns = np.mgrid[:41, :41]
     straight = np.hypot(rows - 20, columns - 20)
     assert np.all(found >= straight - 1e-9) and np.max(found - straight) < 1.6  # first order: worst along diagonals
     free[:40, 25] = False
-    around = distances(free, 20, 20)
+    around = distances(free, np.ones(free.shape), 20, 20)
     assert around[20, 30] > 20 and not np.isfinite(around[5, 25])
 
 

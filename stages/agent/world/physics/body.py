@@ -75,6 +75,8 @@ AROUND = 1.4
 """What is farther from the base does not matter to the arm [m]."""
 CLOSED_ON_NOTHING = 0.004
 """Opening of the fingers below which they hold nothing [m]."""
+COMFORT = 4.5
+"""Cells of the map within which a turn of the pedestal (0.28 m) with its folded arm (0.39 m) may touch something."""
 NEARER = 0.1
 """The arm is shorter than the one of the fast world: it starts so much nearer to a table before it [m]."""
 
@@ -82,7 +84,7 @@ NEARER = 0.1
 class PhysicsBody:
     """One episode's world in pybullet. `sought`: classes that the eyes are asked for. `close` it."""
 
-    same_thing, stand_off, clearance, short_armed = 0.07, 0.38, 2.7, True
+    same_thing, stand_off, clearance, short_armed = 0.07, 0.38, 2.9, True
 
     def __init__(self, apartment: Apartment, sought: tuple[str, ...], rates: Rates, seed: int) -> None:
         self.apartment, self._rates, self._luck = apartment, rates, Luck(seed)
@@ -109,7 +111,7 @@ class PhysicsBody:
         self._pieces: list[head.SeenPiece] = []
         self._tops: dict[int, float] = {}
         self._surfaces: list[Surface] = []
-        self._obstacles = ObstacleMap(self.base, self.clearance)
+        self._obstacles = ObstacleMap(self.base, self.clearance, COMFORT)
         self._log = EventLog()
         self._seconds = self.metres = 0.0
         self._grasps = 0
@@ -198,11 +200,16 @@ class PhysicsBody:
         way = self._obstacles.path(self.base, (base.x, base.y))
         failed = MotionFailed("no_way", "the obstacle map shows no way there") if way is None else None
         if way is not None:
+            if not np.allclose(self._arm, self._description.carry):
+                self._arm_to(self._description.carry)
             error = self._random.normal(0, 1, 3) * (LOCALISATION, LOCALISATION, TURNED)
-            start = self._true_base()
-            rows = [*(np.array([*point, 0.0]) - self._error for point in way[1:-1]), goal - error]
-            rows = _facing_on(start, rows)
-            failed = self._roll_along(start, rows)
+            points = [np.array([*point, 0.0]) - self._error for point in way[1:-1]]
+            ease = [self._obstacles.at_ease(*point) for point in way[1:-1]]
+            for turns in (ease, [False] * len(ease), [True] * len(ease)):
+                start = self._true_base()
+                failed = self._roll_along(start, _facing_on(start, points, turns, goal - error))
+                if failed is None:
+                    break
             self._error = error
             self._believed = goal if failed is None else self._true_base() + error
             self._believed[2] = (self._believed[2] + pi) % (2 * pi) - pi
@@ -263,7 +270,8 @@ class PhysicsBody:
             renderer = renderer or self.room.renderer(pose[:3, 3])
             picture = take(renderer, NEAR_BY if close else WRIST, self._aimed(pose, at, close), self._random)
             camera = self._aimed(seen_pose, at, close)
-            self._keep_top(picture, camera, piece)
+            if not close:  # a thing fills a picture from near by
+                self._keep_top(picture, camera, piece)
             masks = self._segmenter.masks(picture, (sector, close))
             found += seen_in(picture, masks, camera, camera[:3, 3])
             self.pictures = [*self.pictures[-40:], (f"{'near ' if close else ''}{turn:+.1f}", picture.color)]
@@ -612,13 +620,14 @@ def whole_body_rows(bases: np.ndarray, arm: np.ndarray) -> np.ndarray:
     return np.concatenate([bases, np.tile(arm, (len(bases), 1))], axis=1)
 
 
-def _facing_on(start: np.ndarray, rows: list[np.ndarray]) -> list[np.ndarray]:
-    """Return base poses (3,) with yaws that turn little from each to the next; between start and end, along the way."""
+def _facing_on(start: np.ndarray, points: list[np.ndarray], turns: list[bool], goal: np.ndarray) -> list[np.ndarray]:
+    """Return base poses (3,) through points to a goal pose that turn little from each to the next: along the way at
+    points where it `turns`, as before at the others, for the base drives to any side."""
     made, before = [], start
-    for k, row in enumerate(rows):
-        turned = row.copy()
-        if k + 1 < len(rows):
-            turned[2] = atan2(row[1] - before[1], row[0] - before[0])
+    for point, turn in zip([*points, goal], [*turns, True], strict=True):
+        turned = point.copy()
+        if len(made) < len(points):
+            turned[2] = atan2(point[1] - before[1], point[0] - before[0]) if turn else before[2]
         turned[2] = before[2] + (turned[2] - before[2] + pi) % (2 * pi) - pi
         made.append(turned)
         before = turned

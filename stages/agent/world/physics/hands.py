@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stages.agent.world.physics.eyes import Surface
-from stages.agent.world.physics.grasps import antipodal_grasps
+from stages.agent.world.physics.grasps import antipodal_grasps, within_reach
 from stages.agent.world.physics.shapes import record_of, slab, urdf_of
 from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.arm_motion import ArmPlanner, Tally
@@ -146,7 +146,8 @@ def plan_grasp(
     surface, name, rank = target.surface, target.name, target.rank
     keep = _inside(surface)
     points, normals = surface.points[keep], surface.normals[keep]
-    grasps = antipodal_grasps(points, normals, opening, target.floor)[rank * NEXT :][:CANDIDATES]
+    heading = np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
+    grasps = within_reach(antipodal_grasps(points, normals, opening, target.floor), heading)[rank * NEXT :][:CANDIDATES]
     if not grasps:
         width = narrowest_width(points)
         raise MotionFailed(

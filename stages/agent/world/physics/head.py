@@ -23,6 +23,9 @@ ENOUGH = 3
 LEAST = 60
 """Points of a piece of furniture that is made out."""
 GRAIN = 0.04
+TOP_SHARE = 0.3
+"""Of the fullest level's cubes: the highest level that has as many is the top; above it are strays at the rims of
+things that stand there."""
 
 
 def cells_of(points: np.ndarray, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -68,7 +71,10 @@ class SeenPiece:
         if self._box is None:
             points = np.array(sorted(self.cubes)) * GRAIN
             points = points[clusters(points, 0.2) == 0]
-            self._box = np.percentile(points, 1, axis=0), np.percentile(points, 99, axis=0)
+            low, high = np.percentile(points, 1, axis=0), np.percentile(points, 99, axis=0)
+            levels, counts = np.unique(points[:, 2], return_counts=True)
+            high[2] = levels[counts >= TOP_SHARE * counts.max()].max()
+            self._box = low, high
         return self._box
 
 
