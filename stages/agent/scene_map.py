@@ -15,9 +15,9 @@ SAME_FURNITURE = 0.3
 """Two sightings of furniture this near are of one piece [m], and those of a class whose boxes overlap."""
 IN_FRONT = 0.7
 """Furniture whose edge is this near to the base is in front of it [m]."""
-SURE = 0.9
+SURE = 0.8
 """A thing is taken to be on a small carrier within this share of its radius: nearer to the rim it may lean on it."""
-UNLIKE = 0.5
+UNLIKE = 0.8
 """What is narrower than this share of a carrier is a thing on it, not the carrier."""
 Region = tuple[int | str, bool]
 """Quarter turn (or `hand`) from which something was seen, and whether from near by."""

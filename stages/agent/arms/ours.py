@@ -301,7 +301,9 @@ class OwnSkills(CommonSkills):
         over = self.scene.at_carrier(at, place)
         for close in (True, False):
             look = self._body.look(at, close=close)
-            new = [d for d in look.detections if d.label in wanted and self.scene.at(d.position, place, d.radius) is None]
+            new = [
+                d for d in look.detections if d.label in wanted and self.scene.at(d.position, place, d.radius) is None
+            ]
             near = [(hypot(d.position[0] - at[0], d.position[1] - at[1]), d) for d in new]
             away, seen = min(near, default=(BESIDE, None), key=lambda pair: pair[0])
             if seen is not None and away < BESIDE:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
+from scipy.ndimage import binary_erosion
 
 from schemas.apartment import Apartment, Furniture
 from stages.agent.body import Base, Detection, Felt, FeltKind, Look, Position, SeenFurniture, Sweep
@@ -115,6 +116,7 @@ class PhysicsBody:
         self._log = EventLog()
         self._seconds = self.metres = 0.0
         self._grasps = 0
+        self._looked_from: Base | None = None
         self.pictures: list[tuple[str, np.ndarray]] = []
         """What the wrist camera took last, for people."""
 
@@ -164,7 +166,8 @@ class PhysicsBody:
             numbers = picture.instance.reshape(-1)
             for number in np.unique(numbers[there]):
                 name = self.room.named.get(int(number), "")
-                own = there & (numbers == number)
+                inner = binary_erosion(picture.instance == number).reshape(-1)  # depth at edges is of what is behind
+                own = there & inner & (picture.depth.reshape(-1) < head.SURE)
                 if name in self.room.furniture and own.sum() >= head.LEAST:
                     head.enter(self._pieces, self.room.furniture[name].label, points[own])
             self._seconds += PICTURE_SECONDS
@@ -280,6 +283,7 @@ class PhysicsBody:
             if self.room.things[name].label in self._sought:
                 self._log.mistaken("missed", f"look {name}")
         self._oracle.missed.clear()
+        self._looked_from = self.base
         near = [s for s in fuse(found) if self._belongs(s, at, piece, close)]
         old = [s for s in self._surfaces if not self._belongs(s, at, piece, close)]
         self._surfaces = old + near
@@ -440,15 +444,27 @@ class PhysicsBody:
         self._log.done("grasp", step, right, cause, self.room.things[held].label if held else "")
         return Felt(True)
 
+    def _see_from_here(self, at: Position) -> None:
+        """Look once more at what will be grasped: what was measured from another stop is off by both stops' errors."""
+        if self._looked_from == self.base:
+            return
+        before = self._surfaces
+        self.look(at, close=True)
+        if not any(hypot(s.middle[0] - at[0], s.middle[1] - at[1]) <= FOUND_WITHIN for s in self._surfaces):
+            self._surfaces = before
+
     def _take(self, at: Position, candidate: int) -> None:
+        self._see_from_here(at)
         away = [hypot(s.middle[0] - at[0], s.middle[1] - at[1]) for s in self._surfaces]
         number = int(np.argmin(away)) if away else -1
         if number < 0 or away[number] > FOUND_WITHIN:
             raise MotionFailed("no_grasp", "no surface was seen there", (), {"distance": min(away, default=9.0)})
+        surface = self._surfaces[number]
+        self._surfaces = [s for s in self._surfaces if s is surface or not s.same_as(surface)]
+        number = next(k for k, s in enumerate(self._surfaces) if s is surface)
         self._beliefs.hold(None)
         self._beliefs.show(self._boxes())
         piece = self._piece_at(at)
-        surface = self._surfaces[number]
         floor = self._tops.get(piece, float(surface.low[2])) if piece is not None else float(surface.low[2])
         target = Target(surface, f"thing_{number}", candidate, floor)
         motion = plan_grasp(self._beliefs, self._believed, self._arm, target, self._random)

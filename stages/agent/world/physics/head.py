@@ -74,6 +74,9 @@ class SeenPiece:
             low, high = np.percentile(points, 1, axis=0), np.percentile(points, 99, axis=0)
             levels, counts = np.unique(points[:, 2], return_counts=True)
             high[2] = levels[counts >= TOP_SHARE * counts.max()].max()
+            top = points[np.abs(points[:, 2] - high[2]) < 1.5 * GRAIN, :2]
+            if len(top) >= LEAST:  # what stands there is as wide as its top
+                low[:2], high[:2] = np.percentile(top, 2, axis=0), np.percentile(top, 98, axis=0)
             self._box = low, high
         return self._box
 
