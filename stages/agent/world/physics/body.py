@@ -10,7 +10,6 @@ from __future__ import annotations
 from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
-from scipy.ndimage import binary_erosion
 
 from schemas.apartment import Apartment, Furniture
 from stages.agent.body import Base, Detection, Felt, FeltKind, Look, Position, SeenFurniture, Sweep
@@ -34,6 +33,7 @@ from stages.agent.world.physics.eyes import (
 from stages.agent.world.physics.hands import (
     DROP,
     JUST_OVER,
+    SOME_WAY_OVER,
     Beliefs,
     Box,
     Hold,
@@ -161,13 +161,12 @@ class PhysicsBody:
             pose = look_at(eye, eye + away)
             picture = take(renderer, HEAD, pose, self._random)
             points = apply(map_from_true @ pose, back_project(picture.depth, HEAD).reshape(-1, 3).astype(float))
-            there = picture.depth.reshape(-1) > 0
+            there = head.steady(picture.depth).reshape(-1)
             clouds.append(points[there])
             numbers = picture.instance.reshape(-1)
             for number in np.unique(numbers[there]):
                 name = self.room.named.get(int(number), "")
-                inner = binary_erosion(picture.instance == number).reshape(-1)  # depth at edges is of what is behind
-                own = there & inner & (picture.depth.reshape(-1) < head.SURE)
+                own = there & (numbers == number) & (picture.depth.reshape(-1) < head.SURE)
                 if name in self.room.furniture and own.sum() >= head.LEAST:
                     head.enter(self._pieces, self.room.furniture[name].label, points[own])
             self._seconds += PICTURE_SECONDS
@@ -526,10 +525,8 @@ class PhysicsBody:
             return Felt(True)
         here = (at[0], at[1], self._support(at))
         self._beliefs.show(self._boxes(at))
-        height = JUST_OVER if gently else DROP
         try:
-            motion = plan_release(self._beliefs, self._believed, self._arm, self._hold, here, height, self._random)
-            self._let_go(motion, gently)
+            self._let_go(self._way_down(here, (JUST_OVER, SOME_WAY_OVER) if gently else (DROP,)), gently)
         except MotionFailed as failed:
             self._recover()
             self._log.done("release", step, False, "place", "")
@@ -539,6 +536,16 @@ class PhysicsBody:
         on = self.room.things[body.on].label if body.on in self.room.things else on
         self._log.done("release", step, on == label, "place", "")
         return Felt(True)
+
+    def _way_down(self, here: Position, heights: tuple[float, ...]) -> Motion:
+        """Plan to let go at the first of the heights over a position that can be got to. Raises MotionFailed."""
+        for number, height in enumerate(heights):
+            try:
+                return plan_release(self._beliefs, self._believed, self._arm, self._hold, here, height, self._random)
+            except MotionFailed:
+                if number + 1 == len(heights):
+                    raise
+        raise AssertionError("unreachable")
 
     def _let_go(self, motion: Motion, gently: bool) -> None:
         reach, down = motion.there
