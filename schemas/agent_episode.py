@@ -116,8 +116,8 @@ class EpisodeMaps(Model):
 
 
 class AgentEpisode(Artifact):
-    """`episode.json`, `episode.txt`, `apartment.json` (the true one), `maps.json`, `map.png` (what the robot knew as it
-    grew), in physics `views.png` (what the wrist camera
+    """`episode.json`, `episode.txt`, `apartment.json` (the true one), `maps.json`, `map.png` and `map.gif` (what the robot
+    knew, as it grew), in physics `views.png` (what the wrist camera
     saw last); `transcript.jsonl` when a language model was asked."""
 
     kind: ClassVar[str] = "agent_episode"

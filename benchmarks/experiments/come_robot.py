@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
 from benchmarks.tabulation import markdown
 from stages.agent.arms.registry import ARMS
-from stages.agent.judging import CAUSES, score
+from stages.agent.judging import CAUSES, Score, score
 from stages.agent.tasks import TASKS, THESIS_TASKS, make_apartment
 from stages.agent.trials import Setting, run_trial
 from stages.agent.world.failures import TABLE_3_4, Rates
@@ -63,23 +63,24 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Reco
     for trial in trials:
         setting = Setting(apartment, task.words, task.goals, rates, seed, floor=floor)
         session, world = run_trial(setting, trial.arm)
-        made = score(task.goals, task.impossible, session, world)
-        yield (
-            trial,
-            Record(
-                success=made.success,
-                false_success=made.claimed and not made.success,
-                impossible=bool(task.impossible),
-                executions=made.executions,
-                executed=made.executed,
-                replanned=made.replanned,
-                recovered=made.recovered,
-                calls=made.calls,
-                seconds=made.seconds,
-                metres=made.metres,
-                failures=made.failures,
-            ),
-        )
+        yield trial, record_of(score(task.goals, task.impossible, session, world), impossible=bool(task.impossible))
+
+
+def record_of(made: Score, *, impossible: bool) -> Record:
+    """Return what is kept of a judged trial."""
+    return Record(
+        success=made.success,
+        false_success=made.claimed and not made.success,
+        impossible=impossible,
+        executions=made.executions,
+        executed=made.executed,
+        replanned=made.replanned,
+        recovered=made.recovered,
+        calls=made.calls,
+        seconds=made.seconds,
+        metres=made.metres,
+        failures=made.failures,
+    )
 
 
 def share(part: str, whole: str) -> Callable[[Sequence[Record]], float | None]:
@@ -104,10 +105,15 @@ def failed(cause: str, which: int) -> Callable[[Sequence[Record]], float | None]
 
 def more_figures(results: Results) -> dict[str, float]:
     """Figures over the groups of tasks that the thesis sums up, and over the impossible ones."""
-    flat: dict[str, float] = {}
     groups = {"tabletop": FAST[:4], "mobile": FAST[4:8], "possible": FAST[:10], "impossible": FAST[10:]}
+    return of_groups(results, groups, RIVALS)
+
+
+def of_groups(results: Results, groups: Mapping[str, Sequence[str]], arms: Sequence[str]) -> dict[str, float]:
+    """Return figures over all trials of a group of cases, `<arm>/<group>/<measure>`."""
+    flat: dict[str, float] = {}
     for group, cases in groups.items():
-        for arm in RIVALS:
+        for arm in arms:
             records = [record for case in cases for record in results.of(arm, case)]
             for name in ("success", "step_success", "recovery", "false_success"):
                 value = MEASURES[name].of(records)

@@ -25,7 +25,7 @@ from stages.agent.judging import score
 from stages.agent.language.interpreter import Called, Ran
 from stages.agent.language.values import as_text
 from stages.agent.obstacle_map import CELL, UNKNOWN
-from stages.agent.pictures import Panel, draw_growing_map, write_views
+from stages.agent.pictures import Panel, animate_map, draw_growing_map, write_views
 from stages.agent.scene_map import SceneMap
 from stages.agent.session import Session, Turn
 from stages.agent.trials import Setting, run_trial
@@ -122,6 +122,7 @@ def write_episode(
     EpisodeMaps(snapshots=tuple(watching.snapshots)).write(output / "maps.json")
     output.joinpath("episode.txt").write_text(episode_text(file), encoding="utf-8")
     draw_growing_map(output / "map.png", watching.panels, width)
+    animate_map(output / "map.gif", watching.panels, width // 2)
     success = made.success if setting.goals else session.end == "done"
     return AgentEpisode(root=output, outcome=_outcome(session, success), summary=_summary(file))
 

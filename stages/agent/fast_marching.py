@@ -9,10 +9,10 @@ from numba import njit
 
 
 @njit(cache=True)
-def distances(free: np.ndarray, row: int, column: int) -> np.ndarray:
+def distances(free: np.ndarray, cost: np.ndarray, row: int, column: int) -> np.ndarray:
     """Return (H, W) the travel distance [cells] from a cell over the free ones (bool); inf where there is no way.
 
-    First-order upwind solution of the eikonal equation with unit speed.
+    First-order upwind solution of the eikonal equation; `cost` (H, W): of a cell's length in each cell.
     """
     height, width = free.shape
     found = np.full((height, width), np.inf)
@@ -31,7 +31,8 @@ def distances(free: np.ndarray, row: int, column: int) -> np.ndarray:
             up = min(found[i - 1, j] if i > 0 else np.inf, found[i + 1, j] if i + 1 < height else np.inf)
             side = min(found[i, j - 1] if j > 0 else np.inf, found[i, j + 1] if j + 1 < width else np.inf)
             near, far = min(up, side), max(up, side)
-            new = near + 1.0 if far - near >= 1.0 else 0.5 * (near + far + np.sqrt(2.0 - (far - near) ** 2))
+            h = cost[i, j]
+            new = near + h if far - near >= h else 0.5 * (near + far + np.sqrt(2.0 * h * h - (far - near) ** 2))
             if new < found[i, j]:
                 found[i, j] = new
                 heapq.heappush(queue, (new, i, j))

@@ -15,6 +15,8 @@ from stages.agent.fast_marching import distances
 CELL = 0.1
 """Edge of a cell [m]; cell (i, j) has its middle at (i, j) * CELL of the map frame."""
 UNKNOWN, FREE, OCCUPIED = 0, 1, 2
+DEARER = 4.0
+"""What a cell costs there: the corners of a turning base come nearer than its sides."""
 HALF = int(LARGEST_SIDE / CELL) + 20
 
 
@@ -30,9 +32,12 @@ class ObstacleMap:
     start: Base
     clearance: float
     """Cells that the base keeps from what is occupied."""
+    comfort: float = 0.0
+    """Nearer than so many cells to what is occupied it goes where it has to."""
     state: np.ndarray = field(init=False)
     _fields: dict[tuple[int, int], np.ndarray] = field(init=False, default_factory=dict)
     _drivable: np.ndarray | None = field(init=False, default=None)
+    _dear: np.ndarray | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         self.state = np.zeros((2 * HALF + 1, 2 * HALF + 1), np.int8)
@@ -51,7 +56,7 @@ class ObstacleMap:
             target = self.state[rows[:, 0], rows[:, 1]]
             self.state[rows[:, 0], rows[:, 1]] = np.maximum(target, value)
         self._fields.clear()
-        self._drivable = None
+        self._drivable = self._dear = None
         return int(np.count_nonzero(self.window) - before)
 
     @property
@@ -74,19 +79,30 @@ class ObstacleMap:
     def drivable(self) -> np.ndarray:
         """(H, W) bool: cells of the window where the base fits."""
         if self._drivable is None:
-            k = ceil(self.clearance)
-            disk = np.hypot(*np.mgrid[-k : k + 1, -k : k + 1]) <= self.clearance
-            blocked = binary_dilation(self.window == OCCUPIED, disk)
-            self._drivable = (self.window == FREE) & ~blocked
+            self._drivable = (self.window == FREE) & ~self._near_obstacles(self.clearance)
         return self._drivable
+
+    def _near_obstacles(self, cells: float) -> np.ndarray:
+        """Return (H, W) bool: cells of the window at most so far from what is occupied."""
+        k = ceil(cells)
+        disk = np.hypot(*np.mgrid[-k : k + 1, -k : k + 1]) <= cells
+        return binary_dilation(self.window == OCCUPIED, disk)
 
     def fits(self, x: float, y: float) -> bool:
         """Whether the base fits at a point [m], as far as is known."""
         at = self._in_window(x, y)
         return at is not None and bool(self.drivable[at])
 
+    def at_ease(self, x: float, y: float) -> bool:
+        """Whether nothing occupied is known within the comfortable distance of a point [m]."""
+        at = self._in_window(x, y)
+        if self._dear is None:
+            self._dear = self._near_obstacles(self.comfort)
+        return at is not None and not self._dear[at]
+
     def distances_from(self, x: float, y: float) -> np.ndarray:
-        """Return (H, W) distances [m] that the base drives from a point, inf where it cannot get."""
+        """Return (H, W) distances [m] that the base drives from a point, inf where it cannot get; where it is not
+        at ease a multiple of them."""
         at = self._in_window(x, y)
         if at is None:
             return np.full(self.window.shape, np.inf)
@@ -96,7 +112,11 @@ class ObstacleMap:
             free[max(0, at[0] - k) : at[0] + k + 1, max(0, at[1] - k) : at[1] + k + 1] |= (
                 self.window[max(0, at[0] - k) : at[0] + k + 1, max(0, at[1] - k) : at[1] + k + 1] == FREE
             )  # it stands here already, however near to something
-            self._fields[at] = distances(free, at[0], at[1]) * CELL
+            cost = np.ones(self.window.shape)
+            if self.comfort > 0:
+                self._dear = self._near_obstacles(self.comfort)
+                cost[self._dear] = DEARER
+            self._fields[at] = distances(free, cost, at[0], at[1]) * CELL
         return self._fields[at]
 
     def way(self, start: Base, goal: tuple[float, float]) -> float:

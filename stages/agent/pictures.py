@@ -11,12 +11,14 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
+from PIL import Image
 
 from schemas.agent_episode import MapThing
 from stages.agent.body import Base
 from stages.agent.obstacle_map import CELL
 
 MOST_PANELS = 6
+MOST_FRAMES, FRAME_MILLISECONDS = 24, 500
 VIEWS, VIEWS_ACROSS = 24, 6
 DOTS = 100
 SHADES = np.array([0.72, 1.0, 0.35])
@@ -48,6 +50,27 @@ def draw_growing_map(path: Path, panels: Sequence[Panel], width: int) -> None:
         _draw(figure.add_subplot(rows, columns, number + 1), panel)
     FigureCanvasAgg(figure)
     figure.savefig(path, metadata={"Software": None})
+
+
+def animate_map(path: Path, panels: Sequence[Panel], width: int) -> None:
+    """Write a GIF of the map as it grew, at most 24 of the panels, all of the last one's extent; nothing for none."""
+    if not panels:
+        return
+    picks = np.unique(np.linspace(0, len(panels) - 1, min(MOST_FRAMES, len(panels))).round().astype(int))
+    last = panels[-1]
+    frames = []
+    for number in picks:
+        figure = Figure(figsize=(width / DOTS, width / DOTS), dpi=DOTS, layout="constrained")
+        axes = figure.add_subplot()
+        _draw(axes, panels[number])
+        (x, y), (height, across) = last.origin, last.window.shape
+        axes.set_xlim(x - CELL, x + (height + 1) * CELL)
+        axes.set_ylim(y - CELL, y + (across + 1) * CELL)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy()).quantize(64))
+    times = [FRAME_MILLISECONDS] * (len(frames) - 1) + [5 * FRAME_MILLISECONDS]
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=times, loop=0, optimize=False)
 
 
 def _draw(axes, panel: Panel) -> None:  # type: ignore[no-untyped-def]

@@ -15,6 +15,10 @@ SAME_FURNITURE = 0.3
 """Two sightings of furniture this near are of one piece [m], and those of a class whose boxes overlap."""
 IN_FRONT = 0.7
 """Furniture whose edge is this near to the base is in front of it [m]."""
+SURE = 0.8
+"""A thing is taken to be on a small carrier within this share of its radius: nearer to the rim it may lean on it."""
+UNLIKE = 0.8
+"""What is narrower than this share of a carrier is a thing on it, not the carrier."""
 Region = tuple[int | str, bool]
 """Quarter turn (or `hand`) from which something was seen, and whether from near by."""
 
@@ -85,7 +89,7 @@ class SceneMap:
 
     def add(self, detection: Detection, place: str, region: Region) -> Item:
         """Enter a detection: a vote of its region for the thing that lies there, or a new thing."""
-        item = self.at(detection.position, place)
+        item = self.at(detection.position, place, detection.radius)
         if item is None:
             key = self._name(detection.label)
             item = self.items[key] = Item(key, detection.position, detection.color, detection.radius, place)
@@ -95,9 +99,13 @@ class SceneMap:
             item.used_votes[region] = detection.used
         return item
 
-    def at(self, position: Position, place: str) -> Item | None:
-        """Return the thing of a place that a sighting at a position is of."""
-        near = [(_apart(i.position, position), i.key) for i in self.items.values() if i.place == place]
+    def at(self, position: Position, place: str, radius: float) -> Item | None:
+        """Return the thing of a place that a sighting of a radius [m] at a position is of."""
+        near = [
+            (_apart(i.position, position), i.key)
+            for i in self.items.values()
+            if i.place == place and not (i.label in CARRIERS and radius < UNLIKE * i.radius)
+        ]
         return self.items[min(near)[1]] if near and min(near)[0] <= self._same_thing else None
 
     def carrier_of(self, item: Item) -> str:
@@ -107,7 +115,7 @@ class SceneMap:
     def at_carrier(self, position: Position, place: str) -> str:
         """Return the key of the small carrier of a place that is at a position, or nothing."""
         carriers = (item for item in self.items.values() if item.label in CARRIERS and item.place == place)
-        return next((c.key for c in carriers if _apart(c.position, position) <= c.radius), "")
+        return next((c.key for c in carriers if _apart(c.position, position) <= SURE * c.radius), "")
 
     def scene_object(self, key: str) -> SceneObject:
         """Return a thing or piece of furniture as programs see it."""

@@ -13,8 +13,11 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from schemas.errors import BadInput
+from schemas.outside import file_content
 
 MAXIMUM_PIXELS = 40_000_000
+LARGEST_ANIMATION = 6_000_000
+"""Of a GIF that is embedded as it is [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,17 @@ def from_file(path: Path, alt: str, width: int) -> Picture:
     if image.getcolors(4096) is None:
         return jpeg(np.asarray(image), alt, width)
     return _png(image.quantize(128), alt)
+
+
+def animation(path: Path, alt: str) -> Picture:
+    """Embed a GIF as it is. Raises BadInput when it cannot be read or is too large for a page."""
+    try:
+        with Image.open(path) as opened:
+            width, height = opened.size
+        data = file_content(path, LARGEST_ANIMATION)
+    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
+        raise BadInput(f"{path}: {error}", hint="make the artifact again") from None
+    return Picture(f"data:image/gif;base64,{base64.b64encode(data).decode('ascii')}", width, height, alt)
 
 
 def plot(path: Path, alt: str, width: int = 1100) -> Picture:

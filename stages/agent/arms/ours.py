@@ -29,6 +29,8 @@ AWAY = 0.1
 """Of what was placed from its spot, at most [m]."""
 OFF_SPOT = 0.05
 """Spots this near to one that something rolled off are not tried again [m]."""
+SAME_TARGET = 0.1
+"""A base pose that failed for one position fails for those this near [m]."""
 HAND_VIEWS = 3
 
 
@@ -56,7 +58,8 @@ class OwnSkills(CommonSkills):
     def __init__(self, body: Body, mechanisms: Mechanisms | None = None) -> None:
         super().__init__(body)
         self._use = mechanisms or Mechanisms()
-        self._bad: dict[str, list[Base]] = {}
+        self._bad: dict[str, list[tuple[Base, Position]]] = {}
+        """Furniture -> base poses that failed, and what for."""
         self._off: list[Position] = []
         """Spots from which something rolled off."""
         self._looked: dict[str, set[int]] = {}
@@ -168,7 +171,7 @@ class OwnSkills(CommonSkills):
         while len(tried) < TRIES:
             poses = [(0.0, self._body.base)] if self.scene.in_front(self._body.base) == place else []
             poses += drivable(self.scene, self._body.base, around(self.scene.furniture[place], self._body.stand_off))
-            known = tried + (self._bad.get(place, []) if self._use.memory else [])
+            known = tried + self._remembered(place, at)
             fresh = [
                 base
                 for _, base in poses
@@ -187,8 +190,16 @@ class OwnSkills(CommonSkills):
     def _there(self, base: Base, place: str) -> bool:
         return base == self._body.base or self.drive(base, place)
 
-    def _failed_from(self, place: str, base: Base) -> None:
-        self._bad.setdefault(place, []).append(base)
+    def _failed_from(self, place: str, base: Base, at: Position) -> None:
+        self._bad.setdefault(place, []).append((base, at))
+
+    def _remembered(self, place: str, at: Position) -> list[Base]:
+        """Return base poses that failed; with a short arm those that failed for a position near by: what it does not
+        get to from one pose says little about the rest."""
+        if not self._use.memory:
+            return []
+        near = not self._body.short_armed
+        return [b for b, p in self._bad.get(place, []) if near or hypot(p[0] - at[0], p[1] - at[1]) < SAME_TARGET]
 
     def _unreachable(self, place: str, tries: int, last: Failure | None = None) -> Outcome:
         """Say that all base poses failed, and what motion planning or control said the last time."""
@@ -220,7 +231,7 @@ class OwnSkills(CommonSkills):
                 felt = self._body.grasp(item.position, item.label, candidate)
                 if not felt.ok:
                     last = felt.failure
-                    self._failed_from(place, base)
+                    self._failed_from(place, base, item.position)
                     break
                 held = self._in_hand() if self._use.recheck else item.label
                 if held:
@@ -229,7 +240,7 @@ class OwnSkills(CommonSkills):
                 if not self._use.repair:
                     return Outcome(False, "not_held", f"{item.key} slipped out of the hand")
                 if not self._found_again(item):
-                    return Outcome(False, "gone", f"{item.key} slipped and is not seen any more")
+                    return Outcome(False, "lost", f"{item.key} slipped and is not seen any more")
         return self._unreachable(place, tries, last)
 
     def _holds(self, item: Item, held: str) -> Outcome:
@@ -275,7 +286,7 @@ class OwnSkills(CommonSkills):
                 if felt.ok:
                     return self._lies(place, label, position)
                 last = felt.failure
-                self._failed_from(place, base)
+                self._failed_from(place, base, position)
         return self._unreachable(place, tries, last)
 
     def _lies(self, place: str, label: str, at: Position) -> Outcome:
@@ -290,7 +301,9 @@ class OwnSkills(CommonSkills):
         over = self.scene.at_carrier(at, place)
         for close in (True, False):
             look = self._body.look(at, close=close)
-            new = [d for d in look.detections if d.label in wanted and self.scene.at(d.position, place) is None]
+            new = [
+                d for d in look.detections if d.label in wanted and self.scene.at(d.position, place, d.radius) is None
+            ]
             near = [(hypot(d.position[0] - at[0], d.position[1] - at[1]), d) for d in new]
             away, seen = min(near, default=(BESIDE, None), key=lambda pair: pair[0])
             if seen is not None and away < BESIDE:
@@ -302,7 +315,7 @@ class OwnSkills(CommonSkills):
         self._off.append(at)
         if item.key in self.scene.items:
             return Outcome(False, "not_there", f"{item.key} lies beside {label}, not on it")
-        return Outcome(False, "gone", f"{item.key} is not seen on {label}")
+        return Outcome(False, "lost", f"{item.key} is not seen on {label}")
 
     def pull(self, key: str, *, opening: bool) -> Outcome:
         """Pull or push a door from base poses that reach it."""
@@ -318,5 +331,5 @@ class OwnSkills(CommonSkills):
             if self._body.pull(at, opening=opening).ok:
                 self.scene.set_opened(key, opening)
                 return Outcome(True)
-            self._failed_from(key, base)
+            self._failed_from(key, base, at)
         return self._unreachable(key, tries)

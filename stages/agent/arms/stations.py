@@ -12,7 +12,7 @@ APART = 0.35
 """Between neighbouring base poses along an edge [m]."""
 FINE = 0.03
 """Between positions around a middle, and of one from the rim of what is known to stand near [m]."""
-RING = 0.65
+RING = 0.5
 """Of the radius of a small carrier, where things are put on it."""
 INSIDE = 0.2
 """Of a spot from the edge over which it is placed [m]."""

@@ -60,6 +60,10 @@ class RulesBrain:
         self._handled: set[str] = set()
         """Classes of things that were taken, which may be anywhere since."""
         self._at, self._turn, self._troubles = "", 0, 0
+        self._lost: list[SceneObject] = []
+        """Things that left the hand and were not seen again: nothing is done as long as one is missing."""
+        self._known: set[str] = set()
+        """Keys of all things that were ever on a map."""
         self._held: SceneObject | None = None
         self._gathered = ""
         """Where things are being gathered."""
@@ -132,6 +136,10 @@ class RulesBrain:
         self._at = place
         self._things = {k: t for k, t in self._things.items() if t.place != place}
         for item in found:
+            again = [lost for lost in self._lost if lost.label == item.label and item.key not in self._known]
+            if again:
+                self._lost.remove(again[0])
+            self._known.add(item.key)
             self._things[item.key] = item
             self._written[item.key] = f"{self._map_name(place)}[{item.key!r}]"
         self._looked[place] += 1
@@ -153,6 +161,8 @@ class RulesBrain:
             self._check = ("hand", thing, thing) if self._style.pictures else None
             return
         tries = self._trouble("grasp", thing.key)
+        if outcome.kind == "lost":
+            self._lost.append(thing)
         if outcome.kind == "wrong_in_hand":
             self._held = replace(self._things.pop(thing.key), label=outcome.label)
         elif outcome.kind == "unreachable" or tries >= MOST_FAILURES:
@@ -182,7 +192,9 @@ class RulesBrain:
             self._check = (where, thing, target) if self._style.pictures else None
             return
         tries = self._trouble("place", target.key)
-        if outcome.kind in ("not_there", "gone"):
+        if outcome.kind == "lost":
+            self._lost.append(thing)
+        if outcome.kind in ("not_there", "lost"):
             self._held, self._at, self._look_again = None, place, True
         elif outcome.kind == "unreachable" or tries >= MOST_FAILURES:
             self._rejected.add(target.key)
@@ -244,7 +256,17 @@ class RulesBrain:
             step = self._pursue(goal)
             if step is not None:
                 return step
+        missing = [t for t in self._lost for g in goals if self._is_missed(t, g)]
+        if missing and self._failed["lost", missing[0].key] < MOST_FAILURES:
+            self._failed["lost", missing[0].key] += 1
+            return self._look(f"Where is {missing[0].key}?")
+        if missing:
+            raise _GiveUp(f"{missing[0].key} got lost on the way")
         return self._write("Everything is where it belongs.", "done", "", "done()")
+
+    def _is_missed(self, thing: SceneObject, goal: Goal) -> bool:
+        every = isinstance(goal, Gather) or (isinstance(goal, Move) and goal.every)
+        return every and self._moves(goal).fits(thing.label, thing.color, thing.used)
 
     @staticmethod
     def _moves(goal: Goal) -> Description:

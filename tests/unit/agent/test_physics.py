@@ -15,7 +15,8 @@ from stages.agent.tasks import TASKS, make_apartment
 from stages.agent.trials import Setting, open_world
 from stages.agent.world.failures import Rates
 from stages.agent.world.physics.body import PhysicsBody
-from stages.agent.world.physics.grasps import antipodal_grasps
+from stages.agent.world.physics.grasps import antipodal_grasps, within_reach
+from stages.agent.world.physics.head import SeenPiece, steady
 from stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
 
 NO_ERRORS = Rates().with_true_eyes()
@@ -96,6 +97,37 @@ def test_grasps_come_from_above_first_and_across_the_narrow_side() -> None:
     assert all(pose[2, 3] > 0.004 for pose in grasps)
     wide = random.uniform(-0.08, 0.08, (4000, 3))
     assert antipodal_grasps(wide, np.tile([0.0, 1.0, 0.0], (4000, 1)), opening=0.08, floor=-0.08) == []
+
+
+def test_furniture_is_as_large_as_it_is_and_its_top_as_high() -> None:
+    random = np.random.default_rng(1)
+    top = np.column_stack([random.uniform(0, 1.4, 4000), random.uniform(0, 0.75, 4000), np.full(4000, 0.74)])
+    side = np.column_stack([random.uniform(0, 1.4, 2000), np.zeros(2000), random.uniform(0, 0.74, 2000)])
+    behind = np.column_stack([random.uniform(0, 1.4, 60), random.uniform(0.8, 1.3, 60), random.uniform(0.2, 0.6, 60)])
+    cup = np.column_stack([random.uniform(0.5, 0.6, 30), random.uniform(0.3, 0.4, 30), random.uniform(0.78, 0.85, 30)])
+    piece = SeenPiece("table")
+    piece.add(np.concatenate([top, side, behind, cup]))
+    low, high = piece.box
+    assert np.allclose([*low[:2], *high[:2]], [0, 0, 1.4, 0.75], atol=0.06) and abs(high[2] - 0.74) <= 0.03
+
+
+def test_depth_beside_a_jump_is_nobodys() -> None:
+    depth = np.full((20, 20), 2.0)
+    depth[:, 10:] = 3.0
+    depth[5, 5] = 0.0
+    kept = steady(depth)
+    assert kept[:, :9].sum() == 20 * 9 - 1 and not kept[:, 9:11].any() and kept[:, 11:].all()
+
+
+def test_a_few_grasps_of_each_steepness_and_none_from_behind() -> None:
+    angles = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    ring = np.column_stack([0.03 * np.cos(angles), 0.03 * np.sin(angles)])
+    points = np.concatenate([np.column_stack([ring, np.full(60, z)]) for z in np.linspace(0.02, 0.1, 12)])
+    normals = np.column_stack([np.tile(ring / 0.03, (12, 1)), np.zeros(720)])
+    grasps = within_reach(antipodal_grasps(points, normals, 0.08, 0.0), 0.0)
+    steep = [round(float(g[2, 2]), 1) for g in grasps]
+    assert steep == sorted(steep) and max(steep.count(p) for p in set(steep)) <= 8 and len(set(steep)) == 3
+    assert all(g[0, 2] > 0 for g in grasps if g[2, 2] > -0.99)
 
 
 def test_errors_of_a_segmenter_persist_and_name_what_was_asked_for() -> None:

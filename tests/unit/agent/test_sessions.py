@@ -23,9 +23,9 @@ from stages.agent.language.interpreter import Ran
 from stages.agent.parameters import EvaluateParameters, ReplayParameters, RunParameters, check_run
 from stages.agent.replay_stage import run as replay
 from stages.agent.run_stage import run as run_step
-from stages.agent.session import Limits, Session
+from stages.agent.session import Limits, Session, run_session
 from stages.agent.tasks import TASKS, make_apartment
-from stages.agent.trials import Setting, goals_of, run_trial
+from stages.agent.trials import Setting, goals_of, rules_brain, run_trial
 from stages.agent.world.failures import Rates
 from stages.agent.world.fast import FastWorld
 from stages.engine.digests import content_digest, record_files
@@ -173,6 +173,27 @@ def test_empty_worlds_and_walls_are_answered(apartment: Apartment, words: str, e
     for arm in ("thesis", "ours"):
         session, _ = run_trial(Setting(apartment, words, goals_of(words), NOTHING_FAILS, 0), arm)
         assert (session.end, why in session.words) == (end, True), session.words
+
+
+class Drops(FastWorld):
+    """A world in which the first thing that is placed is never seen again."""
+
+    dropped = ""
+
+    def release(self, at, label, *, gently=False):  # type: ignore[no-untyped-def]
+        felt = super().release(at, label, gently=gently)
+        for name in self.bodies:
+            if self.bodies[name].on == "plate_0" and self.dropped in ("", name):
+                self.dropped = name
+                self.bodies[name].on, self.bodies[name].at = "floor", (-50.0, -50.0)
+        return felt
+
+
+def test_what_left_the_hand_and_is_not_seen_again_is_not_done() -> None:
+    wanted = setting("place_fruit", 305)
+    world = Drops(wanted.apartment, ("apple", "banana", "lemon", "orange", "plate"), NOTHING_FAILS, wanted.seed, None)
+    session = run_session(rules_brain(wanted, "ours"), ARMS["ours"].skills(world), world, wanted.limits)
+    assert session.end == "give_up" and "got lost" in session.words
 
 
 def test_a_name_that_gives_orders_stays_a_name() -> None:

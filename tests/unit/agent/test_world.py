@@ -7,11 +7,12 @@ import pytest
 from pydantic import ValidationError
 
 from schemas.apartment import Apartment, Furniture, Room, Thing
-from stages.agent.body import Base
+from stages.agent.body import Base, Sweep
 from stages.agent.brains.words import NotUnderstood, understood
 from stages.agent.exploration import explore
 from stages.agent.fast_marching import distances
 from stages.agent.goals import Move, Shut, kind
+from stages.agent.obstacle_map import ObstacleMap
 from stages.agent.scene_map import SceneMap
 from stages.agent.tasks import TASKS, make_apartment
 from stages.agent.world.failures import COUNTS, EXECUTIONS, GRASPS, PLACES, TABLE_3_4, Rates
@@ -57,12 +58,12 @@ def test_exploration_finds_all_furniture_without_being_told() -> None:
 
 def test_distances_are_those_of_the_plane_and_go_around_walls() -> None:
     free = np.ones((41, 41), bool)
-    found = distances(free, 20, 20)
+    found = distances(free, np.ones(free.shape), 20, 20)
     rows, columns = np.mgrid[:41, :41]
     straight = np.hypot(rows - 20, columns - 20)
     assert np.all(found >= straight - 1e-9) and np.max(found - straight) < 1.6  # first order: worst along diagonals
     free[:40, 25] = False
-    around = distances(free, 20, 20)
+    around = distances(free, np.ones(free.shape), 20, 20)
     assert around[20, 30] > 20 and not np.isfinite(around[5, 25])
 
 
@@ -132,3 +133,19 @@ def test_the_base_stays_where_a_pose_is_not_free() -> None:
     world = FastWorld(apartment, (), NOTHING_FAILS, 0)
     assert not world.drive(Base(2.0, 2.0, 0.0), 1.0, "table").ok and world.base == Base(1, 1, 0)
     assert not world.drive(Base(9.0, 9.0, 0.0), 1.0, "").ok and world.drive(Base(3.2, 1.0, 0.0), 2.2, "").ok
+
+
+def test_a_base_prefers_room_to_turn() -> None:
+    walls = [(i, j) for i in range(-12, 13) for j in range(-12, 13) if max(abs(i), abs(j)) == 12]
+    walls += [(0, j) for j in (*range(-12, -8), *range(3, 12))]
+    free = np.array([(i, j) for i in range(-11, 12) for j in range(-11, 12)])
+    sweep = Sweep(free, np.array(walls), ())
+    bold, careful = ObstacleMap(Base(-0.8, 0, 0), 2.9), ObstacleMap(Base(-0.8, 0, 0), 2.9, 4.5)
+    nearest = {}
+    for name, there in (("bold", bold), ("careful", careful)):
+        there.add(sweep)
+        way = there.path(Base(-0.6, -0.6, 0), (0.6, -0.6))
+        assert way is not None
+        nearest[name] = min(np.hypot(x - 0.1 * i, y - 0.1 * j) for x, y in way[1:-1] for i, j in walls)
+    assert nearest["careful"] > nearest["bold"]
+    assert careful.at_ease(-0.6, -0.2) and not careful.at_ease(-0.3, -0.8)

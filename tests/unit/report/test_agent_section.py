@@ -18,5 +18,5 @@ def test_the_section_tells_the_session_and_that_no_model_was_asked(tmp_path: Pat
     made = run(None, None, parameters=RunParameters(task="prepare_cup", image_width=300), context=context)
     result = report(tmp_path / "report", episode=AgentEpisode(made.root))
     page = parse((tmp_path / "report" / "report.html").read_text())
-    assert result.summary["pictures"] == 1 and "no language model was asked" in page.text
+    assert result.summary["pictures"] == 2 and "no language model was asked" in page.text
     assert made.info.words in page.text and all(turn.reason in page.text for turn in made.info.turns)

@@ -33,6 +33,7 @@ from stages.agent.world.physics.eyes import (
 from stages.agent.world.physics.hands import (
     DROP,
     JUST_OVER,
+    SOME_WAY_OVER,
     Beliefs,
     Box,
     Hold,
@@ -75,6 +76,8 @@ AROUND = 1.4
 """What is farther from the base does not matter to the arm [m]."""
 CLOSED_ON_NOTHING = 0.004
 """Opening of the fingers below which they hold nothing [m]."""
+COMFORT = 4.5
+"""Cells of the map within which a turn of the pedestal (0.28 m) with its folded arm (0.39 m) may touch something."""
 NEARER = 0.1
 """The arm is shorter than the one of the fast world: it starts so much nearer to a table before it [m]."""
 
@@ -82,7 +85,7 @@ NEARER = 0.1
 class PhysicsBody:
     """One episode's world in pybullet. `sought`: classes that the eyes are asked for. `close` it."""
 
-    same_thing, stand_off, clearance, short_armed = 0.07, 0.38, 2.7, True
+    same_thing, stand_off, clearance, short_armed = 0.07, 0.38, 2.9, True
 
     def __init__(self, apartment: Apartment, sought: tuple[str, ...], rates: Rates, seed: int) -> None:
         self.apartment, self._rates, self._luck = apartment, rates, Luck(seed)
@@ -109,10 +112,11 @@ class PhysicsBody:
         self._pieces: list[head.SeenPiece] = []
         self._tops: dict[int, float] = {}
         self._surfaces: list[Surface] = []
-        self._obstacles = ObstacleMap(self.base, self.clearance)
+        self._obstacles = ObstacleMap(self.base, self.clearance, COMFORT)
         self._log = EventLog()
         self._seconds = self.metres = 0.0
         self._grasps = 0
+        self._looked_from: Base | None = None
         self.pictures: list[tuple[str, np.ndarray]] = []
         """What the wrist camera took last, for people."""
 
@@ -157,12 +161,12 @@ class PhysicsBody:
             pose = look_at(eye, eye + away)
             picture = take(renderer, HEAD, pose, self._random)
             points = apply(map_from_true @ pose, back_project(picture.depth, HEAD).reshape(-1, 3).astype(float))
-            there = picture.depth.reshape(-1) > 0
+            there = head.steady(picture.depth).reshape(-1)
             clouds.append(points[there])
             numbers = picture.instance.reshape(-1)
             for number in np.unique(numbers[there]):
                 name = self.room.named.get(int(number), "")
-                own = there & (numbers == number)
+                own = there & (numbers == number) & (picture.depth.reshape(-1) < head.SURE)
                 if name in self.room.furniture and own.sum() >= head.LEAST:
                     head.enter(self._pieces, self.room.furniture[name].label, points[own])
             self._seconds += PICTURE_SECONDS
@@ -198,11 +202,16 @@ class PhysicsBody:
         way = self._obstacles.path(self.base, (base.x, base.y))
         failed = MotionFailed("no_way", "the obstacle map shows no way there") if way is None else None
         if way is not None:
+            if not np.allclose(self._arm, self._description.carry):
+                self._arm_to(self._description.carry)
             error = self._random.normal(0, 1, 3) * (LOCALISATION, LOCALISATION, TURNED)
-            start = self._true_base()
-            rows = [*(np.array([*point, 0.0]) - self._error for point in way[1:-1]), goal - error]
-            rows = _facing_on(start, rows)
-            failed = self._roll_along(start, rows)
+            points = [np.array([*point, 0.0]) - self._error for point in way[1:-1]]
+            ease = [self._obstacles.at_ease(*point) for point in way[1:-1]]
+            for turns in (ease, [False] * len(ease), [True] * len(ease)):
+                start = self._true_base()
+                failed = self._roll_along(start, _facing_on(start, points, turns, goal - error))
+                if failed is None:
+                    break
             self._error = error
             self._believed = goal if failed is None else self._true_base() + error
             self._believed[2] = (self._believed[2] + pi) % (2 * pi) - pi
@@ -263,7 +272,8 @@ class PhysicsBody:
             renderer = renderer or self.room.renderer(pose[:3, 3])
             picture = take(renderer, NEAR_BY if close else WRIST, self._aimed(pose, at, close), self._random)
             camera = self._aimed(seen_pose, at, close)
-            self._keep_top(picture, camera, piece)
+            if not close:  # a thing fills a picture from near by
+                self._keep_top(picture, camera, piece)
             masks = self._segmenter.masks(picture, (sector, close))
             found += seen_in(picture, masks, camera, camera[:3, 3])
             self.pictures = [*self.pictures[-40:], (f"{'near ' if close else ''}{turn:+.1f}", picture.color)]
@@ -272,6 +282,7 @@ class PhysicsBody:
             if self.room.things[name].label in self._sought:
                 self._log.mistaken("missed", f"look {name}")
         self._oracle.missed.clear()
+        self._looked_from = self.base
         near = [s for s in fuse(found) if self._belongs(s, at, piece, close)]
         old = [s for s in self._surfaces if not self._belongs(s, at, piece, close)]
         self._surfaces = old + near
@@ -432,15 +443,27 @@ class PhysicsBody:
         self._log.done("grasp", step, right, cause, self.room.things[held].label if held else "")
         return Felt(True)
 
+    def _see_from_here(self, at: Position) -> None:
+        """Look once more at what will be grasped: what was measured from another stop is off by both stops' errors."""
+        if self._looked_from == self.base:
+            return
+        before = self._surfaces
+        self.look(at, close=True)
+        if not any(hypot(s.middle[0] - at[0], s.middle[1] - at[1]) <= FOUND_WITHIN for s in self._surfaces):
+            self._surfaces = before
+
     def _take(self, at: Position, candidate: int) -> None:
+        self._see_from_here(at)
         away = [hypot(s.middle[0] - at[0], s.middle[1] - at[1]) for s in self._surfaces]
         number = int(np.argmin(away)) if away else -1
         if number < 0 or away[number] > FOUND_WITHIN:
             raise MotionFailed("no_grasp", "no surface was seen there", (), {"distance": min(away, default=9.0)})
+        surface = self._surfaces[number]
+        self._surfaces = [s for s in self._surfaces if s is surface or not s.same_as(surface)]
+        number = next(k for k, s in enumerate(self._surfaces) if s is surface)
         self._beliefs.hold(None)
         self._beliefs.show(self._boxes())
         piece = self._piece_at(at)
-        surface = self._surfaces[number]
         floor = self._tops.get(piece, float(surface.low[2])) if piece is not None else float(surface.low[2])
         target = Target(surface, f"thing_{number}", candidate, floor)
         motion = plan_grasp(self._beliefs, self._believed, self._arm, target, self._random)
@@ -502,10 +525,8 @@ class PhysicsBody:
             return Felt(True)
         here = (at[0], at[1], self._support(at))
         self._beliefs.show(self._boxes(at))
-        height = JUST_OVER if gently else DROP
         try:
-            motion = plan_release(self._beliefs, self._believed, self._arm, self._hold, here, height, self._random)
-            self._let_go(motion, gently)
+            self._let_go(self._way_down(here, (JUST_OVER, SOME_WAY_OVER) if gently else (DROP,)), gently)
         except MotionFailed as failed:
             self._recover()
             self._log.done("release", step, False, "place", "")
@@ -515,6 +536,16 @@ class PhysicsBody:
         on = self.room.things[body.on].label if body.on in self.room.things else on
         self._log.done("release", step, on == label, "place", "")
         return Felt(True)
+
+    def _way_down(self, here: Position, heights: tuple[float, ...]) -> Motion:
+        """Plan to let go at the first of the heights over a position that can be got to. Raises MotionFailed."""
+        for number, height in enumerate(heights):
+            try:
+                return plan_release(self._beliefs, self._believed, self._arm, self._hold, here, height, self._random)
+            except MotionFailed:
+                if number + 1 == len(heights):
+                    raise
+        raise AssertionError("unreachable")
 
     def _let_go(self, motion: Motion, gently: bool) -> None:
         reach, down = motion.there
@@ -612,13 +643,14 @@ def whole_body_rows(bases: np.ndarray, arm: np.ndarray) -> np.ndarray:
     return np.concatenate([bases, np.tile(arm, (len(bases), 1))], axis=1)
 
 
-def _facing_on(start: np.ndarray, rows: list[np.ndarray]) -> list[np.ndarray]:
-    """Return base poses (3,) with yaws that turn little from each to the next; between start and end, along the way."""
+def _facing_on(start: np.ndarray, points: list[np.ndarray], turns: list[bool], goal: np.ndarray) -> list[np.ndarray]:
+    """Return base poses (3,) through points to a goal pose that turn little from each to the next: along the way at
+    points where it `turns`, as before at the others, for the base drives to any side."""
     made, before = [], start
-    for k, row in enumerate(rows):
-        turned = row.copy()
-        if k + 1 < len(rows):
-            turned[2] = atan2(row[1] - before[1], row[0] - before[0])
+    for point, turn in zip([*points, goal], [*turns, True], strict=True):
+        turned = point.copy()
+        if len(made) < len(points):
+            turned[2] = atan2(point[1] - before[1], point[0] - before[0]) if turn else before[2]
         turned[2] = before[2] + (turned[2] - before[2] + pi) % (2 * pi) - pi
         made.append(turned)
         before = turned

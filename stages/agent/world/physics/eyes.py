@@ -27,6 +27,8 @@ LEAST_PIXELS, LEAST_POINTS = 25, 16
 VOXEL, LINK, OVERLAP = 0.025, 0.05, 0.5
 """Edge of a cell in which two clouds overlap, distance of points of one cluster [m], and the share from which they are
 one (ConceptGraphs)."""
+COINCIDE = 0.03
+"""Corners of the boxes of one thing that was taken for two classes are this near to each other [m]."""
 NEIGHBOURS = 14
 """Points of which a surface normal is made."""
 STAINED = 0.04
@@ -85,6 +87,12 @@ class Surface:
     def middle(self) -> np.ndarray:
         """Of the box around it (3,)."""
         return (self.low + self.high) / 2
+
+    def same_as(self, other: Surface) -> bool:
+        """Whether two surfaces of different classes are of one thing: boxes that all but coincide."""
+        return bool(
+            np.all(np.abs(self.low - other.low) < COINCIDE) and np.all(np.abs(self.high - other.high) < COINCIDE)
+        )
 
 
 def take(

@@ -25,6 +25,10 @@ PITCHES = (np.pi / 2, 1.1, 0.7)
 """How steeply the hand comes, from above first [rad]."""
 ALIKE = 0.006
 """Widths that differ by less are as good as each other [m]."""
+OF_ONE_PITCH = 8
+"""Grasps that come equally steeply, at most: where the arm cannot come from above, the others have their turn."""
+ASIDE = 0.3
+"""Least cosine between where an aslant hand comes from and where the robot stands: it does not reach around a thing."""
 TIP_BEFORE = 0.008
 """The tool point lies this far behind the finger tips [m]."""
 
@@ -67,3 +71,18 @@ def antipodal_grasps(points: np.ndarray, normals: np.ndarray, opening: float, fl
             made.append((rank, round(width / ALIKE), number * 7 % HEADINGS, pose))
     made.sort(key=lambda entry: entry[:3])
     return [pose for *_, pose in made]
+
+
+def within_reach(grasps: list[np.ndarray], heading: float) -> list[np.ndarray]:
+    """Return those of grasps (4, 4) that an arm may get at that stands before the thing, a few of each pitch in their
+    order. `heading` [rad]: from the base to the thing."""
+    kept: list[np.ndarray] = []
+    of_pitch: dict[float, int] = {}
+    for pose in grasps:
+        along = pose[:2, 2]
+        pitch, level = round(float(pose[2, 2]), 2), float(np.hypot(*along))
+        aside = level > 0.1 and float(along @ (np.cos(heading), np.sin(heading))) < ASIDE * level
+        if not aside and of_pitch.get(pitch, 0) < OF_ONE_PITCH:
+            of_pitch[pitch] = of_pitch.get(pitch, 0) + 1
+            kept.append(pose)
+    return kept

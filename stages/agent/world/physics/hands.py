@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stages.agent.world.physics.eyes import Surface
-from stages.agent.world.physics.grasps import antipodal_grasps
+from stages.agent.world.physics.grasps import antipodal_grasps, within_reach
 from stages.agent.world.physics.shapes import record_of, slab, urdf_of
 from stages.kit.geometry.transforms import inverse
 from stages.kit.motion.arm_motion import ArmPlanner, Tally
@@ -31,6 +32,10 @@ DROP = 0.15
 """Height over its target at which the thesis lets go [m]."""
 JUST_OVER = 0.008
 """Height at which ours does, if nothing was touched before [m]."""
+SOME_WAY_OVER = 0.06
+"""Height at which ours does where the hand has no room farther down [m]."""
+TURNS = tuple((turn, tilt) for tilt in (0.0, 0.45) for turn in (0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6))
+"""How the hand is turned about the vertical, and leaned away from the robot where it gets no farther upright [rad]."""
 SLOW = 0.35
 SAMPLES = 500
 """Of one path search."""
@@ -146,7 +151,8 @@ def plan_grasp(
     surface, name, rank = target.surface, target.name, target.rank
     keep = _inside(surface)
     points, normals = surface.points[keep], surface.normals[keep]
-    grasps = antipodal_grasps(points, normals, opening, target.floor)[rank * NEXT :][:CANDIDATES]
+    heading = np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
+    grasps = within_reach(antipodal_grasps(points, normals, opening, target.floor), heading)[rank * NEXT :][:CANDIDATES]
     if not grasps:
         width = narrowest_width(points)
         raise MotionFailed(
@@ -252,8 +258,8 @@ def plan_release(
     beliefs.checker.allow(touch=("held",) if hold is not None else ())
     heading = float(np.arctan2(at[1] - base[1], at[0] - base[0]))
     try:
-        for turn in (0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6):
-            pose = _turned(hold, heading, turn)
+        for turn, tilt in TURNS:
+            pose = _tilted(_turned(hold, heading, turn), heading, tilt)
             pose[:3, 3] = (at[0], at[1], at[2] + height + foot)
             goal = planner.reachable(base, pose, tally, starts=3)
             if goal is None or not planner.free(base, goal, tally):
@@ -291,3 +297,11 @@ def _turned(hold: Hold | None, heading: float, turn: float) -> np.ndarray:
     pose = np.eye(4)
     pose[:3, :3] = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ hold.rotation
     return pose
+
+
+def _tilted(pose: np.ndarray, heading: float, tilt: float) -> np.ndarray:
+    """Return a tool's rotation (4, 4) leaned so that the hand is behind its tip, as seen along a heading [rad]."""
+    axis = np.array([np.sin(heading), -np.cos(heading), 0.0])
+    turn = np.eye(4)
+    turn[:3, :3] = Rotation.from_rotvec(tilt * axis).as_matrix()
+    return turn @ pose

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from stages.agent.obstacle_map import CELL
 from stages.kit.geometry.point_clouds import clusters
@@ -22,7 +23,19 @@ ENOUGH = 3
 """Points of an occupied cell."""
 LEAST = 60
 """Points of a piece of furniture that is made out."""
+JUMP = 0.06
+"""Of the depth within a pixel's neighbours that is no jump yet, as a share of it: floors slope by less."""
 GRAIN = 0.04
+TOP_SHARE = 0.3
+"""Of the fullest level's cubes: the highest level that has as many is the top; above it are strays at the rims of
+things that stand there."""
+
+
+def steady(depth: np.ndarray) -> np.ndarray:
+    """Return (H, W) bool: pixels of a depth picture [m] that were measured and lie beside no jump, where what is
+    measured is of neither side."""
+    low = minimum_filter(np.where(depth > 0, depth, np.inf), 3)
+    return (depth > 0) & (maximum_filter(depth, 3) - low < JUMP * depth)
 
 
 def cells_of(points: np.ndarray, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -68,7 +81,13 @@ class SeenPiece:
         if self._box is None:
             points = np.array(sorted(self.cubes)) * GRAIN
             points = points[clusters(points, 0.2) == 0]
-            self._box = np.percentile(points, 1, axis=0), np.percentile(points, 99, axis=0)
+            low, high = np.percentile(points, 1, axis=0), np.percentile(points, 99, axis=0)
+            levels, counts = np.unique(points[:, 2], return_counts=True)
+            high[2] = levels[counts >= TOP_SHARE * counts.max()].max()
+            top = points[np.abs(points[:, 2] - high[2]) < 1.5 * GRAIN, :2]
+            if len(top) >= LEAST:  # what stands there is as wide as its top
+                low[:2], high[:2] = np.percentile(top, 2, axis=0), np.percentile(top, 98, axis=0)
+            self._box = low, high
         return self._box
 
 

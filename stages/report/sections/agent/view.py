@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from schemas.agent_episode import AgentEpisode, EpisodeTurn
-from stages.report.images import from_file
+from stages.report.images import animation, from_file
 from stages.report.page import Page
 
 WIDTH, MOST_ROWS = 1100, 80
@@ -32,10 +32,13 @@ def view(page: Page) -> dict[str, Any] | None:
     if episode is None:
         return None
     file, picture = episode.info, episode.path("map.png")
+    moving, views = episode.path("map.gif"), episode.path("views.png")
     return {
         "file": file,
         "model": file.language is not None,
         "rows": [turn_row(number, turn) for number, turn in enumerate(file.turns[:MOST_ROWS], 1)],
         "hidden": max(0, len(file.turns) - MOST_ROWS),
+        "moving": animation(moving, "the map growing, turn by turn") if moving.is_file() else None,
+        "views": from_file(views, "the last pictures of the wrist camera", WIDTH) if views.is_file() else None,
         "picture": from_file(picture, "the map as it grew", WIDTH) if picture.is_file() else None,
     }

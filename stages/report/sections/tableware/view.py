@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import base64
 from collections import Counter
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from PIL import Image
-
-from schemas.errors import BadInput
-from schemas.outside import file_content
 from schemas.tableware_detections import TablewareDetections
 from schemas.tableware_plan import TablewarePlan
 from schemas.tableware_trial import EvaluatedPolicy, TablewareEvaluation, TablewareTrial
-from stages.report.images import Picture, from_file
+from stages.report.images import Picture, animation, from_file
 from stages.report.page import Page
 
 WIDTH = 1100
 """Of pictures, at most [px]."""
-LARGEST_ANIMATION = 6_000_000
 CAPTIONS = {
     "overlay": "What was seen, and how sure that is",
     "detections": "What was seen, and how sure that is",
@@ -138,17 +131,6 @@ def _rows(trial: TablewareTrial | None) -> tuple[TablewareRow, ...]:
         text = "; ".join(part for part in (came, wrong) if part)
         rows.append(TablewareRow(number, step.action.words, f"{step.start:.1f}", text, bool(wrong)))
     return tuple(rows)
-
-
-def animation(path: Path, alt: str) -> Picture:
-    """Embed a GIF as it is. Raises BadInput when it cannot be read or is too large for a page."""
-    try:
-        with Image.open(path) as opened:
-            width, height = opened.size
-        data = file_content(path, LARGEST_ANIMATION)
-    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
-        raise BadInput(f"{path}: {error}", hint="make the artifact again") from None
-    return Picture(f"data:image/gif;base64,{base64.b64encode(data).decode('ascii')}", width, height, alt)
 
 
 def view(page: Page) -> dict[str, Any]:
