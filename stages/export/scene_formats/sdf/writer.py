@@ -39,9 +39,11 @@ def write(folder: Path, scene: SceneToExport) -> Written:
     (folder / "scene.sdf").write_bytes(text)
     _copy_meshes(scene, folder)
     values = scene.written.joint_values
-    named = (entry.name for body in scene.bodies for entry in (body, *body.links, *body.joints))
+    named = {body.name for body in scene.bodies}
+    for body in scene.bodies:
+        named |= {link.name for link in body.links} | {joint.name for joint in body.joints}
     return Written(
-        names={allowed(name): name for name in sorted(set(named)) if allowed(name) != name},
+        names={allowed(name): name for name in sorted(named) if allowed(name) != name},
         joint_zero={name: value for name, value in sorted(values.items()) if value},
     )
 
