@@ -295,8 +295,12 @@ train-stereo: setup ## Train the small RAFT-Stereo on our own renderings (QUICK=
 figures: setup ## Write every figure of README and docs anew from docs/results/*.json
 	$(PYTHON) -m benchmarks.figures
 
+.PHONY: site
+site: extras ## Build the docs as a site, links checked: outputs/site/index.html
+	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --site-dir $(OUTPUTS)/site
+
 .PHONY: pictures
-pictures: setup ## Take the README's pictures out of the demo run
+pictures: setup ## Take the pictures of README and gallery out of the demo run
 	$(PYTHON) docs/pictures.py $(OUTPUTS)/demo
 
 .PHONY: train-network bench-network

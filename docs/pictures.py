@@ -1,4 +1,4 @@
-"""Makes the README's picture out of a finished demo run: python docs/pictures.py outputs/demo (make pictures)."""
+"""Makes the pictures of README and gallery out of a demo run: python docs/pictures.py outputs/demo (make pictures)."""
 
 from __future__ import annotations
 
@@ -14,6 +14,16 @@ TOP = ("frame 30", "The map, every instance in its colour", "CAD scene")
 """Alternative texts in report.html of the upper row: what the camera saw, the map, the scene."""
 GRAPHS = "contact graphs"
 WIDTH, GAP, KEY_FRAMES = 1600, 6, 5
+GALLERY = {
+    "synthesize": ("The true room from the same place",),
+    "ingest": ("frame 30", "depth of frame 30"),
+    "segment": ("frame 50", "segments of frame 50"),
+    "fuse": ("The map, every instance in its colour", "In the colours of the images"),
+    "cad": ("CAD scene", "CAD scene from above"),
+    "plan": ("key frame: grasp", "key frame: place"),
+    "evaluate": ("surface distance",),
+}
+"""Step -> alternative texts in report.html of what the gallery shows of it."""
 
 
 def pictures_of(html: str) -> dict[str, np.ndarray]:
@@ -40,7 +50,7 @@ def in_a_row(images: list[np.ndarray]) -> np.ndarray:
 
 
 def main(run: Path) -> None:
-    """Write docs/images/demo.jpg and graphs.png from a run folder."""
+    """Write docs/images/demo.jpg, graphs.png and gallery_*.jpg from a run folder."""
     folder = Path(__file__).resolve().parent / "images"
     pictures = pictures_of((run / "report" / "report.html").read_text())
     cv2.imwrite(str(folder / "graphs.png"), pictures[GRAPHS])
@@ -49,6 +59,16 @@ def main(run: Path) -> None:
     rows = [in_a_row([pictures[text] for text in TOP]), in_a_row([cv2.imread(str(path)) for path in chosen])]
     between = np.full((GAP, WIDTH, 3), 255, np.uint8)
     cv2.imwrite(str(folder / "demo.jpg"), np.vstack([rows[0], between, rows[1]]), [cv2.IMWRITE_JPEG_QUALITY, 85])
+    write_gallery(folder, pictures)
+
+
+def write_gallery(folder: Path, pictures: dict[str, np.ndarray]) -> None:
+    """Write a picture a step for docs/GALLERY.md, half as wide."""
+    for step, texts in GALLERY.items():
+        row = in_a_row([pictures[text] for text in texts])
+        scale = WIDTH // 2 / row.shape[1]
+        small = cv2.resize(row, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+        cv2.imwrite(str(folder / f"gallery_{step}.jpg"), small, [cv2.IMWRITE_JPEG_QUALITY, 80])
 
 
 if __name__ == "__main__":

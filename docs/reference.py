@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,9 +40,7 @@ def pages() -> dict[str, str]:
 
 
 def commands_page() -> str:
-    """Every command: those of steps from their declarations, the others by their own help."""
-    from typer.main import get_command  # noqa: F401  (typer is what the commands are made with)
-
+    """Every step's command, from its declaration, and the other commands with what they say of themselves."""
     lines = ["# Commands and their options", "", "Every step also takes `--out`, `--seed`, `--device`, `--config`,"]
     lines += ["`--max-memory`, `--force`, `--dry-run`, `--accept`, `--json`, `--quiet` and `--debug`.", ""]
     for stage in sorted(all_stages().values(), key=lambda entry: entry.name):
@@ -52,7 +51,30 @@ def commands_page() -> str:
         lines += [f"| `--{role.replace('_', '-')}` | {_input(what)} |" for role, what in stage.reads.items()]
         kind = stage.writes.kind
         lines += ["", f"Writes a [{kind}](kinds.md#{kind}). Version {stage.version}.", "", *_options(stage), ""]
-    return "\n".join(lines)
+    lines += [
+        "## Other commands",
+        "",
+        "`scenewright COMMAND --help` has their options.",
+        "",
+        "| command | |",
+        "|---|---|",
+    ]
+    lines += [f"| `{name}` | {text} |" for name, text in other_commands().items()]
+    return "\n".join([*lines, ""])
+
+
+def other_commands() -> dict[str, str]:
+    """Return name -> first sentence of the help of every command that is no step."""
+    from cli.application import build_application
+
+    table = inspect.getclosurevars(build_application()).nonlocals["table"]
+    steps = {stage.folder for stage in all_stages().values()}
+    found = {}
+    for name, command in sorted(table.commands.items()):
+        if name not in steps and not command.hidden:
+            words = " ".join((command.help or "").split())
+            found[name] = words.partition(". ")[0].rstrip(".").replace("|", "\\|") + "."
+    return found
 
 
 def _input(what: Any) -> str:

@@ -22,10 +22,10 @@ from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import look_at
 from stages.segment.fusion_ours import fuse
 from stages.segment.geometric import segment_depth
+from stages.segment.one_frame import describe
 from stages.segment.panoptic import PanopticFrame, PanopticMask
 from stages.segment.parameters import SegmentParameters
 from stages.segment.settings import fusion_settings, geometric_settings
-from stages.segment.stage import describe
 
 CAMERA = Camera(width=640, height=480, fx=525.0, fy=525.0, cx=319.5, cy=239.5)
 LENGTH, WIDTH, HEIGHT = 4.0, 2.5, 2.5

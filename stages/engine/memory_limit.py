@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
@@ -42,13 +42,24 @@ def parse_limit(text: str) -> int:
 
 
 def resident_memory_bytes() -> int:
-    """Return the resident memory of this process now [bytes]; its peak where the system does not tell."""
+    """Return the resident memory now of this process and of those that it started [bytes], pages that they share
+    counted for each; its own peak where the system does not tell."""
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
+        for child in _children():
+            with suppress(OSError, IndexError):  # it has ended
+                pages += int(Path(f"/proc/{child}/statm").read_text().split()[1])
         return pages * resource.getpagesize()
     except OSError:
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         return peak if sys.platform == "darwin" else peak * 1024
+
+
+def _children() -> list[str]:
+    try:
+        return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+    except OSError:
+        return []
 
 
 class _Watch:

@@ -72,10 +72,16 @@ class BackendRequest:
         return self.parameters
 
 
+def chosen_backend(request: BackendRequest) -> BackendDeclaration:
+    """Return the declaration of the backend that the parameters ask for. Raises ValueError for a name of none."""
+    if request.parameters.backend == AUTO:
+        return automatic(request.weights)
+    return backend_for(request.parameters.backend)
+
+
 def choose_backend(request: BackendRequest) -> Backend:
     """Return the backend that the parameters ask for. Raises UsageError, BadInput or MissingDependency."""
-    automatically = request.parameters.backend == AUTO
-    chosen = automatic(request.weights) if automatically else backend_for(request.parameters.backend)
+    chosen = chosen_backend(request)
     _refuse_options_of_others(request.parameters, chosen)
     if request.sequence is not None:
         _require_streams(request.sequence, chosen)

@@ -55,6 +55,9 @@ class BackendDeclaration:
     versions: str = ""
     """Module of its folder whose function `versions(parameters)` returns what else decides its masks, by name, as that
     of a step does (Stage.versions)."""
+    apart: bool = False
+    """Whether it judges a frame by that frame alone and needs little memory, so that frames may be segmented in
+    processes of their own."""
     address: str = ""
     """How an http address reads that is given in place of the name; empty: it goes by its name."""
 

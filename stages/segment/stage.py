@@ -8,24 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from schemas.errors import BadInput
-from schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
+from schemas.segments import FrameSegments, Segments, SegmentsFile
 from schemas.sequence import Sequence
 from schemas.vocabulary import UNNAMED, load_vocabulary
-from stages.kit.formats.frames import Frame, FrameReader, require_depth
+from stages.kit.formats.frames import FrameReader, require_depth
 from stages.kit.formats.masks import write_panoptic_zip
 from stages.kit.stage import Context
-from stages.segment import fusion_ours, fusion_thesis, fusion_voxblox
-from stages.segment.choice import Backend, BackendRequest, choose_backend
-from stages.segment.fusion import FusedFrame, FusionRule
-from stages.segment.geometric import segment_depth
+from stages.segment.apart import segmented_apart, segmented_here, worker_count
+from stages.segment.choice import BackendRequest, choose_backend, chosen_backend
 from stages.segment.parameters import SegmentParameters
-from stages.segment.settings import fusion_settings, geometric_settings
-
-FUSION: dict[str, FusionRule] = {
-    "ours": fusion_ours.fuse,
-    "thesis": fusion_thesis.fuse,
-    "voxblox++": fusion_voxblox.fuse,
-}
 
 
 def run(
@@ -47,30 +38,34 @@ def run(
     require_depth(sequence)
     with FrameReader(sequence.path("frames.mcap")) as reader:
         with context.progress.step("prepare the backend"):
-            backend = choose_backend(
-                BackendRequest(
-                    parameters,
-                    weights,
-                    mask_weights=mask_weights,
-                    semantic_weights=semantic_weights,
-                    labels=labels,
-                    sidecar=sidecar,
-                    masks=masks,
-                    device=context.device,
-                    sequence=sequence,
-                    reader=reader,
-                    seed=context.seed,
-                    ask_again=context.force,
-                )
+            request = BackendRequest(
+                parameters,
+                weights,
+                mask_weights=mask_weights,
+                semantic_weights=semantic_weights,
+                labels=labels,
+                sidecar=sidecar,
+                masks=masks,
+                device=context.device,
+                sequence=sequence,
+                reader=reader,
+                seed=context.seed,
+                ask_again=context.force,
             )
+            backend = choose_backend(request)
         annotations: list[FrameSegments] = []
+        streams = tuple(dict.fromkeys(("depth", *backend.streams)))
+        workers = worker_count(len(reader), chosen_backend(request).apart, context.device)
 
-        def images() -> Iterator[tuple[int, np.ndarray]]:
-            frames = reader.frames(streams=dict.fromkeys(("depth", *backend.streams)))
-            for frame in context.progress.track(frames, total=len(reader), description="segment"):
-                fused = segment_frame(frame, reader, backend, parameters, context.random(frame.index))
-                annotations.append(describe(frame.index, fused))
-                yield frame.index, fused.ids
+        def images() -> Iterator[tuple[int, np.ndarray | bytes]]:
+            found = (
+                segmented_apart(request, streams, workers)
+                if workers > 1
+                else segmented_here(request, backend, streams, context.random)
+            )
+            for index, image, record in context.progress.track(found, total=len(reader), description="segment"):
+                annotations.append(record)
+                yield index, image
 
         with context.progress.step("segment the frames"):
             write_panoptic_zip(context.output / "panoptic.zip", images())
@@ -103,34 +98,3 @@ def recognised_share(frames: Iterable[FrameSegments], unnamed: int) -> float | N
     things = [segment for frame in frames for segment in frame.segments if segment.is_thing and segment.category_id]
     total = sum(segment.area for segment in things)
     return sum(s.area for s in things if s.category_id != unnamed) / total if total else None
-
-
-def segment_frame(
-    frame: Frame, reader: FrameReader, backend: Backend, parameters: SegmentParameters, random: np.random.Generator
-) -> FusedFrame:
-    """Return the fused segments of one frame; a frame without depth has none."""
-    camera = reader.cameras[frame.camera_name]
-    shape = (camera.height, camera.width)
-    depth = frame.depth if frame.depth is not None else np.zeros(shape, dtype=np.float32)
-    geometric = segment_depth(depth, camera, geometric_settings(parameters))
-    panoptic = backend(frame, geometric, random)
-    fuse = FUSION[parameters.fusion]
-    return fuse(geometric.labels, panoptic, geometric.points, fusion_settings(parameters), geometric.small)
-
-
-def describe(index: int, fused: FusedFrame) -> FrameSegments:
-    """Return the record of a frame for segments.json."""
-    return FrameSegments(
-        frame=index,
-        segments=tuple(
-            FrameSegment(
-                id=segment.id,
-                category_id=segment.category_id,
-                instance=segment.instance,
-                is_thing=segment.is_thing,
-                score=round(segment.score, 4),
-                area=segment.area,
-            )
-            for segment in fused.segments
-        ),
-    )

@@ -3,7 +3,9 @@ is added, and everything that lists them finds it without another edit."""
 
 from __future__ import annotations
 
+import importlib.util
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -69,6 +71,15 @@ def view(page):
 """,
     "stages/report/sections/novelty/section.html.j2": '<section id="novelty">{{ text }}</section>',
 }
+TUTORIAL = REPOSITORY / "docs" / "tutorials" / "new_step.md"
+
+
+def files_of_the_tutorial() -> dict[str, str]:
+    """Return path -> text of the files that the tutorial about a new step shows."""
+    blocks = re.findall(r"```python\n# ((?:schemas|stages)/\S+)\n(.*?)```", TUTORIAL.read_text(), re.DOTALL)
+    return {"stages/heights/__init__.py": "", **dict(blocks)}
+
+
 IN_PYTHON = """
 import json
 from cli.viewing.view import viewer_of
@@ -89,7 +100,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(REPOSITORY / name, root / name)
     (root / "data").symlink_to(REPOSITORY / "data")
-    for name, text in NEW_FILES.items():
+    for name, text in (NEW_FILES | files_of_the_tutorial()).items():
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text)
     python(root, "-m", "cli", "brandnew", "--text", "as <new> as can be", "--out", "tests/golden/v1/novelty")
@@ -100,6 +111,21 @@ def python(tree: Path, *words: str) -> str:
     done = subprocess.run([sys.executable, *words], cwd=tree, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
+
+
+def test_the_step_of_the_tutorial(tree: Path) -> None:
+    """Its commands, on the map of the golden artifacts."""
+    text = TUTORIAL.read_text().split("## Run it")[1]
+    assert len(files_of_the_tutorial()) == 4
+    shutil.copytree(REPOSITORY / "tests/golden/v1/panoptic_map", tree / "outputs/demo/panoptic_map")
+    commands = [line.removeprefix("scenewright ") for line in text.split("```")[1].split("\n") if line.strip()]
+    assert len(commands) == 4
+    for command in commands:
+        python(tree, "-m", "cli", *command.split())
+    again = json.loads(python(tree, "-m", "cli", *commands[1].split(), "--json"))
+    assert again["status"] == "up to date"
+    if importlib.util.find_spec("pandas"):
+        assert "floor" not in python(tree, "-c", text.split("```python\n")[1].split("```")[0])
 
 
 def test_the_command_is_there_with_its_estimate(tree: Path) -> None:

@@ -41,9 +41,9 @@ from stages.kit.measurement.panoptic_quality import ClassQuality
 from stages.kit.stage import Parameters
 from stages.segment.choice import BackendRequest, choose_backend
 from stages.segment.geometric import GeometricFrame, GeometricSettings, segment_depth
+from stages.segment.one_frame import FUSION, describe
 from stages.segment.parameters import SegmentParameters
 from stages.segment.settings import fusion_settings, geometric_settings
-from stages.segment.stage import FUSION, describe
 
 DRIFT_STREAM = 11
 SEED = 0

@@ -71,21 +71,22 @@ def panoptic_name(frame_index: int) -> str:
     return f"{frame_index:06d}.png"
 
 
-def write_panoptic_zip(path: Path, images: Iterable[tuple[int, np.ndarray]]) -> None:
+def write_panoptic_zip(path: Path, images: Iterable[tuple[int, np.ndarray | bytes]]) -> None:
     """Write pairs (frame index, id image (H, W)) as PNGs into a stored (not deflated) zip with fixed timestamps.
 
+    An image may be a PNG already (encode_panoptic_png).
     The same images in the same order give the same bytes. Raises ValueError when a frame comes twice.
     """
     seen: set[int] = set()
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
-        for frame_index, ids in images:
+        for frame_index, image in images:
             if frame_index in seen:
                 raise ValueError(f"frame {frame_index} comes twice")
             seen.add(frame_index)
             entry = zipfile.ZipInfo(panoptic_name(frame_index), date_time=FIXED_TIMESTAMP)
             entry.external_attr = 0o644 << 16
             entry.create_system = 3
-            archive.writestr(entry, encode_panoptic_png(ids))
+            archive.writestr(entry, image if isinstance(image, bytes) else encode_panoptic_png(image))
 
 
 class PanopticReader:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import shutil
+import time
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -28,7 +29,7 @@ from stages.kit.formats.written_scene import WrittenScene
 from stages.kit.geometry.transforms import apply, transform_from
 from stages.kit.simulation.world import load_scene
 from stages.urdf.exports import write_exports
-from tests.unit.urdf.small_room import context, graph_of, room, small_library
+from tests.unit.urdf.small_room import context, graph_of, layout, placed, room, small_library
 
 MOVABLE = ("cup_5", "bottle_6", "cup_7")
 DOOR = "fridge_4__door_hinge"
@@ -291,6 +292,74 @@ def test_a_scene_without_bodies_is_empty(tmp_path: Path) -> None:
                 context=context(tmp_path / declared.name),
             )
             assert done.outcome == "empty" and done.summary["reason"] == "the scene has no bodies"
+
+
+@pytest.fixture(scope="module")
+def badly_named(tmp_path_factory: pytest.TempPathFactory) -> InteractiveScene:
+    """Cups with names that URDF allows: `__cup__` is SDF's own, USD knows neither `-` nor `.` nor a digit first."""
+    library = small_library(tmp_path_factory.mktemp("library"), "cup")
+    names = ("__cup__", "cup-a.1_1", "cup_a_1_1", "7cup_2")
+    bodies = [
+        placed(library, name, "cup_00", (0.3 * number, 0, 0), parent="floor_1", movable=True)
+        for number, name in enumerate(names)
+    ]
+    bodies = [layout("floor_1", "floor", (0.5, 0, 0.0), (4.0, 3.0, 0.02)), *bodies]
+    root = tmp_path_factory.mktemp("badly_named")
+    graph = ContactGraphFile(nodes=graph_of([]).nodes, links=())
+    write_exports(root, write_scene_bundle(root, bodies, graph))
+    return InteractiveScene(root)
+
+
+def test_names_that_usd_does_not_allow_stay_apart(badly_named: InteractiveScene, tmp_path: Path) -> None:
+    done = written(badly_named, "usd", tmp_path)
+    stage = Usd.Stage.Open(str(done.path("scene.usdc")))
+    bodies = [prim.GetName() for prim in stage.GetPrimAtPath("/World").GetChildren()]
+    where = {old: new for new, old in done.info.names.items()}
+    standing = [where.get(name, name) for name in ("__cup__", "cup-a.1_1", "cup_a_1_1", "7cup_2")]
+    assert len(set(standing)) == 4 and set(standing) <= set(bodies)
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    assert UsdValidation.ValidationContext(validators).Validate(stage) == []
+
+
+def test_names_that_sdf_keeps_for_itself(badly_named: InteractiveScene, tmp_path: Path) -> None:
+    done = written(badly_named, "sdf", tmp_path)
+    tree = ElementTree.parse(done.path("scene.sdf"))
+    assert done.info.names == {"of___cup__": "__cup__"}
+    names = [element.get("name", "") for element in tree.iter() if element.tag in ("model", "link", "joint")]
+    assert not [name for name in names if name.startswith("__") and name.endswith("__")]
+    engine = pybullet.connect(pybullet.DIRECT)
+    try:
+        assert len(pybullet.loadSDF(str(done.path("scene.sdf")), physicsClientId=engine)) == 5
+    finally:
+        pybullet.disconnect(engine)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", ["usd", "sdf"])
+def test_a_mesh_of_a_million_faces(scene: InteractiveScene, target: str, tmp_path: Path) -> None:
+    root = tmp_path / "scene"
+    shutil.copytree(scene.root, root)
+    cup = next(body for body in to_export(scene).bodies if body.name == "cup_5")
+    shape = cup.links[0].visuals[0]
+    side = 710
+    grid = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), axis=-1).reshape(-1, 2) * 1e-4
+    corner = np.arange(side * side).reshape(side, side)[:-1, :-1].ravel() + 1
+    faces = np.vstack([[corner, corner + 1, corner + side], [corner + 1, corner + side + 1, corner + side]])
+    faces = np.hstack([faces[:3], faces[3:]]).T
+    with (root / shape.mesh).open("w") as file:
+        np.savetxt(file, grid, fmt="v %.4f %.4f 0")
+        np.savetxt(file, faces, fmt="f %d %d %d")
+    assert len(faces) > 1_000_000
+    started = time.process_time()
+    done = written(InteractiveScene(root), target, tmp_path / "out")
+    assert time.process_time() - started < 120
+    if target == "usd":
+        stage = Usd.Stage.Open(str(done.path("scene.usdc")))
+        meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+        counts = [len(mesh.GetFaceVertexCountsAttr().Get() or ()) for mesh in meshes]
+        assert max(counts) == len(faces)
+    else:
+        assert done.path(shape.mesh).read_bytes() == (root / shape.mesh).read_bytes()
 
 
 @pytest.mark.parametrize("target", ["usd", "moveit"])

@@ -39,11 +39,22 @@ def write(folder: Path, scene: SceneToExport) -> Written:
     (folder / "scene.sdf").write_bytes(text)
     _copy_meshes(scene, folder)
     values = scene.written.joint_values
-    return Written(joint_zero={name: value for name, value in sorted(values.items()) if value})
+    named = {body.name for body in scene.bodies}
+    for body in scene.bodies:
+        named |= {link.name for link in body.links} | {joint.name for joint in body.joints}
+    return Written(
+        names={allowed(name): name for name in sorted(named) if allowed(name) != name},
+        joint_zero={name: value for name, value in sorted(values.items()) if value},
+    )
+
+
+def allowed(name: str) -> str:
+    """Return a name that SDF allows: it keeps `__...__` and `world` for itself."""
+    return f"of_{name}" if name == "world" or (name.startswith("__") and name.endswith("__")) else name
 
 
 def _model(body: BodyToExport, scene: SceneToExport) -> Element:
-    model = Element("model", name=body.name)
+    model = Element("model", name=allowed(body.name))
     world_from_model = scene.pose(body.links[0])
     _pose(model, world_from_model)
     if not body.dynamic:
@@ -53,7 +64,7 @@ def _model(body: BodyToExport, scene: SceneToExport) -> Element:
     if body.dynamic and not body.record.movable:
         joint = SubElement(model, "joint", name=f"{body.name}__to_the_world", type="fixed")
         SubElement(joint, "parent").text = "world"
-        SubElement(joint, "child").text = body.name
+        SubElement(joint, "child").text = allowed(body.links[0].name)
     for entry in body.joints:
         model.append(_joint(entry, scene.written.joint_values.get(entry.name, 0.0)))
     return model
@@ -65,7 +76,7 @@ def _pose(parent: Element, pose: np.ndarray) -> None:
 
 
 def _link(link: Link, model_from_link: np.ndarray, *, dynamic: bool) -> Element:
-    element = Element("link", name=link.name)
+    element = Element("link", name=allowed(link.name))
     _pose(element, model_from_link)
     if dynamic and link.inertial is not None:
         inertial = SubElement(element, "inertial")
@@ -111,9 +122,9 @@ def _geometry(parent: Element, shape: Shape) -> None:
 
 
 def _joint(joint: UrdfJoint, value: float) -> Element:
-    element = Element("joint", name=joint.name, type=joint.type)
-    SubElement(element, "parent").text = joint.parent
-    SubElement(element, "child").text = joint.child
+    element = Element("joint", name=allowed(joint.name), type=joint.type)
+    SubElement(element, "parent").text = allowed(joint.parent)
+    SubElement(element, "child").text = allowed(joint.child)
     if joint.type == "fixed":
         return element
     axis = SubElement(element, "axis")

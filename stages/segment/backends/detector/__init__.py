@@ -20,6 +20,7 @@ BACKEND = BackendDeclaration(
     name="detector",
     summary="an ONNX object detector and the depth",
     order=40,
+    apart=True,
     needs=frozenset({"color"}),
     weights="an ONNX file",
     parameters=DetectorParameters,

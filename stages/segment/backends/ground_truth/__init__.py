@@ -20,6 +20,7 @@ BACKEND = BackendDeclaration(
     name="ground-truth",
     summary="the log's own labels",
     order=10,
+    apart=True,
     needs=frozenset({"labels"}),
     parameters=GroundTruthParameters,
     exclusive=("corruption",),
