@@ -11,12 +11,12 @@ from pydantic import Field
 
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
 from benchmarks.tabulation import markdown
+from stages.kit.predicates.expressions import text_of
 from stages.kit.stage import Parameters
 from stages.kit.tasks.pddl import domain_text
 from stages.kit.tasks.strips import Atom, Domain
 from stages.kit.tasks.task_planner import TaskPlan
 from stages.predicates.execution import Abstraction, Attempt, Planner, Replayed, Replays, attempt, oracle, timed_plan
-from stages.predicates.language.expressions import text_of
 from stages.predicates.learning.grammar import GIVEN
 from stages.predicates.learning.memory import Memory
 from stages.predicates.learning.ours import OursLearner
@@ -30,9 +30,9 @@ from stages.predicates.training import Training, train
 from stages.predicates.truth import true_domain
 from stages.predicates.world.catalogue import DOMAINS, kitchen_file
 
-TUNING, REPORTING = range(20), range(100, 110)
+TUNING, REPORTING = range(100), range(200, 210)
 TRAINING_TASKS, SET_TASKS = 10, 10
-OF_TRAINING, OF_TESTS = 1000, 5000
+OF_TRAINING, OF_TESTS = 1000, 6000
 """Added to a seed for its training tasks; the seed of the tests, which all share."""
 BEFORE = {"store_objects": "set_table", "set_table": "store_objects", "cook_meal": "store_objects"}
 """Domain -> the one that was taught before it, bootstrapped."""

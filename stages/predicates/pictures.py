@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from stages.predicates.language.evaluating import Evaluator
-from stages.predicates.language.expressions import Predicate
+from stages.kit.predicates.evaluating import Evaluator
+from stages.kit.predicates.expressions import Predicate
 from stages.predicates.state import TABLE_LEFT, TABLE_RIGHT, State
 from stages.predicates.world.kitchen import FAUCET_HEIGHT, SINK_DEPTH, SINK_WIDTH, SINK_X
 

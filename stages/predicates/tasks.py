@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stages.kit.predicates.evaluating import Evaluator
 from stages.kit.tasks.strips import Atom, Problem, apply_action, ground
-from stages.predicates.language.evaluating import Evaluator
 from stages.predicates.state import State
 from stages.predicates.truth import true_domain, true_predicates, truth_file
 from stages.predicates.world.actions import free_place

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from stages.kit.tasks.strips import Atom, Domain, Problem, ground
 from stages.kit.tasks.task_planner import plan_task
-from stages.predicates.execution import MOST_FAILURES, MOST_STEPS, PLANNING_LIMIT, action_atom
+from stages.predicates.execution import MOST_FAILURES, MOST_STEPS, PLANNING_LIMIT, SHORTENING, action_atom
 from stages.predicates.learning.ours import OursLearner
 from stages.predicates.learning.phrases import goal_phrases
 from stages.predicates.state import State
@@ -34,8 +34,10 @@ def train(learner: OursLearner, domain: str, tasks: Sequence[Task]) -> Training:
     """Let a learner work through tasks with its teacher."""
     training = Training()
     for task in tasks:
+        reached = training.reached
         _episode(learner, domain, task, training)
         training.episodes += 1
+        learner.missed += training.reached == reached
     return training
 
 
@@ -90,5 +92,5 @@ def _next_action(learner: OursLearner, domain: str, state: State, goal: frozense
 def first_action(domain: Domain, objects: Sequence[str], atoms: frozenset[Atom], goal: frozenset[Atom]) -> Atom | None:
     """Return the first action of a plan, None without one."""
     problem = Problem("task", dict.fromkeys(objects, ""), atoms, goal)
-    found = plan_task(problem, ground(domain, problem), limit=PLANNING_LIMIT)
+    found = plan_task(problem, ground(domain, problem), limit=PLANNING_LIMIT, improvement=SHORTENING)
     return action_atom(found.actions[0]) if found.actions else None

@@ -9,9 +9,10 @@ from pydantic import Field
 
 from schemas.base import Model
 from schemas.outside import LARGEST_SETTINGS, file_text, file_toml
+from stages.kit.predicates.expressions import Predicate, check, read
 from stages.kit.tasks.pddl import parse_domain
 from stages.kit.tasks.strips import Domain
-from stages.predicates.language.expressions import Predicate, check, read
+from stages.predicates.state import KITCHEN_WORDS
 
 FOLDER = Path(__file__).resolve().parents[2] / "data" / "kitchen"
 TRUTH = FOLDER / "truth.toml"
@@ -54,7 +55,7 @@ def true_predicates() -> dict[str, Predicate]:
         name: Predicate(name, meant.arguments, read(meant.means, f"truth.toml, {name}"))
         for name, meant in truth_file().predicates.items()
     }
-    check(found)
+    check(found, KITCHEN_WORDS)
     return found
 
 

@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
-from stages.predicates.language.expressions import Predicate, Tree, read, size_of
+from stages.kit.predicates.expressions import Predicate, Tree, read, size_of
 from stages.predicates.learning.phrases import CATEGORIES, Phrase
+from stages.predicates.state import TOLERANCE
 
 GIVEN_TEXTS = {
     "in_gripper": (
@@ -33,7 +34,6 @@ GIVEN_TEXTS = {
 """What every learner starts with: the thesis's worked example (`in_gripper`), and three relations of boxes."""
 GIVEN = {name: Predicate(name, count, read(text, name)) for name, (count, text) in GIVEN_TEXTS.items()}
 _USES = {"in_gripper": {"gripper"}, "rests_on": {"above"}, "rests_on_table": {"above", "table"}, "within": {"inside"}}
-TOLERANCE = 0.2
 UNMENTIONED, LEFT_OUT, OTHER_SIDE, OWN_NUMBER = 3.0, 4.0, 7.0, 3.0
 """Costs: of a perception that is not spoken of, of one that is and is not used, of the wrong side, of a number that
 neither the phrase nor the worked example says."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import dataclass, field
 
+from stages.kit.predicates.evaluating import Evaluator
+from stages.kit.predicates.expressions import Predicate, Tree
 from stages.kit.tasks.strips import Atom, Domain
-from stages.predicates.language.evaluating import Evaluator
-from stages.predicates.language.expressions import Predicate, Tree
 from stages.predicates.learning.grammar import GIVEN
 from stages.predicates.learning.operators import Transition, learn_operators
 from stages.predicates.learning.phrases import Phrase

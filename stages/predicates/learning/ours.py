@@ -13,8 +13,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stages.kit.predicates.evaluating import Evaluator
 from stages.kit.tasks.strips import Atom
-from stages.predicates.language.evaluating import Evaluator
 from stages.predicates.learning.grammar import GIVEN
 from stages.predicates.learning.memory import Memory, Turn
 from stages.predicates.learning.operators import Transition
@@ -28,6 +28,8 @@ MOST_QUESTIONS = 3
 """About one phrase, told apart from its rivals."""
 ASKED_AGAIN = 2.0
 """Weight of a sentence that was confirmed."""
+DOUBT_AFTER = 3
+"""Episodes without their goal after which what was said once is tried."""
 
 
 class OursLearner:
@@ -43,6 +45,8 @@ class OursLearner:
         self._synthesiser = Synthesiser(self.memory.states)
         self._tried: Counter[tuple[str, ...]] = Counter()
         self._asked: Counter[Phrase] = Counter()
+        self.missed = 0
+        """Episodes that ended without their goal."""
 
     # ---- what it hears -----------------------------------------------------------------------------------------
 
@@ -224,24 +228,42 @@ class OursLearner:
         return best[int(self.random.integers(len(best)))] if best else None
 
     def doubtful(self, state: State) -> Atom | None:
-        """Return an action that was never allowed and whose preconditions, as named, were never seen to hold together:
-        one of them, said once, may be wrong. The one with the fewest of them against it."""
+        """Return an action against which nothing speaks but what was said once, and which may be wrong.
+
+        Of an action that was never allowed, whose preconditions were never seen to hold together; and, once DOUBT_AFTER
+        episodes went amiss, of any where the one precondition against it is nothing that actions change. The one with
+        the fewest against it."""
         names, held = self.memory.names(), self.memory.see(state)
         done = {transition.action[0] for transition in self.memory.transitions}
+        changing = self._changing()
         said: Counter[tuple[str, Atom]] = Counter()
         for (action, phrase, variables), count in self.memory.stated.items():
             said[action, (names[phrase], *variables)] += count
         found = []
         for name in self.actions:
             wanted = [(atom, count) for (action, atom), count in said.items() if action == name]
-            if name in done or not wanted or self._seen_together(name, [atom for atom, _ in wanted]):
+            never = name not in done and not self._seen_together(name, [atom for atom, _ in wanted])
+            if not wanted or not (never or self.missed >= DOUBT_AFTER):
                 continue
             for objects in itertools.permutations(state.objects, ARITY[name]):
-                against = [count for atom, count in wanted if _bound(atom, objects) not in held]
-                if against and max(against) == 1:
+                against = [entry for entry in wanted if _bound(entry[0], objects) not in held]
+                single = len(against) == 1 and against[0][0][0] not in changing
+                if against and max(count for _, count in against) == 1 and (never or single):
                     found.append((len(against), (name, *objects)))
         fewest = [action for count, action in found if count == min(found)[0]]
         return fewest[int(self.random.integers(len(fewest)))] if fewest else None
+
+    def _changing(self) -> set[str]:
+        """Return the predicates that some action was seen to change."""
+        seen = {number: self.memory.see(self.memory.states[number]) for number in self._ends()}
+        return {
+            atom[0]
+            for transition in self.memory.transitions
+            for atom in seen[transition.before] ^ seen[transition.after]
+        }
+
+    def _ends(self) -> set[int]:
+        return {number for each in self.memory.transitions for number in (each.before, each.after)}
 
     def _seen_together(self, name: str, wanted: list[Atom]) -> bool:
         """Whether all of what was named for an action held at once, for some objects, in a state that was seen."""

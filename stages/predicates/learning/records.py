@@ -18,14 +18,14 @@ from schemas.learned_domain import (
     SeenState,
     StatedPrecondition,
 )
-from stages.predicates.language.expressions import Predicate, check, read, text_of
+from stages.kit.predicates.expressions import Predicate, check, read, text_of
 from stages.predicates.language.saying import say
 from stages.predicates.learning.grammar import GIVEN
 from stages.predicates.learning.memory import Memory, Turn
 from stages.predicates.learning.operators import Transition
 from stages.predicates.learning.phrases import Phrase
 from stages.predicates.learning.synthesis import Label
-from stages.predicates.state import Seen, State
+from stages.predicates.state import KITCHEN_WORDS, Seen, State
 
 
 def document_of(memory: Memory, **rest: Any) -> LearnedDomainFile:
@@ -96,7 +96,7 @@ def memory_of(document: LearnedDomainFile, where: str) -> Memory:
         each.name: Predicate(each.name, each.arguments, read(each.means, f"{where}: {each.name}"))
         for each in document.predicates
     }
-    check(predicates)
+    check(predicates, KITCHEN_WORDS)
     memory = Memory()
     memory.states = [
         State(

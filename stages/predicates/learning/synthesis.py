@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stages.predicates.language.evaluating import Evaluator, of_object, of_scene
-from stages.predicates.language.expressions import Tree
+from stages.kit.predicates.evaluating import Evaluator
+from stages.kit.predicates.expressions import Tree
 from stages.predicates.learning.grammar import GIVEN, MEASURES, candidates
 from stages.predicates.learning.phrases import Phrase
 from stages.predicates.state import State
@@ -89,7 +89,7 @@ class Synthesiser:
             values: dict[bool, set[float]] = {True: set(), False: set()}
             for label in labels:
                 state = self.states[label.state]
-                value = of_object(state, label.objects[0], measure) if label.objects else of_scene(state, measure)
+                value = state.number(label.objects[0], measure) if label.objects else state.of_scene(measure)
                 values[label.holds].add(round(value, 3))
             if values[True] and values[False] and not values[True] & values[False]:
                 both = sorted([(v, True) for v in values[True]] + [(v, False) for v in values[False]])

@@ -11,8 +11,8 @@ from functools import cache
 
 import numpy as np
 
-from stages.predicates.language.evaluating import Evaluator
-from stages.predicates.language.expressions import Predicate, Tree
+from stages.kit.predicates.evaluating import Evaluator
+from stages.kit.predicates.expressions import Predicate, Tree
 from stages.predicates.learning.grammar import GIVEN
 from stages.predicates.learning.memory import Memory
 from stages.predicates.state import Seen, State

@@ -7,8 +7,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from stages.kit.predicates.evaluating import Evaluator
 from stages.kit.tasks.strips import Atom, Problem, ground
-from stages.predicates.language.evaluating import Evaluator
 from stages.predicates.state import State
 from stages.predicates.tasks import true_atoms
 from stages.predicates.truth import action_of, true_domain, true_predicates, truth_file

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from stages.kit.predicates.expressions import read, text_of
 from stages.kit.tasks.pddl import domain_text, parse_domain
 from stages.predicates.execution import attempt
-from stages.predicates.language.expressions import read, text_of
 from stages.predicates.learning.operators import Transition, learn_operators, lift
 from stages.predicates.learning.ours import OursLearner
 from stages.predicates.learning.phrases import Phrase, goal_phrases, phrase_of
