@@ -20,7 +20,7 @@ from stages.predicates.execution import Abstraction, Attempt, Planner, Replayed,
 from stages.predicates.learning.grammar import GIVEN
 from stages.predicates.learning.memory import Memory
 from stages.predicates.learning.ours import OursLearner
-from stages.predicates.learning.phrases import goal_phrases
+from stages.kit.predicates.goal_words import goal_phrases
 from stages.predicates.learning.random_exploration import RandomLearner
 from stages.predicates.measure.accuracy import balanced_accuracy, drawn_cases
 from stages.predicates.state import State

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from schemas.kitchen_plan import EvaluatedSet, KitchenEvaluation, KitchenEvaluationFile
 from schemas.learned_domain import LearnedDomain
+from stages.kit.predicates.goal_words import goal_phrases
 from stages.kit.stage import Context
 from stages.kit.tasks.strips import Domain
 from stages.predicates.execution import Attempt, attempt, oracle
 from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.phrases import goal_phrases
 from stages.predicates.learning.records import memory_of
 from stages.predicates.measure.accuracy import accuracies
 from stages.predicates.parameters import EvaluateParameters

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from schemas.kitchen_plan import KitchenPlan, KitchenPlanFile, KitchenStep
 from schemas.learned_domain import LearnedDomain
+from stages.kit.predicates.goal_words import goal_phrases
 from stages.kit.stage import Context
 from stages.predicates.execution import Attempt, Live, attempt
 from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.phrases import goal_phrases
 from stages.predicates.learning.records import memory_of
 from stages.predicates.parameters import PlanParameters
 from stages.predicates.pictures import animate, draw_kitchen

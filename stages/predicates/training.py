@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from stages.kit.predicates.goal_words import goal_phrases
 from stages.kit.tasks.strips import Atom, Domain, Problem, ground
 from stages.kit.tasks.task_planner import plan_task
 from stages.predicates.execution import MOST_FAILURES, MOST_STEPS, PLANNING_LIMIT, SHORTENING, action_atom
 from stages.predicates.learning.ours import OursLearner
-from stages.predicates.learning.phrases import goal_phrases
 from stages.predicates.state import State
 from stages.predicates.tasks import Task, open_kitchen, true_atoms
 from stages.predicates.world.actions import act

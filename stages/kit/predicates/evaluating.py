@@ -75,7 +75,7 @@ class Evaluator:
                 return one < two
             return one <= two if head == "at_most" else abs(one - two) < self.state.tolerance
         names = tuple(binding[str(part)] for part in tree[1:])
-        return self._atom((head, *names)) if head in self.predicates else self.state.related(str(head), names)
+        return self._atom((str(head), *names)) if head in self.predicates else self.state.related(str(head), names)
 
     def _word(self, tree: Tree | str | float, binding: dict[str, str]) -> str:
         if isinstance(tree, tuple):

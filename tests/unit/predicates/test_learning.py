@@ -9,7 +9,8 @@ from stages.kit.tasks.pddl import domain_text, parse_domain
 from stages.predicates.execution import attempt
 from stages.predicates.learning.operators import Transition, learn_operators, lift
 from stages.predicates.learning.ours import OursLearner
-from stages.predicates.learning.phrases import Phrase, goal_phrases, phrase_of
+from stages.kit.predicates.goal_words import goal_phrases
+from stages.predicates.learning.phrases import Phrase, phrase_of
 from stages.predicates.learning.synthesis import Label, Synthesiser
 from stages.predicates.state import Seen, State
 from stages.predicates.tasks import tasks_of
