@@ -12,6 +12,7 @@ from pydantic import Field
 from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, count, mean
 from benchmarks.tabulation import markdown
 from stages.kit.predicates.expressions import text_of
+from stages.kit.predicates.goal_words import goal_phrases
 from stages.kit.stage import Parameters
 from stages.kit.tasks.pddl import domain_text
 from stages.kit.tasks.strips import Atom, Domain
@@ -20,7 +21,6 @@ from stages.predicates.execution import Abstraction, Attempt, Planner, Replayed,
 from stages.predicates.learning.grammar import GIVEN
 from stages.predicates.learning.memory import Memory
 from stages.predicates.learning.ours import OursLearner
-from stages.kit.predicates.goal_words import goal_phrases
 from stages.predicates.learning.random_exploration import RandomLearner
 from stages.predicates.measure.accuracy import balanced_accuracy, drawn_cases
 from stages.predicates.state import State

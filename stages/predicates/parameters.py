@@ -72,7 +72,7 @@ def kitchen_files(parameters: Any) -> tuple[str, ...]:
 
 TEACH = Stage(
     name="predicates teach",
-    version=1,
+    version=2,
     summary="Learn predicates and operators from a simulated teacher's corrections in a planar kitchen",
     parameters=TeachParameters,
     reads={"learned": Optionally(LearnedDomain)},
@@ -84,7 +84,7 @@ TEACH = Stage(
 )
 PLAN = Stage(
     name="predicates plan",
-    version=1,
+    version=2,
     summary="Plan for a goal in words with what was learned, and try it in the kitchen",
     parameters=PlanParameters,
     reads={"learned": LearnedDomain},
@@ -97,7 +97,7 @@ PLAN = Stage(
 )
 EVALUATE = Stage(
     name="predicates evaluate",
-    version=1,
+    version=2,
     summary="Count what is reached of sets of tasks with what was learned, beside the teacher's own operators",
     parameters=EvaluateParameters,
     reads={"learned": LearnedDomain},

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from stages.kit.predicates.expressions import read, text_of
+from stages.kit.predicates.goal_words import goal_phrases
 from stages.kit.tasks.pddl import domain_text, parse_domain
 from stages.predicates.execution import attempt
 from stages.predicates.learning.operators import Transition, learn_operators, lift
 from stages.predicates.learning.ours import OursLearner
-from stages.kit.predicates.goal_words import goal_phrases
 from stages.predicates.learning.phrases import Phrase, phrase_of
 from stages.predicates.learning.synthesis import Label, Synthesiser
 from stages.predicates.state import Seen, State
