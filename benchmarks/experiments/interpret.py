@@ -13,21 +13,21 @@ from benchmarks.experiment import Bench, Experiment, Measure, Results, Trial, co
 from benchmarks.tabulation import markdown
 from stages.kit.predicates.expressions import text_of
 from stages.kit.predicates.goal_words import goal_phrases
+from stages.kit.predicates.vocabulary import Perceived
 from stages.kit.stage import Parameters
 from stages.kit.tasks.pddl import domain_text
 from stages.kit.tasks.strips import Atom, Domain
 from stages.kit.tasks.task_planner import TaskPlan
 from stages.predicates.execution import Abstraction, Attempt, Planner, Replayed, Replays, attempt, oracle, timed_plan
-from stages.predicates.learning.grammar import GIVEN
 from stages.predicates.learning.memory import Memory
 from stages.predicates.learning.ours import OursLearner
 from stages.predicates.learning.random_exploration import RandomLearner
+from stages.predicates.learning.setting import KITCHEN_GIVEN
 from stages.predicates.measure.accuracy import balanced_accuracy, drawn_cases
-from stages.predicates.state import State
 from stages.predicates.tasks import SETS, Task, tasks_of
-from stages.predicates.teacher.simulated import SimulatedTeacher, Wording, meant_by
+from stages.predicates.teacher.simulated import SimulatedTeacher, Wording
 from stages.predicates.training import Training, train
-from stages.predicates.truth import true_domain
+from stages.predicates.truth import true_domain, truth_of
 from stages.predicates.world.catalogue import DOMAINS, kitchen_file
 
 TUNING, REPORTING = range(100), range(200, 210)
@@ -96,7 +96,7 @@ class Known:
         """Return a memory's abstraction, which evaluates each of the states in `replays` once."""
         key = tuple((each.name, text_of(each.means)) for each in memory.predicates().values()), tuple(memory.used())
 
-        def see(state: State) -> frozenset[Atom]:
+        def see(state: Perceived) -> frozenset[Atom]:
             if (key, id(state)) not in self.seen:
                 self.seen[key, id(state)] = memory.see(state)
             return self.seen[key, id(state)]
@@ -186,11 +186,13 @@ def _accuracy(memory: Memory, name: str, states: int, known: Known) -> tuple[flo
     half, what a coin would get."""
     found = dict.fromkeys((each for each in true_domain(name).predicates if each != "in_gripper"), 0.5)
     for phrase, means in memory.meanings.items():
-        meant = meant_by(phrase.text)
+        meant = truth_of(name).meant_by(phrase.text)
         if meant in found:
             key = (meant, means)
             if key not in known.accuracies:
-                known.accuracies[key] = balanced_accuracy(drawn_cases(meant, name, states, OF_TESTS), means, GIVEN)
+                known.accuracies[key] = balanced_accuracy(
+                    drawn_cases(meant, name, states, OF_TESTS), means, KITCHEN_GIVEN
+                )
             found[meant] = max(found[meant], known.accuracies[key])
     return statistics.mean(found.values()), min(found.values())
 

@@ -7,15 +7,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from stages.kit.predicates.vocabulary import Perceived
 from stages.kit.tasks.strips import Atom, Domain, GroundAction, Problem, apply_action, ground
 from stages.kit.tasks.task_planner import TaskPlan, plan_task
+from stages.predicates.learning.setting import SETTINGS
 from stages.predicates.state import State
 from stages.predicates.tasks import Task, open_kitchen, true_atoms
 from stages.predicates.truth import action_of, true_domain
-from stages.predicates.world.actions import ARITY, act
+from stages.predicates.world.actions import act
 from stages.predicates.world.kitchen import Kitchen
 
 MOST_STEPS, MOST_FAILURES = 20, 5
+ARITY = {name: count for setting in SETTINGS.values() for name, count in setting.arity.items()}
 PLANNING_LIMIT, SHORTENING = 5_000, 50
 """Expanded states of one search, and of each that looks for a shorter plan: plans are wanted within moments."""
 
@@ -41,7 +44,7 @@ class Attempt:
     """Wanted atoms that no actions can make true."""
 
 
-Abstraction = Callable[[State], frozenset[Atom]]
+Abstraction = Callable[[Perceived], frozenset[Atom]]
 Planner = Callable[[Domain, list[str], frozenset[Atom], frozenset[Atom], frozenset[Atom]], tuple[TaskPlan, float]]
 """Domain, objects, what holds, what is wanted, actions to avoid -> plan and the seconds that it took."""
 
@@ -49,7 +52,7 @@ Planner = Callable[[Domain, list[str], frozenset[Atom], frozenset[Atom], frozens
 class World(Protocol):
     """Where actions are done."""
 
-    def state(self) -> State:
+    def state(self) -> Perceived:
         """What is perceived now."""
         ...
 
@@ -197,7 +200,7 @@ def plan_without(
 def oracle(task: Task, name: str, world: World | None = None, planner: Planner | None = None) -> Attempt:
     """Try a task with the teacher's own operators and predicates: the ceiling of physics."""
 
-    def see(state: State) -> frozenset[Atom]:
+    def see(state: Perceived) -> frozenset[Atom]:
         return true_atoms(state, name)
 
     return attempt(task, name, true_domain(name), see, frozenset(task.goal), replan=True, world=world, planner=planner)

@@ -10,7 +10,7 @@ from pydantic import Field
 from schemas.errors import UsageError
 from schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
 from schemas.learned_domain import LearnedDomain
-from stages.kit.stage import Optionally, Parameters, Stage
+from stages.kit.stage import External, Optionally, Parameters, Stage
 
 DomainName = Literal["store_objects", "set_table", "cook_meal"]
 SetName = Literal["canonical", "more_objects", "novel_goals", "combined", "hundred_goals"]
@@ -24,6 +24,9 @@ class TeachParameters(Parameters):
     domain: DomainName = Field("store_objects", description="Which kitchen")
     tasks: int = Field(10, ge=1, le=100, description="Training tasks")
     wording: Literal["plain", "diverse"] = Field("plain", description="One sentence for each thing amiss, or several")
+    teacher: Literal["simulated", "terminal"] = Field(
+        "simulated", description="Who teaches: `terminal` asks you, and keeps what you say in teacher.jsonl"
+    )
     wrong: float = Field(0.0, ge=0.0, le=0.5, description="Share of corrections that are wrong or missing")
 
 
@@ -67,6 +70,8 @@ def kitchen_files(parameters: Any) -> tuple[str, ...]:
         "kitchen/store_objects.pddl",
         "kitchen/set_table.pddl",
         "kitchen/cook_meal.pddl",
+        "room/truth.toml",
+        "room/room.pddl",
     )
 
 
@@ -75,7 +80,11 @@ TEACH = Stage(
     version=2,
     summary="Learn predicates and operators from a simulated teacher's corrections in a planar kitchen",
     parameters=TeachParameters,
-    reads={"learned": Optionally(LearnedDomain)},
+    reads={
+        "learned": Optionally(LearnedDomain),
+        "scene": Optionally(External("rooms to learn in instead of the kitchen: interactive scenes, `room` of truths")),
+        "dialogue": Optionally(External("teacher.jsonl of an earlier --teacher terminal, replayed")),
+    },
     writes=LearnedDomain,
     libraries=(*LIBRARIES, "pillow"),
     module="teach_stage",
@@ -100,7 +109,7 @@ EVALUATE = Stage(
     version=2,
     summary="Count what is reached of sets of tasks with what was learned, beside the teacher's own operators",
     parameters=EvaluateParameters,
-    reads={"learned": LearnedDomain},
+    reads={"learned": LearnedDomain, "scene": Optionally(External("rooms to try in what was learned in rooms"))},
     writes=KitchenEvaluation,
     libraries=LIBRARIES,
     module="evaluate_stage",

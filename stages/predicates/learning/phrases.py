@@ -16,6 +16,10 @@ CONCEPTS: dict[str, tuple[str, ...]] = {
     "above": ("on", "top", "onto"),
     "inside": ("inside",),
     "other": ("another", "something", "other", "more"),
+    "open": ("open", "opened", "shut", "closed"),
+    "door": ("door", "doors"),
+    "reach": ("reach", "reached"),
+    "level": ("level",),
 }
 """What words point at: the word list that stands in for a language model. It is written by hand."""
 CATEGORIES = ("food", "can", "coaster", "shelf", "cup", "pot", "basket", "placemat", "plate")

@@ -16,7 +16,7 @@ from stages.predicates.state import Seen, State
 from stages.predicates.tasks import tasks_of
 from stages.predicates.teacher.simulated import SimulatedTeacher
 from stages.predicates.training import train
-from stages.predicates.truth import truth_file
+from stages.predicates.truth import truth_of
 from stages.predicates.world.catalogue import kitchen_file
 
 
@@ -73,7 +73,7 @@ def test_many_labels_outweigh_a_wrong_one() -> None:
 
 
 def test_every_sentence_of_the_teacher_is_read_back_as_she_meant_it() -> None:
-    for name, meant in truth_file().predicates.items():
+    for name, meant in truth_of("store_objects").file.predicates.items():
         for sentence in (*meant.lacks, *meant.unmet):
             said = sentence.replace("<1>", "can").replace("<2>", "shelf")
             phrase, objects = phrase_of(said, TABLE.objects)
