@@ -114,11 +114,15 @@ class OursLearner:
 
     def _heard(self, state: Perceived, sentence: str, about: str) -> tuple[Phrase, tuple[str, ...]]:
         self.memory.dialogue.append(Turn("teacher", sentence, about))
-        phrase, objects = phrase_of(sentence, state.names)
+        phrase, objects = self._phrase_of(sentence, state)
         turn = len(self.memory.dialogue) - 1
         label = Label(self.memory.remember(state), objects, False, "sentence", 1.0, turn)
         self.memory.labels[phrase].append(label)
         return phrase, objects
+
+    def _phrase_of(self, sentence: str, state: Perceived) -> tuple[Phrase, tuple[str, ...]]:
+        """Return a sentence as a phrase and its objects."""
+        return phrase_of(sentence, state.names)
 
     # ---- what it makes of it -----------------------------------------------------------------------------------
 
