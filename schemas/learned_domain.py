@@ -132,6 +132,8 @@ class LearnedDomainFile(Model):
     setting: Literal["kitchen", "room"] = "kitchen"
     """The kitchen of blocks, or rooms of the chain."""
     teacher: Text
+    learner: Text = "ours"
+    """`ours`, `random`, or `thesis, <who answered>`."""
     predicates: Annotated[tuple[LearnedPredicate, ...], Field(max_length=200)]
     phrases: Annotated[tuple[HeardPhrase, ...], Field(max_length=200)]
     preconditions: tuple[StatedPrecondition, ...]

@@ -10,6 +10,7 @@ from pydantic import Field
 from schemas.errors import UsageError
 from schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
 from schemas.learned_domain import LearnedDomain
+from stages.kit.language.options import LanguageParameters
 from stages.kit.stage import External, Optionally, Parameters, Stage
 
 DomainName = Literal["store_objects", "set_table", "cook_meal"]
@@ -18,12 +19,17 @@ SET_NAMES: tuple[SetName, ...] = ("canonical", "more_objects", "novel_goals", "c
 LIBRARIES = ("numpy", "pymunk", "numba")
 
 
-class TeachParameters(Parameters):
+class TeachParameters(LanguageParameters):
     """Options of `predicates teach`."""
 
     domain: DomainName = Field("store_objects", description="Which kitchen")
     tasks: int = Field(10, ge=1, le=100, description="Training tasks")
     wording: Literal["plain", "diverse"] = Field("plain", description="One sentence for each thing amiss, or several")
+    learner: Literal["ours", "thesis", "random"] = Field(
+        "ours",
+        description="Who learns: `thesis` asks a language model (--language; scripted is a stand-in, no model), "
+        "`random` explores by chance",
+    )
     teacher: Literal["simulated", "terminal"] = Field(
         "simulated", description="Who teaches: `terminal` asks you, and keeps what you say in teacher.jsonl"
     )
@@ -84,6 +90,7 @@ TEACH = Stage(
         "learned": Optionally(LearnedDomain),
         "scene": Optionally(External("rooms to learn in instead of the kitchen: interactive scenes, `room` of truths")),
         "dialogue": Optionally(External("teacher.jsonl of an earlier --teacher terminal, replayed")),
+        "transcript": Optionally(External("transcript.jsonl of an earlier --learner thesis")),
     },
     writes=LearnedDomain,
     libraries=(*LIBRARIES, "pillow"),

@@ -11,10 +11,11 @@ from stages.kit.stage import Context
 from stages.kit.tasks.pddl import domain_text
 from stages.predicates.language.saying import say
 from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.ours import OursLearner
+from stages.predicates.learning.opening import Exchange, empty_memory, open_learner
 from stages.predicates.learning.records import document_of, memory_of
 from stages.predicates.learning.setting import KITCHEN, Setting
 from stages.predicates.learning.setting import ROOM as ROOM_SETTING
+from stages.predicates.learning.thesis_memory import ThesisMemory
 from stages.predicates.parameters import TeachParameters
 from stages.predicates.pictures import draw_predicates
 from stages.predicates.room.tasks import open_room, read_rooms, room_tasks
@@ -49,15 +50,18 @@ def run(
     learned: LearnedDomain | None,
     scene: Path | None,
     dialogue: Path | None,
+    transcript: Path | None,
     *,
     parameters: TeachParameters,
     context: Context,
 ) -> LearnedDomain:
     """Teach in the kitchen, or in the rooms of `scene`; what `learned` holds is known from the beginning."""
     course = course_of(scene, parameters.domain, parameters.tasks, context.seed)
-    memory = Memory(course.setting)
+    memory = empty_memory(parameters.learner, course.setting)
     if learned is not None:
         memory = memory_of(learned.info, str(learned.root))
+        if isinstance(memory, ThesisMemory) != (parameters.learner == "thesis"):
+            raise BadInput(f"{learned.root}: another learner learned it", hint=f"it was {learned.info.learner}")
         if memory.setting is not course.setting:
             raise BadInput(
                 f"{learned.root}: was learned in a {memory.setting.name}, this is a {course.setting.name}",
@@ -65,7 +69,9 @@ def run(
             )
     before = memory.sentences
     teacher = open_teacher(parameters, course.domain, context.seed, dialogue, context.output / "teacher.jsonl")
-    learner = OursLearner(teacher, course.actions, context.seed, memory)
+    learner = open_learner(
+        parameters, teacher, course.actions, context.seed, memory, Exchange(transcript, context.output)
+    )
     with context.progress.step("teach"):
         training = train(learner, course.domain, course.tasks, course.opened)
     heard = memory.sentences - before
@@ -76,7 +82,12 @@ def run(
         f"{training.reached} of {training.episodes} goals reached"
     )
     document = document_of(
-        memory, domain=course.domain, teacher=teacher.label, physics=tuple(training.physics), statement=statement
+        memory,
+        domain=course.domain,
+        teacher=teacher.label,
+        learner=learner.label,
+        physics=tuple(training.physics),
+        statement=statement,
     )
     document.write(context.output / "domain.json")
     (context.output / "domain.pddl").write_text(domain_text(domain), encoding="utf-8")

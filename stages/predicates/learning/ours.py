@@ -33,6 +33,7 @@ DOUBT_AFTER = 3
 class OursLearner:
     """Learns from a teacher; `memory` may hold what another domain taught."""
 
+    label = "ours"
     plans = True
     """Whether it follows plans while it is taught."""
 

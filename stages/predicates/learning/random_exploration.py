@@ -12,6 +12,7 @@ from stages.predicates.learning.ours import OursLearner
 class RandomLearner(OursLearner):
     """Explores by chance."""
 
+    label = "random"
     plans = False
 
     def explore(self, state: Perceived) -> Atom | None:

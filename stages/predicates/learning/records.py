@@ -29,6 +29,7 @@ from stages.predicates.learning.operators import Transition
 from stages.predicates.learning.phrases import Phrase
 from stages.predicates.learning.setting import SETTINGS
 from stages.predicates.learning.synthesis import Label
+from stages.predicates.learning.thesis_memory import THESIS, ThesisMemory
 from stages.predicates.state import Seen, State
 
 
@@ -141,7 +142,7 @@ def memory_of(document: LearnedDomainFile, where: str) -> Memory:
     }
     setting = SETTINGS[document.setting]
     check(predicates, setting.words)
-    memory = Memory(setting)
+    memory = ThesisMemory(setting) if document.learner.startswith(THESIS) else Memory(setting)
     memory.states = _states_of(document)
     phrases = [Phrase(each.text, each.arguments) for each in document.phrases]
     for phrase, heard in zip(phrases, document.phrases, strict=True):

@@ -11,7 +11,6 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from pydantic import Field
@@ -26,13 +25,12 @@ from stages.kit.language.reply_schema import schema_of
 from stages.kit.language.reply_text import objects_in
 from stages.kit.predicates.expressions import Predicate, Tree, check, read, text_of
 from stages.kit.predicates.vocabulary import Perceived
-from stages.kit.tasks.strips import Atom, Domain
+from stages.kit.tasks.strips import Atom
 from stages.predicates.learning.grammar import candidates
-from stages.predicates.learning.memory import Memory
 from stages.predicates.learning.ours import OursLearner
 from stages.predicates.learning.phrases import Phrase, phrase_of
 from stages.predicates.learning.synthesis import Label
-from stages.predicates.learning.thesis_operators import search_operators
+from stages.predicates.learning.thesis_memory import THESIS, ThesisMemory
 from stages.predicates.teacher.simulated import Teacher
 
 ROUNDS = 3
@@ -59,30 +57,6 @@ class Coded(Model):
     expression: str = Field(max_length=4000)
 
 
-@dataclass
-class ThesisMemory(Memory):
-    """A memory whose predicates have negations, and whose operators are searched for."""
-
-    def predicates(self) -> dict[str, Predicate]:
-        """Return what was learned, each with its negation."""
-        found = super().predicates()
-        for name in self.names().values():
-            each = found[name]
-            found[f"no-{name}"] = Predicate(f"no-{name}", each.arguments, ("not", (name, *each.variables)))
-        return found
-
-    def used(self) -> dict[str, int]:
-        """Return the predicates that plans are made with."""
-        plain = super().used()
-        learned = {self.names()[phrase] for phrase in self.meanings}
-        return plain | {f"no-{name}": count for name, count in plain.items() if name in learned}
-
-    def domain(self, name: str) -> Domain:
-        """Return the operators, searched for from scratch."""
-        atoms = [self.see(state) for state in self.states]
-        return search_operators(name, self.used(), self.transitions, atoms, self.preconditions())
-
-
 class ThesisLearner(OursLearner):
     """Learns as the thesis does; what it asks of the language model is counted by `chat`."""
 
@@ -90,7 +64,7 @@ class ThesisLearner(OursLearner):
         self, teacher: Teacher, actions: Sequence[str], seed: int, memory: ThesisMemory | None = None, *, chat: Chat
     ) -> None:
         super().__init__(teacher, actions, seed, memory or ThesisMemory())
-        self.chat = chat
+        self.chat, self.label = chat, f"{THESIS}, {chat.backend.label}"
         self.unwritten: list[str] = []
         """Why a predicate could not be written."""
 
@@ -101,7 +75,7 @@ class ThesisLearner(OursLearner):
             "objects": list(state.names),
             "complaints": [phrase.text for phrase in self.memory.labels],
         }
-        reply = self._ask("reasoner", REASONER, given, Reasoned)
+        reply = self._spoken("reasoner", REASONER, given, Reasoned)
         if reply is None or not set(reply.objects) <= set(state.names):
             return phrase_of(sentence, state.names)
         return Phrase(reply.complaint, len(reply.objects)), tuple(reply.objects)
@@ -113,9 +87,7 @@ class ThesisLearner(OursLearner):
         if means is None:
             means = self._written("coder", CODER, phrase, {"complaint": phrase.text, **self._words(phrase)}) or NEVER
         for _ in range(ROUNDS):
-            wrong = [
-                label for label in labels if self._synthesiser.truth(means, label.state, label.objects) != label.holds
-            ]
+            wrong = [each for each in labels if self._synthesiser.truth(means, each.state, each.objects) != each.holds]
             if not wrong:
                 break
             given = {
@@ -133,7 +105,7 @@ class ThesisLearner(OursLearner):
     def _written(self, who: str, task: str, phrase: Phrase, given: dict[str, Any]) -> Tree | None:
         """Return an expression that passes every check, None when none came in ROUNDS tries."""
         for _ in range(ROUNDS):
-            reply = self._ask(who, task, given, Coded)
+            reply = self._spoken(who, task, given, Coded)
             if reply is None:
                 return None
             try:
@@ -172,7 +144,7 @@ class ThesisLearner(OursLearner):
             "scene": {call: round(state.of_scene(call), 3) for call in words.of_scene},
         }
 
-    def _ask(self, who: str, task: str, given: dict[str, Any], model: type[Any]) -> Any:
+    def _spoken(self, who: str, task: str, given: dict[str, Any], model: type[Any]) -> Any:
         """Return a reply, None where the language model gave none that can be read."""
         try:
             return self.chat.ask(
@@ -208,7 +180,7 @@ PREFACE = (
     "(less A B), (at_most A B), (near A B) of numbers; (and ...), (or ...), (not ...) of truths; "
     "(some ?x T), (every ?x T) over the other objects; (is (category ?a) word); (plus A B), (minus A B), (times A B), "
     "(over A B), (abs A); calls of one object such as (width ?a), calls of the scene such as (table_height), and the "
-    "given predicates by name. For example, that an object is in the gripper is written: (and (less 0.2 (gripper_mass)) "
+    "given predicates by name. For example, that an object is in the gripper: (and (less 0.2 (gripper_mass)) "
     "(near (left ?a) (gripper_left)) (near (right ?a) (gripper_right)) (less (bottom ?a) (gripper_top)) "
     "(less (gripper_bottom) (top ?a)))."
 )

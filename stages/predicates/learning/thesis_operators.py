@@ -1,7 +1,7 @@
 """The thesis's operator learner: candidates by pre-state, merged, then literals dropped while effects stay as certain.
 
 Han 2024, section 5.4 (a variant of cluster-then-search): for each action one candidate for every distinct lifted state
-before it; candidates whose preconditions another's cover are merged into it; literals are dropped one by one, those
+before it; candidates whose preconditions another's cover, with the same effect, are merged into it; literals are dropped one by one, those
 with most variables outside action and effect first, never one that the teacher named; a drop is kept when the
 log-likelihood, the negative entropy of the effects, does not fall by more than 1e-5.
 """
@@ -20,6 +20,7 @@ MOST_OTHERS = 2
 """Objects beside the action's that one lifted transition may speak of."""
 Case = tuple[frozenset[Atom], frozenset[Atom], frozenset[Atom]]
 """Lifted: what held before, what was added, what was deleted."""
+Effect = tuple[frozenset[Atom], frozenset[Atom]]
 
 
 def search_operators(
@@ -37,16 +38,15 @@ def search_operators(
             cases[transition.action[0]].append(case)
     schemas = []
     for action in sorted(cases):
-        kept: list[frozenset[Atom]] = []
+        kept: dict[frozenset[Atom], Effect] = {}
         named = stated.get(action, frozenset())
         for before in dict.fromkeys(case[0] for case in cases[action]):
             dropped = _dropped(before, named, cases[action])
-            kept = [each for each in kept if not dropped <= each]
-            if not any(each <= dropped for each in kept):
-                kept.append(dropped)
-        for number, preconditions in enumerate(kept):
-            covered = Counter(case[1:] for case in cases[action] if preconditions <= case[0])
-            (add, delete), _ = max(covered.items(), key=lambda entry: (entry[1], sorted(entry[0][0])))
+            effect = usual_effect(dropped, cases[action])
+            kept = {each: own for each, own in kept.items() if not (dropped <= each and own == effect)}
+            if not any(each <= dropped and own == effect for each, own in kept.items()):
+                kept[dropped] = effect
+        for number, (preconditions, (add, delete)) in enumerate(kept.items()):
             wanted = preconditions | delete
             variables = {term for atom in (*wanted, *add) for term in atom[1:]} | {"?a"}
             if not {term for atom in add for term in atom[1:]} <= {term for atom in wanted for term in atom[1:]} | {
@@ -65,6 +65,13 @@ def search_operators(
                 )
             )
     return Domain(name, {}, {each: ("",) * count for each, count in predicates.items()}, tuple(schemas))
+
+
+def usual_effect(preconditions: frozenset[Atom], cases: Sequence[Case]) -> Effect:
+    """Return what was added and deleted most often in the cases that preconditions cover."""
+    covered = Counter(case[1:] for case in cases if preconditions <= case[0])
+    effect, _ = max(covered.items(), key=lambda entry: (entry[1], sorted(entry[0][0])))
+    return effect
 
 
 def lifted(action: Atom, before: frozenset[Atom], after: frozenset[Atom]) -> Case | None:
