@@ -1,7 +1,7 @@
 """The thesis's operator learner: candidates by pre-state, merged, then literals dropped while effects stay as certain.
 
 Han 2024, section 5.4 (a variant of cluster-then-search): for each action one candidate for every distinct lifted state
-before it; candidates whose preconditions another's cover, with the same effect, are merged into it; literals are dropped
+before it; candidates whose preconditions another covers, with the same effect, are merged; literals are dropped
 one by one, those with most variables outside action and effect first, never one that the teacher named; a drop is kept
 when the log-likelihood, the negative entropy of the effects, does not fall by more than 1e-5.
 """
