@@ -35,9 +35,9 @@ from stages.predicates.training import Training, train
 from stages.predicates.truth import true_domain, truth_of
 from stages.predicates.world.catalogue import DOMAINS, kitchen_file
 
-TUNING, REPORTING = range(100), range(200, 210)
+TUNING, REPORTING = range(210), range(300, 310)
 TRAINING_TASKS, SET_TASKS = 10, 10
-OF_TRAINING, OF_TESTS = 1000, 6000
+OF_TRAINING, OF_TESTS = 1000, 7000
 """Added to a seed for its training tasks; the seed of the tests, which all share."""
 BEFORE = {"store_objects": "set_table", "set_table": "store_objects", "cook_meal": "store_objects"}
 """Domain -> the one that was taught before it, bootstrapped."""
