@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from schemas.artifact import Artifact, Document
-from schemas.base import Model
+from schemas.base import Model, Vector3
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Text = Annotated[str, Field(max_length=4000)]
@@ -91,6 +91,30 @@ class SeenState(Model):
     mass: float
 
 
+class SeenBody(Model):
+    """What perception says of a body in a room (stages/kit/predicates/room.py). Metres, world frame."""
+
+    middle: Vector3
+    edges: Vector3
+    width: float = Field(ge=0.0)
+    depth: float = Field(ge=0.0)
+    category: Name
+    openness: float
+    doors: int = Field(ge=0)
+    surface: float = Field(ge=0.0)
+
+
+class SeenRoom(Model):
+    """A moment in a room: bodies, what carries or contains what, and what the hand holds."""
+
+    bodies: dict[Name, SeenBody]
+    supported: dict[Name, Name]
+    contained: dict[Name, Name]
+    held: str
+    reach: tuple[float, float]
+    hand_opening: float
+
+
 class DialogueTurn(Model):
     """One line that teacher or robot said."""
 
@@ -104,14 +128,20 @@ class LearnedDomainFile(Model):
     """domain.json."""
 
     domain: Name
-    """Of the kitchen."""
+    """Of the kitchen, or `room`."""
+    setting: Literal["kitchen", "room"] = "kitchen"
+    """The kitchen of blocks, or rooms of the chain."""
     teacher: Text
+    learner: Text = "ours"
+    """`ours`, `random`, or `thesis, <who answered>`."""
     predicates: Annotated[tuple[LearnedPredicate, ...], Field(max_length=200)]
     phrases: Annotated[tuple[HeardPhrase, ...], Field(max_length=200)]
     preconditions: tuple[StatedPrecondition, ...]
     goals: tuple[GoalMeaning, ...]
     transitions: tuple[DoneAction, ...]
     states: tuple[SeenState, ...]
+    rooms: tuple[SeenRoom, ...] = ()
+    """States, where the setting is a room."""
     dialogue: tuple[DialogueTurn, ...]
     disbelieved: tuple[Text, ...]
     sentences: int = Field(ge=0)

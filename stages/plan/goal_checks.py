@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from schemas.plan import BodyMatch, Check
 from stages.kit.simulation.world import PhysicsWorld
 from stages.plan.action import goal_checks
@@ -14,14 +16,22 @@ def check_goal(
     matches: dict[str, BodyMatch],
     joint_names: dict[str, str],
     held: str | None,
+    learned: Callable[[str], Check | None],
 ) -> tuple[Check, ...]:
-    """Check ground literals such as `on(bottle_7, table_3)`, whose names are those of the plan.
+    """Check ground literals such as `on(bottle_7, table_3)` or `not in(cup_3, fridge_2)`, whose names are those of the
+    plan.
 
-    `joint_names` maps joints of the plan to those of this world. A body without a match makes its condition false.
+    `joint_names` maps joints of the plan to those of this world; `learned` checks what predicates of a given domain
+    mean, None for others. A body without a match makes its condition false, and a negated one too: it was not seen.
     """
     checks = []
     for literal in goal:
-        predicate, inner = literal.rstrip(")").split("(")
+        found = learned(literal)
+        if found is not None:
+            checks.append(found)
+            continue
+        plain = literal.removeprefix("not ")
+        predicate, inner = plain.rstrip(")").split("(")
         names = [word.strip() for word in inner.split(",")]
         owners = [name if name in matches else _owner(name, matches) for name in names]
         missing = [name for name in owners if matches[name].matched is None]
@@ -31,7 +41,8 @@ def check_goal(
             continue
         here = tuple(matches[name].matched or "" for name in owners)
         joints = tuple(world.bodies[here[0]].joints) if names[0] in matches else (joint_names[names[0]],)
-        checks.append(goal_checks()[predicate](GoalInRoom(world, literal, here, joints, held)))
+        check = goal_checks()[predicate](GoalInRoom(world, literal, here, joints, held))
+        checks.append(check if plain == literal else check.model_copy(update={"holds": not check.holds}))
     return tuple(checks)
 
 

@@ -11,7 +11,7 @@ from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
 from schemas.plan import Plan
 from stages.kit.estimates import grows_with
-from stages.kit.stage import Optionally, Parameters, Stage
+from stages.kit.stage import External, Optionally, Parameters, Stage
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 
@@ -22,7 +22,9 @@ class PlanParameters(Parameters):
     goal: tuple[str, ...] = Field(
         (),
         description="Goal literals such as on(bottle_7,table_3) closed(fridge_2); predicates on, in, open, closed, "
-        "holding. Empty: take an item out of furniture with a door, put it on a table, shut the door",
+        "holding, and those of --domain; `not on(...)`, `on(every bottle,any table)`, or a formula in brackets with "
+        "and, or, not, forall, exists. Empty: take an item out of furniture with a door, put it on a table, shut the "
+        "door",
     )
     task: Literal["", "fridge-to-microwave", "tidy-the-desk", "put-away-in-drawer", "stack-and-carry"] = Field(
         "", description="A task by name; its goal is derived from what is in the scene. Not together with --goal"
@@ -82,10 +84,14 @@ def robot_files(parameters: PlanParameters) -> tuple[str, ...]:
 
 STAGE = Stage(
     name="plan",
-    version=9,
+    version=10,
     summary="Plan what a robot does in the scene, execute it in physics, check the goal or say why not",
     parameters=PlanParameters,
-    reads={"scene": InteractiveScene, "ground_truth": Optionally(GroundTruth)},
+    reads={
+        "scene": InteractiveScene,
+        "ground_truth": Optionally(GroundTruth),
+        "domain": Optionally(External("operators to plan with: PDDL, or what `predicates teach --scene` wrote")),
+    },
     writes=Plan,
     libraries=("numpy", "scipy", "numba", "ompl", "pybullet", "open3d", "trimesh"),
     data_files=robot_files,

@@ -12,10 +12,10 @@ from stages.kit.motion.base_placement import plan_drive
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.segments import Manipulation, Segment
 from stages.kit.tasks.fast_downward import plan_with_fast_downward
-from stages.kit.tasks.strips import Atom, Domain, GroundAction, Problem, apply_action, atom_text, ground
+from stages.kit.tasks.strips import Atom, GroundAction, Problem, apply_action, atom_text
 from stages.kit.tasks.task_planner import Heuristic, TaskPlan, plan_task
 from stages.plan.action import MotionRequest, action_named
-from stages.plan.domain import START
+from stages.plan.domain import DOMAIN, START
 from stages.plan.learning import Lessons
 from stages.plan.pick_place import Budgets, GraspStyle
 from stages.plan.world_model import RobotState, WorldModel, hold_for_checks
@@ -173,18 +173,17 @@ class SearchSettings:
 def plan_and_refine(
     model: WorldModel,
     state: RobotState,
-    domain: Domain,
-    problem: Problem,
+    task: tuple[Problem, list[GroundAction]],
     budgets: Budgets,
     random: np.random.Generator,
     settings: SearchSettings,
 ) -> Attempt:
-    """Alternate between task search and geometry.
+    """Alternate between task search and geometry. `task`: a problem without negation, and its ground actions.
 
     What an action's geometry fails of in all `refinement_attempts` (the earlier choices are drawn anew each time) is a
     lesson for the task search (`learning`), at most `task_attempts` times.
     """
-    actions = ground(domain, problem)
+    problem, actions = task
     failures: list[Failure] = []
     lessons = Lessons(held=next((atom[1] for atom in problem.initial if atom[0] == "holding"), None))
     tried: list[TriedPlan] = []
@@ -194,7 +193,7 @@ def plan_and_refine(
         if settings.planner == "builtin":
             plan = plan_task(problem, allowed, heuristic=heuristic, limit=TASK_STATES[heuristic == "max"])
         else:
-            plan = plan_with_fast_downward(domain, problem, allowed)
+            plan = plan_with_fast_downward(DOMAIN, problem, allowed)
         if plan.actions is None:
             failures.append(_no_task_plan(problem, plan, lessons))
             return Attempt(None, None, failures, tuple(tried), tuple(lessons.words))

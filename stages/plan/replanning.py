@@ -13,14 +13,15 @@ from dataclasses import dataclass, field
 from schemas.contact_graph import ContactGraphFile
 from schemas.plan import Failure, TriedPlan
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.tasks.strips import Atom, Problem
+from stages.kit.tasks.strips import Atom, GroundAction, Problem
 from stages.plan.believed_tree import TreeState
+from stages.plan.reading import Reading
 from stages.plan.refinement import Attempt, Step
-from stages.plan.symbols import parse_goal, symbolic_state, task_problem
+from stages.plan.symbols import symbolic_state
 from stages.plan.tree_state import graph_of_state
 from stages.plan.world_model import RobotState, WorldModel
 
-Search = Callable[[RobotState, Problem], Attempt]
+Search = Callable[[RobotState, tuple[Problem, list[GroundAction]]], Attempt]
 """Task and motion planning from a robot's state, in the model as it is."""
 
 
@@ -34,6 +35,7 @@ class Replanning:
     believed: TreeState
     """At the beginning, in the planned scene."""
     literals: tuple[str, ...]
+    reading: Reading
     search: Search
     failures: list[Failure] = field(default_factory=list)
     tried: list[TriedPlan] = field(default_factory=list)
@@ -53,11 +55,11 @@ class Replanning:
                 self.model.put_on(name, parent)
         objects, initial = symbolic_state(self.model, graph)
         initial = in_the_middle(initial, state.holding, start, observed)
-        goal, _ = parse_goal(self.literals, objects)
+        problem = self.reading.problem(self.model, graph, objects, initial, self.literals)
         if state.holding is not None:
             self.model.take_aboard(state.holding)
         try:
-            attempt = self.search(state, task_problem(objects, initial, goal))
+            attempt = self.search(state, self.reading.task(self.model, problem))
         except MotionFailed as failed:
             self.failures.append(failed.failure)
             return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from stages.plan.goal_checks import check_goal
 from stages.plan.parameters import PlanParameters
 from stages.plan.pick_place import Budgets
 from stages.plan.pictures import RoomPictures, picture_camera
+from stages.plan.reading import Reading
 from stages.plan.refinement import Step
 from stages.plan.replanning import Replanning, Search
 from stages.plan.trajectories import executed_rows
@@ -56,6 +58,7 @@ class Order:
     graph: ContactGraphFile
     beliefs: list[Belief]
     literals: tuple[str, ...]
+    reading: Reading
     state: RobotState
     steps: list[Step]
 
@@ -113,7 +116,7 @@ def execute(
     matches = match_beliefs(order.beliefs, match_bodies(planned, room.records, parameters.match_radius), room.records)
     joint_names = joint_pairs(planned, room.records, matches)
     believed = start_state(model)
-    replanning = Replanning(model, order.graph, believed, order.literals, search)
+    replanning = Replanning(model, order.graph, believed, order.literals, order.reading, search)
     observed: dict[int, TreeState] = {}
     anew: dict[int, TreeState] = {}
     with load_scene(root) as world:
@@ -130,7 +133,10 @@ def execute(
         def settled_checks() -> tuple[Check, ...]:
             world.wake()
             physical.wait(SETTLE_SECONDS)
-            return check_goal(world, order.literals, matches, joint_names, physical.held)
+            now = observed_state(world, matches, joint_names, physical.held)
+            graph = graph_of_state(order.graph, observed[START], now, believed, model)
+            learned = partial(order.reading.check, model, graph)
+            return check_goal(world, order.literals, matches, joint_names, physical.held, learned)
 
         def replan(state: RobotState, number: int) -> list[Step] | None:
             anew[number] = observed_state(world, matches, joint_names, physical.held)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -19,17 +20,19 @@ from stages.kit.motion.failures import MotionFailed
 from stages.kit.simulation.robot_description import RobotDescription, load_robot
 from stages.kit.stage import Context
 from stages.kit.tasks.pddl import domain_text, problem_text
-from stages.kit.tasks.strips import Atom
+from stages.kit.tasks.strips import Atom, Problem
 from stages.plan.assumptions import believe, parse_priors
 from stages.plan.domain import DOMAIN
+from stages.plan.given_domain import read_given_domain
 from stages.plan.goals import TABLE_CLASSES, default_goals
 from stages.plan.parameters import PlanParameters
 from stages.plan.pick_place import Budgets
 from stages.plan.plan_text import plan_text
+from stages.plan.reading import Reading
 from stages.plan.refinement import SearchSettings, Step, plan_and_refine
 from stages.plan.room_execution import Order, Outcome, execute, only_planned
 from stages.plan.start_pose import start_base
-from stages.plan.symbols import parse_goal, symbolic_state, task_problem
+from stages.plan.symbols import symbolic_state, task_problem
 from stages.plan.tasks import task_goals
 from stages.plan.trajectories import planned_rows, write_trajectory
 from stages.plan.world_model import RobotState, WorldModel
@@ -44,19 +47,44 @@ class Found:
     """What planning found: the goal that was chosen and its steps (None: there are none), and what it took."""
 
     literals: tuple[str, ...] = ()
-    goal: frozenset[Atom] = frozenset()
+    problem: Problem | None = None
     steps: list[Step] | None = None
     failures: list[Failure] = field(default_factory=list)
     tried: list[TriedPlan] = field(default_factory=list)
     learned: list[str] = field(default_factory=list)
+    ungrounded: tuple[str, ...] = ()
+    """What a given domain speaks of and nothing here stands for."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is planned in: the model, its graph, and what is true of it at the beginning."""
+
+    model: WorldModel
+    graph: ContactGraphFile
+    objects: dict[str, str]
+    initial: frozenset[Atom]
+    reading: Reading
+
+    def problem(self, literals: tuple[str, ...]) -> Problem:
+        """Return the task of ground literals."""
+        return self.reading.problem(self.model, self.graph, self.objects, self.initial, literals)
 
 
 def run(
-    scene: InteractiveScene, ground_truth: GroundTruth | None, *, parameters: PlanParameters, context: Context
+    scene: InteractiveScene,
+    ground_truth: GroundTruth | None,
+    domain: Path | None,
+    *,
+    parameters: PlanParameters,
+    context: Context,
 ) -> Plan:
-    """Plan in `scene`; execute in the true room of `ground_truth`, or in `scene` itself when there is none."""
+    """Plan in `scene`; execute in the true room of `ground_truth`, or in `scene` itself when there is none.
+
+    `domain`: predicates and operators to plan with instead of the chain's (`read_given_domain`)."""
     if parameters.goal and parameters.task:
         raise UsageError("--goal and --task cannot be given together", hint="leave one of them out")
+    reading = Reading(None if domain is None else read_given_domain(domain))
     robot = load_robot(parameters.robot)
     budgets = Budgets(
         parameters.base_samples,
@@ -72,16 +100,16 @@ def run(
         graph = believe(model, scene.graph, beliefs)
         objects, initial = symbolic_state(model, graph, parameters.size_uncertainty)
         with context.progress.step("plan"):
-            state, planning = _find(model, graph, objects, initial, budgets, parameters, context)
-        problem = task_problem(objects, initial, planning.goal)
-        context.output.joinpath("domain.pddl").write_text(domain_text(DOMAIN), encoding="utf-8")
-        context.output.joinpath("problem.pddl").write_text(problem_text(problem, DOMAIN.name), encoding="utf-8")
+            state, planning = _find(Scene(model, graph, objects, initial, reading), budgets, parameters, context)
+        problem = planning.problem or task_problem(objects, initial, frozenset())
+        written = DOMAIN if reading.given is None else reading.given.domain
+        context.output.joinpath("domain.pddl").write_text(domain_text(written), encoding="utf-8")
+        context.output.joinpath("problem.pddl").write_text(problem_text(problem, written.name), encoding="utf-8")
         if planning.steps is not None and parameters.execute:
-            order = Order(scene, ground_truth, graph, beliefs, planning.literals, state, planning.steps)
+            order = Order(scene, ground_truth, graph, beliefs, planning.literals, reading, state, planning.steps)
             anew = partial(
                 plan_and_refine,
                 model,
-                domain=DOMAIN,
                 budgets=replace(budgets, size_uncertainty=0.0),
                 random=context.random(REPLANNING),
                 settings=_search_settings(parameters),
@@ -91,14 +119,22 @@ def run(
                     model,
                     order,
                     budgets,
-                    lambda state, problem: anew(state=state, problem=problem),
+                    lambda state, task: anew(state=state, task=task),
                     parameters,
                     context,
                     context.random(EXECUTION),
                 )
         else:
             outcome = only_planned(model, graph, planning.steps)
-        return _write(parameters, context, planning, outcome, graph, [belief.words for belief in beliefs], robot)
+        return _write(
+            parameters,
+            context,
+            planning,
+            outcome,
+            graph,
+            [*(belief.words for belief in beliefs), *planning.ungrounded],
+            robot,
+        )
     finally:
         model.close()
 
@@ -109,34 +145,26 @@ def _search_settings(parameters: PlanParameters) -> SearchSettings:
     )
 
 
-def _find(
-    model: WorldModel,
-    graph: ContactGraphFile,
-    objects: dict[str, str],
-    initial: frozenset[Atom],
-    budgets: Budgets,
-    parameters: PlanParameters,
-    context: Context,
-) -> tuple[RobotState, Found]:
+def _find(scene: Scene, budgets: Budgets, parameters: PlanParameters, context: Context) -> tuple[RobotState, Found]:
     """Return where the robot starts, and the plan of the first goal that has one (or the first goal, without)."""
-    planning = Found()
+    planning, model = Found(), scene.model
     carry = model.description.carry
-    goals = [parse_goal(literals, objects) for literals in _candidates(model, initial, parameters, planning.failures)]
+    planning.ungrounded = _ungrounded(scene, parameters, context)
+    goals = [(scene.problem(literals), literals) for literals in _candidates(scene, parameters, planning.failures)]
     if not goals and not planning.failures:
-        planning.failures.append(_nothing_to_do(model, graph, initial))
+        planning.failures.append(_nothing_to_do(model, scene.graph, scene.initial))
     if goals:
-        planning.goal, planning.literals = goals[0]
+        planning.problem, planning.literals = goals[0]
     try:
         state = RobotState(start_base(model, carry, context.random(START)), carry)
     except MotionFailed as failed:
         planning.failures.append(failed.failure)
         return RobotState(np.zeros(3), carry), planning
-    for number, (goal, literals) in enumerate(goals):
+    for number, (problem, literals) in enumerate(goals):
         attempt = plan_and_refine(
             model,
             state,
-            DOMAIN,
-            task_problem(objects, initial, goal),
+            scene.reading.task(model, problem),
             budgets,
             context.random(SEARCH, number),
             _search_settings(parameters),
@@ -145,17 +173,30 @@ def _find(
         planning.learned += attempt.learned
         planning.tried += attempt.tried
         if attempt.steps is not None:
-            planning.goal, planning.literals, planning.steps = goal, literals, attempt.steps
+            planning.problem, planning.literals, planning.steps = problem, literals, attempt.steps
             break
     return state, planning
 
 
-def _candidates(
-    model: WorldModel, initial: frozenset[Atom], parameters: PlanParameters, failures: list[Failure]
-) -> list[tuple[str, ...]]:
+def _ungrounded(scene: Scene, parameters: PlanParameters, context: Context) -> tuple[str, ...]:
+    """Return what can't be grounded of a given domain, and say it in one line."""
+    given = scene.reading.given
+    if given is None:
+        return ()
+    if parameters.planner != "builtin":
+        raise UsageError("--planner fast-downward plans in the scene's own domain", hint="leave --domain or it out")
+    classes = {name: record.class_name for name, record in scene.model.records.items()}
+    words = given.ungrounded(scene.objects, classes)
+    if words:
+        context.logger.warning("%s: can't be grounded in this scene: %s", given.source, "; ".join(words))
+    return tuple(f"not grounded: {each}" for each in words)
+
+
+def _candidates(scene: Scene, parameters: PlanParameters, failures: list[Failure]) -> list[tuple[str, ...]]:
     """Return the goals that may be tried, the preferred first; why a task has none goes to `failures`."""
+    model, initial = scene.model, scene.initial
     if parameters.goal:
-        return [parameters.goal]
+        return scene.reading.candidates(model, scene.graph, scene.objects, initial, parameters.goal)
     if not parameters.task:
         return default_goals(model, initial, model.description.opening + parameters.size_uncertainty)
     try:

@@ -2,39 +2,49 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from schemas.errors import BadInput
 from schemas.kitchen_plan import EvaluatedSet, KitchenEvaluation, KitchenEvaluationFile
 from schemas.learned_domain import LearnedDomain
+from stages.kit.predicates.goal_words import goal_phrases
 from stages.kit.stage import Context
 from stages.kit.tasks.strips import Domain
-from stages.predicates.execution import Attempt, attempt, oracle
+from stages.predicates.execution import Attempt, World, attempt, oracle
 from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.phrases import goal_phrases
 from stages.predicates.learning.records import memory_of
+from stages.predicates.learning.thesis_memory import ThesisMemory
 from stages.predicates.measure.accuracy import accuracies
 from stages.predicates.parameters import EvaluateParameters
+from stages.predicates.room.tasks import open_room, read_rooms, room_tasks
 from stages.predicates.tasks import Task, tasks_of
+from stages.predicates.training import Opened, in_the_kitchen
+from stages.predicates.truth import ROOM
 
 
-def run(learned: LearnedDomain, *, parameters: EvaluateParameters, context: Context) -> KitchenEvaluation:
-    """Count."""
+def run(
+    learned: LearnedDomain, scene: Path | None, *, parameters: EvaluateParameters, context: Context
+) -> KitchenEvaluation:
+    """Count. What was learned in rooms is tried in those of `scene`."""
     name = learned.info.domain
     memory = memory_of(learned.info, str(learned.root))
     domain = memory.domain(name)
+    replan = not isinstance(memory, ThesisMemory)  # the thesis follows its plans open loop in tests
+    sets = _sets(name, scene, parameters, context.seed, str(learned.root))
     rows = []
-    for which in context.progress.track(parameters.sets, total=len(parameters.sets), description="sets"):
-        tasks = tasks_of(name, which, parameters.tasks, context.seed)
-        tried = [try_task(memory, domain, task) for task in tasks]
+    for which, tasks, opened in context.progress.track(sets, total=len(sets), description="sets"):
+        tried = [try_task(memory, domain, task, opened(task), replan) for task in tasks]
         rows.append(
             EvaluatedSet(
                 which=which,
                 tasks=len(tasks),
                 reached=sum(each.success for each in tried),
-                ceiling=sum(oracle(task, name).success for task in tasks),
+                ceiling=sum(oracle(task, name, opened(task)).success for task in tasks),
                 unplanned=sum(bool(each.unplanned) for each in tried),
                 failed_actions=sum(bool(reason) for each in tried for _, reason in each.steps),
             )
         )
-    accuracy = accuracies(memory, name, parameters.states, context.seed)
+    accuracy = {} if name == ROOM else accuracies(memory, name, parameters.states, context.seed)
     file = KitchenEvaluationFile(domain=name, seed=context.seed, rows=tuple(rows), accuracy=accuracy)
     file.write(context.output / "results.json")
     (context.output / "table.md").write_text(as_markdown(file), encoding="utf-8")
@@ -42,12 +52,23 @@ def run(learned: LearnedDomain, *, parameters: EvaluateParameters, context: Cont
     return KitchenEvaluation(root=context.output, summary=summary)
 
 
-def try_task(memory: Memory, domain: Domain, task: Task) -> Attempt:
+def _sets(
+    name: str, scene: Path | None, parameters: EvaluateParameters, seed: int, where: str
+) -> list[tuple[str, list[Task], Opened]]:
+    if (name == ROOM) != (scene is not None):
+        hint = "give the rooms to try it in: --scene FOLDER" if name == ROOM else "leave --scene out"
+        raise BadInput(f"{where}: was learned in {'rooms' if name == ROOM else 'the kitchen'}", hint=hint)
+    if scene is not None:
+        return [("rooms", [*room_tasks(read_rooms(scene), parameters.tasks, seed)], open_room)]
+    return [(which, tasks_of(name, which, parameters.tasks, seed), in_the_kitchen) for which in parameters.sets]
+
+
+def try_task(memory: Memory, domain: Domain, task: Task, world: World, replan: bool = True) -> Attempt:
     """Try a task with what a memory has learned; a goal that nobody explained is not tried."""
     wanted, unknown = memory.goal_atoms(goal_phrases(task.sentence, task.objects))
     if unknown:
         return Attempt(unplanned=f"nobody has said what {unknown[0]!r} means")
-    return attempt(task, task.name.split("/")[0], domain, memory.see, wanted, replan=True)
+    return attempt(task, task.name.split("/")[0], domain, memory.see, wanted, replan=replan, world=world)
 
 
 def as_markdown(file: KitchenEvaluationFile) -> str:

@@ -10,7 +10,8 @@ from pydantic import Field
 from schemas.errors import UsageError
 from schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
 from schemas.learned_domain import LearnedDomain
-from stages.kit.stage import Optionally, Parameters, Stage
+from stages.kit.language.options import LanguageParameters
+from stages.kit.stage import External, Optionally, Parameters, Stage
 
 DomainName = Literal["store_objects", "set_table", "cook_meal"]
 SetName = Literal["canonical", "more_objects", "novel_goals", "combined", "hundred_goals"]
@@ -18,12 +19,20 @@ SET_NAMES: tuple[SetName, ...] = ("canonical", "more_objects", "novel_goals", "c
 LIBRARIES = ("numpy", "pymunk", "numba")
 
 
-class TeachParameters(Parameters):
+class TeachParameters(LanguageParameters):
     """Options of `predicates teach`."""
 
     domain: DomainName = Field("store_objects", description="Which kitchen")
     tasks: int = Field(10, ge=1, le=100, description="Training tasks")
     wording: Literal["plain", "diverse"] = Field("plain", description="One sentence for each thing amiss, or several")
+    learner: Literal["ours", "thesis", "random"] = Field(
+        "ours",
+        description="Who learns: `thesis` asks a language model (--language; scripted is a stand-in, no model), "
+        "`random` explores by chance",
+    )
+    teacher: Literal["simulated", "terminal"] = Field(
+        "simulated", description="Who teaches: `terminal` asks you, and keeps what you say in teacher.jsonl"
+    )
     wrong: float = Field(0.0, ge=0.0, le=0.5, description="Share of corrections that are wrong or missing")
 
 
@@ -67,15 +76,22 @@ def kitchen_files(parameters: Any) -> tuple[str, ...]:
         "kitchen/store_objects.pddl",
         "kitchen/set_table.pddl",
         "kitchen/cook_meal.pddl",
+        "room/truth.toml",
+        "room/room.pddl",
     )
 
 
 TEACH = Stage(
     name="predicates teach",
-    version=1,
+    version=2,
     summary="Learn predicates and operators from a simulated teacher's corrections in a planar kitchen",
     parameters=TeachParameters,
-    reads={"learned": Optionally(LearnedDomain)},
+    reads={
+        "learned": Optionally(LearnedDomain),
+        "scene": Optionally(External("rooms to learn in instead of the kitchen: interactive scenes, `room` of truths")),
+        "dialogue": Optionally(External("teacher.jsonl of an earlier --teacher terminal, replayed")),
+        "transcript": Optionally(External("transcript.jsonl of an earlier --learner thesis")),
+    },
     writes=LearnedDomain,
     libraries=(*LIBRARIES, "pillow"),
     module="teach_stage",
@@ -84,7 +100,7 @@ TEACH = Stage(
 )
 PLAN = Stage(
     name="predicates plan",
-    version=1,
+    version=2,
     summary="Plan for a goal in words with what was learned, and try it in the kitchen",
     parameters=PlanParameters,
     reads={"learned": LearnedDomain},
@@ -97,10 +113,10 @@ PLAN = Stage(
 )
 EVALUATE = Stage(
     name="predicates evaluate",
-    version=1,
+    version=2,
     summary="Count what is reached of sets of tasks with what was learned, beside the teacher's own operators",
     parameters=EvaluateParameters,
-    reads={"learned": LearnedDomain},
+    reads={"learned": LearnedDomain, "scene": Optionally(External("rooms to try in what was learned in rooms"))},
     writes=KitchenEvaluation,
     libraries=LIBRARIES,
     module="evaluate_stage",

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from stages.predicates.language.evaluating import Evaluator
-from stages.predicates.language.expressions import Predicate
+from stages.kit.predicates.evaluating import Evaluator
+from stages.kit.predicates.expressions import Predicate
+from stages.kit.predicates.room import RoomState
+from stages.kit.predicates.vocabulary import Perceived
 from stages.predicates.state import TABLE_LEFT, TABLE_RIGHT, State
 from stages.predicates.world.kitchen import FAUCET_HEIGHT, SINK_DEPTH, SINK_WIDTH, SINK_X
 
@@ -28,6 +30,8 @@ COLORS = {
     "coaster": (190, 160, 90),
 }
 USUAL = (205, 110, 80)
+ROOM_HALF = 3.0
+"""Half the width of the plots of a room [m]; their height is 2 m."""
 GRID = 60
 """Cells along an edge of a plot."""
 
@@ -57,7 +61,7 @@ def draw_kitchen(polygons: Polygons, width: int, title: str = "") -> Image.Image
     return image
 
 
-def draw_predicates(predicates: Sequence[Predicate], state: State, vocabulary: dict[str, Predicate]) -> Image.Image:
+def draw_predicates(predicates: Sequence[Predicate], state: Perceived, vocabulary: dict[str, Predicate]) -> Image.Image:
     """Return plots, one a predicate, of where the middle of its first object may be for it to hold, green, in a state;
     each is about the first objects of the state."""
     size, line = 3 * GRID, 16
@@ -74,17 +78,27 @@ def draw_predicates(predicates: Sequence[Predicate], state: State, vocabulary: d
     return sheet
 
 
-def _held(predicate: Predicate, state: State, vocabulary: dict[str, Predicate]) -> np.ndarray:
+def _held(predicate: Predicate, state: Perceived, vocabulary: dict[str, Predicate]) -> np.ndarray:
     """Return (GRID, GRID) where the predicate holds, rows from above."""
-    names = list(state.objects)[: max(1, predicate.arguments)]
-    moved = names[0]
+    names = list(state.names)[: max(1, predicate.arguments)]
     held = np.zeros((GRID, GRID), dtype=bool)
-    for row, y in enumerate(np.linspace(TOP - 10, -4.0, GRID).tolist()):
-        for column, x in enumerate(np.linspace(LEFT, RIGHT, GRID).tolist()):
-            seen = replace(state.objects[moved], x=x, y=y)
-            there = replace(state, objects={**state.objects, moved: seen})
+    kitchen = isinstance(state, State)
+    heights = np.linspace(TOP - 10, -4.0, GRID) if kitchen else np.linspace(2.0, 0.0, GRID)
+    places = np.linspace(LEFT, RIGHT, GRID) if kitchen else np.linspace(-ROOM_HALF, ROOM_HALF, GRID)
+    for row, height in enumerate(heights.tolist()):
+        for column, x in enumerate(places.tolist()):
+            there = _moved(state, names[0], x, height)
             held[row, column] = Evaluator(there, vocabulary).holds((predicate.name, *names[: predicate.arguments]))
     return held
+
+
+def _moved(state: Perceived, name: str, x: float, height: float) -> Perceived:
+    """Return a state with the middle of an object elsewhere."""
+    if isinstance(state, RoomState):
+        body = state.bodies[name]
+        return state.moved(name, replace(body, middle=(x, body.middle[1], height)))
+    assert isinstance(state, State)
+    return replace(state, objects={**state.objects, name: replace(state.objects[name], x=x, y=height)})
 
 
 def animate(path: Path, frames: Sequence[Polygons], width: int) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from schemas.errors import BadInput
 from schemas.kitchen_plan import KitchenPlan, KitchenPlanFile, KitchenStep
 from schemas.learned_domain import LearnedDomain
+from stages.kit.predicates.goal_words import goal_phrases
 from stages.kit.stage import Context
 from stages.predicates.execution import Attempt, Live, attempt
 from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.phrases import goal_phrases
 from stages.predicates.learning.records import memory_of
 from stages.predicates.parameters import PlanParameters
 from stages.predicates.pictures import animate, draw_kitchen
@@ -17,6 +18,10 @@ from stages.predicates.tasks import Task, open_kitchen, tasks_of
 def run(learned: LearnedDomain, *, parameters: PlanParameters, context: Context) -> KitchenPlan:
     """Plan and try."""
     name = learned.info.domain
+    if learned.info.setting != "kitchen":
+        raise BadInput(
+            f"{learned.root}: was learned in rooms", hint="scenewright plan --domain plans in scenes with it"
+        )
     memory = memory_of(learned.info, str(learned.root))
     task = tasks_of(name, parameters.which, parameters.task, context.seed)[-1]
     sentence = parameters.goal or task.sentence

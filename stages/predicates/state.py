@@ -4,8 +4,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from stages.kit.predicates.vocabulary import Vocabulary
+
 TABLE_HEIGHT, TABLE_LEFT, TABLE_RIGHT = 0.0, -40.0, 25.0
 FINGER_HEIGHT, LARGEST_OPENING = 2.0, 5.0
+TOLERANCE = 0.2
+"""What `near` allows; it is that of the example which every learner is given."""
+KITCHEN_WORDS = Vocabulary(
+    of_object=("x", "y", "left", "right", "bottom", "top", "width", "height", "water"),
+    of_scene=(
+        "table_height",
+        "table_left",
+        "table_right",
+        "gripper_x",
+        "gripper_left",
+        "gripper_right",
+        "gripper_bottom",
+        "gripper_top",
+        "gripper_height",
+        "gripper_mass",
+        "gripper_opening",
+        "largest_opening",
+    ),
+)
 
 
 @dataclass(frozen=True)
@@ -31,3 +52,52 @@ class State:
     opening: float = LARGEST_OPENING
     mass: float = 0.0
     """What the gripper feels in its fingers."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The objects."""
+        return tuple(self.objects)
+
+    @property
+    def tolerance(self) -> float:
+        """What `near` allows."""
+        return TOLERANCE
+
+    def category(self, name: str) -> str:
+        """Return what kind of thing an object is."""
+        return self.objects[name].category
+
+    def related(self, relation: str, names: tuple[str, ...]) -> bool:
+        """Nothing is perceived as a relation here."""
+        raise KeyError(relation)
+
+    def number(self, name: str, call: str) -> float:
+        """Return what a perception call says of an object."""
+        seen = self.objects[name]
+        if call == "left":
+            return seen.x - seen.width / 2
+        if call == "right":
+            return seen.x + seen.width / 2
+        if call == "bottom":
+            return seen.y
+        if call == "top":
+            return seen.y + seen.height
+        return float(getattr(seen, call))
+
+    def of_scene(self, call: str) -> float:
+        """Return what a perception call says of the table or the gripper."""
+        half = self.opening / 2
+        return {
+            "table_height": TABLE_HEIGHT,
+            "table_left": TABLE_LEFT,
+            "table_right": TABLE_RIGHT,
+            "gripper_x": self.gripper_x,
+            "gripper_left": self.gripper_x - half,
+            "gripper_right": self.gripper_x + half,
+            "gripper_bottom": self.gripper_y,
+            "gripper_top": self.gripper_y + FINGER_HEIGHT,
+            "gripper_height": FINGER_HEIGHT,
+            "gripper_mass": self.mass,
+            "gripper_opening": self.opening,
+            "largest_opening": LARGEST_OPENING,
+        }[call]

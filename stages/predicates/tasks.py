@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stages.kit.predicates.vocabulary import Perceived
 from stages.kit.tasks.strips import Atom, Problem, apply_action, ground
-from stages.predicates.language.evaluating import Evaluator
-from stages.predicates.state import State
-from stages.predicates.truth import true_domain, true_predicates, truth_file
+from stages.predicates.truth import true_domain, truth_of
 from stages.predicates.world.actions import free_place
 from stages.predicates.world.catalogue import DomainSetup, kitchen_file
 from stages.predicates.world.kitchen import Kitchen
@@ -35,15 +34,7 @@ class Task:
     @property
     def sentence(self) -> str:
         """The goal in words."""
-        return " and ".join(goal_phrase(atom) for atom in self.goal)
-
-
-def goal_phrase(atom: Atom) -> str:
-    """Return what the teacher says of one literal that she wants."""
-    text = truth_file().goals[atom[0]]
-    for place, name in enumerate(atom[1:], start=1):
-        text = text.replace(f"<{place}>", name)
-    return text
+        return " and ".join(map(truth_of(self.name.split("/")[0]).goal_phrase, self.goal))
 
 
 def open_kitchen(task: Task) -> Kitchen:
@@ -52,10 +43,9 @@ def open_kitchen(task: Task) -> Kitchen:
     return Kitchen([(name, kinds[name], x, y) for name, (x, y) in task.objects.items()], task.seed)
 
 
-def true_atoms(state: State, domain: str) -> frozenset[Atom]:
+def true_atoms(state: Perceived, domain: str) -> frozenset[Atom]:
     """Return which of the teacher's atoms hold."""
-    names = {name: len(kinds) for name, kinds in true_domain(domain).predicates.items()}
-    return Evaluator(state, true_predicates()).atoms(names)
+    return truth_of(domain).atoms(state)
 
 
 def tasks_of(domain: str, which: str, count: int, seed: int) -> list[Task]:
@@ -172,7 +162,7 @@ def _walked_goal(domain: str, task: Task, random: np.random.Generator) -> tuple[
         state = apply_action(state, possible[int(random.integers(len(possible)))])
     if any(atom[0] == "in_gripper" for atom in state):
         return ()
-    said = truth_file().goals
+    said = truth_of(domain).file.goals
     new = sorted(atom for atom in state - start if atom[0] in said)
     if not new:
         return ()

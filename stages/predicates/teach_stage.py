@@ -1,36 +1,81 @@
-"""The step `predicates teach`: training tasks with a simulated teacher, and what was learned of her sentences."""
+"""The step `predicates teach`: training tasks with a teacher, and what was learned of her sentences."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
+from schemas.errors import BadInput
 from schemas.learned_domain import LearnedDomain
 from stages.kit.stage import Context
 from stages.kit.tasks.pddl import domain_text
 from stages.predicates.language.saying import say
-from stages.predicates.learning.grammar import GIVEN
 from stages.predicates.learning.memory import Memory
-from stages.predicates.learning.ours import OursLearner
+from stages.predicates.learning.opening import Exchange, empty_memory, open_learner
 from stages.predicates.learning.records import document_of, memory_of
+from stages.predicates.learning.setting import KITCHEN, Setting
+from stages.predicates.learning.setting import ROOM as ROOM_SETTING
+from stages.predicates.learning.thesis_memory import ThesisMemory
 from stages.predicates.parameters import TeachParameters
 from stages.predicates.pictures import draw_predicates
-from stages.predicates.tasks import tasks_of
-from stages.predicates.teacher.simulated import SimulatedTeacher
-from stages.predicates.training import train
+from stages.predicates.room.tasks import open_room, read_rooms, room_tasks
+from stages.predicates.tasks import Task, tasks_of
+from stages.predicates.teacher.opening import open_teacher
+from stages.predicates.training import Opened, in_the_kitchen, train
+from stages.predicates.truth import ROOM
 from stages.predicates.world.catalogue import kitchen_file
 
 
-def run(learned: LearnedDomain | None, *, parameters: TeachParameters, context: Context) -> LearnedDomain:
-    """Teach; what `learned` holds is known from the beginning."""
-    memory = memory_of(learned.info, str(learned.root)) if learned is not None else Memory()
+@dataclass(frozen=True)
+class Course:
+    """Where and what is taught."""
+
+    domain: str
+    setting: Setting
+    actions: tuple[str, ...]
+    tasks: list[Task]
+    opened: Opened
+
+
+def course_of(scene: Path | None, domain: str, count: int, seed: int) -> Course:
+    """Return the tasks of a kitchen, or of the rooms of a folder. Raises BadInput for rooms that are none."""
+    if scene is None:
+        tasks = tasks_of(domain, "train", count, seed)
+        return Course(domain, KITCHEN, kitchen_file().domains[domain].actions, tasks, in_the_kitchen)
+    rooms: list[Task] = [*room_tasks(read_rooms(scene), count, seed)]
+    return Course(ROOM, ROOM_SETTING, tuple(ROOM_SETTING.arity), rooms, open_room)
+
+
+def run(
+    learned: LearnedDomain | None,
+    scene: Path | None,
+    dialogue: Path | None,
+    transcript: Path | None,
+    *,
+    parameters: TeachParameters,
+    context: Context,
+) -> LearnedDomain:
+    """Teach in the kitchen, or in the rooms of `scene`; what `learned` holds is known from the beginning."""
+    course = course_of(scene, parameters.domain, parameters.tasks, context.seed)
+    memory = empty_memory(parameters.learner, course.setting)
+    if learned is not None:
+        memory = memory_of(learned.info, str(learned.root))
+        if isinstance(memory, ThesisMemory) != (parameters.learner == "thesis"):
+            raise BadInput(f"{learned.root}: another learner learned it", hint=f"it was {learned.info.learner}")
+        if memory.setting is not course.setting:
+            raise BadInput(
+                f"{learned.root}: was learned in a {memory.setting.name}, this is a {course.setting.name}",
+                hint="begin without --learned",
+            )
     before = memory.sentences
-    teacher = SimulatedTeacher(parameters.domain, context.seed, parameters.wording, parameters.wrong)
-    learner = OursLearner(teacher, kitchen_file().domains[parameters.domain].actions, context.seed, memory)
+    teacher = open_teacher(parameters, course.domain, context.seed, dialogue, context.output / "teacher.jsonl")
+    learner = open_learner(
+        parameters, teacher, course.actions, context.seed, memory, Exchange(transcript, context.output)
+    )
     with context.progress.step("teach"):
-        tasks = tasks_of(parameters.domain, "train", parameters.tasks, context.seed)
-        training = train(learner, parameters.domain, tasks)
+        training = train(learner, course.domain, course.tasks, course.opened)
     heard = memory.sentences - before
-    domain = memory.domain(parameters.domain)
+    domain = memory.domain(course.domain)
     statement = (
         f"{len(memory.meanings)} phrases and {len(domain.schemas)} operators out of {heard} sentences and "
         f"{training.actions} actions ({training.refused} refused); "
@@ -38,8 +83,9 @@ def run(learned: LearnedDomain | None, *, parameters: TeachParameters, context: 
     )
     document = document_of(
         memory,
-        domain=parameters.domain,
-        teacher=f"simulated, {parameters.wording}, {parameters.wrong:g} wrong",
+        domain=course.domain,
+        teacher=teacher.label,
+        learner=learner.label,
         physics=tuple(training.physics),
         statement=statement,
     )
@@ -64,5 +110,6 @@ def write_predicates(memory: Memory, output: Path) -> None:
         lines += ["", "No longer believed:", *(f"- {sentence}" for sentence in memory.disbelieved)]
     (output / "predicates.txt").write_text("\n".join([*lines, ""]), encoding="utf-8")
     if memory.states:
-        learned = [each for name, each in predicates.items() if name not in GIVEN] or list(GIVEN.values())
+        given = memory.setting.given
+        learned = [each for name, each in predicates.items() if name not in given] or list(given.values())
         draw_predicates(learned, memory.states[0], predicates).save(output / "predicates.png")

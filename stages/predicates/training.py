@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from stages.kit.predicates.goal_words import goal_phrases
+from stages.kit.predicates.vocabulary import Perceived
 from stages.kit.tasks.strips import Atom, Domain, Problem, ground
 from stages.kit.tasks.task_planner import plan_task
-from stages.predicates.execution import MOST_FAILURES, MOST_STEPS, PLANNING_LIMIT, action_atom
+from stages.predicates.execution import MOST_FAILURES, MOST_STEPS, PLANNING_LIMIT, SHORTENING, Live, World, action_atom
 from stages.predicates.learning.ours import OursLearner
-from stages.predicates.learning.phrases import goal_phrases
-from stages.predicates.state import State
-from stages.predicates.tasks import Task, open_kitchen, true_atoms
-from stages.predicates.world.actions import act
+from stages.predicates.tasks import Task, open_kitchen
+from stages.predicates.teacher.simulated import TeacherLeft
 
 LEFT_FOR_THE_GOAL = 8
 """Steps of an episode that are kept for its goal; before them whatever was never tried comes first."""
+
+
+Opened = Callable[[Task], World]
+"""Task -> the world that it begins in."""
+
+
+def in_the_kitchen(task: Task) -> World:
+    """Return the kitchen of a task."""
+    return Live(open_kitchen(task))
 
 
 @dataclass
@@ -30,30 +39,34 @@ class Training:
     """Actions that the teacher allowed and physics failed."""
 
 
-def train(learner: OursLearner, domain: str, tasks: Sequence[Task]) -> Training:
-    """Let a learner work through tasks with its teacher."""
+def train(learner: OursLearner, domain: str, tasks: Sequence[Task], opened: Opened = in_the_kitchen) -> Training:
+    """Let a learner work through tasks with its teacher, until she leaves."""
     training = Training()
     for task in tasks:
-        _episode(learner, domain, task, training)
+        reached = training.reached
+        try:
+            _episode(learner, domain, task, opened(task), training)
+        except TeacherLeft:
+            break
         training.episodes += 1
+        learner.missed += training.reached == reached
     return training
 
 
-def _episode(learner: OursLearner, domain: str, task: Task, training: Training) -> None:
-    kitchen = open_kitchen(task)
+def _episode(learner: OursLearner, domain: str, task: Task, world: World, training: Training) -> None:
     memory = learner.memory
     parts = goal_phrases(task.sentence, task.objects)
     failures = 0
     for step in range(MOST_STEPS):
         if failures >= MOST_FAILURES:
             return
-        state = kitchen.state()
+        state = world.state()
         goal, _ = memory.goal_atoms(parts)
         curious = step < MOST_STEPS - LEFT_FOR_THE_GOAL and learner.curious(state)
         if goal <= memory.see(state) and not (
             goal and curious
         ):  # also when nothing is known of the goal: then it is asked for
-            if set(task.goal) <= true_atoms(state, domain):
+            if learner.teacher.satisfied(state, task.goal):
                 learner.reached(state, parts)
                 training.reached += 1
                 return
@@ -68,27 +81,29 @@ def _episode(learner: OursLearner, domain: str, task: Task, training: Training) 
             failures += 1
             learner.refused(state, action, learner.teacher.correct(state, action))
             continue
-        reason = act(kitchen, action)
+        reason = world.do(action)
         if reason:
             training.physics.append(f"{' '.join(action)}: {reason}")
             failures += 1
             continue
         failures = 0
-        learner.allowed(state, action, kitchen.state())
+        learner.allowed(state, action, world.state())
 
 
-def _next_action(learner: OursLearner, domain: str, state: State, goal: frozenset[Atom], curious: bool) -> Atom | None:
+def _next_action(
+    learner: OursLearner, domain: str, state: Perceived, goal: frozenset[Atom], curious: bool
+) -> Atom | None:
     """Return what to do: something never tried while there is time, or whenever there is no plan; else the plan's
     start."""
     tried = learner.explore(state)
     if curious or not learner.plans:
         return tried
-    planned = first_action(learner.memory.domain(domain), list(state.objects), learner.memory.see(state), goal)
+    planned = first_action(learner.memory.domain(domain), list(state.names), learner.memory.see(state), goal)
     return planned or learner.doubtful(state) or tried
 
 
 def first_action(domain: Domain, objects: Sequence[str], atoms: frozenset[Atom], goal: frozenset[Atom]) -> Atom | None:
     """Return the first action of a plan, None without one."""
     problem = Problem("task", dict.fromkeys(objects, ""), atoms, goal)
-    found = plan_task(problem, ground(domain, problem), limit=PLANNING_LIMIT)
+    found = plan_task(problem, ground(domain, problem), limit=PLANNING_LIMIT, improvement=SHORTENING)
     return action_atom(found.actions[0]) if found.actions else None

@@ -1,7 +1,9 @@
-"""Ground truth of the kitchen: what the teacher means, allows and says (data/kitchen)."""
+"""Ground truth: what the teacher means, allows and says (data/kitchen, data/room)."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -9,17 +11,17 @@ from pydantic import Field
 
 from schemas.base import Model
 from schemas.outside import LARGEST_SETTINGS, file_text, file_toml
+from stages.kit.predicates.evaluating import Evaluator
+from stages.kit.predicates.expressions import Predicate, check, read
+from stages.kit.predicates.room import ROOM_WORDS
+from stages.kit.predicates.vocabulary import Perceived, Vocabulary
 from stages.kit.tasks.pddl import parse_domain
-from stages.kit.tasks.strips import Domain
-from stages.predicates.language.expressions import Predicate, check, read
+from stages.kit.tasks.strips import Atom, Domain
+from stages.predicates.state import KITCHEN_WORDS
 
-FOLDER = Path(__file__).resolve().parents[2] / "data" / "kitchen"
-TRUTH = FOLDER / "truth.toml"
-OPERATORS = {
-    "store_objects": FOLDER / "store_objects.pddl",
-    "set_table": FOLDER / "set_table.pddl",
-    "cook_meal": FOLDER / "cook_meal.pddl",
-}
+DATA = Path(__file__).resolve().parents[2] / "data"
+ROOM = "room"
+"""The domain of rooms of the chain; the others are the kitchen's."""
 
 
 class Meant(Model):
@@ -41,29 +43,60 @@ class TruthFile(Model):
     """Predicate -> what is said of it in a goal."""
 
 
-@cache
-def truth_file() -> TruthFile:
-    """Return meanings and sentences."""
-    return TruthFile.model_validate(file_toml(TRUTH, LARGEST_SETTINGS))
+@dataclass(frozen=True)
+class Truth:
+    """What the teacher of a domain means, allows and says."""
+
+    name: str
+    words: Vocabulary
+    file: TruthFile
+    predicates: Mapping[str, Predicate]
+    operators: Domain
+
+    def atoms(self, state: Perceived) -> frozenset[Atom]:
+        """Return which of her atoms hold."""
+        names = {name: len(kinds) for name, kinds in self.operators.predicates.items()}
+        return Evaluator(state, self.predicates).atoms(names)
+
+    def meant_by(self, phrase: str) -> str | None:
+        """Return the predicate that a complaint is about."""
+        for name, meant in self.file.predicates.items():
+            if phrase in (*meant.lacks, *meant.unmet):
+                return name
+        return None
+
+    def goal_phrase(self, atom: Atom) -> str:
+        """Return what she says of one literal that she wants."""
+        text = self.file.goals[atom[0]]
+        for place, name in enumerate(atom[1:], start=1):
+            text = text.replace(f"<{place}>", name)
+        return text
 
 
 @cache
-def true_predicates() -> dict[str, Predicate]:
-    """Return what the teacher means by each of her predicates."""
-    found = {
+def truth_of(domain: str) -> Truth:
+    """Return the ground truth of a domain."""
+    folder, words = (DATA / "room", ROOM_WORDS) if domain == ROOM else (DATA / "kitchen", KITCHEN_WORDS)
+    file = TruthFile.model_validate(file_toml(folder / "truth.toml", LARGEST_SETTINGS))
+    predicates = {
         name: Predicate(name, meant.arguments, read(meant.means, f"truth.toml, {name}"))
-        for name, meant in truth_file().predicates.items()
+        for name, meant in file.predicates.items()
     }
-    check(found)
-    return found
-
-
-@cache
-def true_domain(name: str) -> Domain:
-    """Return the teacher's operators of a domain of the kitchen."""
-    return parse_domain(file_text(OPERATORS[name], LARGEST_SETTINGS))
+    check(predicates, words)
+    operators = parse_domain(file_text(folder / f"{domain}.pddl", LARGEST_SETTINGS))
+    return Truth(domain, words, file, predicates, operators)
 
 
 def action_of(operator: str) -> str:
     """Return the action that an operator is about: `pick_up-from_table` is `pick_up`."""
     return operator.split("-")[0]
+
+
+def true_predicates() -> Mapping[str, Predicate]:
+    """Return what the teacher of the kitchen means; her three domains share their predicates."""
+    return truth_of("store_objects").predicates
+
+
+def true_domain(name: str) -> Domain:
+    """Return the teacher's operators of a domain."""
+    return truth_of(name).operators

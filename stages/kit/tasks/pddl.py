@@ -10,8 +10,10 @@ Literals = tuple[tuple[Atom, ...], tuple[Atom, ...]]
 """Positive atoms and negated ones."""
 
 
-def _typed(pairs: list[tuple[str, str]]) -> str:
+def _typed(pairs: list[tuple[str, str]], types: bool = True) -> str:
     # Every name gets its type: a bare one before `b - kind` would read back as a kind.
+    if not types:
+        return " ".join(name for name, _ in pairs)
     return " ".join(f"{name} - {kind or 'object'}" for name, kind in pairs)
 
 
@@ -21,19 +23,21 @@ def _conjunction(atoms: list[Atom], negated: list[Atom] | None = None) -> str:
 
 
 def domain_text(domain: Domain) -> str:
-    """Return the PDDL text of a domain."""
-    negative = any(schema.negative for schema in domain.schemas)
-    lines = [f"(define (domain {domain.name})", f"  (:requirements {' '.join(REQUIREMENTS[: 3 if negative else 2])})"]
-    lines.append(f"  (:types {_typed(list(domain.types.items()))})")
+    """Return the PDDL text of a domain; one without types asks for none, as some parsers know no `object` then."""
+    asked = (True, bool(domain.types), any(schema.negative for schema in domain.schemas))
+    requirements = [word for word, needed in zip(REQUIREMENTS, asked, strict=True) if needed]
+    lines = [f"(define (domain {domain.name})", f"  (:requirements {' '.join(requirements)})"]
+    if domain.types:
+        lines.append(f"  (:types {_typed(list(domain.types.items()))})")
     lines.append("  (:predicates")
     for name, kinds in domain.predicates.items():
-        arguments = _typed([(f"?{chr(97 + place)}", kind) for place, kind in enumerate(kinds)])
+        arguments = _typed([(f"?{chr(97 + place)}", kind) for place, kind in enumerate(kinds)], bool(domain.types))
         lines.append(f"    ({name} {arguments})" if arguments else f"    ({name})")
     lines.append("  )")
     for schema in domain.schemas:
         lines += [
             f"  (:action {schema.name}",
-            f"    :parameters ({_typed(list(schema.parameters))})",
+            f"    :parameters ({_typed(list(schema.parameters), bool(domain.types))})",
             f"    :precondition {_conjunction(list(schema.preconditions), list(schema.negative))}",
             f"    :effect {_conjunction(list(schema.add), list(schema.delete))})",
         ]
@@ -45,7 +49,7 @@ def problem_text(problem: Problem, domain_name: str) -> str:
     initial = "\n".join(f"    ({' '.join(atom)})" for atom in sorted(problem.initial))
     return (
         f"(define (problem {problem.name})\n  (:domain {domain_name})\n"
-        f"  (:objects {_typed(sorted(problem.objects.items()))})\n"
+        f"  (:objects {_typed(sorted(problem.objects.items()), any(problem.objects.values()))})\n"
         f"  (:init\n{initial})\n"
         f"  (:goal {_conjunction(sorted(problem.goal), sorted(problem.negative_goal))}))\n"
     )

@@ -41,11 +41,17 @@ class TaskPlan:
 
 
 def plan_task(
-    problem: Problem, actions: list[GroundAction], *, heuristic: Heuristic = "landmarks", limit: int = 50_000
+    problem: Problem,
+    actions: list[GroundAction],
+    *,
+    heuristic: Heuristic = "landmarks",
+    limit: int = 50_000,
+    improvement: int = IMPROVEMENT,
 ) -> TaskPlan:
     """Search for a plan; every action costs 1. `limit` bounds the expanded states; ties fall to the older state.
 
-    `max` gives a shortest plan; `landmarks` a good one fast.
+    `max` gives a shortest plan; `landmarks` a good one fast, for which `improvement` bounds the states that each search
+    for a shorter one expands.
     """
     task = relax(problem, actions)
     estimate = Estimator(task, "max")
@@ -54,18 +60,18 @@ def plan_task(
     if lost:
         return TaskPlan(None, 0, True, lost)
     if heuristic == "landmarks":
-        return _landmark_plan(task, limit)
+        return _landmark_plan(task, limit, min(improvement, limit))
     return _a_star(task, Estimator(task, heuristic), limit)
 
 
-def _landmark_plan(task: Relaxed, limit: int) -> TaskPlan:
+def _landmark_plan(task: Relaxed, limit: int, improvement: int) -> TaskPlan:
     search = LazySearch(task, find_landmarks(task))
     first = search.run(None, limit, None)
     if first.plan is None:
         return TaskPlan(None, first.expanded, first.exhausted)
     plan, expanded = first.plan, first.expanded
     for weight in WEIGHTS:
-        better = search.run(weight, min(IMPROVEMENT, limit), len(plan))
+        better = search.run(weight, improvement, len(plan))
         expanded += better.expanded
         plan = plan if better.plan is None else better.plan
     return TaskPlan([task.actions[action] for action in plan], expanded, False)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import dataclass, field
 
+from stages.kit.predicates.evaluating import Evaluator
+from stages.kit.predicates.expressions import Predicate, Tree
+from stages.kit.predicates.vocabulary import Perceived
 from stages.kit.tasks.strips import Atom, Domain
-from stages.predicates.language.evaluating import Evaluator
-from stages.predicates.language.expressions import Predicate, Tree
-from stages.predicates.learning.grammar import GIVEN
 from stages.predicates.learning.operators import Transition, learn_operators
 from stages.predicates.learning.phrases import Phrase
+from stages.predicates.learning.setting import KITCHEN, Setting
 from stages.predicates.learning.synthesis import Label
-from stages.predicates.state import State
 
 
 @dataclass
@@ -30,7 +30,8 @@ class Turn:
 class Memory:
     """Everything that a learner keeps; `meanings` are set by whoever learns them."""
 
-    states: list[State] = field(default_factory=list)
+    setting: Setting = KITCHEN
+    states: list[Perceived] = field(default_factory=list)
     labels: dict[Phrase, list[Label]] = field(default_factory=lambda: defaultdict(list))
     meanings: dict[Phrase, Tree] = field(default_factory=dict)
     stated: dict[tuple[str, Phrase, tuple[str, ...]], int] = field(default_factory=dict)
@@ -42,7 +43,7 @@ class Memory:
     disbelieved: list[str] = field(default_factory=list)
     questions: int = 0
 
-    def remember(self, state: State) -> int:
+    def remember(self, state: Perceived) -> int:
         """Return the number of a state, kept from now on."""
         if not self.states or self.states[-1] != state:
             self.states.append(state)
@@ -55,9 +56,9 @@ class Memory:
 
     def names(self) -> dict[Phrase, str]:
         """Return the predicate of every phrase; phrases that mean the same have the same."""
-        by_meaning: dict[Tree, str] = {each.means: name for name, each in GIVEN.items()}
-        by_meaning |= {(name, *each.variables): name for name, each in GIVEN.items()}
-        taken = set(GIVEN)
+        by_meaning: dict[Tree, str] = {each.means: name for name, each in self.setting.given.items()}
+        by_meaning |= {(name, *each.variables): name for name, each in self.setting.given.items()}
+        taken = set(self.setting.given)
         found = {}
         for phrase, means in self.meanings.items():
             if means not in by_meaning:
@@ -71,7 +72,7 @@ class Memory:
 
     def predicates(self) -> dict[str, Predicate]:
         """Return what was learned, with the given predicates that it uses."""
-        found = dict(GIVEN)
+        found = dict(self.setting.given)
         for phrase, name in self.names().items():
             if name not in found:
                 found[name] = Predicate(name, phrase.arguments, self.meanings[phrase])
@@ -80,9 +81,9 @@ class Memory:
     def used(self) -> dict[str, int]:
         """Return the predicates that plans are made with: those of phrases, and of the worked example."""
         learned = {name: phrase.arguments for phrase, name in self.names().items()}
-        return {"in_gripper": 1, **learned}
+        return {self.setting.held: 1, **learned}
 
-    def see(self, state: State) -> frozenset[Atom]:
+    def see(self, state: Perceived) -> frozenset[Atom]:
         """Return which atoms hold in a state."""
         return Evaluator(state, self.predicates()).atoms(self.used())
 
@@ -103,7 +104,8 @@ class Memory:
             Evaluator(state, predicates).atoms(used) if number in wanted else nothing
             for number, state in enumerate(self.states)
         ]
-        return learn_operators(name, used, self.transitions, atoms, self.preconditions())
+        apart = self.setting.tells_apart
+        return learn_operators(name, used, self.transitions, atoms, self.preconditions(), apart)
 
     def goal_atoms(self, parts: list[tuple[str, tuple[str, ...]]]) -> tuple[frozenset[Atom], tuple[str, ...]]:
         """Return what a goal sentence's parts want, and the parts that nobody has explained."""

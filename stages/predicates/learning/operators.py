@@ -48,20 +48,27 @@ def learn_operators(
     transitions: list[Transition],
     atoms: list[frozenset[Atom]],
     stated: Stated,
+    apart: bool = False,
 ) -> Domain:
-    """Return the operators of a domain; `atoms` are what held in each state."""
+    """Return the operators of a domain; `atoms` are what held in each state. With `apart`, of an action with several
+    effects, each asks for what held whenever it was seen and never when another was."""
     groups: dict[str, dict[Lifted, int]] = defaultdict(lambda: defaultdict(int))
+    before_of: dict[str, dict[Lifted, list[frozenset[Atom]]]] = defaultdict(lambda: defaultdict(list))
     for transition in transitions:
         before, after = atoms[transition.before], atoms[transition.after]
         lifted = lift(transition.action, after - before, before - after)
         if lifted is not None and any(lifted):
             groups[transition.action[0]][lifted] += 1
+            if apart:
+                before_of[transition.action[0]][lifted].append(_of_arguments(transition.action, before))
     schemas = []
     for action in sorted(groups):
         kept = _without_accidents(groups[action])
         for number, (add, delete) in enumerate(kept):
             variables = {term for atom in (*add, *delete) for term in atom[1:]}
             wanted = stated.get(action, frozenset()) | delete
+            if apart:
+                wanted |= _telling(before_of[action], (add, delete))
             arity = {"?a"} | {term for atom in wanted for term in atom[1:]} | variables
             if _takes_two(action, transitions):
                 arity.add("?b")
@@ -78,6 +85,22 @@ def learn_operators(
                 )
             )
     return Domain(name, {}, {each: ("",) * count for each, count in predicates.items()}, tuple(schemas))
+
+
+def _of_arguments(action: Atom, held: frozenset[Atom]) -> frozenset[Atom]:
+    """Return what held of an action's objects alone, lifted."""
+    names = dict(zip(action[1:], ("?a", "?b"), strict=False))
+    return frozenset((atom[0], *(names[term] for term in atom[1:])) for atom in held if set(atom[1:]) <= set(names))
+
+
+def _telling(seen: Mapping[Lifted, list[frozenset[Atom]]], effect: Lifted) -> frozenset[Atom]:
+    """Return the atoms over the arguments that held before every transition with an effect and before none with
+    another; nothing where there is one effect alone."""
+    others = [held for other, each in seen.items() if other != effect for held in each]
+    if not others:
+        return frozenset()
+    always = frozenset.intersection(*seen[effect])
+    return frozenset(atom for atom in always if len(atom) > 1 and not any(atom in held for held in others))
 
 
 def _takes_two(action: str, transitions: list[Transition]) -> bool:

@@ -13,40 +13,45 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stages.kit.predicates.evaluating import Evaluator
+from stages.kit.predicates.vocabulary import Perceived
 from stages.kit.tasks.strips import Atom
-from stages.predicates.language.evaluating import Evaluator
-from stages.predicates.learning.grammar import GIVEN
 from stages.predicates.learning.memory import Memory, Turn
 from stages.predicates.learning.operators import Transition
 from stages.predicates.learning.phrases import Phrase, phrase_of
 from stages.predicates.learning.synthesis import Label, Synthesiser
-from stages.predicates.state import State
 from stages.predicates.teacher.simulated import Teacher
-from stages.predicates.world.actions import ARITY
 
 MOST_QUESTIONS = 3
 """About one phrase, told apart from its rivals."""
 ASKED_AGAIN = 2.0
 """Weight of a sentence that was confirmed."""
+DOUBT_AFTER = 3
+"""Episodes without their goal after which what was said once is tried."""
 
 
 class OursLearner:
     """Learns from a teacher; `memory` may hold what another domain taught."""
 
+    label = "ours"
     plans = True
     """Whether it follows plans while it is taught."""
 
     def __init__(self, teacher: Teacher, actions: Sequence[str], seed: int, memory: Memory | None = None) -> None:
         self.memory = memory or Memory()
+        self.setting = self.memory.setting
         self.teacher, self.actions = teacher, tuple(actions)
         self.random = np.random.default_rng([seed, 11])
-        self._synthesiser = Synthesiser(self.memory.states)
+        self._synthesiser = Synthesiser(self.memory.states, self.setting)
         self._tried: Counter[tuple[str, ...]] = Counter()
         self._asked: Counter[Phrase] = Counter()
+        self._facts: tuple[Perceived | None, bool, dict[str, tuple[str, ...]]] = (None, False, {})
+        self.missed = 0
+        """Episodes that ended without their goal."""
 
     # ---- what it hears -----------------------------------------------------------------------------------------
 
-    def refused(self, state: State, action: Atom, sentence: str) -> None:
+    def refused(self, state: Perceived, action: Atom, sentence: str) -> None:
         """Take in that an action was not allowed, and what was said about it."""
         self._tried[self._situation(state, action)] += 1
         if not sentence:
@@ -61,7 +66,7 @@ class OursLearner:
                     self._follows(phrase, key[2], transition)
         self._understand(phrase, state)
 
-    def allowed(self, before: State, action: Atom, after: State) -> None:
+    def allowed(self, before: Perceived, action: Atom, after: Perceived) -> None:
         """Take in that an action was allowed and done: what the teacher named for it held."""
         self._tried[self._situation(before, action)] += 1
         transition = Transition(action, self.memory.remember(before), self.memory.remember(after))
@@ -77,7 +82,7 @@ class OursLearner:
         source = f"accepted {transition.action[0]} {' '.join(variables)}"
         self.memory.labels[phrase].append(Label(transition.before, objects, True, source, 1.0))
 
-    def unmet(self, state: State, parts: list[tuple[str, tuple[str, ...]]], sentence: str) -> None:
+    def unmet(self, state: Perceived, parts: list[tuple[str, tuple[str, ...]]], sentence: str) -> None:
         """Take in what the teacher misses of a goal."""
         if not sentence:
             return
@@ -99,7 +104,7 @@ class OursLearner:
         if all(meanings.get(other) != meanings[phrase] or at != places for other, at in known):
             known.append((phrase, places))
 
-    def reached(self, state: State, parts: list[tuple[str, tuple[str, ...]]]) -> None:
+    def reached(self, state: Perceived, parts: list[tuple[str, tuple[str, ...]]]) -> None:
         """Take in that a goal was reached: all that was missed of it holds."""
         number = self.memory.remember(state)
         for part, objects in parts:
@@ -108,17 +113,21 @@ class OursLearner:
                 self.memory.labels[phrase].append(Label(number, named, True, "goal"))
                 self._understand(phrase, state)
 
-    def _heard(self, state: State, sentence: str, about: str) -> tuple[Phrase, tuple[str, ...]]:
+    def _heard(self, state: Perceived, sentence: str, about: str) -> tuple[Phrase, tuple[str, ...]]:
         self.memory.dialogue.append(Turn("teacher", sentence, about))
-        phrase, objects = phrase_of(sentence, state.objects)
+        phrase, objects = self._phrase_of(sentence, state)
         turn = len(self.memory.dialogue) - 1
         label = Label(self.memory.remember(state), objects, False, "sentence", 1.0, turn)
         self.memory.labels[phrase].append(label)
         return phrase, objects
 
+    def _phrase_of(self, sentence: str, state: Perceived) -> tuple[Phrase, tuple[str, ...]]:
+        """Return a sentence as a phrase and its objects."""
+        return phrase_of(sentence, state.names)
+
     # ---- what it makes of it -----------------------------------------------------------------------------------
 
-    def _understand(self, phrase: Phrase, state: State) -> None:
+    def _understand(self, phrase: Phrase, state: Perceived) -> None:
         """Find the meaning anew; ask again about a sentence that stands against it, and between rivals."""
         labels = self.memory.labels[phrase]
         meaning = self._synthesiser.best(phrase, labels)
@@ -172,25 +181,25 @@ class OursLearner:
             self.memory.stated.pop(key, None)
 
     def _telling(
-        self, means: object, rivals: tuple[object, ...], phrase: Phrase, state: State
+        self, means: object, rivals: tuple[object, ...], phrase: Phrase, state: Perceived
     ) -> tuple[str, ...] | None:
         """Return objects, now, for which rivals disagree most evenly; None when they agree on all that is here."""
-        evaluator = Evaluator(state, GIVEN)
+        evaluator = Evaluator(state, self.setting.given)
         trees = [means, *rivals]
         best, asked = 0, None
-        for objects in itertools.permutations(state.objects, phrase.arguments):
+        for objects in itertools.permutations(state.names, phrase.arguments):
             binding = dict(zip(("?a", "?b"), objects, strict=False))
             held = sum(evaluator.truth(tree, binding) for tree in trees)  # type: ignore[arg-type]
             if min(held, len(trees) - held) > best:
                 best, asked = min(held, len(trees) - held), objects
         return asked
 
-    def _ask(self, phrase: Phrase, objects: tuple[str, ...], state: State) -> None:
+    def _ask(self, phrase: Phrase, objects: tuple[str, ...], state: Perceived) -> None:
         holds = self._question(phrase, objects, state)
         turn = len(self.memory.dialogue) - 1
         self.memory.labels[phrase].append(Label(self.memory.remember(state), objects, holds, "answer", 1.0, turn))
 
-    def _question(self, phrase: Phrase, objects: tuple[str, ...], state: State) -> bool:
+    def _question(self, phrase: Phrase, objects: tuple[str, ...], state: Perceived) -> bool:
         """Ask whether a complaint is right of objects in a state; returns whether its predicate holds."""
         text = phrase.text
         for place, name in enumerate(objects, start=1):
@@ -203,14 +212,14 @@ class OursLearner:
 
     # ---- what it tries -----------------------------------------------------------------------------------------
 
-    def explore(self, state: State) -> Atom | None:
+    def explore(self, state: Perceived) -> Atom | None:
         """Return the action in the situation that was tried least, of those that nothing is known against."""
         stated = self.memory.preconditions()
         held = self.memory.see(state)
         best: list[Atom] = []
         fewest = 10**9
         for name in self.actions:
-            for objects in itertools.permutations(state.objects, ARITY[name]):
+            for objects in itertools.permutations(state.names, self.setting.arity[name]):
                 action = (name, *objects)
                 binding = dict(zip(("?a", "?b"), objects, strict=False))
                 wanted = {(atom[0], *(binding[term] for term in atom[1:])) for atom in stated.get(name, ())}
@@ -223,58 +232,68 @@ class OursLearner:
                     best.append(action)
         return best[int(self.random.integers(len(best)))] if best else None
 
-    def doubtful(self, state: State) -> Atom | None:
-        """Return an action that was never allowed and whose preconditions, as named, were never seen to hold together:
-        one of them, said once, may be wrong. The one with the fewest of them against it."""
+    def doubtful(self, state: Perceived) -> Atom | None:
+        """Return an action against which nothing speaks but what was said once, and which may be wrong.
+
+        Of an action that was never allowed, whose preconditions were never seen to hold together; and, once DOUBT_AFTER
+        episodes went amiss, of any where the one precondition against it is nothing that actions change. The one with
+        the fewest against it."""
         names, held = self.memory.names(), self.memory.see(state)
         done = {transition.action[0] for transition in self.memory.transitions}
+        changing = self._changing()
         said: Counter[tuple[str, Atom]] = Counter()
         for (action, phrase, variables), count in self.memory.stated.items():
             said[action, (names[phrase], *variables)] += count
         found = []
         for name in self.actions:
             wanted = [(atom, count) for (action, atom), count in said.items() if action == name]
-            if name in done or not wanted or self._seen_together(name, [atom for atom, _ in wanted]):
+            never = name not in done and not self._seen_together(name, [atom for atom, _ in wanted])
+            if not wanted or not (never or self.missed >= DOUBT_AFTER):
                 continue
-            for objects in itertools.permutations(state.objects, ARITY[name]):
-                against = [count for atom, count in wanted if _bound(atom, objects) not in held]
-                if against and max(against) == 1:
+            for objects in itertools.permutations(state.names, self.setting.arity[name]):
+                against = [entry for entry in wanted if _bound(entry[0], objects) not in held]
+                single = len(against) == 1 and against[0][0][0] not in changing
+                if against and max(count for _, count in against) == 1 and (never or single):
                     found.append((len(against), (name, *objects)))
         fewest = [action for count, action in found if count == min(found)[0]]
         return fewest[int(self.random.integers(len(fewest)))] if fewest else None
+
+    def _changing(self) -> set[str]:
+        """Return the predicates that some action was seen to change."""
+        seen = {number: self.memory.see(self.memory.states[number]) for number in self._ends()}
+        return {
+            atom[0]
+            for transition in self.memory.transitions
+            for atom in seen[transition.before] ^ seen[transition.after]
+        }
+
+    def _ends(self) -> set[int]:
+        return {number for each in self.memory.transitions for number in (each.before, each.after)}
 
     def _seen_together(self, name: str, wanted: list[Atom]) -> bool:
         """Whether all of what was named for an action held at once, for some objects, in a state that was seen."""
         for state in self.memory.states:
             held = self.memory.see(state)
-            for objects in itertools.permutations(state.objects, ARITY[name]):
+            for objects in itertools.permutations(state.names, self.setting.arity[name]):
                 if all(_bound(atom, objects) in held for atom in wanted):
                     return True
         return False
 
-    def curious(self, state: State) -> bool:
+    def curious(self, state: Perceived) -> bool:
         """Whether there is an action that was never tried in such a situation."""
         action = self.explore(state)
         return action is not None and self._tried[self._situation(state, action)] == 0
 
-    def _situation(self, state: State, action: Atom) -> tuple[str, ...]:
-        """Return what matters of a state for an action, as far as one can see: categories, what is held, what rests on
-        or within what, and water."""
-        evaluator = Evaluator(state, GIVEN)
-        full = any(evaluator.holds(("in_gripper", name)) for name in state.objects)
-        seen = [action[0], f"full:{full}"]
-        for name in action[1:]:
-            others = [other for other in state.objects if other != name]
-            facts = (
-                evaluator.holds(("in_gripper", name)),
-                any(evaluator.holds(("rests_on", other, name)) for other in others),
-                any(evaluator.holds(("within", name, other)) for other in others),
-                any(evaluator.holds(("within", other, name)) for other in others),
-                state.objects[name].water > 0,
-            )
-            category = state.objects[name].category
-            seen.append(f"{category}:{''.join('01'[fact] for fact in facts)}")
-        return tuple(seen)
+    def _situation(self, state: Perceived, action: Atom) -> tuple[str, ...]:
+        """Return what matters of a state for an action, as far as one can see: what kind of things they are, whether
+        something is held, what rests on or within what."""
+        if self._facts[0] is not state:
+            held = self.setting.held
+            evaluator = Evaluator(state, self.setting.given)
+            full = any(evaluator.holds((held, name)) for name in state.names)
+            self._facts = (state, full, {name: self.setting.facts(state, name) for name in state.names})
+        _, full, facts = self._facts
+        return (action[0], f"full:{full}", *(fact for name in action[1:] for fact in facts[name]))
 
 
 def _bound(atom: Atom, objects: Sequence[str]) -> Atom:

@@ -16,6 +16,10 @@ CONCEPTS: dict[str, tuple[str, ...]] = {
     "above": ("on", "top", "onto"),
     "inside": ("inside",),
     "other": ("another", "something", "other", "more"),
+    "open": ("open", "opened", "shut", "closed"),
+    "door": ("door", "doors"),
+    "reach": ("reach", "reached"),
+    "level": ("level",),
 }
 """What words point at: the word list that stands in for a language model. It is written by hand."""
 CATEGORIES = ("food", "can", "coaster", "shelf", "cup", "pot", "basket", "placemat", "plate")
@@ -91,21 +95,3 @@ def phrase_of(sentence: str, names: Iterable[str]) -> tuple[Phrase, tuple[str, .
 
     text = re.sub(r"object (\w+)", slot, " ".join(sentence.lower().split()))
     return Phrase(text, len(objects)), tuple(objects)
-
-
-def goal_phrases(sentence: str, names: Iterable[str]) -> list[tuple[str, tuple[str, ...]]]:
-    """Return the parts of a goal that `and` joins, each as text with <1>, <2> and its objects."""
-    known = set(names)
-    parts = []
-    for part in " ".join(sentence.lower().rstrip(".").split()).split(" and "):
-        objects: list[str] = []
-        words = []
-        for word in part.split():
-            if word in known:
-                if word not in objects:
-                    objects.append(word)
-                words.append(f"<{objects.index(word) + 1}>")
-            else:
-                words.append(word)
-        parts.append((" ".join(words), tuple(objects)))
-    return parts

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import itertools
 
+from stages.kit.predicates.vocabulary import Perceived
 from stages.kit.tasks.strips import Atom
 from stages.predicates.learning.ours import OursLearner
-from stages.predicates.state import State
-from stages.predicates.world.actions import ARITY
 
 
 class RandomLearner(OursLearner):
     """Explores by chance."""
 
+    label = "random"
     plans = False
 
-    def explore(self, state: State) -> Atom | None:
+    def explore(self, state: Perceived) -> Atom | None:
         """Return any action."""
         actions = [
-            (name, *objects) for name in self.actions for objects in itertools.permutations(state.objects, ARITY[name])
+            (name, *objects)
+            for name in self.actions
+            for objects in itertools.permutations(state.names, self.setting.arity[name])
         ]
         return actions[int(self.random.integers(len(actions)))] if actions else None
 
-    def curious(self, state: State) -> bool:
+    def curious(self, state: Perceived) -> bool:
         """It is not: a goal that happens to hold is claimed."""
         return False

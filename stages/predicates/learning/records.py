@@ -14,17 +14,22 @@ from schemas.learned_domain import (
     LabelledExample,
     LearnedDomainFile,
     LearnedPredicate,
+    SeenBody,
     SeenObject,
+    SeenRoom,
     SeenState,
     StatedPrecondition,
 )
-from stages.predicates.language.expressions import Predicate, check, read, text_of
+from stages.kit.predicates.expressions import Predicate, check, read, text_of
+from stages.kit.predicates.room import Body, RoomState
+from stages.kit.predicates.vocabulary import Perceived
 from stages.predicates.language.saying import say
-from stages.predicates.learning.grammar import GIVEN
 from stages.predicates.learning.memory import Memory, Turn
 from stages.predicates.learning.operators import Transition
 from stages.predicates.learning.phrases import Phrase
+from stages.predicates.learning.setting import SETTINGS
 from stages.predicates.learning.synthesis import Label
+from stages.predicates.learning.thesis_memory import THESIS, ThesisMemory
 from stages.predicates.state import Seen, State
 
 
@@ -69,16 +74,9 @@ def document_of(memory: Memory, **rest: Any) -> LearnedDomainFile:
         transitions=tuple(
             DoneAction(action=each.action, before=each.before, after=each.after) for each in memory.transitions
         ),
-        states=tuple(
-            SeenState(
-                objects={name: SeenObject(**vars(seen)) for name, seen in state.objects.items()},
-                gripper_x=state.gripper_x,
-                gripper_y=state.gripper_y,
-                opening=state.opening,
-                mass=state.mass,
-            )
-            for state in memory.states
-        ),
+        setting=memory.setting.name,
+        states=tuple(_seen_state(state) for state in memory.states if isinstance(state, State)),
+        rooms=tuple(_seen_room(state) for state in memory.states if isinstance(state, RoomState)),
         dialogue=tuple(
             DialogueTurn(speaker=turn.speaker, text=turn.text, about=turn.about, believed=turn.believed)
             for turn in memory.dialogue
@@ -90,15 +88,29 @@ def document_of(memory: Memory, **rest: Any) -> LearnedDomainFile:
     )
 
 
-def memory_of(document: LearnedDomainFile, where: str) -> Memory:
-    """Return the memory of a document. Raises BadInput naming what refers to nothing, or is no expression."""
-    predicates = {
-        each.name: Predicate(each.name, each.arguments, read(each.means, f"{where}: {each.name}"))
-        for each in document.predicates
-    }
-    check(predicates)
-    memory = Memory()
-    memory.states = [
+def _seen_state(state: State) -> SeenState:
+    return SeenState(
+        objects={name: SeenObject(**vars(seen)) for name, seen in state.objects.items()},
+        gripper_x=state.gripper_x,
+        gripper_y=state.gripper_y,
+        opening=state.opening,
+        mass=state.mass,
+    )
+
+
+def _seen_room(state: RoomState) -> SeenRoom:
+    return SeenRoom(
+        bodies={name: SeenBody(**vars(body)) for name, body in state.bodies.items()},
+        supported=state.supported,
+        contained=state.contained,
+        held=state.held,
+        reach=state.reach,
+        hand_opening=state.hand_opening,
+    )
+
+
+def _states_of(document: LearnedDomainFile) -> list[Perceived]:
+    kitchens = [
         State(
             {name: Seen(**seen.model_dump()) for name, seen in state.objects.items()},
             state.gripper_x,
@@ -108,6 +120,30 @@ def memory_of(document: LearnedDomainFile, where: str) -> Memory:
         )
         for state in document.states
     ]
+    rooms = [
+        RoomState(
+            {name: Body(**body.model_dump()) for name, body in room.bodies.items()},
+            dict(room.supported),
+            dict(room.contained),
+            room.held,
+            room.reach,
+            room.hand_opening,
+        )
+        for room in document.rooms
+    ]
+    return [*kitchens, *rooms]
+
+
+def memory_of(document: LearnedDomainFile, where: str) -> Memory:
+    """Return the memory of a document. Raises BadInput naming what refers to nothing, or is no expression."""
+    predicates = {
+        each.name: Predicate(each.name, each.arguments, read(each.means, f"{where}: {each.name}"))
+        for each in document.predicates
+    }
+    setting = SETTINGS[document.setting]
+    check(predicates, setting.words)
+    memory = ThesisMemory(setting) if document.learner.startswith(THESIS) else Memory(setting)
+    memory.states = _states_of(document)
     phrases = [Phrase(each.text, each.arguments) for each in document.phrases]
     for phrase, heard in zip(phrases, document.phrases, strict=True):
         if heard.predicate not in predicates:
@@ -115,12 +151,12 @@ def memory_of(document: LearnedDomainFile, where: str) -> Memory:
         if predicates[heard.predicate].arguments != heard.arguments:
             raise _refuse(where, f"{heard.predicate} is not about {heard.arguments} objects")
         predicate = predicates[heard.predicate]
-        given = GIVEN.get(heard.predicate)
+        given = setting.given.get(heard.predicate)
         memory.meanings[phrase] = (predicate.name, *predicate.variables) if given == predicate else predicate.means
         for example in heard.examples:
             if example.state >= len(memory.states) or len(example.objects) != heard.arguments:
                 raise _refuse(where, f"an example of {heard.text!r} names no state, or other objects")
-            if not set(example.objects) <= set(memory.states[example.state].objects):
+            if not set(example.objects) <= set(memory.states[example.state].names):
                 raise _refuse(where, f"an example of {heard.text!r} names objects that its state has not")
             memory.labels[phrase].append(Label(**example.model_dump()))
     for stated in document.preconditions:

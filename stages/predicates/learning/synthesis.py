@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stages.predicates.language.evaluating import Evaluator, of_object, of_scene
-from stages.predicates.language.expressions import Tree
-from stages.predicates.learning.grammar import GIVEN, MEASURES, candidates
+from stages.kit.predicates.evaluating import Evaluator
+from stages.kit.predicates.expressions import Tree
+from stages.kit.predicates.vocabulary import Perceived
+from stages.predicates.learning.grammar import candidates
 from stages.predicates.learning.phrases import Phrase
-from stages.predicates.state import State
+from stages.predicates.learning.setting import KITCHEN, Setting
 
 VIOLATION = 6.0
 """What a label that a meaning contradicts adds to its cost, times the label's weight."""
@@ -45,8 +46,8 @@ class Meaning:
 class Synthesiser:
     """Finds meanings over remembered states; truths of expressions are kept."""
 
-    def __init__(self, states: list[State]) -> None:
-        self.states = states
+    def __init__(self, states: list[Perceived], setting: Setting = KITCHEN) -> None:
+        self.states, self.setting = states, setting
         self._evaluators: dict[int, Evaluator] = {}
         self._known: dict[tuple[Tree, int, tuple[str, ...]], bool] = {}
 
@@ -55,7 +56,7 @@ class Synthesiser:
         key = (tree, state, objects)
         if key not in self._known:
             if state not in self._evaluators:
-                self._evaluators[state] = Evaluator(self.states[state], GIVEN)
+                self._evaluators[state] = Evaluator(self.states[state], self.setting.given)
             binding = dict(zip(("?a", "?b"), objects, strict=False))
             self._known[key] = self._evaluators[state].truth(tree, binding)
         return self._known[key]
@@ -65,7 +66,7 @@ class Synthesiser:
         many right ones say."""
         found: list[tuple[float, Tree, tuple[int, ...]]] = []
         least = float("inf")
-        for cost, tree in candidates(phrase, self._margins(phrase, labels))[:MOST_TRIED]:
+        for cost, tree in candidates(phrase, self._margins(phrase, labels), self.setting)[:MOST_TRIED]:
             if cost > least + RIVAL:
                 break
             violated = tuple(
@@ -84,12 +85,12 @@ class Synthesiser:
     def _margins(self, phrase: Phrase, labels: list[Label]) -> dict[str, list[float]]:
         """Return, for each measure, middles between values with and without the predicate."""
         margins: dict[str, list[float]] = {}
-        measures = MEASURES if phrase.arguments == 1 else ("gripper_mass",) if phrase.arguments == 0 else ()
+        measures = ((*self.setting.of_whole,), (*self.setting.measures,), ())[phrase.arguments]
         for measure in measures:
             values: dict[bool, set[float]] = {True: set(), False: set()}
             for label in labels:
                 state = self.states[label.state]
-                value = of_object(state, label.objects[0], measure) if label.objects else of_scene(state, measure)
+                value = state.number(label.objects[0], measure) if label.objects else state.of_scene(measure)
                 values[label.holds].add(round(value, 3))
             if values[True] and values[False] and not values[True] & values[False]:
                 both = sorted([(v, True) for v in values[True]] + [(v, False) for v in values[False]])

@@ -11,13 +11,12 @@ from functools import cache
 
 import numpy as np
 
-from stages.predicates.language.evaluating import Evaluator
-from stages.predicates.language.expressions import Predicate, Tree
-from stages.predicates.learning.grammar import GIVEN
+from stages.kit.predicates.evaluating import Evaluator
+from stages.kit.predicates.expressions import Predicate, Tree
 from stages.predicates.learning.memory import Memory
+from stages.predicates.learning.setting import KITCHEN_GIVEN
 from stages.predicates.state import Seen, State
-from stages.predicates.teacher.simulated import meant_by
-from stages.predicates.truth import true_predicates
+from stages.predicates.truth import true_predicates, truth_of
 from stages.predicates.world.catalogue import DomainSetup, kitchen_file
 
 HALVINGS = 7
@@ -119,9 +118,9 @@ def accuracies(memory: Memory, domain: str, count: int, seed: int) -> dict[str, 
     """Return, by the teacher's predicate, how right the worst meaning of a phrase about it is."""
     found: dict[str, float] = {}
     for phrase, means in memory.meanings.items():
-        name = meant_by(phrase.text)
+        name = truth_of(domain).meant_by(phrase.text)
         if name is not None:
-            value = balanced_accuracy(drawn_cases(name, domain, count, seed), means, GIVEN)
+            value = balanced_accuracy(drawn_cases(name, domain, count, seed), means, KITCHEN_GIVEN)
             found[name] = min(value, found.get(name, 1.0))
     return dict(sorted(found.items()))
 

@@ -7,31 +7,43 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from stages.kit.predicates.evaluating import Evaluator
+from stages.kit.predicates.vocabulary import Perceived
 from stages.kit.tasks.strips import Atom, Problem, ground
-from stages.predicates.language.evaluating import Evaluator
-from stages.predicates.state import State
-from stages.predicates.tasks import true_atoms
-from stages.predicates.truth import action_of, true_domain, true_predicates, truth_file
+from stages.predicates.truth import action_of, truth_of
 
 Wording = Literal["plain", "diverse"]
+
+
+class TeacherLeft(Exception):
+    """The teacher is gone; what she taught stays."""
 
 
 class Teacher(Protocol):
     """Who corrects."""
 
-    def allows(self, state: State, action: Atom) -> bool:
+    @property
+    def label(self) -> str:
+        """Who she is, for records."""
+        ...
+
+    def allows(self, state: Perceived, action: Atom) -> bool:
         """Whether an action may be done."""
         ...
 
-    def correct(self, state: State, action: Atom) -> str:
+    def correct(self, state: Perceived, action: Atom) -> str:
         """Say one thing that keeps an action from being done; nothing when she can't name one."""
         ...
 
-    def unmet(self, state: State, goal: tuple[Atom, ...]) -> str:
+    def satisfied(self, state: Perceived, goal: tuple[Atom, ...]) -> bool:
+        """Whether all is as wanted."""
+        ...
+
+    def unmet(self, state: Perceived, goal: tuple[Atom, ...]) -> str:
         """Say one thing that is not as wanted; nothing when all is."""
         ...
 
-    def answer(self, state: State, phrase: str, objects: tuple[str, ...]) -> bool:
+    def answer(self, state: Perceived, phrase: str, objects: tuple[str, ...]) -> bool:
         """Say whether a phrase (a complaint) is right of objects."""
         ...
 
@@ -50,12 +62,13 @@ class SimulatedTeacher:
     def __post_init__(self) -> None:
         """Take up the seed."""
         self._random = np.random.default_rng([self.seed, 7])
-        self._operators = true_domain(self.domain)
+        self._truth = truth_of(self.domain)
+        self._operators = self._truth.operators
 
-    def allows(self, state: State, action: Atom) -> bool:
+    def allows(self, state: Perceived, action: Atom) -> bool:
         """Whether one of her operators for the action applies."""
-        atoms = true_atoms(state, self.domain)
-        problem = Problem("now", dict.fromkeys(state.objects, ""), atoms, frozenset())
+        atoms = self._truth.atoms(state)
+        problem = Problem("now", dict.fromkeys(state.names, ""), atoms, frozenset())
         return any(
             action_of(each.name) == action[0]
             and each.arguments[: len(action) - 1] == action[1:]
@@ -63,12 +76,12 @@ class SimulatedTeacher:
             for each in ground(self._operators, problem)
         )
 
-    def correct(self, state: State, action: Atom) -> str:
+    def correct(self, state: Perceived, action: Atom) -> str:
         """Name one of the preconditions, common to her operators for the action, that do not hold."""
         sets = [set(each.preconditions) for each in self._operators.schemas if action_of(each.name) == action[0]]
         binding = dict(zip(("?a", "?b"), action[1:], strict=False))
         shared = [tuple(binding.get(term, term) for term in atom) for atom in set.intersection(*sets)]
-        atoms = true_atoms(state, self.domain)
+        atoms = self._truth.atoms(state)
         violated = sorted(atom for atom in shared if atom not in atoms)
         if self._random.random() < self.wrong:
             return self._something_wrong(action, set(violated)) if self._random.random() < 0.5 else ""
@@ -85,28 +98,29 @@ class SimulatedTeacher:
         chosen = [atom for atom in others if atom not in violated]
         return self._say(chosen[int(self._random.integers(len(chosen)))], "lacks")
 
-    def unmet(self, state: State, goal: tuple[Atom, ...]) -> str:
+    @property
+    def label(self) -> str:
+        """Who she is."""
+        return f"simulated, {self.wording}, {self.wrong:g} wrong"
+
+    def satisfied(self, state: Perceived, goal: tuple[Atom, ...]) -> bool:
+        """Whether all is as wanted."""
+        return set(goal) <= self._truth.atoms(state)
+
+    def unmet(self, state: Perceived, goal: tuple[Atom, ...]) -> str:
         """Name one literal of the goal that does not hold."""
-        missing = sorted(set(goal) - true_atoms(state, self.domain))
+        missing = sorted(set(goal) - self._truth.atoms(state))
         return self._say(missing[int(self._random.integers(len(missing)))], "unmet") if missing else ""
 
-    def answer(self, state: State, phrase: str, objects: tuple[str, ...]) -> bool:
+    def answer(self, state: Perceived, phrase: str, objects: tuple[str, ...]) -> bool:
         """Whether the complaint is right."""
-        name = meant_by(phrase)
-        right = name is not None and not Evaluator(state, true_predicates()).holds((name, *objects))
+        name = self._truth.meant_by(phrase)
+        right = name is not None and not Evaluator(state, self._truth.predicates).holds((name, *objects))
         return right != (self._random.random() < self.wrong)
 
     def _say(self, atom: Atom, kind: Literal["lacks", "unmet"]) -> str:
-        texts = getattr(truth_file().predicates[atom[0]], kind)
+        texts = getattr(self._truth.file.predicates[atom[0]], kind)
         text = texts[0] if self.wording == "plain" else texts[int(self._random.integers(len(texts)))]
         for place, name in enumerate(atom[1:], start=1):
             text = text.replace(f"<{place}>", name)
         return str(text)
-
-
-def meant_by(phrase: str) -> str | None:
-    """Return the teacher's predicate that a complaint is about."""
-    for name, meant in truth_file().predicates.items():
-        if phrase in (*meant.lacks, *meant.unmet):
-            return name
-    return None

@@ -15,6 +15,7 @@ from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
 from stages.kit.motion.rrt_connect import densify
 from stages.kit.simulation.robot_description import load_robot
+from stages.kit.tasks.strips import positive_task
 from stages.plan.action import MotionRequest
 from stages.plan.door_motion import plan_close
 from stages.plan.goals import default_goals
@@ -104,8 +105,7 @@ def test_every_motion_of_a_refined_plan_is_free_of_collision(
     attempt = plan_and_refine(
         model,
         START,
-        DOMAIN,
-        task_problem(objects, initial, goal),
+        positive_task(DOMAIN, task_problem(objects, initial, goal)),
         BUDGETS,
         np.random.default_rng(0),
         SearchSettings("add", task_attempts=2, refinement_attempts=3),
@@ -250,8 +250,7 @@ def test_what_the_hand_cannot_take_is_known_before_any_geometry(tmp_path: Path) 
         attempt = plan_and_refine(
             model,
             START,
-            DOMAIN,
-            task_problem(objects, initial, goal),
+            positive_task(DOMAIN, task_problem(objects, initial, goal)),
             BUDGETS,
             np.random.default_rng(0),
             SearchSettings("add", task_attempts=3, refinement_attempts=2),

@@ -12,9 +12,10 @@ from schemas.contact_graph import ContactGraphFile
 from schemas.plan import Failure, TriedPlan
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
-from stages.kit.tasks.strips import Problem
+from stages.kit.tasks.strips import GroundAction, Problem
 from stages.plan.believed_tree import TreeState
 from stages.plan.carriers import HAND, NOTHING
+from stages.plan.reading import Reading
 from stages.plan.refinement import Attempt, Step
 from stages.plan.replanning import Replanning, in_the_middle
 from stages.plan.tree_state import start_state
@@ -74,8 +75,8 @@ class Script:
         self.answers = list(answers)
         self.asked: list[tuple[RobotState, Problem]] = []
 
-    def __call__(self, state: RobotState, problem: Problem) -> Attempt:
-        self.asked.append((state, problem))
+    def __call__(self, state: RobotState, task: tuple[Problem, list[GroundAction]]) -> Attempt:
+        self.asked.append((state, task[0]))
         answer = self.answers.pop(0)
         if isinstance(answer, MotionFailed):
             raise answer
@@ -84,7 +85,7 @@ class Script:
 
 def replanning(model: WorldModel, scene: Path, script: Script, *literals: str) -> Replanning:
     graph = ContactGraphFile.read(scene / "graph.json")
-    return Replanning(model, graph, start_state(model), literals, script)
+    return Replanning(model, graph, start_state(model), literals, Reading(), script)
 
 
 def seen(start: TreeState, name: str, parent: str, pose: np.ndarray, held: str | None = None) -> TreeState:
@@ -130,7 +131,7 @@ def test_what_stands_on_what_is_held_goes_along(model: WorldModel, scene: Path) 
     """In every motion that is searched for, though geometry puts the model back after each failure."""
     laden = []
 
-    def search(state: RobotState, problem: Problem) -> Attempt:
+    def search(state: RobotState, task: tuple[Problem, list[GroundAction]]) -> Attempt:
         snapshot = model.snapshot()
         for _ in range(2):
             laden.append(model.laden("bottle_7"))
@@ -141,7 +142,9 @@ def test_what_stands_on_what_is_held_goes_along(model: WorldModel, scene: Path) 
     start = start_state(model)
     over = model.pose("bottle_7") @ transform_from_yaw(0.0, np.array([0.0, 0.0, 0.2]))
     model.world.set_pose("cup_5", over)
-    anew = Replanning(model, ContactGraphFile.read(scene / "graph.json"), start, ("on(bottle_7, table_3)",), search)
+    anew = Replanning(
+        model, ContactGraphFile.read(scene / "graph.json"), start, ("on(bottle_7, table_3)",), Reading(), search
+    )
     held = seen(seen(start, "cup_5", "bottle_7", over), "bottle_7", HAND, model.pose("bottle_7"), held="bottle_7")
     anew.plan(RobotState(np.zeros(3), model.description.carry, "bottle_7"), start, held, 1)
     assert laden == [True, True] and model.laden("bottle_7")

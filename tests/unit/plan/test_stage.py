@@ -20,13 +20,21 @@ from stages.plan.stage import run
 from tests.unit.simulation.handmade_scene import HandmadeBody, kitchen, write_scene
 
 
-def plan(tmp_path: Path, scene: Path, ground_truth: Path | None = None, name: str = "plan", **options) -> Plan:
+def plan(
+    tmp_path: Path,
+    scene: Path,
+    ground_truth: Path | None = None,
+    name: str = "plan",
+    domain: Path | None = None,
+    **options,
+) -> Plan:
     output = tmp_path / name
     output.mkdir()
     options = {"image_width": 96, "video_rate": 0.2} | options
     return run(
         InteractiveScene(root=scene),
         None if ground_truth is None else GroundTruth(root=ground_truth),
+        domain,
         parameters=PlanParameters(**options),
         context=Context(output=output, seed=0, device="cpu", progress=SilentProgress()),
     )

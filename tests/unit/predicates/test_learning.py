@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import pytest
 
+from stages.kit.predicates.expressions import read, text_of
+from stages.kit.predicates.goal_words import goal_phrases
 from stages.kit.tasks.pddl import domain_text, parse_domain
 from stages.predicates.execution import attempt
-from stages.predicates.language.expressions import read, text_of
 from stages.predicates.learning.operators import Transition, learn_operators, lift
 from stages.predicates.learning.ours import OursLearner
-from stages.predicates.learning.phrases import Phrase, goal_phrases, phrase_of
+from stages.predicates.learning.phrases import Phrase, phrase_of
 from stages.predicates.learning.synthesis import Label, Synthesiser
 from stages.predicates.state import Seen, State
 from stages.predicates.tasks import tasks_of
 from stages.predicates.teacher.simulated import SimulatedTeacher
 from stages.predicates.training import train
-from stages.predicates.truth import truth_file
+from stages.predicates.truth import truth_of
 from stages.predicates.world.catalogue import kitchen_file
 
 
@@ -72,7 +73,7 @@ def test_many_labels_outweigh_a_wrong_one() -> None:
 
 
 def test_every_sentence_of_the_teacher_is_read_back_as_she_meant_it() -> None:
-    for name, meant in truth_file().predicates.items():
+    for name, meant in truth_of("store_objects").file.predicates.items():
         for sentence in (*meant.lacks, *meant.unmet):
             said = sentence.replace("<1>", "can").replace("<2>", "shelf")
             phrase, objects = phrase_of(said, TABLE.objects)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from schemas.errors import BadInput
+from stages.kit.predicates.evaluating import Evaluator
+from stages.kit.predicates.expressions import Predicate, check, read, text_of
 from stages.predicates.execution import oracle
-from stages.predicates.language.evaluating import Evaluator
-from stages.predicates.language.expressions import Predicate, check, read, text_of
 from stages.predicates.language.saying import say
-from stages.predicates.state import Seen, State
+from stages.predicates.state import KITCHEN_WORDS, Seen, State
 from stages.predicates.tasks import SETS, open_kitchen, tasks_of, true_atoms
 from stages.predicates.truth import true_domain, true_predicates
 from stages.predicates.world.actions import act
@@ -109,7 +109,7 @@ def test_the_teachers_words_are_checked_and_said() -> None:
 )
 def test_what_is_no_predicate_is_refused_in_one_line(text: str, message: str) -> None:
     with pytest.raises(BadInput, match=message):
-        check({"p": Predicate("p", 1, read(text, "predicate p"))})
+        check({"p": Predicate("p", 1, read(text, "predicate p"))}, KITCHEN_WORDS)
 
 
 def test_dividing_by_zero_and_endless_quantifiers_end_in_one_line() -> None:
@@ -119,7 +119,7 @@ def test_dividing_by_zero_and_endless_quantifiers_end_in_one_line() -> None:
         "p": Predicate("p", 1, read("(less (over 1 (minus (width ?a) 1)) 2)", "p")),
         "q": Predicate("q", 0, read(nested, "q")),
     }
-    check(found)
+    check(found, KITCHEN_WORDS)
     with pytest.raises(BadInput, match="divides by zero"):
         Evaluator(state, found).holds(("p", "o0"))
     with pytest.raises(BadInput, match="steps"):

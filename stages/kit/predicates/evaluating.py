@@ -6,20 +6,18 @@ from collections.abc import Mapping
 from itertools import permutations
 
 from schemas.errors import BadInput
+from stages.kit.predicates.expressions import Predicate, Tree
+from stages.kit.predicates.vocabulary import Perceived
 from stages.kit.tasks.strips import Atom
-from stages.predicates.language.expressions import Predicate, Tree
-from stages.predicates.state import FINGER_HEIGHT, LARGEST_OPENING, TABLE_HEIGHT, TABLE_LEFT, TABLE_RIGHT, State
 
 LIMIT = 200_000
 """Steps of the evaluation of one atom, those of the predicates that it names included."""
-TOLERANCE = 0.2
-"""What `near` allows; it is that of the example which every learner is given."""
 
 
 class Evaluator:
     """Truth of atoms in one state; what was evaluated is remembered."""
 
-    def __init__(self, state: State, predicates: Mapping[str, Predicate]) -> None:
+    def __init__(self, state: Perceived, predicates: Mapping[str, Predicate]) -> None:
         self.state, self.predicates = state, predicates
         self._known: dict[Atom, bool] = {}
         self._steps = 0
@@ -40,7 +38,7 @@ class Evaluator:
         found = [
             (name, *objects)
             for name, count in wanted.items()
-            for objects in permutations(self.state.objects, count)
+            for objects in permutations(self.state.names, count)
             if self.holds((name, *objects))
         ]
         return frozenset(found)
@@ -66,7 +64,7 @@ class Evaluator:
             return not self._truth(tree[1], binding)  # type: ignore[arg-type]
         if head in ("some", "every"):
             variable, body = str(tree[1]), tree[2]
-            others = [name for name in self.state.objects if name not in binding.values()]
+            others = [name for name in self.state.names if name not in binding.values()]
             values = (self._truth(body, {**binding, variable: name}) for name in others)  # type: ignore[arg-type]
             return any(values) if head == "some" else all(values)
         if head == "is":
@@ -75,12 +73,13 @@ class Evaluator:
             one, two = self._number(tree[1], binding), self._number(tree[2], binding)
             if head == "less":
                 return one < two
-            return one <= two if head == "at_most" else abs(one - two) < TOLERANCE
-        return self._atom((str(head), *(binding[str(part)] for part in tree[1:])))
+            return one <= two if head == "at_most" else abs(one - two) < self.state.tolerance
+        names = tuple(binding[str(part)] for part in tree[1:])
+        return self._atom((str(head), *names)) if head in self.predicates else self.state.related(str(head), names)
 
     def _word(self, tree: Tree | str | float, binding: dict[str, str]) -> str:
         if isinstance(tree, tuple):
-            return self.state.objects[binding[str(tree[1])]].category
+            return self.state.category(binding[str(tree[1])])
         return str(tree)
 
     def _number(self, tree: Tree | str | float, binding: dict[str, str]) -> float:
@@ -90,9 +89,9 @@ class Evaluator:
         assert isinstance(tree, tuple)
         head = str(tree[0])
         if len(tree) == 2 and head != "abs":
-            return of_object(self.state, binding[str(tree[1])], head)
+            return self.state.number(binding[str(tree[1])], head)
         if len(tree) == 1:
-            return of_scene(self.state, head)
+            return self.state.of_scene(head)
         numbers = [self._number(part, binding) for part in tree[1:]]
         if head == "abs":
             return abs(numbers[0])
@@ -106,36 +105,3 @@ class Evaluator:
         if two == 0.0:
             raise BadInput("a predicate divides by zero", hint="docs/INTERPRET.md has the language of predicates")
         return one / two
-
-
-def of_object(state: State, name: str, call: str) -> float:
-    """Return what a perception call says of an object."""
-    seen = state.objects[name]
-    if call == "left":
-        return seen.x - seen.width / 2
-    if call == "right":
-        return seen.x + seen.width / 2
-    if call == "bottom":
-        return seen.y
-    if call == "top":
-        return seen.y + seen.height
-    return float(getattr(seen, call))
-
-
-def of_scene(state: State, call: str) -> float:
-    """Return what a perception call says of the table or the gripper."""
-    half = state.opening / 2
-    return {
-        "table_height": TABLE_HEIGHT,
-        "table_left": TABLE_LEFT,
-        "table_right": TABLE_RIGHT,
-        "gripper_x": state.gripper_x,
-        "gripper_left": state.gripper_x - half,
-        "gripper_right": state.gripper_x + half,
-        "gripper_bottom": state.gripper_y,
-        "gripper_top": state.gripper_y + FINGER_HEIGHT,
-        "gripper_height": FINGER_HEIGHT,
-        "gripper_mass": state.mass,
-        "gripper_opening": state.opening,
-        "largest_opening": LARGEST_OPENING,
-    }[call]

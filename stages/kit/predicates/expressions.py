@@ -13,30 +13,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from schemas.errors import BadInput
+from stages.kit.predicates.vocabulary import Vocabulary
 from stages.kit.tasks.pddl_expressions import Expression as Listed
 from stages.kit.tasks.pddl_expressions import parse_expression
 
 Tree = tuple["Tree | str | float", ...]
-OF_OBJECT = ("x", "y", "left", "right", "bottom", "top", "width", "height", "water")
-OF_SCENE = (
-    "table_height",
-    "table_left",
-    "table_right",
-    "gripper_x",
-    "gripper_left",
-    "gripper_right",
-    "gripper_bottom",
-    "gripper_top",
-    "gripper_height",
-    "gripper_mass",
-    "gripper_opening",
-    "largest_opening",
-)
 ARITHMETIC = {"plus": 2, "minus": 2, "times": 2, "over": 2, "abs": 1}
 COMPARISONS = ("less", "at_most", "near")
 CONNECTIVES = ("and", "or")
 QUANTIFIERS = ("some", "every")
-WORDS = {*OF_OBJECT, *OF_SCENE, *ARITHMETIC, *COMPARISONS, *CONNECTIVES, *QUANTIFIERS, "not", "is", "category"}
+WORDS = {*ARITHMETIC, *COMPARISONS, *CONNECTIVES, *QUANTIFIERS, "not", "is", "category"}
+"""Of every vocabulary."""
 DEEPEST = 24
 LARGEST = 400
 """Words of one expression."""
@@ -103,16 +90,18 @@ def _tree(listed: list[Listed], where: str, depth: int) -> Tree:
     return tuple(parts)
 
 
-def check(predicates: Mapping[str, Predicate]) -> None:
+def check(predicates: Mapping[str, Predicate], vocabulary: Vocabulary) -> None:
     """Raise BadInput for an expression of wrong types, with free variables or unknown names, and for predicates that
     are defined by each other."""
+    words = _words_of(vocabulary)
+    words |= {name: (["object"] * each.arguments, "truth") for name, each in predicates.items() if name not in words}
     for predicate in predicates.values():
         where = f"predicate {predicate.name}"
-        if predicate.name in WORDS:
+        if predicate.name in WORDS | {*vocabulary.of_object, *vocabulary.of_scene, *vocabulary.relations}:
             raise refuse(where, "the name is a word of the language")
         if _words(predicate.means) > LARGEST:
             raise refuse(where, f"more than {LARGEST} words")
-        kind = _type_of(predicate.means, frozenset(predicate.variables), predicates, where)
+        kind = _type_of(predicate.means, frozenset(predicate.variables), words, where)
         if kind != "truth":
             raise refuse(where, f"is a {kind}, a truth is wanted")
     _check_circles(predicates)
@@ -153,7 +142,21 @@ def _words(tree: Tree) -> int:
     return sum(_words(part) if isinstance(part, tuple) else 1 for part in tree)
 
 
-def _type_of(tree: Tree | str | float, bound: frozenset[str], predicates: Mapping[str, Predicate], where: str) -> str:
+Words = dict[str, tuple[list[str], str]]
+"""Word -> types of what it takes, type of what it gives."""
+
+
+def _words_of(vocabulary: Vocabulary) -> Words:
+    words: Words = {name: (["object"], "number") for name in vocabulary.of_object}
+    words |= {name: ([], "number") for name in vocabulary.of_scene}
+    words |= {name: (["object"] * count, "truth") for name, count in vocabulary.relations.items()}
+    words |= {name: (["number"] * count, "number") for name, count in ARITHMETIC.items()}
+    words |= {name: (["number"] * 2, "truth") for name in COMPARISONS}
+    words |= {"not": (["truth"], "truth"), "category": (["object"], "word"), "is": (["word", "word"], "truth")}
+    return words
+
+
+def _type_of(tree: Tree | str | float, bound: frozenset[str], words: Words, where: str) -> str:
     """Return `number`, `truth`, `object` or `word`."""
     if isinstance(tree, float):
         return "number"
@@ -171,33 +174,16 @@ def _type_of(tree: Tree | str | float, bound: frozenset[str], predicates: Mappin
             raise refuse(where, f"`{head}` takes a variable and a truth")
         if parts[0] in bound:
             raise refuse(where, f"{parts[0]} is bound twice")
-        if _type_of(parts[1], bound | {parts[0]}, predicates, where) != "truth":
+        if _type_of(parts[1], bound | {parts[0]}, words, where) != "truth":
             raise refuse(where, f"`{head}` takes a variable and a truth")
         return "truth"
-    kinds = [_type_of(part, bound, predicates, where) for part in parts]
-    wanted, result = _signature(head, len(parts), predicates, where)
+    kinds = [_type_of(part, bound, words, where) for part in parts]
+    if head in CONNECTIVES:
+        wanted, result = ["truth"] * max(1, len(parts)), "truth"
+    elif head in words:
+        wanted, result = words[head]
+    else:
+        raise refuse(where, f"there is no `{head[:40]}`")
     if kinds != wanted:
         raise refuse(where, f"`{head}` takes {', '.join(wanted) or 'nothing'}, not {', '.join(kinds) or 'nothing'}")
     return result
-
-
-def _signature(head: str, count: int, predicates: Mapping[str, Predicate], where: str) -> tuple[list[str], str]:
-    if head in OF_OBJECT:
-        return ["object"], "number"
-    if head in OF_SCENE:
-        return [], "number"
-    if head in ARITHMETIC:
-        return ["number"] * ARITHMETIC[head], "number"
-    if head in COMPARISONS:
-        return ["number"] * 2, "truth"
-    if head in CONNECTIVES:
-        return ["truth"] * max(1, count), "truth"
-    if head == "not":
-        return ["truth"], "truth"
-    if head == "category":
-        return ["object"], "word"
-    if head == "is":
-        return ["word", "word"], "truth"
-    if head in predicates:
-        return ["object"] * predicates[head].arguments, "truth"
-    raise refuse(where, f"there is no `{head[:40]}`")

@@ -1,0 +1,1 @@
+"""Predicates as data: checked expressions over what is perceived, and their evaluation."""

@@ -1,0 +1,37 @@
+"""What the thesis's learner keeps: each predicate with its negation, operators by its own search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from stages.kit.predicates.expressions import Predicate
+from stages.kit.tasks.strips import Domain
+from stages.predicates.learning.memory import Memory
+from stages.predicates.learning.thesis_operators import search_operators
+
+THESIS = "thesis"
+"""How the label of this learner begins."""
+
+
+@dataclass
+class ThesisMemory(Memory):
+    """A memory whose predicates have negations, and whose operators are searched for."""
+
+    def predicates(self) -> dict[str, Predicate]:
+        """Return what was learned, each with its negation."""
+        found = super().predicates()
+        for name in self.names().values():
+            each = found[name]
+            found[f"no-{name}"] = Predicate(f"no-{name}", each.arguments, ("not", (name, *each.variables)))
+        return found
+
+    def used(self) -> dict[str, int]:
+        """Return the predicates that plans are made with."""
+        plain = super().used()
+        learned = {self.names()[phrase] for phrase in self.meanings}
+        return plain | {f"no-{name}": count for name, count in plain.items() if name in learned}
+
+    def domain(self, name: str) -> Domain:
+        """Return the operators, searched for from scratch."""
+        atoms = [self.see(state) for state in self.states]
+        return search_operators(name, self.used(), self.transitions, atoms, self.preconditions())
