@@ -40,6 +40,8 @@ class Anchor(Model):
     """Around all of its surface, in the world frame."""
     point: Point
     """On its surface, far from whatever else is there [m]."""
+    surface: tuple[Point, ...] = Field(default=(), max_length=64)
+    """Points spread over its surface [m]; none where the box has to do: in a graph, and in what people write."""
 
 
 class Edit(Model):

@@ -42,6 +42,9 @@ class GraphState:
             if node.box is not None
         ]
 
+    def called(self, points: np.ndarray, reach: float) -> None:
+        """A graph knows no surface."""
+
     def replace_node(self, node: GraphNode) -> None:
         """Put a node into the place of the one with its id."""
         nodes = tuple(node if other.id == node.id else other for other in self.graph.nodes)
@@ -57,8 +60,7 @@ def apply_graph_edits(state: GraphState, edits: Iterable[AnyEdit], fitting: Fitt
 
 def support(state: GraphState, edit: Support, fitting: Fitting) -> Done:
     """Hang the thing where the person says, on the plane of what carries it that fits it best."""
-    things = state.things()
-    place = find(edit.of, things, fitting).instance
+    place = find(edit.of, state, fitting).instance
     child = state.graph.nodes[place]
     if child.node_type == "layout":
         raise Conflict(f"{child.id} is part of the building: nothing carries it")
@@ -67,7 +69,7 @@ def support(state: GraphState, edit: Support, fitting: Fitting) -> Done:
         link = Relation(source=SCENE_NODE, target=child.id, relation="supports", confidence=1.0)
         parent = None
     else:
-        parent = state.graph.nodes[find(edit.on, things, fitting).instance]
+        parent = state.graph.nodes[find(edit.on, state, fitting).instance]
         if parent.id in _and_below(state.graph, child.id):
             raise Conflict(f"{parent.id} is {child.id}, or stands on it: it cannot carry it")
         link = Relation(source=parent.id, target=child.id, relation=edit.relation, confidence=1.0)
@@ -80,7 +82,7 @@ def support(state: GraphState, edit: Support, fitting: Fitting) -> Done:
 
 def mark(state: GraphState, edit: Mark, fitting: Fitting) -> Done:
     """Say whether the thing is free to move."""
-    place = find(edit.of, state.things(), fitting).instance
+    place = find(edit.of, state, fitting).instance
     node = state.graph.nodes[place]
     if edit.as_ == "movable":
         if node.node_type == "layout":

@@ -27,6 +27,19 @@ class EditMapParameters(Parameters):
     reach: float = Field(
         0.06, gt=0, le=1, description="... and when its surface comes this near to the edit's point [m]"
     )
+    minimum_share: float = Field(
+        0.5,
+        gt=0,
+        le=1,
+        description="Where the edit says points of the surface: the thing has this share of those that are of any, "
+        "and --minimum-part of all",
+    )
+    minimum_inside: float = Field(
+        0.5, gt=0, le=1, description="... and this share of the thing lies in the edit's box, grown by --margin"
+    )
+    rival_share: float = Field(
+        0.5, gt=0, le=1, description="... and no other thing has more than this share of what it has"
+    )
     clear_share: float = Field(
         0.7, gt=0, le=1, description="A second thing that fits by this share of the best fit makes the edit a conflict"
     )
@@ -34,7 +47,7 @@ class EditMapParameters(Parameters):
 
 MAP = Stage(
     name="edit map",
-    version=2,
+    version=3,
     summary="Apply edits (edits.toml) to a panoptic map; what no longer fits is a conflict, and not applied",
     parameters=EditMapParameters,
     reads={"panoptic_map": PanopticMap, "edits": External("edits.toml, as `edit rename` and the like write it")},
