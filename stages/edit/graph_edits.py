@@ -70,7 +70,7 @@ def support(state: GraphState, edit: Support, fitting: Fitting) -> Done:
         parent = None
     else:
         parent = state.graph.nodes[find(edit.on, state, fitting).instance]
-        if parent.id in _and_below(state.graph, child.id):
+        if parent.id in and_below(state.graph, child.id):
             raise Conflict(f"{parent.id} is {child.id}, or stands on it: it cannot carry it")
         link = Relation(source=parent.id, target=child.id, relation=edit.relation, confidence=1.0)
     if before is not None and (before.source, before.relation) == (link.source, link.relation):
@@ -100,7 +100,7 @@ def _said(link: Relation) -> str:
     return "nothing carries it" if link.source == SCENE_NODE else f"{link.source} {link.relation} it"
 
 
-def _and_below(graph: ContactGraphFile, name: str) -> set[str]:
+def and_below(graph: ContactGraphFile, name: str) -> set[str]:
     """Return a node and all that it carries, directly or not."""
     found, open_nodes = {name}, [name]
     while open_nodes:
@@ -137,7 +137,7 @@ def _placed(
     if parent is None or link.relation not in STANDS:
         child = child.model_copy(update={"box": box})
         return child, link if parent is None else _hanging(link, box, parent)
-    best = _carrying(box, parent)
+    best = carrying(box, parent)
     if best is None:
         return child.model_copy(update={"box": box}), link
     plane, gap, share = best
@@ -150,9 +150,9 @@ def _placed(
     return child, link.model_copy(update=measured)
 
 
-def _carrying(box: Box, parent: GraphNode) -> tuple[int, float, float] | None:
+def carrying(box: Box, parent: GraphNode, *, seen: bool = False) -> tuple[int, float, float] | None:
     """Return index, gap [m] and overlap of the parent's plane that speaks most for carrying a box (equations 2.1 to
-    2.3); the index after the last for one that nobody saw; None when no surface of the parent lies below it."""
+    2.3); the index after the last for one that nobody saw, unless `seen`; None when no surface of it lies below."""
     ground, ranked = footprint(box), []
     area = max(polygon_area(ground), 1e-12)
     for k, plane in enumerate(parent.planes):
@@ -163,7 +163,7 @@ def _carrying(box: Box, parent: GraphNode) -> tuple[int, float, float] | None:
             gap = bottom(box) - plane_height(plane, np.asarray(box.center[:2]))
             if share > 0:
                 ranked.append(((1.0 - min(1.0, abs(gap))) * share, k, gap, share))
-    if parent.box is not None:
+    if parent.box is not None and not seen:
         share = min(1.0, polygon_area(clip_polygon(footprint(parent.box), ground)) / area)
         if share > 0 and bottom(parent.box) - ORDER_TOLERANCE <= bottom(box) <= top(parent.box) + ORDER_TOLERANCE:
             ranked.append((HIDDEN_WORTH * share, len(parent.planes), 0.0, share))
@@ -171,6 +171,21 @@ def _carrying(box: Box, parent: GraphNode) -> tuple[int, float, float] | None:
         return None
     _, k, gap, share = max(ranked, key=lambda entry: (entry[0], -entry[1]))
     return k, gap, share
+
+
+def relink(state: GraphState, name: str) -> None:
+    """Measure anew what carries a node that was moved, and what it carries: the nearest planes, gaps, overlaps."""
+    node, links = state.graph.node(name), []
+    for link in state.graph.links:
+        if link.relation in (*STANDS, "also_supports") and name in (link.source, link.target):
+            parent, child = state.graph.node(link.source), state.graph.node(link.target)
+            best = None if child.box is None or parent.id == SCENE_NODE else carrying(child.box, parent, seen=True)
+            plane, gap, share = best or (None, None, None)
+            link = link.model_copy(update={"plane": plane, "gap": gap, "overlap": share})
+        elif name == link.source and (link.plane or 0) >= len(node.planes):
+            link = link.model_copy(update={"plane": None})
+        links.append(link)
+    state.graph = state.graph.model_copy(update={"links": tuple(links)})
 
 
 def _hanging(link: Relation, box: Box, parent: GraphNode) -> Relation:

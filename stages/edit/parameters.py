@@ -1,12 +1,14 @@
-"""Declarations of `scenewright edit map` and `edit graph`."""
+"""Declarations of `scenewright edit map`, `edit graph` and `edit scene`."""
 
 from __future__ import annotations
 
 from pydantic import Field
 
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import CadScene
 from schemas.contact_graph import ContactGraph
 from schemas.panoptic_map import PanopticMap
-from stages.kit.stage import External, Parameters, Stage
+from stages.kit.stage import External, Optionally, Parameters, Stage
 
 
 class EditMapParameters(Parameters):
@@ -71,4 +73,22 @@ GRAPH = Stage(
     "--out outputs/demo/edited_graph",
 )
 
-STAGES = (MAP, GRAPH)
+SCENE = Stage(
+    name="edit scene",
+    version=1,
+    summary="Apply edits (edits.toml) to a CAD scene: another model or none, another place, joints",
+    parameters=EditMapParameters,
+    reads={
+        "cad_scene": CadScene,
+        "edits": External("edits.toml, as `edit model` and the like write it"),
+        "library": Optionally(CadLibrary),
+        "panoptic_map": Optionally(PanopticMap),
+    },
+    writes=CadScene,
+    libraries=("numpy", "scipy", "trimesh"),
+    module="scene_stage",
+    example="scenewright edit scene --cad-scene outputs/demo/cad_scene --edits edits.toml "
+    "--out outputs/demo/edited_scene",
+)
+
+STAGES = (MAP, GRAPH, SCENE)
