@@ -93,7 +93,12 @@ def add(
     return append(file, by, note, what="add", box=box, surface=surface, **{"class": class_name})
 
 
-APPLIED_BY = {"support": "graph --contact-graph", "mark": "graph --contact-graph"}
+GRAPH, SCENE = "graph --contact-graph", "scene --cad-scene"
+APPLIED_BY = {
+    "support": GRAPH,
+    "mark": "graph|scene",
+    **dict.fromkeys(("model", "move", "joint", "no_joint", "new_joint"), SCENE),
+}
 """What applies an edit that is none of a map, and to what."""
 COMMANDS = (rename, delete, merge, split, add)
 

@@ -6,9 +6,10 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from schemas.artifact import Artifact, Document
+from schemas.artifact import Artifact, Document, OptionalDocument
 from schemas.base import Model, Name, Transform
 from schemas.contact_graph import ContactGraphFile
+from schemas.edits import AppliedEditsFile
 
 
 class CadCandidate(Model):
@@ -87,9 +88,10 @@ class CadScene(Artifact):
     """`scene.json`, `graph.json` (cg': the contact graph with model, pose, scale, joints per node, boxes and
     planes of the CAD models), `models/<id>/` (copies of the chosen library models), `meshes/<node>.ply` (nodes
     that keep their mesh), `layout/<node>.ply`, `meshes/surroundings.ply` (what the map shows and
-    has no name; absent when there is nothing)."""
+    has no name; absent when there is nothing), `edits.json` (what became of each edit, where people put it right)."""
 
     kind: ClassVar[str] = "cad_scene"
     description: ClassVar[str] = "CAD replacement: model, pose, scale, errors and alternatives per node"
     info = Document(CadSceneFile, "scene.json")
     graph = Document(ContactGraphFile, "graph.json")
+    edits = OptionalDocument(AppliedEditsFile, "edits.json")

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from schemas.base import Model
+from schemas.base import Model, Name
 from schemas.hand_written import Point, UprightBox
 from schemas.vocabulary import load_vocabulary
 
@@ -40,6 +40,8 @@ class Anchor(Model):
     """Around all of its surface, in the world frame."""
     point: Point
     """On its surface, far from whatever else is there [m]."""
+    surface: tuple[Point, ...] = Field(default=(), max_length=64)
+    """Points spread over its surface [m]; none where the box has to do: in a graph, and in what people write."""
 
 
 class Edit(Model):
@@ -113,9 +115,88 @@ class Mark(Edit):
     as_: Literal["fixed", "movable"] = Field(alias="as")
 
 
+class ChooseModel(Edit):
+    """Which CAD model stands for the thing."""
+
+    what: Literal["model"]
+    of: Anchor
+    model: Name | None = None
+    """Of the scene or the library; None: none, its own mesh does."""
+
+
+class Move(Edit):
+    """Where the thing stands, and how it is turned."""
+
+    what: Literal["move"]
+    of: Anchor
+    to: Point
+    """The middle of its box [m]."""
+    heading_degrees: float | None = Field(default=None, ge=-360, le=360)
+    """Of the x axis of its `model` about the vertical; None: as it is."""
+    model: Name | None = None
+    """What the heading is of: other models look another way."""
+    turn_degrees: float = Field(default=0.0, ge=-360, le=360)
+    """Of a thing with a mesh of its own: how far it is turned about the middle of its box."""
+    carried: bool = False
+    """Whether what it carries goes with it."""
+
+
+class JointAnchor(Model):
+    """Which joint of a thing is meant, by what it moves."""
+
+    type: Literal["revolute", "prismatic"]
+    axis: Point
+    """Direction in the world; opening goes by it."""
+    middle: Point
+    """Of the box of the part that it moves, closed, in the world [m]."""
+
+
+class SetJoint(Edit):
+    """The thing's model is right in that this moves."""
+
+    what: Literal["joint"]
+    of: Anchor
+    at: JointAnchor
+    lower: float | None = Field(default=None, ge=-100, le=100)
+    upper: float | None = Field(default=None, ge=-100, le=100)
+    """Another range [rad, m]."""
+    value: float | None = Field(default=None, ge=-100, le=100)
+    """Where it stands."""
+
+
+class RemoveJoint(Edit):
+    """This does not move."""
+
+    what: Literal["no_joint"]
+    of: Anchor
+    at: JointAnchor
+
+
+class AddJoint(Edit):
+    """What of the thing lies in the box moves, which its model or mesh does not say."""
+
+    what: Literal["new_joint"]
+    of: Anchor
+    part: UprightBox
+    type: Literal["revolute", "prismatic"]
+    axis: Point
+    """Direction in the world; opening goes by it (right-handed)."""
+    origin: Point
+    """On the axis, in the world [m]."""
+    lower: float = Field(default=0.0, ge=-100, le=100)
+    upper: float = Field(ge=-100, le=100)
+    """[rad, m]"""
+    handle: Point | None = None
+    """Where a hand takes hold of the part, closed, in the world [m]."""
+
+
 MapEdit = Annotated[Rename | Delete | Merge | Split | Add, Field(discriminator="what")]
 GraphEdit = Annotated[Support | Mark, Field(discriminator="what")]
-AnyEdit = Annotated[Rename | Delete | Merge | Split | Add | Support | Mark, Field(discriminator="what")]
+SceneEdit = Annotated[ChooseModel | Move | SetJoint | RemoveJoint | AddJoint | Mark, Field(discriminator="what")]
+AnyEdit = Annotated[
+    Rename | Delete | Merge | Split | Add | Support | Mark | ChooseModel | Move | SetJoint | RemoveJoint | AddJoint,
+    Field(discriminator="what"),
+]
 """What a line of edits.toml may say. Each step applies the kinds that are its own and leaves the others."""
 
 

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from schemas.base import as_vector
 from schemas.contact_graph import GraphNode
 from schemas.scene_parts import Box, SurfacePlane
 from stages.cad.alignment import Alignment
@@ -14,9 +13,9 @@ from stages.cad.matching import CUBE_ROTATIONS, Match
 from stages.cad.model_surfaces import ModelSurface, to_world
 from stages.cad.shapes import Placement
 from stages.kit.geometry.boxes import box_corners, clip_polygon, footprint, gravity_aligned_box, polygon_area
+from stages.kit.geometry.planes import UPWARD, moved_planes
 from stages.kit.geometry.transforms import transform_from_yaw
 
-UPWARD = 0.9
 COVER_SHARE = 0.1
 """A surface above a child limits its height when it covers this share of the child's footprint."""
 WALL_NEAR = 0.15
@@ -58,22 +57,7 @@ def placed_box(placement: Placement, surface: ModelSurface) -> Box:
 
 def placed_planes(placement: Placement) -> tuple[SurfacePlane, ...]:
     """Return the model's surface planes in the world."""
-    planes = []
-    for plane in placement.shape.surfaces:
-        normal = placement.rotation @ np.asarray(plane.normal)
-        offset = placement.scale * plane.offset - float(normal @ placement.translation)
-        points = to_world(placement, np.array([plane.center, *plane.corners]))
-        planes.append(
-            SurfacePlane(
-                normal=as_vector(normal),
-                offset=offset,
-                area=plane.area * placement.scale**2,
-                center=as_vector(points[0]),
-                corners=tuple(as_vector(corner) for corner in points[1:]),
-                horizontal=plane.horizontal if is_upright(placement) else bool(normal[2] >= UPWARD),
-            )
-        )
-    return tuple(planes)
+    return moved_planes(placement.shape.surfaces, placement.rotation, placement.translation, placement.scale)
 
 
 def size_misfit(frame_size: np.ndarray, placement: Placement) -> float:

@@ -1,16 +1,20 @@
 """Which thing of a map an anchor means, and the anchor of a thing.
 
-A thing fits when it is of the class, or of none that the masks knew; when its surface passes the anchor's point; and
-when its box is much the same (intersection over union of the two boxes, grown so that flat things have a volume), or
-lies within the anchor's as the only one of its class: less was seen of it. Where nothing fits, or two things fit nearly
-alike, the answer is a conflict in words: a wrong guess would be applied in silence, a conflict is seen.
+Where the anchor says points of the surface and the map what each place of its own is called, a thing fits when it is of
+the class, or of none that the masks knew; when most of those points that are called anything are called it; and when
+most of it lies in the anchor's box. Else (people write boxes, graphs hold no surface) it fits when its surface passes
+the anchor's point, and when its box is much the same (intersection over union of the two boxes, grown so that flat
+things have a volume), or lies within the anchor's as the only one of its class: less was seen of it. Where nothing
+fits, or two things fit nearly alike, the answer is a conflict in words: a wrong guess would be applied in silence, a
+conflict is seen.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -39,6 +43,8 @@ AROUND = 0.05
 """Surface this near to a point is around it [m]."""
 MOST_TRIED = 5000
 """Vertices of a thing that may be an anchor's point."""
+SPREAD = 16
+"""Points that stand for the surface of a thing."""
 MOSTLY_WITHIN = 0.8
 """A box lies in another one by this share of its volume."""
 
@@ -58,6 +64,9 @@ class Fitting:
     reach: float
     """[m]"""
     clear_share: float
+    minimum_share: float
+    minimum_inside: float
+    rival_share: float
 
     def overlap(self, a: Box, b: Box) -> float:
         """Return the intersection over union, 0 to 1, of two upright boxes grown by the margin."""
@@ -72,9 +81,29 @@ class Fitting:
         return gravity_aligned_box(box.center, np.asarray(box.size) + 2 * self.margin, box_yaw(box))
 
 
-def find(anchor: Anchor, things: Sequence[Thing], fitting: Fitting, also: Sequence[str] = ()) -> Thing:
+class Where(Protocol):
+    """What holds things, and may know what the surface at a place is called."""
+
+    def things(self) -> list[Thing]: ...
+
+    def called(self, points: np.ndarray, reach: float) -> np.ndarray | None: ...
+
+
+def shares(anchor: Anchor, where: Where, fitting: Fitting) -> dict[int, float]:
+    """Return instance -> share, 0 to 1, of the anchor's surface that is called so; empty when neither knows any."""
+    labels = where.called(np.array(anchor.surface), fitting.reach) if anchor.surface else None
+    if labels is None:
+        return {}
+    numbers, counts = np.unique(labels, return_counts=True)
+    return {int(k): float(count) / len(labels) for k, count in zip(numbers, counts, strict=True)}
+
+
+def find(anchor: Anchor, where: Where, fitting: Fitting, also: Sequence[str] = ()) -> Thing:
     """Return the one thing that fits an anchor, of its class or one of `also`. Raises Conflict."""
-    box, classes = upright_box(anchor.box), (anchor.class_name, *also, NAMELESS)
+    box, classes, things = upright_box(anchor.box), (anchor.class_name, *also, NAMELESS), where.things()
+    found = shares(anchor, where, fitting)
+    if found:
+        return _by_surface(anchor, things, found, fitting, classes)
     there = sorted(
         ((fitting.overlap(box, thing.box), thing) for thing in things if passes(thing, anchor, fitting)),
         key=lambda pair: (-pair[0], pair[1].instance),
@@ -90,6 +119,36 @@ def find(anchor: Anchor, things: Sequence[Thing], fitting: Fitting, also: Sequen
         both = ", ".join(f"{thing.name} ({overlap:.2f})" for overlap, thing in good[:2])
         raise Conflict(f"{_place(anchor)} more than one thing fits: {both}")
     return named[0][1]
+
+
+def _by_surface(
+    anchor: Anchor, things: Sequence[Thing], found: Mapping[int, float], fitting: Fitting, classes: Sequence[str]
+) -> Thing:
+    """Return the thing that most of the anchor's surface is called, if most of the thing lies in the anchor's box, and
+    none of its class has a like share. Raises Conflict."""
+    named = sum(found.get(thing.instance, 0.0) for thing in things)
+    there = sorted(
+        ((found[thing.instance], thing) for thing in things if thing.instance in found),
+        key=lambda pair: (-pair[0], pair[1].instance),
+    )
+    if not there:
+        raise Conflict(f"{_place(anchor)} lies no thing")
+    share, best = there[0]
+    if share < fitting.minimum_part or share < fitting.minimum_share * named:
+        raise Conflict(f"{_place(anchor)} {best.name} has {100 * share:.0f} % of its surface, and nothing has more")
+    if not _may_be(best, anchor, classes):
+        raise Conflict(f"{_place(anchor)} lies {best.name}, which is no {anchor.class_name}")
+    assert best.surface is not None  # of a map
+    box = upright_box(anchor.box)
+    inside = float(points_in_box(box, np.asarray(best.surface.data), fitting.margin).mean())
+    if inside < fitting.minimum_inside:
+        raise Conflict(f"{_place(anchor)} lies {best.name}, of which {100 * inside:.0f} % is where it was")
+    alike = max(fitting.minimum_overlap, fitting.clear_share * fitting.overlap(box, best.box))
+    for thing in things:
+        same = found.get(thing.instance, 0.0) >= fitting.rival_share * share
+        if thing.instance != best.instance and (same or fitting.overlap(box, thing.box) >= alike):
+            raise Conflict(f"{_place(anchor)} more than one thing fits: {best.name}, {thing.name}")
+    return best
 
 
 def _may_be(thing: Thing, anchor: Anchor, classes: Sequence[str]) -> bool:
@@ -144,8 +203,24 @@ def anchor_of(state: MapState, instance: int) -> Anchor:
     others = others[points_in_box(thing.box, others, AROUND)]
     if len(others):
         near = near - cKDTree(others).query_ball_point(tried, AROUND, return_length=True)
-    x, y, z = (round(float(value), MILLIMETRES) for value in tried[int(np.argmax(near))])
-    return Anchor.model_validate({"class": thing.class_name, "box": written_box(thing.box), "point": (x, y, z)})
+    spread = [tried[int(np.argmax(near))], *tried[_spread(tried, near)]]
+    point, *surface = (tuple(round(float(value), MILLIMETRES) for value in place) for place in spread)
+    said = {"class": thing.class_name, "box": written_box(thing.box), "point": point, "surface": tuple(surface)}
+    return Anchor.model_validate(said)
+
+
+def _spread(points: np.ndarray, worth: np.ndarray) -> list[int]:
+    """Return which of points (N, 3) stand for all of them: the worthiest of each of the SPREAD cells around points that
+    lie as far from each other as can be."""
+    far = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    distance, cell = np.full(len(points), np.inf), np.zeros(len(points), int)
+    for number in range(min(SPREAD, len(points))):
+        start = int(np.argmax(far if number == 0 else distance))
+        nearer = np.linalg.norm(points - points[start], axis=1)
+        cell = np.where(nearer < distance, number, cell)
+        distance = np.minimum(distance, nearer)
+    cells = [np.flatnonzero(cell == number) for number in np.unique(cell)]
+    return [int(rows[np.argmax(worth[rows])]) for rows in cells]
 
 
 def anchor_of_node(node: Thing) -> Anchor:
@@ -162,9 +237,15 @@ def written_box(box: Box) -> UprightBox:
 
 
 def joint_anchor(anchors: Sequence[Anchor]) -> Anchor:
-    """Return the anchor of what the things of several anchors are together; its point is that of the first."""
+    """Return the anchor of what the things of several anchors are together; its point is that of the first, its surface
+    that of all."""
     corners = np.concatenate([box_corners(upright_box(anchor.box)) for anchor in anchors])
     first = anchors[0]
     return Anchor.model_validate(
-        {"class": first.class_name, "box": written_box(minimum_box(corners)), "point": first.point}
+        {
+            "class": first.class_name,
+            "box": written_box(minimum_box(corners)),
+            "point": first.point,
+            "surface": tuple(point for anchor in anchors for point in anchor.surface)[:64],
+        }
     )

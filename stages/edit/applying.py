@@ -15,7 +15,7 @@ import numpy as np
 from schemas.edits import Add, Anchor, AnyEdit, AppliedEdit, Delete, Edit, Merge, Rename, Split
 from schemas.hand_written import UprightBox
 from schemas.scene_parts import Box
-from stages.edit.anchoring import Conflict, Fitting, find, joint_anchor, passes
+from stages.edit.anchoring import Conflict, Fitting, find, joint_anchor, passes, shares
 from stages.edit.map_state import MapState, Thing
 from stages.kit.geometry.boxes import box_rotation, points_in_box, upright_box
 
@@ -24,6 +24,8 @@ FEWEST_VERTICES = 20
 MOST_STEPS = 200
 """Along an edge of a box that is drawn into the map."""
 
+MOSTLY_ONE = 0.8
+"""Of the surface of each thing that was merged already, this share is called what they are together."""
 BOX_TOLERANCE = 1e-3
 """Boxes that people wrote are rounded to millimetres [m]."""
 
@@ -73,7 +75,7 @@ def apply_edits(state: MapState, edits: Iterable[AnyEdit], fitting: Fitting) -> 
 
 def rename(state: MapState, edit: Rename, fitting: Fitting) -> Done:
     """Give the thing its class."""
-    thing = find(edit.of, state.things(), fitting, also=(edit.class_name,))
+    thing = find(edit.of, state, fitting, also=(edit.class_name,))
     if thing.class_name == edit.class_name:
         return Done("already", (thing.instance,), f"it is a {edit.class_name}")
     state.rename(thing.instance, edit.class_name)
@@ -82,7 +84,7 @@ def rename(state: MapState, edit: Rename, fitting: Fitting) -> Done:
 
 def delete(state: MapState, edit: Delete, fitting: Fitting) -> Done:
     """Take the name from the thing's surface."""
-    thing = find(edit.of, state.things(), fitting)
+    thing = find(edit.of, state, fitting)
     state.relabel(state.instance == thing.instance, 0)
     state.remove(thing.instance)
     return Done("applied", reason=f"{thing.name} is gone")
@@ -91,15 +93,15 @@ def delete(state: MapState, edit: Delete, fitting: Fitting) -> Done:
 def merge(state: MapState, edit: Merge, fitting: Fitting) -> Done:
     """Give the surface of all of the things to the first one."""
     try:
-        found = [find(anchor, state.things(), fitting) for anchor in edit.of]
+        found = [find(anchor, state, fitting) for anchor in edit.of]
+        if len({thing.instance for thing in found}) != len(found):
+            raise Conflict("two of its things are one and the same here: " + ", ".join(thing.name for thing in found))
     except Conflict:
         one = _merged_already(state, edit.of, fitting)
         if one is None:
             raise
         return Done("already", (one.instance,), "they are one thing")
     instances = [thing.instance for thing in found]
-    if len(set(instances)) != len(instances):
-        raise Conflict("two of its things are one and the same here: " + ", ".join(thing.name for thing in found))
     kept, *others = instances
     parts = [state.entities[instance] for instance in instances]
     state.relabel(np.isin(state.instance, others), kept)
@@ -116,17 +118,26 @@ def merge(state: MapState, edit: Merge, fitting: Fitting) -> Done:
 
 
 def _merged_already(state: MapState, anchors: Sequence[Anchor], fitting: Fitting) -> Thing | None:
-    """Return the thing that is what the things of the anchors are together, or None."""
+    """Return the thing that is what the things of the anchors are together, or None.
+
+    Where the anchors say where their surfaces were, most of each must be called that thing: the box of a large thing
+    and a small one beside it is much that of the large one alone.
+    """
     try:
-        whole = find(joint_anchor(anchors), state.things(), fitting)
+        whole = find(joint_anchor(anchors), state, fitting)
     except Conflict:
         return None
-    return whole if all(passes(whole, anchor, fitting) for anchor in anchors) else None
+    if not all(passes(whole, anchor, fitting) for anchor in anchors):
+        return None
+    for anchor in anchors:
+        if anchor.surface and shares(anchor, state, fitting).get(whole.instance, 0.0) < MOSTLY_ONE:
+            return None
+    return whole
 
 
 def split(state: MapState, edit: Split, fitting: Fitting) -> Done:
     """Make the surface of the thing that lies in the box a thing of its own."""
-    thing = find(edit.of, state.things(), fitting)
+    thing = find(edit.of, state, fitting)
     inside = _inside(state, edit.part) & (state.instance == thing.instance)
     count, whole = int(inside.sum()), int((state.instance == thing.instance).sum())
     if count < FEWEST_VERTICES or whole - count < FEWEST_VERTICES:

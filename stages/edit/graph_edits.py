@@ -42,6 +42,9 @@ class GraphState:
             if node.box is not None
         ]
 
+    def called(self, points: np.ndarray, reach: float) -> None:
+        """A graph knows no surface."""
+
     def replace_node(self, node: GraphNode) -> None:
         """Put a node into the place of the one with its id."""
         nodes = tuple(node if other.id == node.id else other for other in self.graph.nodes)
@@ -57,8 +60,7 @@ def apply_graph_edits(state: GraphState, edits: Iterable[AnyEdit], fitting: Fitt
 
 def support(state: GraphState, edit: Support, fitting: Fitting) -> Done:
     """Hang the thing where the person says, on the plane of what carries it that fits it best."""
-    things = state.things()
-    place = find(edit.of, things, fitting).instance
+    place = find(edit.of, state, fitting).instance
     child = state.graph.nodes[place]
     if child.node_type == "layout":
         raise Conflict(f"{child.id} is part of the building: nothing carries it")
@@ -67,8 +69,8 @@ def support(state: GraphState, edit: Support, fitting: Fitting) -> Done:
         link = Relation(source=SCENE_NODE, target=child.id, relation="supports", confidence=1.0)
         parent = None
     else:
-        parent = state.graph.nodes[find(edit.on, things, fitting).instance]
-        if parent.id in _and_below(state.graph, child.id):
+        parent = state.graph.nodes[find(edit.on, state, fitting).instance]
+        if parent.id in and_below(state.graph, child.id):
             raise Conflict(f"{parent.id} is {child.id}, or stands on it: it cannot carry it")
         link = Relation(source=parent.id, target=child.id, relation=edit.relation, confidence=1.0)
     if before is not None and (before.source, before.relation) == (link.source, link.relation):
@@ -80,7 +82,7 @@ def support(state: GraphState, edit: Support, fitting: Fitting) -> Done:
 
 def mark(state: GraphState, edit: Mark, fitting: Fitting) -> Done:
     """Say whether the thing is free to move."""
-    place = find(edit.of, state.things(), fitting).instance
+    place = find(edit.of, state, fitting).instance
     node = state.graph.nodes[place]
     if edit.as_ == "movable":
         if node.node_type == "layout":
@@ -98,7 +100,7 @@ def _said(link: Relation) -> str:
     return "nothing carries it" if link.source == SCENE_NODE else f"{link.source} {link.relation} it"
 
 
-def _and_below(graph: ContactGraphFile, name: str) -> set[str]:
+def and_below(graph: ContactGraphFile, name: str) -> set[str]:
     """Return a node and all that it carries, directly or not."""
     found, open_nodes = {name}, [name]
     while open_nodes:
@@ -135,7 +137,7 @@ def _placed(
     if parent is None or link.relation not in STANDS:
         child = child.model_copy(update={"box": box})
         return child, link if parent is None else _hanging(link, box, parent)
-    best = _carrying(box, parent)
+    best = carrying(box, parent)
     if best is None:
         return child.model_copy(update={"box": box}), link
     plane, gap, share = best
@@ -148,9 +150,9 @@ def _placed(
     return child, link.model_copy(update=measured)
 
 
-def _carrying(box: Box, parent: GraphNode) -> tuple[int, float, float] | None:
+def carrying(box: Box, parent: GraphNode, *, seen: bool = False) -> tuple[int, float, float] | None:
     """Return index, gap [m] and overlap of the parent's plane that speaks most for carrying a box (equations 2.1 to
-    2.3); the index after the last for one that nobody saw; None when no surface of the parent lies below it."""
+    2.3); the index after the last for one that nobody saw, unless `seen`; None when no surface of it lies below."""
     ground, ranked = footprint(box), []
     area = max(polygon_area(ground), 1e-12)
     for k, plane in enumerate(parent.planes):
@@ -161,7 +163,7 @@ def _carrying(box: Box, parent: GraphNode) -> tuple[int, float, float] | None:
             gap = bottom(box) - plane_height(plane, np.asarray(box.center[:2]))
             if share > 0:
                 ranked.append(((1.0 - min(1.0, abs(gap))) * share, k, gap, share))
-    if parent.box is not None:
+    if parent.box is not None and not seen:
         share = min(1.0, polygon_area(clip_polygon(footprint(parent.box), ground)) / area)
         if share > 0 and bottom(parent.box) - ORDER_TOLERANCE <= bottom(box) <= top(parent.box) + ORDER_TOLERANCE:
             ranked.append((HIDDEN_WORTH * share, len(parent.planes), 0.0, share))
@@ -169,6 +171,21 @@ def _carrying(box: Box, parent: GraphNode) -> tuple[int, float, float] | None:
         return None
     _, k, gap, share = max(ranked, key=lambda entry: (entry[0], -entry[1]))
     return k, gap, share
+
+
+def relink(state: GraphState, name: str) -> None:
+    """Measure anew what carries a node that was moved, and what it carries: the nearest planes, gaps, overlaps."""
+    node, links = state.graph.node(name), []
+    for link in state.graph.links:
+        if link.relation in (*STANDS, "also_supports") and name in (link.source, link.target):
+            parent, child = state.graph.node(link.source), state.graph.node(link.target)
+            best = None if child.box is None or parent.id == SCENE_NODE else carrying(child.box, parent, seen=True)
+            plane, gap, share = best or (None, None, None)
+            link = link.model_copy(update={"plane": plane, "gap": gap, "overlap": share})
+        elif name == link.source and (link.plane or 0) >= len(node.planes):
+            link = link.model_copy(update={"plane": None})
+        links.append(link)
+    state.graph = state.graph.model_copy(update={"links": tuple(links)})
 
 
 def _hanging(link: Relation, box: Box, parent: GraphNode) -> Relation:

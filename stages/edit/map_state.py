@@ -57,6 +57,7 @@ class MapState:
     """Instances whose surface is no longer that of the map that was read."""
     next_instance: int = 1
     _things: dict[int, Thing] = field(default_factory=dict)
+    _tree: tuple[ColoredMesh, cKDTree] | None = None
 
     def things(self) -> list[Thing]:
         """Return the things that have a surface, ascending by instance."""
@@ -70,6 +71,13 @@ class MapState:
                     class_name = self.entities[instance].class_name
                     self._things[instance] = Thing(instance, class_name, minimum_box(points), cKDTree(points))
         return [self._things[instance] for instance in sorted(self._things) if instance in self.entities]
+
+    def called(self, points: np.ndarray, reach: float) -> np.ndarray:
+        """Return the instance (N,) of the vertex that is nearest to each point (N, 3), -1 beyond `reach` [m]."""
+        if self._tree is None or self._tree[0] is not self.surface:
+            self._tree = (self.surface, cKDTree(self.surface.vertices.astype(float)))
+        distance, nearest = self._tree[1].query(points, distance_upper_bound=reach)
+        return np.where(np.isfinite(distance), np.append(self.instance, 0)[nearest], -1)
 
     def relabel(self, chosen: np.ndarray, instance: int) -> None:
         """Give the chosen vertices (V,) bool to an instance, 0 for none."""

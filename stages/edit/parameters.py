@@ -1,12 +1,14 @@
-"""Declarations of `scenewright edit map` and `edit graph`."""
+"""Declarations of `scenewright edit map`, `edit graph` and `edit scene`."""
 
 from __future__ import annotations
 
 from pydantic import Field
 
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import CadScene
 from schemas.contact_graph import ContactGraph
 from schemas.panoptic_map import PanopticMap
-from stages.kit.stage import External, Parameters, Stage
+from stages.kit.stage import External, Optionally, Parameters, Stage
 
 
 class EditMapParameters(Parameters):
@@ -27,6 +29,19 @@ class EditMapParameters(Parameters):
     reach: float = Field(
         0.06, gt=0, le=1, description="... and when its surface comes this near to the edit's point [m]"
     )
+    minimum_share: float = Field(
+        0.5,
+        gt=0,
+        le=1,
+        description="Where the edit says points of the surface: the thing has this share of those that are of any, "
+        "and --minimum-part of all",
+    )
+    minimum_inside: float = Field(
+        0.5, gt=0, le=1, description="... and this share of the thing lies in the edit's box, grown by --margin"
+    )
+    rival_share: float = Field(
+        0.5, gt=0, le=1, description="... and no other thing has more than this share of what it has"
+    )
     clear_share: float = Field(
         0.7, gt=0, le=1, description="A second thing that fits by this share of the best fit makes the edit a conflict"
     )
@@ -34,7 +49,7 @@ class EditMapParameters(Parameters):
 
 MAP = Stage(
     name="edit map",
-    version=2,
+    version=3,
     summary="Apply edits (edits.toml) to a panoptic map; what no longer fits is a conflict, and not applied",
     parameters=EditMapParameters,
     reads={"panoptic_map": PanopticMap, "edits": External("edits.toml, as `edit rename` and the like write it")},
@@ -58,4 +73,22 @@ GRAPH = Stage(
     "--out outputs/demo/edited_graph",
 )
 
-STAGES = (MAP, GRAPH)
+SCENE = Stage(
+    name="edit scene",
+    version=1,
+    summary="Apply edits (edits.toml) to a CAD scene: another model or none, another place, joints",
+    parameters=EditMapParameters,
+    reads={
+        "cad_scene": CadScene,
+        "edits": External("edits.toml, as `edit model` and the like write it"),
+        "library": Optionally(CadLibrary),
+        "panoptic_map": Optionally(PanopticMap),
+    },
+    writes=CadScene,
+    libraries=("numpy", "scipy", "trimesh"),
+    module="scene_stage",
+    example="scenewright edit scene --cad-scene outputs/demo/cad_scene --edits edits.toml "
+    "--out outputs/demo/edited_scene",
+)
+
+STAGES = (MAP, GRAPH, SCENE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,8 @@ from schemas.base import as_vector
 from schemas.scene_parts import SurfacePlane
 from stages.kit.geometry.boxes import minimum_rectangle, polygon_area
 
+UPWARD = 0.9
+"""A normal (or the z axis of a frame) whose z is above this points up [-]."""
 SCREENING_POINTS = 2000
 """Hypotheses are scored on this many points first; only the best few are scored on all (LIBRARIES 3d)."""
 FINALISTS = 5
@@ -50,6 +53,30 @@ def plane_height(plane: SurfacePlane, at: np.ndarray) -> float:
     """
     nx, ny, nz = plane.normal
     return -(plane.offset + nx * float(at[0]) + ny * float(at[1])) / nz
+
+
+def moved_planes(
+    planes: Iterable[SurfacePlane], rotation: np.ndarray, translation: np.ndarray, scale: float = 1.0
+) -> tuple[SurfacePlane, ...]:
+    """Return planes where rotation (3, 3), translation (3,) [m] and scale put them: p -> R (s p) + t. A frame that
+    stays upright keeps what is level; in another, what looks up is."""
+    upright, placed = bool(rotation[2, 2] > UPWARD), []
+    for plane in planes:
+        normal = rotation @ np.asarray(plane.normal)
+        points = scale * np.array([plane.center, *plane.corners]) @ rotation.T + translation
+        placed.append(
+            plane.model_copy(
+                update={
+                    "normal": as_vector(normal),
+                    "offset": scale * plane.offset - float(normal @ translation),
+                    "area": plane.area * scale**2,
+                    "center": as_vector(points[0]),
+                    "corners": tuple(as_vector(corner) for corner in points[1:]),
+                    "horizontal": plane.horizontal if upright else bool(normal[2] >= UPWARD),
+                }
+            )
+        )
+    return tuple(placed)
 
 
 def level_plane(outline: np.ndarray, height: float, *, hidden: bool) -> SurfacePlane:

@@ -80,8 +80,8 @@ def test_what_no_longer_fits_is_a_conflict_and_changes_nothing(seen: PanopticMap
     as_one = room_map(tmp_path / "as_one", joined={CUP: TABLE})
     otherwise = room_map(tmp_path / "otherwise", classes={CUP: "book"})
     for where, words in (
-        (gone, "lies no thing"),
-        (as_one, "table_2, whose box"),
+        (gone, "table_2, which is no cup"),
+        (as_one, "table_2, which is no cup"),
         (otherwise, "book_3, which is no cup"),
     ):
         state, (record,) = applied(where, asked)

@@ -1,0 +1,58 @@
+"""Wiring of `edit scene`: a CAD scene and what a person put right become another CAD scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from schemas.cad_library import CadLibrary
+from schemas.cad_scene import CadScene
+from schemas.panoptic_map import PanopticMap
+from stages.edit.anchoring import Fitting
+from stages.edit.edits_file import read_edits
+from stages.edit.outcome import outcome_of, write_records
+from stages.edit.parameters import EditMapParameters
+from stages.edit.scene_edits import apply_scene_edits
+from stages.edit.scene_state import SceneState
+from stages.kit.stage import Context
+
+
+def run(
+    cad_scene: CadScene,
+    edits: Path,
+    library: CadLibrary | None,
+    panoptic_map: PanopticMap | None,
+    *,
+    parameters: EditMapParameters,
+    context: Context,
+) -> CadScene:
+    """Apply the edits of scenes in their order and write the scene that results, and what became of each (edits.json).
+
+    The library has the models that an edit may choose, the map the meshes of what no model is to stand for. The outcome
+    is `conflicts` when an edit was not applied. Raises BadInput when the edits or the scene are broken.
+    """
+    asked, before = read_edits(edits), cad_scene.info
+    state = SceneState(
+        cad_scene.graph,
+        {entry.node: entry for entry in before.replacements},
+        cad_scene,
+        None if library is None else library.path("models"),
+        None if panoptic_map is None else panoptic_map.root,
+        context.output,
+    )
+    with context.progress.step("apply the edits"):
+        records = apply_scene_edits(state, asked.edits, Fitting(**parameters.model_dump()))
+    with context.progress.step("write the scene"):
+        state.write()
+        replacements = tuple(state.replacements.values())
+        before.model_copy(update={"replacements": replacements}).write(context.output / "scene.json")
+        state.graph.write(context.output / "graph.json")
+    summary = write_records(records, len(asked.edits), context)
+    decisions = [entry.decision for entry in replacements]
+    summary |= {
+        "cad": decisions.count("cad"),
+        "mesh": decisions.count("mesh"),
+        "layout": decisions.count("layout"),
+        "joints": sum(len(entry.joint_evidence or {}) for entry in replacements),
+        "joints_held": sum(len(entry.held) for entry in replacements),
+    }
+    return CadScene(context.output, outcome=outcome_of(records), summary=summary)
