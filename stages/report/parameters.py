@@ -36,12 +36,12 @@ def check_inputs(parameters: ReportParameters, inputs: Mapping[str, Any]) -> Non
 
 STAGE = Stage(
     name="report",
-    version=9,
+    version=10,
     summary="Write one self-contained HTML page about a run: pictures, graph, figures, times, how it was made",
     parameters=ReportParameters,
     reads={role: Optionally(kind) for role, kind in all_roles().items()},
     writes=Report,
-    libraries=("numpy", "scipy", "jinja2", "matplotlib", "pillow", "open3d"),
+    libraries=("numpy", "scipy", "jinja2", "matplotlib", "pillow", "open3d", "trimesh"),
     check=check_inputs,
     example="scenewright report --sequence outputs/demo/sequence --panoptic-map outputs/demo/panoptic_map "
     "--evaluation outputs/demo/evaluation --out outputs/demo/report",

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from cli.viewing.canvas import JointedLink
-from cli.viewing.page import library, page_canvas
-from cli.viewing.page.library import three_js
-from cli.viewing.page.packing import STEPS
-from cli.viewing.page.page_canvas import PageCanvas
 from schemas.errors import BadInput, MissingDependency
 from stages.kit.geometry.boxes import box_from_bounds
+from stages.kit.viewing.canvas import JointedLink
+from stages.kit.viewing.page import library, page_canvas
+from stages.kit.viewing.page.library import three_js
+from stages.kit.viewing.page.packing import STEPS
+from stages.kit.viewing.page.page_canvas import PageCanvas
 from tests.browser import WEBGL, Browser, browser, needs_browser
 
 HOSTILE = "</script><script>document.title='taken'</script><b>\"'&" + "x" * 10_000
