@@ -24,6 +24,8 @@ def view(page: Page) -> dict[str, Any] | None:
     """Return the page, and the digests of the scripts that may run in it; None when there is nothing to walk into."""
     panoptic_map = page.given("panoptic_map", PanopticMap)
     scene, graph = page.given("interactive_scene", InteractiveScene), page.given("contact_graph", ContactGraph)
+    if scene is not None and not scene.path(scene.info.combined_file).is_file():
+        scene = None
     shown = panoptic_map is not None and panoptic_map.path("mesh.ply").is_file()
     if not shown and scene is None:
         return None
