@@ -7,16 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from cli.viewing.canvas import Canvas
-from cli.viewing.graph_view import draw_graph
 from cli.viewing.inputs import input_artifact
-from cli.viewing.meshes import load_mesh
 from schemas.cad_library import CadLibrary
 from schemas.cad_scene import SURROUNDINGS, CadCandidate, CadScene, Replacement
 from schemas.panoptic_map import PanopticMap
 from stages.kit.formats.cad_models import read_model
 from stages.kit.formats.painted_models import painted_mesh
 from stages.kit.measurement.cad_candidates import candidates_of
+from stages.kit.viewing.canvas import Canvas
+from stages.kit.viewing.graphs import draw_graph
+from stages.kit.viewing.meshes import load_mesh
+from stages.kit.viewing.scenes import trust_of_models
 
 CANDIDATES = "candidates"
 """Candidates that were not chosen lie below this path: drawn, but hidden at first, as they stand in the chosen ones."""
@@ -55,7 +56,7 @@ def draw_cad_scene(cad_scene: CadScene, canvas: Canvas) -> None:
     panoptic_map = input_artifact(cad_scene, PanopticMap)
     if panoptic_map is not None and panoptic_map.path("mesh.ply").exists():
         canvas.mesh(MAP, load_mesh(panoptic_map.path("mesh.ply")), front_only=True)
-    draw_graph(cad_scene.graph, canvas, CANDIDATES, MAP)
+    draw_graph(cad_scene.graph, canvas, CANDIDATES, MAP, trusted=trust_of_models(cad_scene.info))
     canvas.document("replacements", "\n".join(rows))
     canvas.document(CANDIDATES, candidate_table(cad_scene))
 

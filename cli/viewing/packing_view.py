@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from cli.viewing.canvas import Canvas
 from cli.viewing.robot_view import animate_arm, draw_robot
 from schemas.outside import LARGEST_SHOWN, file_content
 from schemas.packing import BASKET_SLAB, BASKET_TOP, TABLE_TOP, Packing, PackingArea, PackingBox, PackingStep
 from schemas.scene_parts import Box
 from stages.kit.formats.numpy_files import read_arrays
+from stages.kit.viewing.canvas import Canvas
 
 PICTURES = ("layout", "attempts", "scene")
 PERIOD = 0.05

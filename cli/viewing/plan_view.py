@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from google.protobuf.message import DecodeError
 
-from cli.viewing.canvas import SHELL, Canvas
 from cli.viewing.inputs import input_artifact
 from cli.viewing.robot_view import ROBOT, draw_robot
-from cli.viewing.scene_view import draw_scene_folder
 from schemas.errors import BadInput
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
 from schemas.plan import Plan
 from stages.kit.formats.foxglove import JPEG_START, stamp_nanoseconds, transform_matrix
 from stages.kit.formats.indexed_mcap import IndexedMcap
+from stages.kit.formats.numpy_files import read_all_arrays
+from stages.kit.viewing.canvas import SHELL, Canvas
+from stages.kit.viewing.scenes import draw_scene_folder
 
 
 def draw_plan(plan: Plan, canvas: Canvas) -> None:
@@ -33,6 +35,28 @@ def draw_plan(plan: Plan, canvas: Canvas) -> None:
     with IndexedMcap(path) as log:
         draw_robot(canvas)
         _animate(log, canvas)
+    for seconds, text, bad in moments(plan):
+        canvas.moment(seconds, text, bad=bad)
+
+
+def moments(plan: Plan) -> list[tuple[float, str, bool]]:
+    """Return when each action began in execution [s], in words, and last what failed and why."""
+    path, actions = plan.path("trajectory.npz"), plan.info.actions
+    if not path.is_file():
+        return []
+    arrays = read_all_arrays(path, hint="make the plan again")
+    time, action = (arrays.get(f"executed_{name}", np.zeros(0)).ravel() for name in ("time", "action"))
+    if len(time) != len(action) or not len(time):
+        return []
+    found: list[tuple[float, str, bool]] = []
+    for number in np.unique(action[(action >= 0) & (action < len(actions))]):
+        said = actions[int(number)]
+        begins = float(time[np.flatnonzero(action == number)[0]])
+        found.append((begins, f"{int(number) + 1}. {said.name} {', '.join(said.arguments)}", False))
+    end = float(time[-1])
+    found += [(end, f"{failure.kind}: {failure.message}", True) for failure in plan.info.failures]
+    found += [(end, f"not so: {c.condition} ({c.detail})", True) for c in plan.info.checks if not c.holds]
+    return sorted(found, key=lambda row: (row[0], row[2]))
 
 
 def plan_text(plan: Plan) -> str:

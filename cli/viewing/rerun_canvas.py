@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -13,13 +13,13 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from cli.viewing.arrangement import Arrangement
-from cli.viewing.canvas import Color, JointedLink, Parts, bytes_of, vertex_colors
 from cli.viewing.viewer_process import viewer_address
 from schemas.errors import BadInput, MissingDependency
 from schemas.scene_parts import Box, Camera
 from stages.kit.formats.foxglove import PNG_START
 from stages.kit.geometry.cameras import intrinsic_matrix
 from stages.kit.geometry.transforms import quaternion_of
+from stages.kit.viewing.canvas import Color, JointedLink, Parts, Trust, bytes_of, trust_table, vertex_colors
 
 WORLD = "world"
 DISTRIBUTION = "rerun-sdk"
@@ -221,6 +221,17 @@ class RerunCanvas:
         self._arrangement.graph = True
         nodes = self._rerun.GraphNodes(names, labels=names, colors=[bytes_of(color) for color in colors])
         self._log("graph", nodes, self._rerun.GraphEdges(edges, graph_type="directed"))
+
+    def trust(self, rows: Mapping[str, Trust]) -> None:
+        """Show how far things can be trusted as a table."""
+        self.document("trust", trust_table(rows))
+
+    def moment(self, seconds: float, text: str, *, bad: bool = False) -> None:
+        """Say in the log of texts what begins at a time [s]."""
+        static = self._static
+        self.time(seconds)
+        self._log("moments", self._rerun.TextLog(text, level="ERROR" if bad else "INFO"))
+        self._static = static
 
     def document(self, path: str, markdown: str) -> None:
         """Show a text in Markdown."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cli.viewing.canvas import Canvas
-from cli.viewing.meshes import merged, shape_mesh
 from schemas.errors import BadInput
 from stages.kit.formats.link_poses import link_poses
 from stages.kit.formats.urdf_file import Urdf, parse_urdf
+from stages.kit.viewing.canvas import Canvas
+from stages.kit.viewing.meshes import merged, shape_mesh
 
 ROBOT = "robot/"
 NAME = "panda"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from cli.viewing.canvas import Canvas
 from cli.viewing.inputs import input_artifact
 from cli.viewing.sequence_view import MAXIMUM_FRAMES
 from schemas.segments import FrameSegments, Segments
@@ -13,6 +12,7 @@ from schemas.vocabulary import load_vocabulary
 from stages.kit.drawing.palette import instance_color
 from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.masks import PanopticReader
+from stages.kit.viewing.canvas import Canvas
 
 
 def draw_segments(segments: Segments, canvas: Canvas) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from cli.viewing.canvas import Canvas
 from schemas.sequence import Sequence
 from schemas.trajectory import Trajectory
 from stages.kit.drawing.palette import instance_color
@@ -12,6 +11,7 @@ from stages.kit.formats.frames import FrameReader
 from stages.kit.formats.trajectories import read_tum
 from stages.kit.geometry.cameras import back_project
 from stages.kit.geometry.transforms import apply
+from stages.kit.viewing.canvas import Canvas
 
 MAXIMUM_FRAMES = 150
 """More frames than this are thinned out, so that a recording stays in the tens of megabytes."""

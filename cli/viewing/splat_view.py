@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cli.viewing.canvas import Canvas
 from schemas.outside import LARGEST_SHOWN, file_content
 from schemas.splat import SplatViews
+from stages.kit.viewing.canvas import Canvas
 
 
 def draw_splat_views(views: SplatViews, canvas: Canvas) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from cli.viewing.canvas import Canvas
 from cli.viewing.sequence_view import draw_sequence
 from schemas.errors import BadInput
 from schemas.outside import LARGEST_SHOWN, file_content, file_text
@@ -15,6 +14,7 @@ from schemas.suture_scene import StereoRigRecord, SutureScene
 from schemas.suture_trial import SutureEvaluation, SutureTrial
 from stages.kit.formats.numpy_files import read_arrays
 from stages.kit.geometry.transforms import apply
+from stages.kit.viewing.canvas import Canvas
 
 STEEL, THREAD, TIP, TRUE = (0.75, 0.2, 0.18), (0.48, 0.31, 0.69), (0.9, 0.55, 0.1), (0.2, 0.7, 0.3)
 ARM_COLORS = ((0.18, 0.44, 0.7), (0.3, 0.6, 0.42))

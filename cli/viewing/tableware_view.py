@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from cli.viewing.canvas import Canvas
 from schemas.artifact import Artifact
 from schemas.outside import LARGEST_SHOWN, file_content, file_text
 from schemas.scene_parts import Box
@@ -13,6 +12,7 @@ from schemas.tableware_plan import TablewarePlan
 from schemas.tableware_scene import TablewareItem, TablewareScene
 from schemas.tableware_trial import TablewareEvaluation, TablewareTrial
 from stages.kit.formats.mesh_files import read_mesh
+from stages.kit.viewing.canvas import Canvas
 
 TABLE = (0.78, 0.61, 0.03)
 """Extents of the table top [m]; its surface is at z = 0."""
@@ -76,7 +76,9 @@ def draw_tableware_trial(trial: TablewareTrial, canvas: Canvas) -> None:
     for item in first:
         canvas.transform(f"items/{item.name}", _pose(item))
     binned = 0
-    for step in file.steps:
+    for number, step in enumerate(file.steps, 1):
+        lost = f": {', '.join(step.dropped)} fell" if step.dropped else ""
+        canvas.moment(step.end, f"action {number}{lost}", bad=bool(step.dropped))
         canvas.time(step.end)
         for item in step.after:
             canvas.transform(f"items/{item.name}", _pose(item))

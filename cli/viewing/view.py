@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import cli.viewing
-from cli.viewing.canvas import Canvas
-from cli.viewing.page.page_canvas import PageCanvas
 from cli.viewing.rerun_canvas import RerunCanvas, import_rerun
 from schemas.artifact import Artifact
 from schemas.errors import BadInput, UsageError
 from stages.engine.reading import open_artifact
+from stages.kit.viewing.canvas import Canvas
+from stages.kit.viewing.page.page_canvas import PageCanvas
 
 PAGE, RECORDING = ".html", ".rrd"
 

@@ -41,7 +41,7 @@ STAGE = Stage(
     parameters=ReportParameters,
     reads={role: Optionally(kind) for role, kind in all_roles().items()},
     writes=Report,
-    libraries=("numpy", "scipy", "jinja2", "matplotlib", "pillow", "open3d"),
+    libraries=("numpy", "scipy", "jinja2", "matplotlib", "pillow", "open3d", "trimesh"),
     check=check_inputs,
     example="scenewright report --sequence outputs/demo/sequence --panoptic-map outputs/demo/panoptic_map "
     "--evaluation outputs/demo/evaluation --out outputs/demo/report",

@@ -1,7 +1,8 @@
 """Sections of the page, found by place: every folder `sections/<name>/` with a `section.py` is one.
 
 `section.py` declares it as SECTION and is cheap to import; `view.py` has `view(page)`, which returns the values of
-`section.html.j2`, or None when there is nothing to show. `tiles` among them (name and value) stand on top of the page.
+`section.html.j2`, or None when there is nothing to show. `tiles` among them (name and value) stand on top of the page;
+`scripts` are digests of the only scripts that may run in it.
 """
 
 from __future__ import annotations

@@ -29,6 +29,7 @@ def run(*, parameters: ReportParameters, context: Context, **inputs: Artifact | 
     head = {"label": page.label, "baseline_label": page.baseline_label}
     shown: list[dict[str, Any]] = []
     tiles: list[Any] = []
+    scripts: list[str] = []
     for section in all_sections():
         if section.reads and not any(page.given(role, kind) for role, kind in section.reads.items()):
             continue
@@ -38,10 +39,10 @@ def run(*, parameters: ReportParameters, context: Context, **inputs: Artifact | 
             html = render(f"sections/{section.name}/section.html.j2", {**head, **values})
             shown.append({"id": section.name, "name": section.title, "html": html})
             tiles += values.get("tiles", ())
+            scripts += values.get("scripts", ())
     title = parameters.title or _title(page)
-    page_text = render_page(
-        {**head, "title": title, "lead": _lead(page), "tiles": tiles, "sections": shown, "version": _version()}
-    )
+    values = {"title": title, "lead": _lead(page), "tiles": tiles, "sections": shown, "version": _version()}
+    page_text = render_page({**head, **values, "scripts": scripts})
     return _write(page_text, title, tuple(section["id"] for section in shown), artifacts, context)
 
 

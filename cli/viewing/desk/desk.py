@@ -15,11 +15,8 @@ from typing import Any
 import trimesh
 
 from cli.edit_command import asked_edit
-from cli.viewing.canvas import Canvas
 from cli.viewing.desk.forms import forms_of, kinds_of
 from cli.viewing.inputs import input_artifact
-from cli.viewing.map_view import ShownThing, draw_map
-from cli.viewing.page.page_canvas import PageCanvas, ServedPage
 from cli.viewing.view import viewer_of
 from schemas.artifact import Artifact
 from schemas.edits import AnyEdit, AppliedEdit, Edit, EditsFile, MapEdit
@@ -33,6 +30,9 @@ from stages.edit.edits_file import UNWRITTEN, Changed, append_edits, read_edits,
 from stages.edit.map_state import MapState, read_state
 from stages.edit.parameters import EditMapParameters
 from stages.engine.reading import open_artifact, read_manifest
+from stages.kit.viewing.canvas import Canvas
+from stages.kit.viewing.maps import ShownThing, draw_map
+from stages.kit.viewing.page.page_canvas import PageCanvas, ServedPage
 
 SCRIPT = Path(__file__).with_name("editing.js")
 MOST_GENERATIONS = 20

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import io
+import json
 import re
+import time
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -25,6 +27,7 @@ from stages.report.provenance import made_of
 from stages.report.stage import run
 from stages.report.surfaces import map_model
 from stages.report.views import bounds_of, cut_away, oblique_view, place_labels, render, top_view
+from tests.browser import ELEMENT, WEBGL, browser, needs_browser
 from tests.unit.evaluate.handmade import (
     LABEL,
     ROOM,
@@ -147,7 +150,7 @@ def test_every_section_is_there_and_the_page_is_sound(whole):
     page = (folder / "report" / "report.html").read_text()
     tags = parse(page)
     ids = {attributes.get("id") for tag, attributes in tags.seen if tag == "section"}
-    assert ids == {"outlook", "frames", "map", "graph", "cad", "scene", "plan", "figures", "cost", "made"}
+    assert ids == {"outlook", "walk", "frames", "map", "graph", "cad", "scene", "plan", "figures", "cost", "made"}
     links = {attributes["href"] for tag, attributes in tags.seen if tag == "a" and attributes["href"].startswith("#")}
     assert links == {f"#{name}" for name in ids}
     for text in (
@@ -166,7 +169,7 @@ def test_every_section_is_there_and_the_page_is_sound(whole):
         "in cabinet_6",
     ):
         assert text in tags.text, text
-    assert made.summary["sections"] == 10  # the outlook first
+    assert made.summary["sections"] == 11  # the outlook first
     assert Report(folder / "report").json_files["report.json"].read(folder / "report" / "report.json").sections
 
 
@@ -181,7 +184,7 @@ def test_the_mask_label_stands_beside_every_figure(whole):
 
 def test_nothing_is_loaded_from_anywhere(whole):
     folder, _ = whole
-    page = (folder / "report" / "report.html").read_text()
+    page = without_walk((folder / "report" / "report.html").read_text())
     without_pictures = re.sub(r"data:image/(png|jpeg);base64,[A-Za-z0-9+/=]+", "DATA", page)
     assert "http" not in without_pictures.replace("http-equiv", "")
     assert not re.search(r"""(src|href)\s*=\s*["']?(//|[a-z]+:)""", without_pictures)
@@ -196,9 +199,48 @@ def test_nothing_is_loaded_from_anywhere(whole):
     assert str(folder) not in page
 
 
-def test_pictures_decode_to_their_stated_size(whole):
+def without_walk(page: str) -> str:
+    """The report without the page that stands in it, which has tests of its own."""
+    return re.sub(r' srcdoc="[^"]*"', "", page)
+
+
+def test_the_page_that_stands_in_the_report_runs_alone(whole):
     folder, _ = whole
     page = (folder / "report" / "report.html").read_text()
+    (frame,) = [attributes for tag, attributes in parse(page).seen if tag == "iframe"]
+    assert frame["sandbox"] == "allow-scripts" and "<script" not in page
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page)[1]
+    inner = re.search(r'Content-Security-Policy" content="([^"]*)"', frame["srcdoc"])[1]
+    digests = re.findall(r"'sha256-[^']+'", inner)
+    assert len(digests) == 2 and all(digest in policy for digest in digests) and "unsafe-inline' 'sha" not in policy
+    drawn = json.loads(re.search(r'<script id="document"[^>]*>(.*?)</script>', frame["srcdoc"], re.S)[1])
+    paths = {item["path"] for item in drawn["meshes"]}
+    assert {"color", "instance", "class", "trust"} <= paths and 0 <= drawn["trust"]["cup_4"]["share"] <= 1
+    assert drawn["views"][0]["name"] == "scan" and "scene" in drawn["views"][0]["hidden"]
+    assert drawn["graph"]["names"] and drawn["boxes"]
+    assert len(page) < 15_000_000
+
+
+@needs_browser
+def test_the_report_can_be_walked_into(whole):
+    folder, _ = whole
+    with browser(*WEBGL) as window:
+        window.open((folder / "report" / "report.html").as_uri() + "#walk")
+        window.run("document.querySelector('iframe.walk').scrollIntoView()")
+        window.ask("POST", "/frame", {"id": {ELEMENT: window.find("iframe.walk")}})
+        deadline = time.monotonic() + 60
+        while not window.run("return document.body && document.body.dataset.ready && document.body.dataset.drawn"):
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+        assert window.text("#name") == "The room"
+        window.press("#trust")
+        assert window.run("return document.querySelectorAll('#trusted .node').length") > 3
+        assert window.complaints() == []
+
+
+def test_pictures_decode_to_their_stated_size(whole):
+    folder, _ = whole
+    page = without_walk((folder / "report" / "report.html").read_text())
     pattern = r'<img class="\w+" src="data:image/(\w+);base64,([^"]+)" width="(\d+)" height="(\d+)"'
     pictures = re.findall(pattern, page)
     assert len(pictures) == page.count("data:image/") >= 15

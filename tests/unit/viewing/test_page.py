@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from cli.viewing.canvas import JointedLink
-from cli.viewing.page import library, page_canvas
-from cli.viewing.page.library import three_js
-from cli.viewing.page.packing import STEPS
-from cli.viewing.page.page_canvas import PageCanvas
 from schemas.errors import BadInput, MissingDependency
 from stages.kit.geometry.boxes import box_from_bounds
+from stages.kit.viewing.canvas import JointedLink, Trust
+from stages.kit.viewing.page import library, page_canvas
+from stages.kit.viewing.page.library import three_js
+from stages.kit.viewing.page.packing import STEPS
+from stages.kit.viewing.page.page_canvas import PageCanvas
 from tests.browser import WEBGL, Browser, browser, needs_browser
 
 HOSTILE = "</script><script>document.title='taken'</script><b>\"'&" + "x" * 10_000
@@ -68,6 +68,9 @@ def small_page(path: Path, name: str = "small") -> Path:
                 JointedLink("cabinet/door", "cabinet/body", hinge, "turning", name="hinge", lower=0.0, upper=1.5),
             ]
         )
+        canvas.trust({"cup_2": Trust(0.2, ("no mask gave it a name",)), "table_1": Trust(0.9)})
+        canvas.moment(10.0, "1. push cup_2")
+        canvas.moment(11.5, f"it fell: {name}", bad=True)
         for moment in (0.0, 1.0, 2.0):
             canvas.time(10.0 + moment)
             pose = np.eye(4)
@@ -144,13 +147,20 @@ def test_a_page_in_a_browser(tmp_path: Path) -> None:
         time.sleep(0.5)
         assert window.run(off) == ["table_1"]
         assert not window.run("return document.querySelector('[data-layer=table_1] input').checked")
+        # What to trust, the least first, by its key.
+        window.keys("t")
+        rows = "return [...document.querySelectorAll('#trusted .node')].map((row) => row.textContent)"
+        assert window.run(rows) == ["cup_2no mask gave it a name", "table_1nothing speaks against it"]
+        assert window.run("return document.getElementById('doubts').open && window.scenewright.state.trust")
         # A joint by its slider.
         slide = "const s = document.querySelector('[data-joint=hinge] input'); s.value = 1.0;"
         window.run(slide + "s.dispatchEvent(new Event('input'))")
         assert window.text("[data-joint=hinge] output") == "57°"
         # Time by its bar, and played by a key.
         window.run("const m = document.getElementById('moment'); m.value = 11; m.dispatchEvent(new Event('input'))")
-        assert window.text("#clock") == "1.00 s"
+        assert window.text("#clock") == "1.00 s" and window.text("#happening") == "1. push cup_2"
+        window.press(".tick.bad")
+        assert window.text("#clock") == "1.50 s" and window.text("#happening").startswith("it fell: </script>")
         window.run("document.getElementById('picture').focus()")
         window.keys(" ")
         window.wait_for("#clock", "2.00 s")

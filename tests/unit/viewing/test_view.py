@@ -11,10 +11,7 @@ import numpy as np
 import pytest
 
 from cli.main import run as scenewright
-from cli.viewing.graph_view import relation_table
 from cli.viewing.library_view import row_places
-from cli.viewing.page.library import three_js
-from cli.viewing.page.page_canvas import LARGEST_PAGE
 from cli.viewing.rerun_canvas import import_rerun
 from cli.viewing.segments_view import segment_images
 from cli.viewing.sequence_view import draw_sequence
@@ -30,6 +27,9 @@ from schemas.sequence import Sequence
 from stages.kit.formats.link_poses import joint_motion, link_poses
 from stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
 from stages.kit.measurement.relation_evidence import evidence
+from stages.kit.viewing.graphs import relation_table
+from stages.kit.viewing.page.library import three_js
+from stages.kit.viewing.page.page_canvas import LARGEST_PAGE
 from tests.unit.viewing import artifacts
 from tests.unit.viewing.suture_artifacts import make_suture
 from tests.unit.viewing.tableware_artifacts import make_tableware

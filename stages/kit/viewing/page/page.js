@@ -31,7 +31,7 @@
   const [low, high] = shown.bounds;
   const middle = low.map((value, k) => (value + high[k]) / 2);
   const extent = Math.max(0.5, Math.hypot(...low.map((value, k) => high[k] - value)));
-  const start = { eye: [-2.11, 0.825, extent], target: middle, time: null, off: [], fade: {}, joints: {}, chosen: "" };
+  const start = { eye: [-2.11, 0.825, extent], target: middle, time: null, off: [], fade: {}, joints: {}, chosen: "", trust: false };
   const state = structuredClone(start);
   const number = (value) => typeof value === "number" && Number.isFinite(value);
   function readAddress() {
@@ -44,6 +44,7 @@
       for (const key of ["fade", "joints"])
         for (const [name, value] of Object.entries(given[key] || {})) if (number(value)) state[key][name] = value;
       if (typeof given.chosen === "string") state.chosen = given.chosen;
+      state.trust = given.trust === true;
       return true;
     } catch { return false; }
   }
@@ -127,6 +128,7 @@
   // ---- time and places -----------------------------------------------------------------------------------------------
   const timed = [...things, ...shown.transforms, ...shown.pictures, ...shown.documents].map((item) => item.time).filter(number);
   const first = timed.reduce((a, b) => Math.min(a, b), Infinity), last = timed.reduce((a, b) => Math.max(a, b), -Infinity);
+  const moments = [...shown.moments].sort((a, b) => a.time - b.time);
   const byPath = (items) => {
     const found = new Map();
     for (const item of items) { if (!found.has(item.path)) found.set(item.path, []); found.get(item.path).push(item); }
@@ -179,9 +181,14 @@
       }
     }
     if (timed.length) { element("moment").value = time; element("clock").textContent = (time - first).toFixed(2) + " s"; }
+    const happening = element("happening"), begun = moments.filter((moment) => moment.time <= time + 1e-9);
+    const latestOnes = begun.filter((moment) => moment.time === begun[begun.length - 1].time);
+    happening.textContent = (latestOnes.some((one) => one.bad) ? latestOnes.filter((one) => one.bad) : latestOnes).map((one) => one.text).join("; ");
+    happening.classList.toggle("bad", latestOnes.some((one) => one.bad));
     for (const [image, list] of images) {
       const found = latest(list, time);
       if (found && image.src !== found.address) image.src = found.address;
+      image.hidden = !image.src;
     }
     draw();
   }
@@ -268,6 +275,26 @@
     for (const { object, path, kind } of things)
       if (kind === "mesh") object.material.emissive.setHex(path.split("/").some((part) => names.some((name) => same(part, name))) ? 0x553300 : 0);
     return found[0];
+  }
+  // ---- what is trustworthy: colours by what is known of each thing -------------------------------------------------------
+  const trusted = Object.entries(shown.trust || {});
+  const doubted = (path) => {
+    const parts = path.split("/").flatMap((part) => [part, part.split("__")[0]]);
+    return trusted.find(([name]) => parts.some((part) => same(part, name)));
+  };
+  const grey = [178, 174, 168];
+  function showTrust() {
+    for (const thing of things) {
+      if (thing.kind !== "mesh" || thing.item.of) continue;
+      const { material } = thing.object;
+      thing.own ??= { vertexColors: material.vertexColors, color: material.color.getHex() };
+      const found = state.trust && trusted.length ? doubted(thing.path) : null;
+      const vertexColors = !state.trust && thing.own.vertexColors;
+      if (material.vertexColors !== vertexColors) { material.vertexColors = vertexColors; material.needsUpdate = true; }
+      if (state.trust) material.color.setRGB(...(found ? found[1].color : grey).map((value) => value / 255));
+      else material.color.setHex(thing.own.color);
+    }
+    draw();
   }
   const markNode = (name) => markNodes(name ? [name] : []);
   const labelled = shown.lines.flatMap((item) => (item.labels || []).map((text, k) => ({ text, points: item.ends[k] })));
@@ -374,13 +401,14 @@
     if (does) { event.preventDefault(); does(); }
   });
   const fit = () => { state.eye = [...start.eye]; state.target = [...start.target]; remember(); draw(); };
+  if (window !== window.parent) element("link").hidden = true;  // within another page there is no address to hold it
   element("fit").addEventListener("click", fit);
   element("link").addEventListener("click", () => {
     const link = element("address");
     link.href = addressOf(); link.hidden = false;
     try { history.replaceState(null, "", addressOf()); } catch { /* shown within another page */ }
   });
-  window.addEventListener("hashchange", () => { if (readAddress()) { refresh(); arrange(); choose(state.chosen, false); } });
+  window.addEventListener("hashchange", () => { if (readAddress()) { refresh(); showTrust(); arrange(); choose(state.chosen, false); } });
   window.addEventListener("resize", draw);
 
   // ---- playing -----------------------------------------------------------------------------------------------------------
@@ -405,6 +433,14 @@
   if (timed.length) {
     element("timeline").hidden = false;
     Object.assign(element("moment"), { min: first, max: last });
+    for (const moment of moments) {
+      const tick = made("button", "", moment.bad ? "tick bad" : "tick");
+      tick.style.left = `${100 * Math.min(1, Math.max(0, (moment.time - first) / Math.max(last - first, 1e-9)))}%`;
+      tick.title = moment.text;
+      tick.setAttribute("aria-label", moment.text);
+      tick.addEventListener("click", () => { state.time = moment.time; remember(); arrange(); });
+      element("bar").append(tick);
+    }
     element("moment").addEventListener("input", () => { state.time = Number(element("moment").value); remember(); arrange(); });
   }
 
@@ -420,6 +456,26 @@
     button.title = `View ${k + 1} (key ${k + 1})`;
     button.addEventListener("click", () => open(view));
     if (shown.views.length > 1) element("views").append(button, " ");
+  }
+  if (trusted.length) {
+    const button = made("button", "what to trust"), list = element("trusted");
+    button.id = "trust";
+    button.title = "Green: can be trusted; red: cannot; grey: nothing is known (t)";
+    const turn = () => { state.trust = !state.trust; remember(); refresh(); showTrust(); };
+    button.addEventListener("click", turn);
+    KEYS.t = turn;
+    element("views").append(button);
+    refreshers.push(() => { button.setAttribute("aria-pressed", String(state.trust)); element("doubts").open = state.trust; });
+    element("doubts").hidden = false;
+    for (const [name, { share, reasons, color }] of trusted.sort((a, b) => a[1].share - b[1].share || (a[0] < b[0] ? -1 : 1))) {
+      const row = made("div", undefined, "node"), dot = made("i"), says = made("button", name);
+      dot.style.background = `rgb(${color})`;
+      says.addEventListener("click", () => choose(name, true));
+      for (const event of ["mouseenter", "focus"]) says.addEventListener(event, () => markNode(name));
+      row.append(dot, says, made("small", reasons.join("; ") || "nothing speaks against it"));
+      row.title = `${Math.round(100 * share)} %`;
+      list.append(row);
+    }
   }
   for (const group of [...new Set(things.map(({ path }) => groupOf(path)))]) {
     const row = made("div", undefined, "row"), label = made("label"), box = made("input"), fade = made("input");
@@ -510,6 +566,7 @@
 
   if (!readAddress() && shown.views.length) state.off = [...shown.views[0].hidden];
   refresh();
+  showTrust();
   arrange();
   if (state.chosen) choose(state.chosen, false);
   if (!renderer) say("This browser shows no WebGL: a coarse picture without lines; everything else works.");

@@ -49,6 +49,16 @@ class Parts:
     names: Mapping[int, str]
 
 
+@dataclass(frozen=True)
+class Trust:
+    """How far a thing can be trusted."""
+
+    share: float
+    """0 (not at all) to 1."""
+    reasons: tuple[str, ...] = ()
+    """What speaks against it, in words."""
+
+
 class Canvas(Protocol):
     """Lengths in metres, z up, times in seconds. Paths name what is drawn, their parts separated by /.
 
@@ -125,6 +135,12 @@ class Canvas(Protocol):
     def graph(self, names: list[str], colors: list[Color], edges: list[tuple[str, str]]) -> None:
         """Show a directed graph in a view of its own."""
 
+    def trust(self, rows: Mapping[str, Trust]) -> None:
+        """Say how far things can be trusted, by name: what is drawn at a path that holds the name can be seen so."""
+
+    def moment(self, seconds: float, text: str, *, bad: bool = False) -> None:
+        """Say what begins at a time [s]: an action, or (`bad`) what went wrong and why."""
+
     def document(self, path: str, markdown: str) -> None:
         """Show a text in Markdown."""
 
@@ -151,3 +167,17 @@ def vertex_colors(mesh: trimesh.Trimesh, colors: np.ndarray | None) -> tuple[tri
         visual = visual.to_color()
     own = np.asarray(visual.vertex_colors)
     return mesh, own if own.shape == (len(mesh.vertices), 4) else None
+
+
+def trust_color(share: float) -> Color:
+    """Return red for what cannot be trusted (0), yellow between, green for what can (1)."""
+    share = min(max(share, 0.0), 1.0)
+    return (0.8 if share < 0.5 else 0.8 * 2 * (1 - share), 0.7 if share > 0.5 else 0.7 * 2 * share, 0.15)
+
+
+def trust_table(rows: Mapping[str, Trust]) -> str:
+    """Return what can be trusted how far in Markdown, the least first."""
+    lines = ["| thing | trust | what speaks against it |", "|---|--:|---|"]
+    for name, trust in sorted(rows.items(), key=lambda row: (row[1].share, row[0])):
+        lines.append(f"| {name} | {trust.share:.2f} | {'; '.join(trust.reasons)} |")
+    return "\n".join(lines)

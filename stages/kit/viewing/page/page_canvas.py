@@ -15,14 +15,14 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from cli.viewing.canvas import Color, JointedLink, Parts, bytes_of, vertex_colors
-from cli.viewing.page.library import three_js
-from cli.viewing.page.packing import Block, thinned_mesh
 from schemas.errors import BadInput, MachineFailure
 from schemas.plain_text import cleaned
 from schemas.scene_parts import Box, Camera
 from stages.kit.formats.foxglove import PNG_START
 from stages.kit.geometry.boxes import box_corners
+from stages.kit.viewing.canvas import Color, JointedLink, Parts, Trust, bytes_of, trust_color, vertex_colors
+from stages.kit.viewing.page.library import three_js
+from stages.kit.viewing.page.packing import Block, thinned_mesh
 
 FOLDER = Path(__file__).resolve().parent
 LARGEST_PAGE = 15_000_000
@@ -73,9 +73,10 @@ class PageCanvas:
         self._pictures: list[tuple[str, float | None, bytes]] = []
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
         self._said: dict[str, list[Any]] = {
-            kind: [] for kind in ("lines", "points", "boxes", "transforms", "documents", "views", "joints")
+            kind: [] for kind in ("lines", "points", "boxes", "transforms", "documents", "views", "joints", "moments")
         }
         self._graph: dict[str, Any] | None = None
+        self._trust: dict[str, dict[str, Any]] = {}
         self._left_out: set[str] = set()
 
     def __enter__(self) -> PageCanvas:
@@ -203,6 +204,17 @@ class PageCanvas:
         """See Canvas."""
         self._graph = {"names": names, "colors": [bytes_of(color) for color in colors], "edges": edges}
 
+    def trust(self, rows: Mapping[str, Trust]) -> None:
+        """See Canvas."""
+        for name, trust in rows.items():
+            said = [cleaned(reason) for reason in trust.reasons]
+            color = bytes_of(trust_color(trust.share))
+            self._trust[name] = {"share": round(trust.share, 3), "reasons": said, "color": color}
+
+    def moment(self, seconds: float, text: str, *, bad: bool = False) -> None:
+        """See Canvas."""
+        self._said["moments"].append({"time": float(seconds), "text": cleaned(text), "bad": bad})
+
     def document(self, path: str, markdown: str) -> None:
         """See Canvas."""
         self._said["documents"].append({**self._entry(path), "text": cleaned(markdown)})
@@ -256,6 +268,7 @@ class PageCanvas:
             "meshes": meshes,
             "pictures": self._kept_pictures(),
             "graph": self._graph,
+            "trust": self._trust,
             "left_out": sorted(self._left_out),
             **self._said,
         }
@@ -292,15 +305,30 @@ def _thinned_to(shapes: Iterable[np.ndarray], edge: float) -> int:
     )
 
 
+def script_digests() -> tuple[str, ...]:
+    """Return the digests of the scripts of a page that is not served, as a content security policy names them: a page
+    that it stands in has to allow them."""
+    return tuple(digest_of(script) for script in _scripts())
+
+
+def digest_of(script: str) -> str:
+    """Return `'sha256-...'` of a script."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+
+
+def _scripts() -> list[str]:
+    return [three_js(), (FOLDER / "page.js").read_text(encoding="utf-8")]
+
+
 def page_text(document: dict[str, Any], block: Block, served: ServedPage | None = None) -> bytes:
     """Return the page of a document. Everything in it that came from outside is data: JSON without a `<`, which the
     script shows as text. The policy in its head lets nothing run but the scripts that stand in it, and asks nobody but
     the server that a served page came from."""
-    scripts = [three_js(), (FOLDER / "page.js").read_text(encoding="utf-8")]
+    scripts = _scripts()
     if served is not None:
         scripts.append(served.script)
         document = {**document, "served": dict(served.facts)}
-    hashes = " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in scripts)
+    hashes = " ".join(digest_of(script) for script in scripts)
     policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'"
     policy += "; form-action 'none'" + ("" if served is None else "; connect-src 'self'")
     text = json.dumps(document, sort_keys=True, allow_nan=False, ensure_ascii=True, separators=(",", ":"))

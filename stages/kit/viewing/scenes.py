@@ -1,0 +1,116 @@
+"""Interactive scenes: every link of scene.urdf where it stands, moving parts as far open as they were seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import trimesh
+
+from schemas.cad_scene import CadSceneFile
+from schemas.interactive_scene import InteractiveScene, InteractiveSceneFile
+from stages.kit.drawing.palette import instance_color
+from stages.kit.formats.link_poses import link_poses
+from stages.kit.formats.urdf_file import Urdf, UrdfJoint, parse_urdf
+from stages.kit.viewing.canvas import SHELL, Canvas, JointedLink, Trust
+from stages.kit.viewing.graphs import draw_graph
+from stages.kit.viewing.meshes import merged, shape_mesh
+
+NEAR, FAR = 0.02, 0.1
+"""A model this near to what was seen is that; one this far is not [m]."""
+SHELL_CLASSES = ("wall", "ceiling")
+
+
+def draw_scene_with_graph(scene: InteractiveScene, cad_scene: CadSceneFile | None, canvas: Canvas) -> None:
+    """Draw the links, the boxes and the contact graph, and what is known of models and joints."""
+    draw_scene_folder(scene.root, canvas)
+    draw_graph(scene.graph, canvas, trusted=trust_of_models(cad_scene) if cad_scene is not None else None)
+
+
+def trust_of_models(cad_scene: CadSceneFile) -> dict[str, Trust]:
+    """Return how far what stands for the nodes can be trusted: a model by how near it lies to what was seen and by the
+    grounds for its joints, a scanned mesh only for what was seen of it."""
+    found = {}
+    for replacement in cad_scene.replacements:
+        share, reasons = 1.0, []
+        if replacement.decision == "mesh":
+            share, reasons = 0.5, [f"no model: {replacement.reason}" if replacement.reason else "no model"]
+        elif replacement.decision == "cad" and replacement.chosen is not None:
+            error = replacement.chosen.alignment_error
+            share = max(0.0, 1.0 - error / FAR)
+            if error > NEAR:
+                reasons.append(f"its model lies {1000 * error:.0f} mm from what was seen")
+        if replacement.held:
+            names = ", ".join(sorted(replacement.held))
+            share, reasons = min(share, 0.5), [*reasons, f"nothing in the map speaks for its joints: {names}"]
+        if replacement.decision != "layout":
+            found[replacement.node] = Trust(share, tuple(reasons))
+    return found
+
+
+def draw_scene_folder(root: Path, canvas: Canvas, prefix: str = "scene", *, animated: bool = False) -> tuple[str, ...]:
+    """Draw the links of an interactive scene's folder under `prefix`, and return their names.
+
+    `animated`: the poses hold from time 0 on, until others are drawn (in Rerun what is always there never changes).
+    """
+    description = InteractiveSceneFile.read(root / "scene.json")
+    urdf = parse_urdf(root / description.combined_file)
+    values = {name: value for body in description.bodies for name, value in body.joint_values.items()}
+    poses = link_poses(urdf, values)
+    shell = {body.name for body in description.bodies if body.class_name in SHELL_CLASSES}
+    drawn = []
+    for number, link in enumerate(urdf.links):
+        shapes = link.visuals or link.collisions
+        if not shapes:
+            continue
+        mesh = merged([shape_mesh(shape, root) for shape in shapes])
+        plain = isinstance(mesh.visual, trimesh.visual.ColorVisuals) and not mesh.visual.defined
+        colors = np.tile(np.array(instance_color(number)) * 255, (len(mesh.vertices), 1)).astype(np.uint8)
+        path = _path(link.name, shell, prefix)
+        if animated:
+            canvas.time(0.0)
+        canvas.transform(path, poses[link.name])
+        canvas.always()
+        canvas.mesh(path, mesh, colors if plain else None)
+        drawn.append(link.name)
+    canvas.joints(jointed_links(urdf, values, {name: _path(name, shell, prefix) for name in drawn}))
+    return tuple(drawn)
+
+
+def _path(link: str, shell: set[str], prefix: str) -> str:
+    return f"{SHELL if link in shell else prefix}/{link}"
+
+
+def jointed_links(urdf: Urdf, values: Mapping[str, float], paths: Mapping[str, str]) -> list[JointedLink]:
+    """Return the links of a description, parents first, with where those that are drawn are drawn."""
+    path_of = {link.name: paths.get(link.name, f"undrawn/{link.name}") for link in urdf.links}
+    children: dict[str, list[UrdfJoint]] = {}
+    for joint in urdf.joints:
+        children.setdefault(joint.parent, []).append(joint)
+    found = [JointedLink(path_of[root], "", np.eye(4)) for root in urdf.roots()]
+    waiting = list(urdf.roots())
+    while waiting:
+        parent = waiting.pop(0)
+        for joint in children.get(parent, []):
+            kind: Literal["fixed", "turning", "sliding"] = "fixed"
+            if joint.type in ("revolute", "continuous"):
+                kind = "turning"
+            elif joint.type == "prismatic":
+                kind = "sliding"
+            found.append(
+                JointedLink(
+                    path_of[joint.child],
+                    path_of[parent],
+                    joint.parent_from_child,
+                    kind,
+                    joint.axis,
+                    joint.name,
+                    joint.lower,
+                    joint.upper,
+                    values.get(joint.name, 0.0),
+                )
+            )
+            waiting.append(joint.child)
+    return found

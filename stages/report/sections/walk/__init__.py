@@ -1,0 +1,1 @@
+"""Section `walk`: the room in three dimensions, to walk into."""
