@@ -13,6 +13,7 @@ from cli import edit_command, edit_node_command
 from cli.batch_command import batch
 from cli.collection_command import gc
 from cli.comparison_command import diff
+from cli.follow_command import follow
 from cli.inspect_command import inspect
 from cli.output import out as _out
 from cli.output import say as _say
@@ -284,6 +285,7 @@ GROUPS: tuple[tuple[str, Callable[..., Any], tuple[Callable[..., Any], ...], str
 """Commands that do something by themselves and have commands below them."""
 BESIDE_STEPS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("cutting", record),
+    ("suture", follow),
     *(("edit", command) for command in (*edit_command.COMMANDS, *edit_node_command.COMMANDS)),
 )
 """Commands of a group of steps that are no steps; they are there where the group's steps are."""

@@ -89,6 +89,11 @@ def open_masks(
 
 def _from_files(sequence: Sequence, folder: Path | None, segmenter: Path | None, size: tuple[int, int]) -> MaskMaker:
     assert folder is not None  # the declaration asks for it
+    return masks_in(folder, size)
+
+
+def masks_in(folder: Path, size: tuple[int, int]) -> MaskMaker:
+    """Return what reads a frame's masks from files by its number. Raises BadInput where there is no folder."""
     if not folder.is_dir():
         raise BadInput(
             f"{folder}: no folder of masks", hint="give a folder with 000000_left.png, 000000_right.png, ..."
@@ -148,6 +153,11 @@ def _from_truth(sequence: Sequence, masks: Path | None, segmenter: Path | None, 
 
 
 def _from_network(sequence: Sequence, masks: Path | None, checkpoint: Path | None, size: tuple[int, int]) -> MaskMaker:
+    return network_masks(checkpoint)
+
+
+def network_masks(checkpoint: Path | None) -> MaskMaker:
+    """Return what makes a frame's masks by the segmenter of a checkpoint, or by the one in data/."""
     segmenter = open_segmenter(checkpoint)
 
     def make(pair: Pair) -> EyeMasks:

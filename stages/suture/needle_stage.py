@@ -20,10 +20,11 @@ from stages.suture.motion_reports import motions_to_last
 from stages.suture.needle.drawing import draw_eyes, estimate_text
 from stages.suture.needle.estimators import ESTIMATORS
 from stages.suture.needle.observation import NeedleEstimate
+from stages.suture.needle.radius import as_if_usual, in_metres
 from stages.suture.needle.records import as_estimate_record
 from stages.suture.pairs import Pair, StereoPairs
 from stages.suture.parameters import NeedleParameters
-from stages.suture.rig import NEEDLE_RADIUS, NeedlePose
+from stages.suture.rig import NeedlePose, StereoRig
 
 
 def run(
@@ -59,7 +60,7 @@ def run(
         masks_from=masks_from,
         disparity="" if disparity is None else disparity.matching.detail,
         rig=record,
-        needle_radius=NEEDLE_RADIUS,
+        needle_radius=parameters.needle_radius,
         frames=tuple(frames),
         filtered=None if fused is None else as_estimate_record(fused),
         filter=motion,  # type: ignore[arg-type]
@@ -132,31 +133,33 @@ def _estimates(
     of_view = ESTIMATORS[parameters.estimator].of_view
     guess: NeedlePose | None = None
     matched = 0
+    rig, radius = as_if_usual(pairs.rig, parameters.needle_radius), parameters.needle_radius
     for pair in context.progress.track(pairs, total=len(pairs), description="needles"):
         disparity = None if maps is None else maps.of(pair)
         matched += disparity is not None
         seen = make(pair)
-        observation = seen.observation(pairs.rig, disparity)
+        observation = seen.observation(rig, disparity)
         answer = of_view(observation, context.seed, guess if follows else None)
         guess = answer.pose if not answer.abstained else None
-        answers.append(answer)
+        told = in_metres(answer, radius)
+        answers.append(told)
         pixels = (int(seen.needle[0].sum()), int(seen.needle[1].sum()))
         frames.append(
-            NeedleFrame(frame=pair.index, time=pair.time, estimate=as_estimate_record(answer), mask_pixels=pixels)
+            NeedleFrame(frame=pair.index, time=pair.time, estimate=as_estimate_record(told), mask_pixels=pixels)
         )
         if len(frames) <= parameters.pictures:
-            _draw(context.output / "pictures", pair, seen, pairs, answer, views)
+            _draw(context.output / "pictures", pair, seen, rig, answer, views)
     if maps is not None and frames and not matched:
         raise BadInput("the disparity has none of the sequence's frames", hint="make the disparity of this sequence")
     return frames, answers
 
 
 def _draw(
-    folder: Path, pair: Pair, seen: EyeMasks, pairs: StereoPairs, answer: NeedleEstimate, views: tuple[SutureView, ...]
+    folder: Path, pair: Pair, seen: EyeMasks, rig: StereoRig, answer: NeedleEstimate, views: tuple[SutureView, ...]
 ) -> None:
     folder.mkdir(exist_ok=True)
     truth = NeedlePose(np.array(views[pair.index].camera_from_needle)) if pair.index < len(views) else None
-    picture = draw_eyes((pair.left, pair.right), seen.needle, pairs.rig, answer, truth)
+    picture = draw_eyes((pair.left, pair.right), seen.needle, rig, answer, truth)
     path = folder / f"{pair.index:06d}.png"
     if not cv2.imwrite(str(path), picture[..., ::-1]):
         raise OSError(f"{path} could not be written")

@@ -54,6 +54,9 @@ class NeedleParameters(MaskOptions):
         description="Frames to one estimate: by the motion that a scene's kinematics report, as of a needle at rest, "
         "or not; `auto`: kinematics where they are known",
     )
+    needle_radius: float = Field(
+        0.012, ge=0.002, le=0.05, description="Radius of the needle's half circle [m]; 12 mm is a GS-21's"
+    )
 
 
 class ThreadParameters(MaskOptions):

@@ -16,6 +16,7 @@ from schemas.suture_needle import SutureNeedle, SutureThread, SutureThreadFile, 
 from stages.kit.stage import Context
 from stages.suture.masks import EyeMasks, open_masks
 from stages.suture.needle.drawing import VIOLET, WHITE
+from stages.suture.needle.radius import swage_of
 from stages.suture.needle.records import as_estimate
 from stages.suture.pairs import Pair, StereoPairs
 from stages.suture.parameters import ThreadParameters
@@ -110,7 +111,7 @@ def _starts(needle: SutureNeedle | None) -> dict[int, np.ndarray]:
     for frame in needle.info.frames:
         answer = as_estimate(frame.estimate)
         if answer.pose is not None and not answer.abstained:
-            starts[frame.frame] = answer.pose.swage
+            starts[frame.frame] = swage_of(answer.pose, needle.info.needle_radius)
     return starts
 
 

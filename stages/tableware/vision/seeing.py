@@ -66,6 +66,8 @@ class Sight:
     """The view from above in which was looked."""
     sizes: DishSizes = STANDARD
     """Of what was looked for."""
+    estimated: bool = False
+    """Sizes were estimated: each detection has its own."""
 
     @property
     def statement(self) -> str:
@@ -145,7 +147,9 @@ def see(
         detections = seen_from_the_side(detections)
     notes += _unhandled(heights)
     plane = ((float(normal[0]), float(normal[1]), float(normal[2])), float(offset))
-    return Sight(detections, tuple(notes), intrinsics, world, plane, sides, rectified, heights, dishes)
+    return Sight(
+        detections, tuple(notes), intrinsics, world, plane, sides, rectified, heights, dishes, sizes == "estimated"
+    )
 
 
 def _check(color: np.ndarray, depth: np.ndarray | None, camera: Camera) -> None:

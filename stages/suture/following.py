@@ -1,0 +1,155 @@
+"""A needle followed while pictures arrive: pairs of a folder that grows, or of a pipe that names them, to poses.
+
+In a folder a pair is `<name>_left.png` and `<name>_right.png` (or .jpg), in the order of their names; it is taken when
+neither file has changed from one look to the next. A pipe names two files a line.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+import cv2
+import numpy as np
+from pydantic import ValidationError
+
+from schemas.errors import BadInput
+from schemas.outside import file_content, file_json
+from schemas.suture_scene import StereoRigRecord
+from stages.suture.masks import EyeMasks, MaskMaker
+from stages.suture.needle.estimators import ESTIMATORS
+from stages.suture.needle.radius import as_if_usual, in_metres
+from stages.suture.needle.records import as_estimate_record
+from stages.suture.pairs import SQUARE, Pair
+from stages.suture.rig import NeedlePose, StereoRig
+
+LARGEST_PICTURE = 64 * 2**20
+RIG_HINT = (
+    'a rig is {"camera": {"width", "height", "fx", "fy", "cx", "cy"}, "baseline": metres}; docs/STITCH.md shows one'
+)
+ENDINGS = (".png", ".jpg")
+
+
+@dataclass(frozen=True)
+class PairFiles:
+    """The two pictures of a moment, and how many older ones were passed over for it."""
+
+    name: str
+    left: Path
+    right: Path
+    skipped: int = 0
+
+
+def read_rig(path: Path) -> StereoRig:
+    """Read rig.json: a rectified pair. Raises BadInput in one line."""
+    try:
+        record = StereoRigRecord.model_validate(file_json(path, LARGEST_PICTURE, hint=RIG_HINT), strict=False)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "document"
+        raise BadInput(f"{path}: {where:.100}: {first['msg']:.200}", hint=RIG_HINT) from None
+    camera = record.camera
+    if min(camera.fx, camera.fy) <= 0 or abs(camera.fx / camera.fy - 1.0) > SQUARE:
+        raise BadInput(
+            f"{path}: fx {camera.fx:g} and fy {camera.fy:g} are no square pixels", hint="rectify to square pixels"
+        )
+    return StereoRig(camera.width, camera.height, camera.fx, (camera.cx, camera.cy), record.baseline)
+
+
+def named_pairs(lines: TextIO | Iterable[str]) -> Iterator[PairFiles]:
+    """Yield the pairs that lines name: two paths with white space between. Raises BadInput for another line."""
+    for number, line in enumerate(lines, start=1):
+        words = line.split()
+        if len(words) != 2:
+            raise BadInput(f"line {number} of the pipe names {len(words)} files, not two", hint="left.png right.png")
+        yield PairFiles(Path(words[0]).stem.removesuffix("_left"), Path(words[0]), Path(words[1]))
+
+
+def growing_pairs(folder: Path, *, latest: bool, idle: float, poll: float = 0.02) -> Iterator[PairFiles]:
+    """Yield the pairs of a folder as they become whole, until none came for `idle` seconds (0: what is there, once).
+
+    `latest`: of those that wait, the last alone. Raises BadInput where there is no folder.
+    """
+    if not folder.is_dir():
+        raise BadInput(f"{folder}: no folder of pictures", hint="make it before they arrive")
+    done: set[str] = set()
+    sizes: dict[str, tuple[int, ...]] = {}
+    last = time.monotonic()
+    while True:
+        pairs = {name: pair for name, pair in _pairs_in(folder).items() if name not in done}
+        stamps = {name: _stamp(pair) for name, pair in pairs.items()}
+        whole = sorted(name for name in pairs if stamps[name] and (idle == 0.0 or sizes.get(name) == stamps[name]))
+        sizes = stamps
+        for name in whole[-1:] if latest else whole[:1]:
+            skipped = len(whole) - 1 if latest else 0
+            done.update(whole if latest else (name,))
+            left, right = pairs[name]
+            yield PairFiles(name, left, right, skipped)
+            last = time.monotonic()
+        if not whole:
+            if time.monotonic() - last >= idle:
+                return
+            time.sleep(poll)
+
+
+def _pairs_in(folder: Path) -> dict[str, tuple[Path, Path]]:
+    names = {path.name for path in folder.iterdir()}
+    found = {}
+    for name in names:
+        for ending in ENDINGS:
+            stem = name.removesuffix(f"_left{ending}")
+            if stem != name and f"{stem}_right{ending}" in names:
+                found[stem] = (folder / name, folder / f"{stem}_right{ending}")
+    return found
+
+
+def _stamp(pair: tuple[Path, Path]) -> tuple[int, ...]:
+    """Return size and time of both files; empty where one is gone or empty."""
+    try:
+        states = [path.stat() for path in pair]
+    except OSError:
+        return ()
+    return () if min(s.st_size for s in states) == 0 else tuple(v for s in states for v in (s.st_size, s.st_mtime_ns))
+
+
+class Follower:
+    """Turns pairs into lines. The pose of one frame is where the next is looked for first."""
+
+    def __init__(self, rig: StereoRig, make: MaskMaker, radius: float, seed: int = 0) -> None:
+        self._rig, self._make, self._radius, self._seed = as_if_usual(rig, radius), make, radius, seed
+        self._guess: NeedlePose | None = None
+        self._count = 0
+
+    def line(self, files: PairFiles) -> dict[str, Any]:
+        """Return what is known of the needle in a pair: `camera_from_needle` (4, 4) [m], `covariance` (6, 6),
+        `tip_probability`, `abstained`, and what it took. A picture that cannot be used is an abstention."""
+        began = time.monotonic()
+        said: dict[str, Any] = {"name": files.name, "frame": self._count}
+        try:
+            pair = Pair(self._count, 0.0, 0, self._picture(files.left), self._picture(files.right))
+            said["taken"] = files.left.stat().st_mtime
+            seen: EyeMasks = self._make(pair)
+            of_view = ESTIMATORS["ours"].of_view
+            answer = of_view(seen.observation(self._rig, None), self._seed, self._guess)
+        except BadInput as error:
+            self._guess = None
+            said |= {"camera_from_needle": None, "covariance": None, "tip_probability": 0.5, "abstained": str(error)}
+        else:
+            self._guess = None if answer.abstained else answer.pose
+            said |= as_estimate_record(in_metres(answer, self._radius)).model_dump(mode="json")
+        self._count += 1
+        return said | {"skipped": files.skipped, "seconds": round(time.monotonic() - began, 4)}
+
+    def _picture(self, path: Path) -> np.ndarray:
+        content = file_content(path, LARGEST_PICTURE, hint="give the pictures of both eyes")
+        picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+        size = (self._rig.height, self._rig.width)
+        if picture is None or picture.shape[:2] != size:
+            what = "no picture" if picture is None else f"{picture.shape[1]} x {picture.shape[0]} pixels"
+            raise BadInput(
+                f"{path}: {what}, the rig's are {size[1]} x {size[0]}", hint="rectified pictures of that size"
+            )
+        return np.ascontiguousarray(picture[..., ::-1])

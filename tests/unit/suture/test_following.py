@@ -1,0 +1,116 @@
+"""A needle followed while pictures arrive, and needles of other radii."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from schemas.errors import BadInput
+from stages.suture.following import Follower, growing_pairs, named_pairs, read_rig
+from stages.suture.masks import masks_in
+from stages.suture.needle.estimators import ESTIMATORS
+from stages.suture.needle.radius import as_if_usual, in_metres
+from stages.suture.rig import NEEDLE_RADIUS, TWO_CAMERAS
+from tests.unit.suture.needle_cases import drawn_mask, observed, pose_at
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+RIG = {
+    "camera": {"width": 1280, "height": 960, "fx": 1600.0, "fy": 1600.0, "cx": 639.5, "cy": 479.5},
+    "baseline": TWO_CAMERAS.baseline,
+}
+
+
+@pytest.fixture(scope="module")
+def masks(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("masks")
+    for number in range(2):
+        for eye, side in enumerate(("left", "right")):
+            mask = drawn_mask(TWO_CAMERAS, pose_at(), eye).astype(np.uint8)
+            cv2.imwrite(str(folder / f"{number:06d}_{side}.png"), mask)
+    return folder
+
+
+def arrive(folder: Path, name: str, size: tuple[int, int] = (960, 1280)) -> None:
+    for side in ("left", "right"):
+        cv2.imwrite(str(folder / f"{name}_{side}.png"), np.zeros((*size, 3), np.uint8))
+
+
+def test_a_needle_of_half_the_radius_is_half_as_far_between_eyes_half_as_far_apart() -> None:
+    seen = observed(pose_at())
+    usual = ESTIMATORS["ours"].of_view(replace(seen, disparity=None), 0, None)
+    near = replace(TWO_CAMERAS, baseline=TWO_CAMERAS.baseline / 2)
+    rig = as_if_usual(near, NEEDLE_RADIUS / 2)
+    assert rig.baseline == pytest.approx(TWO_CAMERAS.baseline)
+    small = in_metres(ESTIMATORS["ours"].of_view(replace(seen, rig=rig, disparity=None), 0, None), NEEDLE_RADIUS / 2)
+    assert usual.pose is not None and small.pose is not None and not small.abstained
+    assert small.pose.centre == pytest.approx(usual.pose.centre / 2, abs=1e-6)
+    lengths = np.array([0.25] * 3 + [1.0] * 3)
+    assert np.diag(small.covariance) == pytest.approx(np.diag(usual.covariance) * lengths, rel=0.03)
+    assert as_if_usual(near, NEEDLE_RADIUS) is near and in_metres(usual, NEEDLE_RADIUS) is usual
+
+
+def test_pairs_are_taken_as_they_arrive_and_whole(tmp_path: Path) -> None:
+    def camera() -> None:
+        (tmp_path / "a_left.png").write_bytes(b"half")
+        time.sleep(0.1)
+        arrive(tmp_path, "a")
+        time.sleep(0.1)
+        arrive(tmp_path, "b")
+
+    thread = threading.Thread(target=camera)
+    thread.start()
+    names = [files.name for files in growing_pairs(tmp_path, latest=False, idle=1.5)]
+    thread.join()
+    assert names == ["a", "b"]
+    (last,) = growing_pairs(tmp_path, latest=True, idle=0.0)
+    assert last.name == "b" and last.skipped == 1
+    with pytest.raises(BadInput, match="no folder"):
+        next(growing_pairs(tmp_path / "none", latest=False, idle=0.0))
+
+
+def test_a_pair_becomes_a_line_and_a_broken_picture_an_abstention(masks: Path, tmp_path: Path) -> None:
+    arrive(tmp_path, "one")
+    arrive(tmp_path, "two", (96, 128))
+    follower = Follower(TWO_CAMERAS, masks_in(masks, (960, 1280)), NEEDLE_RADIUS)
+    one, two = (follower.line(files) for files in growing_pairs(tmp_path, latest=False, idle=0.0))
+    assert one["name"] == "one" and not one["abstained"] and np.array(one["covariance"]).shape == (6, 6)
+    assert np.array(one["camera_from_needle"])[:3, 3] == pytest.approx(pose_at().centre, abs=2e-3)
+    assert two["camera_from_needle"] is None and "128 x 96" in two["abstained"] and two["frame"] == 1
+    assert [files.right.name for files in named_pairs(["a_left.png a_right.png\n"])] == ["a_right.png"]
+    with pytest.raises(BadInput, match="line 1 of the pipe"):
+        list(named_pairs(["alone.png"]))
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ({}, "camera"),
+        (RIG | {"baseline": 0}, "baseline"),
+        (RIG | {"camera": RIG["camera"] | {"fy": 9.0}}, "square"),  # type: ignore[operator]
+    ],
+)
+def test_a_rig_that_cannot_be_is_refused(told: dict[str, object], said: str, tmp_path: Path) -> None:
+    (tmp_path / "rig.json").write_text(json.dumps(told))
+    with pytest.raises(BadInput, match=said):
+        read_rig(tmp_path / "rig.json")
+
+
+def test_the_command_writes_lines(masks: Path, tmp_path: Path) -> None:
+    arrive(tmp_path, "000000")
+    (tmp_path / "rig.json").write_text(json.dumps(RIG))
+    command = [sys.executable, "-m", "cli", "suture", "follow", str(tmp_path), "--rig", str(tmp_path / "rig.json")]
+    done = subprocess.run(
+        [*command, "--masks", str(masks), "--idle", "0"], cwd=REPOSITORY, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    (line,) = done.stdout.splitlines()
+    assert json.loads(line)["tip_probability"] >= 0.5
