@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from math import hypot
 from typing import Protocol
@@ -26,7 +27,7 @@ class Skills(Protocol):
         ...
 
 
-class CommonSkills:
+class CommonSkills(ABC):
     """Checks a call and hands it to the arm's own way of doing it."""
 
     def __init__(self, body: Body) -> None:
@@ -131,34 +132,34 @@ class CommonSkills:
         return self._body.drive(base, self.scene.obstacles.way(self._body.base, (base.x, base.y)), toward).ok
 
     # What differs from arm to arm.
+    @abstractmethod
     def explore_local(self, place: str) -> ObjectMap:
         """Look at the furniture in front."""
-        raise NotImplementedError
 
+    @abstractmethod
     def picture_of_hand(self) -> Observation:
         """Say what the hand holds."""
-        raise NotImplementedError
 
+    @abstractmethod
     def picture_of(self, target: SceneObject) -> Observation:
         """Say what is seen of a thing from near by, or on furniture."""
-        raise NotImplementedError
 
+    @abstractmethod
     def navigate(self, target: SceneObject) -> Outcome:
         """Drive before something."""
-        raise NotImplementedError
 
+    @abstractmethod
     def grasp(self, item: Item) -> Outcome:
         """Take a thing."""
-        raise NotImplementedError
 
+    @abstractmethod
     def place(self, target: SceneObject) -> Outcome:
         """Put down what is held."""
-        raise NotImplementedError
 
+    @abstractmethod
     def place_at(self, place: str, label: str, at: list[Position]) -> Outcome:
         """Put down what is held at one of some positions on furniture, over something of a class."""
-        raise NotImplementedError
 
+    @abstractmethod
     def pull(self, key: str, *, opening: bool) -> Outcome:
         """Open or close a door."""
-        raise NotImplementedError

@@ -646,7 +646,8 @@ def whole_body_rows(bases: np.ndarray, arm: np.ndarray) -> np.ndarray:
 def _facing_on(start: np.ndarray, points: list[np.ndarray], turns: list[bool], goal: np.ndarray) -> list[np.ndarray]:
     """Return base poses (3,) through points to a goal pose that turn little from each to the next: along the way at
     points where it `turns`, as before at the others, for the base drives to any side."""
-    made, before = [], start
+    made: list[np.ndarray] = []
+    before = start
     for point, turn in zip([*points, goal], [*turns, True], strict=True):
         turned = point.copy()
         if len(made) < len(points):
