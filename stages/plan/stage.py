@@ -13,6 +13,7 @@ from schemas.contact_graph import ContactGraphFile
 from schemas.errors import UsageError
 from schemas.ground_truth import GroundTruth
 from schemas.interactive_scene import InteractiveScene
+from schemas.language_map import LanguageMap
 from schemas.plan import Failure, Plan, PlanFile, PlannedAction, TriedPlan
 from stages.kit.geometry.transforms import transform_from_yaw
 from stages.kit.motion.failures import MotionFailed
@@ -23,6 +24,7 @@ from stages.kit.tasks.strips import Atom
 from stages.plan.assumptions import believe, parse_priors
 from stages.plan.domain import DOMAIN
 from stages.plan.goals import TABLE_CLASSES, default_goals
+from stages.plan.open_goals import has_words, named_goal
 from stages.plan.parameters import PlanParameters
 from stages.plan.pick_place import Budgets
 from stages.plan.plan_text import plan_text
@@ -52,7 +54,12 @@ class Found:
 
 
 def run(
-    scene: InteractiveScene, ground_truth: GroundTruth | None, *, parameters: PlanParameters, context: Context
+    scene: InteractiveScene,
+    ground_truth: GroundTruth | None,
+    language: LanguageMap | None = None,
+    *,
+    parameters: PlanParameters,
+    context: Context,
 ) -> Plan:
     """Plan in `scene`; execute in the true room of `ground_truth`, or in `scene` itself when there is none."""
     if parameters.goal and parameters.task:
@@ -72,6 +79,9 @@ def run(
         graph = believe(model, scene.graph, beliefs)
         objects, initial = symbolic_state(model, graph, parameters.size_uncertainty)
         with context.progress.step("plan"):
+            if has_words(parameters.goal):
+                goal = named_goal(parameters.goal, objects, graph, language)
+                parameters = parameters.model_copy(update={"goal": goal})
             state, planning = _find(model, graph, objects, initial, budgets, parameters, context)
         problem = task_problem(objects, initial, planning.goal)
         context.output.joinpath("domain.pddl").write_text(domain_text(DOMAIN), encoding="utf-8")

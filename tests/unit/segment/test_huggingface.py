@@ -19,7 +19,7 @@ from stages.kit.formats.frames import Frame
 from stages.kit.labels import LabelSet, parse_words
 from stages.segment.backends.huggingface import panoptic
 from stages.segment.backends.huggingface.backend import HuggingFaceSettings, make_backend
-from stages.segment.backends.huggingface.loading import short_name
+from stages.kit.formats.transformers_folder import short_name
 from stages.segment.backends.huggingface.open_vocabulary import make_prompts, word_scores
 from stages.segment.choice import BackendRequest, choose_backend
 from stages.segment.parameters import SegmentParameters

@@ -11,7 +11,7 @@ import numpy as np
 
 from schemas.errors import BadInput
 from stages.kit.labels import Label
-from stages.segment.backends.huggingface.loading import (
+from stages.kit.formats.transformers_folder import (
     load_model,
     load_processor,
     load_tokenizer,

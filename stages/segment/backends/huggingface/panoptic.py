@@ -12,7 +12,7 @@ import numpy as np
 
 from schemas.errors import BadInput
 from stages.kit.labels import LabelSet, match_labels
-from stages.segment.backends.huggingface.loading import (
+from stages.kit.formats.transformers_folder import (
     load_model,
     load_processor,
     load_tokenizer,

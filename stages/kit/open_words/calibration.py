@@ -1,0 +1,58 @@
+"""Relevancies as probabilities: a logistic function fitted to right and wrong answers in tuning rooms.
+
+data/words/calibration.toml holds one for each source and encoder; benchmarks/experiments/legs_language.py fits it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import BadInput
+from schemas.outside import file_toml
+
+FILE = "words/calibration.toml"
+"""Below data/."""
+BUNDLED = Path(__file__).resolve().parents[3] / "data" / FILE
+CLOSEST = 1e-4
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """probability = logistic(bias + looks x log odds of the looks + field x log odds of the field)."""
+
+    bias: float
+    looks: float
+    field: float
+    fitted: bool
+
+    def probabilities(self, looks: np.ndarray, field: np.ndarray | None) -> np.ndarray:
+        """Return (R,) of relevancies (R,); those of regions that no picture shows are 0."""
+        odds = self.bias + self.looks * log_odds(looks)
+        if field is not None:
+            odds = odds + self.field * log_odds(field)
+        return np.where(looks > 0, 1.0 / (1.0 + np.exp(-odds)), 0.0)
+
+
+UNFITTED = Calibration(0.0, 1.0, 0.0, False)
+"""Of an encoder that nothing was fitted for: the relevancy of the looks."""
+
+
+def log_odds(shares: np.ndarray) -> np.ndarray:
+    """Return log(p / (1 - p)) of shares kept off 0 and 1."""
+    kept = np.clip(shares, CLOSEST, 1 - CLOSEST)
+    return np.log(kept / (1 - kept))
+
+
+def calibration_of(source: str, encoder: str, path: Path = BUNDLED) -> Calibration:
+    """Return what was fitted for a source (`splat`, `panoptic_map`) and the label of an encoder; UNFITTED where nothing
+    was. Raises BadInput for a damaged file."""
+    for entry in file_toml(path).get("fit", ()):
+        try:
+            if (entry["source"], entry["encoder"]) == (source, encoder):
+                return Calibration(float(entry["bias"]), float(entry["looks"]), float(entry["field"]), True)
+        except (KeyError, TypeError, ValueError):
+            raise BadInput(f"{path}: an entry lacks source, encoder, bias, looks or field") from None
+    return UNFITTED
