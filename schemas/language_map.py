@@ -41,10 +41,10 @@ class LanguageMapFile(Model):
 
 
 class LanguageMap(Artifact):
-    """`language.json` and `vectors.npz`: `regions` (R, width) float16, unit vectors of what pictures show of each region;
-    of a splat also `means` (N, 3) float32 [m], `opacities` (N,) float32, `vectors` (N, sizes, width) float16, the field at
-    every Gaussian, and `pieces` (granularities, N) int32, the region of every Gaussian, fine to coarse, -1 none (a map has
-    N = 0)."""
+    """`language.json` and `vectors.npz`: `regions` (R, width) float16, unit vectors of what pictures show of each
+    region; of a splat also `means` (N, 3) float32 [m], `opacities` (N,) float32, `vectors` (N, sizes, width) float16,
+    the field at every Gaussian, and `pieces` (granularities, N) int32, the region of every Gaussian, fine to coarse, -1
+    none (a map has N = 0)."""
 
     kind: ClassVar[str] = "language_map"
     description: ClassVar[str] = "places of a room with vectors that open words find"

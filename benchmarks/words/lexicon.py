@@ -110,7 +110,9 @@ class Lexicon:
         """Whether no picture of the thing may be trained on."""
         if (thing.class_name, thing.style) in self.held_styles:
             return True
-        return any((color, thing.class_name) in self.held_combinations and share >= TRACE for color, share in thing.colors)
+        return any(
+            (color, thing.class_name) in self.held_combinations and share >= TRACE for color, share in thing.colors
+        )
 
     def is_held_phrase(self, phrase: Phrase) -> bool:
         """Whether no training text may be this."""
@@ -124,8 +126,10 @@ class Lexicon:
 
     def phrase(self, row: np.ndarray, random: np.random.Generator) -> Phrase:
         """Return a phrase that is true of a thing: a noun, mostly with a word or two before it, or a colour alone."""
-        true = {kind: [k for k, (each, _) in enumerate(self.attributes) if each == kind and row[k] == TRUE] for kind in
-                ("class", "style", "group", "color", "material", "size")}
+        true = {
+            kind: [k for k, (each, _) in enumerate(self.attributes) if each == kind and row[k] == TRUE]
+            for kind in ("class", "style", "group", "color", "material", "size")
+        }
         nouns = true["class"] * 6 + true["style"] * 3 + true["group"]
         chosen: list[int] = []
         for kind, chance in (("size", 0.15), ("color", 0.55), ("material", 0.15)):

@@ -7,7 +7,6 @@ are rendered alone, half of them in another colour, and set before pieces of roo
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -32,10 +31,25 @@ MAIN_SHARE = 0.3
 """Share, weighted towards the middle, of a crop from which on it shows its main thing."""
 PRESENT_SHARE = 0.03
 RENDERED = 48
-PALETTE = np.array(
-    [(235, 235, 230), (150, 152, 156), (45, 46, 50), (190, 55, 50), (225, 130, 45), (235, 195, 70), (85, 145, 95),
-     (60, 105, 170), (125, 85, 55), (215, 195, 160), (230, 150, 170), (120, 80, 150)]
-) / 255.0
+PALETTE = (
+    np.array(
+        [
+            (235, 235, 230),
+            (150, 152, 156),
+            (45, 46, 50),
+            (190, 55, 50),
+            (225, 130, 45),
+            (235, 195, 70),
+            (85, 145, 95),
+            (60, 105, 170),
+            (125, 85, 55),
+            (215, 195, 160),
+            (230, 150, 170),
+            (120, 80, 150),
+        ]
+    )
+    / 255.0
+)
 
 
 @dataclass(frozen=True)
@@ -145,9 +159,7 @@ def thing_of(entry: TrueObject, library: CadLibrary, models: dict[str, CadModel]
         return Thing(entry.class_name)
     model = models[entry.model_id]
     mesh = posed_mesh(model_folder(library, entry.model_id), model, entry.joints, entry.scale)
-    return Thing(
-        entry.class_name, str(model.recipe.get("style", "")), _shares_of(mesh), float(max(entry.box.size))
-    )
+    return Thing(entry.class_name, str(model.recipe.get("style", "")), _shares_of(mesh), float(max(entry.box.size)))
 
 
 def _shares_of(mesh: trimesh.Trimesh) -> tuple[tuple[str, float], ...]:
@@ -187,7 +199,9 @@ def rendered_models(libraries: list[CadLibrary], views: int, seed: int) -> list[
             for paint in (None, PALETTE[random.integers(len(PALETTE))] + random.uniform(-0.04, 0.04, 3)):
                 if paint is not None:
                     changed = recolored(np.asarray(colors, float)[:, :3] / 255.0, _corner_areas(mesh), paint)
-                    mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=np.round(255 * changed).astype(np.uint8))
+                    mesh.visual = trimesh.visual.ColorVisuals(
+                        mesh, vertex_colors=np.round(255 * changed).astype(np.uint8)
+                    )
                 thing = Thing(
                     model.class_name, str(model.recipe.get("style", "")), _shares_of(mesh), float(max(mesh.extents))
                 )
@@ -215,9 +229,7 @@ def _rendered(mesh: trimesh.Trimesh, thing: Thing, views: int, random: np.random
     return Rendered(thing, np.stack(pictures), np.stack(masks))
 
 
-def composed(
-    rendered: Rendered, frames: list[Seen], row: np.ndarray, random: np.random.Generator
-) -> Crop:
+def composed(rendered: Rendered, frames: list[Seen], row: np.ndarray, random: np.random.Generator) -> Crop:
     """Return a model before a piece of a room."""
     view = int(random.integers(len(rendered.pictures)))
     seen = frames[int(random.integers(len(frames)))]
@@ -237,7 +249,9 @@ def changed(picture: np.ndarray, random: np.random.Generator) -> np.ndarray:
     image = picture.astype(np.float32) / 255.0
     if random.random() < 0.5:
         image = image[:, ::-1]
-    image = np.clip(image, 0, 1) ** random.uniform(0.8, 1.25) * random.uniform(0.75, 1.2) * random.uniform(0.94, 1.06, 3)
+    image = (
+        np.clip(image, 0, 1) ** random.uniform(0.8, 1.25) * random.uniform(0.75, 1.2) * random.uniform(0.94, 1.06, 3)
+    )
     if random.random() < 0.4:
         image = cv2.GaussianBlur(image.astype(np.float32), (0, 0), random.uniform(0.3, 1.1))
     image = image + random.normal(0, random.uniform(0, 0.02), image.shape)

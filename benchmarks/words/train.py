@@ -120,14 +120,19 @@ class Run(TrainingRun):
         super().save()
         network = TwoTowers()
         network.load_state_dict(self.average)
-        description = f"two towers, step {self.step} of {self.plan.steps}, batch {self.plan.batch}, seed {self.plan.seed}"
+        description = (
+            f"two towers, step {self.step} of {self.plan.steps}, batch {self.plan.batch}, seed {self.plan.seed}"
+        )
         save_towers(self.out / FILE, network, vocabulary(lexicon()), description)
 
 
 def vocabulary(words: Lexicon) -> list[str]:
     """Return the words that may stand in a training text."""
-    texts = [text for k, (kind, _) in enumerate(words.attributes) for text in
-             (words.nouns(k) if kind in ("class", "style", "group") else words.adjectives(k))]
+    texts = [
+        text
+        for k, (kind, _) in enumerate(words.attributes)
+        for text in (words.nouns(k) if kind in ("class", "style", "group") else words.adjectives(k))
+    ]
     free = [text for text in texts if not words.is_held_phrase(Phrase(text, ()))]
     return sorted({word for text in (*free, *CANONICAL, "thing", "a", "the") for word in words_of(text)})
 

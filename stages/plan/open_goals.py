@@ -28,8 +28,8 @@ def named_goal(
 ) -> tuple[str, ...]:
     """Return the literals with the likeliest fitting node in place of every quoted text.
 
-    Of the nodes those count that may stand there: only an item can be on something. Raises UsageError without a language
-    map, for a text that is none, and where no node is likely enough; BadInput for a language map of other things.
+    Of the nodes those count that may stand there: only an item can be on something. Raises UsageError without a
+    language map, for a text that is none, and where no node is likely enough; BadInput for a language map of other things.
     """
     if not has_words(literals):
         return literals

@@ -23,8 +23,8 @@ class PlanParameters(Parameters):
     goal: tuple[str, ...] = Field(
         (),
         description="Goal literals such as on(bottle_7,table_3) closed(fridge_2); predicates on, in, open, closed, "
-        'holding; with --language also on("red mug","dining table"). Empty: take an item out of furniture with a door, put '
-        "it on a table, shut the door",
+        'holding; with --language also on("red mug","dining table"). Empty: take an item out of furniture with a '
+        "door, put it on a table, shut the door",
     )
     task: Literal["", "fridge-to-microwave", "tidy-the-desk", "put-away-in-drawer", "stack-and-carry"] = Field(
         "", description="A task by name; its goal is derived from what is in the scene. Not together with --goal"
@@ -89,11 +89,7 @@ STAGE = Stage(
     version=9,
     summary="Plan what a robot does in the scene, execute it in physics, check the goal or say why not",
     parameters=PlanParameters,
-    reads={
-        "scene": InteractiveScene,
-        "ground_truth": Optionally(GroundTruth),
-        "language": Optionally(LanguageMap),
-    },
+    reads={"scene": InteractiveScene, "ground_truth": Optionally(GroundTruth), "language": Optionally(LanguageMap)},
     writes=Plan,
     libraries=("numpy", "scipy", "numba", "ompl", "pybullet", "open3d", "trimesh"),
     data_files=plan_files,

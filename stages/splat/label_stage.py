@@ -16,9 +16,9 @@ from stages.kit.formats.frames import FrameReader
 from stages.kit.geometry.boxes import minimum_box
 from stages.kit.geometry.transforms import inverse
 from stages.kit.open_words.opening import open_encoder
+from stages.kit.open_words.vectors import of_regions, write_vectors
 from stages.kit.stage import Context
 from stages.splat.language.looks import Sight, looks
-from stages.kit.open_words.vectors import of_regions, write_vectors
 from stages.splat.parameters import LabelParameters
 from stages.splat.views import evenly, posed_frames
 

@@ -15,17 +15,17 @@ from schemas.splat import Splat
 from stages.kit.formats.frames import FrameReader
 from stages.kit.geometry.boxes import minimum_box
 from stages.kit.geometry.transforms import inverse
+from stages.kit.open_words.answering import members_of
 from stages.kit.open_words.opening import open_encoder
+from stages.kit.open_words.vectors import Vectors, write_vectors
 from stages.kit.rendering.splatting.rasterizer import View
 from stages.kit.stage import Context
 from stages.splat.build_stage import rasterizer_of
-from stages.kit.open_words.answering import region_index
 from stages.splat.language.field import LanguageField
 from stages.splat.language.learning import learn, lesson_of
 from stages.splat.language.looks import Sight, looks
 from stages.splat.language.pieces import pieces
 from stages.splat.language.pyramid import pyramid
-from stages.kit.open_words.vectors import Vectors, write_vectors
 from stages.splat.parameters import LanguageParameters
 from stages.splat.ply import read_gaussians
 from stages.splat.views import evenly, posed_frames
@@ -54,7 +54,9 @@ def run(
         chosen = evenly(frames, parameters.most_views) if len(gaussians) else []
         for frame in context.progress.track(chosen, total=len(chosen), description="pictures"):
             if frame not in poses:
-                raise BadInput(f"{sequence.root}: frame {frame} is not there: the splat was built from another sequence")
+                raise BadInput(
+                    f"{sequence.root}: frame {frame} is not there: the splat was built from another sequence"
+                )
             found = reader.read(frame, ("color", "depth"))
             if found.color is None:
                 continue
@@ -63,7 +65,9 @@ def run(
             depth = found.depth
             if depth is None:
                 shown = rasterizer.draw(gaussians, View(camera, pose)).picture
-                depth = np.where(shown.alpha > COVERED, shown.depth / np.maximum(shown.alpha, 1e-6), 0).astype(np.float32)
+                depth = np.where(shown.alpha > COVERED, shown.depth / np.maximum(shown.alpha, 1e-6), 0).astype(
+                    np.float32
+                )
             sights.append(Sight(found.color, depth, camera, pose))
     field, losses = _field(gaussians.means, encoder.width, context.seed), deque[float](maxlen=LAST)
     if any(len(lesson.places) for lesson in lessons):
@@ -71,8 +75,8 @@ def run(
         losses.extend(context.progress.track(taught, total=parameters.steps, description="steps"))
     with context.progress.step("pieces"):
         numbered = _numbered(pieces(gaussians))
-        index = region_index(numbered, int(numbered.max(initial=-1)) + 1)
-        members = [gaussians.means[index.members(k)].astype(float) for k in range(len(index.starts) - 1)]
+        order, starts = members_of(numbered, int(numbered.max(initial=-1)) + 1)
+        members = [gaussians.means[part].astype(float) for part in np.split(order, starts[1:-1])] if len(order) else []
         vectors, counts = looks(members, sights, encoder)
     at_sizes = [field.vectors(gaussians.means, size) for size in SIZES]
     opacities = 1.0 / (1.0 + np.exp(-gaussians.logit_opacities))
@@ -92,7 +96,12 @@ def run(
         ),
     )
     info.write(context.output / "language.json")
-    summary = {"gaussians": len(gaussians), "regions": len(members), "pictures": len(lessons), "loss": round(info.loss, 4)}
+    summary = {
+        "gaussians": len(gaussians),
+        "regions": len(members),
+        "pictures": len(lessons),
+        "loss": round(info.loss, 4),
+    }
     return LanguageMap(context.output, outcome="ok" if members else "empty", summary=summary)
 
 
@@ -102,8 +111,7 @@ def _field(means: np.ndarray, width: int, seed: int) -> LanguageField:
 
 
 def _numbered(found: np.ndarray) -> np.ndarray:
-    """Return pieces (granularities, N) with numbers of their own in every row; a coarser piece that is a finer one
-    keeps a number, so that no box is asked twice only by the ranking."""
+    """Return pieces (granularities, N) with numbers of their own in every row."""
     result, first = found.copy(), 0
     for row in result:
         row[row >= 0] += first

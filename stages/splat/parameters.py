@@ -51,20 +51,26 @@ class LanguageParameters(EncoderParameters):
     """Options of `splat language`."""
 
     steps: int = Field(400, ge=0, le=1_000_000, description="Steps of training the field")
-    most_views: int = Field(60, ge=0, le=100_000, description="At most so many pictures are read, evenly spread; 0: all")
+    most_views: int = Field(
+        60, ge=0, le=100_000, description="At most so many pictures are read, evenly spread; 0: all"
+    )
 
 
 class LabelParameters(EncoderParameters):
     """Options of `splat label`."""
 
-    most_views: int = Field(120, ge=0, le=100_000, description="At most so many pictures are read, evenly spread; 0: all")
+    most_views: int = Field(
+        120, ge=0, le=100_000, description="At most so many pictures are read, evenly spread; 0: all"
+    )
 
 
 class QueryParameters(EncoderParameters):
     """Options of `splat query`."""
 
     text: str = Field("", description='What is looked for: "red mug"; with --contact-graph also "cup on the desk"')
-    least_probability: float = Field(0.5, ge=0, le=1, description="Answers are at least so likely; else: the room has none")
+    least_probability: float = Field(
+        0.5, ge=0, le=1, description="Answers are at least so likely; else: the room has none"
+    )
     most: int = Field(10, ge=1, le=20, description="At most so many answers")
 
 
@@ -111,19 +117,15 @@ LANGUAGE = Stage(
     module="language_stage",
     extras=EXTRAS,
     data_files=encoder_files,
-    example="scenewright splat language --splat outputs/demo/splat --sequence outputs/demo/sequence --out outputs/words",
+    example="scenewright splat language --splat outputs/demo/splat --sequence outputs/demo/sequence "
+    "--out outputs/words",
 )
 LABEL = Stage(
     name="splat label",
     version=1,
     summary="Keep what pictures show of every entity of a panoptic map, so that words find it",
     parameters=LabelParameters,
-    reads={
-        "panoptic_map": PanopticMap,
-        "sequence": Sequence,
-        "trajectory": Optionally(Trajectory),
-        "weights": WEIGHTS,
-    },
+    reads={"panoptic_map": PanopticMap, "sequence": Sequence, "trajectory": Optionally(Trajectory), "weights": WEIGHTS},
     writes=LanguageMap,
     libraries=("numpy", "opencv-python-headless", "trimesh", "torch"),
     module="label_stage",

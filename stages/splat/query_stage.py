@@ -11,10 +11,10 @@ from schemas.errors import BadInput
 from schemas.language_map import Answer, Answers, AnswersFile, LanguageMap
 from stages.kit.formats.map_files import write_arrays
 from stages.kit.open_words.encoder import check_width, checked_text
-from stages.kit.open_words.opening import open_encoder
-from stages.kit.stage import Context
 from stages.kit.open_words.finding import Finder, Found
+from stages.kit.open_words.opening import open_encoder
 from stages.kit.open_words.relations import split_relation
+from stages.kit.stage import Context
 from stages.splat.parameters import QueryParameters
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from schemas.language_map import LanguageMapFile
-from stages.kit.open_words.relevancy import relevancy
 from stages.kit.open_words.calibration import Calibration
+from stages.kit.open_words.relevancy import margins, relevancy
 from stages.kit.open_words.vectors import Vectors
 
 MOST_ANSWERS = 20
@@ -42,37 +42,53 @@ class RegionIndex:
     starts: np.ndarray
     """(R + 1,)"""
 
+    owners: np.ndarray
+    """(K,) region of each of `gaussians`."""
+    extents: np.ndarray
+    """(R,) greatest edge of each region's box [m]."""
+
+    def sums(self, values: np.ndarray) -> np.ndarray:
+        """Return (R,) sums of values (N,) of Gaussians over the regions."""
+        return np.bincount(self.owners, values[self.gaussians], minlength=len(self.extents))
+
     def members(self, region: int) -> np.ndarray:
         """Return the Gaussians of a region."""
         return self.gaussians[self.starts[region] : self.starts[region + 1]]
 
 
-def region_index(pieces: np.ndarray, count: int) -> RegionIndex:
-    """Return the index of pieces (granularities, N) with `count` regions."""
+def region_index(pieces: np.ndarray, info: LanguageMapFile) -> RegionIndex:
+    """Return the index of pieces (granularities, N) of a language map."""
+    count = len(info.regions)
+    gaussians, starts = members_of(pieces, count)
+    owners = np.repeat(np.arange(count), np.diff(starts))
+    extents = np.array([max(region.box.size) for region in info.regions], float)
+    return RegionIndex(gaussians, starts, owners, extents)
+
+
+def members_of(pieces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the Gaussians (K,) by region and where each of `count` regions starts (count + 1,)."""
     flat = pieces.reshape(-1)
-    gaussian = np.tile(np.arange(pieces.shape[1] if pieces.ndim == 2 else 0), len(pieces))
+    gaussian = np.tile(np.arange(pieces.shape[1]), len(pieces))
     order = np.argsort(flat, kind="stable")
     order = order[flat[order] >= 0]
-    starts = np.concatenate([[0], np.cumsum(np.bincount(flat[order], minlength=count))])
-    return RegionIndex(gaussian[order], starts)
+    return gaussian[order], np.concatenate([[0], np.cumsum(np.bincount(flat[order], minlength=count))])
 
 
-def fits(vectors: Vectors, info: LanguageMapFile, index: RegionIndex, rows: np.ndarray, calibration: Calibration) -> Fits:
+def fits(
+    vectors: Vectors, info: LanguageMapFile, index: RegionIndex, rows: np.ndarray, calibration: Calibration
+) -> Fits:
     """Return how well the text rows[0] fits, against the canonical phrases rows[1:]."""
     seen = np.array([region.looks > 0 for region in info.regions], bool)
-    of_looks = np.where(seen, relevancy(vectors.regions, rows), 0.0)
+    of_looks = np.where(seen, relevancy(margins(vectors.regions, rows)), 0.0)
     field = sizes = None
     if len(vectors.means):
-        found = relevancy(vectors.vectors, rows)
-        best = found.argmax(axis=1)
-        counts = np.maximum(np.diff(index.starts), 1)
-        which = np.repeat(np.arange(len(seen)), np.diff(index.starts))
-        weights = vectors.opacities[index.gaussians]
-        total = np.maximum(np.bincount(which, weights, minlength=len(seen)), 1e-9)
-        at_best = found[np.arange(len(found)), best]
-        field = np.bincount(which, weights * at_best[index.gaussians], minlength=len(seen)) / total
-        sizes = np.rint(np.bincount(which, best[index.gaussians], minlength=len(seen)) / counts).astype(int)
-    return Fits(of_looks, field, sizes, calibration.probabilities(of_looks, field))
+        apart = margins(vectors.vectors, rows)
+        best = apart.argmax(axis=1)
+        at_best = relevancy(apart[np.arange(len(apart)), best])
+        weights = vectors.opacities
+        field = index.sums(weights * at_best) / np.maximum(index.sums(weights), 1e-9)
+        sizes = np.rint(index.sums(best.astype(float)) / np.maximum(np.diff(index.starts), 1)).astype(int)
+    return Fits(of_looks, field, sizes, calibration.probabilities(of_looks, field, index.extents))
 
 
 def ranked(info: LanguageMapFile, index: RegionIndex, probabilities: np.ndarray, most: int = MOST_ANSWERS) -> list[int]:

@@ -17,27 +17,34 @@ FILE = "words/calibration.toml"
 """Below data/."""
 BUNDLED = Path(__file__).resolve().parents[3] / "data" / FILE
 CLOSEST = 1e-4
+SHORTEST = 0.01
+"""Edge of a region, at least [m]."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """probability = logistic(bias + looks x log odds of the looks + field x log odds of the field)."""
+    """probability = logistic(bias + looks x log odds of the looks + field x log odds of the field + extent x e +
+    extent_squared x e^2), where e is the logarithm of the greatest edge of a region [m]."""
 
     bias: float
     looks: float
     field: float
-    fitted: bool
+    extent: float
+    extent_squared: float
+    fitted: bool = True
 
-    def probabilities(self, looks: np.ndarray, field: np.ndarray | None) -> np.ndarray:
-        """Return (R,) of relevancies (R,); those of regions that no picture shows are 0."""
-        odds = self.bias + self.looks * log_odds(looks)
+    def probabilities(self, looks: np.ndarray, field: np.ndarray | None, extents: np.ndarray) -> np.ndarray:
+        """Return (R,) of relevancies (R,) and edges (R,); those of regions that no picture shows are 0."""
+        e = np.log(np.maximum(extents, SHORTEST))
+        odds = self.bias + self.looks * log_odds(looks) + self.extent * e + self.extent_squared * e**2
         if field is not None:
             odds = odds + self.field * log_odds(field)
         return np.where(looks > 0, 1.0 / (1.0 + np.exp(-odds)), 0.0)
 
 
-UNFITTED = Calibration(0.0, 1.0, 0.0, False)
+UNFITTED = Calibration(0.0, 1.0, 0.0, 0.0, 0.0, fitted=False)
 """Of an encoder that nothing was fitted for: the relevancy of the looks."""
+WEIGHTS = ("bias", "looks", "field", "extent", "extent_squared")
 
 
 def log_odds(shares: np.ndarray) -> np.ndarray:
@@ -52,7 +59,7 @@ def calibration_of(source: str, encoder: str, path: Path = BUNDLED) -> Calibrati
     for entry in file_toml(path).get("fit", ()):
         try:
             if (entry["source"], entry["encoder"]) == (source, encoder):
-                return Calibration(float(entry["bias"]), float(entry["looks"]), float(entry["field"]), True)
+                return Calibration(*(float(entry[name]) for name in WEIGHTS))
         except (KeyError, TypeError, ValueError):
-            raise BadInput(f"{path}: an entry lacks source, encoder, bias, looks or field") from None
+            raise BadInput(f"{path}: an entry lacks source, encoder or {', '.join(WEIGHTS)}") from None
     return UNFITTED

@@ -8,11 +8,11 @@ import numpy as np
 
 from schemas.contact_graph import ContactGraphFile
 from schemas.language_map import LanguageMap
-from stages.kit.open_words.encoder import Encoder
-from stages.kit.open_words.relevancy import query_rows
 from stages.kit.open_words.answering import MOST_ANSWERS, Fits, fits, ranked, region_index
 from stages.kit.open_words.calibration import Calibration, calibration_of
+from stages.kit.open_words.encoder import Encoder
 from stages.kit.open_words.relations import related
+from stages.kit.open_words.relevancy import query_rows
 from stages.kit.open_words.vectors import read_vectors
 
 
@@ -35,7 +35,7 @@ class Finder:
     def __init__(self, language: LanguageMap, encoder: Encoder, calibration: Calibration | None = None) -> None:
         self.info, self.encoder = language.info, encoder
         self.vectors = read_vectors(language)
-        self.index = region_index(self.vectors.pieces, len(self.info.regions))
+        self.index = region_index(self.vectors.pieces, self.info)
         self.calibration = calibration or calibration_of(self.info.source, self.info.encoder)
 
     def fits(self, text: str) -> Fits:

@@ -8,13 +8,15 @@ from pydantic import Field, field_validator
 from pydantic_core import PydanticCustomError
 
 from stages.kit.services.address import check_address
-from stages.kit.stage import NOT_SHOWN, Extra, External, Optionally, Parameters
+from stages.kit.stage import NOT_SHOWN, External, Extra, Optionally, Parameters
 
 ADDRESS_FORM = "http://HOST:PORT"
 WEIGHTS = Optionally(
     External("CLIP or SigLIP folder for --encoder huggingface, or another .safetensors for embedded", weights=True)
 )
-EXTRAS = (Extra("transformers", "transformers", "--encoder huggingface: pip install transformers (without torchvision)"),)
+EXTRAS = (
+    Extra("transformers", "transformers", "--encoder huggingface: pip install transformers (without torchvision)"),
+)
 
 
 class EncoderParameters(Parameters):

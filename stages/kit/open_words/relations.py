@@ -31,8 +31,8 @@ def split_relation(text: str) -> tuple[str, str, str] | None:
 def related(graph: ContactGraphFile, relation: str) -> set[tuple[int, int]]:
     """Return (instance of the thing, instance of the other) of all pairs that stand in a relation.
 
-    `on` and `in` hold through all that carries: a cup on a tray on a table is on the table. `beside` is any proximal pair
-    and whatever stands on the same thing.
+    `on` and `in` hold through all that carries: a cup on a tray on a table is on the table. `beside` is any proximal
+    pair and whatever stands on the same thing.
     """
     instances = {node.id: node.instance for node in graph.nodes}
     parents = {link.target: link for link in graph.links if link.relation in TREE_RELATIONS}
@@ -50,8 +50,11 @@ def related(graph: ContactGraphFile, relation: str) -> set[tuple[int, int]]:
             pairs.update((instances[node], instances[other]) for other in siblings if other != node)
     if relation == "beside":
         near = [link for link in graph.links if link.relation == "proximal"]
-        pairs.update((instances[a], instances[b]) for link in near for a, b in
-                     ((link.source, link.target), (link.target, link.source)))
+        pairs.update(
+            (instances[a], instances[b])
+            for link in near
+            for a, b in ((link.source, link.target), (link.target, link.source))
+        )
     if relation == "under":
         pairs = {(b, a) for a, b in pairs}
     return {(a, b) for a, b in pairs if a and b}

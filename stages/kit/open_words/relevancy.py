@@ -16,9 +16,14 @@ def query_rows(encoder: Encoder, text: str) -> np.ndarray:
     return encoder.texts((text, *CANONICAL))
 
 
-def relevancy(features: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return (...,) in 0..1 of features (..., width): the least share exp(10 f.t) / (exp(10 f.t) + exp(10 f.c)) that the
-    text t = rows[0] has against a canonical phrase c in rows[1:]."""
-    fits = features @ rows.T
-    apart = fits[..., 0] - fits[..., 1:].max(axis=-1)
-    return 1.0 / (1.0 + np.exp(-TEMPERATURE * apart))
+def margins(features: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Return (...,): how much nearer features (..., width) are to the text rows[0] than to the nearest canonical
+    phrase, one of rows[1:]."""
+    flat = features.reshape(-1, features.shape[-1]) @ rows.T
+    return (flat[:, 0] - flat[:, 1:].max(axis=1)).reshape(features.shape[:-1])
+
+
+def relevancy(margin: np.ndarray) -> np.ndarray:
+    """Return (...,) in 0..1 of margins: the least share exp(10 f.t) / (exp(10 f.t) + exp(10 f.c)) that the text t has
+    against a canonical phrase c."""
+    return 1.0 / (1.0 + np.exp(-TEMPERATURE * margin))

@@ -20,7 +20,10 @@ from stages.kit.formats.transformers_folder import (
 )
 from stages.kit.open_words.encoder import unit
 
-FAMILIES = {"clip": ("CLIPModel", "clip", "CLIPImageProcessorPil"), "siglip": ("SiglipModel", "siglip", "SiglipImageProcessorPil")}
+FAMILIES = {
+    "clip": ("CLIPModel", "clip", "CLIPImageProcessorPil"),
+    "siglip": ("SiglipModel", "siglip", "SiglipImageProcessorPil"),
+}
 """Model type -> class of the model, package and class of its image processor."""
 SIDE = 224
 """Crops are handed over so large where the model says nothing else [px]."""

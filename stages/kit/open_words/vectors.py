@@ -65,7 +65,9 @@ def read_vectors(language: LanguageMap) -> Vectors:
     for name, shape in shapes.items():
         array = found[name]
         if array.shape != shape or array.dtype.kind not in "fi" or not np.isfinite(array).all():
-            raise BadInput(f"{path}: {name} has shape {array.shape}, expected {shape} finite numbers", hint="make it again")
+            raise BadInput(
+                f"{path}: {name} has shape {array.shape}, expected {shape} finite numbers", hint="make it again"
+            )
     pieces = found["pieces"]
     if pieces.size and (pieces.min() < -1 or pieces.max() >= regions):
         raise BadInput(f"{path}: a Gaussian belongs to a region that is not there", hint="make it again")

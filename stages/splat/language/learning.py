@@ -1,7 +1,7 @@
 """Teach the language field what the squares of the pictures say, at the surface that each pixel shows.
 
-The thesis rasterises what the grids hold at the Gaussians' centres and runs the network at each pixel; here the field is
-looked up where the splat has its surface at the pixel, which is the same for opaque surfaces and needs no gradients
+The thesis rasterises what the grids hold at the Gaussians' centres and runs the network at each pixel; here the field
+is looked up where the splat has its surface at the pixel, which is the same for opaque surfaces and needs no gradients
 through the picture. Of a pixel's seven squares one is drawn at random; its size in the room is share x height x depth /
 focal length. Huber loss (delta 1.25), Adam 2.5e-3 to 1e-3.
 """

@@ -68,13 +68,13 @@ def looks(regions: Sequence[np.ndarray], sights: Iterable[Sight], encoder: Encod
     vectors = np.zeros((len(regions), encoder.width), np.float32)
     if crops:
         weights = np.sqrt([score for each in kept for score in each.scores])
-        np.add.at(vectors, np.repeat(np.arange(len(regions)), counts), encoder.pictures(np.stack(crops)) * weights[:, None])
+        np.add.at(
+            vectors, np.repeat(np.arange(len(regions)), counts), encoder.pictures(np.stack(crops)) * weights[:, None]
+        )
     return unit(vectors), counts
 
 
-def _look(
-    sight: Sight, points: np.ndarray, owner: np.ndarray, sizes: np.ndarray, kept: list[_Kept], side: int
-) -> None:
+def _look(sight: Sight, points: np.ndarray, owner: np.ndarray, sizes: np.ndarray, kept: list[_Kept], side: int) -> None:
     camera = sight.camera
     local = apply(sight.camera_from_world, points)
     z = np.maximum(local[:, 2], 1e-6)

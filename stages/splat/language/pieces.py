@@ -28,7 +28,7 @@ FIRST_HARMONIC = 0.28209479177387814
 
 
 def pieces(gaussians: Gaussians) -> np.ndarray:
-    """Return (granularities, N) int32: number of the piece of every Gaussian, from 0; -1 for one that is hardly there."""
+    """Return (granularities, N) int32: number of the piece of every Gaussian, from 0; -1: it is hardly there."""
     result = np.full((len(GRANULARITIES), len(gaussians)), -1, np.int32)
     opacities = 1.0 / (1.0 + np.exp(-gaussians.logit_opacities))
     solid = np.flatnonzero(opacities > SEEN)

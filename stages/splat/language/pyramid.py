@@ -29,7 +29,9 @@ class Level:
 
     def at(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Return (N, width): vectors between the four nearest middles, bilinear, at pixels (N,)."""
-        (r, wr), (c, wc) = (_between(middles, each) for middles, each in zip(self.centers, (rows, columns), strict=True))
+        (r, wr), (c, wc) = (
+            _between(middles, each) for middles, each in zip(self.centers, (rows, columns), strict=True)
+        )
         result = np.zeros((len(rows), self.vectors.shape[2]), np.float32)
         for dr in (0, 1):
             for dc in (0, 1):

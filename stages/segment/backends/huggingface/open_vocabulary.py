@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.kit.labels import Label
 from stages.kit.formats.transformers_folder import (
     load_model,
     load_processor,
@@ -18,6 +17,7 @@ from stages.kit.formats.transformers_folder import (
     processor_class,
     short_name,
 )
+from stages.kit.labels import Label
 from stages.segment.naming import InstanceMask
 from stages.segment.suppression import suppress
 

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from schemas.errors import BadInput
-from stages.kit.labels import LabelSet, match_labels
 from stages.kit.formats.transformers_folder import (
     load_model,
     load_processor,
@@ -20,6 +19,7 @@ from stages.kit.formats.transformers_folder import (
     short_name,
     transformers_library,
 )
+from stages.kit.labels import LabelSet, match_labels
 from stages.segment.naming import NamedSegment
 
 OVERLAP_SHARE = 0.8
