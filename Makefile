@@ -134,7 +134,7 @@ words-calibrate: setup ## Fit the probabilities of answers on tuning rooms (QUIC
 
 legs: setup ## Rooms as Gaussians, learned while pictures arrive, beside the thesis's method (QUICK=1: seconds, one room)
 	OMP_NUM_THREADS=1 $(EXPERIMENT) legs --data $(REAL_DATA) --out $(OUTPUTS)/experiments/legs$(if $(QUICK),-quick) $(ASKED)
-	OMP_NUM_THREADS=1 $(EXPERIMENT) legs_words --out $(OUTPUTS)/experiments/legs-words$(if $(QUICK),-quick) $(ASKED)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) legs_words --out $(OUTPUTS)/experiments/legs-words$(if $(QUICK),-quick) $(if $(QUICK),--quick) $(if $(FRESH),--fresh)
 
 .PHONY: bench-surface
 bench-surface: setup ## Seen surface that is in the map, at any angle, beside Open3D (QUICK=1: one board and room a case)

@@ -8,6 +8,7 @@ from the encoder's training here: what it makes of such words is in its own figu
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,12 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.generated_rooms import RoomFolder, make_room
-from benchmarks.steps import made, opened
+from benchmarks.perfect_maps import perfect_map
+from benchmarks.steps import made, opened, unrecorded
 from benchmarks.words.lexicon import FALSE, TRUE, Phrase, Thing, lexicon, truth_of
 from benchmarks.words.samples import thing_of
 from schemas.cad_library import CadLibrary
 from schemas.ground_truth import GroundTruth, TrueObject
 from schemas.language_map import LanguageMap
+from schemas.sequence import Sequence
 from schemas.splat import Splat
 from stages.kit.formats.frames import FrameReader
 from stages.kit.geometry.boxes import points_in_box
@@ -32,7 +35,8 @@ LEAST_PIXELS = 300
 MARGIN = 0.02
 """A place is at a thing when it lies within its box grown by this on every side [m]."""
 SPLAT = ("--width", 160, "--steps", 100, "--steps-per-second", 1, "--hold-out-every", 6)
-CORRUPTION = 0.2
+VIEWS = 12
+"""Pictures that are read for language."""
 
 
 @dataclass(frozen=True)
@@ -69,18 +73,18 @@ class AskedRoom:
     def language(self) -> LanguageMap:
         """Language in the splat."""
         given = ("--splat", self.splat.root, "--sequence", self.room.sequence, "--steps", self.steps)
+        given = (*given, "--most-views", VIEWS)
         return opened(LanguageMap, made("splat language", self.room.folder / "language", *given))
 
     @cached_property
     def entities(self) -> LanguageMap:
-        """Labels of the panoptic map of the same pictures, whose masks are true ones with errors put in."""
-        folder, sequence = self.room.folder, self.room.sequence
-        given = ("--backend", "ground-truth", "--corruption", CORRUPTION)
-        segments = made("segment", folder / "segments", "--sequence", sequence, *given)
-        given = ("--sequence", sequence, "--segments", segments, "--voxel-size", 0.025)
-        panoptic = made("fuse", folder / "map", *given)
-        given = ("--panoptic-map", panoptic, "--sequence", sequence)
-        return opened(LanguageMap, made("splat label", folder / "labels", *given))
+        """Labels of a perfect map: the true surface that was seen, with true entities."""
+        target = self.room.folder / "labels"
+        if target.exists():
+            shutil.rmtree(target)
+        panoptic = perfect_map(self.truth, self.room.folder / "perfect")
+        sequence = opened(Sequence, self.room.sequence)
+        return unrecorded("splat label", target, {"most_views": VIEWS}, panoptic_map=panoptic, sequence=sequence)
 
     @cached_property
     def objects(self) -> dict[int, TrueObject]:

@@ -20,11 +20,11 @@ from stages.kit.open_words.calibration import BUNDLED, SHORTEST, Calibration, lo
 from stages.kit.open_words.embedded import EmbeddedEncoder
 from stages.kit.open_words.finding import Finder
 
-ROOMS = ("kitchen-40", "office-40", "room-40")
+ROOMS = ("kitchen-40", "office-40")
 FIRST = 3
 RIDGE = 1e-3
-HEADER = """# Relevancies as probabilities (stages/kit/open_words/calibration.py): fitted on tuning rooms, for one encoder,
-# by python -m benchmarks.words.calibrate.
+HEADER = """# Relevancies as probabilities (stages/kit/open_words/calibration.py), fitted on tuning rooms, for one
+# encoder, by python -m benchmarks.words.calibrate.
 """
 
 

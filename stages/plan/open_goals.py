@@ -29,7 +29,7 @@ def named_goal(
     """Return the literals with the likeliest fitting node in place of every quoted text.
 
     Of the nodes those count that may stand there: only an item can be on something. Raises UsageError without a
-    language map, for a text that is none, and where no node is likely enough; BadInput for a language map of other things.
+    language map, for a text that is none, and where no node is likely enough; BadInput for a map of other things.
     """
     if not has_words(literals):
         return literals

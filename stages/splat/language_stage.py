@@ -34,7 +34,9 @@ SIZES = tuple(round(float(size), 4) for size in np.geomspace(0.08, 1.5, 8))
 """At which every Gaussian is asked for, up to the thesis's largest [m]."""
 LAST = 50
 MIDDLE = (2.0, 98.0)
-"""A region's box holds its Gaussians between these percentiles: splats have strays."""
+"""A region's box holds its Gaussians between these percentiles: splats have strays ..."""
+FEW = 50
+"""... but of so few Gaussians all count."""
 COVERED = 0.5
 
 
@@ -120,7 +122,9 @@ def _numbered(found: np.ndarray) -> np.ndarray:
 
 
 def _middle(points: np.ndarray) -> np.ndarray:
-    """Return the points without those outside the percentiles MIDDLE of any axis."""
+    """Return the points without those outside the percentiles MIDDLE of any axis; all of a few."""
+    if len(points) <= FEW:
+        return points
     low, high = np.percentile(points, MIDDLE[0], axis=0), np.percentile(points, MIDDLE[1], axis=0)
     kept = ((points >= low) & (points <= high)).all(axis=1)
     return points[kept] if kept.any() else points

@@ -59,7 +59,7 @@ def calibration_of(source: str, encoder: str, path: Path = BUNDLED) -> Calibrati
     for entry in file_toml(path).get("fit", ()):
         try:
             if (entry["source"], entry["encoder"]) == (source, encoder):
-                return Calibration(*(float(entry[name]) for name in WEIGHTS))
+                return Calibration(**{name: float(entry[name]) for name in WEIGHTS})
         except (KeyError, TypeError, ValueError):
             raise BadInput(f"{path}: an entry lacks source, encoder or {', '.join(WEIGHTS)}") from None
     return UNFITTED
