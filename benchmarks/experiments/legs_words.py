@@ -29,7 +29,7 @@ from stages.splat.ply import read_gaussians
 
 ROOMS = ("kitchen", "office", "bedroom", "room")
 REPORTING = tuple(f"{ROOMS[k % 4]}-{1500 + k}" for k in range(20))
-TUNING = ("kitchen-40", "office-40")
+TUNING = ("kitchen-40",)
 LEAST = 0.5
 """Probability from which on something is an answer: one for all rooms."""
 BOX_OVERLAP = 0.25

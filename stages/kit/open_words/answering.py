@@ -46,6 +46,9 @@ class RegionIndex:
     """(K,) region of each of `gaussians`."""
     extents: np.ndarray
     """(R,) greatest edge of each region's box [m]."""
+    lows: np.ndarray
+    highs: np.ndarray
+    """(R, 3) least and greatest corners of the boxes as if they stood along the axes [m]."""
 
     def sums(self, values: np.ndarray) -> np.ndarray:
         """Return (R,) sums of values (N,) of Gaussians over the regions."""
@@ -61,8 +64,10 @@ def region_index(pieces: np.ndarray, info: LanguageMapFile) -> RegionIndex:
     count = len(info.regions)
     gaussians, starts = members_of(pieces, count)
     owners = np.repeat(np.arange(count), np.diff(starts))
-    extents = np.array([max(region.box.size) for region in info.regions], float)
-    return RegionIndex(gaussians, starts, owners, extents)
+    centers = np.array([region.box.center for region in info.regions], float).reshape(-1, 3)
+    sizes = np.array([region.box.size for region in info.regions], float).reshape(-1, 3)
+    extents = sizes.max(axis=1, initial=0.0)
+    return RegionIndex(gaussians, starts, owners, extents, centers - sizes / 2, centers + sizes / 2)
 
 
 def members_of(pieces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -97,21 +102,25 @@ def ranked(info: LanguageMapFile, index: RegionIndex, probabilities: np.ndarray,
     for region in np.argsort(-probabilities, kind="stable"):
         if len(kept) == most:
             break
-        if all(not _one_place(info, index, int(region), other) for other in kept):
+        if not _known_place(info, index, int(region), kept):
             kept.append(int(region))
     return kept
 
 
-def _one_place(info: LanguageMapFile, index: RegionIndex, a: int, b: int) -> bool:
-    if info.regions[a].instance or info.regions[b].instance:
-        return False  # entities of a map are things of their own
-    first, second = index.members(a), index.members(b)
-    if len(first) and len(second):
-        shared = len(np.intersect1d(first, second, assume_unique=True))
-        if shared > SHARED * min(len(first), len(second)):
+def _known_place(info: LanguageMapFile, index: RegionIndex, region: int, kept: list[int]) -> bool:
+    """Whether a region shares its box or its Gaussians with one of those kept; entities of a map are things of their
+    own."""
+    if not kept or info.regions[region].instance:
+        return False
+    edges = np.minimum(index.highs[region], index.highs[kept]) - np.maximum(index.lows[region], index.lows[kept])
+    shared = np.prod(np.maximum(edges, 0), axis=1)
+    volumes = np.prod(np.maximum(index.highs - index.lows, 1e-3)[[region, *kept]], axis=1)
+    if (shared > SHARED * np.minimum(volumes[0], volumes[1:])).any():
+        return True
+    own = index.members(region)
+    for other in (kept[k] for k in np.flatnonzero((edges > 0).all(axis=1))):
+        theirs = index.members(other)
+        common = len(np.intersect1d(own, theirs, assume_unique=True))
+        if common > SHARED * min(len(own), len(theirs)):
             return True
-    boxes = [info.regions[k].box for k in (a, b)]
-    low = np.max([np.array(box.center) - np.array(box.size) / 2 for box in boxes], axis=0)
-    high = np.min([np.array(box.center) + np.array(box.size) / 2 for box in boxes], axis=0)
-    volume = float(np.prod(np.maximum(high - low, 0)))
-    return volume > SHARED * min(float(np.prod(np.maximum(box.size, 1e-3))) for box in boxes)
+    return False

@@ -26,12 +26,13 @@ CHUNK = 32768
 class HashGrid(nn.Module):
     """Places (N, 3) in 0..1 -> (N, 2 x 12 x 4)."""
 
-    def __init__(self) -> None:
+    def __init__(self, entries: int) -> None:
         super().__init__()
+        self.entries = entries
         sizes = [low * (high / low) ** (k / (LEVELS - 1)) for low, high in GRIDS for k in range(LEVELS)]
         self.register_buffer("resolutions", torch.tensor(np.floor(sizes), dtype=torch.float32), persistent=False)
         self.register_buffer("corners", torch.tensor(CORNERS, dtype=torch.int64), persistent=False)
-        self.table = nn.Parameter(1e-4 * (2 * torch.rand(len(sizes) * ENTRIES, NUMBERS) - 1))
+        self.table = nn.Parameter(1e-4 * (2 * torch.rand(len(sizes) * entries, NUMBERS) - 1))
 
     def forward(self, places: torch.Tensor) -> torch.Tensor:
         """Return what the corners around each place hold, trilinear, level by level."""
@@ -41,7 +42,7 @@ class HashGrid(nn.Module):
         part = scaled - low
         corner = low.long()[:, :, None, :] + self.corners  # (N, L, 8, 3)
         hashed = corner[..., 0] * PRIMES[0] ^ corner[..., 1] * PRIMES[1] ^ corner[..., 2] * PRIMES[2]
-        row = (hashed & (ENTRIES - 1)) + torch.arange(levels)[None, :, None] * ENTRIES
+        row = (hashed & (self.entries - 1)) + torch.arange(levels)[None, :, None] * self.entries
         weight = torch.where(self.corners.bool(), part[:, :, None, :], 1 - part[:, :, None, :]).prod(-1)
         found = nn.functional.embedding_bag(
             row.reshape(-1, 8), self.table, per_sample_weights=weight.reshape(-1, 8), mode="sum"
@@ -50,14 +51,14 @@ class HashGrid(nn.Module):
 
 
 class LanguageField(nn.Module):
-    """Places [m, world] and sizes [m] -> unit vectors of an encoder's width."""
+    """Places [m, world] and sizes [m] -> unit vectors of an encoder's width; `entries`, a power of 2, a level."""
 
-    def __init__(self, centers: np.ndarray, width: int) -> None:
+    def __init__(self, centers: np.ndarray, width: int, entries: int = ENTRIES) -> None:
         super().__init__()
         low, high = np.percentile(centers, INNER[0], axis=0), np.percentile(centers, INNER[1], axis=0)
         self.middle = torch.tensor((low + high) / 2, dtype=torch.float32)
         self.reach = torch.tensor(np.maximum((high - low) / 2, 0.1), dtype=torch.float32)
-        self.grid = HashGrid()
+        self.grid = HashGrid(entries)
         inputs = [2 * LEVELS * NUMBERS + 1, *[HIDDEN] * LAYERS]
         layers: list[nn.Module] = []
         for before, after in zip(inputs[:-1], inputs[1:], strict=True):

@@ -100,7 +100,7 @@ def test_the_pyramid_covers_the_picture_and_reads_between_its_squares(shown: tup
 def test_the_field_learns_what_is_where(shown: tuple[Gaussians, list[Sight]]) -> None:
     made, sights = shown
     torch.manual_seed(0)
-    field, encoder = LanguageField(made.means, 3), ColorEncoder()
+    field, encoder = LanguageField(made.means, 3, 2**12), ColorEncoder()
     lessons = [
         lesson_of(pyramid(s.color, encoder), made, CompiledRasterizer(), CAMERA, s.camera_from_world) for s in sights
     ]
@@ -141,13 +141,19 @@ def language_of(room: tuple[Sequence, Splat], out: Path) -> LanguageMap:
     return language_stage.run(room[1], room[0], None, parameters=parameters, context=context(out))
 
 
+@pytest.fixture(scope="module")
+def language(room: tuple[Sequence, Splat], tmp_path_factory: pytest.TempPathFactory) -> LanguageMap:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(language_stage, "open_encoder", lambda *_: ColorEncoder())
+        return language_of(room, tmp_path_factory.mktemp("made") / "language")
+
+
 def ask(language: LanguageMap, text: str, out: Path, graph: ContactGraph | None = None, **options: float):  # type: ignore[no-untyped-def]
     parameters = QueryParameters.model_validate({"text": text, **options})
     return query_stage.run(language, graph, None, parameters=parameters, context=context(out))
 
 
-def test_a_splat_answers(room: tuple[Sequence, Splat], colors: None, tmp_path: Path) -> None:
-    language = language_of(room, tmp_path / "language")
+def test_a_splat_answers(room: tuple[Sequence, Splat], language: LanguageMap, colors: None, tmp_path: Path) -> None:
     info, vectors = language.info, read_vectors(language)
     assert language.outcome == "ok" and info.gaussians == room[1].built.gaussians == len(vectors.means)
     assert info.steps == 5 and info.source == "splat" and len(info.regions) == len(vectors.regions) > 3
@@ -176,8 +182,7 @@ def test_a_room_of_balls_has_its_balls_and_no_fourth(shown: tuple[Gaussians, lis
         assert best == found[0, 500 * number]
 
 
-def test_bad_input_is_said_in_one_line(room: tuple[Sequence, Splat], colors: None, tmp_path: Path) -> None:
-    language = language_of(room, tmp_path / "language")
+def test_bad_input_is_said_in_one_line(language: LanguageMap, colors: None, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="10000 characters"):
         ask(language, "x" * 10_000, tmp_path / "long")
     node = GraphNode(id="cup_7", instance=7, class_name="cup", node_type="rigid")
@@ -185,17 +190,16 @@ def test_bad_input_is_said_in_one_line(room: tuple[Sequence, Splat], colors: Non
     ContactGraphFile(nodes=(node,), links=()).write(tmp_path / "graph" / "graph.json")
     with pytest.raises(BadInput, match="no nodes of the contact graph"):
         ask(language, "red on blue", tmp_path / "related", ContactGraph(tmp_path / "graph"))
-    data = language.path("vectors.npz").read_bytes()
-    language.path("vectors.npz").write_bytes(data[:-100])
+    (tmp_path / "torn").mkdir()
+    (tmp_path / "torn" / "language.json").write_bytes(language.path("language.json").read_bytes())
+    (tmp_path / "torn" / "vectors.npz").write_bytes(language.path("vectors.npz").read_bytes()[:-100])
     with pytest.raises(BadInput, match="vectors.npz"):
-        ask(language, "red", tmp_path / "torn")
+        ask(LanguageMap(tmp_path / "torn"), "red", tmp_path / "asked")
 
 
 def test_an_encoder_of_another_width_and_a_folder_without_language(
-    room: tuple[Sequence, Splat], colors: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    room: tuple[Sequence, Splat], language: LanguageMap, tmp_path: Path
 ) -> None:
-    language = language_of(room, tmp_path / "language")
-    monkeypatch.undo()
     with pytest.raises(BadInput, match="3 wide.*64 wide"):
         ask(language, "red mug", tmp_path / "wide")
     with pytest.raises(BadInput, match="language.json"):
