@@ -1,8 +1,8 @@
 """Generated rooms that are asked: the artifacts of each arm, and queries with their right answers by a stated rule.
 
 A room is asked for 15 things that are there and 15 that are not. There: things are drawn from those that at least 300
-pixels of the log show and no phrase before them is true of, and called by a noun or, every second time, by colour and
-noun. Not there: a phrase of any class of the lexicon that is false of everything in the room. No phrase is held out
+pixels of the log show, and called by a noun or, every second time, by colour and noun, until 15 texts differ. Not
+there: a phrase of any class of the lexicon that is false of everything in the room. No phrase is held out
 from the encoder's training here: what it makes of such words is in its own figures.
 """
 
