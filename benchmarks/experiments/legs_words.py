@@ -19,8 +19,9 @@ from benchmarks.generated_rooms import STEPS
 from benchmarks.words.asked import AskedRoom, Query
 from stages.kit.geometry.boxes import box_iou
 from stages.kit.geometry.cameras import scaled
-from stages.kit.open_words.embedded import EmbeddedEncoder
 from stages.kit.open_words.finding import Finder
+from stages.kit.open_words.opening import open_encoder
+from stages.kit.open_words.options import EncoderParameters
 from stages.kit.open_words.relevancy import margins, query_rows, relevancy
 from stages.kit.rendering.splatting.compiled import CompiledRasterizer
 from stages.kit.rendering.splatting.rasterizer import View
@@ -91,7 +92,7 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Aske
 
 def asked(room: AskedRoom, arm: str) -> Asked:
     """Return what an arm makes of a room's queries."""
-    encoder = EmbeddedEncoder()
+    encoder = open_encoder(EncoderParameters(), None)
     finder = Finder(room.entities if arm == "entities" else room.language, encoder)
     thesis = ThesisWay(room, finder) if arm == "thesis" else None
     present, absent = room.queries
